@@ -1,0 +1,1 @@
+# Assets of the pages are embedded here (apps/report).

@@ -1,0 +1,60 @@
+#pragma once
+/// Working pressure of one cylinder in one direction as a Gaussian process of (flow, static force):
+///   p(Q, F) = m0 + m1 F + sum_j w_j s^2 exp(-1/2 [((Q-Q_j)/l_Q)^2 + ((F-F_j)/l_F)^2])
+/// Source: Rasmussen & Williams (2006), ch. 2.2, 2.7; sparse form: Titsias (2009), eqs. 6 and 9.
+/// The mean is linear in F because a zero-mean SE process falls back to a *low* pressure outside its
+/// data, which an optimiser would exploit.
+#include <Eigen/Dense>
+
+namespace sparflow {
+
+/// Value, gradient and Hessian of a pressure (or its variance) with respect to (flow, force), SI.
+struct GpDerivatives {
+  double value = 0.0;  ///< [Pa]
+  double d_flow = 0.0, d_force = 0.0;
+  double d_flow_flow = 0.0, d_flow_force = 0.0, d_force_force = 0.0;
+};
+
+/// Everything the process is, as stored in the model file. SI units.
+struct GpParameters {
+  double length_flow = 1.0;   ///< [m^3/s]
+  double length_force = 1.0;  ///< [N]
+  double signal_std = 1.0;    ///< [Pa]
+  double noise_std = 1.0;     ///< [Pa], one measurement
+  double mean_constant = 0.0; ///< [Pa]
+  double mean_slope = 0.0;    ///< [Pa/N]
+  Eigen::ArrayXd flow;        ///< [m^3/s] centres (all data, or inducing points)
+  Eigen::ArrayXd force;       ///< [N] centres
+  Eigen::ArrayXd weight;      ///< [1/Pa] so that signal_std^2 * weight is a pressure
+  /// Latent variance is signal_std^2 - k^T C k with k the kernel vector at the centres (plus the mean's
+  /// own uncertainty): C is stored as a symmetric matrix. [1/Pa^2]
+  Eigen::MatrixXd variance_core;
+  /// Where the data lies; outside it the mean extrapolates and the variance says so. [lo, hi]
+  double flow_min = 0.0, flow_max = 0.0, force_min = 0.0, force_max = 0.0;
+  int data_count = 0;  ///< measurements the process has seen
+};
+
+/// Immutable and safe to share between threads; evaluation allocates nothing.
+class GaussianProcess {
+ public:
+  GaussianProcess() = default;
+  explicit GaussianProcess(GpParameters parameters);
+
+  /// @param flow [m^3/s], always positive  @param force static force [N]  @return pressure [Pa]
+  double mean(double flow, double force) const;
+  /// Mean with exact first and second derivatives in one pass over the centres.
+  GpDerivatives mean_derivatives(double flow, double force) const;
+  /// Latent predictive variance [Pa^2] (measurement noise not included).
+  double variance(double flow, double force) const;
+  /// The same with exact first and second derivatives.
+  GpDerivatives variance_derivatives(double flow, double force) const;
+
+  const GpParameters& parameters() const { return parameters_; }
+  bool empty() const { return parameters_.weight.size() == 0; }
+
+ private:
+  GpParameters parameters_;
+  Eigen::ArrayXd scaled_flow_, scaled_force_, scaled_weight_;  // padded to whole vector registers
+};
+
+}  // namespace sparflow
