@@ -8,15 +8,14 @@ namespace {
 
 template <class List>
 int index_by_name(const List& list, const std::string& name) {
-  const auto it = std::find_if(list.begin(), list.end(), [&](const auto& e) { return e.name == name; });
+  const auto it =
+      std::find_if(list.begin(), list.end(), [&](const auto& e) { return e.name == name; });
   return it == list.end() ? -1 : static_cast<int>(it - list.begin());
 }
 
 }  // namespace
 
-double Cylinder::area_piston() const {
-  return parallel * std::numbers::pi / 4.0 * bore * bore;
-}
+double Cylinder::area_piston() const { return parallel * std::numbers::pi / 4.0 * bore * bore; }
 
 double Cylinder::area_rod() const {
   return parallel * std::numbers::pi / 4.0 * (bore * bore - rod * rod);
