@@ -178,13 +178,13 @@ struct NumTraits<sparflow::Dual2<N>> : NumTraits<double> {
   using Real = sparflow::Dual2<N>;
   using NonInteger = sparflow::Dual2<N>;
   using Nested = sparflow::Dual2<N>;
-  enum { RequireInitialization = 1, AddCost = N * N, MulCost = 4 * N * N };
+  enum { RequireInitialization = 1, ReadCost = N * N, AddCost = N * N, MulCost = 4 * N * N };
 };
 template <>
 struct NumTraits<sparflow::Taylor3> : NumTraits<double> {
   using Real = sparflow::Taylor3;
   using NonInteger = sparflow::Taylor3;
   using Nested = sparflow::Taylor3;
-  enum { RequireInitialization = 1, AddCost = 4, MulCost = 12 };
+  enum { RequireInitialization = 1, ReadCost = 4, AddCost = 4, MulCost = 12 };
 };
 }  // namespace Eigen
