@@ -1,0 +1,112 @@
+#pragma once
+/// The one model object: a machine and what was learned about it. Identification, optimiser and pages all
+/// evaluate this, so whatever is learned once is seen by all of them. Immutable once built.
+#include <string>
+#include <vector>
+
+#include "models/gaussian_process.h"
+#include "models/machine.h"
+#include "models/static_force.h"
+
+namespace sparflow {
+
+/// What was learned about one cylinder.
+struct CylinderModel {
+  GaussianProcess extend;   ///< working pressure on the piston side, p(Q, F); empty = not learned
+  GaussianProcess retract;  ///< working pressure on the rod side
+  double margin = 0.0;      ///< [Pa] c_i >= 0 of paper eq. 15
+  double valve_gain_extend = 0.0;   ///< [m^3/s] flow at full command; 0 = not learned
+  double valve_gain_retract = 0.0;  ///< [m^3/s]
+};
+
+/// What was learned about one pump.
+struct PumpModel {
+  double standby =
+      0.0;  ///< [Pa] load sensing: least pressure; constant-pressure supply: its pressure
+};
+
+/// One log the model has seen.
+struct DataSource {
+  std::string file;    ///< name without folder
+  std::string sha256;  ///< of the file's bytes
+  long rows = 0;
+  std::string use;  ///< "train" or "test"
+};
+
+/// Quality of one stage, as `compare` reports it.
+struct StageQuality {
+  std::string stage;  ///< force, flow, pressure, pump, energy
+  std::string at;     ///< "<cylinder>", "<cylinder> extend", "<pump>"
+  std::string data;   ///< "train" or "test"
+  double rmse = 0.0;  ///< in `unit`
+  std::string unit;
+  double fit_percent = 0.0;
+  long n = 0;
+};
+
+struct CraneModel {
+  Machine machine;
+  std::vector<CylinderModel> cylinders;  ///< by cylinder
+  std::vector<PumpModel> pumps;          ///< by pump
+  std::vector<DataSource> data;
+  std::vector<StageQuality> quality;
+
+  /// A model of which nothing is learned yet: margins 0, standby from the machine file.
+  static CraneModel untrained(Machine machine);
+  /// Whether every hydraulic cylinder has both pressure processes.
+  bool complete() const;
+  /// Names of what is missing ("boom retract"), for a message.
+  std::vector<std::string> missing() const;
+};
+
+/// One cylinder at one instant, exact law (paper eqs. 2-13).
+struct CylinderState {
+  double length = 0.0;        ///< [m] pin to pin
+  double rate = 0.0;          ///< dx/dq [m/rad] or [-]
+  double speed = 0.0;         ///< dx/dt [m/s], positive extending
+  double force = 0.0;         ///< static force [N], positive pushes the rod in
+  double flow = 0.0;          ///< [m^3/s] into the working chamber, never negative
+  double pressure = 0.0;      ///< [Pa] working pressure, 0 at rest
+  double pressure_std = 0.0;  ///< [Pa] of the process' mean; 0 at rest
+  bool moving = false;
+};
+
+/// One pump at one instant (paper eqs. 14-16).
+struct PumpState {
+  double flow = 0.0;      ///< [m^3/s]
+  double pressure = 0.0;  ///< [Pa]
+  int leader = -1;  ///< the cylinder that sets the pressure, -1 = standby or constant pressure
+};
+
+struct MachineState {
+  std::vector<CylinderState> cylinders;
+  std::vector<PumpState> pumps;
+  double power = 0.0;  ///< [W] sum over pumps of pressure times flow
+
+  /// Power lost in the valve of a cylinder, (p_pump - P_i) Q_i. [W]
+  double throttling(const Machine& machine, int cylinder) const;
+};
+
+/// Evaluates the exact chain; a workspace, one a thread, no allocation after construction.
+class Chain {
+ public:
+  explicit Chain(const CraneModel& model);
+
+  /// @param q, qd by joint  @param payload [kg]  @param with_std also predictive standard deviations
+  /// @param rest_speed |dx/dt| up to which a cylinder counts as at rest [m/s]. The exact law knows only
+  ///        zero; the default merely swallows rounding. Measured speeds need a threshold above noise.
+  /// @throws std::domain_error when a four-bar cannot close at q
+  const MachineState& evaluate(const double* q, const double* qd, double payload,
+                               bool with_std = false, double rest_speed = 1e-9);
+
+  /// The pressure stages alone, from given speeds and forces of all cylinders [m/s], [N].
+  const MachineState& evaluate_pressures(const double* speed, const double* force,
+                                         bool with_std = false, double rest_speed = 1e-9);
+
+ private:
+  const CraneModel* model_;
+  StaticForce statics_;
+  MachineState state_;
+};
+
+}  // namespace sparflow
