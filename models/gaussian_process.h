@@ -6,6 +6,8 @@
 /// data, which an optimiser would exploit.
 #include <Eigen/Dense>
 
+#include "models/gp_kernel.h"
+
 namespace sparflow {
 
 /// Value, gradient and Hessian of a pressure (or its variance) with respect to (flow, force), SI.
@@ -17,27 +19,31 @@ struct GpDerivatives {
 
 /// Everything the process is, as stored in the model file. SI units.
 struct GpParameters {
-  double length_flow = 1.0;   ///< [m^3/s]
-  double length_force = 1.0;  ///< [N]
-  double signal_std = 1.0;    ///< [Pa]
-  double noise_std = 1.0;     ///< [Pa], one measurement
-  double mean_constant = 0.0; ///< [Pa]
-  double mean_slope = 0.0;    ///< [Pa/N]
-  Eigen::ArrayXd flow;        ///< [m^3/s] centres (all data, or inducing points)
-  Eigen::ArrayXd force;       ///< [N] centres
-  Eigen::ArrayXd weight;      ///< [1/Pa] so that signal_std^2 * weight is a pressure
-  /// Latent variance is signal_std^2 - k^T C k with k the kernel vector at the centres (plus the mean's
-  /// own uncertainty): C is stored as a symmetric matrix. [1/Pa^2]
+  double length_flow = 1.0;    ///< [m^3/s]
+  double length_force = 1.0;   ///< [N]
+  double signal_std = 1.0;     ///< [Pa]
+  double noise_std = 1.0;      ///< [Pa], one measurement
+  double mean_constant = 0.0;  ///< [Pa]
+  double mean_slope = 0.0;     ///< [Pa/N]
+  Eigen::ArrayXd flow;         ///< [m^3/s] centres (all data, or inducing points)
+  Eigen::ArrayXd force;        ///< [N] centres
+  Eigen::ArrayXd weight;       ///< [1/Pa] so that signal_std^2 * weight is a pressure
+  /// Latent variance is signal_std^2 - b^T C b with b = [k; 1; F], k the kernel vector at the n centres
+  /// [Pa^2] and C this symmetric matrix, (n+2) x (n+2). The last two rows and columns carry what the
+  /// data leave open about the mean's two coefficients, so the variance grows with F far outside
+  /// (Rasmussen & Williams 2006, eq. 2.42). Empty: the variance is not known and signal_std^2 is given.
   Eigen::MatrixXd variance_core;
   /// Where the data lies; outside it the mean extrapolates and the variance says so. [lo, hi]
   double flow_min = 0.0, flow_max = 0.0, force_min = 0.0, force_max = 0.0;
   int data_count = 0;  ///< measurements the process has seen
 };
 
-/// Immutable and safe to share between threads; evaluation allocates nothing.
+/// Immutable and safe to share between threads. Evaluation allocates nothing, except that the variance
+/// keeps one scratch array a thread, which grows to the largest process that thread has evaluated.
 class GaussianProcess {
  public:
   GaussianProcess() = default;
+  /// @throws InputError when sizes disagree, a length or deviation is not positive or a value not finite
   explicit GaussianProcess(GpParameters parameters);
 
   /// @param flow [m^3/s], always positive  @param force static force [N]  @return pressure [Pa]
@@ -54,7 +60,11 @@ class GaussianProcess {
 
  private:
   GpParameters parameters_;
-  Eigen::ArrayXd scaled_flow_, scaled_force_, scaled_weight_;  // padded to whole vector registers
+  KernelCentres centres() const;
+
+  // Padded to whole vector registers; the weight is multiplied by the signal variance.
+  Eigen::ArrayXd scaled_flow_, scaled_force_, scaled_weight_;
+  double inverse_length_flow_ = 1.0, inverse_length_force_ = 1.0;
 };
 
 }  // namespace sparflow
