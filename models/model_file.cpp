@@ -1,0 +1,433 @@
+#include "models/model_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "models/yaml_reader.h"
+
+namespace sparflow {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// ---------------------------------------------------------------- writing
+
+/// Objects and lists of objects a line each, lists of plain values on one line.
+void write(const Json& value, int indent, std::string& out) {
+  const std::string pad(static_cast<std::size_t>(indent) + 1, ' ');
+  const auto block = [&](char open, char close, const auto& element) {
+    out += open;
+    bool first = true;
+    for (auto it = value.begin(); it != value.end(); ++it) {
+      out += first ? "\n" : ",\n";
+      first = false;
+      out += pad;
+      element(it);
+    }
+    out += '\n' + std::string(static_cast<std::size_t>(indent), ' ') + close;
+  };
+  if (value.is_object() && !value.empty()) {
+    block('{', '}', [&](const auto& it) {
+      out += Json(it.key()).dump() + ": ";
+      write(it.value(), indent + 1, out);
+    });
+  } else if (value.is_array() && !value.empty() && value.front().is_structured()) {
+    block('[', ']', [&](const auto& it) { write(*it, indent + 1, out); });
+  } else {
+    out += value.dump();
+  }
+}
+
+Json numbers(const Eigen::ArrayXd& values) {
+  return std::vector<double>(values.data(), values.data() + values.size());
+}
+
+Json process_json(const GaussianProcess& process) {
+  if (process.empty()) return nullptr;
+  const GpParameters& p = process.parameters();
+  Json core = Json::array();
+  for (Eigen::Index i = 0; i < p.variance_core.rows(); ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) core.push_back(p.variance_core(i, j));
+  }
+  return {{"length_flow", p.length_flow},
+          {"length_force", p.length_force},
+          {"signal_std", p.signal_std},
+          {"noise_std", p.noise_std},
+          {"mean_constant", p.mean_constant},
+          {"mean_slope", p.mean_slope},
+          {"flow_range", {p.flow_min, p.flow_max}},
+          {"force_range", {p.force_min, p.force_max}},
+          {"data_count", p.data_count},
+          {"flow", numbers(p.flow)},
+          {"force", numbers(p.force)},
+          {"weight", numbers(p.weight)},
+          {"variance_core", std::move(core)}};
+}
+
+// ---------------------------------------------------------------- reading
+
+/// A value of the file with its key path, for messages.
+class Cursor {
+ public:
+  Cursor(const Json& value, const std::string& file, std::string path)
+      : value_(&value), file_(&file), path_(std::move(path)) {}
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw InputError({*file_, 0, 0}, path_, message);
+  }
+  [[noreturn]] void fail_expected(const std::string& expected) const {
+    std::string found = value_->is_structured()
+                            ? fmt::format("{} of {} element(s)",
+                                          value_->is_array() ? "a list" : "an object", value_->size())
+                            : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
+    if (found.size() > 60) found = found.substr(0, 57) + "...";
+    fail("got " + found + ", expected " + expected);
+  }
+  bool is_null() const { return value_->is_null(); }
+  std::size_t size() const { return value_->size(); }
+  const std::string& path() const { return path_; }
+
+  /// Checks that the value is an object with these keys and no others.
+  const Cursor& keys(const std::vector<std::string>& known) const {
+    if (!value_->is_object()) fail_expected("an object with the keys " + listed(known));
+    for (auto it = value_->begin(); it != value_->end(); ++it) {
+      if (std::find(known.begin(), known.end(), it.key()) == known.end()) {
+        fail(fmt::format("unknown key \"{}\"{}", it.key(), suggestion(it.key(), known)));
+      }
+    }
+    return *this;
+  }
+  bool has(const std::string& key) const { return value_->is_object() && value_->contains(key); }
+  Cursor at(const std::string& key, const std::string& expected) const {
+    const std::string child = path_.empty() ? key : path_ + "." + key;
+    if (!has(key)) {
+      throw InputError({*file_, 0, 0}, child,
+                       fmt::format("missing; expected {}. Is the file complete?", expected));
+    }
+    return {value_->at(key), *file_, child};
+  }
+  Cursor element(std::size_t i, const std::string& name) const {
+    return {value_->at(i), *file_, fmt::format("{}[{}]", path_, name)};
+  }
+  std::vector<Cursor> list(const std::string& expected) const {
+    if (!value_->is_array()) fail_expected(expected);
+    std::vector<Cursor> out;
+    for (std::size_t i = 0; i < value_->size(); ++i) out.push_back(element(i, std::to_string(i)));
+    return out;
+  }
+  double number(const std::string& expected) const {
+    if (!value_->is_number()) fail_expected(expected);
+    const double v = value_->get<double>();
+    if (!std::isfinite(v)) fail_expected(expected);
+    return v;
+  }
+  double non_negative(const std::string& expected) const {
+    const double v = number(expected);
+    if (v < 0.0) fail_expected(expected);
+    return v;
+  }
+  long whole(const std::string& expected) const {
+    if (!value_->is_number_integer() || value_->get<double>() < 0.0 || value_->get<double>() > 1e15) {
+      fail_expected(expected);
+    }
+    return value_->get<long>();
+  }
+  std::string text(const std::string& expected) const {
+    if (!value_->is_string()) fail_expected(expected);
+    return value_->get<std::string>();
+  }
+  Eigen::ArrayXd numbers(const std::string& expected) const {
+    const std::vector<Cursor> values = list(expected);
+    Eigen::ArrayXd out(static_cast<Eigen::Index>(values.size()));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      out[static_cast<Eigen::Index>(i)] = values[i].number("a finite number");
+    }
+    return out;
+  }
+  Range range(const std::string& expected) const {
+    const Eigen::ArrayXd v = numbers(expected);
+    if (v.size() != 2 || v[0] > v[1]) fail_expected(expected);
+    return {v[0], v[1]};
+  }
+
+ private:
+  const Json* value_;
+  const std::string* file_;
+  std::string path_;
+};
+
+GaussianProcess read_process(const Cursor& c) {
+  if (c.is_null()) return {};
+  c.keys({"length_flow", "length_force", "signal_std", "noise_std", "mean_constant", "mean_slope",
+          "flow_range", "force_range", "data_count", "flow", "force", "weight", "variance_core"});
+  const auto positive = [&](const char* key, const char* unit) {
+    const Cursor v = c.at(key, fmt::format("a positive number [{}]", unit));
+    const double number = v.number(fmt::format("a positive number [{}]", unit));
+    if (!(number > 0.0)) v.fail_expected(fmt::format("a positive number [{}]", unit));
+    return number;
+  };
+  GpParameters p;
+  p.length_flow = positive("length_flow", "m^3/s");
+  p.length_force = positive("length_force", "N");
+  p.signal_std = positive("signal_std", "Pa");
+  p.noise_std = c.at("noise_std", "a number [Pa]").non_negative("a number >= 0 [Pa]");
+  p.mean_constant = c.at("mean_constant", "a number [Pa]").number("a number [Pa]");
+  p.mean_slope = c.at("mean_slope", "a number [Pa/N]").number("a number [Pa/N]");
+  const Range flow = c.at("flow_range", "[lo, hi] [m^3/s]").range("[lo, hi] with lo <= hi [m^3/s]");
+  const Range force = c.at("force_range", "[lo, hi] [N]").range("[lo, hi] with lo <= hi [N]");
+  p.flow_min = flow.lo;
+  p.flow_max = flow.hi;
+  p.force_min = force.lo;
+  p.force_max = force.hi;
+  const std::string count = "how many measurements the process has seen";
+  p.data_count = static_cast<int>(std::min<long>(c.at("data_count", count).whole(count), 1L << 30));
+  p.weight = c.at("weight", "a list of numbers").numbers("a list of numbers, one a centre");
+  const Eigen::Index n = p.weight.size();
+  if (n == 0) c.at("weight", "").fail("got no number, expected at least one centre");
+  const auto centres = [&](const char* key) {
+    const std::string expected = fmt::format("{} numbers, one for each weight", n);
+    const Cursor v = c.at(key, expected);
+    Eigen::ArrayXd values = v.numbers(expected);
+    if (values.size() != n) v.fail_expected(expected);
+    return values;
+  };
+  p.flow = centres("flow");
+  p.force = centres("force");
+  const Cursor core = c.at("variance_core", "the lower triangle of a symmetric matrix, row by row");
+  const Eigen::ArrayXd packed = core.numbers("a list of numbers");
+  if (packed.size() > 0) {
+    const Eigen::Index rows = n + 2;
+    if (packed.size() != rows * (rows + 1) / 2) {
+      core.fail_expected(fmt::format("{} numbers: the lower triangle of {} x {} (centres + 2)",
+                                     rows * (rows + 1) / 2, rows, rows));
+    }
+    p.variance_core.resize(rows, rows);
+    for (Eigen::Index i = 0, k = 0; i < rows; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++k) {
+        p.variance_core(i, j) = p.variance_core(j, i) = packed[k];
+      }
+    }
+  }
+  try {
+    return GaussianProcess(std::move(p));
+  } catch (const InputError& error) {
+    c.fail(error.what());
+  }
+}
+
+/// Elements that must name the machine's parts, one each in the machine's order.
+template <class Part>
+std::vector<Cursor> matched(const Cursor& root, const std::string& key, const std::vector<Part>& parts) {
+  std::vector<std::string> names;
+  for (const Part& part : parts) names.push_back(part.name);
+  const std::string expected = fmt::format("a list, one element for each of the machine's {}: {}",
+                                           key, listed(names));
+  const Cursor list = root.at(key, expected);
+  const std::vector<Cursor> elements = list.list(expected);
+  if (elements.size() != parts.size()) list.fail_expected(expected);
+  std::vector<Cursor> named;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Cursor name = elements[i].at("name", fmt::format("\"{}\"", names[i]));
+    if (name.text("a name") != names[i]) {
+      name.fail_expected(fmt::format("\"{}\", as in the machine", names[i]));
+    }
+    named.push_back(list.element(i, names[i]));
+  }
+  return named;
+}
+
+void read_provenance(const Cursor& root, CraneModel& model) {
+  const std::string whole = "a whole number that is not negative";
+  for (const Cursor& d : root.at("data", "a list of logs").list("a list of logs")) {
+    d.keys({"file", "sha256", "rows", "use"});
+    DataSource source;
+    source.file = d.at("file", "a file name").text("a file name");
+    const Cursor hash = d.at("sha256", "64 hexadecimal digits");
+    source.sha256 = hash.text("64 hexadecimal digits");
+    if (source.sha256.size() != 64 ||
+        source.sha256.find_first_not_of("0123456789abcdef") != std::string::npos) {
+      hash.fail_expected("64 hexadecimal digits");
+    }
+    source.rows = d.at("rows", whole).whole(whole);
+    source.use = d.at("use", "\"train\" or \"test\"").text("\"train\" or \"test\"");
+    if (source.use != "train" && source.use != "test") {
+      d.at("use", "").fail_expected("\"train\" or \"test\"");
+    }
+    model.data.push_back(std::move(source));
+  }
+  for (const Cursor& q : root.at("quality", "a list of stages").list("a list of stages")) {
+    q.keys({"stage", "at", "data", "rmse", "unit", "fit_percent", "n"});
+    StageQuality quality;
+    quality.stage = q.at("stage", "a stage").text("a stage");
+    quality.at = q.at("at", "a name").text("a name");
+    quality.data = q.at("data", "which data").text("which data");
+    quality.rmse = q.at("rmse", "a number").non_negative("a number >= 0");
+    quality.unit = q.at("unit", "a unit").text("a unit");
+    const Cursor fit = q.at("fit_percent", "a number or null");
+    quality.fit_percent = fit.is_null() ? std::numeric_limits<double>::quiet_NaN()
+                                        : fit.number("a number or null");
+    quality.n = q.at("n", whole).whole(whole);
+    model.quality.push_back(std::move(quality));
+  }
+}
+
+/// Nothing of the model may be left out silently: what this program cannot evaluate is an error.
+void refuse_effects(const Cursor& root) {
+  const std::string expected = "a list of physical effects";
+  const std::vector<Cursor> effects = root.at("effects", expected).list(expected);
+  if (!effects.empty()) {
+    std::string id = "without an id";
+    if (effects[0].has("id")) id = "\"" + effects[0].at("id", "").text("an effect's id") + "\"";
+    effects[0].fail(fmt::format(
+        "this program does not know the physical effect {}; without it the model would be wrong. "
+        "Update the program, or fit the model again",
+        id));
+  }
+  const std::vector<Cursor> steps = root.at("steps", "a list").list("a list");
+  if (!steps.empty()) {
+    steps[0].fail("got a step of extending the model, expected none: no effect is in this model. "
+                  "Update the program, or fit the model again");
+  }
+}
+
+FilePlace place_of_byte(const std::string& file, const std::string& text, std::size_t byte) {
+  FilePlace place{file, 1, 1};
+  for (std::size_t i = 0; i + 1 < byte && i < text.size(); ++i) {
+    place.column = text[i] == '\n' ? 1 : place.column + 1;
+    if (text[i] == '\n') ++place.line;
+  }
+  return place;
+}
+
+Json parse(const std::string& text, const std::string& file) {
+  const std::size_t start = text.find_first_not_of(" \t\r\n");
+  if (start == std::string::npos) {
+    throw InputError({file, 0, 0}, "", "the file is empty; expected a model written by `sparflow fit`");
+  }
+  if (text[start] != '{') {
+    throw InputError(place_of_byte(file, text, start + 1), "",
+                     "this is not JSON; expected a model written by `sparflow fit`");
+  }
+  try {
+    return Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    // The library counts the character it stopped at, from one.
+    const bool ended = error.byte > text.size();
+    std::string reason = error.what();
+    const std::size_t cut = reason.rfind("; ");
+    reason = cut == std::string::npos ? "not valid JSON" : reason.substr(cut + 2);
+    throw InputError(place_of_byte(file, text, error.byte), "",
+                     ended ? "the JSON ends in the middle; was the file copied completely?"
+                           : "not valid JSON: " + reason);
+  } catch (const Json::out_of_range&) {
+    throw InputError({file, 0, 0}, "", "a number in it is too large for a double");
+  }
+}
+
+}  // namespace
+
+const char* program_version() { return SPARFLOW_VERSION; }
+
+std::string model_to_json(const CraneModel& model) {
+  Json root;
+  root["sparflow_model"] = kModelFileVersion;
+  root["program"] = fmt::format("sparflow {}", program_version());
+  root["machine"] = {{"name", model.machine.name},
+                     {"yaml", model.machine.source_text.empty() ? write_machine(model.machine)
+                                                                : model.machine.source_text}};
+  root["data"] = Json::array();
+  for (const DataSource& d : model.data) {
+    root["data"].push_back({{"file", d.file}, {"sha256", d.sha256}, {"rows", d.rows}, {"use", d.use}});
+  }
+  root["quality"] = Json::array();
+  for (const StageQuality& q : model.quality) {
+    root["quality"].push_back({{"stage", q.stage},
+                               {"at", q.at},
+                               {"data", q.data},
+                               {"rmse", q.rmse},
+                               {"unit", q.unit},
+                               {"fit_percent", q.fit_percent},  // NaN becomes null
+                               {"n", q.n}});
+  }
+  root["effects"] = Json::array();
+  root["steps"] = Json::array();
+  root["pumps"] = Json::array();
+  for (std::size_t p = 0; p < model.pumps.size(); ++p) {
+    root["pumps"].push_back(
+        {{"name", model.machine.pumps[p].name}, {"standby", model.pumps[p].standby}});
+  }
+  root["cylinders"] = Json::array();
+  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+    const CylinderModel& c = model.cylinders[i];
+    root["cylinders"].push_back({{"name", model.machine.cylinders[i].name},
+                                 {"margin", c.margin},
+                                 {"valve_gain_extend", c.valve_gain_extend},
+                                 {"valve_gain_retract", c.valve_gain_retract},
+                                 {"extend", process_json(c.extend)},
+                                 {"retract", process_json(c.retract)}});
+  }
+  std::string text;
+  write(root, 0, text);
+  return text + "\n";
+}
+
+CraneModel model_from_json(const std::string& text, const std::string& file) {
+  const Json document = parse(text, file);
+  const Cursor root(document, file, "");
+  if (!root.has("sparflow_model")) {
+    root.fail("this JSON is not a model (no key \"sparflow_model\"); expected a file written by `sparflow fit`");
+  }
+  const Cursor version = root.at("sparflow_model", "");
+  const std::string expected_version = fmt::format("a version from 1 to {}", kModelFileVersion);
+  const long number = version.whole(expected_version);
+  if (number > kModelFileVersion) {
+    version.fail(fmt::format("got version {}, but this program (sparflow {}) reads up to {}; update it, "
+                             "or fit the model again with this one",
+                             number, program_version(), kModelFileVersion));
+  }
+  if (number < 1) version.fail_expected(expected_version);
+  root.keys({"sparflow_model", "program", "machine", "data", "quality", "effects", "steps", "pumps",
+             "cylinders"});
+  root.at("program", "a program's name").text("a program's name");
+  const Cursor machine = root.at("machine", "an object").keys({"name", "yaml"});
+  machine.at("name", "a name").text("a name");
+  const std::string yaml = machine.at("yaml", "the machine file's text").text("the machine file's text");
+  CraneModel model = CraneModel::untrained(parse_machine(yaml, file + " (machine.yaml)", ""));
+  read_provenance(root, model);
+  refuse_effects(root);
+  const std::vector<Cursor> pumps = matched(root, "pumps", model.machine.pumps);
+  for (std::size_t p = 0; p < pumps.size(); ++p) {
+    const std::string expected = "a pressure >= 0 [Pa]";
+    model.pumps[p].standby = pumps[p].keys({"name", "standby"}).at("standby", expected).non_negative(expected);
+  }
+  const std::vector<Cursor> cylinders = matched(root, "cylinders", model.machine.cylinders);
+  for (std::size_t i = 0; i < cylinders.size(); ++i) {
+    const Cursor& c = cylinders[i];
+    c.keys({"name", "margin", "valve_gain_extend", "valve_gain_retract", "extend", "retract"});
+    CylinderModel& out = model.cylinders[i];
+    const auto value = [&](const char* key, const std::string& expected) {
+      return c.at(key, expected).non_negative(expected);
+    };
+    out.margin = value("margin", "a pressure >= 0 [Pa]");
+    out.valve_gain_extend = value("valve_gain_extend", "a flow >= 0 [m^3/s]");
+    out.valve_gain_retract = value("valve_gain_retract", "a flow >= 0 [m^3/s]");
+    out.extend = read_process(c.at("extend", "a process or null"));
+    out.retract = read_process(c.at("retract", "a process or null"));
+  }
+  return model;
+}
+
+void save_model(const CraneModel& model, const std::string& path) {
+  write_file_atomically(path, model_to_json(model));
+}
+
+CraneModel load_model(const std::string& path) { return model_from_json(read_file(path), path); }
+
+}  // namespace sparflow
