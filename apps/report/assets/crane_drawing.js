@@ -1,0 +1,200 @@
+"use strict";
+/* The crane at several instants, and a slider that moves it. */
+(function () {
+  const { theme, number, ticks, element, svg } = page;
+  const { line, label } = page.svgTools;
+
+  /* Parts of one instant into an SVG group, thicknesses in parts of the crane's size. */
+  page.drawParts = function (into, kinds, points, plane, weight) {
+    const reach = Math.max(plane.z1 - plane.z0, 0.5 * (plane.x1 - plane.x0)) * plane.scale;
+    const unit = Math.min(Math.max(reach * 0.0022, 0.7), 1.6) * (weight || 1);
+    const steel = theme.get("--steel"), rod = theme.get("--rod"), barrel = theme.get("--barrel");
+    const looks = { link: [steel, 9], telescope: [steel, 6], barrel: [barrel, 5.5], rod: [rod, 3],
+      rocker: [theme.color(0), 3.5], coupler: [theme.color(0), 3.5] };
+    let stage = 0;
+    kinds.forEach((kind, i) => {
+      const p = points[i];
+      if (kind === "pin") {
+        into.append(svg("circle", { cx: plane.X(p[0]), cy: plane.Z(p[1]), r: 2.4 * unit, fill: theme.paper(),
+          stroke: steel, "stroke-width": 1.2 * unit }));
+        return;
+      }
+      const [color, width] = looks[kind];
+      const thinner = kind === "telescope" ? Math.pow(0.82, stage++) : 1;  // inner stages are slimmer
+      into.append(svg("polyline", { points: polyline(p, plane), fill: "none", stroke: color,
+        "stroke-width": width * thinner * unit, "stroke-linecap": kind === "barrel" ? "butt" : "round",
+        "stroke-linejoin": "round" }));
+    });
+  };
+
+  function polyline(p, plane) {
+    let text = "";
+    for (let i = 0; i < p.length; i += 2) text += plane.X(p[i]).toFixed(1) + "," + plane.Z(p[i + 1]).toFixed(1) + " ";
+    return text;
+  }
+
+  function drawPayload(into, tip, plane) {
+    const x = plane.X(tip[0]), z = plane.Z(tip[1]), s = Math.min(Math.max(0.28 * plane.scale, 7), 18);
+    into.append(line(x, z, x, z + s * 1.1, theme.muted(), 1.2));
+    into.append(svg("rect", { x: x - s / 2, y: z + s * 1.1, width: s, height: s * 0.8, fill: theme.color(1), rx: 1 }));
+  }
+
+  /* What is to be seen: everything the crane touches; obstacles widen it by half at most. */
+  function extent(spec) {
+    const box = { x0: 0, x1: 0, z0: 0, z1: 0 };
+    const include = (x, z) => {
+      box.x0 = Math.min(box.x0, x); box.x1 = Math.max(box.x1, x);
+      box.z0 = Math.min(box.z0, z); box.z1 = Math.max(box.z1, z);
+    };
+    const flat = (p) => { for (let i = 0; i < p.length; i += 2) include(p[i], p[i + 1]); };
+    for (const f of spec.frames) { f.points.forEach(flat); flat(f.tip); }
+    if (spec.goal) flat(spec.goal);
+    spec.paths.forEach((p) => flat(p.points));
+    if (spec.ground != null) include(0, spec.ground);
+    const size = Math.max(box.x1 - box.x0, box.z1 - box.z0) || 1, core = { ...box };
+    for (const o of spec.obstacles) {
+      for (let i = 0; i < o.points.length; i += 2) {
+        for (const d of [-o.radius, o.radius]) {
+          include(Math.min(Math.max(o.points[i] + d, core.x0 - size / 4), core.x1 + size / 4),
+                  Math.min(Math.max(o.points[i + 1] + d, core.z0 - size / 4), core.z1 + size / 4));
+        }
+      }
+    }
+    const pad = 0.05 * size;
+    return { x0: box.x0 - pad, x1: box.x1 + pad, z0: box.z0 - pad, z1: box.z1 + pad };
+  }
+
+  function drawScene(plane, spec) {
+    const { content } = plane;
+    if (spec.ground != null) {
+      const y = plane.Z(spec.ground);
+      content.append(line(plane.left, y, plane.right, y, theme.muted(), 1.5));
+      for (let x = plane.left; x < plane.right; x += 14) content.append(line(x, y + 7, x + 7, y, theme.muted(), 0.8));
+    }
+    for (const o of spec.obstacles) {
+      const look = { fill: page.faded(theme.get("--c3"), 0.35), stroke: theme.get("--c3"), "stroke-width": 1.2 };
+      const shape = o.radius > 0
+        ? svg("circle", { cx: plane.X(o.points[0]), cy: plane.Z(o.points[1]), r: o.radius * plane.scale, ...look })
+        : svg("polygon", { points: polyline(o.points, plane), ...look });
+      shape.append(svg("title", {}, o.name));
+      content.append(shape);
+      let x = 0, z = 0;
+      for (let i = 0; i < o.points.length; i += 2) { x += o.points[i]; z += o.points[i + 1]; }
+      const half = o.points.length / 2 || 1;
+      content.append(label(o.name, plane.X(x / half), plane.Z(z / half) + 4, "middle", theme.ink()));
+    }
+  }
+
+  function drawTipPaths(plane, spec) {
+    const { content, X, Z } = plane;
+    for (const path of spec.paths) {
+      content.append(svg("polyline", { points: polyline(path.points, plane), fill: "none", stroke: theme.muted(),
+        "stroke-width": 1.5, "stroke-dasharray": "5 4" }));
+    }
+    if (spec.frames.length === 0) return;
+    const tips = spec.frames.map((f) => f.tip), first = tips[0], last = tips[tips.length - 1];
+    content.append(svg("polyline", { points: polyline(tips.flat(), plane), fill: "none", stroke: theme.color(1), "stroke-width": 1.8 }));
+    for (const [at, text] of [[first, "start"], [spec.goal || last, spec.goal ? "goal" : "end"]]) {
+      content.append(svg("circle", { cx: X(at[0]), cy: Z(at[1]), r: 5, fill: text === "start" ? theme.paper() : theme.color(1),
+        stroke: theme.color(1), "stroke-width": 1.8 }));
+      content.append(label(text, X(at[0]) + 9, Z(at[1]) - 7, "start", theme.ink()));
+    }
+  }
+
+  function drawScaleBar(plane) {
+    const metres = ticks(0, 90 / plane.scale, 1).step, from = plane.right - 14 - metres * plane.scale, y = plane.top + 22;
+    const g = svg("g");
+    g.append(line(from, y, plane.right - 14, y, theme.ink(), 2));
+    for (const x of [from, plane.right - 14]) g.append(line(x, y - 4, x, y + 4, theme.ink(), 1.5));
+    g.append(label(metres + " m", (from + plane.right - 14) / 2, y - 8, "middle", theme.ink()));
+    plane.drawing.append(g);
+  }
+
+  /* The instant between two frames: every coordinate in proportion. */
+  function between(frames, time) {
+    let k = frames.findIndex((f) => f.t >= time);
+    if (k < 0) k = frames.length - 1;
+    if (k === 0) return frames[0];
+    const a = frames[k - 1], b = frames[k], part = b.t > a.t ? Math.min((time - a.t) / (b.t - a.t), 1) : 1;
+    const mix = (p, q) => p.map((v, i) => v + (q[i] - v) * part);
+    return { t: time, tip: mix(a.tip, b.tip), points: a.points.map((p, i) => mix(p, b.points[i])) };
+  }
+
+  page.kinds.crane = function (host, spec) {
+    const plane = page.plane(host, extent(spec), spec, 14, spec.height || 520);
+    const { content, drawing } = plane, frames = spec.frames;
+    drawScene(plane, spec);
+    const stills = Math.min(spec.stills, frames.length);
+    for (let k = 0; k < stills; ++k) {
+      const time = frames[0].t + (frames[frames.length - 1].t - frames[0].t) * (stills > 1 ? k / (stills - 1) : 1);
+      const still = svg("g", { opacity: (0.1 + 0.3 * (k + 1) / stills).toFixed(2) });
+      const frame = between(frames, time);
+      page.drawParts(still, spec.kinds, frame.points, plane, 0.85);
+      content.append(still);
+    }
+    drawTipPaths(plane, spec);
+    const moving = svg("g");
+    content.append(moving);
+    drawScaleBar(plane);
+    if (frames.length === 0) {
+      drawing.append(label("no values", (plane.left + plane.right) / 2, plane.top + 20, "middle"));
+      return { picture: () => page.rasterised(drawing), rows: () => [["t [s]", "tip x [m]", "tip z [m]"]] };
+    }
+
+    const start = frames[0].t, end = frames[frames.length - 1].t;
+    const player = element("div", { class: "player" });
+    const button = element("button", { type: "button" }, "play");
+    const slider = element("input", { type: "range", min: start, max: end, step: "any", "aria-label": "time" });
+    const output = element("output");
+    player.append(button, slider, output);
+    host.append(player);
+
+    function show(time) {
+      const frame = between(frames, Math.min(Math.max(time, start), end));
+      moving.replaceChildren();
+      page.drawParts(moving, spec.kinds, frame.points, plane);
+      if (spec.payload) drawPayload(moving, frame.tip, plane);
+      slider.value = time;
+      output.textContent = `t = ${frame.t.toFixed(2)} s · tip ${spec.x_axis.label} ${frame.tip[0].toFixed(2)} m, ` +
+        `${spec.z_axis.label} ${frame.tip[1].toFixed(2)} m`;
+    }
+
+    // Real time, hurried when the motion takes longer than ten seconds.
+    const speed = Math.max(1, (end - start) / 10);
+    let playing = 0, since = 0;
+    function step(now) {
+      const time = Math.min(slider.valueAsNumber + (speed * (now - since)) / 1000, end);
+      since = now;
+      show(time);
+      page.tellInstant(spec.group, time, slider);
+      playing = time < end ? requestAnimationFrame(step) : 0;
+      button.textContent = playing ? "pause" : "play";
+    }
+    function pause() {
+      cancelAnimationFrame(playing);
+      playing = 0;
+      button.textContent = "play";
+    }
+    button.title = speed > 1 ? `plays ${number(speed, 2)} times as fast as the crane` : "plays in real time";
+    button.addEventListener("click", () => {
+      if (playing) return pause();
+      if (slider.valueAsNumber >= end - 1e-9) show(start);
+      since = performance.now();
+      playing = requestAnimationFrame(step);
+      button.textContent = "pause";
+    });
+    slider.addEventListener("input", () => {
+      pause();
+      show(slider.valueAsNumber);
+      page.tellInstant(spec.group, slider.valueAsNumber, slider);
+    });
+    const forget = page.onInstant(spec.group, (time, source) => { if (source !== slider) show(time); });
+    show(end);
+    return {
+      picture: () => page.rasterised(drawing),
+      rows: () => [["t [s]", "tip " + spec.x_axis.label + " [m]", "tip " + spec.z_axis.label + " [m]"]].concat(
+        frames.map((f) => [f.t, ...f.tip])),
+      remove: () => { pause(); forget(); },
+    };
+  };
+})();

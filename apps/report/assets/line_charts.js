@@ -1,0 +1,231 @@
+"use strict";
+/* Line and scatter charts, drawn by uPlot. */
+(function () {
+  const { theme, faded, titled, number, tickLabels, element } = page;
+  const kLeft = 62, kRight = 14;  // equal margins: charts below one another share their time axis
+
+  /* uPlot leaves a scale without values undefined; an empty chart still needs its axes. */
+  function range(pad) {
+    return (u, lo, hi) => {
+      if (lo == null || !isFinite(lo)) return [0, 1];
+      if (lo === hi) {
+        const half = Math.abs(lo) * 0.1 || 0.5;
+        return [lo - half, hi + half];
+      }
+      return [lo - pad * (hi - lo), hi + pad * (hi - lo)];
+    };
+  }
+
+  function axes(spec) {
+    const common = {
+      stroke: theme.muted(), font: theme.font, labelFont: theme.font, labelGap: 0,
+      grid: { stroke: theme.grid(), width: 1 }, ticks: { stroke: theme.grid(), width: 1, size: 5 },
+      values: (u, splits) => tickLabels(splits),
+    };
+    return [
+      { ...common, label: titled(spec.x_axis), size: 30, labelSize: 18, space: 70 },
+      { ...common, label: titled(spec.y_axis), size: kLeft - 18, labelSize: 18, space: 34 },
+    ];
+  }
+
+  function emptyNote(u, isEmpty) {
+    if (!isEmpty) return;
+    const c = u.ctx, b = u.bbox;
+    c.save();
+    c.fillStyle = theme.muted();
+    c.textAlign = "center";
+    c.font = scaled(u, theme.font);
+    c.fillText("no values", b.left + b.width / 2, b.top + b.height / 2);
+    c.restore();
+  }
+
+  const scaled = (u, font) => font.replace(/^\d+/, (px) => px * devicePixelRatio);
+
+  function drawSpans(u, spec) {
+    const c = u.ctx, b = u.bbox;
+    c.save();
+    c.beginPath();
+    c.rect(b.left, b.top, b.width, b.height);
+    c.clip();
+    c.fillStyle = faded(theme.get("--c4"), 0.22);
+    for (const span of spec.spans) {
+      const from = u.valToPos(span.from, "x", true), to = u.valToPos(span.to, "x", true);
+      c.fillRect(from, b.top, Math.max(to - from, 1), b.height);
+    }
+    c.restore();
+  }
+
+  /* Labels of spans and markers at the top, left out where they would run into the one before. */
+  function drawLabels(u, spec) {
+    const c = u.ctx, b = u.bbox, ratio = devicePixelRatio;
+    const labels = spec.spans.map((s) => ({ x: s.from, label: s.label, line: false }))
+      .concat(spec.markers.map((m) => ({ x: m.x, label: m.label, line: true })))
+      .filter((l) => l.x >= u.scales.x.min && l.x <= u.scales.x.max).sort((a, z) => a.x - z.x);
+    c.save();
+    c.font = scaled(u, "11px system-ui, sans-serif");
+    c.fillStyle = c.strokeStyle = theme.muted();
+    c.lineWidth = ratio;
+    c.setLineDash([4 * ratio, 3 * ratio]);
+    let free = -Infinity;
+    for (const { x, label, line } of labels) {
+      const at = Math.round(u.valToPos(x, "x", true));
+      if (line) {
+        c.beginPath();
+        c.moveTo(at, b.top);
+        c.lineTo(at, b.top + b.height);
+        c.stroke();
+      }
+      const width = c.measureText(label).width;
+      let from = at + 4 * ratio;
+      if (from + width > b.left + b.width) from = at - 4 * ratio - width;
+      if (from > free) {
+        c.fillText(label, from, b.top + 11 * ratio);
+        free = from + width + 6 * ratio;
+      }
+    }
+    c.restore();
+  }
+
+  /* The curve's look; the key shows the same colour. */
+  function look(series) {
+    const color = theme.color(series.color);
+    if (series.style === "measured") return { stroke: faded(color, 0.38), width: 3.5 };
+    if (series.style === "predicted") return { stroke: color, width: 1.5 };
+    if (series.style === "limit") return { stroke: color, width: 1.2, dash: [6, 4] };
+    return { stroke: color, width: 1.8 };
+  }
+
+  page.kinds.lines = function (host, spec) {
+    const unit = spec.y_axis.unit ? " " + spec.y_axis.unit : "";
+    const xUnit = spec.x_axis.unit ? " " + spec.x_axis.unit : "";
+    const data = [spec.x];
+    const series = [{ label: spec.x_axis.label, value: (u, v) => (v == null ? "" : number(v, 5) + xUnit) }];
+    const bands = [];
+    for (const s of spec.series) {
+      if (!s.lower) continue;  // bands lie under all curves
+      for (const edge of [s.upper, s.lower]) {
+        data.push(edge);
+        series.push({ label: s.name, class: "quiet", stroke: "transparent", width: 0, points: { show: false } });
+      }
+      bands.push({ series: [data.length - 2, data.length - 1], fill: faded(theme.color(s.color), 0.16) });
+    }
+    const firstCurve = data.length;
+    for (const s of spec.series) {
+      data.push(s.y);
+      series.push({ label: s.name, ...look(s), value: (u, v) => (v == null ? "" : number(v) + unit),
+        points: { size: 5, fill: theme.color(s.color) } });
+    }
+    const isEmpty = !spec.series.some((s) => s.y.some((v) => v != null));
+    const chart = new uPlot({
+      width: host.clientWidth, height: spec.height || 240, padding: [8, kRight, 0, 0],
+      scales: { x: { time: false, range: range(0) }, y: { range: range(0.06) } },
+      axes: axes(spec), series, bands,
+      legend: { markers: { fill: (u, i) => u.series[i]._stroke || "transparent", width: 0 } },
+      cursor: {
+        drag: { x: true, y: false },
+        points: { size: 6, show: (u, i) => (i < firstCurve ? undefined : uPlotPoint(u, i)) },
+        sync: spec.group ? { key: spec.group, scales: ["x", null] } : undefined,
+      },
+      hooks: {
+        drawClear: [(u) => drawSpans(u, spec)],
+        draw: [(u) => { drawLabels(u, spec); emptyNote(u, isEmpty); }],
+        setCursor: [(u) => {
+          if (u.cursor.left >= 0 && u.cursor.event) page.tellInstant(spec.group, u.posToVal(u.cursor.left, "x"), u);
+        }],
+      },
+    }, data, host);
+    const forget = page.onInstant(spec.group, (time, source) => {
+      if (source instanceof uPlot) return;  // between charts uPlot does it
+      chart.setCursor({ left: chart.valToPos(time, "x"), top: chart.bbox.height / 2 / devicePixelRatio }, false);
+    });
+    return {
+      picture: () => chart.ctx.canvas,
+      key: () => spec.series.map((s) => ({ name: s.name, color: look(s).stroke })),
+      rows: () => {
+        const names = [titled(spec.x_axis)], columns = [spec.x];
+        for (const s of spec.series) {
+          names.push(titled({ label: s.name, unit: spec.y_axis.unit }));
+          columns.push(s.y);
+          if (s.lower) {
+            names.push(s.name + " lower", s.name + " upper");
+            columns.push(s.lower, s.upper);
+          }
+        }
+        return [names].concat(spec.x.map((_, i) => columns.map((column) => column[i])));
+      },
+      remove: () => { forget(); chart.destroy(); },
+    };
+  };
+
+  function uPlotPoint(u, i) {
+    return element("div", { style: "background:" + theme.color(-1) + ";border-color:" + u.series[i]._stroke });
+  }
+
+  page.kinds.scatter = function (host, spec) {
+    // uPlot wants one ascending abscissa: all points sorted by x, each in the column of its group.
+    const points = [];
+    spec.groups.forEach((g, k) => g.x.forEach((x, i) => points.push([x, k, g.y[i]])));
+    const groupCount = spec.groups.length, trend = spec.trend && spec.trend.x.length > 1;
+    if (trend) spec.trend.x.forEach((x, i) => points.push([x, groupCount, spec.trend.y[i]]));
+    points.sort((a, b) => a[0] - b[0]);
+    const columns = groupCount + (trend ? 1 : 0);
+    const data = [points.map((p) => p[0])];
+    for (let k = 0; k < columns; ++k) data.push(points.map((p) => (p[1] === k ? p[2] : null)));
+
+    const series = [{ label: spec.x_axis.label, class: "quiet" }];
+    const alpha = points.length > 1500 ? 0.35 : 0.65;
+    spec.groups.forEach((g, k) => {
+      const color = theme.color(k);
+      series.push({ label: g.name, stroke: color, paths: () => null,
+        points: { show: true, size: points.length > 1500 ? 3.5 : 5, width: 0, fill: faded(color, alpha) } });
+    });
+    if (trend) {
+      series.push({ label: "median", stroke: theme.ink(), width: 2.2, spanGaps: true, points: { show: false } });
+    }
+    const reading = element("div", { class: "reading" });
+    const chart = new uPlot({
+      width: host.clientWidth, height: spec.height || 280, padding: [8, kRight, 0, 0],
+      scales: { x: { time: false, range: range(0.03) }, y: { range: range(0.06) } },
+      axes: axes(spec), series,
+      legend: { live: false, markers: { fill: (u, i) => u.series[i]._stroke || "transparent", width: 0 } },
+      cursor: { drag: { x: true, y: true, uni: 40 }, points: { show: false } },
+      hooks: {
+        drawClear: [(u) => drawReferenceLines(u, spec)],
+        draw: [(u) => emptyNote(u, points.length === 0)],
+        setCursor: [(u) => {
+          const inside = u.cursor.left >= 0;
+          reading.textContent = inside
+            ? number(u.posToVal(u.cursor.left, "x")) + " " + spec.x_axis.unit + " · " +
+              number(u.posToVal(u.cursor.top, "y")) + " " + spec.y_axis.unit
+            : "";
+        }],
+      },
+    }, data, host);
+    chart.root.querySelector(".u-legend").classList.add("dots");
+    chart.over.append(reading);
+    return {
+      picture: () => chart.ctx.canvas,
+      key: () => spec.groups.map((g, k) => ({ name: g.name, color: theme.color(k) })),
+      rows: () => [["group", titled(spec.x_axis), titled(spec.y_axis)]].concat(
+        ...spec.groups.map((g) => g.x.map((x, i) => [g.name, x, g.y[i]]))),
+      remove: () => chart.destroy(),
+    };
+  };
+
+  /* The zero line, or y = x. */
+  function drawReferenceLines(u, spec) {
+    const c = u.ctx, b = u.bbox, { x, y } = u.scales;
+    c.save();
+    c.beginPath();
+    c.rect(b.left, b.top, b.width, b.height);
+    c.clip();
+    c.strokeStyle = theme.muted();
+    c.lineWidth = devicePixelRatio;
+    c.beginPath();
+    const end = (v) => (spec.diagonal ? v : 0);
+    c.moveTo(u.valToPos(x.min, "x", true), u.valToPos(end(x.min), "y", true));
+    c.lineTo(u.valToPos(x.max, "x", true), u.valToPos(end(x.max), "y", true));
+    if (spec.diagonal || (y.min <= 0 && y.max >= 0)) c.stroke();
+    c.restore();
+  }
+})();

@@ -1,0 +1,106 @@
+#include "apps/report/decimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <unordered_set>
+#include <utility>
+
+#include "models/error.h"
+
+namespace sparflow {
+namespace {
+
+using Index = Eigen::Index;
+
+std::vector<Index> finite_points(const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
+  SPARFLOW_CHECK(x.size() == y.size(), "a cloud needs as many x as y");
+  std::vector<Index> points;
+  for (Index i = 0; i < x.size(); ++i) {
+    if (std::isfinite(x[i]) && std::isfinite(y[i])) points.push_back(i);
+  }
+  return points;
+}
+
+}  // namespace
+
+std::vector<Index> decimate_rows(const std::vector<const Eigen::VectorXd*>& columns, Index most) {
+  const Index rows = columns.empty() ? 0 : columns.front()->size();
+  std::vector<Index> kept;
+  if (rows <= most) {
+    for (Index i = 0; i < rows; ++i) kept.push_back(i);
+    return kept;
+  }
+  const Index buckets = std::max<Index>(1, most / (2 * static_cast<Index>(columns.size())));
+  std::set<Index> chosen = {0, rows - 1};
+  for (Index bucket = 0; bucket < buckets; ++bucket) {
+    const Index begin = bucket * rows / buckets;
+    const Index end = (bucket + 1) * rows / buckets;
+    for (const Eigen::VectorXd* column : columns) {
+      SPARFLOW_CHECK(column->size() == rows, "curves of one chart need one length");
+      Index smallest = -1, largest = -1, gap = -1;
+      for (Index i = begin; i < end; ++i) {
+        const double value = (*column)[i];
+        if (!std::isfinite(value)) {
+          if (gap < 0) gap = i;
+          continue;
+        }
+        if (smallest < 0 || value < (*column)[smallest]) smallest = i;
+        if (largest < 0 || value > (*column)[largest]) largest = i;
+      }
+      for (const Index i : {smallest, largest, gap}) {
+        if (i >= 0) chosen.insert(i);
+      }
+    }
+  }
+  return {chosen.begin(), chosen.end()};
+}
+
+std::vector<Index> decimate_cloud(const Eigen::VectorXd& x, const Eigen::VectorXd& y, Index most) {
+  const std::vector<Index> points = finite_points(x, y);
+  if (static_cast<Index>(points.size()) <= most) return points;
+  double x_lo = x[points[0]], x_hi = x_lo, y_lo = y[points[0]], y_hi = y_lo;
+  for (const Index i : points) {
+    x_lo = std::min(x_lo, x[i]);
+    x_hi = std::max(x_hi, x[i]);
+    y_lo = std::min(y_lo, y[i]);
+    y_hi = std::max(y_hi, y[i]);
+  }
+  std::vector<Index> kept;
+  // 640 x 320 cells is about what a chart can show; coarser only when that leaves too many.
+  for (double cells = 640.0; cells >= 2.0; cells *= 0.8) {
+    kept.clear();
+    std::unordered_set<long> taken;
+    const double x_scale = x_hi > x_lo ? cells / (x_hi - x_lo) : 0.0;
+    const double y_scale = y_hi > y_lo ? 0.5 * cells / (y_hi - y_lo) : 0.0;
+    for (const Index i : points) {
+      const long column = std::lround((x[i] - x_lo) * x_scale);
+      const long row = std::lround((y[i] - y_lo) * y_scale);
+      if (taken.insert(row * 1000 + column).second) kept.push_back(i);
+    }
+    if (static_cast<Index>(kept.size()) <= most) break;
+  }
+  return kept;
+}
+
+BinnedMedian binned_median(const Eigen::VectorXd& x, const Eigen::VectorXd& y, int bins) {
+  std::vector<Index> points = finite_points(x, y);
+  const Index count = static_cast<Index>(points.size());
+  const Index used = std::min<Index>(bins, count / 20);
+  if (used < 2) return {};
+  std::stable_sort(points.begin(), points.end(), [&](Index a, Index b) { return x[a] < x[b]; });
+  BinnedMedian trend{Eigen::VectorXd(used), Eigen::VectorXd(used)};
+  for (Index bin = 0; bin < used; ++bin) {
+    const auto begin = points.begin() + bin * count / used;
+    const auto end = points.begin() + (bin + 1) * count / used;
+    trend.x[bin] = x[*(begin + (end - begin) / 2)];
+    std::vector<double> values;
+    for (auto i = begin; i != end; ++i) values.push_back(y[*i]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    trend.y[bin] = *middle;
+  }
+  return trend;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,9 @@
+#pragma once
+/// A page with every kind of figure, filled with made-up but realistic data.
+#include "apps/report/page.h"
+
+namespace sparflow::testing {
+
+Page sample_page();
+
+}  // namespace sparflow::testing
