@@ -1,0 +1,172 @@
+#include "identification/sparse_gp.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "models/error.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Added to the diagonal of Kuu, relative to the signal variance. Inducing points are never closer than
+/// their conditional variance allows, so this only covers rounding.
+constexpr double kJitter = 1e-9;
+
+double log_det(const Eigen::LLT<MatrixXd>& factor) {
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+}
+
+}  // namespace
+
+InducingChoice choose_inducing(const ArrayXd& x1, const ArrayXd& x2, const GpHyper& hyper,
+                               Index count, double tolerance) {
+  const Index n = x1.size();
+  const GpHyper unit(hyper[0], hyper[1], 0.0, 0.0);
+  InducingChoice choice;
+  ArrayXd left = ArrayXd::Ones(n);  // conditional variance
+  count = std::min(count, n);
+  MatrixXd rows(n, count);  // columns of the Cholesky factor
+  for (Index m = 0; m < count; ++m) {
+    Index pivot = 0;
+    const double largest = left.maxCoeff(&pivot);
+    // Below a thousand jitters a further point adds rounding, not information.
+    if (largest < 1e3 * kJitter || (m > 2 && left.mean() < tolerance)) break;
+    const ArrayXd p1 = ArrayXd::Constant(1, x1[pivot]), p2 = ArrayXd::Constant(1, x2[pivot]);
+    VectorXd column = kernel_matrix(x1, x2, p1, p2, unit);
+    column.noalias() -= rows.leftCols(m) * rows.row(pivot).head(m).transpose();
+    column /= std::sqrt(largest);
+    rows.col(m) = column;
+    left = (left - column.array().square()).max(0.0);
+    left[pivot] = 0.0;
+    choice.rows.push_back(pivot);
+  }
+  choice.mean_variance = left.mean();
+  choice.max_variance = left.maxCoeff();
+  return choice;
+}
+
+SparseGp::SparseGp(const GpPoints& points, const std::vector<Index>& inducing)
+    : points_(points), z1_(points.x1(inducing)), z2_(points.x2(inducing)) {}
+
+bool SparseGp::factorise(const GpHyper& hyper) {
+  const double signal = std::exp(hyper[2]), noise = std::exp(hyper[3]);
+  kuu_ = kernel_matrix(z1_, z2_, z1_, z2_, hyper);
+  kuu_.diagonal().array() += kJitter * signal;
+  chol_uu_.compute(kuu_);
+  if (chol_uu_.info() != Eigen::Success) return false;
+  kuf_ = kernel_matrix(z1_, z2_, points_.x1, points_.x2, hyper);
+  v_ = kuf_;
+  chol_uu_.matrixL().solveInPlace(v_);
+  const Index m = z1_.size();
+  MatrixXd b = MatrixXd::Zero(m, m);
+  b.selfadjointView<Eigen::Lower>().rankUpdate(v_, 1.0 / noise);
+  trace_v_ = noise * b.trace();
+  b.diagonal().array() += 1.0;
+  chol_b_.compute(b.selfadjointView<Eigen::Lower>());
+  if (chol_b_.info() != Eigen::Success) return false;
+  b_inverse_ = chol_b_.solve(MatrixXd::Identity(m, m));
+  vh_.noalias() = v_ * points_.basis;
+  vy_.noalias() = v_ * points_.y;
+  const MatrixXd bh = chol_b_.solve(vh_);
+  const MatrixXd a =
+      (points_.basis.transpose() * points_.basis - vh_.transpose() * bh / noise) / noise;
+  chol_a_.compute(a);
+  if (chol_a_.info() != Eigen::Success) return false;
+  beta_ =
+      chol_a_.solve((points_.basis.transpose() * points_.y - bh.transpose() * vy_ / noise) / noise);
+  return beta_.allFinite();
+}
+
+double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
+  constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
+  if (!factorise(hyper)) return kMinusInfinity;
+  const double signal = std::exp(hyper[2]), noise = std::exp(hyper[3]);
+  const Index count = points_.size(), m = z1_.size(), b = points_.basis.cols();
+  const double n = static_cast<double>(count);
+  const VectorXd residual = points_.y - points_.basis * beta_;
+  const VectorXd v_residual = vy_ - vh_ * beta_;
+  // gamma = Sigma^-1 (y - H beta), Sigma = V^T V + noise I, by the inversion lemma.
+  const VectorXd b_v_residual = chol_b_.solve(v_residual);
+  VectorXd gamma = residual;
+  gamma.noalias() -= v_.transpose() * b_v_residual / noise;
+  gamma /= noise;
+  const double lost_trace = n * signal - trace_v_;  // tr(Kff - Qff)
+  const double value =
+      -0.5 * (residual.dot(gamma) + n * hyper[3] + log_det(chol_b_) + log_det(chol_a_) +
+              (n - static_cast<double>(b)) * std::log(2.0 * std::numbers::pi) + lost_trace / noise);
+  if (!std::isfinite(value)) return kMinusInfinity;
+  if (gradient == nullptr) return value;
+
+  // E = Sigma^-1 H A^(-T/2), so that P = Sigma^-1 - E E^T. With respect to Qff the bound has the gradient
+  // 1/2 [gamma gamma^T + V^T B^-1 V / noise^2 + E E^T] (the identities cancel against the trace term),
+  // which W = Kuu^-1 Kuf turns into gradients with respect to Kuf (2 T) and Kuu (-S).
+  MatrixXd e = points_.basis - v_.transpose() * (chol_b_.solve(vh_) / noise);
+  e /= noise;
+  chol_a_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(e);
+  MatrixXd t(m, count);
+  const MatrixXd shrink = (MatrixXd::Identity(m, m) - b_inverse_) / noise;
+  t.noalias() = shrink * v_;
+  t.noalias() += (v_ * gamma) * gamma.transpose();
+  t.noalias() += (v_ * e) * e.transpose();
+  t *= 0.5;
+  MatrixXd s = t * v_.transpose();  // L^T S L
+  chol_uu_.matrixL().transpose().solveInPlace(t);
+  chol_uu_.matrixL().transpose().solveInPlace(s);
+  chol_uu_.matrixL().solveInPlace<Eigen::OnTheRight>(s);
+
+  gradient->setZero();
+  for (Index j = 0; j < count; ++j) {
+    const ArrayXd tk = 2.0 * t.col(j).array() * kuf_.col(j).array();
+    (*gradient)[0] += (tk * (z1_ - points_.x1[j]).square()).sum();
+    (*gradient)[1] += (tk * (z2_ - points_.x2[j]).square()).sum();
+    (*gradient)[2] += tk.sum();
+  }
+  for (Index j = 0; j < m; ++j) {
+    const ArrayXd sk = s.col(j).array() * kuu_.col(j).array();
+    (*gradient)[0] -= (sk * (z1_ - z1_[j]).square()).sum();
+    (*gradient)[1] -= (sk * (z2_ - z2_[j]).square()).sum();
+    (*gradient)[2] -= sk.sum();
+  }
+  (*gradient)[0] *= std::exp(-2.0 * hyper[0]);
+  (*gradient)[1] *= std::exp(-2.0 * hyper[1]);
+  (*gradient)[2] -= 0.5 * n * signal / noise;
+  const double trace_p =
+      (n - static_cast<double>(m) + b_inverse_.trace()) / noise - e.squaredNorm();
+  (*gradient)[3] = 0.5 * noise * (gamma.squaredNorm() - trace_p) + 0.5 * lost_trace / noise;
+  return value;
+}
+
+GpPosterior SparseGp::posterior(const GpHyper& hyper) {
+  SPARFLOW_CHECK(factorise(hyper), "posterior asked for at hyperparameters without a bound");
+  const double noise = std::exp(hyper[3]);
+  const Index m = z1_.size(), b = points_.basis.cols();
+  GpPosterior out;
+  out.x1 = z1_;
+  out.x2 = z2_;
+  out.beta = beta_;
+  out.weight = chol_b_.solve(vy_ - vh_ * beta_) / noise;
+  chol_uu_.matrixL().transpose().solveInPlace(out.weight);
+  // With a = L^-1 k: variance = s^2 - a^T (I - B^-1) a + r^T A^-1 r, r = h - G a, G = (V H)^T B^-1 / noise.
+  const MatrixXd g = (chol_b_.solve(vh_) / noise).transpose();
+  const MatrixXd a_inverse = chol_a_.solve(MatrixXd::Identity(b, b));
+  MatrixXd kk = MatrixXd::Identity(m, m) - b_inverse_ - g.transpose() * a_inverse * g;
+  MatrixXd kh = g.transpose() * a_inverse;
+  chol_uu_.matrixL().transpose().solveInPlace(kk);
+  chol_uu_.matrixL().solveInPlace<Eigen::OnTheRight>(kk);
+  chol_uu_.matrixL().transpose().solveInPlace(kh);
+  out.core = MatrixXd(m + b, m + b);
+  out.core.topLeftCorner(m, m) = 0.5 * (kk + kk.transpose());
+  out.core.topRightCorner(m, b) = kh;
+  out.core.bottomLeftCorner(b, m) = kh.transpose();
+  out.core.bottomRightCorner(b, b) = -a_inverse;
+  return out;
+}
+
+}  // namespace sparflow
