@@ -3,6 +3,7 @@
 /// each with exact dense derivative blocks. Implemented by the crane (optimizer/crane_knot_model.h)
 /// and by the reference problem (bench/).
 #include <Eigen/Dense>
+#include <string>
 
 namespace sparflow {
 
@@ -25,6 +26,11 @@ class KnotModel {
   virtual void path_bounds(double* /*lower*/, double* /*upper*/) const {}
   /// Whether row `row` depends on the velocities (rows that do not get a narrower Jacobian block).
   virtual bool path_uses_velocity(int /*row*/) const { return true; }
+  /// Whether row `row` depends on the accelerations. Rows that do are imposed at both ends of every
+  /// interval with that interval's qdd, the others once a knot.
+  virtual bool path_uses_acceleration(int /*row*/) const { return uses_acceleration(); }
+  /// Words for messages, e.g. "flow of pump main".
+  virtual std::string path_name(int row) const { return "path row " + std::to_string(row); }
   virtual void path(const double* /*z*/, double* /*g*/) {}
   /// Values and Jacobian [path_count x size, row-major].
   virtual void path_jacobian(const double* /*z*/, double* /*g*/, double* /*jacobian*/) {}

@@ -1,0 +1,403 @@
+#include "bench/reference_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sparflow::bench {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kToLpm = 60000.0;  // m^3/s -> l/min
+constexpr double kToKiloNewton = 1e-3;
+constexpr double kBarLpmToKilowatt = 1.0 / 600.0;
+}  // namespace
+
+/// Transmission ratio c' = d length / d joint of one cylinder, and its derivatives.
+struct ReferenceKnot::Rate {
+  double ratio = 1.0, d = 0.0, dd = 0.0;
+};
+
+/// What follows from one cylinder's speed v: direction weight (extend), flow, and derivatives with respect to v.
+struct ReferenceKnot::Speed {
+  double extend, retract;  ///< w and 1 - w, both accurate when tiny
+  double d_extend, dd_extend;
+  double flow, d_flow, dd_flow;  ///< [l/min]
+};
+
+/// Pressure blended over the directions, margin included, with respect to (v, F).
+struct ReferenceKnot::Blend {
+  double value, d_v, d_f, d_vv, d_vf, d_ff;
+};
+
+ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
+    : problem_(std::move(problem)) {
+  const ReferenceProblem& p = *problem_;
+  // tau1 = gS_inner cos th1 + tau2, tau2 = (gS_fixed + gS_slide d) cos phi, tau3 = gS_slide sin phi
+  gS_inner_ = p.gravity * (p.m_inner * p.s_inner + (p.m_outer + p.m_tele + p.m_payload) * p.L1);
+  gS_fixed_ = p.gravity * (p.m_outer * p.s_outer + p.m_tele * p.s_tele0 + p.m_payload * p.L2);
+  gS_slide_ = p.gravity * (p.m_tele * p.s_tele1 + p.m_payload);
+  const std::array<double, 2> offset = {p.alpha1, kPi + p.alpha2};
+  for (std::size_t i = 0; i < 2; ++i) {
+    angle_sin_[i] = std::sin(offset[i]);
+    angle_cos_[i] = std::cos(offset[i]);
+  }
+  // A direction of weight u is left out when that changes nothing at 1e-13 relative: it moves the blended
+  // pressure by at most u (bound_extend + bound_retract), the log-sum-exp by no more than that, and the pump
+  // pressure is never below standby, so u (b_e + b_r) <= 1e-13 standby suffices. In the derivatives the same
+  // terms carry (2/eps_v)^k, which is also the scale of the k-th derivative where the direction changes.
+  for (std::size_t i = 0; i < 3; ++i) {
+    negligible_[i] = 1e-13 * p.standby / (p.gp[i][0].bound + p.gp[i][1].bound);
+  }
+}
+
+void ReferenceKnot::rates(const double* z, Rate* rate) const {
+  const ReferenceProblem& p = *problem_;
+  const std::array<double, 2> a = {p.a1, p.a2}, b = {p.b1, p.b2};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double s0 = std::sin(z[i]), c0 = std::cos(z[i]);
+    const double sine = s0 * angle_cos_[i] + c0 * angle_sin_[i];
+    const double cosine = c0 * angle_cos_[i] - s0 * angle_sin_[i];
+    const double ab = a[i] * b[i];
+    const double inverse = 1.0 / std::sqrt(a[i] * a[i] + b[i] * b[i] - 2.0 * ab * cosine);
+    // c c' = ab sin, c c'' + c'^2 = ab cos, c c''' + 3 c' c'' = -ab sin
+    Rate& r = rate[i];
+    r.ratio = ab * sine * inverse;
+    r.d = (ab * cosine - r.ratio * r.ratio) * inverse;
+    r.dd = (-ab * sine - 3.0 * r.ratio * r.d) * inverse;
+  }
+  rate[2] = {1.0, 0.0, 0.0};
+}
+
+ReferenceKnot::Speed ReferenceKnot::speed(int cylinder, double v) const {
+  const ReferenceProblem& p = *problem_;
+  const auto i = static_cast<std::size_t>(cylinder);
+  Speed s;
+  // The smaller weight first: 1 - w would lose it. Beyond 2|v|/eps = 40 it is below 5e-18.
+  const double argument = 2.0 * std::abs(v) / p.eps_v;
+  const double tail = argument < 40.0 ? std::exp(-argument) : 0.0;
+  const double small = tail / (1.0 + tail), large = 1.0 / (1.0 + tail);
+  s.extend = v >= 0.0 ? large : small;
+  s.retract = v >= 0.0 ? small : large;
+  s.d_extend = 2.0 * small * large / p.eps_v;
+  s.dd_extend = 2.0 * s.d_extend * (s.retract - s.extend) / p.eps_v;
+
+  const double root = std::sqrt(v * v + p.eps_v * p.eps_v);
+  const double d_root = v / root, dd_root = p.eps_v * p.eps_v / (root * root * root);
+  const double difference = p.area_piston[i] - p.area_rod[i];
+  const double area = s.extend * p.area_piston[i] + s.retract * p.area_rod[i];
+  const double d_area = difference * s.d_extend, dd_area = difference * s.dd_extend;
+  s.flow = kToLpm * area * root;
+  s.d_flow = kToLpm * (d_area * root + area * d_root);
+  s.dd_flow = kToLpm * (dd_area * root + 2.0 * d_area * d_root + area * dd_root);
+  return s;
+}
+
+void ReferenceKnot::forces(const double* z, const Rate* rate, double* force) const {
+  const double phi = z[0] + z[1];
+  const double tau2 = (gS_fixed_ + gS_slide_ * z[2]) * std::cos(phi);
+  const double tau1 = gS_inner_ * std::cos(z[0]) + tau2;
+  const double tau3 = gS_slide_ * std::sin(phi);
+  force[0] = kToKiloNewton * tau1 / rate[0].ratio;
+  force[1] = kToKiloNewton * tau2 / rate[1].ratio;
+  force[2] = kToKiloNewton * tau3;
+}
+
+/// Log-sum-exp over standby and the cylinders' pressures; the largest term is taken out, so nothing overflows.
+/// @param share [3] weights of the softmax (derivatives), may be null
+double ReferenceKnot::pump_pressure(const double* pressure, double* share) const {
+  const ReferenceProblem& p = *problem_;
+  const double t = p.lse_temperature;
+  const double top = std::max({p.standby, pressure[0], pressure[1], pressure[2]});
+  std::array<double, 3> term;
+  double sum = std::exp((p.standby - top) / t);
+  for (std::size_t i = 0; i < 3; ++i) {
+    term[i] = std::exp((pressure[i] - top) / t);
+    sum += term[i];
+  }
+  if (share != nullptr) {
+    for (std::size_t i = 0; i < 3; ++i) share[i] = term[i] / sum;
+  }
+  return top + t * std::log(sum);
+}
+
+ReferenceKnot::State ReferenceKnot::state(const double* z) {
+  const ReferenceProblem& p = *problem_;
+  Rate rate[3];
+  rates(z, rate);
+  State out;
+  forces(z, rate, out.force.data());
+  std::array<double, 3> demand;
+  double total_flow = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Speed s = speed(static_cast<int>(i), rate[i].ratio * z[3 + i]);
+    out.flow[i] = s.flow;
+    total_flow += s.flow;
+    double pressure = 0.0;
+    const double weight[2] = {s.extend, s.retract};
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (weight[side] <= negligible_[i]) continue;
+      const ReferenceGp& gp = p.gp[i][side];
+      pressure += weight[side] * kernel_sum(gp.centres(), s.flow * gp.inverse_length_flow,
+                                            out.force[i] * gp.inverse_length_force);
+    }
+    out.pressure[i] = pressure;
+    const double q2 = s.flow * s.flow;
+    demand[i] = pressure + p.margin * q2 / (q2 + p.q_eps * p.q_eps);
+  }
+  out.pump = pump_pressure(demand.data(), nullptr);
+  out.power = kBarLpmToKilowatt * out.pump * total_flow;
+  return out;
+}
+
+double ReferenceKnot::cost(const double* z) { return state(z).power; }
+
+double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double* hessian) {
+  const ReferenceProblem& p = *problem_;
+  Rate rate[3];
+  rates(z, rate);
+  double force[3];
+  forces(z, rate, force);
+
+  // Pressures with margin, with respect to each cylinder's own (v, F).
+  Speed speeds[3];
+  Blend blend[3];
+  double demand[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Speed s = speeds[i] = speed(static_cast<int>(i), rate[i].ratio * z[3 + i]);
+    KernelSums side[2];
+    const double weight[2] = {s.extend, s.retract};
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (weight[k] <= negligible_[i]) continue;
+      const ReferenceGp& gp = p.gp[i][k];
+      const double iq = gp.inverse_length_flow, jf = gp.inverse_length_force;
+      KernelSums sums = kernel_sum_derivatives(gp.centres(), s.flow * iq, force[i] * jf);
+      sums.d_x *= iq;
+      sums.d_y *= jf;
+      sums.d_xx *= iq * iq;
+      sums.d_xy *= iq * jf;
+      sums.d_yy *= jf * jf;
+      side[k] = sums;
+    }
+    const auto mixed = [&](double KernelSums::*part) {
+      return s.extend * side[0].*part + s.retract * side[1].*part;
+    };
+    const auto apart = [&](double KernelSums::*part) { return side[0].*part - side[1].*part; };
+    const double q2 = s.flow * s.flow, e2 = p.q_eps * p.q_eps, sum = q2 + e2;
+    const double margin = p.margin * q2 / sum;
+    const double d_margin = p.margin * 2.0 * e2 * s.flow / (sum * sum);
+    const double dd_margin = p.margin * 2.0 * e2 * (e2 - 3.0 * q2) / (sum * sum * sum);
+    const double d_q = mixed(&KernelSums::d_x) + d_margin;
+    Blend& b = blend[i];
+    b.value = demand[i] = mixed(&KernelSums::value) + margin;
+    b.d_v = s.d_extend * apart(&KernelSums::value) + d_q * s.d_flow;
+    b.d_f = mixed(&KernelSums::d_y);
+    b.d_vv = s.dd_extend * apart(&KernelSums::value) +
+             2.0 * s.d_extend * s.d_flow * apart(&KernelSums::d_x) +
+             (mixed(&KernelSums::d_xx) + dd_margin) * s.d_flow * s.d_flow + d_q * s.dd_flow;
+    b.d_vf = s.d_extend * apart(&KernelSums::d_y) + mixed(&KernelSums::d_xy) * s.d_flow;
+    b.d_ff = mixed(&KernelSums::d_yy);
+  }
+
+  // Power with respect to v and F of all cylinders: pump pressure times total flow.
+  double share[3];
+  const double pump = pump_pressure(demand, share);
+  const double flow = speeds[0].flow + speeds[1].flow + speeds[2].flow;
+  Vector3d pump_v, pump_f, flow_v;
+  for (int i = 0; i < 3; ++i) {
+    pump_v[i] = share[i] * blend[i].d_v;
+    pump_f[i] = share[i] * blend[i].d_f;
+    flow_v[i] = speeds[i].d_flow;
+  }
+  const double k = kBarLpmToKilowatt, curl = 1.0 / p.lse_temperature;
+  const Vector3d power_v = k * (flow * pump_v + pump * flow_v);
+  const Vector3d power_f = k * flow * pump_f;
+  const Vector3d flow_v_k = k * flow_v;
+  const double fk = k * flow, fc = fk * curl;
+  Matrix3d h_vv, h_vf, h_ff;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      h_vv(r, c) = -fc * pump_v[r] * pump_v[c] + flow_v_k[r] * pump_v[c] + pump_v[r] * flow_v_k[c];
+      h_vf(r, c) = -fc * pump_v[r] * pump_f[c] + flow_v_k[r] * pump_f[c];
+      h_ff(r, c) = -fc * pump_f[r] * pump_f[c];
+    }
+    const Blend& b = blend[c];
+    h_vv(c, c) += fk * share[c] * (b.d_vv + curl * b.d_v * b.d_v) + k * pump * speeds[c].dd_flow;
+    h_vf(c, c) += fk * share[c] * (b.d_vf + curl * b.d_v * b.d_f);
+    h_ff(c, c) += fk * share[c] * (b.d_ff + curl * b.d_f * b.d_f);
+  }
+
+  // Forces: F_i = 1e-3 tau_i / c_i'; gradients and Hessians with respect to q.
+  const double phi = z[0] + z[1], sin_phi = std::sin(phi), cos_phi = std::cos(phi);
+  const double arm = gS_fixed_ + gS_slide_ * z[2];
+  const double tau2 = arm * cos_phi;
+  const double inner_cos = gS_inner_ * std::cos(z[0]), inner_sin = gS_inner_ * std::sin(z[0]);
+  const double tau[3] = {inner_cos + tau2, tau2, gS_slide_ * sin_phi};
+  const Vector3d d_tau[3] = {{-inner_sin - arm * sin_phi, -arm * sin_phi, gS_slide_ * cos_phi},
+                             {-arm * sin_phi, -arm * sin_phi, gS_slide_ * cos_phi},
+                             {gS_slide_ * cos_phi, gS_slide_ * cos_phi, 0.0}};
+  Matrix3d force_q;                    // row i = gradient of F_i
+  Matrix3d curved = Matrix3d::Zero();  // sum_i power_f[i] * Hessian of F_i
+  for (int i = 0; i < 3; ++i) {
+    const Rate& r = rate[i];
+    const double inv = kToKiloNewton / r.ratio;
+    const double d_inv = -inv * r.d / r.ratio;
+    const double dd_inv = inv * (2.0 * r.d * r.d / r.ratio - r.dd) / r.ratio;
+    force_q.row(i) = inv * d_tau[i].transpose();
+    force_q(i, i) += d_inv * tau[i];
+    const double lambda = power_f[i];
+    const double bend = lambda * inv * -(i == 2 ? tau[2] : tau2);  // both angles turn phi alike
+    curved(0, 0) += bend;
+    curved(0, 1) += bend;
+    curved(1, 0) += bend;
+    curved(1, 1) += bend;
+    if (i == 0) curved(0, 0) -= lambda * inv * inner_cos;
+    if (i < 2) {
+      const double slide = -lambda * inv * gS_slide_ * sin_phi;
+      curved(0, 2) += slide;
+      curved(2, 0) += slide;
+      curved(1, 2) += slide;
+      curved(2, 1) += slide;
+    }
+    curved.row(i) += lambda * d_inv * d_tau[i].transpose();
+    curved.col(i) += lambda * d_inv * d_tau[i];
+    curved(i, i) += lambda * dd_inv * tau[i];
+  }
+
+  // v_i = c_i'(q_i) qd_i: one diagonal with respect to q (a), one with respect to qd (b).
+  Vector3d a, b;
+  for (int i = 0; i < 3; ++i) {
+    a[i] = rate[i].d * z[3 + i];
+    b[i] = rate[i].ratio;
+  }
+  Eigen::Map<Eigen::Matrix<double, 6, 1>> g(gradient);
+  g.head<3>() = a.cwiseProduct(power_v);
+  g.head<3>().noalias() += force_q.transpose() * power_f;
+  g.tail<3>() = b.cwiseProduct(power_v);
+
+  const Matrix3d vf_q = h_vf * force_q;  // d power_v through the forces
+  Matrix3d qq = force_q.transpose() * h_ff * force_q + curved;
+  Matrix3d q_qd;  // row qd, column q
+  Eigen::Map<Eigen::Matrix<double, 6, 6>> h(hessian);
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      qq(r, c) += a[r] * h_vv(r, c) * a[c] + a[r] * vf_q(r, c) + vf_q(c, r) * a[c];
+      q_qd(r, c) = b[r] * (h_vv(r, c) * a[c] + vf_q(r, c));
+      h(3 + r, 3 + c) = b[r] * h_vv(r, c) * b[c];
+    }
+    qq(c, c) += power_v[c] * rate[c].dd * z[3 + c];
+    q_qd(c, c) += power_v[c] * rate[c].d;
+  }
+  h.topLeftCorner<3, 3>() = qq;
+  h.bottomLeftCorner<3, 3>() = q_qd;
+  h.topRightCorner<3, 3>() = q_qd.transpose();
+  return k * pump * flow;
+}
+
+void ReferenceKnot::path_bounds(double* lower, double* upper) const {
+  lower[0] = -kNoBound;
+  upper[0] = problem_->q_total_max;
+}
+
+void ReferenceKnot::path(const double* z, double* g) {
+  Rate rate[3];
+  rates(z, rate);
+  g[0] = 0.0;
+  for (int i = 0; i < 3; ++i) g[0] += speed(i, rate[i].ratio * z[3 + i]).flow;
+}
+
+void ReferenceKnot::path_jacobian(const double* z, double* g, double* jacobian) {
+  Rate rate[3];
+  rates(z, rate);
+  g[0] = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const Speed s = speed(i, rate[i].ratio * z[3 + i]);
+    g[0] += s.flow;
+    jacobian[i] = s.d_flow * rate[i].d * z[3 + i];
+    jacobian[3 + i] = s.d_flow * rate[i].ratio;
+  }
+}
+
+void ReferenceKnot::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
+  Rate rate[3];
+  rates(z, rate);
+  Eigen::Map<Eigen::Matrix<double, 6, 6>> h(hessian);
+  for (int i = 0; i < 3; ++i) {
+    const double qd = z[3 + i];
+    const Speed s = speed(i, rate[i].ratio * qd);
+    const double a = rate[i].d * qd, b = rate[i].ratio, m = multiplier[0];
+    const double cross = m * (s.dd_flow * a * b + s.d_flow * rate[i].d);
+    h(i, i) += m * (s.dd_flow * a * a + s.d_flow * rate[i].dd * qd);
+    h(i, 3 + i) += cross;
+    h(3 + i, i) += cross;
+    h(3 + i, 3 + i) += m * s.dd_flow * b * b;
+  }
+}
+
+void ReferenceGoal::bounds(double* lower, double* upper) const {
+  for (std::size_t i = 0; i < 2; ++i) lower[i] = upper[i] = problem_->goal[i];
+}
+
+void ReferenceGoal::value(const double* q, double* g) {
+  const ReferenceProblem& p = *problem_;
+  const double phi = q[0] + q[1], reach = p.L2 + q[2];
+  g[0] = p.base[0] + p.L1 * std::cos(q[0]) + reach * std::cos(phi);
+  g[1] = p.base[1] + p.L1 * std::sin(q[0]) + reach * std::sin(phi);
+}
+
+void ReferenceGoal::jacobian(const double* q, double* jacobian) {
+  const ReferenceProblem& p = *problem_;
+  const double phi = q[0] + q[1], reach = p.L2 + q[2];
+  const double s = std::sin(phi), c = std::cos(phi);
+  const double rows[6] = {-p.L1 * std::sin(q[0]) - reach * s, -reach * s, c,
+                          p.L1 * std::cos(q[0]) + reach * c,  reach * c,  s};
+  std::copy(rows, rows + 6, jacobian);
+}
+
+void ReferenceGoal::add_hessian(const double* q, const double* multiplier, double* hessian) {
+  const ReferenceProblem& p = *problem_;
+  const double phi = q[0] + q[1], reach = p.L2 + q[2];
+  const double s = std::sin(phi), c = std::cos(phi);
+  const double turn = -reach * (multiplier[0] * c + multiplier[1] * s);
+  const double slide = -multiplier[0] * s + multiplier[1] * c;
+  Eigen::Map<Matrix3d> h(hessian);
+  h.topLeftCorner<2, 2>().array() += turn;
+  h(0, 0) -= p.L1 * (multiplier[0] * std::cos(q[0]) + multiplier[1] * std::sin(q[0]));
+  h.block<2, 1>(0, 2).array() += slide;
+  h.block<1, 2>(2, 0).array() += slide;
+}
+
+Transcription reference_transcription(std::shared_ptr<const ReferenceProblem> problem) {
+  const ReferenceProblem& p = *problem;
+  const auto vec = [](const std::array<double, 3>& v) -> Eigen::VectorXd {
+    return Vector3d(v[0], v[1], v[2]);
+  };
+  const int n = p.intervals;
+  TranscriptionSpec spec;
+  spec.t = Eigen::VectorXd::LinSpaced(n + 1, 0.0, p.duration);
+  spec.knot = std::make_shared<ReferenceKnot>(problem);
+  spec.terminal = std::make_shared<ReferenceGoal>(problem);
+  spec.bounds = TranscriptionBounds::uniform(n, vec(p.q_lb), vec(p.q_ub), vec(p.qd_lb),
+                                             vec(p.qd_ub), vec(p.qdd_lb), vec(p.qdd_ub));
+  spec.bounds.rest_to_rest(vec(p.q_start));
+  spec.acceleration_weight = Eigen::VectorXd::Constant(3, p.w_acc);
+  spec.acceleration_weight_times_step = false;
+  spec.joint_names = {"th1", "th2", "d"};
+  Transcription nlp(std::move(spec));
+
+  // Straight line in joint space; the rates are its slope, but for rest at both ends.
+  const Eigen::VectorXd first = vec(p.q_start), way = vec(p.q_goal_guess) - first;
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(nlp.size().variables);
+  for (int k = 0; k <= n; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      x[nlp.q_index(k, i)] = first[i] + way[i] * k / n;
+      if (k > 0 && k < n) x[nlp.qd_index(k, i)] = way[i] / p.duration;
+    }
+  }
+  nlp.set_start(x);
+  return nlp;
+}
+
+}  // namespace sparflow::bench

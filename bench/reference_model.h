@@ -1,0 +1,113 @@
+#pragma once
+/// The reference NLP: one energy-optimal reach of a planar three-cylinder crane in which every number is fixed
+/// (bench/data/reference_problem.json; equations in docs/transcription.md). It smooths activation and direction on
+/// purpose, to be one smooth problem; it is a yardstick for derivative code and speed, not a way to pose a task.
+///
+/// Units of this problem, unlike the rest of the program: flow l/min, force kN, pressure bar, power kW,
+/// energy kJ; angles rad, lengths m, speeds m/s.
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "models/gp_kernel.h"
+#include "optimizer/transcription.h"
+
+namespace sparflow::bench {
+
+/// Pressure of one cylinder in one direction: sum_j weight_j exp(-1/2 |(Q, F)/l - centre_j|^2) [bar].
+struct ReferenceGp {
+  double inverse_length_flow = 0.0;   ///< [min/l]
+  double inverse_length_force = 0.0;  ///< [1/kN]
+  std::vector<double> flow, force;  ///< centres divided by the length-scales, padded for the kernel
+  std::vector<double> weight;       ///< [bar] sf2 * alpha
+  /// |P(Q, F)| <= bound everywhere [bar]: the norm sqrt(w^T K w) of P in the kernel's Hilbert space, as
+  /// |P(x)| = |<P, k(x, .)>| <= |P| sqrt(k(x, x)) and k(x, x) = 1.
+  double bound = 0.0;
+
+  KernelCentres centres() const {
+    return {flow.data(), force.data(), weight.data(), weight.size()};
+  }
+};
+
+struct ReferenceProblem {
+  double duration = 0.0;  ///< [s]
+  int intervals = 0;
+  double gravity = 0.0;
+  std::array<double, 2> base{};
+  double L1 = 0.0, L2 = 0.0;
+  double m_inner = 0.0, s_inner = 0.0, m_outer = 0.0, s_outer = 0.0, m_tele = 0.0, s_tele0 = 0.0,
+         s_tele1 = 0.0, m_payload = 0.0;
+  double a1 = 0.0, b1 = 0.0, alpha1 = 0.0, a2 = 0.0, b2 = 0.0, alpha2 = 0.0;
+  std::array<double, 3> area_piston{}, area_rod{};            ///< [m^2]
+  double eps_v = 0.0;                                         ///< [m/s]
+  double q_eps = 0.0;                                         ///< [l/min]
+  double standby = 0.0, margin = 0.0, lse_temperature = 0.0;  ///< [bar]
+  double q_total_max = 0.0;                                   ///< [l/min]
+  double w_acc = 0.0;
+  std::array<double, 3> q_lb{}, q_ub{}, qd_lb{}, qd_ub{}, qdd_lb{}, qdd_ub{};
+  std::array<double, 3> q_start{}, q_goal_guess{};
+  std::array<double, 2> goal{};                  ///< [m] x, z
+  std::array<std::array<ReferenceGp, 2>, 3> gp;  ///< [cylinder][extend, retract]
+};
+
+/// @throws InputError with file and key when the file cannot be read, is not JSON, or lacks something
+ReferenceProblem read_reference_problem(const std::string& path);
+
+/// Power of one instant, z = [th1, th2, d, and their rates], and the total flow as path constraint.
+class ReferenceKnot final : public KnotModel {
+ public:
+  explicit ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem);
+
+  /// What stands between z and the power, for checks and pages.
+  struct State {
+    std::array<double, 3> force, flow, pressure;
+    double pump = 0.0, power = 0.0;
+  };
+  State state(const double* z);
+
+  int joint_count() const override { return 3; }
+  double cost(const double* z) override;
+  double cost_derivatives(const double* z, double* gradient, double* hessian) override;
+  int path_count() const override { return 1; }
+  void path_bounds(double* lower, double* upper) const override;
+  std::string path_name(int) const override { return "total flow"; }
+  void path(const double* z, double* g) override;
+  void path_jacobian(const double* z, double* g, double* jacobian) override;
+  void add_path_hessian(const double* z, const double* multiplier, double* hessian) override;
+
+ private:
+  struct Rate;
+  struct Speed;
+  struct Blend;
+  void rates(const double* z, Rate* rate) const;
+  Speed speed(int cylinder, double v) const;
+  void forces(const double* z, const Rate* rate, double* force) const;
+  double pump_pressure(const double* pressure, double* share) const;
+
+  std::shared_ptr<const ReferenceProblem> problem_;
+  double gS_inner_, gS_fixed_,
+      gS_slide_;  ///< moments of weight [Nm], [Nm], [N]: see the constructor
+  std::array<double, 2> angle_sin_, angle_cos_;  ///< of the linkage offsets
+  std::array<double, 3> negligible_;  ///< weight below which a direction is not evaluated
+};
+
+/// The tip at the goal, x and z [m].
+class ReferenceGoal final : public TerminalModel {
+ public:
+  explicit ReferenceGoal(std::shared_ptr<const ReferenceProblem> problem)
+      : problem_(std::move(problem)) {}
+  int count() const override { return 2; }
+  void bounds(double* lower, double* upper) const override;
+  void value(const double* q, double* g) override;
+  void jacobian(const double* q, double* jacobian) override;
+  void add_hessian(const double* q, const double* multiplier, double* hessian) override;
+
+ private:
+  std::shared_ptr<const ReferenceProblem> problem_;
+};
+
+/// The whole NLP with its initial guess.
+Transcription reference_transcription(std::shared_ptr<const ReferenceProblem> problem);
+
+}  // namespace sparflow::bench

@@ -1,0 +1,230 @@
+#include "optimizer/transcription.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <unordered_map>
+
+#include "models/error.h"
+
+namespace sparflow {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+bool same_point(const VectorXd& known, const double* x) {
+  return std::memcmp(known.data(), x, sizeof(double) * static_cast<std::size_t>(known.size())) == 0;
+}
+
+}  // namespace
+
+Transcription::Transcription(TranscriptionSpec spec)
+    : spec_(std::move(spec)),
+      n_(spec_.knot ? spec_.knot->joint_count() : 0),
+      knots_(static_cast<int>(spec_.t.size())),
+      intervals_(knots_ - 1),
+      z_size_(spec_.knot ? spec_.knot->size() : 0),
+      terminal_count_(spec_.terminal ? spec_.terminal->count() : 0),
+      path_count_(spec_.knot ? spec_.knot->path_count() : 0),
+      with_acceleration_(spec_.knot && spec_.knot->uses_acceleration()) {
+  SPARFLOW_CHECK(n_ >= 1 && intervals_ >= 1, "a transcription needs a model and two knots");
+  step_ = spec_.t.tail(intervals_) - spec_.t.head(intervals_);
+  SPARFLOW_CHECK((step_.array() > 0.0).all(), "knots must increase in time");
+  const TranscriptionBounds& b = spec_.bounds;
+  for (const MatrixXd* m : {&b.q_lower, &b.q_upper, &b.qd_lower, &b.qd_upper}) {
+    SPARFLOW_CHECK(m->rows() == knots_ && m->cols() == n_, "bounds of q and qd are (N+1) x n");
+  }
+  for (const MatrixXd* m : {&b.qdd_lower, &b.qdd_upper}) {
+    SPARFLOW_CHECK(m->rows() == intervals_ && m->cols() == n_, "bounds of qdd are N x n");
+  }
+  if (spec_.acceleration_weight.size() == 0) spec_.acceleration_weight = VectorXd::Zero(n_);
+  SPARFLOW_CHECK(spec_.acceleration_weight.size() == n_, "one acceleration weight a joint");
+  acceleration_factor_ = spec_.acceleration_weight.replicate(1, intervals_);
+  if (spec_.acceleration_weight_times_step) {
+    acceleration_factor_.array().rowwise() *= step_.transpose().array();
+  }
+
+  make_nodes();
+  make_defects();
+  make_jacobian();
+  make_hessian();
+
+  const int x_size = n_ * (2 * knots_ + intervals_);
+  VectorXd lower(x_size), upper(x_size), g_lower(row_count_), g_upper(row_count_);
+  bounds(lower, upper, g_lower, g_upper);
+  start_ = (0.5 * (lower + upper)).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+  // NaN equals no point, so nothing is known yet.
+  cost_x_ = derivative_x_ = VectorXd::Constant(x_size, std::nan(""));
+  cost_gradient_.resize(x_size);
+  const auto z = static_cast<std::size_t>(z_size_);
+  node_cost_hessian_.resize(nodes_.size() * z * z);
+  block_.resize(z * z);
+  terminal_block_.resize(static_cast<std::size_t>(n_ * n_));
+  z_.resize(z_size_);
+  z_gradient_.resize(z_size_);
+  path_value_.resize(path_count_);
+  path_multiplier_.resize(path_count_);
+  path_jacobian_.resize(static_cast<std::size_t>(path_count_) * z);
+  terminal_jacobian_value_.resize(terminal_count_ * n_);
+}
+
+void Transcription::gather(const Node& node, const double* x, double* z) const {
+  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(n_);
+  std::memcpy(z, x + q_index(node.knot, 0), bytes);
+  std::memcpy(z + n_, x + qd_index(node.knot, 0), bytes);
+  if (with_acceleration_) std::memcpy(z + 2 * n_, x + qdd_index(node.interval, 0), bytes);
+}
+
+double Transcription::acceleration_cost(const double* x) const {
+  const Eigen::Map<const Eigen::ArrayXd> qdd(x + qdd_index(0, 0), n_ * intervals_);
+  const Eigen::Map<const Eigen::ArrayXd> w(acceleration_factor_.data(), n_ * intervals_);
+  return (w * qdd.square()).sum();
+}
+
+void Transcription::update_cost(const double* x) {
+  if (same_point(cost_x_, x)) return;
+  double total = 0.0;
+  for (const Node& node : nodes_) {
+    gather(node, x, z_.data());
+    total += node.weight * spec_.knot->cost(z_.data());
+  }
+  cost_ = total;
+  std::memcpy(cost_x_.data(), x, sizeof(double) * static_cast<std::size_t>(cost_x_.size()));
+}
+
+void Transcription::update_derivatives(const double* x) {
+  if (same_point(derivative_x_, x)) return;
+  double total = 0.0;
+  cost_gradient_.setZero();
+  const std::size_t block = static_cast<std::size_t>(z_size_ * z_size_);
+  double* hessian = node_cost_hessian_.data();
+  for (const Node& node : nodes_) {
+    gather(node, x, z_.data());
+    total += node.weight * spec_.knot->cost_derivatives(z_.data(), z_gradient_.data(), hessian);
+    for (int i = 0; i < z_size_; ++i) {
+      cost_gradient_[global_index(node, i)] += node.weight * z_gradient_[i];
+    }
+    hessian += block;
+  }
+  cost_ = total;
+  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(cost_x_.size());
+  std::memcpy(cost_x_.data(), x, bytes);
+  std::memcpy(derivative_x_.data(), x, bytes);
+}
+
+double Transcription::objective(In x) {
+  update_cost(x.data());
+  return cost_ + acceleration_cost(x.data());
+}
+
+double Transcription::model_cost(const VectorXd& x) {
+  update_cost(x.data());
+  return cost_;
+}
+
+void Transcription::gradient(In x, Out gradient) {
+  update_derivatives(x.data());
+  gradient = cost_gradient_;
+  const int first = qdd_index(0, 0), count = n_ * intervals_;
+  const Eigen::Map<const Eigen::ArrayXd> w(acceleration_factor_.data(), count);
+  gradient.segment(first, count).array() += 2.0 * w * x.segment(first, count).array();
+}
+
+void Transcription::constraints(In x, Out g) {
+  int row = 0;
+  for (const Defect& d : defects_) {
+    const int k = d.interval, i = d.joint;
+    const double qd0 = x[qd_index(k, i)], qd1 = x[qd_index(k + 1, i)];
+    g[row++] = d.velocity ? qd1 - qd0 - step_[k] * x[qdd_index(k, i)]
+                          : x[q_index(k + 1, i)] - x[q_index(k, i)] - 0.5 * step_[k] * (qd0 + qd1);
+  }
+  if (terminal_count_ > 0) {
+    spec_.terminal->value(x.data() + q_index(intervals_, 0), g.data() + terminal_row_);
+  }
+  if (path_count_ == 0) return;
+  for (const Node& node : nodes_) {
+    const std::vector<int>& rows = rows_of(node);
+    if (rows.empty()) continue;
+    gather(node, x.data(), z_.data());
+    spec_.knot->path(z_.data(), path_value_.data());
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      g[node.first_row + static_cast<int>(r)] = path_value_[rows[r]];
+    }
+  }
+}
+
+void Transcription::jacobian(In x, Out value) {
+  value = jacobian_constant_;
+  if (terminal_count_ > 0) {
+    spec_.terminal->jacobian(x.data() + q_index(intervals_, 0), terminal_jacobian_value_.data());
+    value.segment(terminal_jacobian_, terminal_count_ * n_) = terminal_jacobian_value_;
+  }
+  if (path_count_ == 0) return;
+  for (std::size_t s = 0; s < nodes_.size(); ++s) {
+    const std::vector<int>& rows = rows_of(nodes_[s]);
+    if (rows.empty()) continue;
+    gather(nodes_[s], x.data(), z_.data());
+    spec_.knot->path_jacobian(z_.data(), path_value_.data(), path_jacobian_.data());
+    int at = node_jacobian_[s];
+    for (int row : rows) {
+      const double* line = path_jacobian_.data() + row * z_size_;
+      for (int local : row_columns_[static_cast<std::size_t>(row)]) value[at++] = line[local];
+    }
+  }
+}
+
+void Transcription::hessian(In x, double objective_factor, In multiplier, Out value) {
+  if (objective_factor != 0.0) update_derivatives(x.data());
+  value.setZero();
+  const std::size_t block = static_cast<std::size_t>(z_size_ * z_size_);
+  const int* place = node_hessian_.data();
+  for (std::size_t s = 0; s < nodes_.size(); ++s) {
+    const Node& node = nodes_[s];
+    const double* cost = node_cost_hessian_.data() + s * block;
+    const double factor = objective_factor * node.weight;
+    if (factor != 0.0) {  // the restoration phase asks for the constraints' part alone
+      for (std::size_t i = 0; i < block; ++i) block_[i] = factor * cost[i];
+    } else {
+      std::fill(block_.begin(), block_.end(), 0.0);
+    }
+    if (path_count_ > 0) {
+      const std::vector<int>& rows = rows_of(node);
+      path_multiplier_.setZero();
+      bool any = false;
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        const double m = multiplier[node.first_row + static_cast<int>(r)];
+        path_multiplier_[rows[r]] = m;
+        any = any || m != 0.0;
+      }
+      if (any) {
+        gather(node, x.data(), z_.data());
+        spec_.knot->add_path_hessian(z_.data(), path_multiplier_.data(), block_.data());
+      }
+    }
+    for (int c = 0; c < z_size_; ++c) {
+      for (int r = c; r < z_size_; ++r) {
+        value[*place++] += block_[static_cast<std::size_t>(c * z_size_ + r)];
+      }
+    }
+  }
+  if (terminal_count_ > 0) {
+    std::fill(terminal_block_.begin(), terminal_block_.end(), 0.0);
+    spec_.terminal->add_hessian(x.data() + q_index(intervals_, 0),
+                                multiplier.data() + terminal_row_, terminal_block_.data());
+    const int* at = terminal_hessian_.data();
+    for (int c = 0; c < n_; ++c) {
+      for (int r = c; r < n_; ++r) {
+        value[*at++] += terminal_block_[static_cast<std::size_t>(c * n_ + r)];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < acceleration_hessian_.size(); ++i) {
+    value[acceleration_hessian_[i]] += 2.0 * objective_factor * acceleration_factor_.data()[i];
+  }
+}
+
+}  // namespace sparflow
