@@ -1,0 +1,11 @@
+#pragma once
+/// Fingerprint of a file's bytes, so that a fitted model can say which data it has seen.
+#include <string>
+#include <string_view>
+
+namespace sparflow {
+
+/// SHA-256 of `bytes` as 64 lower-case hexadecimal digits. Source: FIPS 180-4, section 6.2.
+std::string sha256_hex(std::string_view bytes);
+
+}  // namespace sparflow
