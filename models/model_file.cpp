@@ -83,10 +83,11 @@ class Cursor {
     throw InputError({*file_, 0, 0}, path_, message);
   }
   [[noreturn]] void fail_expected(const std::string& expected) const {
-    std::string found = value_->is_structured()
-                            ? fmt::format("{} of {} element(s)",
-                                          value_->is_array() ? "a list" : "an object", value_->size())
-                            : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
+    std::string found =
+        value_->is_structured()
+            ? fmt::format("{} of {} element(s)", value_->is_array() ? "a list" : "an object",
+                          value_->size())
+            : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
     if (found.size() > 60) found = found.substr(0, 57) + "...";
     fail("got " + found + ", expected " + expected);
   }
@@ -134,7 +135,8 @@ class Cursor {
     return v;
   }
   long whole(const std::string& expected) const {
-    if (!value_->is_number_integer() || value_->get<double>() < 0.0 || value_->get<double>() > 1e15) {
+    if (!value_->is_number_integer() || value_->get<double>() < 0.0 ||
+        value_->get<double>() > 1e15) {
       fail_expected(expected);
     }
     return value_->get<long>();
@@ -224,11 +226,12 @@ GaussianProcess read_process(const Cursor& c) {
 
 /// Elements that must name the machine's parts, one each in the machine's order.
 template <class Part>
-std::vector<Cursor> matched(const Cursor& root, const std::string& key, const std::vector<Part>& parts) {
+std::vector<Cursor> matched(const Cursor& root, const std::string& key,
+                            const std::vector<Part>& parts) {
   std::vector<std::string> names;
   for (const Part& part : parts) names.push_back(part.name);
-  const std::string expected = fmt::format("a list, one element for each of the machine's {}: {}",
-                                           key, listed(names));
+  const std::string expected =
+      fmt::format("a list, one element for each of the machine's {}: {}", key, listed(names));
   const Cursor list = root.at(key, expected);
   const std::vector<Cursor> elements = list.list(expected);
   if (elements.size() != parts.size()) list.fail_expected(expected);
@@ -271,8 +274,8 @@ void read_provenance(const Cursor& root, CraneModel& model) {
     quality.rmse = q.at("rmse", "a number").non_negative("a number >= 0");
     quality.unit = q.at("unit", "a unit").text("a unit");
     const Cursor fit = q.at("fit_percent", "a number or null");
-    quality.fit_percent = fit.is_null() ? std::numeric_limits<double>::quiet_NaN()
-                                        : fit.number("a number or null");
+    quality.fit_percent =
+        fit.is_null() ? std::numeric_limits<double>::quiet_NaN() : fit.number("a number or null");
     quality.n = q.at("n", whole).whole(whole);
     model.quality.push_back(std::move(quality));
   }
@@ -292,8 +295,9 @@ void refuse_effects(const Cursor& root) {
   }
   const std::vector<Cursor> steps = root.at("steps", "a list").list("a list");
   if (!steps.empty()) {
-    steps[0].fail("got a step of extending the model, expected none: no effect is in this model. "
-                  "Update the program, or fit the model again");
+    steps[0].fail(
+        "got a step of extending the model, expected none: no effect is in this model. "
+        "Update the program, or fit the model again");
   }
 }
 
@@ -309,7 +313,8 @@ FilePlace place_of_byte(const std::string& file, const std::string& text, std::s
 Json parse(const std::string& text, const std::string& file) {
   const std::size_t start = text.find_first_not_of(" \t\r\n");
   if (start == std::string::npos) {
-    throw InputError({file, 0, 0}, "", "the file is empty; expected a model written by `sparflow fit`");
+    throw InputError({file, 0, 0}, "",
+                     "the file is empty; expected a model written by `sparflow fit`");
   }
   if (text[start] != '{') {
     throw InputError(place_of_byte(file, text, start + 1), "",
@@ -344,7 +349,8 @@ std::string model_to_json(const CraneModel& model) {
                                                                 : model.machine.source_text}};
   root["data"] = Json::array();
   for (const DataSource& d : model.data) {
-    root["data"].push_back({{"file", d.file}, {"sha256", d.sha256}, {"rows", d.rows}, {"use", d.use}});
+    root["data"].push_back(
+        {{"file", d.file}, {"sha256", d.sha256}, {"rows", d.rows}, {"use", d.use}});
   }
   root["quality"] = Json::array();
   for (const StageQuality& q : model.quality) {
@@ -382,15 +388,18 @@ CraneModel model_from_json(const std::string& text, const std::string& file) {
   const Json document = parse(text, file);
   const Cursor root(document, file, "");
   if (!root.has("sparflow_model")) {
-    root.fail("this JSON is not a model (no key \"sparflow_model\"); expected a file written by `sparflow fit`");
+    root.fail(
+        "this JSON is not a model (no key \"sparflow_model\"); expected a file written by "
+        "`sparflow fit`");
   }
   const Cursor version = root.at("sparflow_model", "");
   const std::string expected_version = fmt::format("a version from 1 to {}", kModelFileVersion);
   const long number = version.whole(expected_version);
   if (number > kModelFileVersion) {
-    version.fail(fmt::format("got version {}, but this program (sparflow {}) reads up to {}; update it, "
-                             "or fit the model again with this one",
-                             number, program_version(), kModelFileVersion));
+    version.fail(
+        fmt::format("got version {}, but this program (sparflow {}) reads up to {}; update it, "
+                    "or fit the model again with this one",
+                    number, program_version(), kModelFileVersion));
   }
   if (number < 1) version.fail_expected(expected_version);
   root.keys({"sparflow_model", "program", "machine", "data", "quality", "effects", "steps", "pumps",
@@ -398,14 +407,16 @@ CraneModel model_from_json(const std::string& text, const std::string& file) {
   root.at("program", "a program's name").text("a program's name");
   const Cursor machine = root.at("machine", "an object").keys({"name", "yaml"});
   machine.at("name", "a name").text("a name");
-  const std::string yaml = machine.at("yaml", "the machine file's text").text("the machine file's text");
+  const std::string yaml =
+      machine.at("yaml", "the machine file's text").text("the machine file's text");
   CraneModel model = CraneModel::untrained(parse_machine(yaml, file + " (machine.yaml)", ""));
   read_provenance(root, model);
   refuse_effects(root);
   const std::vector<Cursor> pumps = matched(root, "pumps", model.machine.pumps);
   for (std::size_t p = 0; p < pumps.size(); ++p) {
     const std::string expected = "a pressure >= 0 [Pa]";
-    model.pumps[p].standby = pumps[p].keys({"name", "standby"}).at("standby", expected).non_negative(expected);
+    model.pumps[p].standby =
+        pumps[p].keys({"name", "standby"}).at("standby", expected).non_negative(expected);
   }
   const std::vector<Cursor> cylinders = matched(root, "cylinders", model.machine.cylinders);
   for (std::size_t i = 0; i < cylinders.size(); ++i) {
