@@ -16,6 +16,12 @@ class KnotModel {
   virtual bool uses_acceleration() const { return false; }
   int size() const { return joint_count() * (uses_acceleration() ? 3 : 2); }
 
+  /// Called before every evaluation: the knot, and the interval (knot - 1 or knot) in whose name it happens.
+  /// A model whose law changes from interval to interval (modes) looks here.
+  virtual void begin_node(int /*knot*/, int /*interval*/) {}
+  /// Whether the law differs on the two sides of this knot: it is then evaluated once for each.
+  virtual bool split_at(int /*knot*/) const { return false; }
+
   /// Cost rate at z (power, in the problem's scaled unit).
   virtual double cost(const double* z) = 0;
   /// Cost rate, gradient [size] and full symmetric Hessian [size x size, column-major].

@@ -77,6 +77,7 @@ void Transcription::gather(const Node& node, const double* x, double* z) const {
   std::memcpy(z, x + q_index(node.knot, 0), bytes);
   std::memcpy(z + n_, x + qd_index(node.knot, 0), bytes);
   if (with_acceleration_) std::memcpy(z + 2 * n_, x + qdd_index(node.interval, 0), bytes);
+  spec_.knot->begin_node(node.knot, node.law);
 }
 
 double Transcription::acceleration_cost(const double* x) const {

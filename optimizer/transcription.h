@@ -101,14 +101,16 @@ class Transcription final : public NlpProblem {
   std::string constraint_name(int index) const override;
 
  private:
-  /// One evaluation of the model: a knot, or (with acceleration) one end of an interval.
+  /// One evaluation of the model: a knot, one side of a knot at which the law changes, or (with
+  /// acceleration) one end of an interval.
   struct Node {
     int knot = 0;
     int interval = -1;    ///< whose qdd; -1 = the model does not use it
     double weight = 0.0;  ///< [s] in the trapezoid
     int first_row = 0;    ///< in g, of this node's path rows
-    bool all_rows =
-        true;  ///< false: only rows that use the acceleration (the others are another node's)
+    int law = 0;          ///< interval in whose name the model is evaluated
+    /// false: only rows that use the acceleration (the others are another node's)
+    bool all_rows = true;
   };
   struct Defect {
     int interval, joint;

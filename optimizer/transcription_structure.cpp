@@ -1,6 +1,7 @@
 // The fixed part of a transcription: who stands where, computed once.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
@@ -31,14 +32,19 @@ void Transcription::make_nodes() {
     for (int k = 0; k < knots_; ++k) {
       const double before = k > 0 ? step_[k - 1] : 0.0;
       const double after = k < intervals_ ? step_[k] : 0.0;
-      nodes_.push_back({k, -1, 0.5 * (before + after), 0, true});
+      if (k > 0 && k < intervals_ && spec_.knot->split_at(k)) {
+        nodes_.push_back({k, -1, 0.5 * before, 0, k - 1, true});
+        nodes_.push_back({k, -1, 0.5 * after, 0, k, false});
+        continue;
+      }
+      nodes_.push_back({k, -1, 0.5 * (before + after), 0, std::min(k, intervals_ - 1), true});
     }
     return;
   }
   // Rows without acceleration belong to the interval that begins at the knot; at the last knot, to the last one.
   for (int k = 0; k < intervals_; ++k) {
-    nodes_.push_back({k, k, 0.5 * step_[k], 0, true});
-    nodes_.push_back({k + 1, k, 0.5 * step_[k], 0, k + 1 == intervals_});
+    nodes_.push_back({k, k, 0.5 * step_[k], 0, k, true});
+    nodes_.push_back({k + 1, k, 0.5 * step_[k], 0, k, k + 1 == intervals_});
   }
 }
 

@@ -1,0 +1,52 @@
+#pragma once
+/// Independent solves in child processes: the solver underneath is not thread-safe (MUMPS keeps module
+/// variables), processes are.
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace sparflow {
+
+struct ChildResult {
+  bool ok = false;
+  std::string bytes;  ///< what the work returned
+  std::string
+      error;  ///< why there is nothing: an exception's text, or the signal that ended the child
+};
+
+/// Runs work(0) .. work(count-1), at most `at_once` at a time, each in a forked child whose return value
+/// comes back through a pipe. With at_once <= 1 or count == 1 everything runs in this process.
+/// @param on_done called in this process as results arrive: (index, finished so far)
+std::vector<ChildResult> run_in_children(int count, int at_once,
+                                         const std::function<std::string(int)>& work,
+                                         const std::function<void(int, int)>& on_done = {});
+
+/// Number of processors this process may use.
+int usable_processors();
+
+/// Plain binary packing of what travels through the pipe (same program at both ends).
+class Packer {
+ public:
+  Packer& number(double value);
+  Packer& text(const std::string& value);
+  Packer& numbers(const double* values, std::size_t count);
+  std::string bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+class Unpacker {
+ public:
+  explicit Unpacker(const std::string& bytes) : bytes_(&bytes) {}
+  double number();
+  std::string text();
+  std::vector<double> numbers();
+
+ private:
+  void take(void* out, std::size_t size);
+  const std::string* bytes_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace sparflow

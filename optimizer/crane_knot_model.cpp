@@ -1,0 +1,390 @@
+#include "optimizer/crane_knot_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "models/error.h"
+
+namespace sparflow {
+namespace {
+
+constexpr double kPowerUnit = 1e3;     // kW
+constexpr double kFlowUnit = 1e-3;     // l/s
+constexpr double kPressureUnit = 1e7;  // 100 bar
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& problem,
+                               CraneKnotOptions options)
+    : model_(&model),
+      problem_(&problem),
+      options_(std::move(options)),
+      n_(model.machine.joint_count()),
+      m_(model.machine.cylinder_count()),
+      power_(model),
+      statics_(model.machine),
+      tip_chain_(model.machine) {
+  const Machine& machine = model.machine;
+  power_.smoothing = options_.smoothing;
+  for (int p = 0; p < machine.pump_count(); ++p) {
+    const auto i = static_cast<std::size_t>(p);
+    const double flow = problem.limits.pump_max_flow[i];
+    if (flow > 0.0) {
+      rows_.push_back({RowKind::kPumpFlow, p, -kInfinity, options_.flow_share * flow / kFlowUnit});
+    }
+  }
+  for (int c = 0; c < m_; ++c) {
+    const Valve* valve = machine.valve_of_cylinder(c);
+    const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(c)];
+    if (valve == nullptr || !cylinder.hydraulic()) continue;
+    const double share = options_.valve_share * problem.limits.valve_fraction;
+    const auto limit = [&](double flow, double area) {
+      return flow > 0.0 ? share * flow / area : kInfinity;
+    };
+    const double out = limit(valve->max_flow_extend, cylinder.area_piston());
+    const double in = limit(valve->max_flow_retract, cylinder.area_rod());
+    if (out == kInfinity && in == kInfinity) continue;
+    rows_.push_back({RowKind::kValve, c, -in, out});
+  }
+  for (int p = 0; p < machine.pump_count() && options_.limit_pressure; ++p) {
+    const auto i = static_cast<std::size_t>(p);
+    const double limit = problem.limits.pump_max_pressure[i];
+    if (limit <= 0.0 || machine.pumps[i].type != PumpType::kLoadSensing) continue;
+    rows_.push_back(
+        {RowKind::kPumpPressure, p, -kInfinity, options_.pressure_share * limit / kPressureUnit});
+  }
+  const auto* goal = std::get_if<TipGoal>(&problem.goal);
+  if (problem.tip_line) {
+    const Eigen::Vector3d end =
+        goal ? goal->tip : tip_position<double>(machine, std::get<JointGoal>(problem.goal).q);
+    line_start_ = tip_position<double>(machine, problem.start);
+    line_direction_ = (end - line_start_).normalized();
+    const double share = options_.tip_line_share;
+    rows_.push_back({RowKind::kTipLine, 0, -kInfinity, share * share});
+  }
+  if (!problem.obstacles.empty()) {
+    clearance_ = std::make_unique<ClearanceModel>(problem);
+    clearance_rows_ = clearance_->rows();
+  }
+  mode_.assign(static_cast<std::size_t>(m_), CylinderMode::kFree);
+  speed_.setZero(m_);
+  force_.setZero(m_);
+  length_.resize(static_cast<std::size_t>(m_));
+  jacobian_.setZero(2 * m_, 2 * n_);
+  scratch_gradient_.setZero(2 * m_);
+  scratch_multiplier_.setZero(clearance_rows_);
+  scratch_hessian_.setZero(2 * m_, 2 * m_);
+  product_.setZero(2 * m_, 2 * n_);
+  outer_.setZero(2 * n_, 2 * n_);
+  tip_jacobian_.setZero(3, n_);
+}
+
+void CraneKnotModel::begin_node(int /*knot*/, int interval) {
+  if (options_.modes.rows() == 0) return;
+  for (int c = 0; c < m_; ++c) mode_[static_cast<std::size_t>(c)] = options_.modes(interval, c);
+}
+
+bool CraneKnotModel::split_at(int knot) const {
+  if (options_.modes.rows() == 0 || knot <= 0 || knot >= options_.modes.rows()) return false;
+  return (options_.modes.row(knot).array() != options_.modes.row(knot - 1).array()).any();
+}
+
+void CraneKnotModel::update(const double* z, int order, bool forces) {
+  if (forces) {
+    statics_.update(z, problem_->payload, order);
+  }
+  for (int c = 0; c < m_; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    const int j = model_->machine.cylinders[i].joint;
+    length_[i] = forces ? statics_.length(c) : linkage_rates(model_->machine, c, z[j]);
+    const double qd = z[n_ + j];
+    speed_[c] = length_[i].d1 * qd;
+    if (forces) force_[c] = statics_.force()[c];
+    if (order < 1) continue;
+    jacobian_.row(c).setZero();
+    jacobian_(c, j) = length_[i].d2 * qd;
+    jacobian_(c, n_ + j) = length_[i].d1;
+    if (forces) jacobian_.row(m_ + c).head(n_) = statics_.force_jacobian().row(c);
+  }
+}
+
+void CraneKnotModel::chain_gradient(const double* g, double* gradient) const {
+  for (int column = 0; column < 2 * n_; ++column) {
+    double sum = 0.0;
+    for (int row = 0; row < 2 * m_; ++row) sum += g[row] * jacobian_(row, column);
+    gradient[column] += sum;
+  }
+}
+
+void CraneKnotModel::chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h,
+                                   double* hessian) {
+  Eigen::Map<Eigen::MatrixXd> out(hessian, 2 * n_, 2 * n_);
+  product_.noalias() = h.lazyProduct(jacobian_);
+  outer_.noalias() = jacobian_.transpose().lazyProduct(product_);
+  out += outer_;
+  for (int c = 0; c < m_; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    const int j = model_->machine.cylinders[i].joint;
+    out(j, j) += g[c] * length_[i].d3 * z[n_ + j];
+    out(n_ + j, j) += g[c] * length_[i].d2;
+    out(j, n_ + j) += g[c] * length_[i].d2;
+    if (g[m_ + c] != 0.0) out.topLeftCorner(n_, n_) += g[m_ + c] * statics_.force_hessian(c);
+  }
+}
+
+double CraneKnotModel::cost(const double* z) {
+  update(z, 0, true);
+  const double power = power_.value(speed_.data(), force_.data(), mode_.data());
+  return options_.energy_weight * power / kPowerUnit;
+}
+
+double CraneKnotModel::cost_derivatives(const double* z, double* gradient, double* hessian) {
+  update(z, 2, true);
+  const double power = power_.derivatives(speed_.data(), force_.data(), mode_.data());
+  Eigen::Map<Eigen::VectorXd> g(gradient, 2 * n_);
+  Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+  g.setZero();
+  h.setZero();
+  chain_gradient(power_.gradient().data(), gradient);
+  chain_hessian(z, power_.gradient().data(), power_.hessian(), hessian);
+  const double scale = options_.energy_weight / kPowerUnit;
+  g *= scale;
+  h *= scale;
+  return scale * power;
+}
+
+void CraneKnotModel::path_bounds(double* lower, double* upper) const {
+  std::size_t k = 0;
+  for (const Row& row : rows_) {
+    lower[k] = row.lower;
+    upper[k++] = row.upper;
+  }
+  for (int r = 0; r < clearance_rows_; ++r) {
+    lower[k] = options_.extra_clearance;
+    upper[k++] = kInfinity;
+  }
+}
+
+bool CraneKnotModel::path_uses_velocity(int row) const {
+  return row < static_cast<int>(rows_.size()) &&
+         rows_[static_cast<std::size_t>(row)].kind != RowKind::kTipLine;
+}
+
+std::string CraneKnotModel::path_name(int row) const {
+  const Machine& machine = model_->machine;
+  if (row >= static_cast<int>(rows_.size())) return "clearance from the obstacles";
+  const Row& r = rows_[static_cast<std::size_t>(row)];
+  const auto i = static_cast<std::size_t>(r.index);
+  switch (r.kind) {
+    case RowKind::kPumpFlow:
+      return fmt::format("flow of pump {}", machine.pumps[i].name);
+    case RowKind::kValve:
+      return fmt::format("flow through valve {}", machine.cylinders[i].name);
+    case RowKind::kPumpPressure:
+      return fmt::format("pressure of pump {}", machine.pumps[i].name);
+    case RowKind::kTipLine:
+      return "distance of the tip from its line";
+  }
+  return "path";
+}
+
+double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessian, double factor) {
+  // squared distance from the line in units of the tolerance
+  ChainGeometry& chain = tip_chain_;
+  chain.update(model_->machine, q);
+  const Tip& tip = model_->machine.tip;
+  const Eigen::Vector3d p = chain.point(tip.joint, tip.xyz);
+  const double scale = 1.0 / (problem_->tip_line->tolerance * problem_->tip_line->tolerance);
+  Eigen::Vector3d off = p - line_start_;
+  off -= line_direction_ * line_direction_.dot(off);
+  if (gradient == nullptr && hessian == nullptr) return scale * off.squaredNorm();
+  for (int k = 0; k < n_; ++k) {
+    tip_jacobian_.col(k) = point_jacobian(chain, tip.joint, p, k);
+    if (gradient != nullptr) gradient[k] = 2.0 * scale * off.dot(tip_jacobian_.col(k));
+  }
+  if (hessian != nullptr) {
+    Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+    for (int k = 0; k < n_; ++k) {
+      for (int i = 0; i <= k; ++i) {
+        const Eigen::Vector3d a = tip_jacobian_.col(i), b = tip_jacobian_.col(k);
+        const double inner = a.dot(b) - a.dot(line_direction_) * b.dot(line_direction_);
+        const double bend = k <= tip.joint ? off.dot(point_hessian(chain, i, b)) : 0.0;
+        const double value = factor * 2.0 * scale * (inner + bend);
+        h(i, k) += value;
+        if (i != k) h(k, i) += value;
+      }
+    }
+  }
+  return scale * off.squaredNorm();
+}
+
+void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
+  const bool forces = options_.limit_pressure;
+  update(z, jacobian != nullptr ? 1 : 0, forces);
+  if (forces) {
+    if (jacobian != nullptr) {
+      power_.derivatives(speed_.data(), force_.data(), mode_.data());
+    } else {
+      power_.value(speed_.data(), force_.data(), mode_.data());
+    }
+  }
+  const int width = 2 * n_;
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    const Row& row = rows_[r];
+    double* out = jacobian == nullptr ? nullptr : jacobian + static_cast<std::ptrdiff_t>(r) * width;
+    if (out != nullptr) std::fill(out, out + width, 0.0);
+    switch (row.kind) {
+      case RowKind::kPumpFlow: {
+        double sum = 0.0;
+        for (const int c : model_->machine.pumps[static_cast<std::size_t>(row.index)].feeds) {
+          const SmoothPower::Flow f = power_.flow(c, speed_[c], mode_[static_cast<std::size_t>(c)]);
+          sum += f.q;
+          if (out == nullptr) continue;
+          const int j = model_->machine.cylinders[static_cast<std::size_t>(c)].joint;
+          out[j] += f.d1 * jacobian_(c, j) / kFlowUnit;
+          out[n_ + j] += f.d1 * jacobian_(c, n_ + j) / kFlowUnit;
+        }
+        g[r] = sum / kFlowUnit;
+        break;
+      }
+      case RowKind::kValve: {
+        const int j = model_->machine.cylinders[static_cast<std::size_t>(row.index)].joint;
+        g[r] = speed_[row.index];
+        if (out != nullptr) {
+          out[j] = jacobian_(row.index, j);
+          out[n_ + j] = jacobian_(row.index, n_ + j);
+        }
+        break;
+      }
+      case RowKind::kPumpPressure: {
+        g[r] = power_.pump_pressure(row.index) / kPressureUnit;
+        if (out != nullptr) {
+          scratch_gradient_.setZero();
+          power_.add_pressure_gradient(row.index, 1.0 / kPressureUnit, scratch_gradient_.data());
+          chain_gradient(scratch_gradient_.data(), out);
+        }
+        break;
+      }
+      case RowKind::kTipLine:
+        g[r] = tip_line(z, out, nullptr, 1.0);
+        break;
+    }
+  }
+  if (clearance_rows_ == 0) return;
+  double* g_clear = g + rows_.size();
+  if (jacobian == nullptr) {
+    clearance_->values(z, g_clear);
+    return;
+  }
+  // rows of n values are spread into rows of 2 n, last row first so that nothing is overwritten
+  double* out = jacobian + static_cast<std::ptrdiff_t>(rows_.size()) * width;
+  clearance_->jacobian(z, g_clear, out);
+  for (int r = clearance_rows_ - 1; r >= 0; --r) {
+    for (int k = n_ - 1; k >= 0; --k) out[r * width + k] = out[r * n_ + k];
+    std::fill(out + r * width + n_, out + (r + 1) * width, 0.0);
+  }
+}
+
+void CraneKnotModel::path(const double* z, double* g) { path_all(z, g, nullptr); }
+
+void CraneKnotModel::path_jacobian(const double* z, double* g, double* jacobian) {
+  path_all(z, g, jacobian);
+}
+
+void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
+  const bool forces = options_.limit_pressure;
+  update(z, forces ? 2 : 1, forces);
+  scratch_gradient_.setZero();
+  scratch_hessian_.setZero();
+  if (forces) power_.derivatives(speed_.data(), force_.data(), mode_.data());
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    const Row& row = rows_[r];
+    const double factor = multiplier[r];
+    if (factor == 0.0) continue;
+    switch (row.kind) {
+      case RowKind::kPumpFlow:
+        for (const int c : model_->machine.pumps[static_cast<std::size_t>(row.index)].feeds) {
+          const SmoothPower::Flow f = power_.flow(c, speed_[c], mode_[static_cast<std::size_t>(c)]);
+          scratch_gradient_[c] += factor * f.d1 / kFlowUnit;
+          scratch_hessian_(c, c) += factor * f.d2 / kFlowUnit;
+        }
+        break;
+      case RowKind::kValve:
+        scratch_gradient_[row.index] += factor;
+        break;
+      case RowKind::kPumpPressure:
+        power_.add_pressure_gradient(row.index, factor / kPressureUnit, scratch_gradient_.data());
+        power_.add_pressure_hessian(row.index, factor / kPressureUnit, scratch_hessian_);
+        break;
+      case RowKind::kTipLine:
+        break;
+    }
+  }
+  chain_hessian(z, scratch_gradient_.data(), scratch_hessian_, hessian);
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    if (rows_[r].kind == RowKind::kTipLine) tip_line(z, nullptr, hessian, multiplier[r]);
+  }
+  if (clearance_rows_ > 0) {
+    outer_.setZero();
+    clearance_->add_hessian(z, multiplier + rows_.size(), outer_.data());
+    Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+    h.topLeftCorner(n_, n_) += Eigen::Map<Eigen::MatrixXd>(outer_.data(), n_, n_);
+  }
+}
+
+TipAtGoal::TipAtGoal(const Machine& machine, const Eigen::Vector3d& goal)
+    : machine_(&machine), chain_(machine), goal_(goal) {
+  // the directions in which the tip moves = the complement of those in which it cannot
+  const std::vector<Eigen::Vector3d> fixed = fixed_tip_directions(machine);
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Vector3d d = Eigen::Vector3d::Unit(axis);
+    for (const Eigen::Vector3d& f : fixed) d -= f * f.dot(d);
+    for (const Eigen::Vector3d& e : directions_) d -= e * e.dot(d);
+    if (d.norm() > 1e-6) directions_.push_back(d.normalized());
+  }
+}
+
+void TipAtGoal::bounds(double* lower, double* upper) const {
+  for (std::size_t i = 0; i < directions_.size(); ++i)
+    lower[i] = upper[i] = directions_[i].dot(goal_);
+}
+
+void TipAtGoal::value(const double* q, double* g) {
+  chain_.update(*machine_, q);
+  const Eigen::Vector3d p = chain_.point(machine_->tip.joint, machine_->tip.xyz);
+  for (std::size_t i = 0; i < directions_.size(); ++i) g[i] = directions_[i].dot(p);
+}
+
+void TipAtGoal::jacobian(const double* q, double* jacobian) {
+  chain_.update(*machine_, q);
+  const Eigen::Vector3d p = chain_.point(machine_->tip.joint, machine_->tip.xyz);
+  const int n = machine_->joint_count();
+  for (int k = 0; k < n; ++k) {
+    const Eigen::Vector3d column = point_jacobian(chain_, machine_->tip.joint, p, k);
+    for (std::size_t i = 0; i < directions_.size(); ++i) {
+      jacobian[static_cast<std::ptrdiff_t>(i) * n + k] = directions_[i].dot(column);
+    }
+  }
+}
+
+void TipAtGoal::add_hessian(const double* q, const double* multiplier, double* hessian) {
+  chain_.update(*machine_, q);
+  const Eigen::Vector3d p = chain_.point(machine_->tip.joint, machine_->tip.xyz);
+  const int n = machine_->joint_count();
+  Eigen::Vector3d weight = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < directions_.size(); ++i) weight += multiplier[i] * directions_[i];
+  Eigen::Map<Eigen::MatrixXd> h(hessian, n, n);
+  for (int k = 0; k <= machine_->tip.joint; ++k) {
+    const Eigen::Vector3d column = point_jacobian(chain_, machine_->tip.joint, p, k);
+    for (int i = 0; i <= k; ++i) {
+      const double value = weight.dot(point_hessian(chain_, i, column));
+      h(i, k) += value;
+      if (i != k) h(k, i) += value;
+    }
+  }
+}
+
+}  // namespace sparflow

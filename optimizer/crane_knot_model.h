@@ -1,0 +1,106 @@
+#pragma once
+/// The machine as a KnotModel: power of its pumps under the smooth law and every limit that is not a plain
+/// bound (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "models/crane_model.h"
+#include "models/smooth_power.h"
+#include "optimizer/knot_model.h"
+#include "problems/clearance.h"
+#include "problems/problem.h"
+
+namespace sparflow {
+
+/// Mode of every cylinder in every interval, [intervals x cylinders].
+using ModeTable = Eigen::Matrix<CylinderMode, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct CraneKnotOptions {
+  Smoothing smoothing;
+  double energy_weight = 1.0;  ///< [-] factor on the power
+  ModeTable modes;             ///< empty = every cylinder free everywhere
+  /// Shares of the limits that may be used, slightly below one so that they also hold between knots.
+  double flow_share = 1.0;
+  double valve_share = 1.0;
+  double pressure_share = 1.0;
+  double extra_clearance = 0.0;  ///< [m]
+  double tip_line_share = 1.0;
+  /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
+  /// when a motion without them came too near.
+  bool limit_pressure = false;
+};
+
+/// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m: all
+/// near one, as the solver likes it.
+class CraneKnotModel final : public KnotModel {
+ public:
+  /// The references must outlive the object.
+  CraneKnotModel(const CraneModel& model, const MotionProblem& problem, CraneKnotOptions options);
+
+  int joint_count() const override { return n_; }
+  void begin_node(int knot, int interval) override;
+  bool split_at(int knot) const override;
+  double cost(const double* z) override;
+  double cost_derivatives(const double* z, double* gradient, double* hessian) override;
+  int path_count() const override { return static_cast<int>(rows_.size()) + clearance_rows_; }
+  void path_bounds(double* lower, double* upper) const override;
+  bool path_uses_velocity(int row) const override;
+  std::string path_name(int row) const override;
+  void path(const double* z, double* g) override;
+  void path_jacobian(const double* z, double* g, double* jacobian) override;
+  void add_path_hessian(const double* z, const double* multiplier, double* hessian) override;
+
+ private:
+  enum class RowKind { kPumpFlow, kValve, kPumpPressure, kTipLine };
+  struct Row {
+    RowKind kind;
+    int index;  // pump or cylinder
+    double lower, upper;
+  };
+
+  /// Speeds, forces (of `order` derivatives) and the joint-space derivatives of both.
+  void update(const double* z, int order, bool forces);
+  /// gradient += D^T g and hessian += D^T H D + sum g_a Hess(z_a), for a function of (v, F).
+  void chain_gradient(const double* g, double* gradient) const;
+  void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
+  double tip_line(const double* q, double* gradient, double* hessian, double factor);
+  void path_all(const double* z, double* g, double* jacobian);
+
+  const CraneModel* model_;
+  const MotionProblem* problem_;
+  CraneKnotOptions options_;
+  int n_, m_;
+  SmoothPower power_;
+  StaticForce statics_;
+  ChainGeometry tip_chain_;
+  std::vector<Row> rows_;
+  std::unique_ptr<ClearanceModel> clearance_;
+  int clearance_rows_ = 0;
+  Eigen::Vector3d line_start_, line_direction_;
+  std::vector<CylinderMode> mode_;
+  Eigen::VectorXd speed_, force_, scratch_gradient_, scratch_multiplier_;
+  std::vector<Taylor3> length_;
+  Eigen::MatrixXd jacobian_;  // d(v, F)/dz, [2 m x 2 n]
+  Eigen::MatrixXd scratch_hessian_, product_, outer_;
+  Eigen::Matrix3Xd tip_jacobian_;
+};
+
+/// The tip (in the directions in which it can move) at a goal point [m].
+class TipAtGoal final : public TerminalModel {
+ public:
+  TipAtGoal(const Machine& machine, const Eigen::Vector3d& goal);
+  int count() const override { return static_cast<int>(directions_.size()); }
+  void bounds(double* lower, double* upper) const override;
+  void value(const double* q, double* g) override;
+  void jacobian(const double* q, double* jacobian) override;
+  void add_hessian(const double* q, const double* multiplier, double* hessian) override;
+
+ private:
+  const Machine* machine_;
+  ChainGeometry chain_;
+  Eigen::Vector3d goal_;
+  std::vector<Eigen::Vector3d> directions_;  // orthonormal, in which the tip is free
+};
+
+}  // namespace sparflow

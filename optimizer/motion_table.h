@@ -1,0 +1,17 @@
+#pragma once
+/// The motion file (CSV) of the contract: what the optimiser found, with everything the exact law says of it.
+#include <string>
+
+#include "models/crane_model.h"
+#include "models/trajectory.h"
+
+namespace sparflow {
+
+/// t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm and P_*_bar by cylinder, p_*_bar by pump, power_W.
+std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload);
+
+/// Reads a motion back (t, q, qd, qdd; other columns are ignored).
+/// @throws InputError with line and column name
+Trajectory load_motion(const std::string& path, const Machine& machine);
+
+}  // namespace sparflow

@@ -1,0 +1,288 @@
+#include "optimizer/optimize.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "models/error.h"
+#include "optimizer/child_processes.h"
+
+namespace sparflow {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+void pack_matrix(Packer& p, const Eigen::MatrixXd& m) {
+  p.number(static_cast<double>(m.rows())).number(static_cast<double>(m.cols()));
+  p.numbers(m.data(), static_cast<std::size_t>(m.size()));
+}
+
+Eigen::MatrixXd unpack_matrix(Unpacker& u) {
+  const auto rows = static_cast<Eigen::Index>(u.number());
+  const auto cols = static_cast<Eigen::Index>(u.number());
+  const std::vector<double> values = u.numbers();
+  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
+}
+
+std::string pack(const StartResult& r) {
+  Packer p;
+  p.text(r.seed).number(static_cast<double>(r.status)).text(r.message);
+  pack_matrix(p, r.motion.t);
+  pack_matrix(p, r.motion.q);
+  pack_matrix(p, r.motion.qd);
+  pack_matrix(p, r.motion.qdd);
+  p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
+  p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
+  p.number(r.seed_energy).number(r.seed_feasible);
+  return p.bytes();
+}
+
+StartResult unpack(const std::string& bytes) {
+  Unpacker u(bytes);
+  StartResult r;
+  r.seed = u.text();
+  r.status = static_cast<NlpStatus>(static_cast<int>(u.number()));
+  r.message = u.text();
+  r.motion.t = unpack_matrix(u);
+  r.motion.q = unpack_matrix(u);
+  r.motion.qd = unpack_matrix(u);
+  r.motion.qdd = unpack_matrix(u);
+  r.energy_exact = u.number();
+  r.energy_smooth = u.number();
+  r.excess = u.number();
+  r.iterations = static_cast<int>(u.number());
+  r.solve_s = u.number();
+  r.callbacks_s = u.number();
+  r.linear_solver_s = u.number();
+  r.modes_held = u.number() != 0.0;
+  r.seed_energy = u.number();
+  r.seed_feasible = u.number() != 0.0;
+  return r;
+}
+
+/// Two starts that ended in the same motion: all joints within a thousandth of their range at all knots.
+bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
+  if (a.size() != b.size() || a.size() < 2) return false;
+  for (Eigen::Index j = 0; j < a.q.cols(); ++j) {
+    const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
+    if ((a.q.col(j) - b.q.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
+  }
+  return true;
+}
+
+double shortest_seed(const std::vector<SeedMotion>& seeds) {
+  double shortest = 0.0;
+  for (const SeedMotion& s : seeds) {
+    if (s.shortest_duration > 0.0 && (shortest == 0.0 || s.shortest_duration < shortest))
+      shortest = s.shortest_duration;
+  }
+  return shortest;
+}
+
+void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
+                        double duration, OptimizeResult& result) {
+  const StartResult* nearest = nullptr;
+  for (const StartResult& s : result.starts) {
+    if (s.motion.size() > 1 && (nearest == nullptr || s.excess < nearest->excess)) nearest = &s;
+  }
+  std::string worst;
+  if (nearest != nullptr && !result.checks.empty()) {
+    const LimitCheck& c = result.checks.front();
+    worst = fmt::format(" Worst: {} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}.", c.what,
+                        c.time, c.value, c.limit, c.unit);
+  } else if (!result.starts.empty()) {
+    worst = " The solver says: " + result.starts.front().message + ".";
+  }
+  const double shortest = shortest_seed(seeds);
+  const std::string remedy =
+      shortest > 0.0 ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.",
+                                   shortest, duration)
+                     : std::string();
+  result.status = OptimizeStatus::kInfeasible;
+  result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
+}
+
+}  // namespace
+
+const char* to_string(OptimizeStatus status) {
+  switch (status) {
+    case OptimizeStatus::kOptimal:
+      return "optimal";
+    case OptimizeStatus::kInfeasible:
+      return "infeasible";
+    case OptimizeStatus::kFailed:
+      return "failed";
+    case OptimizeStatus::kInterrupted:
+      return "interrupted";
+  }
+  return "failed";
+}
+
+OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, double duration,
+                           const OptimizeOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  OptimizeResult result;
+  result.duration = duration;
+  const int count = static_cast<int>(seeds.size());
+  const auto work = [&](int i) {
+    return pack(
+        optimize_from(model, problem, seeds[static_cast<std::size_t>(i)], duration, options));
+  };
+  const auto done = [&](int index, int finished) {
+    if (options.progress)
+      options.progress(finished, count, seeds[static_cast<std::size_t>(index)].name);
+  };
+  const std::vector<ChildResult> children = run_in_children(count, options.processes, work, done);
+  for (int i = 0; i < count; ++i) {
+    const ChildResult& child = children[static_cast<std::size_t>(i)];
+    StartResult start;
+    if (child.ok) {
+      start = unpack(child.bytes);
+    } else {
+      start.seed = seeds[static_cast<std::size_t>(i)].name;
+      start.message = child.error;
+    }
+    for (std::size_t k = 0; k < result.starts.size() && start.same_as < 0; ++k) {
+      if (same_motion(problem, start.motion, result.starts[k].motion))
+        start.same_as = static_cast<int>(k);
+    }
+    if (start.seed_feasible &&
+        (result.best_seed_energy == 0.0 || start.seed_energy < result.best_seed_energy)) {
+      result.best_seed_energy = start.seed_energy;
+    }
+    if (start.seed_feasible && seeds[static_cast<std::size_t>(i)].straight_line &&
+        (result.straight_line_energy == 0.0 || start.seed_energy < result.straight_line_energy)) {
+      result.straight_line_energy = start.seed_energy;
+      result.straight_line_name = start.seed;
+    }
+    result.starts.push_back(std::move(start));
+  }
+  for (int i = 0; i < count; ++i) {
+    const StartResult& s = result.starts[static_cast<std::size_t>(i)];
+    if (!s.usable(options.limit_tolerance)) continue;
+    if (result.best_start < 0 ||
+        s.energy_exact < result.starts[static_cast<std::size_t>(result.best_start)].energy_exact) {
+      result.best_start = i;
+    }
+  }
+  result.solve_s = seconds_since(begin);
+  if (result.best_start >= 0) {
+    const StartResult& best = result.starts[static_cast<std::size_t>(result.best_start)];
+    result.status = best.status == NlpStatus::kInterrupted ? OptimizeStatus::kInterrupted
+                                                           : OptimizeStatus::kOptimal;
+    result.motion = best.motion;
+    result.energy_smooth = best.energy_smooth;
+    result.energy = exact_energy(model, best.motion, problem.payload, options.refine);
+    result.checks = check_limits(model, problem, best.motion, options.refine);
+    result.message =
+        fmt::format("{}: {:.1f} kJ in {:.2f} s", problem.name, result.energy.total / 1e3, duration);
+    return result;
+  }
+  bool interrupted = false;
+  for (const StartResult& s : result.starts) {
+    interrupted = interrupted || s.status == NlpStatus::kInterrupted;
+    if (s.motion.size() > 1 && result.checks.empty())
+      result.checks = check_limits(model, problem, s.motion, options.refine);
+  }
+  if (interrupted) {
+    result.status = OptimizeStatus::kInterrupted;
+    result.message = problem.name + ": interrupted before any motion was found";
+  } else {
+    say_why_infeasible(problem, seeds, duration, result);
+  }
+  return result;
+}
+
+OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
+                        const std::vector<SeedMotion>& seeds, const OptimizeOptions& options) {
+  SPARFLOW_CHECK(!seeds.empty(), "optimisation starts from at least one seed");
+  const std::vector<std::string> missing = model.missing();
+  if (!missing.empty()) {
+    throw InputError({problem.file, 0, 0}, "model",
+                     fmt::format("the model has no working pressure for {}; fit it on a log in "
+                                 "which that movement occurs",
+                                 fmt::join(missing, ", ")));
+  }
+  if (problem.duration.fixed())
+    return optimize_at(model, problem, seeds, problem.duration.min, options);
+
+  // Free or bounded time: J(T) = E(T) + idle power * T. All starts at a comfortable duration, then a golden
+  // section over T from the best motion, which changes little from one duration to the next.
+  const auto begin = std::chrono::steady_clock::now();
+  const double shortest = shortest_seed(seeds);
+  const double lo = std::max(problem.duration.min, 0.4 * shortest);
+  const double hi = std::min(problem.duration.max, std::max(6.0 * shortest, 2.0 * lo));
+  OptimizeResult best =
+      optimize_at(model, problem, seeds, std::clamp(1.5 * shortest, lo, hi), options);
+  if (best.status == OptimizeStatus::kInfeasible && hi > best.duration)
+    best = optimize_at(model, problem, seeds, hi, options);
+  if (best.status != OptimizeStatus::kOptimal) return best;
+  const auto cost = [&](const OptimizeResult& r) {
+    return r.status == OptimizeStatus::kOptimal ? r.energy.total + problem.idle_power * r.duration
+                                                : std::numeric_limits<double>::infinity();
+  };
+  int durations = 1;
+  const auto evaluate = [&](double duration) {
+    SeedMotion seed{best.starts[static_cast<std::size_t>(best.best_start)].seed, best.motion,
+                    shortest, false};
+    OptimizeResult r = optimize_at(model, problem, {seed}, duration, options);
+    ++durations;
+    const double value = cost(r);
+    if (value < cost(best)) {
+      r.starts.front().seed = seed.name;
+      std::vector<StartResult> starts =
+          best.starts;  // keep what the other starts gave at the first duration
+      starts[static_cast<std::size_t>(best.best_start)] = r.starts.front();
+      r.starts = std::move(starts);
+      r.best_start = best.best_start;
+      best = std::move(r);
+    }
+    if (options.progress)
+      options.progress(durations, 14, fmt::format("duration {:.2f} s", duration));
+    return value;
+  };
+  constexpr double kGolden = 0.6180339887498949;
+  double a = lo, b = hi;
+  double x1 = b - kGolden * (b - a), x2 = a + kGolden * (b - a);
+  double f1 = evaluate(x1), f2 = evaluate(x2);
+  while (b - a > 0.02 * best.duration && durations < 14 &&
+         !(options.interrupted && options.interrupted())) {
+    if (f1 < f2) {
+      b = x2;
+      x2 = x1;
+      f2 = f1;
+      x1 = b - kGolden * (b - a);
+      f1 = evaluate(x1);
+    } else {
+      a = x1;
+      x1 = x2;
+      f1 = f2;
+      x2 = a + kGolden * (b - a);
+      f2 = evaluate(x2);
+    }
+  }
+  // straight lines and seeds at the duration that was chosen, so that the comparison is at equal time
+  best.best_seed_energy = best.straight_line_energy = 0.0;
+  for (const SeedMotion& s : seeds) {
+    const Trajectory timed = with_duration(s.motion, best.duration);
+    if (worst_excess(check_limits(model, problem, timed, options.refine)) > 1e-3) continue;
+    const double energy = exact_energy(model, timed, problem.payload, options.refine).total;
+    if (best.best_seed_energy == 0.0 || energy < best.best_seed_energy)
+      best.best_seed_energy = energy;
+    if (s.straight_line &&
+        (best.straight_line_energy == 0.0 || energy < best.straight_line_energy)) {
+      best.straight_line_energy = energy;
+      best.straight_line_name = s.name;
+    }
+  }
+  best.evaluated_durations = durations;
+  best.solve_s = seconds_since(begin);
+  return best;
+}
+
+}  // namespace sparflow

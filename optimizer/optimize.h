@@ -1,0 +1,100 @@
+#pragma once
+/// Energy-optimal motion from seed paths: smooth NLP with falling smoothing, then the modes it found held
+/// fixed (no activation left to exploit), then the exact law's verdict between the knots.
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "optimizer/exact_energy.h"
+#include "optimizer/motion_modes.h"
+#include "optimizer/nlp/ipopt_solver.h"
+
+namespace sparflow {
+
+/// A starting motion as plain data; whoever made it (a planner, a straight line, a previous motion) is only
+/// a name here.
+struct SeedMotion {
+  std::string name;
+  Trajectory motion;  ///< any duration; rest to rest
+  /// Shortest duration at which this path keeps all limits [s]; 0 = not known.
+  double shortest_duration = 0.0;
+  bool straight_line = false;  ///< a straight joint-space line, the baseline users compare with
+};
+
+struct OptimizeOptions {
+  int intervals = 100;
+  /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the one before.
+  std::vector<Smoothing> schedule = {{20e-3, 10e5}, {6e-3, 3e5}, {2e-3, 1e5}};
+  bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
+  ModeOptions mode_options;
+  double pressure_in_modes = 0.3e5;  ///< beta of the finish [Pa]
+  double tolerance = 1e-6;           ///< of the last solve
+  int refine = 16;                   ///< density of the checks between knots
+  double limit_tolerance = 1e-5;     ///< relative overshoot between knots that counts as kept
+  int tightenings = 5;               ///< solves that may be spent on limits broken between knots
+  int processes = 2;                 ///< starts solved at once
+  double max_seconds = 60.0;         ///< of one start
+  std::map<std::string, std::string> ipopt;  ///< further solver options by name
+  /// (starts done, starts in all, sentence); false interrupts.
+  std::function<bool(int, int, const std::string&)> progress;
+  /// Asked once an iteration; true stops with the best so far.
+  std::function<bool()> interrupted;
+};
+
+/// One start's outcome.
+struct StartResult {
+  std::string seed;
+  NlpStatus status = NlpStatus::kFailed;
+  std::string message;
+  Trajectory motion;           ///< empty when there is none
+  double energy_exact = 0.0;   ///< [J]
+  double energy_smooth = 0.0;  ///< [J] of the last solve's own law
+  double excess = 0.0;         ///< worst relative overshoot of a limit between knots
+  int iterations = 0;
+  double solve_s = 0.0, callbacks_s = 0.0, linear_solver_s = 0.0;
+  bool modes_held = false;  ///< finished with fixed modes
+  double seed_energy =
+      0.0;  ///< [J] exact energy of the seed at this duration; 0 if it breaks limits
+  bool seed_feasible = false;
+  int same_as = -1;  ///< index of an earlier start with the same motion
+  bool usable(double limit_tolerance) const {
+    return motion.size() > 1 && excess <= limit_tolerance;
+  }
+};
+
+enum class OptimizeStatus { kOptimal, kInfeasible, kFailed, kInterrupted };
+const char* to_string(OptimizeStatus status);
+
+struct OptimizeResult {
+  OptimizeStatus status = OptimizeStatus::kFailed;
+  std::string message;  ///< one sentence
+  Trajectory motion;
+  double duration = 0.0;       ///< [s]
+  MotionEnergy energy;         ///< under the exact law
+  double energy_smooth = 0.0;  ///< [J]
+  std::vector<LimitCheck> checks;
+  int best_start = -1;
+  std::vector<StartResult> starts;
+  double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
+  double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
+  std::string straight_line_name;
+  double solve_s = 0.0;  ///< wall time of everything
+  double evaluated_durations = 1;
+};
+
+/// One start at one duration.
+StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
+                          const SeedMotion& seed, double duration, const OptimizeOptions& options);
+
+/// All starts at one duration, in child processes, best one chosen by its exact energy.
+OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, double duration,
+                           const OptimizeOptions& options);
+
+/// The problem as posed: a fixed duration, or the duration that minimises energy + idle power * time.
+/// @throws InputError when the model lacks a pressure process the machine needs
+OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
+                        const std::vector<SeedMotion>& seeds, const OptimizeOptions& options = {});
+
+}  // namespace sparflow
