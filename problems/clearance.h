@@ -1,0 +1,127 @@
+#pragma once
+/// Distance of the machine to the obstacles: exact for checking, smooth rows for optimising.
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "models/kinematics.h"
+#include "models/trajectory.h"
+#include "problems/obstacle_distance.h"
+#include "problems/problem.h"
+
+namespace sparflow {
+
+/// Radius of the machine's capsules [m]: the problem's clearance, or 0.1 m where it asks for none.
+double capsule_radius(const MotionProblem& problem);
+
+struct ClearanceOptions {
+  /// How much further than the capsule's radius the smooth rows keep each sample point at most [m]
+  /// (plus the box's bias, problems/obstacle_distance.h). Smaller = closer passes, more rows.
+  double inflation = 0.05;
+};
+
+/// Nearest approach of the machine at one configuration.
+struct Nearest {
+  double distance = 0.0;  ///< signed, less the capsule's radius [m]; +infinity without obstacles
+  int part = -1;          ///< index for part_name(), -1 = no obstacle
+  int obstacle = -1;      ///< index in the problem, -1 = none
+};
+
+/// The machine as capsules of one radius r: each link from its joint to the next one (or to the tip), each
+/// telescope from its mount to where the prismatic joint stands. Parts that no joint moves (a slewing
+/// column) are left out: no motion changes their distance.
+///
+/// Smooth rows. A part is cut into pieces no longer than 2h and a row stands at every cut:
+/// g = SmoothObstacle(point; level) with level = sqrt(r^2 + h^2) for a box,
+/// level = sqrt((R + r)^2 + h^2) - R for a sphere of radius R, and level = r at the ends alone for a
+/// half-space. All rows >= 0 imply distance >= 0 at that configuration: let k be any point of the obstacle
+/// (a sphere: its centre) and D the distance both ends of a piece keep from it; a chord of length 2h
+/// with both ends outside the ball of radius D around k stays sqrt(D^2 - h^2) away from k. h follows from
+/// `inflation`. Rows of points that cannot reach the obstacle within the limits, or that no joint moves, are left
+/// out; next to an immovable point pieces are shortened so that the bound holds without its row,
+/// see cover_complete().
+///
+/// A mutable workspace: one a thread. No evaluation allocates.
+class ClearanceModel {
+ public:
+  explicit ClearanceModel(const MotionProblem& problem, const ClearanceOptions& options = {});
+
+  double radius() const { return radius_; }
+  /// Name of the joint whose link (or telescope) the part is.
+  const std::string& part_name(int part) const;
+  const std::string& obstacle_name(int obstacle) const;
+  /// "jib is 0.03 m inside the clearance of wall" and the like, for messages.
+  std::string describe(const Nearest& nearest) const;
+
+  /// Exact least distance. @param q joint coordinates in the machine's order
+  Nearest nearest(const double* q);
+  bool clear(const double* q) { return nearest(q).distance >= 0.0; }
+
+  /// Share of the straight joint line from -> to that is clear, 1 = all of it; negative when `from` is not.
+  /// Conservative advancement: no point of the machine moves further between two tests than the distance
+  /// just found, or 1 mm where that is less. What is missed is thus never deeper than 0.5 mm.
+  double clear_share(const double* from, const double* to);
+  bool motion_clear(const double* from, const double* to) { return clear_share(from, to) >= 1.0; }
+  /// The same along a polyline. @param path waypoints x joints
+  bool path_clear(const Eigen::MatrixXd& path);
+
+  /// Nearest approach of a motion, every interval tested at `factor` instants. @param when its time [s]
+  Nearest nearest_on(const Trajectory& motion, int factor, double* when = nullptr);
+
+  int rows() const { return static_cast<int>(rows_.size()); }
+  /// False when an obstacle is so near to an immovable point that the rows' bound cannot be kept there;
+  /// then rows >= 0 alone do not prove clearance and the exact check must.
+  bool cover_complete() const { return cover_complete_; }
+  /// g [rows], feasible when >= 0. [m]
+  void values(const double* q, double* g);
+  /// g [rows] and jacobian [rows x n, row-major]
+  void jacobian(const double* q, double* g, double* jacobian);
+  /// Adds sum_row multiplier[row] Hessian(row) to hessian [n x n].
+  void add_hessian(const double* q, const double* multiplier, double* hessian);
+  std::string row_name(int row) const;
+
+ private:
+  /// A point of the machine: fixed in link `joint`, or `fraction` of joint `slide`'s travel beyond it.
+  struct Point {
+    int joint = -1;
+    Eigen::Vector3d local = Eigen::Vector3d::Zero();
+    int slide = -1;
+    double fraction = 0.0;
+  };
+  struct Part {
+    Point from, to;
+    int name = 0;         ///< joint index
+    double length = 0.0;  ///< longest [m]
+    bool from_moves = true;
+    bool to_moves = true;
+  };
+  struct Row {
+    Point point;
+    SmoothObstacle smooth;
+    int part = 0;
+    int obstacle = 0;
+  };
+  void build_parts();
+  void build_rows(double inflation);
+  /// Longest allowed half piece h of a part before this obstacle [m].
+  double half_piece(const Part& part, const Obstacle& obstacle, double kept, double inflation);
+  Eigen::Vector3d position(const Point& point, const double* q) const;
+  /// Columns of the point's Jacobian into columns_; how many joints move it.
+  int update_columns(const Point& point, const Eigen::Vector3d& position);
+  bool moves(const Point& point);
+  double reach(const Point& point) const;
+
+  Machine machine_;
+  std::vector<Range> limits_;
+  std::vector<Obstacle> obstacles_;
+  double radius_ = 0.0;
+  bool cover_complete_ = true;
+  std::vector<Part> parts_;
+  std::vector<Row> rows_;
+  Eigen::VectorXd travel_radius_;  ///< [m/rad] or [-] largest displacement per unit of each joint
+  ChainGeometry chain_;
+  std::vector<Eigen::Vector3d> columns_;
+  Eigen::VectorXd between_;
+};
+
+}  // namespace sparflow
