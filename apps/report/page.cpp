@@ -37,6 +37,22 @@ std::string with_unit(const std::string& label, const std::string& unit) {
   return fmt::format("{} <span class=\"unit\">[{}]</span>", html_escape(label), html_escape(unit));
 }
 
+/// Thousands apart by narrow no-break spaces (1234 stays together), a true minus sign.
+std::string grouped(std::string text) {
+  const std::size_t point = std::min(text.find('.'), text.size());
+  const std::size_t first = text[0] == '-' ? 1 : 0;
+  if (point - first > 4) {
+    for (std::size_t at = point; at > first + 3; at -= 3) text.insert(at - 3, "\u202F");
+  }
+  if (first == 1) text.replace(0, 1, "\u2212");
+  return text;
+}
+
+std::string display_count(double value) {
+  if (!std::isfinite(value) || std::abs(value) > 1e15) return display_number(value, 4);
+  return grouped(fmt::format("{:.0f}", value));
+}
+
 std::string tiles_html(const std::vector<Tile>& tiles) {
   std::string html = "<div class=\"tiles\">\n";
   for (const Tile& tile : tiles) {
@@ -60,6 +76,14 @@ bool is_numeric(const Table& table, std::size_t column) {
   });
 }
 
+/// A column of counts: no decimals.
+bool is_whole(const Table& table, std::size_t column) {
+  return std::all_of(table.rows.begin(), table.rows.end(), [&](const auto& row) {
+    const double* number = column < row.size() ? std::get_if<double>(&row[column]) : nullptr;
+    return number == nullptr || !std::isfinite(*number) || *number == std::trunc(*number);
+  });
+}
+
 std::string table_html(const Table& table) {
   std::string html = "<div class=\"table\"><table>\n";
   if (!table.title.empty()) {
@@ -80,7 +104,8 @@ std::string table_html(const Table& table) {
       const TableCell& cell = table.rows[r][c];
       if (const double* number = std::get_if<double>(&cell)) {
         html += fmt::format("<td class=\"num\">{}</td>",
-                            display_number(*number, table.columns[c].digits));
+                            is_whole(table, c) ? display_count(*number)
+                                               : display_number(*number, table.columns[c].digits));
       } else {
         html += fmt::format("<td{}>{}</td>", is_numeric(table, c) ? " class=\"num\"" : "",
                             html_escape(std::get<std::string>(cell)));
@@ -129,13 +154,7 @@ std::string display_number(double value, int digits) {
   const int exponent = static_cast<int>(std::floor(std::log10(magnitude)));
   std::string text = fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent));
   if (text.find_first_of("123456789") == std::string::npos) return "0";
-  const std::size_t point = std::min(text.find('.'), text.size());
-  const std::size_t first = text[0] == '-' ? 1 : 0;
-  if (point - first > 4) {  // 1234 stays together, 12 345 does not
-    for (std::size_t at = point; at > first + 3; at -= 3) text.insert(at - 3, "\u202F");
-  }
-  if (first == 1) text.replace(0, 1, "\u2212");
-  return text;
+  return grouped(text);
 }
 
 Page::Page(std::string title) : title_(std::move(title)) {}

@@ -4,8 +4,8 @@
   const { theme, number, ticks, element, svg } = page;
   const { line, label } = page.svgTools;
 
-  /* Parts of one instant into an SVG group, thicknesses in parts of the crane's size. */
-  page.drawParts = function (into, kinds, points, plane, weight) {
+  /* Parts of one instant into an SVG group, thicknesses in parts of the crane's size; `only`: all in one colour. */
+  page.drawParts = function (into, kinds, points, plane, weight, only) {
     const reach = Math.max(plane.z1 - plane.z0, 0.5 * (plane.x1 - plane.x0)) * plane.scale;
     const unit = Math.min(Math.max(reach * 0.0022, 0.7), 1.6) * (weight || 1);
     const steel = theme.get("--steel"), rod = theme.get("--rod"), barrel = theme.get("--barrel");
@@ -14,14 +14,15 @@
     let stage = 0;
     kinds.forEach((kind, i) => {
       const p = points[i];
+      if (p.length < 2) return;
       if (kind === "pin") {
         into.append(svg("circle", { cx: plane.X(p[0]), cy: plane.Z(p[1]), r: 2.4 * unit, fill: theme.paper(),
-          stroke: steel, "stroke-width": 1.2 * unit }));
+          stroke: only || steel, "stroke-width": 1.2 * unit }));
         return;
       }
       const [color, width] = looks[kind];
       const thinner = kind === "telescope" ? Math.pow(0.82, stage++) : 1;  // inner stages are slimmer
-      into.append(svg("polyline", { points: polyline(p, plane), fill: "none", stroke: color,
+      into.append(svg("polyline", { points: polyline(p, plane), fill: "none", stroke: only || color,
         "stroke-width": width * thinner * unit, "stroke-linecap": kind === "barrel" ? "butt" : "round",
         "stroke-linejoin": "round" }));
     });
@@ -78,10 +79,19 @@
         : svg("polygon", { points: polyline(o.points, plane), ...look });
       shape.append(svg("title", {}, o.name));
       content.append(shape);
+    }
+  }
+
+  /* Names of obstacles over everything, at their middle (of what is in view). */
+  function drawObstacleNames(plane, spec) {
+    for (const o of spec.obstacles) {
       let x = 0, z = 0;
-      for (let i = 0; i < o.points.length; i += 2) { x += o.points[i]; z += o.points[i + 1]; }
-      const half = o.points.length / 2 || 1;
-      content.append(label(o.name, plane.X(x / half), plane.Z(z / half) + 4, "middle", theme.ink()));
+      for (let i = 0; i < o.points.length; i += 2) {
+        x += Math.min(Math.max(o.points[i], plane.x0), plane.x1);
+        z += Math.min(Math.max(o.points[i + 1], plane.z0), plane.z1);
+      }
+      const count = o.points.length / 2 || 1;
+      plane.content.append(label(o.name, plane.X(x / count), plane.Z(z / count) + 4, "middle", theme.ink()));
     }
   }
 
@@ -97,16 +107,20 @@
     for (const [at, text] of [[first, "start"], [spec.goal || last, spec.goal ? "goal" : "end"]]) {
       content.append(svg("circle", { cx: X(at[0]), cy: Z(at[1]), r: 5, fill: text === "start" ? theme.paper() : theme.color(1),
         stroke: theme.color(1), "stroke-width": 1.8 }));
-      content.append(label(text, X(at[0]) + 9, Z(at[1]) - 7, "start", theme.ink()));
+      const outside = X(at[0]) + 50 > plane.right;
+      content.append(label(text, X(at[0]) + (outside ? -9 : 9), Z(at[1]) + 5, outside ? "end" : "start", theme.ink(),
+        { "font-weight": 600 }));
     }
   }
 
+  /* Outside the plane, where nothing can be in its way. */
   function drawScaleBar(plane) {
-    const metres = ticks(0, 90 / plane.scale, 1).step, from = plane.right - 14 - metres * plane.scale, y = plane.top + 22;
+    const metres = ticks(0, 70 / plane.scale, 1).step, to = plane.right, from = to - metres * plane.scale;
+    const y = plane.height - 8;
     const g = svg("g");
-    g.append(line(from, y, plane.right - 14, y, theme.ink(), 2));
-    for (const x of [from, plane.right - 14]) g.append(line(x, y - 4, x, y + 4, theme.ink(), 1.5));
-    g.append(label(metres + " m", (from + plane.right - 14) / 2, y - 8, "middle", theme.ink()));
+    g.append(line(from, y, to, y, theme.ink(), 2));
+    for (const x of [from, to]) g.append(line(x, y - 4, x, y + 4, theme.ink(), 1.5));
+    g.append(label(metres + " m", from - 8, y + 4, "end", theme.ink()));
     plane.drawing.append(g);
   }
 
@@ -121,7 +135,7 @@
   }
 
   page.kinds.crane = function (host, spec) {
-    const plane = page.plane(host, extent(spec), spec, 14, spec.height || 520);
+    const plane = page.plane(host, extent(spec), spec, 14, spec.height || 580);
     const { content, drawing } = plane, frames = spec.frames;
     drawScene(plane, spec);
     const stills = Math.min(spec.stills, frames.length);
@@ -133,6 +147,7 @@
       content.append(still);
     }
     drawTipPaths(plane, spec);
+    drawObstacleNames(plane, spec);
     const moving = svg("g");
     content.append(moving);
     drawScaleBar(plane);

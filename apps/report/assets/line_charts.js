@@ -24,7 +24,7 @@
     };
     return [
       { ...common, label: titled(spec.x_axis), size: 30, labelSize: 18, space: 70 },
-      { ...common, label: titled(spec.y_axis), size: kLeft - 18, labelSize: 18, space: 34 },
+      { ...common, label: titled(spec.y_axis), size: kLeft - 18, labelSize: 18, space: 26 },
     ];
   }
 
@@ -63,22 +63,28 @@
       .filter((l) => l.x >= u.scales.x.min && l.x <= u.scales.x.max).sort((a, z) => a.x - z.x);
     c.save();
     c.font = scaled(u, "11px system-ui, sans-serif");
-    c.fillStyle = c.strokeStyle = theme.muted();
+    c.textAlign = "left";
+    c.textBaseline = "alphabetic";
+    c.strokeStyle = theme.muted();
     c.lineWidth = ratio;
     c.setLineDash([4 * ratio, 3 * ratio]);
+    const place = (x) => Math.round(u.valToPos(x, "x", true));
+    for (const { x } of labels.filter((l) => l.line)) {
+      c.beginPath();
+      c.moveTo(place(x), b.top);
+      c.lineTo(place(x), b.top + b.height);
+      c.stroke();
+    }
     let free = -Infinity;
-    for (const { x, label, line } of labels) {
-      const at = Math.round(u.valToPos(x, "x", true));
-      if (line) {
-        c.beginPath();
-        c.moveTo(at, b.top);
-        c.lineTo(at, b.top + b.height);
-        c.stroke();
-      }
+    for (const { x, label } of labels) {
+      const at = place(x);
       const width = c.measureText(label).width;
       let from = at + 4 * ratio;
       if (from + width > b.left + b.width) from = at - 4 * ratio - width;
       if (from > free) {
+        c.fillStyle = faded(theme.paper(), 0.8);
+        c.fillRect(from - ratio, b.top, width + 2 * ratio, 15 * ratio);
+        c.fillStyle = theme.muted();
         c.fillText(label, from, b.top + 11 * ratio);
         free = from + width + 6 * ratio;
       }
@@ -110,9 +116,10 @@
       bands.push({ series: [data.length - 2, data.length - 1], fill: faded(theme.color(s.color), 0.16) });
     }
     const firstCurve = data.length;
+    const keyColor = (u, i) => (i < firstCurve ? "transparent" : look(spec.series[i - firstCurve]).stroke);
     for (const s of spec.series) {
       data.push(s.y);
-      series.push({ label: s.name, ...look(s), value: (u, v) => (v == null ? "" : number(v) + unit),
+      series.push({ label: s.name, ...look(s), pxAlign: 0, value: (u, v) => (v == null ? "" : number(v) + unit),
         points: { size: 5, fill: theme.color(s.color) } });
     }
     const isEmpty = !spec.series.some((s) => s.y.some((v) => v != null));
@@ -120,10 +127,10 @@
       width: host.clientWidth, height: spec.height || 240, padding: [8, kRight, 0, 0],
       scales: { x: { time: false, range: range(0) }, y: { range: range(0.06) } },
       axes: axes(spec), series, bands,
-      legend: { markers: { fill: (u, i) => u.series[i]._stroke || "transparent", width: 0 } },
+      legend: { markers: { fill: keyColor, width: 0 } },
       cursor: {
         drag: { x: true, y: false },
-        points: { size: 6, show: (u, i) => (i < firstCurve ? undefined : uPlotPoint(u, i)) },
+        points: { size: 6, width: 0, fill: (u, i) => (i < firstCurve ? "transparent" : theme.color(spec.series[i - firstCurve].color)) },
         sync: spec.group ? { key: spec.group, scales: ["x", null] } : undefined,
       },
       hooks: {
@@ -157,10 +164,6 @@
     };
   };
 
-  function uPlotPoint(u, i) {
-    return element("div", { style: "background:" + theme.color(-1) + ";border-color:" + u.series[i]._stroke });
-  }
-
   page.kinds.scatter = function (host, spec) {
     // uPlot wants one ascending abscissa: all points sorted by x, each in the column of its group.
     const points = [];
@@ -180,14 +183,14 @@
         points: { show: true, size: points.length > 1500 ? 3.5 : 5, width: 0, fill: faded(color, alpha) } });
     });
     if (trend) {
-      series.push({ label: "median", stroke: theme.ink(), width: 2.2, spanGaps: true, points: { show: false } });
+      series.push({ label: "median", stroke: theme.ink(), width: 2.2, pxAlign: 0, spanGaps: true, points: { show: false } });
     }
     const reading = element("div", { class: "reading" });
     const chart = new uPlot({
       width: host.clientWidth, height: spec.height || 280, padding: [8, kRight, 0, 0],
       scales: { x: { time: false, range: range(0.03) }, y: { range: range(0.06) } },
       axes: axes(spec), series,
-      legend: { live: false, markers: { fill: (u, i) => u.series[i]._stroke || "transparent", width: 0 } },
+      legend: { live: false, markers: { fill: (u, i) => (i > groupCount ? theme.ink() : theme.color(i - 1)), width: 0 } },
       cursor: { drag: { x: true, y: true, uni: 40 }, points: { show: false } },
       hooks: {
         drawClear: [(u) => drawReferenceLines(u, spec)],

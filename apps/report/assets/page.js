@@ -80,6 +80,7 @@ var page = (function () {
       image.onload = () => {
         const canvas = element("canvas", { width: 2 * width, height: 2 * height });
         canvas.getContext("2d").drawImage(image, 0, 0, 2 * width, 2 * height);
+        canvas.ratio = 2;
         resolve(canvas);
       };
       image.onerror = reject;
@@ -99,7 +100,7 @@ var page = (function () {
   /* Title, key and drawing on paper, so that the picture stands by itself. */
   async function savePng(figure) {
     const drawn = await figure.drawn.picture();
-    const scale = drawn.width / figure.host.clientWidth, key = figure.drawn.key ? figure.drawn.key() : [];
+    const scale = drawn.ratio || devicePixelRatio, key = figure.drawn.key ? figure.drawn.key() : [];
     const head = (key.length ? 48 : 28) * scale;
     const canvas = element("canvas", { width: drawn.width, height: drawn.height + head });
     const c = canvas.getContext("2d");
@@ -179,8 +180,12 @@ var page = (function () {
     setTimeout(report, 0);  // uPlot paints in a microtask
     const redraw = () => figures.forEach(draw);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-    addEventListener("beforeprint", redraw);
-    addEventListener("afterprint", redraw);
+    for (const [event, printing] of [["beforeprint", true], ["afterprint", false]]) {
+      addEventListener(event, () => {
+        document.documentElement.classList.toggle("printing", printing);
+        redraw();
+      });
+    }
     let pending = 0;
     addEventListener("resize", () => {
       clearTimeout(pending);

@@ -42,11 +42,12 @@
 
   /* Metres to pixels, equal on both axes, with grid and labels. `height` is at most what is given. */
   page.plane = function (host, box, spec, right, tallest) {
-    const left = 62, top = 12, bottom = 46, width = host.clientWidth;
+    const left = 62, top = 12, bottom = 46;
     const wide = Math.max(1e-9, box.x1 - box.x0), tall = Math.max(1e-9, box.z1 - box.z0);
-    const scale = Math.min((width - left - right) / wide, (tallest - top - bottom) / tall);
-    // what the height leaves free on the sides is shown too, so that the drawing fills its width
-    const spare = ((width - left - right) / scale - wide) / 2;
+    const scale = Math.min((host.clientWidth - left - right) / wide, (tallest - top - bottom) / tall);
+    // of what the height leaves free on the sides a little is shown, the rest stays paper
+    const spare = Math.min(0.12 * wide, ((host.clientWidth - left - right) / scale - wide) / 2);
+    const width = Math.round(left + right + (wide + 2 * spare) * scale);
     const x0 = box.x0 - spare, x1 = box.x1 + spare, { z0, z1 } = box;
     const height = Math.round(top + bottom + tall * scale);
     const drawing = root(host, width, height);
@@ -55,7 +56,7 @@
     const clip = svg("clipPath", { id });
     clip.append(svg("rect", { x: left, y: top, width: width - left - right, height: height - top - bottom }));
     drawing.append(clip);
-    const zTicks = ticks(z0, z1, (height - top - bottom) / 55), xTicks = ticks(x0, x1, (width - left - right) / 90);
+    const zTicks = ticks(z0, z1, (height - top - bottom) / 55), xTicks = ticks(x0, x1, (width - left - right) / 70);
     tickLabels(xTicks).forEach((text, i) => {
       drawing.append(line(X(xTicks[i]), top, X(xTicks[i]), height - bottom, theme.grid()));
       drawing.append(label(text, X(xTicks[i]), height - bottom + 16, "middle"));
@@ -158,21 +159,26 @@
     if (xs.length === 0) xs.push(0, 1);
     if (zs.length === 0) zs.push(0, 1);
     const box = { x0: Math.min(...xs), x1: Math.max(...xs), z0: Math.min(...zs), z1: Math.max(...zs) };
-    const plane = page.plane(host, box, spec, 110, spec.height || 460);
+    const pad = 0.02 * (box.z1 - box.z0);
+    box.z0 -= pad;
+    box.z1 += pad;
+    const plane = page.plane(host, box, spec, 110, spec.height || 500);
     const { drawing, content, X, Z } = plane;
 
+    const cells = svg("g", { "shape-rendering": "crispEdges" });
+    content.append(cells);
     spec.values.forEach((row, r) => row.forEach((v, c) => {
       if (v == null) return;
       const x = X(spec.x_edges[c]), z = Z(spec.z_edges[r + 1]);
       const w = X(spec.x_edges[c + 1]) - x, h = Z(spec.z_edges[r]) - z;
-      content.append(svg("rect", { x: x.toFixed(1), y: z.toFixed(1), width: (w + 0.4).toFixed(1), height: (h + 0.4).toFixed(1),
+      cells.append(svg("rect", { x: x.toFixed(1), y: z.toFixed(1), width: (w + 0.4).toFixed(1), height: (h + 0.4).toFixed(1),
         fill: color((v - lo) / (hi - lo)) }));
     }));
-    if (page.drawParts) {
-      const halo = svg("g", { opacity: 0.9 });
-      page.drawParts(halo, spec.crane.map((p) => p.kind), spec.crane.map((p) => p.points), plane, 0.55);
-      content.append(halo);
-    }
+    const kinds = spec.crane.map((p) => p.kind), points = spec.crane.map((p) => p.points);
+    const halo = svg("g", { opacity: 0.8 });
+    page.drawParts(halo, kinds, points, plane, 0.95, theme.paper());
+    content.append(halo);
+    page.drawParts(content, kinds, points, plane, 0.6);
     if (values.length === 0) drawing.append(label("no values", (plane.left + plane.right) / 2, plane.top + 20, "middle"));
 
     const barX = plane.right + 18, barTop = plane.top + 8, barHeight = Math.min(260, plane.bottom - barTop - 26);
@@ -185,10 +191,8 @@
     tickLabels(marks).forEach((text, i) => drawing.append(label(text, barX + 20, onBar(marks[i]) + 4)));
     drawing.append(label(spec.value.unit ? "[" + spec.value.unit + "]" : "", barX, barTop + 8, "start", theme.ink()));
 
-    const reading = element("div", { class: "reading" });
-    reading.style.top = plane.top + 4 + "px";
-    reading.style.right = "118px";
-    host.append(reading);
+    const reading = label("", plane.left + 8, plane.top + 16, "start", theme.ink());
+    drawing.append(reading);
     const cell = (edges, v) => edges.findIndex((e, i) => i + 1 < edges.length && v >= e && v < edges[i + 1]);
     drawing.addEventListener("pointermove", (e) => {
       const at = drawing.getBoundingClientRect();

@@ -1,0 +1,86 @@
+#include "apps/report/decimate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+bool contains(const std::vector<Index>& rows, Index row) {
+  return std::binary_search(rows.begin(), rows.end(), row);
+}
+
+TEST(DecimateRows, FewRowsAllStay) {
+  const VectorXd y = VectorXd::Random(50);
+  const auto rows = decimate_rows({&y}, 50);
+  ASSERT_EQ(rows.size(), 50u);
+  for (Index i = 0; i < 50; ++i) EXPECT_EQ(rows[static_cast<std::size_t>(i)], i);
+}
+
+TEST(DecimateRows, EverySpikeOfEveryColumnStays) {
+  const Index n = 100000;
+  VectorXd a = VectorXd::Zero(n), b = VectorXd::Zero(n);
+  a[12345] = 9.0;
+  b[77777] = -4.0;
+  b[99998] = 2.0;
+  const auto rows = decimate_rows({&a, &b}, 400);
+  EXPECT_LE(rows.size(), 402u);
+  EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end()));
+  for (const Index i : {Index{0}, Index{12345}, Index{77777}, Index{99998}, n - 1}) {
+    EXPECT_TRUE(contains(rows, i)) << i;
+  }
+}
+
+TEST(DecimateRows, ShortGapStaysAGap) {
+  VectorXd y = VectorXd::LinSpaced(10000, 0, 1);
+  y.segment(5000, 3).setConstant(kNaN);
+  const auto rows = decimate_rows({&y}, 200);
+  EXPECT_TRUE(contains(rows, 5000));
+}
+
+TEST(DecimateRows, AllNaNAndEmptyAreHarmless) {
+  const VectorXd nothing(0), gaps = VectorXd::Constant(1000, kNaN);
+  EXPECT_TRUE(decimate_rows({}, 10).empty());
+  EXPECT_TRUE(decimate_rows({&nothing}, 10).empty());
+  EXPECT_LE(decimate_rows({&gaps}, 10).size(), 12u);
+}
+
+TEST(DecimateCloud, OutlierStaysAndTheHeapIsThinned) {
+  VectorXd x = VectorXd::Random(50000), y = VectorXd::Random(50000);
+  x[31000] = 10.0;
+  y[31000] = -10.0;
+  x[5] = kNaN;
+  const auto points = decimate_cloud(x, y, 2000);
+  EXPECT_LE(points.size(), 2000u);
+  EXPECT_GE(points.size(), 700u);  // two thirds of the cells may go in one coarsening, not more
+  EXPECT_TRUE(contains(points, 31000));
+  EXPECT_FALSE(contains(points, 5));
+}
+
+TEST(DecimateCloud, CoincidingPointsAreOne) {
+  const VectorXd same = VectorXd::Ones(5000);
+  EXPECT_EQ(decimate_cloud(same, same, 100).size(), 1u);
+  EXPECT_TRUE(decimate_cloud(VectorXd(0), VectorXd(0), 100).empty());
+}
+
+TEST(BinnedMedian, FollowsAStepAndIgnoresOutliers) {
+  const Index n = 4000;
+  const VectorXd x = VectorXd::LinSpaced(n, -1.0, 1.0);
+  VectorXd y = x.unaryExpr([](double v) { return v > 0 ? 3.0 : -3.0; });
+  for (Index i = 0; i < n; i += 10) y[i] = 1e6;
+  const BinnedMedian trend = binned_median(x, y, 24);
+  ASSERT_EQ(trend.x.size(), 24);
+  for (Index i = 0; i < 24; ++i) EXPECT_EQ(trend.y[i], trend.x[i] > 0 ? 3.0 : -3.0);
+  EXPECT_EQ(binned_median(x.head(39), y.head(39), 24).x.size(), 0);
+}
+
+}  // namespace
+}  // namespace sparflow
