@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include "models/file_quantities.h"
+
 namespace sparflow {
 namespace {
 
 using quantities::kCoordinate;
 using quantities::kLength;
 using quantities::kMass;
-using Sign = Quantity::Sign;
+using quantities::Sign;
 
 // 3 m bores do not exist; 180 is a bore in millimetres.
 constexpr Quantity kDiameter{"diameter", "m", Sign::kPositive, 1.0, 3.0};

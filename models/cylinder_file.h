@@ -21,14 +21,6 @@ struct FileFrames {
   Eigen::Vector3d point(int joint, const Eigen::Vector3d& in_file) const;
 };
 
-namespace quantities {
-using Sign = Quantity::Sign;
-/// Machines are smaller than 200 m; a larger number is in millimetres.
-inline constexpr Quantity kCoordinate{"coordinate", "m", Sign::kAny, 1.0, 200.0};
-inline constexpr Quantity kLength{"length", "m", Sign::kPositive, 1.0, 200.0};
-inline constexpr Quantity kMass{"mass", "kg", Sign::kNonNegative};
-}  // namespace quantities
-
 /// @throws InputError for anything a single cylinder's text shows; check_machine() judges the geometry
 Cylinder read_cylinder(const YamlValue& value, const std::vector<Joint>& joints,
                        const FileFrames& frames);

@@ -6,56 +6,21 @@
 #include <map>
 
 #include "models/cylinder_file.h"
+#include "models/file_quantities.h"
 #include "models/machine_check.h"
-#include "models/units.h"
 #include "models/urdf_import.h"
 #include "models/yaml_reader.h"
 
 namespace sparflow {
 namespace {
 
-using quantities::kCoordinate;
-using quantities::kMass;
-using Sign = Quantity::Sign;
+using namespace quantities;
 
-constexpr Quantity kAngle{"angle", "rad"};
-constexpr Quantity kTravel{"length", "m", Sign::kAny, 1.0, 200.0};
 constexpr Quantity kDirection{"component of the axis", ""};
 constexpr Quantity kGravity{"component of gravity", "m/s^2"};
 constexpr Quantity kInertia{"moment of inertia", "kg m^2", Sign::kNonNegative};
 constexpr Quantity kFraction{"fraction of the extension", ""};
-constexpr Quantity kFlow{"flow", "l/min", Sign::kPositive, units::kLitrePerMinute};
-constexpr Quantity kPressure{"pressure", "bar", Sign::kPositive, units::kBar, 10000.0};
 constexpr Quantity kStandby{"pressure", "bar", Sign::kNonNegative, units::kBar, 10000.0};
-
-Eigen::Isometry3d from_rpy(const Eigen::Vector3d& xyz, const Eigen::Vector3d& rpy) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = xyz;
-  pose.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                   Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                   Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                      .toRotationMatrix();
-  return pose;
-}
-
-/// Reads [lo, hi] of a velocity or acceleration: a motion starts and ends at rest.
-Range range_around_zero(const YamlValue& value, const Quantity& what) {
-  const Range r = value.range(what);
-  if (!(r.lo < 0.0 && r.hi > 0.0)) {
-    value.fail(
-        fmt::format("got [{:g}, {:g}], expected lo < 0 < hi; every motion starts and ends at "
-                    "rest",
-                    r.lo, r.hi));
-  }
-  return r;
-}
-
-Quantity rate(bool revolute, int order) {
-  if (order == 1) {
-    return revolute ? Quantity{"velocity", "rad/s"} : Quantity{"velocity", "m/s"};
-  }
-  return revolute ? Quantity{"acceleration", "rad/s^2"} : Quantity{"acceleration", "m/s^2"};
-}
 
 class MachineReader {
  public:
@@ -147,11 +112,12 @@ class MachineReader {
       }
       joint.axis.normalize();
     }
-    joint.position = map.need("position", "the range [lo, hi]").range(revolute ? kAngle : kTravel);
-    joint.velocity =
-        range_around_zero(map.need("velocity", "the range [lo, hi]"), rate(revolute, 1));
-    joint.acceleration =
-        range_around_zero(map.need("acceleration", "the range [lo, hi]"), rate(revolute, 2));
+    joint.position =
+        map.need("position", "the range [lo, hi]").range(joint_quantity(joint.type, 0));
+    joint.velocity = read_range_around_zero(map.need("velocity", "the range [lo, hi]"),
+                                            joint_quantity(joint.type, 1));
+    joint.acceleration = read_range_around_zero(map.need("acceleration", "the range [lo, hi]"),
+                                                joint_quantity(joint.type, 2));
     machine_.joints.push_back(joint);
     frames_.names.push_back(joint.name);
     frames_.in_joint.push_back(own_frame);
@@ -165,7 +131,10 @@ class MachineReader {
     Eigen::Vector3d xyz = Eigen::Vector3d::Zero(), rpy = Eigen::Vector3d::Zero();
     if (const auto v = origin.find("xyz")) xyz = v->vector3(kCoordinate);
     if (const auto v = origin.find("rpy")) rpy = v->vector3(kAngle);
-    return from_rpy(xyz, rpy);
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = xyz;
+    pose.linear() = rotation_from_rpy(rpy);
+    return pose;
   }
 
   /// Standard Denavit-Hartenberg: from the parent's frame Rz(theta + q) Tz(d) Tx(a) Rx(alpha), or
@@ -177,8 +146,8 @@ class MachineReader {
     const double alpha = dh.number_or("alpha", kAngle, 0.0);
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.rotate(Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitZ()));
-    pose.translate(
-        Eigen::Vector3d(dh.number_or("a", kTravel, 0.0), 0.0, dh.number_or("d", kTravel, 0.0)));
+    pose.translate(Eigen::Vector3d(dh.number_or("a", kCoordinate, 0.0), 0.0,
+                                   dh.number_or("d", kCoordinate, 0.0)));
     pose.rotate(Eigen::AngleAxisd(alpha, Eigen::Vector3d::UnitX()));
     return pose;
   }
@@ -286,10 +255,10 @@ class MachineReader {
       // the joint's type is the URDF's to say, so the unit is not named here
       if (const auto v = map.find("position")) limit.position = v->range({"position", "rad or m"});
       if (const auto v = map.find("velocity")) {
-        limit.velocity = range_around_zero(*v, {"velocity", "rad/s or m/s"});
+        limit.velocity = read_range_around_zero(*v, {"velocity", "rad/s or m/s"});
       }
       if (const auto v = map.find("acceleration")) {
-        limit.acceleration = range_around_zero(*v, {"acceleration", "rad/s^2 or m/s^2"});
+        limit.acceleration = read_range_around_zero(*v, {"acceleration", "rad/s^2 or m/s^2"});
       }
     }
     return limits;

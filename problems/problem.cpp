@@ -1,0 +1,51 @@
+#include "problems/problem.h"
+
+#include <cmath>
+#include <limits>
+
+namespace sparflow {
+
+bool Duration::free() const { return min == 0.0 && std::isinf(max); }
+
+MotionLimits limits_of(const Machine& machine) {
+  MotionLimits limits;
+  for (const Joint& joint : machine.joints) {
+    limits.position.push_back(joint.position);
+    limits.velocity.push_back(joint.velocity);
+    limits.acceleration.push_back(joint.acceleration);
+  }
+  for (const Pump& pump : machine.pumps) {
+    limits.pump_max_flow.push_back(pump.max_flow);
+    limits.pump_max_pressure.push_back(pump.max_pressure);
+  }
+  return limits;
+}
+
+// A direction d stays fixed when every revolute axis is parallel to d and every prismatic one normal to
+// it: then no rotation turns d, so looking at one posture is enough. Joints behind the tip do not count.
+std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
+  // d is in the null space of this: sum of (I - a a^T) over revolute and a a^T over prismatic axes.
+  Eigen::Matrix3d moved = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  for (int i = 0; i <= machine.tip.joint; ++i) {
+    const Joint& joint = machine.joints[static_cast<std::size_t>(i)];
+    rotation = (rotation * joint.origin.linear()).eval();
+    const Eigen::Vector3d axis = rotation * joint.axis;
+    const Eigen::Matrix3d along = axis * axis.transpose();
+    moved += joint.type == JointType::kRevolute ? Eigen::Matrix3d::Identity() - along : along;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(moved);
+  std::vector<Eigen::Vector3d> fixed;
+  for (int k = 0; k < 3; ++k) {
+    // squared sine of the angle by which the axes miss parallel: 1e-12 is a millionth of a radian
+    if (eigen.eigenvalues()[k] > 1e-12) continue;
+    Eigen::Vector3d d = eigen.eigenvectors().col(k);
+    Eigen::Index largest = 0;
+    d.cwiseAbs().maxCoeff(&largest);
+    if (d[largest] < 0.0) d = -d;
+    fixed.push_back(d);
+  }
+  return fixed;
+}
+
+}  // namespace sparflow

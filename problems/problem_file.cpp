@@ -1,0 +1,309 @@
+#include "problems/problem_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "models/file_quantities.h"
+#include "models/kinematics.h"
+#include "models/machine_file.h"
+#include "models/yaml_reader.h"
+#include "problems/bundled.h"
+#include "problems/obstacle_file.h"
+
+namespace sparflow {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace quantities;
+
+constexpr Quantity kPoint{"coordinate", "m", Sign::kAny, 1.0, 1000.0};
+constexpr Quantity kDistance{"distance", "m", Sign::kNonNegative, 1.0, 100.0};
+constexpr Quantity kTolerance{"tolerance", "m", Sign::kPositive, 1.0, 100.0};
+constexpr Quantity kTime{"duration", "s", Sign::kPositive};
+constexpr Quantity kPower{"power", "W", Sign::kNonNegative};
+constexpr Quantity kFraction{"share of the full flow", "", Sign::kPositive};
+constexpr Quantity kWeight{"weight", "", Sign::kNonNegative};
+
+/// Goals are typed by hand to a millimetre; a tenth of that is rounding.
+constexpr double kPlaneTolerance = 1e-4;  // [m]
+
+class ProblemReader {
+ public:
+  ProblemReader(std::string file, std::string folder)
+      : file_(std::move(file)), folder_(std::move(folder)) {}
+
+  MotionProblem read(const std::string& text, const Machine* machine) {
+    const YamlMap root = parse_yaml(text, file_)
+                             .map("a motion problem: machine, start, goal, duration_s, ...",
+                                  {"name", "machine", "model", "payload_kg", "start", "goal",
+                                   "duration_s", "idle_power_W", "limits", "obstacles",
+                                   "clearance_m", "path", "objective", "knots"});
+    problem_.file = file_;
+    problem_.name = fs::path(file_).stem().string();
+    if (const auto name = root.find("name")) problem_.name = name->text("the problem's name");
+    read_machine(root, machine);
+    problem_.limits = limits_of(problem_.machine);
+    if (const auto limits = root.find("limits")) read_limits(*limits);
+    problem_.payload = root.number_or("payload_kg", kMass, 0.0);
+
+    const std::string start = "the posture at the start, {q: {JOINT: position}}";
+    problem_.start = read_posture(root.need("start", start).map(start, {"q"}).need("q", start));
+    read_goal(root.need("goal", "where the motion ends, {tip: [x, y, z]} or {q: {...}}"));
+    problem_.idle_power = root.number_or("idle_power_W", kPower, 0.0);
+    read_duration(root.need("duration_s", "seconds, {min, max} or free"));
+    if (const auto obstacles = root.find("obstacles")) {
+      for (const YamlValue& v : obstacles->list("obstacles")) {
+        problem_.obstacles.push_back(
+            read_obstacle(v, static_cast<int>(problem_.obstacles.size()) + 1));
+      }
+    }
+    problem_.clearance = root.number_or("clearance_m", kDistance, 0.0);
+    if (const auto path = root.find("path")) read_path(*path);
+    if (const auto objective = root.find("objective")) read_objective(*objective);
+    if (const auto knots = root.find("knots")) {
+      problem_.knots = knots->integer("the number of knots", 4);
+    }
+    return problem_;
+  }
+
+ private:
+  /// Relative to the problem file.
+  std::string resolved(const std::string& given) const {
+    return (fs::path(folder_) / given).lexically_normal().string();
+  }
+
+  void read_machine(const YamlMap& root, const Machine* machine) {
+    if (const auto model = root.find("model")) {
+      problem_.model_path = resolved(model->text("the fitted model's file"));
+      if (!fs::is_regular_file(problem_.model_path)) {
+        model->fail(fmt::format("there is no file {}; the path is relative to the problem file",
+                                problem_.model_path));
+      }
+    }
+    if (machine != nullptr) {
+      root.find("machine");
+      problem_.machine = *machine;
+      return;
+    }
+    const YamlValue value = root.need("machine", "the machine file");
+    const std::string given = value.text("the machine file");
+    problem_.machine_path = resolved(given);
+    if (!fs::is_regular_file(problem_.machine_path)) {
+      const std::string bundled = bundled_machine(given);
+      if (bundled.empty()) {
+        value.fail(
+            fmt::format("there is no file {} (the path is relative to the problem file) and no "
+                        "bundled machine \"{}\"",
+                        problem_.machine_path, given));
+      }
+      problem_.machine_path = bundled;
+    }
+    problem_.machine = load_machine(problem_.machine_path);
+  }
+
+  static std::string bundled_machine(const std::string& name) {
+    try {
+      return bundled_file("machines/" + name + ".yaml");
+    } catch (const InputError&) {
+      return "";
+    }
+  }
+
+  std::vector<std::string> joint_names() const {
+    std::vector<std::string> names;
+    for (const Joint& joint : problem_.machine.joints) names.push_back(joint.name);
+    return names;
+  }
+
+  const Joint& joint(std::size_t i) const { return problem_.machine.joints[i]; }
+  bool revolute(std::size_t i) const { return joint(i).type == JointType::kRevolute; }
+
+  Quantity position_of(std::size_t i) const { return joint_quantity(joint(i).type, 0); }
+
+  Eigen::VectorXd read_posture(const YamlValue& value) const {
+    const std::vector<std::string> names = joint_names();
+    const std::string expected = fmt::format("a position for each joint ({})", listed(names));
+    if (names.empty()) value.fail("the machine has no joints to move");
+    const YamlMap map = value.map(expected, names);
+    Eigen::VectorXd q(problem_.machine.joint_count());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const YamlValue entry = map.need(names[i], position_of(i).expected());
+      const double position = entry.number(position_of(i));
+      const Range& range = problem_.limits.position[i];
+      if (position < range.lo || position > range.hi) {
+        const double degrees = position / units::kDegree;
+        entry.fail(fmt::format("got {:g}, outside the joint's range [{:g}, {:g}] {}{}", position,
+                               range.lo, range.hi, revolute(i) ? "rad" : "m",
+                               revolute(i) && std::abs(position) > 7.0
+                                   ? "; angles are in rad, are these degrees?"
+                               : revolute(i) ? fmt::format(" ({:.1f} deg)", degrees)
+                                             : std::string()));
+      }
+      q[static_cast<Eigen::Index>(i)] = position;
+    }
+    return q;
+  }
+
+  void read_goal(const YamlValue& value) {
+    const YamlMap map =
+        value.map("a goal {tip: [x, y, z]} or {q: {JOINT: position}}", {"tip", "q"});
+    if (map.has("tip") == map.has("q")) {
+      map.fail(map.has("tip") ? "gives both tip and q; keep one"
+                              : "missing; expected tip: [x, y, z] or q: {JOINT: position}");
+    }
+    if (const auto q = map.find("q")) {
+      problem_.goal = JointGoal{read_posture(*q)};
+      return;
+    }
+    const YamlValue tip = *map.find("tip");
+    const Eigen::Vector3d goal = tip.vector3(kPoint);
+    const Eigen::Vector3d now = tip_position<double>(problem_.machine, problem_.start);
+    for (const Eigen::Vector3d& fixed : fixed_tip_directions(problem_.machine)) {
+      const double off = fixed.dot(goal - now);
+      if (std::abs(off) <= kPlaneTolerance) continue;
+      Eigen::Index axis = 0;
+      const bool along_an_axis = fixed.cwiseAbs().maxCoeff(&axis) > 1.0 - 1e-9;
+      if (along_an_axis) {
+        tip.fail(
+            fmt::format("got {0} = {1:g}, expected {0} = {2:g}: the machine moves its tip only in "
+                        "that plane",
+                        "xyz"[axis], goal[axis], now[axis]));
+      }
+      const Eigen::Vector3d nearest = goal - off * fixed;
+      tip.fail(
+          fmt::format("lies {:.4g} m off the plane the machine moves its tip in; the nearest "
+                      "point of the plane is [{:.4f}, {:.4f}, {:.4f}]",
+                      std::abs(off), nearest.x(), nearest.y(), nearest.z()));
+    }
+    problem_.goal = TipGoal{goal};
+  }
+
+  void read_duration(const YamlValue& value) {
+    const std::string expected = "a duration [s], {min, max} or free";
+    if (value.is_map()) {
+      const YamlMap map = value.map(expected, {"min", "max"});
+      problem_.duration = {map.need_number("min", kTime), map.need_number("max", kTime)};
+      if (problem_.duration.min > problem_.duration.max) {
+        value.fail(fmt::format("got min {:g} above max {:g}; swap the two", problem_.duration.min,
+                               problem_.duration.max));
+      }
+      return;
+    }
+    if (value.word() == "free") {
+      if (problem_.idle_power <= 0.0) {
+        value.fail(
+            "got free, but idle_power_W is zero: slower is then always cheaper and no best "
+            "duration "
+            "exists; give idle_power_W, the engine's power while time passes, or {min, max}");
+      }
+      problem_.duration = {0.0, std::numeric_limits<double>::infinity()};
+      return;
+    }
+    if (value.is_list() || value.word().find_first_of("0123456789.") == std::string::npos) {
+      value.fail_expected(expected);
+    }
+    problem_.duration.min = problem_.duration.max = value.number(kTime);
+  }
+
+  void read_limits(const YamlValue& value) {
+    const YamlMap map =
+        value.map("limits {joints, pumps, valve_fraction}", {"joints", "pumps", "valve_fraction"});
+    if (const auto joints = map.find("joints")) {
+      const YamlMap named = joints->map("limits by joint name", joint_names());
+      for (std::size_t i = 0; i < problem_.machine.joints.size(); ++i) {
+        if (const auto entry = named.find(joint(i).name)) read_joint_limits(*entry, i);
+      }
+    }
+    if (const auto pumps = map.find("pumps")) read_pump_limits(*pumps);
+    if (const auto fraction = map.find("valve_fraction")) {
+      problem_.limits.valve_fraction = fraction->number(kFraction);
+      if (problem_.limits.valve_fraction > 1.0) {
+        fraction->fail(fmt::format("got {:g}, expected at most 1, the valve's full flow",
+                                   problem_.limits.valve_fraction));
+      }
+    }
+  }
+
+  void read_joint_limits(const YamlValue& value, std::size_t i) {
+    const YamlMap map = value.map("limits {position, velocity, acceleration}",
+                                  {"position", "velocity", "acceleration"});
+    if (const auto position = map.find("position")) {
+      const Range given = position->range(position_of(i));
+      const Range& machine = joint(i).position;
+      if (given.lo < machine.lo || given.hi > machine.hi) {
+        position->fail(
+            fmt::format("got [{:g}, {:g}], expected a part of the machine's own range "
+                        "[{:g}, {:g}]",
+                        given.lo, given.hi, machine.lo, machine.hi));
+      }
+      problem_.limits.position[i] = given;
+    }
+    if (const auto velocity = map.find("velocity")) {
+      problem_.limits.velocity[i] =
+          read_range_around_zero(*velocity, joint_quantity(joint(i).type, 1));
+    }
+    if (const auto acceleration = map.find("acceleration")) {
+      problem_.limits.acceleration[i] =
+          read_range_around_zero(*acceleration, joint_quantity(joint(i).type, 2));
+    }
+  }
+
+  void read_pump_limits(const YamlValue& value) {
+    std::vector<std::string> names;
+    for (const Pump& pump : problem_.machine.pumps) names.push_back(pump.name);
+    if (names.empty()) value.fail("the machine has no pumps");
+    const YamlMap named = value.map("limits by pump name", names);
+    for (std::size_t p = 0; p < names.size(); ++p) {
+      const auto entry = named.find(names[p]);
+      if (!entry) continue;
+      const YamlMap map = entry->map("limits {max_flow_lpm, max_pressure_bar}",
+                                     {"max_flow_lpm", "max_pressure_bar"});
+      MotionLimits& limits = problem_.limits;
+      limits.pump_max_flow[p] = map.number_or("max_flow_lpm", kFlow, limits.pump_max_flow[p]);
+      limits.pump_max_pressure[p] =
+          map.number_or("max_pressure_bar", kPressure, limits.pump_max_pressure[p]);
+    }
+  }
+
+  void read_path(const YamlValue& value) {
+    const YamlMap map =
+        value.map("a path {tip_line: true, tolerance_m}", {"tip_line", "tolerance_m"});
+    const bool line = map.need("tip_line", "true or false").flag();
+    if (const auto tolerance = map.find("tolerance_m")) tolerance->number(kTolerance);
+    if (line) problem_.tip_line = TipLine{map.need_number("tolerance_m", kTolerance)};
+  }
+
+  void read_objective(const YamlValue& value) {
+    const YamlMap map = value.map("weights {energy, smoothness}", {"energy", "smoothness"});
+    ObjectiveWeights& weights = problem_.objective;
+    weights.energy = map.number_or("energy", kWeight, 1.0);
+    if (const auto smoothness = map.find("smoothness")) {
+      weights.smoothness = smoothness->number(kWeight);
+    }
+    if (weights.energy == 0.0 && weights.smoothness.value_or(0.0) == 0.0) {
+      value.fail(
+          "both weights are zero, so every motion is as good; give energy or smoothness a "
+          "positive weight");
+    }
+  }
+
+  std::string file_, folder_;
+  MotionProblem problem_;
+};
+
+}  // namespace
+
+MotionProblem parse_problem(const std::string& text, const std::string& name,
+                            const std::string& folder, const Machine* machine) {
+  return ProblemReader(name, folder).read(text, machine);
+}
+
+MotionProblem load_problem(const std::string& path, const Machine* machine) {
+  return parse_problem(read_file(path), path, fs::path(path).parent_path().string(), machine);
+}
+
+}  // namespace sparflow
