@@ -1,0 +1,136 @@
+/// The choice of the smoothing window, declared in smoothing.h.
+#include <algorithm>
+#include <cmath>
+
+#include "identification/log_time.h"
+#include "identification/smoothing.h"
+
+namespace sparflow {
+namespace {
+
+constexpr double kShortest =
+    0.125;                        // [s] shorter windows buy nothing: no crane motion is that quick
+constexpr double kLongest = 0.6;  // [s] longer ones round off the starts and stops of a motion
+constexpr double kRatio = 1.2;    // between neighbouring windows of the grid
+constexpr Eigen::Index kEnough = 40000;  // samples looked at, in blocks spread over the log
+constexpr double kWhenUnknown = 0.25;    // [s]
+
+/// Standard deviation of white noise on a channel: third differences have 20 times its variance and hardly
+/// any motion; the median of their size (0.6745 sigma) is blind to the starts and stops.
+double noise_of(const Eigen::VectorXd& values, const std::vector<SampleRange>& runs) {
+  std::vector<double> size;
+  double lo = INFINITY, hi = -INFINITY;
+  for (const SampleRange& run : runs) {
+    for (Eigen::Index i = run.begin; i < run.end; ++i) {
+      if (!std::isfinite(values[i])) continue;
+      lo = std::min(lo, values[i]);
+      hi = std::max(hi, values[i]);
+      if (i < run.begin + 3) continue;
+      const double d = values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3];
+      // Exact zeros are a sensor at rest within one digit: they say nothing about its noise.
+      if (std::isfinite(d) && d != 0.0) size.push_back(std::abs(d));
+    }
+  }
+  if (size.empty()) return 0.0;
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  std::nth_element(size.begin(), middle, size.end());
+  return std::max(*middle / (0.6745 * std::sqrt(20.0)), 1e-9 * (hi - lo));
+}
+
+/// Blocks of the runs, spread evenly, of kEnough samples together; the runs themselves when they are no more.
+std::vector<SampleRange> spread_blocks(const std::vector<SampleRange>& runs) {
+  Eigen::Index total = 0;
+  for (const SampleRange& run : runs) total += run.size();
+  if (total <= kEnough) return runs;
+  constexpr Eigen::Index kBlock = 4000;
+  const Eigen::Index stride = total / (kEnough / kBlock);
+  std::vector<SampleRange> blocks;
+  for (const SampleRange& run : runs) {
+    for (Eigen::Index at = run.begin; at < run.end; at += stride) {
+      blocks.push_back({at, std::min(at + kBlock, run.end)});
+    }
+  }
+  return blocks;
+}
+
+/// Centred, evenly spaced first-derivative weights padded to `half` samples either side.
+/// Closed form of the cubic filter's weights (for orders 1 and 2 the first derivative is the linear fit's).
+Eigen::VectorXd slope_weights(int half, int padded, int order) {
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(2 * padded + 1);
+  double s2 = 0.0, s4 = 0.0, s6 = 0.0;
+  for (int k = -half; k <= half; ++k) {
+    const double q = static_cast<double>(k) * k;
+    s2 += q, s4 += q * q, s6 += q * q * q;
+  }
+  const double det = s2 * s6 - s4 * s4;
+  for (int k = -half; k <= half; ++k) {
+    const double x = k;
+    w[k + padded] = order < 3 ? x / s2 : (s6 * x - s4 * x * x * x) / det;
+  }
+  return w;
+}
+
+}  // namespace
+
+double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& all_runs,
+                     const Eigen::MatrixXd& positions, int order) {
+  const std::vector<SampleRange> runs = spread_blocks(all_runs);
+  const double step = median_step(time);
+  if (!(step > 0.0) || positions.cols() == 0) return kWhenUnknown;
+  const double shortest = std::max(kShortest, 2.0 * ((order + 2) / 2) * step);
+  std::vector<double> grid;
+  for (double w = shortest; w < std::max(kLongest, 1.01 * shortest); w *= kRatio) grid.push_back(w);
+
+  std::vector<Eigen::VectorXd> weights;  // of the first derivative, per step
+  const auto half = [&](double w) { return static_cast<int>(std::floor(0.5 * w / step + 1e-6)); };
+  const int widest = half(grid.back());
+  for (const double w : grid) weights.push_back(slope_weights(half(w), widest, order));
+
+  Eigen::VectorXd risk = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));
+  bool any = false;
+  for (Eigen::Index c = 0; c < positions.cols(); ++c) {
+    const double sigma =
+        noise_of(positions.col(c), runs) / step;  // of a velocity of weights norm 1
+    if (!(sigma > 0.0)) continue;
+    const double reference = sigma * sigma * weights[0].squaredNorm();
+    Eigen::VectorXd first;
+    for (std::size_t g = 0; g < grid.size(); ++g) {
+      const Eigen::VectorXd v =
+          SavitzkyGolay(time, runs, grid[g], order).apply(positions.col(c), 1);
+      if (g == 0) first = v;
+      const Eigen::ArrayXd d = (v - first).array();
+      const double count = static_cast<double>(d.isFinite().count());
+      if (count == 0.0) break;
+      any = true;
+      const double apart = d.isFinite().select(d.square(), 0.0).sum() / count;
+      const double bias =
+          std::max(0.0, apart - sigma * sigma * (weights[g] - weights[0]).squaredNorm());
+      risk[static_cast<Eigen::Index>(g)] +=
+          (sigma * sigma * weights[g].squaredNorm() + bias) / reference;
+    }
+  }
+  if (!any) return std::max(kWhenUnknown, shortest);
+  Eigen::Index best = 0;
+  risk.minCoeff(&best);
+  return grid[static_cast<std::size_t>(best)];
+}
+
+SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options) {
+  double window = options.window_s;
+  if (!(window > 0.0)) {
+    std::vector<const Channel*> moving;
+    for (const Channel& channel : log.channels) {
+      if (channel.role == Role::kJointPosition || channel.role == Role::kStroke) {
+        moving.push_back(&channel);
+      }
+    }
+    Eigen::MatrixXd positions(log.samples(), static_cast<Eigen::Index>(moving.size()));
+    for (std::size_t i = 0; i < moving.size(); ++i) {
+      positions.col(static_cast<Eigen::Index>(i)) = moving[i]->values;
+    }
+    window = choose_window(log.time, log.runs, positions, options.order);
+  }
+  return {log.time, log.runs, window, options.order};
+}
+
+}  // namespace sparflow
