@@ -1,0 +1,70 @@
+#pragma once
+/// Where a model fails, in plain words: the region of one or two signals that holds the most error for the
+/// fewest samples. Deterministic.
+///
+/// A region's score is the likelihood ratio of M. Kulldorff, "A spatial scan statistic", Commun. Statist.
+/// 26 (1997), with squared error in place of counts: with E the region's share of the squared error and S its
+/// share of the samples, score = E ln(E/S) + (1-E) ln((1-E)/(1-S)), nats. It is zero when error lies
+/// there as everywhere, and prefers neither tiny regions nor large ones. All intervals between the
+/// quantiles of each signal, and all rectangles of two signals, are tried.
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+namespace sparflow {
+
+/// A signal that may explain where the error is. NaN: the sample lies in no interval of it.
+struct RegimeSignal {
+  std::string key;         ///< for scripts, unit in it: "q_boom_deg"
+  std::string words;       ///< for sentences: "boom angle"
+  std::string unit;        ///< of the field: "deg"; "" for pure numbers
+  double scale = 1.0;      ///< SI value of one `unit`
+  Eigen::VectorXd values;  ///< SI
+};
+
+/// The samples of one regime: a cylinder in one direction, a pump while one cylinder leads.
+struct ErrorGroup {
+  std::string stage, at;
+  std::string regime;      ///< "extend", "retract", a leading cylinder, "standby"
+  std::string words;       ///< "boom retracting"
+  std::string pool;        ///< shares are taken among the groups of one pool
+  std::string pool_words;  ///< "the pressure error"
+  std::string unit;
+  double scale = 1.0;                 ///< SI value of one `unit`
+  double severity = 1.0;              ///< of the pool's error, to order pools of different units
+  Eigen::VectorXd squared_error;      ///< SI squared, one a sample
+  std::vector<RegimeSignal> signals;  ///< as long as squared_error
+};
+
+struct RegionBound {
+  std::string key, words, unit;
+  double lo = 0.0, hi = 0.0;  ///< in `unit`
+};
+
+struct WorstRegion {
+  std::string stage, at, regime;
+  std::vector<RegionBound> where;  ///< none: the whole regime
+  double rmse = 0.0;               ///< in `unit`
+  std::string unit;
+  double share_of_error = 0.0;    ///< of the pool's squared error, 0..1
+  double share_of_samples = 0.0;  ///< of the pool's samples, 0..1
+  double score = 0.0;             ///< [nat]
+  /// "boom retracting with boom angle 12..35 deg: 41 % of the pressure error in 9 % of the samples (RMSE
+  /// 4.2 bar)"
+  std::string sentence;
+};
+
+struct RegionOptions {
+  int bins = 10;              ///< quantiles of each signal between which intervals are tried
+  double least_share = 0.02;  ///< of the pool's samples; less is an anecdote
+  double contrast = 1.25;     ///< a region's RMSE is at least this many times the pool's
+  /// A further signal must raise the score by this factor, so that words stay few.
+  double gain_per_signal = 1.25;
+  int most = 6;  ///< regions reported
+};
+
+/// At most one region a group, the worst first. None where the error is spread evenly.
+std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,
+                                       const RegionOptions& options = {});
+
+}  // namespace sparflow

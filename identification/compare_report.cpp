@@ -1,0 +1,181 @@
+// The result of a comparison as JSON and as a table, and the signals a residual is searched over.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "identification/compare.h"
+#include "models/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using Json = nlohmann::ordered_json;
+
+Json score_json(const StageScore& s) {
+  return {{"rmse", s.rmse / s.unit.si},
+          {"unit", s.unit.name},
+          {"fit_percent", s.fit_percent},
+          {"bias", s.bias / s.unit.si},
+          {"within_95_percent", s.within_95_percent},
+          {"n", s.n}};
+}
+
+void add_cylinder(const Machine& machine, const MachineSignals& signals, int index,
+                  std::vector<RegimeSignal>& out) {
+  const std::string& name = machine.cylinders[static_cast<std::size_t>(index)].name;
+  const CylinderSignals& c = signals.cylinders[static_cast<std::size_t>(index)];
+  out.push_back({"speed_" + name + "_mm_s", name + " speed", "mm/s", 1e-3, c.speed.cwiseAbs()});
+  out.push_back(
+      {"acceleration_" + name + "_m_s2", name + " acceleration", "m/s2", 1.0, c.acceleration});
+  out.push_back({"load_" + name + "_kN", name + " load", "kN", 1e3, c.static_force});
+  if (c.has_command()) {
+    out.push_back({"u_" + name, name + " command", "", 1.0, c.command.cwiseAbs()});
+  }
+}
+
+/// Flow of a pump's other cylinders, the sign of motions that overlap.
+VectorXd other_flow(const Machine& machine, const MachineSignals& signals, int pump, int cylinder) {
+  VectorXd sum = VectorXd::Zero(signals.samples());
+  if (pump < 0) return sum;
+  for (const int i : machine.pumps[static_cast<std::size_t>(pump)].feeds) {
+    if (i != cylinder) sum += signals.cylinders[static_cast<std::size_t>(i)].flow;
+  }
+  return sum;
+}
+
+std::string duration_text(double seconds) {
+  return seconds < 120.0 ? fmt::format("{:.1f} s", seconds)
+                         : fmt::format("{:.1f} min", seconds / 60.0);
+}
+
+std::string number(double value) {
+  const double size = std::abs(value);
+  return fmt::format("{:.{}f}", value, size >= 100.0 ? 0 : size >= 10.0 ? 1 : 2);
+}
+
+}  // namespace
+
+std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
+                                         const ComparedSeries& series) {
+  std::vector<RegimeSignal> out;
+  const int cylinder = series.stage == "pump" ? -1 : machine.cylinder_index(series.at);
+  const int pump =
+      series.stage == "pump" ? machine.pump_index(series.at) : machine.pump_of_cylinder(cylinder);
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
+    if (joint.type == JointType::kRevolute) {
+      out.push_back({"q_" + joint.name + "_deg", joint.name + " angle", "deg", units::kDegree,
+                     signals.q.col(j)});
+    } else {
+      out.push_back(
+          {"q_" + joint.name + "_m", joint.name + " position", "m", 1.0, signals.q.col(j)});
+    }
+  }
+  if (cylinder >= 0) add_cylinder(machine, signals, cylinder, out);
+  if (pump >= 0) {
+    out.push_back({cylinder >= 0 ? "other_flow_lpm" : "flow_lpm",
+                   cylinder >= 0 ? "flow to the other cylinders" : "total flow", "l/min",
+                   units::kLitrePerMinute, other_flow(machine, signals, pump, cylinder)});
+  }
+  if (series.stage == "pump") {
+    out.push_back({"predicted_bar", "predicted pressure", "bar", units::kBar, series.predicted});
+  }
+  if (signals.payload_measured)
+    out.push_back({"payload_kg", "payload", "kg", 1.0, signals.payload});
+  if (signals.oil.size() > 0) out.push_back({"oil_C", "oil temperature", "degC", 1.0, signals.oil});
+  if (signals.return_pressure.size() > 0) {
+    out.push_back({"p_return_bar", "return pressure", "bar", units::kBar, signals.return_pressure});
+  }
+  for (const CandidateSignal& c : signals.candidates) {
+    out.push_back({c.name, c.name, c.unit, 1.0, c.values});
+  }
+  return out;
+}
+
+std::string compare_json(const CompareResult& result) {
+  Json stages = Json::object();
+  for (const char* stage : {"force", "flow", "pressure", "pump", "energy"})
+    stages[stage] = Json::object();
+  for (const StageScore& s : result.scores) {
+    if (s.regime.empty()) {
+      stages[s.stage][s.at] = score_json(s);
+    } else {
+      stages[s.stage][s.at][s.regime] = score_json(s);
+    }
+  }
+  for (const EnergyScore& e : result.energy) {
+    Json& at = stages["energy"][e.pump];
+    at = {{"measured_J", e.measured},
+          {"predicted_J", e.predicted},
+          {"relative_error", e.relative_error},
+          {"duration_s", e.duration}};
+    if (e.from_commands) at["predicted_from_commands_J"] = *e.from_commands;
+  }
+  Json worst = Json::array();
+  for (const WorstRegion& w : result.worst) {
+    Json where = Json::object();
+    for (const RegionBound& b : w.where) where[b.key] = {b.lo, b.hi};
+    worst.push_back({{"stage", w.stage},
+                     {"at", w.at},
+                     {"regime", w.regime},
+                     {"where", where},
+                     {"rmse", w.rmse},
+                     {"unit", w.unit},
+                     {"share_of_error", w.share_of_error},
+                     {"share_of_samples", w.share_of_samples},
+                     {"sentence", w.sentence}});
+  }
+  Json logs = Json::array();
+  for (const LogComparison& log : result.logs) {
+    logs.push_back({{"file", log.signals.file},
+                    {"samples", log.signals.samples()},
+                    {"filter_window_s", log.signals.window}});
+  }
+  const Json root = {{"samples", result.samples},
+                     {"stages", stages},
+                     {"worst", worst},
+                     {"notes", result.notes},
+                     {"logs", logs}};
+  return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string compare_table(const CompareResult& result) {
+  std::string text = fmt::format("{} samples in {} log{}\n", result.samples, result.logs.size(),
+                                 result.logs.size() == 1 ? "" : "s");
+  std::size_t width = 12;
+  for (const StageScore& s : result.scores)
+    width = std::max(width, s.at.size() + s.regime.size() + 1);
+  if (result.scores.empty()) {
+    text += "nothing could be compared\n";
+  } else {
+    text += fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", "stage", "at", width,
+                        "RMSE", "bias", "unit", "fit %", "n");
+  }
+  for (const StageScore& s : result.scores) {
+    text +=
+        fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", s.stage,
+                    s.regime.empty() ? s.at : s.at + " " + s.regime, width,
+                    number(s.rmse / s.unit.si), number(s.bias / s.unit.si), s.unit.name,
+                    std::isfinite(s.fit_percent) ? fmt::format("{:.1f}", s.fit_percent) : "-", s.n);
+  }
+  for (const EnergyScore& e : result.energy) {
+    text += fmt::format("{:<12}{:<{}}  measured {} kJ, predicted {} kJ ({:+.2f} %)", "energy",
+                        e.pump, width, number(e.measured / 1e3), number(e.predicted / 1e3),
+                        100.0 * e.relative_error);
+    if (e.from_commands)
+      text += fmt::format(", from commands {} kJ", number(*e.from_commands / 1e3));
+    text += fmt::format(" in {}\n", duration_text(e.duration));
+  }
+  text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
+  if (!result.worst.empty()) text += "\nwhere it fails most\n";
+  for (const WorstRegion& w : result.worst) text += "  " + w.stage + ": " + w.sentence + "\n";
+  if (!result.notes.empty()) text += "\nnot compared, or with care\n";
+  for (const std::string& note : result.notes) text += "  " + note + "\n";
+  return text;
+}
+
+}  // namespace sparflow
