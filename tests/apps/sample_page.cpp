@@ -2,7 +2,10 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
+
+#include "tests/models/test_machines.h"
 
 namespace sparflow::testing {
 namespace {
@@ -13,37 +16,16 @@ using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A planar crane of three joints, close to the reference machine, as lines.
-DrawingFrame frame_at(double time, double boom, double jib, double extension) {
-  const auto direction = [](double angle) { return Vector2d(std::cos(angle), std::sin(angle)); };
-  const Vector2d base(0.0, 0.0), boom_pin(0.0, 2.0);
-  const Vector2d jib_pin = boom_pin + 3.4 * direction(boom);
-  const Vector2d along = direction(boom + jib);
-  const Vector2d jib_end = jib_pin + 3.0 * along;
-  const Vector2d rod_pin =
-      boom_pin + 0.65 * direction(boom) - 0.2 * Vector2d(-std::sin(boom), std::cos(boom));
-  const Vector2d barrel_pin(0.4, 0.5);
-  const Vector2d axis = (rod_pin - barrel_pin).normalized();
-  DrawingFrame frame;
-  frame.time = time;
-  frame.tip = jib_end + extension * along;
-  frame.parts = {{PartKind::kLink, {base, boom_pin}},
-                 {PartKind::kLink, {boom_pin, jib_pin}},
-                 {PartKind::kLink, {jib_pin, jib_end}},
-                 {PartKind::kTelescope, {jib_end, jib_end + 0.5 * extension * along}},
-                 {PartKind::kTelescope, {jib_end + 0.5 * extension * along, frame.tip}},
-                 {PartKind::kRod, {barrel_pin, rod_pin}},
-                 {PartKind::kBarrel, {barrel_pin, barrel_pin + 0.95 * axis}},
-                 {PartKind::kPin, {barrel_pin}},
-                 {PartKind::kPin, {rod_pin}},
-                 {PartKind::kPin, {boom_pin}},
-                 {PartKind::kPin, {jib_pin}}};
-  return frame;
-}
-
-DrawingFrame motion_frame(double time, double duration) {
-  const double s = 0.5 - 0.5 * std::cos(3.14159 * time / duration);
-  return frame_at(time, 0.15 + 0.75 * s, -1.7 + 1.1 * s, 0.4 + 2.8 * s * s);
+/// From low and near to high and far in eight seconds.
+Trajectory reach() {
+  Trajectory motion;
+  motion.t = VectorXd::LinSpaced(81, 0.0, 8.0);
+  motion.q.resize(81, 3);
+  for (Index i = 0; i < 81; ++i) {
+    const double s = 0.5 - 0.5 * std::cos(std::numbers::pi * motion.t[i] / 8.0);
+    motion.q.row(i) << 0.35 + 0.6 * s, -1.75 + 1.15 * s, 0.5 + 2.8 * s * s;
+  }
+  return motion;
 }
 
 LineChart pressures() {
@@ -157,7 +139,7 @@ HeatMap error_map() {
       map.counts(r, c) = std::round(40 + 30 * std::sin(at.y()));
     }
   }
-  map.crane = motion_frame(5.0, 8.0).parts;
+  map.crane = drawing_frame(loader_crane(), reach().q.row(50)).parts;
   return map;
 }
 
@@ -166,9 +148,9 @@ CraneDrawing motion() {
   drawing.title = "The motion";
   drawing.note = "Five instants, the later the stronger; dashed: the planner's path.";
   drawing.group = "motion";
-  for (int i = 0; i <= 80; ++i) drawing.frames.push_back(motion_frame(0.1 * i, 8.0));
+  drawing.frames = drawing_frames(loader_crane(), reach(), 81);
   drawing.obstacles = {{"wall", {{4.6, 0.0}, {5.4, 0.0}, {5.4, 2.6}, {4.6, 2.6}}, 0.0},
-                       {"tank", {{2.3, 0.75}}, 0.6}};
+                       {"tank", {{1.9, 0.6}}, 0.6}};
   drawing.paths = {{"seed", {drawing.frames.front().tip, {6.5, 3.0}, drawing.frames.back().tip}}};
   drawing.goal = drawing.frames.back().tip;
   drawing.ground = 0.0;

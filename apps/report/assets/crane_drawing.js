@@ -130,7 +130,7 @@
     if (k < 0) k = frames.length - 1;
     if (k === 0) return frames[0];
     const a = frames[k - 1], b = frames[k], part = b.t > a.t ? Math.min((time - a.t) / (b.t - a.t), 1) : 1;
-    const mix = (p, q) => p.map((v, i) => v + (q[i] - v) * part);
+    const mix = (p, q) => (p.length === q.length ? p.map((v, i) => v + (q[i] - v) * part) : part < 0.5 ? p : q);
     return { t: time, tip: mix(a.tip, b.tip), points: a.points.map((p, i) => mix(p, b.points[i])) };
   }
 
