@@ -15,26 +15,10 @@ constexpr double kToKiloNewton = 1e-3;
 constexpr double kBarLpmToKilowatt = 1.0 / 600.0;
 }  // namespace
 
-/// Transmission ratio c' = d length / d joint of one cylinder, and its derivatives.
-struct ReferenceKnot::Rate {
-  double ratio = 1.0, d = 0.0, dd = 0.0;
-};
-
-/// What follows from one cylinder's speed v: direction weight (extend), flow, and derivatives with respect to v.
-struct ReferenceKnot::Speed {
-  double extend, retract;  ///< w and 1 - w, both accurate when tiny
-  double d_extend, dd_extend;
-  double flow, d_flow, dd_flow;  ///< [l/min]
-};
-
-/// Pressure blended over the directions, margin included, with respect to (v, F).
-struct ReferenceKnot::Blend {
-  double value, d_v, d_f, d_vv, d_vf, d_ff;
-};
-
 ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
     : problem_(std::move(problem)) {
   const ReferenceProblem& p = *problem_;
+  last_.z.fill(std::nan(""));  // equals no z
   // tau1 = gS_inner cos th1 + tau2, tau2 = (gS_fixed + gS_slide d) cos phi, tau3 = gS_slide sin phi
   gS_inner_ = p.gravity * (p.m_inner * p.s_inner + (p.m_outer + p.m_tele + p.m_payload) * p.L1);
   gS_fixed_ = p.gravity * (p.m_outer * p.s_outer + p.m_tele * p.s_tele0 + p.m_payload * p.L2);
@@ -53,27 +37,39 @@ ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
   }
 }
 
-void ReferenceKnot::rates(const double* z, Rate* rate) const {
+const ReferenceKnot::Kinematics& ReferenceKnot::kinematics(const double* z) {
+  Kinematics& kin = last_;
+  if (std::equal(kin.z.begin(), kin.z.end(), z)) return kin;  // a NaN never is
   const ReferenceProblem& p = *problem_;
+  std::copy(z, z + 6, kin.z.begin());
   const std::array<double, 2> a = {p.a1, p.a2}, b = {p.b1, p.b2};
+  const std::array<double, 2> s = {std::sin(z[0]), std::sin(z[1])};
+  const std::array<double, 2> c = {std::cos(z[0]), std::cos(z[1])};
+  kin.sin_1 = s[0];
+  kin.cos_1 = c[0];
+  kin.sin_phi = s[0] * c[1] + c[0] * s[1];
+  kin.cos_phi = c[0] * c[1] - s[0] * s[1];
   for (std::size_t i = 0; i < 2; ++i) {
-    const double s0 = std::sin(z[i]), c0 = std::cos(z[i]);
-    const double sine = s0 * angle_cos_[i] + c0 * angle_sin_[i];
-    const double cosine = c0 * angle_cos_[i] - s0 * angle_sin_[i];
+    const double sine = s[i] * angle_cos_[i] + c[i] * angle_sin_[i];
+    const double cosine = c[i] * angle_cos_[i] - s[i] * angle_sin_[i];
     const double ab = a[i] * b[i];
     const double inverse = 1.0 / std::sqrt(a[i] * a[i] + b[i] * b[i] - 2.0 * ab * cosine);
     // c c' = ab sin, c c'' + c'^2 = ab cos, c c''' + 3 c' c'' = -ab sin
-    Rate& r = rate[i];
+    Rate& r = kin.rate[i];
     r.ratio = ab * sine * inverse;
     r.d = (ab * cosine - r.ratio * r.ratio) * inverse;
     r.dd = (-ab * sine - 3.0 * r.ratio * r.d) * inverse;
   }
-  rate[2] = {1.0, 0.0, 0.0};
+  kin.flow = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    kin.speed[i] = speed(i, kin.rate[i].ratio * z[3 + i]);
+    kin.flow += kin.speed[i].flow;
+  }
+  return kin;
 }
 
-ReferenceKnot::Speed ReferenceKnot::speed(int cylinder, double v) const {
+ReferenceKnot::Speed ReferenceKnot::speed(std::size_t i, double v) const {
   const ReferenceProblem& p = *problem_;
-  const auto i = static_cast<std::size_t>(cylinder);
   Speed s;
   // The smaller weight first: 1 - w would lose it. Beyond 2|v|/eps = 40 it is below 5e-18.
   const double argument = 2.0 * std::abs(v) / p.eps_v;
@@ -95,46 +91,42 @@ ReferenceKnot::Speed ReferenceKnot::speed(int cylinder, double v) const {
   return s;
 }
 
-void ReferenceKnot::forces(const double* z, const Rate* rate, double* force) const {
-  const double phi = z[0] + z[1];
-  const double tau2 = (gS_fixed_ + gS_slide_ * z[2]) * std::cos(phi);
-  const double tau1 = gS_inner_ * std::cos(z[0]) + tau2;
-  const double tau3 = gS_slide_ * std::sin(phi);
-  force[0] = kToKiloNewton * tau1 / rate[0].ratio;
-  force[1] = kToKiloNewton * tau2 / rate[1].ratio;
-  force[2] = kToKiloNewton * tau3;
+std::array<double, 3> ReferenceKnot::forces(const Kinematics& kin) const {
+  const double tau2 = (gS_fixed_ + gS_slide_ * kin.z[2]) * kin.cos_phi;
+  const double tau1 = gS_inner_ * kin.cos_1 + tau2;
+  const double tau3 = gS_slide_ * kin.sin_phi;
+  return {kToKiloNewton * tau1 / kin.rate[0].ratio, kToKiloNewton * tau2 / kin.rate[1].ratio,
+          kToKiloNewton * tau3};
 }
 
-/// Log-sum-exp over standby and the cylinders' pressures; the largest term is taken out, so nothing overflows.
+/// Log-sum-exp over standby and the cylinders' demands; the largest term is taken out, so nothing overflows.
+/// Terms below exp(-40) of the largest are under a tenth of the sum's last place.
 /// @param share [3] weights of the softmax (derivatives), may be null
-double ReferenceKnot::pump_pressure(const double* pressure, double* share) const {
+double ReferenceKnot::pump_pressure(const std::array<double, 3>& demand, double* share) const {
   const ReferenceProblem& p = *problem_;
-  const double t = p.lse_temperature;
-  const double top = std::max({p.standby, pressure[0], pressure[1], pressure[2]});
-  std::array<double, 3> term;
-  double sum = std::exp((p.standby - top) / t);
-  for (std::size_t i = 0; i < 3; ++i) {
-    term[i] = std::exp((pressure[i] - top) / t);
-    sum += term[i];
-  }
+  const double inverse = 1.0 / p.lse_temperature;
+  const double top = std::max({p.standby, demand[0], demand[1], demand[2]});
+  const auto term = [&](double pressure) {
+    const double exponent = (pressure - top) * inverse;
+    if (exponent == 0.0) return 1.0;
+    return exponent < -40.0 ? 0.0 : std::exp(exponent);  // a NaN stays one
+  };
+  const std::array<double, 3> terms = {term(demand[0]), term(demand[1]), term(demand[2])};
+  const double sum = term(p.standby) + terms[0] + terms[1] + terms[2];
   if (share != nullptr) {
-    for (std::size_t i = 0; i < 3; ++i) share[i] = term[i] / sum;
+    for (std::size_t i = 0; i < 3; ++i) share[i] = terms[i] / sum;
   }
-  return top + t * std::log(sum);
+  return top + p.lse_temperature * std::log(sum);
 }
 
 ReferenceKnot::State ReferenceKnot::state(const double* z) {
   const ReferenceProblem& p = *problem_;
-  Rate rate[3];
-  rates(z, rate);
+  const Kinematics& kin = kinematics(z);
   State out;
-  forces(z, rate, out.force.data());
-  std::array<double, 3> demand;
-  double total_flow = 0.0;
+  out.force = forces(kin);
+  std::array<double, 3> demands;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Speed s = speed(static_cast<int>(i), rate[i].ratio * z[3 + i]);
-    out.flow[i] = s.flow;
-    total_flow += s.flow;
+    const Speed& s = kin.speed[i];
     double pressure = 0.0;
     const double weight[2] = {s.extend, s.retract};
     for (std::size_t side = 0; side < 2; ++side) {
@@ -143,68 +135,70 @@ ReferenceKnot::State ReferenceKnot::state(const double* z) {
       pressure += weight[side] * kernel_sum(gp.centres(), s.flow * gp.inverse_length_flow,
                                             out.force[i] * gp.inverse_length_force);
     }
+    out.flow[i] = s.flow;
     out.pressure[i] = pressure;
     const double q2 = s.flow * s.flow;
-    demand[i] = pressure + p.margin * q2 / (q2 + p.q_eps * p.q_eps);
+    demands[i] = pressure + p.margin * q2 / (q2 + p.q_eps * p.q_eps);
   }
-  out.pump = pump_pressure(demand.data(), nullptr);
-  out.power = kBarLpmToKilowatt * out.pump * total_flow;
+  out.pump = pump_pressure(demands, nullptr);
+  out.power = kBarLpmToKilowatt * out.pump * kin.flow;
   return out;
 }
 
 double ReferenceKnot::cost(const double* z) { return state(z).power; }
 
+ReferenceKnot::Demand ReferenceKnot::demand(std::size_t i, const Speed& s, double force) const {
+  const ReferenceProblem& p = *problem_;
+  KernelSums side[2];
+  const double weight[2] = {s.extend, s.retract};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (weight[k] <= negligible_[i]) continue;
+    const ReferenceGp& gp = p.gp[i][k];
+    const double iq = gp.inverse_length_flow, jf = gp.inverse_length_force;
+    KernelSums& sums = side[k] = kernel_sum_derivatives(gp.centres(), s.flow * iq, force * jf);
+    sums.d_x *= iq;
+    sums.d_y *= jf;
+    sums.d_xx *= iq * iq;
+    sums.d_xy *= iq * jf;
+    sums.d_yy *= jf * jf;
+  }
+  const auto mixed = [&](double KernelSums::*part) {
+    return s.extend * side[0].*part + s.retract * side[1].*part;
+  };
+  const auto apart = [&](double KernelSums::*part) { return side[0].*part - side[1].*part; };
+  const double q2 = s.flow * s.flow, e2 = p.q_eps * p.q_eps, sum = q2 + e2;
+  const double d_margin = p.margin * 2.0 * e2 * s.flow / (sum * sum);
+  const double dd_margin = p.margin * 2.0 * e2 * (e2 - 3.0 * q2) / (sum * sum * sum);
+  const double d_q = mixed(&KernelSums::d_x) + d_margin;
+  Demand d;
+  d.value = mixed(&KernelSums::value) + p.margin * q2 / sum;
+  d.d_v = s.d_extend * apart(&KernelSums::value) + d_q * s.d_flow;
+  d.d_f = mixed(&KernelSums::d_y);
+  d.d_vv = s.dd_extend * apart(&KernelSums::value) +
+           2.0 * s.d_extend * s.d_flow * apart(&KernelSums::d_x) +
+           (mixed(&KernelSums::d_xx) + dd_margin) * s.d_flow * s.d_flow + d_q * s.dd_flow;
+  d.d_vf = s.d_extend * apart(&KernelSums::d_y) + mixed(&KernelSums::d_xy) * s.d_flow;
+  d.d_ff = mixed(&KernelSums::d_yy);
+  return d;
+}
+
 double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double* hessian) {
   const ReferenceProblem& p = *problem_;
-  Rate rate[3];
-  rates(z, rate);
-  double force[3];
-  forces(z, rate, force);
-
-  // Pressures with margin, with respect to each cylinder's own (v, F).
-  Speed speeds[3];
-  Blend blend[3];
-  double demand[3];
+  const Kinematics& kin = kinematics(z);
+  const std::array<Rate, 3>& rate = kin.rate;
+  const std::array<Speed, 3>& speeds = kin.speed;
+  const std::array<double, 3> force = forces(kin);
+  std::array<Demand, 3> blend;
+  std::array<double, 3> demands;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Speed s = speeds[i] = speed(static_cast<int>(i), rate[i].ratio * z[3 + i]);
-    KernelSums side[2];
-    const double weight[2] = {s.extend, s.retract};
-    for (std::size_t k = 0; k < 2; ++k) {
-      if (weight[k] <= negligible_[i]) continue;
-      const ReferenceGp& gp = p.gp[i][k];
-      const double iq = gp.inverse_length_flow, jf = gp.inverse_length_force;
-      KernelSums sums = kernel_sum_derivatives(gp.centres(), s.flow * iq, force[i] * jf);
-      sums.d_x *= iq;
-      sums.d_y *= jf;
-      sums.d_xx *= iq * iq;
-      sums.d_xy *= iq * jf;
-      sums.d_yy *= jf * jf;
-      side[k] = sums;
-    }
-    const auto mixed = [&](double KernelSums::*part) {
-      return s.extend * side[0].*part + s.retract * side[1].*part;
-    };
-    const auto apart = [&](double KernelSums::*part) { return side[0].*part - side[1].*part; };
-    const double q2 = s.flow * s.flow, e2 = p.q_eps * p.q_eps, sum = q2 + e2;
-    const double margin = p.margin * q2 / sum;
-    const double d_margin = p.margin * 2.0 * e2 * s.flow / (sum * sum);
-    const double dd_margin = p.margin * 2.0 * e2 * (e2 - 3.0 * q2) / (sum * sum * sum);
-    const double d_q = mixed(&KernelSums::d_x) + d_margin;
-    Blend& b = blend[i];
-    b.value = demand[i] = mixed(&KernelSums::value) + margin;
-    b.d_v = s.d_extend * apart(&KernelSums::value) + d_q * s.d_flow;
-    b.d_f = mixed(&KernelSums::d_y);
-    b.d_vv = s.dd_extend * apart(&KernelSums::value) +
-             2.0 * s.d_extend * s.d_flow * apart(&KernelSums::d_x) +
-             (mixed(&KernelSums::d_xx) + dd_margin) * s.d_flow * s.d_flow + d_q * s.dd_flow;
-    b.d_vf = s.d_extend * apart(&KernelSums::d_y) + mixed(&KernelSums::d_xy) * s.d_flow;
-    b.d_ff = mixed(&KernelSums::d_yy);
+    blend[i] = demand(i, speeds[i], force[i]);
+    demands[i] = blend[i].value;
   }
 
   // Power with respect to v and F of all cylinders: pump pressure times total flow.
   double share[3];
-  const double pump = pump_pressure(demand, share);
-  const double flow = speeds[0].flow + speeds[1].flow + speeds[2].flow;
+  const double pump = pump_pressure(demands, share);
+  const double flow = kin.flow;
   Vector3d pump_v, pump_f, flow_v;
   for (int i = 0; i < 3; ++i) {
     pump_v[i] = share[i] * blend[i].d_v;
@@ -223,17 +217,17 @@ double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double
       h_vf(r, c) = -fc * pump_v[r] * pump_f[c] + flow_v_k[r] * pump_f[c];
       h_ff(r, c) = -fc * pump_f[r] * pump_f[c];
     }
-    const Blend& b = blend[c];
+    const Demand& b = blend[c];
     h_vv(c, c) += fk * share[c] * (b.d_vv + curl * b.d_v * b.d_v) + k * pump * speeds[c].dd_flow;
     h_vf(c, c) += fk * share[c] * (b.d_vf + curl * b.d_v * b.d_f);
     h_ff(c, c) += fk * share[c] * (b.d_ff + curl * b.d_f * b.d_f);
   }
 
   // Forces: F_i = 1e-3 tau_i / c_i'; gradients and Hessians with respect to q.
-  const double phi = z[0] + z[1], sin_phi = std::sin(phi), cos_phi = std::cos(phi);
+  const double sin_phi = kin.sin_phi, cos_phi = kin.cos_phi;
   const double arm = gS_fixed_ + gS_slide_ * z[2];
   const double tau2 = arm * cos_phi;
-  const double inner_cos = gS_inner_ * std::cos(z[0]), inner_sin = gS_inner_ * std::sin(z[0]);
+  const double inner_cos = gS_inner_ * kin.cos_1, inner_sin = gS_inner_ * kin.sin_1;
   const double tau[3] = {inner_cos + tau2, tau2, gS_slide_ * sin_phi};
   const Vector3d d_tau[3] = {{-inner_sin - arm * sin_phi, -arm * sin_phi, gS_slide_ * cos_phi},
                              {-arm * sin_phi, -arm * sin_phi, gS_slide_ * cos_phi},
@@ -301,35 +295,26 @@ void ReferenceKnot::path_bounds(double* lower, double* upper) const {
   upper[0] = problem_->q_total_max;
 }
 
-void ReferenceKnot::path(const double* z, double* g) {
-  Rate rate[3];
-  rates(z, rate);
-  g[0] = 0.0;
-  for (int i = 0; i < 3; ++i) g[0] += speed(i, rate[i].ratio * z[3 + i]).flow;
-}
+void ReferenceKnot::path(const double* z, double* g) { g[0] = kinematics(z).flow; }
 
 void ReferenceKnot::path_jacobian(const double* z, double* g, double* jacobian) {
-  Rate rate[3];
-  rates(z, rate);
-  g[0] = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const Speed s = speed(i, rate[i].ratio * z[3 + i]);
-    g[0] += s.flow;
-    jacobian[i] = s.d_flow * rate[i].d * z[3 + i];
-    jacobian[3 + i] = s.d_flow * rate[i].ratio;
+  const Kinematics& kin = kinematics(z);
+  g[0] = kin.flow;
+  for (std::size_t i = 0; i < 3; ++i) {
+    jacobian[i] = kin.speed[i].d_flow * kin.rate[i].d * z[3 + i];
+    jacobian[3 + i] = kin.speed[i].d_flow * kin.rate[i].ratio;
   }
 }
 
 void ReferenceKnot::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
-  Rate rate[3];
-  rates(z, rate);
+  const Kinematics& kin = kinematics(z);
   Eigen::Map<Eigen::Matrix<double, 6, 6>> h(hessian);
   for (int i = 0; i < 3; ++i) {
-    const double qd = z[3 + i];
-    const Speed s = speed(i, rate[i].ratio * qd);
-    const double a = rate[i].d * qd, b = rate[i].ratio, m = multiplier[0];
-    const double cross = m * (s.dd_flow * a * b + s.d_flow * rate[i].d);
-    h(i, i) += m * (s.dd_flow * a * a + s.d_flow * rate[i].dd * qd);
+    const Speed& s = kin.speed[i];
+    const Rate& r = kin.rate[i];
+    const double a = r.d * z[3 + i], b = r.ratio, m = multiplier[0];
+    const double cross = m * (s.dd_flow * a * b + s.d_flow * r.d);
+    h(i, i) += m * (s.dd_flow * a * a + s.d_flow * r.dd * z[3 + i]);
     h(i, 3 + i) += cross;
     h(3 + i, i) += cross;
     h(3 + i, 3 + i) += m * s.dd_flow * b * b;

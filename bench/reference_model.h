@@ -77,19 +77,38 @@ class ReferenceKnot final : public KnotModel {
   void add_path_hessian(const double* z, const double* multiplier, double* hessian) override;
 
  private:
-  struct Rate;
-  struct Speed;
-  struct Blend;
-  void rates(const double* z, Rate* rate) const;
-  Speed speed(int cylinder, double v) const;
-  void forces(const double* z, const Rate* rate, double* force) const;
-  double pump_pressure(const double* pressure, double* share) const;
+  /// Transmission ratio c' = d length / d joint of one cylinder, and its derivatives.
+  struct Rate {
+    double ratio = 1.0, d = 0.0, dd = 0.0;
+  };
+  /// What follows from one cylinder's speed: direction weights, flow, derivatives with respect to the speed.
+  struct Speed {
+    double extend, retract;  ///< w and 1 - w, both accurate when tiny
+    double d_extend, dd_extend;
+    double flow, d_flow, dd_flow;  ///< [l/min]
+  };
+  struct Kinematics {
+    std::array<double, 6> z;
+    double sin_1, cos_1, sin_phi, cos_phi;
+    std::array<Rate, 3> rate;
+    std::array<Speed, 3> speed;
+    double flow;  ///< [l/min] total
+  };
+  /// Pressure blended over the directions, margin included, with respect to (v, F).
+  struct Demand {
+    double value, d_v, d_f, d_vv, d_vf, d_ff;
+  };
+  const Kinematics& kinematics(const double* z);
+  Speed speed(std::size_t i, double v) const;
+  std::array<double, 3> forces(const Kinematics& kin) const;
+  Demand demand(std::size_t i, const Speed& s, double force) const;
+  double pump_pressure(const std::array<double, 3>& demand, double* share) const;
 
   std::shared_ptr<const ReferenceProblem> problem_;
-  double gS_inner_, gS_fixed_,
-      gS_slide_;  ///< moments of weight [Nm], [Nm], [N]: see the constructor
+  double gS_inner_, gS_fixed_, gS_slide_;        ///< moments of weight [Nm], [Nm], [N]
   std::array<double, 2> angle_sin_, angle_cos_;  ///< of the linkage offsets
   std::array<double, 3> negligible_;  ///< weight below which a direction is not evaluated
+  Kinematics last_;                   ///< of the z asked for last
 };
 
 /// The tip at the goal, x and z [m].

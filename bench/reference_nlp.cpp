@@ -101,7 +101,7 @@ void print(const Outcome& outcome, const Arguments& arguments) {
       "  evaluations      {} objective, {} gradient, {} constraints, {} Jacobian, {} Hessian\n"
       "  solve            {:8.2f} ms   (median of {} runs, one core)\n"
       "    callbacks      {:8.2f} ms   model and derivatives, {} kernels\n"
-      "    linear solver  {:8.2f} ms   MUMPS and handing it the matrix\n"
+      "    linear solver  {:8.2f} ms   MUMPS, and assembling its matrix\n"
       "    rest of Ipopt  {:8.2f} ms\n"
       "  before           {:8.2f} ms   reading the file, laying out the NLP\n",
       arguments.problem, to_string(r.status), r.iterations, r.objective, outcome.energy_kJ,

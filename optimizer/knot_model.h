@@ -9,6 +9,8 @@ namespace sparflow {
 
 /// z = [q; qd] (2 n values) or, when uses_acceleration(), [q; qd; qdd] (3 n values).
 /// An object is a mutable workspace over an immutable model: one a thread. No call allocates.
+/// The transcription calls cost then path, and cost_derivatives then path_jacobian, at the same z in turn: a model
+/// may remember the last z and share its kinematics.
 class KnotModel {
  public:
   virtual ~KnotModel() = default;

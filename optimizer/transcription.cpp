@@ -58,7 +58,7 @@ Transcription::Transcription(TranscriptionSpec spec)
   bounds(lower, upper, g_lower, g_upper);
   start_ = (0.5 * (lower + upper)).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   // NaN equals no point, so nothing is known yet.
-  cost_x_ = derivative_x_ = VectorXd::Constant(x_size, std::nan(""));
+  value_x_ = derivative_x_ = VectorXd::Constant(x_size, std::nan(""));
   cost_gradient_.resize(x_size);
   const auto z = static_cast<std::size_t>(z_size_);
   node_cost_hessian_.resize(nodes_.size() * z * z);
@@ -66,9 +66,9 @@ Transcription::Transcription(TranscriptionSpec spec)
   terminal_block_.resize(static_cast<std::size_t>(n_ * n_));
   z_.resize(z_size_);
   z_gradient_.resize(z_size_);
-  path_value_.resize(path_count_);
   path_multiplier_.resize(path_count_);
-  path_jacobian_.resize(static_cast<std::size_t>(path_count_) * z);
+  path_value_.resize(nodes_.size() * static_cast<std::size_t>(path_count_));
+  path_jacobian_.resize(path_value_.size() * z);
   terminal_jacobian_value_.resize(terminal_count_ * n_);
 }
 
@@ -86,44 +86,54 @@ double Transcription::acceleration_cost(const double* x) const {
   return (w * qdd.square()).sum();
 }
 
-void Transcription::update_cost(const double* x) {
-  if (same_point(cost_x_, x)) return;
+/// Cost and path constraints of every node, one after the other, so that a model can share what both need: a
+/// line search always asks for both.
+void Transcription::update_values(const double* x) {
+  if (same_point(value_x_, x)) return;
   double total = 0.0;
+  double* path = path_value_.data();
   for (const Node& node : nodes_) {
     gather(node, x, z_.data());
     total += node.weight * spec_.knot->cost(z_.data());
+    if (!rows_of(node).empty()) spec_.knot->path(z_.data(), path);
+    path += path_count_;
   }
   cost_ = total;
-  std::memcpy(cost_x_.data(), x, sizeof(double) * static_cast<std::size_t>(cost_x_.size()));
+  std::memcpy(value_x_.data(), x, sizeof(double) * static_cast<std::size_t>(value_x_.size()));
 }
 
+/// The same with first derivatives of both and the Hessian of the cost; the values come along.
 void Transcription::update_derivatives(const double* x) {
   if (same_point(derivative_x_, x)) return;
   double total = 0.0;
   cost_gradient_.setZero();
-  const std::size_t block = static_cast<std::size_t>(z_size_ * z_size_);
   double* hessian = node_cost_hessian_.data();
+  double* path = path_value_.data();
+  double* jacobian = path_jacobian_.data();
   for (const Node& node : nodes_) {
     gather(node, x, z_.data());
     total += node.weight * spec_.knot->cost_derivatives(z_.data(), z_gradient_.data(), hessian);
     for (int i = 0; i < z_size_; ++i) {
       cost_gradient_[global_index(node, i)] += node.weight * z_gradient_[i];
     }
-    hessian += block;
+    if (!rows_of(node).empty()) spec_.knot->path_jacobian(z_.data(), path, jacobian);
+    hessian += z_size_ * z_size_;
+    path += path_count_;
+    jacobian += path_count_ * z_size_;
   }
   cost_ = total;
-  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(cost_x_.size());
-  std::memcpy(cost_x_.data(), x, bytes);
+  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(value_x_.size());
+  std::memcpy(value_x_.data(), x, bytes);
   std::memcpy(derivative_x_.data(), x, bytes);
 }
 
 double Transcription::objective(In x) {
-  update_cost(x.data());
+  update_values(x.data());
   return cost_ + acceleration_cost(x.data());
 }
 
 double Transcription::model_cost(const VectorXd& x) {
-  update_cost(x.data());
+  update_values(x.data());
   return cost_;
 }
 
@@ -147,14 +157,12 @@ void Transcription::constraints(In x, Out g) {
     spec_.terminal->value(x.data() + q_index(intervals_, 0), g.data() + terminal_row_);
   }
   if (path_count_ == 0) return;
+  update_values(x.data());
+  const double* path = path_value_.data();
   for (const Node& node : nodes_) {
-    const std::vector<int>& rows = rows_of(node);
-    if (rows.empty()) continue;
-    gather(node, x.data(), z_.data());
-    spec_.knot->path(z_.data(), path_value_.data());
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      g[node.first_row + static_cast<int>(r)] = path_value_[rows[r]];
-    }
+    int at = node.first_row;
+    for (int path_row : rows_of(node)) g[at++] = path[path_row];
+    path += path_count_;
   }
 }
 
@@ -165,16 +173,15 @@ void Transcription::jacobian(In x, Out value) {
     value.segment(terminal_jacobian_, terminal_count_ * n_) = terminal_jacobian_value_;
   }
   if (path_count_ == 0) return;
-  for (std::size_t s = 0; s < nodes_.size(); ++s) {
-    const std::vector<int>& rows = rows_of(nodes_[s]);
-    if (rows.empty()) continue;
-    gather(nodes_[s], x.data(), z_.data());
-    spec_.knot->path_jacobian(z_.data(), path_value_.data(), path_jacobian_.data());
-    int at = node_jacobian_[s];
-    for (int row : rows) {
-      const double* line = path_jacobian_.data() + row * z_size_;
-      for (int local : row_columns_[static_cast<std::size_t>(row)]) value[at++] = line[local];
+  update_derivatives(x.data());
+  const double* block = path_jacobian_.data();
+  int at = first_path_jacobian_;
+  for (const Node& node : nodes_) {
+    for (int path_row : rows_of(node)) {
+      const double* line = block + path_row * z_size_;
+      for (int local : row_columns_[static_cast<std::size_t>(path_row)]) value[at++] = line[local];
     }
+    block += path_count_ * z_size_;
   }
 }
 

@@ -125,7 +125,7 @@ class Transcription final : public NlpProblem {
   const std::vector<int>& rows_of(const Node& node) const;
   void gather(const Node& node, const double* x, double* z) const;
   double acceleration_cost(const double* x) const;
-  void update_cost(const double* x);
+  void update_values(const double* x);
   void update_derivatives(const double* x);
   std::string joint_name(int joint) const;
 
@@ -144,7 +144,7 @@ class Transcription final : public NlpProblem {
   Eigen::VectorXd jacobian_constant_;
   std::vector<std::vector<int>> row_columns_;  ///< per path row: the local indices it depends on
   int terminal_jacobian_ = 0;                  ///< first value of the terminal block
-  std::vector<int> node_jacobian_;             ///< first value of each node's path block
+  int first_path_jacobian_ = 0;                ///< first value of the path blocks, node by node
   std::vector<int> node_hessian_;              ///< [node x lower triangle of z, column by column]
   std::vector<int> terminal_hessian_;          ///< [lower triangle of q_N, column by column]
   std::vector<int> acceleration_hessian_;      ///< [N x n] diagonal of qdd
@@ -153,12 +153,14 @@ class Transcription final : public NlpProblem {
   std::unique_ptr<NlpMultipliers> start_multipliers_;
 
   // Workspace: what is known, and at which x.
-  Eigen::VectorXd cost_x_, derivative_x_;
+  Eigen::VectorXd value_x_, derivative_x_;
   double cost_ = 0.0;
   Eigen::VectorXd cost_gradient_;
   std::vector<double> node_cost_hessian_;  ///< [node x z x z]
-  Eigen::VectorXd z_, z_gradient_, path_value_, path_multiplier_, terminal_jacobian_value_;
-  std::vector<double> path_jacobian_, block_, terminal_block_;
+  std::vector<double> path_value_;         ///< [node x path rows]
+  std::vector<double> path_jacobian_;      ///< [node x path rows x z]
+  Eigen::VectorXd z_, z_gradient_, path_multiplier_, terminal_jacobian_value_;
+  std::vector<double> block_, terminal_block_;
 };
 
 /// Position and velocity of a motion at any instants; at rest in its first and last posture outside its time.

@@ -123,8 +123,8 @@ void Transcription::make_jacobian() {
   for (int r = 0; r < terminal_count_; ++r) {
     for (int i = 0; i < n_; ++i) add(terminal_row_ + r, q_index(intervals_, i), 0.0);
   }
+  first_path_jacobian_ = static_cast<int>(constant.size());
   for (const Node& node : nodes_) {
-    node_jacobian_.push_back(static_cast<int>(constant.size()));
     int row = node.first_row;
     for (int path_row : rows_of(node)) {
       for (int local : row_columns_[static_cast<std::size_t>(path_row)]) {

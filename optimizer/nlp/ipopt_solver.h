@@ -75,9 +75,9 @@ struct NlpResult {
   NlpEvaluations evaluations;
   double solve_s = 0.0;  ///< wall time in Ipopt; waiting for another thread's solve is not in it
   double callbacks_s = 0.0;  ///< wall time of it in the problem's evaluations
-  /// Wall time of it in MUMPS (ordering, factorisation, back substitution) and in handing it the matrix, as summed
-  /// by Ipopt's own timing statistics. Those do not cover the restoration phase: a lower bound when
-  /// restoration_iterations > 0.
+  /// Wall time of it in solving KKT systems: assembling the augmented matrix, MUMPS' ordering, factorisation and back
+  /// substitution, refinement. From Ipopt's timing statistics (its narrower timers leave the factorisation out),
+  /// which do not cover the restoration phase: a lower bound when restoration_iterations > 0.
   double linear_solver_s = 0.0;
   std::map<std::string, std::string>
       options_used;  ///< every option that was set, as Ipopt was given it
