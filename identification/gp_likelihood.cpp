@@ -37,7 +37,8 @@ ExactSystem exact_system(const GpPoints& p, const GpHyper& hyper) {
   s.log_det_kernel = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
   s.inverse = factor.solve(MatrixXd::Identity(n, n));
   s.inverse_basis.noalias() = s.inverse * p.basis;
-  const MatrixXd a = p.basis.transpose() * s.inverse_basis;
+  MatrixXd a = p.basis.transpose() * s.inverse_basis;
+  a.diagonal() += p.basis_precision;
   const Eigen::LLT<MatrixXd> basis_factor(a);
   if (basis_factor.info() != Eigen::Success) return s;
   s.log_det_basis = 2.0 * basis_factor.matrixLLT().diagonal().array().log().sum();
@@ -51,7 +52,15 @@ ExactSystem exact_system(const GpPoints& p, const GpHyper& hyper) {
 }  // namespace
 
 GpPoints GpPoints::select(const std::vector<Index>& rows) const {
-  return {x1(rows), x2(rows), y(rows), basis(rows, Eigen::all)};
+  return {x1(rows), x2(rows), y(rows), basis(rows, Eigen::all), basis_precision};
+}
+
+double GpPoints::log_constant() const {
+  double sum = -static_cast<double>(size()) * std::log(2.0 * std::numbers::pi);
+  for (const double precision : basis_precision) {
+    sum += precision > 0.0 ? std::log(precision) : std::log(2.0 * std::numbers::pi);
+  }
+  return 0.5 * sum;
 }
 
 MatrixXd kernel_matrix(const ArrayXd& a1, const ArrayXd& a2, const ArrayXd& b1, const ArrayXd& b2,
@@ -90,9 +99,7 @@ double exact_log_likelihood(const GpPoints& p, const GpHyper& hyper, GpHyper* gr
     }
     (*gradient)[3] = 0.5 * std::exp(hyper[3]) * (py.squaredNorm() - s.projection.trace());
   }
-  const double degrees = static_cast<double>(n - p.basis.cols());
-  return -0.5 * (p.y.dot(py) + s.log_det_kernel + s.log_det_basis +
-                 degrees * std::log(2.0 * std::numbers::pi));
+  return -0.5 * (p.y.dot(py) + s.log_det_kernel + s.log_det_basis) + p.log_constant();
 }
 
 GpPosterior exact_posterior(const GpPoints& p, const GpHyper& hyper) {

@@ -15,10 +15,13 @@ using GpHyper = Eigen::Vector4d;
 struct GpPoints {
   Eigen::ArrayXd x1, x2;  ///< [n] scaled inputs
   Eigen::VectorXd y;      ///< [n] scaled output
-  Eigen::MatrixXd
-      basis;  ///< [n x b] the mean's basis at the points, b = 1 (constant) or 2 (and x2)
+  Eigen::MatrixXd basis;  ///< [n x b] of the mean: 1 or (1, x2)
+  /// [b] prior precision of the mean's coefficients around zero; 0 = nothing known beforehand.
+  Eigen::VectorXd basis_precision;
 
   Eigen::Index size() const { return y.size(); }
+  /// Normalisation of the likelihood that does not depend on the hyperparameters.
+  double log_constant() const;
   GpPoints select(const std::vector<Eigen::Index>& rows) const;
 };
 
@@ -35,7 +38,7 @@ Eigen::MatrixXd kernel_matrix(const Eigen::ArrayXd& a1, const Eigen::ArrayXd& a2
                               const Eigen::ArrayXd& b1, const Eigen::ArrayXd& b2,
                               const GpHyper& hyper);
 
-/// log p(y | hyper), mean integrated (restricted likelihood). O(n^3).
+/// log p(y | hyper), mean integrated (restricted likelihood where its prior is flat). O(n^3).
 /// @param gradient with respect to `hyper`, or nullptr
 /// @return -infinity where the matrix is not positive definite in working precision
 double exact_log_likelihood(const GpPoints& points, const GpHyper& hyper, GpHyper* gradient);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "models/error.h"
 
@@ -75,8 +74,8 @@ bool SparseGp::factorise(const GpHyper& hyper) {
   vh_.noalias() = v_ * points_.basis;
   vy_.noalias() = v_ * points_.y;
   const MatrixXd bh = chol_b_.solve(vh_);
-  const MatrixXd a =
-      (points_.basis.transpose() * points_.basis - vh_.transpose() * bh / noise) / noise;
+  MatrixXd a = (points_.basis.transpose() * points_.basis - vh_.transpose() * bh / noise) / noise;
+  a.diagonal() += points_.basis_precision;
   chol_a_.compute(a);
   if (chol_a_.info() != Eigen::Success) return false;
   beta_ =
@@ -88,7 +87,7 @@ double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
   constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
   if (!factorise(hyper)) return kMinusInfinity;
   const double signal = std::exp(hyper[2]), noise = std::exp(hyper[3]);
-  const Index count = points_.size(), m = z1_.size(), b = points_.basis.cols();
+  const Index count = points_.size(), m = z1_.size();
   const double n = static_cast<double>(count);
   const VectorXd residual = points_.y - points_.basis * beta_;
   const VectorXd v_residual = vy_ - vh_ * beta_;
@@ -98,9 +97,10 @@ double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
   gamma.noalias() -= v_.transpose() * b_v_residual / noise;
   gamma /= noise;
   const double lost_trace = n * signal - trace_v_;  // tr(Kff - Qff)
-  const double value =
-      -0.5 * (residual.dot(gamma) + n * hyper[3] + log_det(chol_b_) + log_det(chol_a_) +
-              (n - static_cast<double>(b)) * std::log(2.0 * std::numbers::pi) + lost_trace / noise);
+  // With a prior on beta, residual^T gamma is y^T P y only together with beta's own part.
+  const double quadratic = residual.dot(gamma) + beta_.cwiseAbs2().dot(points_.basis_precision);
+  const double value = points_.log_constant() - 0.5 * (quadratic + n * hyper[3] + log_det(chol_b_) +
+                                                       log_det(chol_a_) + lost_trace / noise);
   if (!std::isfinite(value)) return kMinusInfinity;
   if (gradient == nullptr) return value;
 
