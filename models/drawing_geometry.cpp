@@ -32,6 +32,10 @@ Vector3d mount(const Machine& machine, const Frames& frames, int joint) {
   return point_in_base(frames, joint - 1, Vector3d(j.origin.translation()));
 }
 
+Vector3d up_direction(const Machine& machine) {
+  return machine.gravity.norm() > 0.0 ? Vector3d(-machine.gravity.normalized()) : Vector3d::UnitZ();
+}
+
 Vector3d horizontal_part(const Vector3d& v, const Vector3d& up) { return v - up * up.dot(v); }
 
 VectorXd mid_range(const Machine& machine) {
@@ -83,11 +87,13 @@ std::string base_axis_name(const Vector3d& direction, const char* otherwise) {
   return otherwise;
 }
 
-void append_links(const Machine& machine, const Frames& frames, std::vector<MachinePart>& parts) {
+void append_links(const Machine& machine, const Frames& frames, const Vector3d& up,
+                  std::vector<MachinePart>& parts) {
   for (int k = 0; k < machine.joint_count(); ++k) {
-    const Vector3d from =
-        k == 0 ? Vector3d::Zero() : frames[static_cast<std::size_t>(k - 1)].position;
     const Vector3d to = mount(machine, frames, k);
+    // The base is drawn as a column from the height of its frame's origin up to the first joint.
+    const Vector3d from =
+        k == 0 ? horizontal_part(to, up) : frames[static_cast<std::size_t>(k - 1)].position;
     parts.push_back({PartKind::kLink, {from, to}});
     if (machine.joints[static_cast<std::size_t>(k)].type == JointType::kRevolute) continue;
     // The stages that share this joint's travel, each ending where its fraction of it ends.
@@ -173,7 +179,7 @@ void append_cylinder(const Machine& machine, const Frames& frames, const VectorX
 
 DrawingPlane drawing_plane(const Machine& machine, const VectorXd& q) {
   DrawingPlane plane;
-  if (machine.gravity.norm() > 0.0) plane.up = -machine.gravity.normalized();
+  plane.up = up_direction(machine);
   const auto direction = [&](const Frames& frames, const ArmJoints& arm) -> Vector3d {
     if (arm.lift < 0) return fallback_direction(machine, frames, plane.up);
     return plane.up.cross(axis_in_base(machine, frames, arm.lift)).normalized();
@@ -204,7 +210,7 @@ std::vector<MachinePart> machine_parts(const Machine& machine, const VectorXd& q
   SPARFLOW_CHECK(q.size() == machine.joint_count(), "one coordinate a joint");
   const Frames frames = forward_kinematics<double>(machine, q);
   std::vector<MachinePart> parts, pins;
-  append_links(machine, frames, parts);
+  append_links(machine, frames, up_direction(machine), parts);
   for (int c = 0; c < machine.cylinder_count(); ++c) {
     append_cylinder(machine, frames, q, c, parts, pins);
   }

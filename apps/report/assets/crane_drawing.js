@@ -170,8 +170,9 @@
       page.drawParts(moving, spec.kinds, frame.points, plane);
       if (spec.payload) drawPayload(moving, frame.tip, plane);
       slider.value = time;
-      output.textContent = `t = ${frame.t.toFixed(2)} s · tip ${spec.x_axis.label} ${frame.tip[0].toFixed(2)} m, ` +
-        `${spec.z_axis.label} ${frame.tip[1].toFixed(2)} m`;
+      const metres = (v) => v.toFixed(2).replace("-", "−") + " m";
+      output.textContent = `t = ${frame.t.toFixed(2)} s · tip ${spec.x_axis.label} ${metres(frame.tip[0])}, ` +
+        `${spec.z_axis.label} ${metres(frame.tip[1])}`;
     }
 
     // Real time, hurried when the motion takes longer than ten seconds.
