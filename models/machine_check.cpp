@@ -198,18 +198,29 @@ class Checker {
       }
     };
     std::vector<double> position, rate;
+    std::vector<bool> closed;
     for (int k = 0; k < kSamples; ++k) {
       const double share = k / (kSamples - 1.0);
-      const double q = joint.position.lo + share * (joint.position.hi - joint.position.lo);
-      if (!closes(q)) {
-        const double edge = position.empty() ? q : border(position.back(), q, closes);
+      position.push_back(joint.position.lo + share * (joint.position.hi - joint.position.lo));
+      closed.push_back(closes(position.back()));
+      rate.push_back(closed.back() ? linkage_rates(machine_, index, position.back()).d1 : 0.0);
+    }
+    for (std::size_t k = 0; k < closed.size(); ++k) {
+      if (closed[k]) continue;
+      const char* remedy = "lengthen rocker or coupler, correct the pins or narrow the range";
+      const std::size_t good =
+          static_cast<std::size_t>(std::find(closed.begin(), closed.end(), true) - closed.begin());
+      if (good == closed.size()) {
         fail(places_.cylinders, i, key,
-             fmt::format("the four-bar cannot close at {}, inside the joint's range {}; lengthen "
-                         "rocker or coupler, correct the pins or narrow the range",
-                         at(joint, edge), range(joint)));
+             fmt::format("the four-bar cannot close anywhere in the range {} of {}; {}",
+                         range(joint), joint.name, remedy));
       }
-      position.push_back(q);
-      rate.push_back(linkage_rates(machine_, index, q).d1);
+      // the border of the open stretch that is nearest to a closed position
+      const std::size_t open = k > 0 ? k : good - 1;
+      const double edge = border(position[k > 0 ? k - 1 : good], position[open], closes);
+      fail(places_.cylinders, i, key,
+           fmt::format("the four-bar cannot close {} {}, inside the joint's range {}; {}",
+                       k > 0 ? "beyond" : "below", at(joint, edge), range(joint), remedy));
     }
     double largest = 0.0;
     for (const double r : rate) largest = std::max(largest, std::abs(r));

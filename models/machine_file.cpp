@@ -48,7 +48,9 @@ class MachineReader {
     }
     if (const auto cylinders = root.find("cylinders")) {
       for (const YamlValue& v : cylinders->list("cylinders")) {
-        machine_.cylinders.push_back(read_cylinder(v, machine_.joints, frames_));
+        const Cylinder cylinder = read_cylinder(v, machine_.joints, frames_);
+        must_be_new(v, cylinder.name, machine_.cylinders, places_.cylinders);
+        machine_.cylinders.push_back(cylinder);
         places_.cylinders.push_back(v.place());
       }
     }
@@ -66,13 +68,34 @@ class MachineReader {
   }
 
  private:
+  /// Names are looked up while reading, so a second one of a kind is reported before anything else.
+  template <class Part>
+  static void must_be_new(const YamlValue& value, const std::string& name,
+                          const std::vector<Part>& parts, const std::vector<FilePlace>& places) {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i].name != name) continue;
+      value.fail(fmt::format("the name {} stands twice (first on line {}); give each its own", name,
+                             places[i].line));
+    }
+  }
+
+  template <class Part>
+  static std::string new_name(const YamlMap& map, const char* expected,
+                              const std::vector<Part>& parts,
+                              const std::vector<FilePlace>& places) {
+    const YamlValue value = map.need("name", expected);
+    const std::string name = value.name("a name");
+    must_be_new(value, name, parts, places);
+    return name;
+  }
+
   void read_joint(const YamlValue& value) {
     const YamlMap map = value.map(
         "a joint {name, type, origin, axis, position, velocity, acceleration}",
         {"name", "type", "parent", "origin", "axis", "dh", "position", "velocity", "acceleration"});
     const std::size_t index = machine_.joints.size();
     Joint joint;
-    joint.name = map.need("name", "the joint's name").name("a name");
+    joint.name = new_name(map, "the joint's name", machine_.joints, places_.joints);
     const YamlValue type = map.need("type", "revolute or prismatic");
     if (type.word() == "continuous") {
       type.fail(
@@ -165,6 +188,7 @@ class MachineReader {
                   {"name", "joint", "mass", "cog", "inertia", "slides_with", "fraction"});
     Link link;
     link.name = map.need("name", "the link's name").text("the link's name");
+    must_be_new(*map.find("name"), link.name, machine_.links, places_.links);
     link.joint = frames_.index(map.need("joint", "the joint whose frame it is fixed in"));
     link.mass = map.need_number("mass", kMass);
     link.cog = frames_.point(
@@ -279,7 +303,7 @@ class MachineReader {
         value.map("a pump {name, feeds, max_flow_lpm, max_pressure_bar, standby_bar}",
                   {"name", "type", "feeds", "max_flow_lpm", "max_pressure_bar", "standby_bar"});
     Pump pump;
-    pump.name = map.need("name", "the pump's name").name("a name");
+    pump.name = new_name(map, "the pump's name", machine_.pumps, places_.pumps);
     if (const auto type = map.find("type")) {
       pump.type = type->choice({"load_sensing", "constant_pressure"}) == 0
                       ? PumpType::kLoadSensing

@@ -66,7 +66,7 @@ bool means_not_finite(const std::string& word) {
 
 /// yaml-cpp's own words turned into what to do about it.
 std::string explained(const std::string& message) {
-  static const std::array<std::array<const char*, 2>, 11> kTable = {{
+  static const std::array<std::array<const char*, 2>, 12> kTable = {{
       {YAML::ErrorMsg::TAB_IN_INDENTATION, "a tab indents this line; YAML wants spaces"},
       {YAML::ErrorMsg::END_OF_MAP_FLOW,
        "a `{` opened before here is not closed, or a comma is missing; write {key: value, key: "
@@ -84,6 +84,8 @@ std::string explained(const std::string& message) {
       {YAML::ErrorMsg::MAP_KEY, "a key where none can stand; check the indentation"},
       {YAML::ErrorMsg::BLOCK_ENTRY, "a `-` where no list can start; check the indentation"},
       {YAML::ErrorMsg::EOF_IN_SCALAR, "a quoted text is not closed; add the missing quote"},
+      {YAML::ErrorMsg::DOC_IN_SCALAR,
+       "a quoted text opened before here is not closed; add the missing quote"},
       {YAML::ErrorMsg::UNKNOWN_TOKEN, "a character YAML cannot read here; put the text in quotes"},
   }};
   for (const auto& [theirs, ours] : kTable) {
@@ -175,8 +177,12 @@ double YamlValue::number(const Quantity& what) const {
     fail(fmt::format("got {}, expected {}", word, what.expected()));
   }
   if (what.implausible_from > 0.0 && std::abs(parsed.value) >= what.implausible_from) {
-    fail(fmt::format("got {}, expected {} below {:g}; is it given in another unit?", word,
-                     what.expected(), what.implausible_from));
+    const std::string remedy =
+        std::string(what.unit) == "m"
+            ? fmt::format("in millimetres? then write {}", parsed.value / 1e3)
+            : std::string("is it given in another unit?");
+    fail(fmt::format("got {}, expected {} below {:g}; {}", word, what.expected(),
+                     what.implausible_from, remedy));
   }
   return parsed.value * what.scale;
 }
@@ -361,7 +367,8 @@ std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() const {
 YamlValue parse_yaml(const std::string& text, const std::string& file) {
   std::vector<YAML::Node> documents;
   try {
-    documents = YAML::LoadAll(text);
+    // the end mark makes yaml-cpp see a quote that is never closed; by itself it takes the rest as text
+    documents = YAML::LoadAll(text + "\n...\n");
   } catch (const YAML::Exception& error) {
     throw InputError(place_of(error.mark, file), "", explained(error.msg));
   }
