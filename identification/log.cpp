@@ -97,8 +97,7 @@ void settle_signal_names(std::vector<UnderstoodColumn>* columns,
 }
 
 /// The column that holds time. @throws InputError when there is none
-const UnderstoodColumn& time_column(const RawTable& table,
-                                    const std::vector<UnderstoodColumn>& columns) {
+UnderstoodColumn time_column(const RawTable& table, const std::vector<UnderstoodColumn>& columns) {
   const auto found = std::find_if(columns.begin(), columns.end(),
                                   [](const UnderstoodColumn& c) { return c.meaning.is_time; });
   if (found == columns.end()) {
@@ -232,15 +231,42 @@ void note_runs(Log* log) {
       log->runs.size() - 1, log->runs.size() == 2 ? "gap" : "gaps", log->runs.size(), longest, at));
 }
 
-RawTable read_table(const std::string& path, const LogOptions& options, Log* log) {
-  LogMapping mapping;
-  if (!options.mapping_file.empty()) mapping = read_log_mapping(options.mapping_file);
-  std::string bytes = read_file(path);
-  log->sha256 = sha256_hex(bytes);
-  RawTable table = is_matlab(bytes, path) ? read_matlab(path)
-                                          : read_delimited(path, std::move(bytes), mapping.dialect);
-  apply_mapping(mapping, &table);
-  return table;
+Log clean_log(const RawTable& table, const std::string& path, const std::string& sha256,
+              const Machine& machine, const LogOptions& options) {
+  Log log;
+  log.path = path;
+  log.file = path.substr(path.find_last_of('/') + 1);
+  log.sha256 = sha256;
+  log.dialect = table.dialect;
+  log.warnings = table.warnings;
+  log.counts.rows_wrong_width = table.rows_wrong_width;
+  log.counts.rows_read = static_cast<std::int64_t>(table.rows()) + table.rows_wrong_width;
+
+  std::vector<UnderstoodColumn> columns = understand(table, machine);
+  const UnderstoodColumn clock = time_column(table, columns);
+  std::vector<double> time = clock.raw->values;
+  for (double& t : time) t = clock.meaning.factor * t + clock.meaning.offset;
+  require_positions(table, columns, machine);
+  settle_signal_names(&columns, &log.warnings);
+
+  const std::vector<std::size_t> rows =
+      rows_in_time(table, clock.raw->name, time, &log.counts, &log.warnings);
+  log.time.resize(static_cast<Eigen::Index>(rows.size()));
+  log.line.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    log.time[static_cast<Eigen::Index>(i)] = time[rows[i]];
+    log.line[i] = table.line(rows[i]);
+  }
+  log.step = median_step(log.time);
+  log.runs = runs_between_gaps(log.time, log.step, options);
+  note_runs(&log);
+  add_channels(columns, rows, options, &log);
+  check_plausible(machine, &log);
+  return log;
+}
+
+LogMapping mapping_of(const LogOptions& options) {
+  return options.mapping_file.empty() ? LogMapping{} : read_log_mapping(options.mapping_file);
 }
 
 }  // namespace
@@ -268,37 +294,20 @@ Eigen::MatrixXd Log::matrix(Role role, int count) const {
 }
 
 Log load_log(const std::string& path, const Machine& machine, const LogOptions& options) {
-  Log log;
-  log.path = path;
-  log.file = path.substr(path.find_last_of('/') + 1);
-  const RawTable table = read_table(path, options, &log);
-  log.dialect = table.dialect;
-  log.warnings = table.warnings;
-  log.counts.rows_wrong_width = table.rows_wrong_width;
-  log.counts.rows_read = static_cast<std::int64_t>(table.rows()) + table.rows_wrong_width;
+  std::string bytes = read_file(path);
+  if (!is_matlab(bytes, path)) return log_from_text(path, std::move(bytes), machine, options);
+  RawTable table = read_matlab(path);
+  apply_mapping(mapping_of(options), &table);
+  return clean_log(table, path, sha256_hex(bytes), machine, options);
+}
 
-  std::vector<UnderstoodColumn> columns = understand(table, machine);
-  const UnderstoodColumn& clock = time_column(table, columns);
-  std::vector<double> time = clock.raw->values;
-  for (double& t : time) t = clock.meaning.factor * t + clock.meaning.offset;
-  const std::string clock_name = clock.raw->name;
-  require_positions(table, columns, machine);
-  settle_signal_names(&columns, &log.warnings);
-
-  const std::vector<std::size_t> rows =
-      rows_in_time(table, clock_name, time, &log.counts, &log.warnings);
-  log.time.resize(static_cast<Eigen::Index>(rows.size()));
-  log.line.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    log.time[static_cast<Eigen::Index>(i)] = time[rows[i]];
-    log.line[i] = table.line(rows[i]);
-  }
-  log.step = median_step(log.time);
-  log.runs = runs_between_gaps(log.time, log.step, options);
-  note_runs(&log);
-  add_channels(columns, rows, options, &log);
-  check_plausible(machine, &log);
-  return log;
+Log log_from_text(const std::string& path, std::string bytes, const Machine& machine,
+                  const LogOptions& options) {
+  const LogMapping mapping = mapping_of(options);
+  const std::string sha256 = sha256_hex(bytes);
+  RawTable table = read_delimited(path, std::move(bytes), mapping.dialect);
+  apply_mapping(mapping, &table);
+  return clean_log(table, path, sha256, machine, options);
 }
 
 }  // namespace sparflow

@@ -91,4 +91,8 @@ struct LogOptions {
 ///   neither position nor stroke, a unit is unknown, or time goes backwards
 Log load_log(const std::string& path, const Machine& machine, const LogOptions& options = {});
 
+/// The same from a text log in memory. @param path name for messages
+Log log_from_text(const std::string& path, std::string bytes, const Machine& machine,
+                  const LogOptions& options = {});
+
 }  // namespace sparflow

@@ -117,7 +117,10 @@ LogMapping read_root(const std::string& path, const YAML::Node& root) {
 }  // namespace
 
 LogMapping read_log_mapping(const std::string& path) {
-  const std::string text = read_file(path);
+  return parse_log_mapping(path, read_file(path));
+}
+
+LogMapping parse_log_mapping(const std::string& path, const std::string& text) {
   try {
     return read_root(path, YAML::Load(text));
   } catch (const YAML::Exception& error) {

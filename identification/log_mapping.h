@@ -25,6 +25,8 @@ struct LogMapping {
 
 /// @throws InputError with file:line:column for unknown keys, wrong types, names given twice
 LogMapping read_log_mapping(const std::string& path);
+/// The same from YAML in memory. @param path name for messages
+LogMapping parse_log_mapping(const std::string& path, const std::string& text);
 
 /// Adds the mapped columns (replacing a column of the same name) and drops the ignored ones.
 /// @throws InputError at the expression's place: unknown column (with the nearest one), text column, syntax

@@ -8,10 +8,12 @@
 namespace sparflow {
 namespace {
 
-constexpr double kShortest =
-    0.125;                        // [s] shorter windows buy nothing: no crane motion is that quick
-constexpr double kLongest = 0.6;  // [s] longer ones round off the starts and stops of a motion
-constexpr double kRatio = 1.2;    // between neighbouring windows of the grid
+// The grid: ten samples, within 0.1 and 0.2 s, to 0.4 s. Below, real noise (digits, vibration) is not the white
+// noise the risk counts on; above, the starts and stops of a motion and a pump's lag (0.1-0.4 s) round off.
+constexpr double kSamples = 10.0;
+constexpr double kShortestLow = 0.1, kShortestHigh = 0.2;  // [s]
+constexpr double kLongest = 0.42;                          // [s]
+constexpr double kRatio = 1.2;           // between neighbouring windows of the grid
 constexpr Eigen::Index kEnough = 40000;  // samples looked at, in blocks spread over the log
 constexpr double kWhenUnknown = 0.25;    // [s]
 
@@ -77,7 +79,8 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   const std::vector<SampleRange> runs = spread_blocks(all_runs);
   const double step = median_step(time);
   if (!(step > 0.0) || positions.cols() == 0) return kWhenUnknown;
-  const double shortest = std::max(kShortest, 2.0 * ((order + 2) / 2) * step);
+  const double shortest = std::max(std::clamp(kSamples * step, kShortestLow, kShortestHigh),
+                                   2.0 * ((order + 2) / 2) * step);
   std::vector<double> grid;
   for (double w = shortest; w < std::max(kLongest, 1.01 * shortest); w *= kRatio) grid.push_back(w);
 

@@ -94,7 +94,7 @@ class LogFiles : public testing::Test {
     return path(name);
   }
   Log load(const std::string& content, const LogOptions& options = {}) const {
-    return load_log(write("log.csv", content), small_crane(), options);
+    return log_from_text("log.csv", content, small_crane(), options);
   }
   /// The message without the folder; "" when nothing was thrown.
   template <class Call>
