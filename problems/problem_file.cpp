@@ -135,13 +135,13 @@ class ProblemReader {
       const double position = entry.number(position_of(i));
       const Range& range = problem_.limits.position[i];
       if (position < range.lo || position > range.hi) {
-        const double degrees = position / units::kDegree;
-        entry.fail(fmt::format("got {:g}, outside the joint's range [{:g}, {:g}] {}{}", position,
+        const bool as_degrees = revolute(i) && std::abs(position) > 7.0;
+        entry.fail(fmt::format("got {:g}{}, outside the joint's range [{:g}, {:g}] {}{}", position,
+                               revolute(i) && !as_degrees
+                                   ? fmt::format(" ({:.1f} deg)", position / units::kDegree)
+                                   : "",
                                range.lo, range.hi, revolute(i) ? "rad" : "m",
-                               revolute(i) && std::abs(position) > 7.0
-                                   ? "; angles are in rad, are these degrees?"
-                               : revolute(i) ? fmt::format(" ({:.1f} deg)", degrees)
-                                             : std::string()));
+                               as_degrees ? "; angles are in rad, are these degrees?" : ""));
       }
       q[static_cast<Eigen::Index>(i)] = position;
     }
@@ -162,6 +162,7 @@ class ProblemReader {
     const YamlValue tip = *map.find("tip");
     const Eigen::Vector3d goal = tip.vector3(kPoint);
     const Eigen::Vector3d now = tip_position<double>(problem_.machine, problem_.start);
+    const auto rounded = [](double x) { return std::abs(x) < 1e-9 ? 0.0 : x; };
     for (const Eigen::Vector3d& fixed : fixed_tip_directions(problem_.machine)) {
       const double off = fixed.dot(goal - now);
       if (std::abs(off) <= kPlaneTolerance) continue;
@@ -171,7 +172,7 @@ class ProblemReader {
         tip.fail(
             fmt::format("got {0} = {1:g}, expected {0} = {2:g}: the machine moves its tip only in "
                         "that plane",
-                        "xyz"[axis], goal[axis], now[axis]));
+                        "xyz"[axis], goal[axis], rounded(now[axis])));
       }
       const Eigen::Vector3d nearest = goal - off * fixed;
       tip.fail(
