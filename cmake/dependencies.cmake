@@ -16,6 +16,10 @@ find_library(OMPL_LIBRARY ompl REQUIRED)
 add_library(sparflow_ompl INTERFACE)
 target_include_directories(sparflow_ompl SYSTEM INTERFACE ${OMPL_INCLUDE})
 target_link_libraries(sparflow_ompl INTERFACE ${OMPL_LIBRARY})
+# libompl brings its own, older Eigen: see the file.
+target_link_options(sparflow_ompl INTERFACE
+  "$<BUILD_INTERFACE:LINKER:--version-script=${CMAKE_SOURCE_DIR}/cmake/keep_eigen_private.map>"
+  "$<INSTALL_INTERFACE:LINKER:--version-script=$<INSTALL_PREFIX>/lib/cmake/sparflow/keep_eigen_private.map>")
 
 find_path(MATIO_INCLUDE matio.h REQUIRED)
 find_library(MATIO_LIBRARY matio REQUIRED)

@@ -23,6 +23,7 @@ install(EXPORT sparflow NAMESPACE sparflow:: FILE sparflowTargets.cmake DESTINAT
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/sparflowConfig.cmake.in
                               ${CMAKE_BINARY_DIR}/sparflowConfig.cmake
                               INSTALL_DESTINATION ${PACKAGE_DIR} PATH_VARS CMAKE_INSTALL_DATADIR)
+install(FILES ${CMAKE_SOURCE_DIR}/cmake/keep_eigen_private.map DESTINATION lib/cmake/sparflow)
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/sparflowConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/sparflowConfig.cmake

@@ -1,0 +1,123 @@
+#include "planners/ompl_query.h"
+
+#include <ompl/base/ProblemDefinition.h>
+#include <ompl/base/ScopedState.h>
+#include <ompl/base/goals/GoalStates.h>
+#include <ompl/base/objectives/PathLengthOptimizationObjective.h>
+#include <ompl/geometric/PathSimplifier.h>
+#include <ompl/geometric/planners/informedtrees/BITstar.h>
+#include <ompl/geometric/planners/rrt/RRTConnect.h>
+#include <ompl/util/Console.h>
+#include <ompl/util/RandomNumbers.h>
+
+#include <limits>
+#include <memory>
+#include <mutex>
+
+namespace sparflow {
+namespace {
+
+namespace ob = ompl::base;
+namespace og = ompl::geometric;
+
+std::mutex& ompl_lock() {
+  static std::mutex lock;
+  return lock;
+}
+
+/// OMPL talks on the console; silent while we use it, as it was afterwards.
+class SilentOmpl {
+ public:
+  SilentOmpl() : level_(ompl::msg::getLogLevel()) { ompl::msg::setLogLevel(ompl::msg::LOG_NONE); }
+  ~SilentOmpl() { ompl::msg::setLogLevel(level_); }
+  SilentOmpl(const SilentOmpl&) = delete;
+  SilentOmpl& operator=(const SilentOmpl&) = delete;
+
+ private:
+  ompl::msg::LogLevel level_;
+};
+
+/// Shortcuts until a round no longer helps. simplify() and simplifyMax() are left alone: the one is bounded
+/// by time, which is not reproducible, the other smooths with B-splines that add states.
+void shorten(og::PathSimplifier& simplifier, og::PathGeometric& path, const QueryLimits& limits) {
+  constexpr unsigned kSteps = 200;
+  double length = path.length();
+  for (int round = 0; round < 20; ++round) {
+    simplifier.reduceVertices(path, kSteps, kSteps, 1.0);
+    simplifier.shortcutPath(path, kSteps, kSteps, 1.0, 0.005);
+    const double shorter = path.length();
+    if (shorter > 0.999 * length) break;
+    length = shorter;
+    if (std::chrono::steady_clock::now() > limits.deadline) break;
+  }
+  simplifier.reduceVertices(path, kSteps, kSteps, 1.0);
+}
+
+}  // namespace
+
+const char* name(PathPlanner planner) {
+  return planner == PathPlanner::kRrtConnect ? "RRT-Connect" : "BIT*";
+}
+
+std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathPlanner planner,
+                                          const Eigen::VectorXd& start,
+                                          const std::vector<Eigen::VectorXd>& ends,
+                                          std::uint32_t seed, const QueryLimits& limits) {
+  if (ends.empty()) return std::nullopt;
+  const std::scoped_lock guard(ompl_lock());
+  const SilentOmpl silent;
+  // Every generator made from here on draws its seed from this one. OMPL's complaint that numbers were
+  // drawn before concerns generators that exist already; none of ours outlives a query.
+  ompl::RNG::setSeed(seed == 0 ? 1 : seed);
+
+  const auto& information = space.information();
+  auto definition = std::make_shared<ob::ProblemDefinition>(information);
+  ob::ScopedState<> state(information);
+  space.write(start, state.get());
+  definition->addStartState(state);
+  auto goal = std::make_shared<ob::GoalStates>(information);
+  for (const Eigen::VectorXd& end : ends) {
+    space.write(end, state.get());
+    goal->addState(state.get());
+  }
+  definition->setGoal(goal);
+  definition->setOptimizationObjective(
+      std::make_shared<ob::PathLengthOptimizationObjective>(information));
+
+  ob::PlannerPtr solver;
+  if (planner == PathPlanner::kBitStar) {
+    solver = std::make_shared<og::BITstar>(information);
+  } else {
+    solver = std::make_shared<og::RRTConnect>(information);
+  }
+  solver->setProblemDefinition(definition);
+  solver->setup();
+  int iteration = 0;
+  const ob::PlannerTerminationCondition stop([&] {
+    const bool late = std::chrono::steady_clock::now() > limits.deadline;
+    if (late && limits.late) *limits.late = true;
+    return ++iteration > limits.iterations || late;
+  });
+  const ob::PlannerStatus status = solver->solve(stop);
+  if (status != ob::PlannerStatus::EXACT_SOLUTION) return std::nullopt;
+
+  auto path = std::static_pointer_cast<og::PathGeometric>(definition->getSolutionPath());
+  og::PathSimplifier simplifier(information);
+  shorten(simplifier, *path, limits);
+  Eigen::MatrixXd rows = space.rows(*path);
+  rows.row(0) = start;
+  // Scaled coordinates round: give the end its own digits back.
+  Eigen::Index nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t e = 0; e < ends.size(); ++e) {
+    const double d = (rows.bottomRows(1).transpose() - ends[e]).norm();
+    if (d < least) {
+      least = d;
+      nearest = static_cast<Eigen::Index>(e);
+    }
+  }
+  rows.bottomRows(1) = ends[static_cast<std::size_t>(nearest)].transpose();
+  return rows;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,33 @@
+#pragma once
+/// One OMPL query: from a start to any of several end postures. Internal to this room.
+#include <Eigen/Dense>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "planners/configuration_space.h"
+
+namespace sparflow {
+
+enum class PathPlanner {
+  kRrtConnect,  ///< Kuffner and LaValle 2000: any path, fast; then shortened
+  kBitStar,     ///< Gammell, Srinivasa and Barfoot 2015: the shortest path it finds
+};
+const char* name(PathPlanner planner);
+
+struct QueryLimits {
+  int iterations = 20000;  ///< of the planner's loop: the limit that keeps results reproducible
+  std::chrono::steady_clock::time_point deadline;  ///< the limit that keeps the user's time
+  bool* late = nullptr;                            ///< set when the deadline cut a query short
+};
+
+/// Shortened path in joint coordinates [waypoints x joints] from `start` to one of `ends`, clear by
+/// ClearanceModel; nothing when none was found. Same seed and no deadline hit: same path. OMPL's random numbers start
+/// from one process-wide seed, so calls are serialised by a lock.
+std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathPlanner planner,
+                                          const Eigen::VectorXd& start,
+                                          const std::vector<Eigen::VectorXd>& ends,
+                                          std::uint32_t seed, const QueryLimits& limits);
+
+}  // namespace sparflow
