@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/robust.h"
+
 namespace sparflow {
 namespace {
 
@@ -10,8 +12,6 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kMadToStd = 1.4826;  // of a normal distribution
 
 /// Residuals from a least-squares quadratic of both inputs; minimum norm, so constant inputs do no harm.
 VectorXd quadratic_residuals(const GpPoints& p) {
@@ -24,16 +24,6 @@ VectorXd quadratic_residuals(const GpPoints& p) {
 }
 
 }  // namespace
-
-double median(VectorXd values) {
-  const Index n = values.size();
-  if (n == 0) return 0.0;
-  double* begin = values.data();
-  std::nth_element(begin, begin + n / 2, begin + n);
-  const double upper = begin[n / 2];
-  if (n % 2 == 1) return upper;
-  return 0.5 * (upper + *std::max_element(begin, begin + n / 2));
-}
 
 std::vector<Index> representative_points(const GpPoints& points, int cells) {
   const VectorXd residual = quadratic_residuals(points);
@@ -69,7 +59,7 @@ Screening screen_outliers(const GpPoints& points, const std::vector<Index>& repr
       posterior.weight;
   residual(representatives) = leave_one_out_residuals(few, hyper);
   Screening out;
-  out.robust_std = kMadToStd * median(residual.cwiseAbs());
+  out.robust_std = robust_std(residual);
   const double limit = threshold * out.robust_std;
   for (Index i = 0; i < points.size(); ++i) {
     if (threshold <= 0.0 || std::abs(residual[i]) <= limit) out.kept.push_back(i);

@@ -8,9 +8,6 @@
 
 namespace sparflow {
 
-/// Median of the values; 0 when there are none.
-double median(Eigen::VectorXd values);
-
 /// At most about `cells` squared points that represent all: inputs are cut into cells x cells boxes, and in
 /// each occupied box the point of median residual from a quadratic fit is taken. Up to half of a
 /// box may be wrong without moving its representative far.
