@@ -146,8 +146,9 @@ class Importer {
       return std::isalnum(c) || c == '_' || c == '-' || c == '.';
     });
     if (!fit || from.name == "base") {
-      fail(key(from),
-           "expected a name of letters, digits, `_`, `-` and `.`, and not `base`; rename the joint");
+      fail(
+          key(from),
+          "expected a name of letters, digits, `_`, `-` and `.`, and not `base`; rename the joint");
     }
     joint.origin = origin;
     switch (from.type) {

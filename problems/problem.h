@@ -81,8 +81,9 @@ struct MotionProblem {
   std::string machine_path;  ///< resolved; empty when the machine was handed in
   std::string model_path;    ///< resolved; empty when the file names none
   Machine machine;
-  double payload = 0.0;   ///< [kg], hangs at the tip
-  Eigen::VectorXd start;  ///< [rad] or [m], in the machine's joint order
+  std::vector<std::string> machine_warnings;  ///< what load_machine() found unusual
+  double payload = 0.0;                       ///< [kg], hangs at the tip
+  Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
   Goal goal;
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]

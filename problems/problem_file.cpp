@@ -102,7 +102,7 @@ class ProblemReader {
       }
       problem_.machine_path = bundled;
     }
-    problem_.machine = load_machine(problem_.machine_path);
+    problem_.machine = load_machine(problem_.machine_path, &problem_.machine_warnings);
   }
 
   static std::string bundled_machine(const std::string& name) {
