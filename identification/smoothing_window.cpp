@@ -79,14 +79,16 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   const std::vector<SampleRange> runs = spread_blocks(all_runs);
   const double step = median_step(time);
   if (!(step > 0.0) || positions.cols() == 0) return kWhenUnknown;
-  const double shortest = std::max(std::clamp(kSamples * step, kShortestLow, kShortestHigh),
-                                   2.0 * ((order + 2) / 2) * step);
+  const int fewest_half = (order + 2) / 2;  // samples either side that the filter insists on
+  const double shortest =
+      std::max(std::clamp(kSamples * step, kShortestLow, kShortestHigh), 2.0 * fewest_half * step);
   std::vector<double> grid;
   for (double w = shortest; w < std::max(kLongest, 1.01 * shortest); w *= kRatio) grid.push_back(w);
 
   std::vector<Eigen::VectorXd> weights;  // of the first derivative, per step
   const auto half = [&](double w) { return static_cast<int>(std::floor(0.5 * w / step + 1e-6)); };
   const int widest = half(grid.back());
+  weights.reserve(grid.size());
   for (const double w : grid) weights.push_back(slope_weights(half(w), widest, order));
 
   Eigen::VectorXd risk = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));

@@ -1,5 +1,6 @@
 #pragma once
 /// Machines and files for the tests of logs.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -76,6 +77,19 @@ inline Machine drive() {
   m.cylinders = {cylinder("axis", 0)};
   m.cylinders[0].bore = m.cylinders[0].rod = 0.0;
   return m;
+}
+
+/// A log of small_crane() without a fault, 50 Hz.
+/// Rows of the plain log all dialects below hold.
+inline std::string plain_log(int rows = 30) {
+  std::string text =
+      "t_s,q_boom_rad,q_extension_m,u_boom,pA_boom_bar,p_main_bar,payload_kg,oil_C\n";
+  for (int i = 0; i < rows; ++i) {
+    text += fmt::format("{:.3f},{:.4f},{:.4f},{:.2f},{:.1f},{:.1f},800,41.5\n", 0.02 * i,
+                        0.5 + 0.001 * i, 1.0 + 0.002 * i, 0.25, 80.0 + 0.1 * (i % 7),
+                        120.5 + 0.1 * (i % 5));
+  }
+  return text;
 }
 
 /// A folder of its own for each test program, removed at the end.

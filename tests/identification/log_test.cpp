@@ -1,14 +1,12 @@
-/// What a log becomes: numbers in SI, runs, holes, counts; the same numbers from every dialect.
+/// What a log becomes: numbers in SI, runs, holes, counts.
 #include "identification/log.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <numbers>
 
 #include "identification/log_columns.h"
-#include "identification/log_dialect.h"
 #include "models/sha256.h"
 #include "tests/identification/log_machines.h"
 
@@ -16,39 +14,11 @@ namespace sparflow {
 namespace {
 
 using test::LogFiles;
+using test::plain_log;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-/// Rows of the plain log all dialects below hold.
-std::string plain_log(int rows = 30) {
-  std::string text =
-      "t_s,q_boom_rad,q_extension_m,u_boom,pA_boom_bar,p_main_bar,payload_kg,oil_C\n";
-  for (int i = 0; i < rows; ++i) {
-    text += fmt::format("{:.3f},{:.4f},{:.4f},{:.2f},{:.1f},{:.1f},800,41.5\n", 0.02 * i,
-                        0.5 + 0.001 * i, 1.0 + 0.002 * i, 0.25, 80.0 + 0.1 * (i % 7),
-                        120.5 + 0.1 * (i % 5));
-  }
-  return text;
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  for (std::size_t at = 0; (at = text.find(from, at)) != text.npos; at += to.size()) {
-    text.replace(at, from.size(), to);
-  }
-  return text;
-}
-
-std::string utf16(const std::string& ascii, bool big_endian) {
-  std::string out = big_endian ? "\xFE\xFF" : "\xFF\xFE";
-  for (const char c : ascii) {
-    if (big_endian) out += '\0';
-    out += c;
-    if (!big_endian) out += '\0';
-  }
-  return out;
-}
 
 TEST(Sha256, KnownAnswers) {  // FIPS 180-2, appendix B
   EXPECT_EQ(sha256_hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
@@ -85,80 +55,6 @@ TEST_F(LogFiles, PlainLogInSiUnits) {
   const Eigen::MatrixXd commands = log.matrix(Role::kCommand, 2);
   EXPECT_DOUBLE_EQ(commands(4, 0), 0.25);
   EXPECT_TRUE(std::isnan(commands(4, 1)));  // not logged
-}
-
-/// Name, the plain log in that dialect.
-struct Dialect {
-  std::string name, text;
-};
-
-std::vector<Dialect> dialects() {
-  const std::string plain = plain_log();
-  const std::size_t first_row = plain.find('\n') + 1;
-  const std::string header = plain.substr(0, first_row), rows = plain.substr(first_row);
-  const std::string european = replaced(replaced(plain, ",", ";"), ".", ",");
-  std::string quoted;
-  for (std::size_t at = 0; at < plain.size();) {
-    const std::size_t end = plain.find('\n', at);
-    quoted += "\"" + replaced(plain.substr(at, end - at), ",", "\",\"") + "\"\n";
-    at = end + 1;
-  }
-  return {
-      {"semicolon", replaced(plain, ",", ";")},
-      {"tab", replaced(plain, ",", "\t")},
-      {"blanks", replaced(plain, ",", "   ")},
-      {"decimal comma, semicolon", european},
-      {"decimal comma, tab", replaced(european, ";", "\t")},
-      {"decimal comma, quoted, comma",
-       replaced(replaced(replaced(quoted, "\",\"", "\x01"), ".", ","), "\x01", "\",\"")},
-      {"quoted", quoted},
-      {"byte order mark", "\xEF\xBB\xBF" + plain},
-      {"UTF-16 little endian", utf16(plain, false)},
-      {"UTF-16 big endian", utf16(plain, true)},
-      {"CRLF", replaced(plain, "\n", "\r\n")},
-      {"CR", replaced(plain, "\n", "\r")},
-      {"no line end at the end", plain.substr(0, plain.size() - 1)},
-      {"blank lines", replaced(plain, "\n", "\n\n")},
-      {"comments", "# recorded on a cold day\n" + header + "# start\n" + rows + "# end\n"},
-      {"header in a comment", "# " + plain},
-      {"trailing separators", replaced(plain, "\n", ",\n")},
-      {"trailing separators under the header only", header + replaced(rows, "\n", ",,\n")},
-      {"blanks around", replaced(plain, ",", " , ")},
-      {"units row", header + "s,rad,m,-,bar,bar,kg,°C\n" + rows},
-      {"units row in brackets", header + "[s],[rad],[m],[-],[bar],[bar],[kg],[°C]\n" + rows},
-      {"spreadsheet hint", "sep=;\r\n" + replaced(replaced(plain, ",", ";"), "\n", "\r\n")},
-      {"plus signs and exponents",
-       replaced(replaced(plain, ",0.25,", ",+2.5e-1,"), ",800,", ",8E2,")},
-      {"units beside names",
-       "t [s],q_boom (rad),q_extension [m],u_boom,pA_boom [bar],p_main [bar],payload [kg],oil "
-       "[degC]\n" +
-           rows},
-      {"units below names",
-       "t,q_boom,q_extension,u_boom,pA_boom,p_main,payload,oil\ns,rad,m,,bar,bar,kg,C\n" + rows},
-  };
-}
-
-TEST_F(LogFiles, SameNumbersFromEveryDialect) {
-  const Log plain = load_log(write("plain.csv", plain_log()), test::small_crane());
-  for (const Dialect& dialect : dialects()) {
-    SCOPED_TRACE(dialect.name);
-    Log log;
-    ASSERT_NO_THROW(log = load(dialect.text));
-    ASSERT_EQ(log.samples(), plain.samples());
-    ASSERT_EQ(log.channels.size(), plain.channels.size());
-    EXPECT_EQ(log.time, plain.time);
-    for (std::size_t i = 0; i < plain.channels.size(); ++i) {
-      EXPECT_EQ(log.channels[i].signal, plain.channels[i].signal);
-      EXPECT_EQ(log.channels[i].values, plain.channels[i].values) << plain.channels[i].signal;
-    }
-    EXPECT_THAT(log.warnings, IsEmpty());
-  }
-}
-
-TEST_F(LogFiles, DialectIsSaidInWords) {
-  EXPECT_EQ(load(plain_log()).dialect, "\",\" between values, decimal point");
-  EXPECT_EQ(load(replaced(replaced(plain_log(), ",", ";"), ".", ",")).dialect,
-            "\";\" between values, decimal comma");
 }
 
 TEST(LogColumns, EverySpellingOfAUnit) {
@@ -387,29 +283,6 @@ TEST(SimulatedLogs, AreReadWithoutLoss) {
   EXPECT_EQ(log.channels.size(), 15u);
   for (const Channel& channel : log.channels) EXPECT_NE(channel.role, Role::kCandidate);
   EXPECT_THAT(log.warnings, IsEmpty());
-}
-
-TEST(ReadingSpeed, IsReported) {  // a figure, not a verdict: machines differ
-  std::string text = "t_s";
-  for (int c = 0; c < 15; ++c) text += fmt::format(",signal_{}", c);
-  text += '\n';
-  for (int i = 0; i < 15000; ++i) {
-    text += fmt::format("{:.3f}", 0.02 * i);
-    for (int c = 0; c < 15; ++c) text += fmt::format(",{:.4f}", std::sin(0.01 * i + c) * 100.0);
-    text += '\n';
-  }
-  double best = 1e9;
-  for (int repeat = 0; repeat < 5; ++repeat) {
-    const auto start = std::chrono::steady_clock::now();
-    const RawTable table = read_delimited("log.csv", text);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    best = std::min(best, took.count());
-    ASSERT_EQ(table.rows(), 15000u);
-  }
-  const double rate = static_cast<double>(text.size()) / best / 1e6;
-  RecordProperty("megabytes_per_second", fmt::format("{:.0f}", rate));
-  fmt::print("reading {:.1f} MB, 15 000 rows: {:.1f} ms, {:.0f} MB/s\n",
-             static_cast<double>(text.size()) / 1e6, best * 1e3, rate);
 }
 
 }  // namespace
