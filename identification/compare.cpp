@@ -105,7 +105,12 @@ void Comparison::flow(std::size_t i, std::vector<ComparedSeries>& out,
   const CylinderSignals& c = signals_.cylinders[i];
   const Cylinder& cylinder = machine_.cylinders[i];
   const CylinderModel& m = model_.cylinders[i];
-  if (!cylinder.hydraulic()) return;
+  if (!cylinder.hydraulic()) {
+    notes.insert(
+        fmt::format("flow and pressures of {}: not compared, the machine file gives it no bore",
+                    cylinder.name));
+    return;
+  }
   if (!c.has_command()) {
     notes.insert(fmt::format("flow of {} from its command: not compared, needs u_{}", cylinder.name,
                              cylinder.name));
@@ -228,11 +233,7 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
   }
   for (std::size_t i = 0; i < machine_.cylinders.size(); ++i) {
     const Cylinder& cylinder = machine_.cylinders[i];
-    if (!cylinder.hydraulic()) {
-      notes.insert(fmt::format("pressures of {}: not compared, the machine file gives it no bore",
-                               cylinder.name));
-      continue;
-    }
+    if (!cylinder.hydraulic()) continue;
     const CylinderSignals& c = signals_.cylinders[i];
     for (const bool bore : {true, false}) {
       if ((bore ? c.pressure_a : c.pressure_b).size() > 0) continue;

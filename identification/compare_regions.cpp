@@ -71,7 +71,7 @@ double score_of(double error_share, double sample_share) {
 double judged(double error, double samples, const Pool& pool, const RegionOptions& options) {
   if (samples < options.least_share * pool.samples || pool.error <= 0.0) return 0.0;
   const double e = error / pool.error, s = samples / pool.samples;
-  if (e < options.contrast * options.contrast * s) return 0.0;
+  if (e < options.least_error || e < options.contrast * options.contrast * s) return 0.0;
   return score_of(e, s);
 }
 
@@ -201,6 +201,7 @@ std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,
   };
   std::vector<Ranked> ranked;
   for (const ErrorGroup& group : groups) {
+    if (group.severity < options.least_severity) continue;
     std::vector<BinnedSignal> signals;
     for (const RegimeSignal& signal : group.signals) {
       BinnedSignal b = binned(signal, options.bins);

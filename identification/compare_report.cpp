@@ -37,6 +37,33 @@ void add_cylinder(const Machine& machine, const MachineSignals& signals, int ind
   }
 }
 
+/// A column without a meaning, in the units of the field where its own is SI.
+RegimeSignal candidate_signal(const CandidateSignal& c) {
+  if (c.unit == "Pa") return {c.name + "_bar", c.name, "bar", units::kBar, c.values};
+  if (c.unit == "m^3/s")
+    return {c.name + "_lpm", c.name, "l/min", units::kLitrePerMinute, c.values};
+  if (c.unit == "rad") return {c.name + "_deg", c.name, "deg", units::kDegree, c.values};
+  return {c.name, c.name, c.unit, 1.0, c.values};
+}
+
+/// Lines of at most about 110 characters; the ones that follow are indented by four.
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t kWidth = 110;
+  std::string out, line = " ";
+  std::size_t start = 0;
+  while (start < text.size()) {
+    const std::size_t end = std::min(text.find(' ', start), text.size());
+    const std::string word = text.substr(start, end - start);
+    if (line.size() + 1 + word.size() > kWidth) {
+      out += line + "\n";
+      line = "   ";
+    }
+    line += " " + word;
+    start = end + 1;
+  }
+  return out + line + "\n";
+}
+
 /// Flow of a pump's other cylinders, the sign of motions that overlap.
 VectorXd other_flow(const Machine& machine, const MachineSignals& signals, int pump, int cylinder) {
   VectorXd sum = VectorXd::Zero(signals.samples());
@@ -90,9 +117,7 @@ std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSi
   if (signals.return_pressure.size() > 0) {
     out.push_back({"p_return_bar", "return pressure", "bar", units::kBar, signals.return_pressure});
   }
-  for (const CandidateSignal& c : signals.candidates) {
-    out.push_back({c.name, c.name, c.unit, 1.0, c.values});
-  }
+  for (const CandidateSignal& c : signals.candidates) out.push_back(candidate_signal(c));
   return out;
 }
 
@@ -172,9 +197,9 @@ std::string compare_table(const CompareResult& result) {
   }
   text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
   if (!result.worst.empty()) text += "\nwhere it fails most\n";
-  for (const WorstRegion& w : result.worst) text += "  " + w.stage + ": " + w.sentence + "\n";
+  for (const WorstRegion& w : result.worst) text += wrapped(w.stage + ": " + w.sentence);
   if (!result.notes.empty()) text += "\nnot compared, or with care\n";
-  for (const std::string& note : result.notes) text += "  " + note + "\n";
+  for (const std::string& note : result.notes) text += wrapped(note);
   return text;
 }
 
