@@ -40,9 +40,9 @@ class SilentOmpl {
 /// Shortcuts until a round no longer helps. simplify() and simplifyMax() are left alone: the one is bounded
 /// by time, which is not reproducible, the other smooths with B-splines that add states.
 void shorten(og::PathSimplifier& simplifier, og::PathGeometric& path, const QueryLimits& limits) {
-  constexpr unsigned kSteps = 200;
+  constexpr unsigned kSteps = 100;
   double length = path.length();
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < 10; ++round) {
     simplifier.reduceVertices(path, kSteps, kSteps, 1.0);
     simplifier.shortcutPath(path, kSteps, kSteps, 1.0, 0.005);
     const double shorter = path.length();

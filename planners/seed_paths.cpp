@@ -24,6 +24,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLimitSlack = 1e-9;  // [rad] or [m] rounding of what the user wrote
 constexpr double kSameEnd = 0.02;     // of every joint's range: ends nearer than this are one
 constexpr const char* kStraight = "straight line";
+constexpr int kBitStarShare = 10;      // BIT* gains little after iterations / 10, and is slow
 constexpr int kDeformationSteps = 32;  // pairs of postures tested between two paths
 
 /// "boom: 1.5 rad, limits are [-0.2, 1.35] rad", or "" when all joints are within.
@@ -241,10 +242,13 @@ class Search {
       std::vector<VectorXd> ends;
     };
     std::vector<Query> queries;
-    queries.push_back({PathPlanner::kRrtConnect, postures_});  // the goal as a region
-    if (!blocked_.empty() && space.has_volume()) {
-      queries.push_back({PathPlanner::kBitStar, postures_});
+    // The goal as a region, less the ends that are tried one by one anyway.
+    std::vector<VectorXd> others;
+    for (const VectorXd& q : postures_) {
+      if (std::find(ends_.begin(), ends_.end(), q) == ends_.end()) others.push_back(q);
     }
+    if (!others.empty()) queries.push_back({PathPlanner::kRrtConnect, others});
+    if (!blocked_.empty() && space.has_volume()) queries.push_back({PathPlanner::kBitStar, ends_});
     // Blocked ends one by one, several tries each: other random trees, other homotopy classes.
     constexpr int kTries = 3;
     for (int t = 0; t < kTries; ++t) {
@@ -255,7 +259,8 @@ class Search {
       tell(static_cast<double>(i + 1) / static_cast<double>(queries.size() + 1),
            fmt::format("{} {} of {}", name(queries[i].planner), i + 1, queries.size()));
       QueryLimits own = limits;
-      if (queries[i].planner == PathPlanner::kBitStar) own.iterations = options_.iterations / 4;
+      if (queries[i].planner == PathPlanner::kBitStar)
+        own.iterations = options_.iterations / kBitStarShare;
       // 2654435761: neighbouring user seeds must not share queries
       const auto seed =
           static_cast<std::uint32_t>((options_.random_seed * 2654435761u + i) % 0x7fffffffu);

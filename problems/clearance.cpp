@@ -14,7 +14,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kDefaultRadius = 0.1;  // [m] half a slender boom section
-constexpr double kLeastStep = 1e-3;     // [m] see clear_share()
+constexpr double kLeastStep = 2e-3;     // [m] see clear_share()
 constexpr double kImmovable = 1e-9;     // [m]
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -108,15 +108,28 @@ void ClearanceModel::build_parts() {
     add({machine_.tip.joint, Vector3d::Zero()}, {machine_.tip.joint, machine_.tip.xyz},
         machine_.tip.joint, machine_.tip.xyz.norm());
   }
-  travel_radius_.resize(n);
-  double beyond = machine_.tip.xyz.norm();
-  for (int k = n - 1; k >= 0; --k) {
-    const Joint& joint = machine_.joints[at(k)];
-    const bool slides = joint.type == JointType::kPrismatic;
-    travel_radius_[k] = slides ? 1.0 : beyond;
-    if (slides) beyond += largest_travel(limits_[at(k)]);
-    beyond += joint.origin.translation().norm();
+  const auto parts = static_cast<int>(parts_.size());
+  travel_radius_.resize(parts, n);
+  part_distance_.resize(parts);
+  for (int p = 0; p < parts; ++p) {
+    for (int k = 0; k < n; ++k) {  // a part's points lie between its ends: the larger of the two
+      travel_radius_(p, k) =
+          std::max(travel_radius(parts_[at(p)].from, k), travel_radius(parts_[at(p)].to, k));
+    }
   }
+}
+
+double ClearanceModel::travel_radius(const Point& point, int k) const {
+  if (k == point.slide) return point.fraction;
+  if (k > point.joint) return 0.0;
+  if (machine_.joints[at(k)].type == JointType::kPrismatic) return 1.0;
+  double far = point.local.norm();  // from joint k to the point, link by link
+  for (int j = k + 1; j <= point.joint; ++j) {
+    far += machine_.joints[at(j)].origin.translation().norm();
+    if (!chain_.revolute[at(j)]) far += largest_travel(limits_[at(j)]);
+  }
+  if (point.slide >= 0) far += point.fraction * largest_travel(limits_[at(point.slide)]);
+  return far;
 }
 
 double ClearanceModel::reach(const Point& point) const {
@@ -204,8 +217,10 @@ Nearest ClearanceModel::nearest(const double* q) {
   for (int p = 0; p < static_cast<int>(parts_.size()); ++p) {
     const Vector3d from = position(parts_[at(p)].from, q);
     const Vector3d to = position(parts_[at(p)].to, q);
+    part_distance_[p] = std::numeric_limits<double>::infinity();
     for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) {
       const double d = segment_distance(obstacles_[at(o)], from, to) - radius_;
+      part_distance_[p] = std::min(part_distance_[p], d);
       if (d < best.distance) best = {d, p, o};
     }
   }
@@ -214,16 +229,20 @@ Nearest ClearanceModel::nearest(const double* q) {
 
 double ClearanceModel::clear_share(const double* from, const double* to) {
   const int n = machine_.joint_count();
-  double travel = 0.0;
-  for (int i = 0; i < n; ++i) travel += travel_radius_[i] * std::abs(to[i] - from[i]);
   double share = 0.0, tested = -1.0;
   for (;;) {
     for (int i = 0; i < n; ++i) between_[i] = from[i] + share * (to[i] - from[i]);
-    const double d = nearest(between_.data()).distance;
-    if (d < 0.0) return tested;
+    if (nearest(between_.data()).distance < 0.0) return tested;
     tested = share;
-    if (share >= 1.0 || travel == 0.0) return 1.0;
-    share = std::min(1.0, share + std::max(d, kLeastStep) / travel);
+    if (share >= 1.0 || obstacles_.empty()) return 1.0;
+    double step = 1.0;
+    for (int p = 0; p < static_cast<int>(parts_.size()); ++p) {
+      double travel = 0.0;
+      for (int i = 0; i < n; ++i) travel += travel_radius_(p, i) * std::abs(to[i] - from[i]);
+      const double allowed = std::max(part_distance_[p], kLeastStep);
+      if (travel * step > allowed) step = allowed / travel;
+    }
+    share = std::min(1.0, share + step);
   }
 }
 

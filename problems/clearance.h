@@ -58,8 +58,8 @@ class ClearanceModel {
   bool clear(const double* q) { return nearest(q).distance >= 0.0; }
 
   /// Share of the straight joint line from -> to that is clear, 1 = all of it; negative when `from` is not.
-  /// Conservative advancement: no point of the machine moves further between two tests than the distance
-  /// just found, or 1 mm where that is less. What is missed is thus never deeper than 0.5 mm.
+  /// Conservative advancement, part by part: no point moves further between two tests than its part's distance
+  /// just found, or 2 mm where that is less. What is missed is thus never deeper than 1 mm.
   double clear_share(const double* from, const double* to);
   bool motion_clear(const double* from, const double* to) { return clear_share(from, to) >= 1.0; }
   /// The same along a polyline. @param path waypoints x joints
@@ -109,6 +109,8 @@ class ClearanceModel {
   /// Columns of the point's Jacobian into columns_; how many joints move it.
   int update_columns(const Point& point, const Eigen::Vector3d& position);
   bool moves(const Point& point);
+  /// Most that joint `k` moves the point per unit.
+  double travel_radius(const Point& point, int k) const;
   double reach(const Point& point) const;
 
   Machine machine_;
@@ -118,10 +120,12 @@ class ClearanceModel {
   bool cover_complete_ = true;
   std::vector<Part> parts_;
   std::vector<Row> rows_;
-  Eigen::VectorXd travel_radius_;  ///< [m/rad] or [-] largest displacement per unit of each joint
+  /// parts x joints: largest displacement of the part per unit of the joint [m/rad] or [-]
+  Eigen::MatrixXd travel_radius_;
   ChainGeometry chain_;
   std::vector<Eigen::Vector3d> columns_;
   Eigen::VectorXd between_;
+  Eigen::VectorXd part_distance_;  ///< of the last nearest() [m]
 };
 
 }  // namespace sparflow

@@ -40,12 +40,12 @@ void expect_good_path(const MotionProblem& problem, const SeedPath& seed) {
     EXPECT_EQ(end, std::get<JointGoal>(problem.goal).q);
   }
   EXPECT_NEAR(seed.length, path_length(seed.path, speed_scale(problem)), 1e-9);
-  // Every leg at 500 points by the exact distance: the motion check may miss 0.5 mm, not more.
+  // Every leg at 500 points by the exact distance: the motion check may miss 1 mm, not more.
   ClearanceModel clearance(problem);
   for (Eigen::Index k = 0; k + 1 < seed.path.rows(); ++k) {
     for (int i = 0; i <= 500; ++i) {
       const VectorXd q = seed.path.row(k) + (seed.path.row(k + 1) - seed.path.row(k)) * (i / 500.0);
-      EXPECT_GT(clearance.nearest(q.data()).distance, -0.5e-3);
+      EXPECT_GT(clearance.nearest(q.data()).distance, -1e-3);
       for (Eigen::Index j = 0; j < q.size(); ++j) {
         const Range& range = problem.limits.position[static_cast<std::size_t>(j)];
         EXPECT_GE(q[j], range.lo - 1e-12);

@@ -1,0 +1,56 @@
+#pragma once
+/// A joint path made a motion: from rest to rest, within every limit a path can be judged by.
+#include <Eigen/Dense>
+#include <string>
+
+#include "models/trajectory.h"
+#include "problems/problem.h"
+
+namespace sparflow {
+
+struct TimingOptions {
+  int intervals = 100;  ///< of the motion, equal; at least 8
+};
+
+enum class TimingStatus {
+  kOk,
+  kTooShort,   ///< the wanted duration is below `shortest`; the motion takes `shortest`
+  kCollision,  ///< the path meets an obstacle, or so nearly that the motion does; see `clearance`
+};
+
+struct TimedMotion {
+  TimingStatus status = TimingStatus::kOk;
+  std::string message;  ///< one sentence
+  Trajectory motion;    ///< rest to rest, constant acceleration in each interval
+  double shortest =
+      0.0;             ///< shortest duration of this path with this profile [s]: an upper bound of
+                       ///< the path's minimum time, usually a few per cent above it
+  std::string limit;   ///< what sets it, e.g. "flow of pump main"
+  bool stops = false;  ///< corners could not be rounded: the motion stops at each waypoint
+  double clearance =
+      0.0;  ///< least exact distance less the capsule's radius [m], +infinity without obstacles
+};
+
+/// Turns a polyline into a motion of `duration` (<= 0: the shortest).
+///  1. Corners are rounded by parabolas over up to half of both legs, less where an obstacle is near.
+///  2. Minimum-time profile along the rounded path under joint speed and acceleration limits, valve
+///     flow per direction and pump flow (forward and backward pass; Bobrow, Dubowsky and Gibson 1985).
+///  3. Points at equal times on it are the control points of a uniform quadratic B-spline: exactly
+///     the piecewise constant acceleration of Trajectory, without ringing, inside the control
+///     polygon's hull (so within position limits), its first two and last two control points equal (rest).
+///  4. All limits are evaluated on that motion (speed at knots and acceleration per interval, which is
+///     exact; flows at 16 instants an interval, with a margin for what lies between) and the time is
+///     stretched so that the worst just holds. Stretching
+///     divides speeds and flows by r and accelerations by r^2, so any longer duration holds too.
+///  5. The exact clearance is checked at 16 instants an interval; when rounding costs it, the motion stops
+///     at the waypoints instead.
+/// @param path waypoints x joints, at least one row, within the position limits
+TimedMotion time_parametrise(const MotionProblem& problem, const Eigen::MatrixXd& path,
+                             double duration, const TimingOptions& options = {});
+
+/// Largest ratio of what the motion asks to what a limit allows (1 = just held), over joint position, speed and
+/// acceleration, valve and pump flow, at `factor` instants an interval. @param limit gets the worst's name
+double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,
+                   std::string* limit = nullptr);
+
+}  // namespace sparflow
