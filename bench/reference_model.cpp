@@ -185,10 +185,10 @@ ReferenceKnot::Demand ReferenceKnot::demand(std::size_t i, const Speed& s, doubl
 double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double* hessian) {
   const ReferenceProblem& p = *problem_;
   const Kinematics& kin = kinematics(z);
-  const std::array<Rate, 3>& rate = kin.rate;
-  const std::array<Speed, 3>& speeds = kin.speed;
+  const Rate* rate = kin.rate.data();
+  const Speed* speeds = kin.speed.data();
   const std::array<double, 3> force = forces(kin);
-  std::array<Demand, 3> blend;
+  Demand blend[3];
   std::array<double, 3> demands;
   for (std::size_t i = 0; i < 3; ++i) {
     blend[i] = demand(i, speeds[i], force[i]);
@@ -310,8 +310,8 @@ void ReferenceKnot::add_path_hessian(const double* z, const double* multiplier, 
   const Kinematics& kin = kinematics(z);
   Eigen::Map<Eigen::Matrix<double, 6, 6>> h(hessian);
   for (int i = 0; i < 3; ++i) {
-    const Speed& s = kin.speed[i];
-    const Rate& r = kin.rate[i];
+    const Speed& s = kin.speed.data()[i];
+    const Rate& r = kin.rate.data()[i];
     const double a = r.d * z[3 + i], b = r.ratio, m = multiplier[0];
     const double cross = m * (s.dd_flow * a * b + s.d_flow * r.d);
     h(i, i) += m * (s.dd_flow * a * a + s.d_flow * r.dd * z[3 + i]);

@@ -1,6 +1,6 @@
 #include "optimizer/nlp/ipopt_adapter.h"
 
-#include <algorithm>
+#include <time.h>
 
 namespace sparflow::detail {
 namespace {
@@ -8,6 +8,12 @@ using ConstMap = Eigen::Map<const Eigen::VectorXd>;
 using Map = Eigen::Map<Eigen::VectorXd>;
 using IndexMap = Eigen::Map<Eigen::VectorXi>;
 }  // namespace
+
+double thread_cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 IpoptAdapter::IpoptAdapter(NlpProblem& problem, const NlpOptions& options, NlpResult& result)
     : problem_(problem),
@@ -21,12 +27,14 @@ template <class Evaluation>
 bool IpoptAdapter::guarded(int& count, const Evaluation& evaluation) {
   if (error_) return false;
   const auto begin = Clock::now();
+  const double cpu_begin = thread_cpu_seconds();
   ++count;
   try {
     evaluation();
   } catch (...) {
     error_ = std::current_exception();
   }
+  result_.callbacks_cpu_s += thread_cpu_seconds() - cpu_begin;
   result_.callbacks_s += std::chrono::duration<double>(Clock::now() - begin).count();
   return !error_;
 }

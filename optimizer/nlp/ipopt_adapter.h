@@ -13,6 +13,9 @@
 
 namespace sparflow::detail {
 
+/// Processor time of the calling thread [s].
+double thread_cpu_seconds();
+
 class IpoptAdapter final : public Ipopt::TNLP {
  public:
   using Index = Ipopt::Index;

@@ -205,7 +205,9 @@ std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, Nlp
   auto* adapter = new IpoptAdapter(problem, options, result);
   const Ipopt::SmartPtr<Ipopt::TNLP> owner = adapter;
   const auto begin = std::chrono::steady_clock::now();
+  const double cpu_begin = detail::thread_cpu_seconds();
   const Ipopt::ApplicationReturnStatus code = app->OptimizeTNLP(owner);
+  result.solve_cpu_s = detail::thread_cpu_seconds() - cpu_begin;
   result.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   result.linear_solver_s = linear_solver_seconds(*app);
   const Outcome outcome = outcome_of(code, adapter->out_of_time());

@@ -75,6 +75,9 @@ struct NlpResult {
   NlpEvaluations evaluations;
   double solve_s = 0.0;  ///< wall time in Ipopt; waiting for another thread's solve is not in it
   double callbacks_s = 0.0;  ///< wall time of it in the problem's evaluations
+  /// The same two as processor time of the solving thread: what they are on a machine that does other things too.
+  double solve_cpu_s = 0.0;
+  double callbacks_cpu_s = 0.0;
   /// Wall time of it in solving KKT systems: assembling the augmented matrix, MUMPS' ordering, factorisation and back
   /// substitution, refinement. From Ipopt's timing statistics (its narrower timers leave the factorisation out),
   /// which do not cover the restoration phase: a lower bound when restoration_iterations > 0.
