@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -36,13 +37,13 @@ struct Arguments {
   NlpOptions options;
 };
 
-/// Solves `repeat` times from the same start; the run with the median solve time is reported.
 struct Outcome {
   NlpResult result;
   double energy_kJ = 0.0;
   double setup_s = 0.0;  ///< reading the file and laying out the NLP
 };
 
+/// Solves `repeat` times from the same start; the run with the median solve time is reported.
 Outcome run(const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
