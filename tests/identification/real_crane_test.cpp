@@ -1,0 +1,87 @@
+// Real logs; they are not part of the project, so these tests skip where they are absent.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "identification/fit.h"
+#include "models/machine_file.h"
+#include "models/units.h"
+
+namespace sparflow {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+const std::string kShared = SPARFLOW_SOURCE_DIR "/../shared/";
+
+class RealCrane : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(kShared + "data/hmf_2020_k4")) {
+      GTEST_SKIP() << "no logs of the real crane beside the source tree";
+    }
+    machine = load_machine(kShared + "machines/hmf_2020_k4.yaml");
+    for (const char* name : {"MainSTDTest1_270325", "MainSineTest_230425", "Dual2SineTest_230425",
+                             "Dual1SineRun_230425"}) {
+      logs.push_back(load_log(kShared + "data/hmf_2020_k4/" + name + ".csv", machine));
+    }
+  }
+  Machine machine;
+  std::vector<Log> logs;
+};
+
+TEST_F(RealCrane, StaticForceFromCadIsOffByTwentyKilonewton) {
+  const CompareResult r = compare(CraneModel::untrained(machine), logs);
+  // Published with the logs: 20 347 N on |dx/dt| > 2 mm/s. The filter's choice moves it by some 10 N.
+  EXPECT_NEAR(r.find("force", "main")->rmse, 20347.0, 30.0);
+  // Whether a command is asked for too changes less than a newton.
+  for (Log& log : logs)
+    std::erase_if(log.channels, [](const Channel& c) { return c.role == Role::kCommand; });
+  EXPECT_NEAR(compare(CraneModel::untrained(machine), logs).find("force", "main")->rmse, 20347.0,
+              30.0);
+}
+
+TEST_F(RealCrane, StrokesBecomeAnglesByTheFourBars) {
+  for (const Log& log : logs) {
+    const MachineSignals s = make_signals(machine, log);
+    EXPECT_TRUE(s.usable.all()) << log.file;
+    for (int j = 0; j < 2; ++j) {
+      EXPECT_GT(s.q.col(j).minCoeff(), machine.joints[static_cast<std::size_t>(j)].position.lo);
+      EXPECT_LT(s.q.col(j).maxCoeff(), machine.joints[static_cast<std::size_t>(j)].position.hi);
+    }
+  }
+}
+
+TEST_F(RealCrane, FitsAndSaysWhereItFails) {
+  const FitResult r = fit(machine, logs);
+  EXPECT_TRUE(r.model.complete()) << "four processes: two cylinders, both ways";
+  ASSERT_TRUE(r.held_out.has_value());
+  // Constant-pressure supply of 134 to 151 bar over the days.
+  EXPECT_GT(r.model.pumps[0].standby, 134.0 * units::kBar);
+  EXPECT_LT(r.model.pumps[0].standby, 151.0 * units::kBar);
+  EXPECT_LT(r.train.find("pressure", "main", "extend")->rmse, 1.5 * units::kBar);
+  EXPECT_LT(std::abs(r.train.energy[0].relative_error), 0.03);
+  EXPECT_GT(r.processes[0].step, 1) << "friction and dynamics make neighbouring errors alike";
+  EXPECT_FALSE(r.train.worst.empty());
+  // The crane's valves have dead bands (authors: 0.07 and 0.13 for the main section).
+  EXPECT_THAT(r.notes, Contains(HasSubstr("dead band")));
+}
+
+TEST(RealDrive, OnlyTheForceIsCompared) {
+  const std::string path = kShared + "data/emps/estimation.csv";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no log of the drive beside the source tree";
+  const Machine machine = load_machine(kShared + "machines/emps.yaml");
+  const FitResult r = fit(machine, {load_log(path, machine)});
+  ASSERT_EQ(r.train.scores.size(), 1u);
+  EXPECT_EQ(r.train.scores[0].stage, "force");
+  EXPECT_GT(r.train.scores[0].n, 20000);
+  // A level carriage has no static load: what is measured is friction and inertia, some 54 N RMS.
+  EXPECT_NEAR(r.train.scores[0].rmse, 54.1, 1.0);
+  EXPECT_THAT(r.train.notes, Contains(HasSubstr("flow and pressures of axis: not compared")));
+  EXPECT_THAT(r.train.notes, Contains(HasSubstr("the machine has no pump")));
+}
+
+}  // namespace
+}  // namespace sparflow
