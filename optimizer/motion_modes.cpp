@@ -43,6 +43,43 @@ double full_speed(const CraneModel& model, const MotionProblem& problem, int cyl
   return std::max(std::abs(v.lo), std::abs(v.hi)) * std::abs(rate);
 }
 
+/// A cylinder that covered much of its way creeping gets a window for it where it was fastest, long enough to
+/// cover the way at half speed.
+void concentrate(ModeTable& modes, int c, const Trajectory& motion, const CraneModel& model,
+                 const MotionProblem& problem, const ModeOptions& options) {
+  const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
+  const Eigen::Index intervals = modes.rows();
+  Eigen::VectorXd way(intervals);  // signed, [m]
+  for (Eigen::Index k = 0; k < intervals; ++k) {
+    way[k] = linkage_rates(model.machine, c, motion.q(k + 1, j)).value -
+             linkage_rates(model.machine, c, motion.q(k, j)).value;
+  }
+  double lost = 0.0;
+  for (Eigen::Index k = 0; k < intervals; ++k) {
+    if (modes(k, c) == CylinderMode::kRest) lost += way[k];
+  }
+  const double total = way.cwiseAbs().sum();
+  if (std::abs(lost) < std::max(options.lost_share * total, 2e-3)) return;
+  const double full = full_speed(model, problem, c, motion);
+  const CylinderMode mode = lost > 0.0 ? CylinderMode::kExtend : CylinderMode::kRetract;
+  const double step = (motion.t[intervals] - motion.t[0]) / static_cast<double>(intervals);
+  const auto length = std::clamp<Eigen::Index>(
+      static_cast<Eigen::Index>(std::abs(lost) / (0.5 * full * step)) + 4, 4, intervals);
+  Eigen::Index best = 0;
+  double most = -1.0;
+  for (Eigen::Index begin = 0; begin + length <= intervals; ++begin) {
+    const double here = std::abs(way.segment(begin, length).sum());
+    const auto opposite =
+        mode == CylinderMode::kExtend ? CylinderMode::kRetract : CylinderMode::kExtend;
+    const bool free = !(modes.col(c).segment(begin, length).array() == opposite).any();
+    if (free && here > most) {
+      most = here;
+      best = begin;
+    }
+  }
+  if (most >= 0.0) modes.col(c).segment(best, length).setConstant(mode);
+}
+
 }  // namespace
 
 ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion,
@@ -75,6 +112,7 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
     for (const Run& run : runs_of(modes, c)) {
       if (run.end - run.begin < options.shortest_move) fill(modes, c, run, CylinderMode::kRest);
     }
+    concentrate(modes, c, motion, model, problem, options);
     // a joint that has to arrive somewhere must be allowed to move: its fastest stretch, if all creeps
     const double travel = motion.q(intervals, j) - motion.q(0, j);
     const bool must_move =

@@ -10,6 +10,7 @@ struct ModeOptions {
   /// A cylinder slower than this share of its full speed is creeping under the smoothed activation and is
   /// put to rest: no proportional spool meters less than a few percent of its flow.
   double rest_share = 0.02;
+  double lost_share = 0.05;  ///< share of a cylinder's way that putting creep to rest may give up
   int shortest_move =
       3;  ///< [intervals] shorter moves are dropped: they cannot leave and regain rest usefully
 };

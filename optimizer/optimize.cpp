@@ -37,7 +37,11 @@ std::string pack(const StartResult& r) {
   pack_matrix(p, r.motion.qdd);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
-  p.number(r.seed_energy).number(r.seed_feasible);
+  p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
+  for (const StageRecord& s : r.stages) {
+    p.text(s.what).number(static_cast<double>(s.status)).number(s.iterations);
+    p.number(s.solve_s).number(s.energy_exact).number(s.excess);
+  }
   return p.bytes();
 }
 
@@ -61,6 +65,15 @@ StartResult unpack(const std::string& bytes) {
   r.modes_held = u.number() != 0.0;
   r.seed_energy = u.number();
   r.seed_feasible = u.number() != 0.0;
+  r.stages.resize(static_cast<std::size_t>(u.number()));
+  for (StageRecord& s : r.stages) {
+    s.what = u.text();
+    s.status = static_cast<NlpStatus>(static_cast<int>(u.number()));
+    s.iterations = static_cast<int>(u.number());
+    s.solve_s = u.number();
+    s.energy_exact = u.number();
+    s.excess = u.number();
+  }
   return r;
 }
 
@@ -128,14 +141,28 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
   const auto begin = std::chrono::steady_clock::now();
   OptimizeResult result;
   result.duration = duration;
-  const int count = static_cast<int>(seeds.size());
+  std::vector<ModeCandidate> one_by_one;
+  if (options.sequential_starts > 0 && options.modes && !problem.tip_line) {
+    const Eigen::VectorXd times = Eigen::VectorXd::LinSpaced(options.intervals + 1, 0.0, duration);
+    std::vector<Eigen::VectorXd> ends;
+    for (const SeedMotion& s : seeds) {
+      ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+    }
+    one_by_one = sequential_candidates(model, problem, times, ends, options.sequential_starts);
+  }
+  const std::size_t given = seeds.size();
+  const int count = static_cast<int>(given + one_by_one.size());
+  const auto name = [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    return k < given ? seeds[k].name : one_by_one[k - given].name;
+  };
   const auto work = [&](int i) {
-    return pack(
-        optimize_from(model, problem, seeds[static_cast<std::size_t>(i)], duration, options));
+    const auto k = static_cast<std::size_t>(i);
+    return pack(k < given ? optimize_from(model, problem, seeds[k], duration, options)
+                          : optimize_with_modes(model, problem, one_by_one[k - given], options));
   };
   const auto done = [&](int index, int finished) {
-    if (options.progress)
-      options.progress(finished, count, seeds[static_cast<std::size_t>(index)].name);
+    if (options.progress) options.progress(finished, count, name(index));
   };
   const std::vector<ChildResult> children = run_in_children(count, options.processes, work, done);
   for (int i = 0; i < count; ++i) {
@@ -144,7 +171,7 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
     if (child.ok) {
       start = unpack(child.bytes);
     } else {
-      start.seed = seeds[static_cast<std::size_t>(i)].name;
+      start.seed = name(i);
       start.message = child.error;
     }
     for (std::size_t k = 0; k < result.starts.size() && start.same_as < 0; ++k) {
@@ -155,7 +182,9 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
         (result.best_seed_energy == 0.0 || start.seed_energy < result.best_seed_energy)) {
       result.best_seed_energy = start.seed_energy;
     }
-    if (start.seed_feasible && seeds[static_cast<std::size_t>(i)].straight_line &&
+    const bool straight =
+        static_cast<std::size_t>(i) < given && seeds[static_cast<std::size_t>(i)].straight_line;
+    if (start.seed_feasible && straight &&
         (result.straight_line_energy == 0.0 || start.seed_energy < result.straight_line_energy)) {
       result.straight_line_energy = start.seed_energy;
       result.straight_line_name = start.seed;

@@ -9,6 +9,7 @@
 #include "optimizer/exact_energy.h"
 #include "optimizer/motion_modes.h"
 #include "optimizer/nlp/ipopt_solver.h"
+#include "optimizer/sequential_modes.h"
 
 namespace sparflow {
 
@@ -25,7 +26,10 @@ struct SeedMotion {
 struct OptimizeOptions {
   int intervals = 100;
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the one before.
-  std::vector<Smoothing> schedule = {{20e-3, 10e5}, {6e-3, 3e5}, {2e-3, 1e5}};
+  std::vector<Smoothing> schedule = {{20e-3, 10e5}, {6e-3, 3e5}};
+  /// Iterations a smooth stage may take: its motion is a start for the modes, not the answer.
+  int smooth_iterations = 150;
+  int sequential_starts = 6;  ///< one-by-one motions tried besides the seeds, the cheapest guesses
   bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
   ModeOptions mode_options;
   double pressure_in_modes = 0.3e5;  ///< beta of the finish [Pa]
@@ -40,6 +44,16 @@ struct OptimizeOptions {
   std::function<bool(int, int, const std::string&)> progress;
   /// Asked once an iteration; true stops with the best so far.
   std::function<bool()> interrupted;
+};
+
+/// One solve on the way of a start.
+struct StageRecord {
+  std::string what;  ///< "smooth, 6 mm/s, 3 bar", "modes", "modes, limits drawn in"
+  NlpStatus status = NlpStatus::kFailed;
+  int iterations = 0;
+  double solve_s = 0.0;
+  double energy_exact = 0.0;  ///< [J], 0 when the solve gave no motion
+  double excess = 0.0;        ///< worst relative overshoot of a limit between knots
 };
 
 /// One start's outcome.
@@ -57,6 +71,7 @@ struct StartResult {
   double seed_energy =
       0.0;  ///< [J] exact energy of the seed at this duration; 0 if it breaks limits
   bool seed_feasible = false;
+  std::vector<StageRecord> stages;
   int same_as = -1;  ///< index of an earlier start with the same motion
   bool usable(double limit_tolerance) const {
     return motion.size() > 1 && excess <= limit_tolerance;
@@ -87,7 +102,11 @@ struct OptimizeResult {
 StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
                           const SeedMotion& seed, double duration, const OptimizeOptions& options);
 
-/// All starts at one duration, in child processes, best one chosen by its exact energy.
+/// One start with its modes given.
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const OptimizeOptions& options);
+
+/// All starts (seeds and one-by-one motions) at one duration, in child processes, best one chosen by its exact energy.
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
                            const std::vector<SeedMotion>& seeds, double duration,
                            const OptimizeOptions& options);

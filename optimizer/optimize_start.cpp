@@ -27,6 +27,17 @@ class Start {
     tightening_.position.assign(model.machine.joints.size(), 0.0);
   }
 
+  StartResult run(const ModeCandidate& candidate) {
+    result_.seed = candidate.name;
+    Smoothing exact = options_.schedule.back();
+    exact.pressure = options_.pressure_in_modes;
+    const NlpResult solved = solve(candidate.guess, exact, candidate.modes, options_.tolerance);
+    result_.status = solved.status;
+    result_.message = solved.message;
+    if (usable(solved)) keep_limits(transcription_->trajectory(solved.x), exact, candidate.modes);
+    return result_;
+  }
+
   StartResult run(const SeedMotion& seed, double duration) {
     result_.seed = seed.name;
     const Trajectory timed = with_duration(seed.motion, duration);
@@ -43,8 +54,10 @@ class Start {
       result_.message = solved.message;
       if (solved.status == NlpStatus::kInterrupted) return result_;
       if (!usable(solved)) {
-        if (solved.max_violation_at.size())
+        if (stage > 0) break;  // the coarser motion is a good enough start for the modes
+        if (solved.max_violation_at.size()) {
           result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
+        }
         return result_;
       }
       motion = transcription_->trajectory(solved.x);
@@ -91,7 +104,7 @@ class Start {
     transcription_->set_start(from);
     NlpOptions nlp;
     nlp.tolerance = tolerance;
-    nlp.max_iterations = 500;
+    nlp.max_iterations = modes.rows() > 0 ? 300 : options_.smooth_iterations;
     nlp.max_seconds = options_.max_seconds;
     nlp.more = options_.ipopt;
     if (modes.rows() > 0 || result_.iterations > 0) nlp.mu_init = 1e-3;
@@ -103,6 +116,21 @@ class Start {
     result_.solve_s += solved.solve_s;
     result_.callbacks_s += solved.callbacks_s;
     result_.linear_solver_s += solved.linear_solver_s;
+    StageRecord record;
+    record.what = modes.rows() > 0 ? "modes"
+                                   : fmt::format("smooth, {:g} mm/s, {:g} bar",
+                                                 1e3 * smoothing.speed, smoothing.pressure / 1e5);
+    if (tightenings_used_ > 0)
+      record.what += fmt::format(", limits drawn in ({})", tightenings_used_);
+    record.status = solved.status;
+    record.iterations = solved.iterations;
+    record.solve_s = solved.solve_s;
+    if (usable(solved)) {
+      const Trajectory motion = transcription_->trajectory(solved.x);
+      record.energy_exact = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+      record.excess = worst_excess(check_limits(model_, problem_, motion, options_.refine));
+    }
+    result_.stages.push_back(std::move(record));
     return solved;
   }
 
@@ -177,6 +205,7 @@ class Start {
         result_.modes_held = modes.rows() > 0;
       }
       if (attempt == options_.tightenings || !tighten(checks)) return;
+      ++tightenings_used_;
       const NlpResult solved = solve(motion, smoothing, modes, options_.tolerance);
       if (!usable(solved)) return;
       motion = transcription_->trajectory(solved.x);
@@ -200,11 +229,17 @@ class Start {
   const OptimizeOptions& options_;
   Eigen::VectorXd times_;
   Tightening tightening_;
+  int tightenings_used_ = 0;
   std::unique_ptr<Transcription> transcription_;
   StartResult result_;
 };
 
 }  // namespace
+
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const OptimizeOptions& options) {
+  return Start(model, problem, candidate.guess.duration(), options).run(candidate);
+}
 
 StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
                           const SeedMotion& seed, double duration, const OptimizeOptions& options) {

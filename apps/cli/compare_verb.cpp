@@ -1,0 +1,54 @@
+#include <fmt/format.h>
+
+#include "apps/cli/context.h"
+#include "apps/report/compare_page.h"
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "models/model_file.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct CompareArguments {
+  std::string model, machine, mapping;
+  std::vector<std::string> logs;
+  Outputs outputs;
+};
+
+int run(const CompareArguments& a) {
+  a.outputs.check();
+  if (a.model.empty() == a.machine.empty()) {
+    throw UsageError(
+        "compare: give either --model MODEL.json, or --machine FILE to compare static forces "
+        "alone");
+  }
+  const CraneModel model =
+      a.model.empty() ? CraneModel::untrained(load_machine(a.machine)) : load_model(a.model);
+  const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
+  const CompareResult result = compare(model, logs);
+  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
+  if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
+  fmt::print("{}\n", compare_table(result));
+  return kDone;
+}
+
+}  // namespace
+
+void add_compare_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<CompareArguments>();
+  CLI::App* verb =
+      app.add_subcommand("compare", "model against measurements, every stage; where it fails");
+  verb->add_option("--model", a->model, "fitted model")->type_name("MODEL.json");
+  verb->add_option("--machine,-m", a->machine,
+                   "machine file instead of a model: static forces alone")
+      ->type_name("FILE");
+  verb->add_option("--log,-l", a->logs, "logs to compare with (CSV or MAT)")
+      ->required()
+      ->type_name("FILE...");
+  verb->add_option("--mapping", a->mapping, "mapping file for logs with other column names (YAML)")
+      ->type_name("FILE");
+  a->outputs.add_to(*verb);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli

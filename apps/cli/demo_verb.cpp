@@ -1,0 +1,119 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "apps/cli/context.h"
+#include "apps/report/compare_page.h"
+#include "apps/report/motion_page.h"
+#include "identification/fit.h"
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "models/model_file.h"
+#include "optimizer/motion_table.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+
+namespace sparflow::cli {
+namespace {
+
+int run(const std::string& folder) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError({folder, 0, 0}, "", "cannot make this folder: " + error.message());
+  const auto in = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
+  check_writable(in("index.html"));
+
+  fmt::print(
+      "Sparflow demo: from a measured log to an energy-optimal motion, on a simulated 21 t.m "
+      "loader crane.\n\n");
+  const Machine machine = load_machine(bundled_file("machines/loader_crane.yaml"));
+  const std::vector<Log> train =
+      load_logs({bundled_file("logs/loader_crane_train.csv")}, machine, "");
+  const std::vector<Log> test =
+      load_logs({bundled_file("logs/loader_crane_test.csv")}, machine, "");
+  fmt::print("1. Learn pressures from {} ({} rows, {:.0f} s of work)\n", train[0].file,
+             train[0].samples(), train[0].duration());
+  const FitResult fitted = [&] {
+    Progress progress("fit");
+    return fit(machine, train, test, {},
+               [&](double share, const std::string& what) { progress(share, what); });
+  }();
+  save_model(fitted.model, in("model.json"));
+  fmt::print("   {}\n\n", fitted.brief());
+
+  fmt::print("2. Compare with a log the model has never seen ({}, {} rows)\n{}\n", test[0].file,
+             test[0].samples(), compare_table(*fitted.test));
+
+  const MotionProblem problem =
+      load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &machine);
+  fmt::print("3. Optimise a reach: {}, {} kg\n", problem.name, problem.payload);
+  OptimizeOptions options;
+  options.interrupted = interrupted;
+  Seeds seeds;
+  const OptimizeResult result = [&] {
+    Progress progress("optimize");
+    SeedOptions seed_options;
+    seed_options.count = 6;
+    seeds = make_seeds(problem, seed_options, options.intervals);
+    options.progress = [&](int done, int all, const std::string& what) {
+      progress(static_cast<double>(done) / std::max(1, all), what);
+      return !interrupted();
+    };
+    return optimize(fitted.model, problem, seeds.motions, options);
+  }();
+  fmt::print("{}\n", optimize_table(fitted.model, problem, result));
+  if (result.status == OptimizeStatus::kInterrupted) return kInterrupted;
+  if (result.motion.size() < 2) return kNotSolved;
+  write_file_atomically(in("motion.csv"), motion_csv(fitted.model, result.motion, problem.payload));
+
+  Page page("Sparflow demo");
+  page.subtitle(
+      "One loader crane: its pressures learned from a log, compared with another log, and one "
+      "reach made energy-optimal.");
+  const double line = result.straight_line_energy, best = result.energy.total;
+  const std::string saving =
+      line > 0.0
+          ? fmt::format("{:.0f} % less than the straight joint line's {:.1f} kJ in the same time",
+                        100.0 * (1.0 - best / line), line / 1e3)
+          : std::string("no straight joint line keeps the limits");
+  page.verdict(Tone::kGood, fmt::format("The reach takes {:.1f} kJ: {}.", best / 1e3, saving),
+               fmt::format("Learned from {} rows; energy on a log never seen predicted to {:.2f} "
+                           "%. Energies are those of the exact law.",
+                           train[0].samples(),
+                           100.0 * std::abs(fitted.test->energy.front().relative_error)));
+  const SeedMotion* straight = cheapest_straight_line(seeds, result);
+  const Trajectory timed =
+      straight ? with_duration(straight->motion, result.duration) : Trajectory{};
+  add_motion(page, fitted.model, problem, result, straight ? &timed : nullptr,
+             straight ? straight->name : "");
+  add_comparison(page, fitted.model, *fitted.test, "Held-out log: ");
+  add_fit(page, fitted);
+  page.provenance("program", std::string("sparflow ") + program_version());
+  for (const DataSource& d : fitted.model.data)
+    page.provenance(d.use + " log", d.file + ", sha256 " + d.sha256.substr(0, 16));
+  page.write(in("index.html"));
+  fmt::print(
+      "Written to {}: index.html (open it in a browser), model.json, motion.csv; {:.1f} s in "
+      "all.\n",
+      folder, seconds());
+  return kDone;
+}
+
+}  // namespace
+
+void add_demo_verb(CLI::App& app, int& code) {
+  auto out = std::make_shared<std::string>("sparflow-demo");
+  CLI::App* verb = app.add_subcommand(
+      "demo", "the whole story on bundled inputs: fit, compare, optimise, one page");
+  verb->add_option("--out", *out, "folder for the page, the model and the motion")
+      ->type_name("DIR")
+      ->capture_default_str();
+  verb->callback([out, &code] { code = run(*out); });
+}
+
+}  // namespace sparflow::cli

@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include "apps/cli/context.h"
+#include "apps/report/motion_page.h"
+#include "models/error.h"
+#include "optimizer/motion_table.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct OptimizeArguments {
+  std::string problem, model, output;
+  SeedOptions seeds;
+  int intervals = 0;
+  int processes = 0;
+  bool smooth_only = false;
+  Outputs outputs;
+};
+
+int exit_code(OptimizeStatus status) {
+  switch (status) {
+    case OptimizeStatus::kOptimal:
+      return kDone;
+    case OptimizeStatus::kInterrupted:
+      return kInterrupted;
+    case OptimizeStatus::kInfeasible:
+    case OptimizeStatus::kFailed:
+      return kNotSolved;
+  }
+  return kInternal;
+}
+
+OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
+  OptimizeResult result;
+  result.status = OptimizeStatus::kInfeasible;
+  result.message = fmt::format("{}: infeasible. {}", problem.name, seeds.paths.message);
+  for (const std::string& r : seeds.refused) result.message += " " + r + ".";
+  return result;
+}
+
+int run(const OptimizeArguments& a) {
+  check_writable(a.output);
+  a.outputs.check();
+  const auto [problem, model] = load_problem_and_model(a.problem, a.model);
+  OptimizeOptions options;
+  options.intervals = a.intervals > 0 ? a.intervals : problem.knots.value_or(101) - 1;
+  options.processes = a.processes > 0 ? a.processes : 2;
+  if (a.smooth_only) {
+    options.modes = false;
+    options.schedule.push_back({2e-3, 1e5});
+    options.smooth_iterations = 1000;
+  }
+  options.interrupted = interrupted;
+  Seeds seeds;
+  OptimizeResult result;
+  {
+    Progress progress("optimize");
+    SeedOptions seed_options = a.seeds;
+    seed_options.progress = [&](double share, const std::string& what) {
+      progress(0.2 * share, what);
+    };
+    seeds = make_seeds(problem, seed_options, options.intervals);
+    options.progress = [&](int done, int all, const std::string& what) {
+      progress(0.2 + 0.8 * done / std::max(1, all), what);
+      return !interrupted();
+    };
+    result = seeds.motions.empty() ? no_seed(problem, seeds)
+                                   : optimize(model, problem, seeds.motions, options);
+  }
+  if (result.motion.size() > 1 && !a.output.empty()) {
+    write_file_atomically(a.output, motion_csv(model, result.motion, problem.payload));
+  }
+  if (!a.outputs.json.empty())
+    write_file_atomically(a.outputs.json, optimize_json(model, problem, result));
+  if (!a.outputs.report.empty()) {
+    const SeedMotion* line = cheapest_straight_line(seeds, result);
+    const Trajectory timed = line ? with_duration(line->motion, result.duration) : Trajectory{};
+    motion_page(model, problem, result, line ? &timed : nullptr, line ? line->name : "")
+        .write(a.outputs.report);
+  }
+  fmt::print("{}", optimize_table(model, problem, result));
+  if (result.motion.size() > 1 && !a.output.empty()) fmt::print("motion written to {}\n", a.output);
+  return exit_code(result.status);
+}
+
+}  // namespace
+
+void add_optimize_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<OptimizeArguments>();
+  CLI::App* verb = app.add_subcommand("optimize", "energy-optimal motion from start to goal");
+  verb->add_option("--problem,-p", a->problem, "motion problem (YAML)")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--model", a->model, "fitted model; absent: the one the problem names")
+      ->type_name("MODEL.json");
+  verb->add_option("--output,-o", a->output, "motion to write (CSV)")->type_name("MOTION.csv");
+  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  verb->add_option("--seconds", a->seeds.seconds, "time for the path search")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
+      ->capture_default_str();
+  verb->add_option("--intervals", a->intervals,
+                   "intervals of the mesh; absent: the problem's knots, or 100")
+      ->check(CLI::Range(10, 5000));
+  verb->add_option("--processes", a->processes, "starts solved at once; absent: 2")
+      ->check(CLI::Range(1, 256));
+  verb->add_flag("--smooth-only", a->smooth_only,
+                 "the single smooth NLP without modes (for comparison)");
+  a->outputs.add_to(*verb);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli

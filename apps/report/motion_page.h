@@ -1,0 +1,27 @@
+#pragma once
+/// Pages about a motion.
+#include "apps/report/page.h"
+#include "optimizer/optimize.h"
+
+namespace sparflow {
+
+/// Appends the motion: crane at several instants, joints, flows, pressures, power, throttling loss per
+/// cylinder, limits at their worst, all starts.
+/// @param baseline a motion to compare with at equal time (the cheapest straight joint line); may be null
+void add_motion(Page& page, const CraneModel& model, const MotionProblem& problem,
+                const OptimizeResult& result, const Trajectory* baseline = nullptr,
+                const std::string& baseline_name = "");
+
+Page motion_page(const CraneModel& model, const MotionProblem& problem,
+                 const OptimizeResult& result, const Trajectory* baseline = nullptr,
+                 const std::string& baseline_name = "");
+
+/// `optimize`'s machine-readable result (keys: docs/commands.md).
+std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
+                          const OptimizeResult& result);
+
+/// One screen for a terminal.
+std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
+                           const OptimizeResult& result);
+
+}  // namespace sparflow

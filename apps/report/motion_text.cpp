@@ -1,0 +1,143 @@
+/// The terminal's and the machine's view of a motion.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/report/motion_page.h"
+#include "models/units.h"
+
+namespace sparflow {
+namespace {
+
+nlohmann::json start_json(const StartResult& s) {
+  nlohmann::json stages = nlohmann::json::array();
+  for (const StageRecord& g : s.stages) {
+    stages.push_back({{"what", g.what},
+                      {"status", to_string(g.status)},
+                      {"iterations", g.iterations},
+                      {"solve_s", g.solve_s},
+                      {"energy_exact_J", g.energy_exact},
+                      {"excess", g.excess}});
+  }
+  nlohmann::json json = {{"seed", s.seed},
+                         {"status", to_string(s.status)},
+                         {"message", s.message},
+                         {"energy_J", s.energy_smooth},
+                         {"energy_exact_J", s.energy_exact},
+                         {"constraint_violation", s.excess},
+                         {"iterations", s.iterations},
+                         {"solve_s", s.solve_s},
+                         {"callbacks_s", s.callbacks_s},
+                         {"linear_solver_s", s.linear_solver_s},
+                         {"modes_held", s.modes_held},
+                         {"stages", stages}};
+  if (s.seed_feasible) json["seed_energy_exact_J"] = s.seed_energy;
+  if (s.same_as >= 0) json["same_as"] = s.same_as;
+  return json;
+}
+
+}  // namespace
+
+std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
+                          const OptimizeResult& r) {
+  nlohmann::json json = {
+      {"problem", problem.name},
+      {"status", r.status == OptimizeStatus::kInterrupted ? "failed" : to_string(r.status)},
+      {"message", r.message},
+      {"duration_s", r.duration},
+      {"solve_s", r.solve_s}};
+  int iterations = 0;
+  for (const StartResult& s : r.starts) iterations += s.iterations;
+  json["iterations"] = iterations;
+  json["starts"] = nlohmann::json::array();
+  for (const StartResult& s : r.starts) json["starts"].push_back(start_json(s));
+  if (r.motion.size() > 1) {
+    json["energy_J"] = r.energy_smooth;
+    json["energy_exact_J"] = r.energy.total;
+    json["seed"] = r.starts[static_cast<std::size_t>(r.best_start)].seed;
+    json["constraint_violation"] = worst_excess(r.checks);
+    json["potential_energy_difference_J"] = r.energy.potential_difference;
+    json["largest_pressure_std_bar"] = r.energy.largest_pressure_std / units::kBar;
+    json["moving_share_outside_data"] = r.energy.moving_share_outside_data;
+    json["share_of_time_moving"] = r.energy.share_moving;
+    for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+      json["throttling_J"][model.machine.cylinders[i].name] = r.energy.throttling[i];
+      json["useful_J"][model.machine.cylinders[i].name] = r.energy.useful[i];
+    }
+    for (std::size_t p = 0; p < model.pumps.size(); ++p)
+      json["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
+    json["best_seed_energy_exact_J"] =
+        r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
+    json["straight_line_energy_exact_J"] =
+        r.straight_line_energy > 0.0 ? nlohmann::json(r.straight_line_energy) : nlohmann::json();
+    json["limits"] = nlohmann::json::array();
+    for (const LimitCheck& c : r.checks) {
+      json["limits"].push_back({{"what", c.what},
+                                {"value", c.value},
+                                {"limit", c.limit},
+                                {"unit", c.unit},
+                                {"t_s", c.time},
+                                {"excess", c.excess}});
+    }
+  }
+  return json.dump(2) + "\n";
+}
+
+std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
+                           const OptimizeResult& r) {
+  std::string text;
+  const auto add = [&](const std::string& line) { text += line + "\n"; };
+  if (r.motion.size() < 2) {
+    add(fmt::format("{}: {}", to_string(r.status), r.message));
+    for (const StartResult& s : r.starts) add(fmt::format("  {:<34} {}", s.seed, s.message));
+    return text;
+  }
+  add(fmt::format("{}: {}", to_string(r.status), problem.name));
+  add(fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}", r.energy.total / 1e3,
+                  r.duration, r.starts[static_cast<std::size_t>(r.best_start)].seed));
+  const auto against = [&](const char* what, double energy) {
+    if (energy > 0.0)
+      add(fmt::format("  {:<20} {:9.2f} kJ   the optimum saves {:.1f} %", what, energy / 1e3,
+                      100.0 * (1.0 - r.energy.total / energy)));
+    else
+      add(fmt::format("  {:<20}         -      keeps no limit set in this time", what));
+  };
+  against("straight joint line", r.straight_line_energy);
+  against("best seed path", r.best_seed_energy);
+  add(fmt::format("  potential energy     {:+9.2f} kJ   end against start",
+                  r.energy.potential_difference / 1e3));
+  add(fmt::format("  {:<14} {:>12} {:>14}", "cylinder", "useful [kJ]", "throttled [kJ]"));
+  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+    add(fmt::format("  {:<14} {:>12.2f} {:>14.2f}", model.machine.cylinders[i].name,
+                    r.energy.useful[i] / 1e3, r.energy.throttling[i] / 1e3));
+  }
+  const LimitCheck& c = r.checks.front();
+  const double margin = -100.0 * c.excess;
+  for (const LimitCheck& k : r.checks) {
+    if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
+      continue;
+    add(fmt::format(
+        "  limits               {} at 16x the knots; nearest: {} {:.4g} of {:.4g} {} at {:.2f} s",
+        margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time));
+    break;
+  }
+  if (r.energy.moving_share_outside_data > 0.02) {
+    add(fmt::format(
+        "  note                 {:.0f} % of the moving time lies outside the data; least certain "
+        "pressure +-{:.1f} bar",
+        100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
+  }
+  int usable = 0, distinct = 0;
+  for (const StartResult& s : r.starts) {
+    usable += s.motion.size() > 1 && s.excess <= 1e-4;
+    distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
+  }
+  add(fmt::format(
+      "  starts               {} tried, {} kept all limits, {} different motions; {:.1f} s",
+      r.starts.size(), usable, distinct, r.solve_s));
+  return text;
+}
+
+}  // namespace sparflow
