@@ -26,16 +26,6 @@ double distance(const VectorXd& a, const VectorXd& b, const VectorXd& scale) {
 
 }  // namespace
 
-VectorXd speed_scale(const MotionProblem& problem) {
-  VectorXd scale(problem.machine.joint_count());
-  for (Eigen::Index i = 0; i < scale.size(); ++i) {
-    const Range& v = problem.limits.velocity[at(i)];
-    scale[i] = 0.5 * (v.hi - v.lo);
-    SPARFLOW_CHECK(scale[i] > 0.0 && std::isfinite(scale[i]), "every joint has a speed limit");
-  }
-  return scale;
-}
-
 double path_length(const MatrixXd& path, const VectorXd& scale) {
   double length = 0.0;
   for (Eigen::Index k = 0; k + 1 < path.rows(); ++k) {

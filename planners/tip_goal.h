@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "problems/clearance.h"
+#include "problems/motion_limits.h"
 #include "problems/problem.h"
 
 namespace sparflow {
@@ -12,13 +13,9 @@ namespace sparflow {
 /// How near the tip must come to count as there [m]. Samples usually are within 1e-9.
 inline constexpr double kTipTolerance = 1e-3;
 
-/// The joint-space metric of this room: every joint's coordinate divided by its mean speed limit, so that
-/// lengths are in seconds of travel at full speed and joints in rad and m compare.
-/// @return [rad/s] or [m/s], by joint
-Eigen::VectorXd speed_scale(const MotionProblem& problem);
-
-/// Length of a polyline in that metric (Euclidean over joints) [s]. Symmetric in direction: a
-/// measure of how far, not of the energy it takes. @param path waypoints x joints
+/// Length of a polyline in the room's metric: Euclidean over joint coordinates divided by speed_scale(), so in
+/// seconds of travel at full speed [s]. Symmetric in direction: a measure of how far, not of energy.
+/// @param path waypoints x joints
 double path_length(const Eigen::MatrixXd& path, const Eigen::VectorXd& scale);
 
 /// A posture found for a wanted tip position.

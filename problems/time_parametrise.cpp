@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "models/error.h"
-#include "models/linkage.h"
 #include "problems/clearance.h"
 
 namespace sparflow {
@@ -28,76 +27,11 @@ constexpr double kLeastInterval = 1e-3;  // [s] for paths without length
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
-/// Flows and rates at one configuration and velocity against their limits.
-class Limits {
- public:
-  explicit Limits(const MotionProblem& problem)
-      : problem_(problem), pump_flow_(VectorXd::Zero(problem.machine.pump_count())) {}
-
-  /// Largest ratio of speed-like quantities (proportional to the velocity).
-  double speed(const VectorXd& q, const VectorXd& qd, std::string* name) {
-    double worst = 0.0;
-    const auto judge = [&](double ratio, auto&& text) {
-      if (ratio <= worst) return;
-      worst = ratio;
-      if (name) *name = text();
-    };
-    const Machine& machine = problem_.machine;
-    for (Eigen::Index j = 0; j < qd.size(); ++j) {
-      const Range& v = problem_.limits.velocity[at(j)];
-      judge(qd[j] > 0.0 ? qd[j] / v.hi : qd[j] / v.lo,
-            [&] { return "speed of joint " + machine.joints[at(j)].name; });
-    }
-    pump_flow_.setZero();
-    for (int i = 0; i < machine.cylinder_count(); ++i) {
-      const Cylinder& cylinder = machine.cylinders[at(i)];
-      if (!cylinder.hydraulic()) continue;
-      const double dx = linkage_rates(machine, i, q[cylinder.joint]).d1 * qd[cylinder.joint];
-      const double flow = std::abs(dx) * (dx > 0.0 ? cylinder.area_piston() : cylinder.area_rod());
-      if (const Valve* valve = machine.valve_of_cylinder(i)) {
-        const double most = problem_.limits.valve_fraction *
-                            (dx > 0.0 ? valve->max_flow_extend : valve->max_flow_retract);
-        if (most > 0.0) {
-          judge(flow / most, [&] {
-            return fmt::format("flow of cylinder {} {}", cylinder.name,
-                               dx > 0.0 ? "extending" : "retracting");
-          });
-        }
-      }
-      const int pump = machine.pump_of_cylinder(i);
-      if (pump >= 0) pump_flow_[pump] += flow;
-    }
-    for (Eigen::Index p = 0; p < pump_flow_.size(); ++p) {
-      const double most = problem_.limits.pump_max_flow[at(p)];
-      if (most > 0.0) {
-        judge(pump_flow_[p] / most, [&] { return "flow of pump " + machine.pumps[at(p)].name; });
-      }
-    }
-    return worst;
-  }
-
-  double acceleration(const VectorXd& qdd, std::string* name) const {
-    double worst = 0.0;
-    for (Eigen::Index j = 0; j < qdd.size(); ++j) {
-      const Range& a = problem_.limits.acceleration[at(j)];
-      const double ratio = qdd[j] > 0.0 ? qdd[j] / a.hi : qdd[j] / a.lo;
-      if (ratio <= worst) continue;
-      worst = ratio;
-      if (name) *name = "acceleration of joint " + problem_.machine.joints[at(j)].name;
-    }
-    return worst;
-  }
-
-  /// Least of the joint's two acceleration limits.
-  double bend(Eigen::Index joint) const {
-    const Range& a = problem_.limits.acceleration[at(joint)];
-    return std::min(a.hi, -a.lo);
-  }
-
- private:
-  const MotionProblem& problem_;
-  VectorXd pump_flow_;
-};
+/// The smaller of a joint's two acceleration limits.
+double least_acceleration(const MotionProblem& problem, Eigen::Index joint) {
+  const Range& a = problem.limits.acceleration[at(joint)];
+  return std::min(a.hi, -a.lo);
+}
 
 /// Samples of a path, and the nodes at which a stopping motion rests.
 struct Grid {
@@ -108,15 +42,6 @@ struct Grid {
     stop.push_back(stops);
   }
 };
-
-VectorXd span_of(const MotionProblem& problem) {
-  VectorXd scale(problem.machine.joint_count());
-  for (Eigen::Index j = 0; j < scale.size(); ++j) {
-    const Range& v = problem.limits.velocity[at(j)];
-    scale[j] = 0.5 * (v.hi - v.lo);
-  }
-  return scale;
-}
 
 /// Whether the chords of the parabola a-corner-b are clear.
 bool parabola_clear(ClearanceModel& clearance, const VectorXd& a, const VectorXd& corner,
@@ -133,7 +58,7 @@ bool parabola_clear(ClearanceModel& clearance, const VectorXd& a, const VectorXd
 
 Grid sample(const MotionProblem& problem, const std::vector<VectorXd>& waypoints, bool round,
             ClearanceModel& clearance) {
-  const VectorXd scale = span_of(problem);
+  const VectorXd scale = speed_scale(problem);
   const auto length = [&](const VectorXd& a, const VectorXd& b) {
     return (b - a).cwiseQuotient(scale).norm();
   };
@@ -191,10 +116,10 @@ struct Run {
 
 /// The fastest run along the grid.
 Run fastest(const MotionProblem& problem, const Grid& grid) {
-  Limits limits(problem);
+  LimitRatios limits(problem);
   const std::size_t pieces = grid.q.size() - 1;
   std::vector<VectorXd> slope(pieces), bend(pieces + 1, VectorXd::Zero(grid.q[0].size()));
-  const VectorXd scale = span_of(problem);
+  const VectorXd scale = speed_scale(problem);
   std::vector<double> ds(pieces);
   for (std::size_t i = 0; i < pieces; ++i) {
     const VectorXd d = grid.q[i + 1] - grid.q[i];
@@ -216,14 +141,16 @@ Run fastest(const MotionProblem& problem, const Grid& grid) {
     if (ratio > 0.0) u[i] = 1.0 / (ratio * ratio);
     for (Eigen::Index j = 0; j < bend[i].size(); ++j) {
       const double b = std::abs(bend[i][j]);
-      if (b > 0.0) u[i] = std::min(u[i], kBendShare * limits.bend(j) / b);
+      if (b > 0.0) u[i] = std::min(u[i], kBendShare * least_acceleration(problem, j) / b);
     }
   }
   const auto gain = [&](std::size_t piece, std::size_t node, double from) {
     double most = std::numeric_limits<double>::infinity();
     for (Eigen::Index j = 0; j < slope[piece].size(); ++j) {
       const double s = std::abs(slope[piece][j]);
-      if (s > 0.0) most = std::min(most, (limits.bend(j) - std::abs(bend[node][j]) * from) / s);
+      if (s > 0.0)
+        most =
+            std::min(most, (least_acceleration(problem, j) - std::abs(bend[node][j]) * from) / s);
     }
     return from + 2.0 * ds[piece] * std::max(0.0, most);
   };
@@ -269,45 +196,13 @@ Trajectory spline(const MatrixXd& c, double h) {
 
 }  // namespace
 
-double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,
-                   std::string* limit) {
-  Limits limits(problem);
-  const Trajectory fine = motion.refined(factor);
-  double worst = 0.0;
-  std::string name;
-  for (Eigen::Index k = 0; k < fine.size(); ++k) {
-    const VectorXd q = fine.q.row(k), qd = fine.qd.row(k), qdd = fine.qdd.row(k);
-    const double speed = limits.speed(q, qd, &name);
-    if (speed > worst) {
-      worst = speed;
-      if (limit) *limit = name;
-    }
-    const double acceleration = limits.acceleration(qdd, &name);
-    if (acceleration > worst) {
-      worst = acceleration;
-      if (limit) *limit = name;
-    }
-    for (Eigen::Index j = 0; j < q.size(); ++j) {
-      const Range& range = problem.limits.position[at(j)];
-      const double half = 0.5 * (range.hi - range.lo);
-      if (half <= 0.0) continue;
-      // 1 at either limit; below a tenth beyond nothing else matters less
-      const double ratio = std::abs(q[j] - 0.5 * (range.lo + range.hi)) / half;
-      if (ratio <= 1.0 + 1e-9 || ratio <= worst) continue;
-      worst = ratio;
-      if (limit) *limit = "position of joint " + problem.machine.joints[at(j)].name;
-    }
-  }
-  return worst;
-}
-
 TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path, double duration,
                              const TimingOptions& options) {
   SPARFLOW_CHECK(options.intervals >= 8, "a timed motion has at least 8 intervals");
   SPARFLOW_CHECK(path.rows() >= 1 && path.cols() == problem.machine.joint_count(),
                  "a path has a row a waypoint and a column a joint");
   const int intervals = options.intervals;
-  const VectorXd scale = span_of(problem);
+  const VectorXd scale = speed_scale(problem);
   std::vector<VectorXd> waypoints{path.row(0).transpose()};
   for (Eigen::Index k = 1; k < path.rows(); ++k) {
     const VectorXd next = path.row(k).transpose();
@@ -331,7 +226,7 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
     }
     // Ratios at interval 1 s tell by how much time must be stretched.
     const Trajectory unit = spline(control, 1.0);
-    Limits limits(problem);
+    LimitRatios limits(problem);
     double interval = kLeastInterval;
     std::string name;
     const auto judge = [&](double needed) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "models/trajectory.h"
+#include "problems/motion_limits.h"
 #include "problems/problem.h"
 
 namespace sparflow {
@@ -47,10 +48,5 @@ struct TimedMotion {
 /// @param path waypoints x joints, at least one row, within the position limits
 TimedMotion time_parametrise(const MotionProblem& problem, const Eigen::MatrixXd& path,
                              double duration, const TimingOptions& options = {});
-
-/// Largest ratio of what the motion asks to what a limit allows (1 = just held), over joint position, speed and
-/// acceleration, valve and pump flow, at `factor` instants an interval. @param limit gets the worst's name
-double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,
-                   std::string* limit = nullptr);
 
 }  // namespace sparflow
