@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "identification/robust.h"
 #include "models/error.h"
 #include "models/units.h"
 
@@ -65,13 +66,19 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
   return out;
 }
 
-/// Every `step`-th sample of each unbroken stretch.
+/// Every `step`-th sample, evenly over each unbroken stretch and at least one of it, so that a short motion
+/// under a rare load is not lost.
 std::vector<Index> thinned(const std::vector<Index>& position, int step) {
   std::vector<Index> rows;
-  Index since = 0;
-  for (std::size_t i = 0; i < position.size(); ++i) {
-    since = i > 0 && position[i] == position[i - 1] + 1 ? since + 1 : 0;
-    if (since % step == step / 2) rows.push_back(static_cast<Index>(i));
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= position.size(); ++i) {
+    if (i < position.size() && position[i] == position[i - 1] + 1) continue;
+    const std::size_t length = i - begin;
+    const std::size_t picks = std::max<std::size_t>(1, length / static_cast<std::size_t>(step));
+    for (std::size_t k = 0; k < picks; ++k) {
+      rows.push_back(static_cast<Index>(begin + (2 * k + 1) * length / (2 * picks)));
+    }
+    begin = i;
   }
   return rows;
 }
@@ -93,19 +100,33 @@ void take(FitPass& pass, std::size_t i, LearnedGp learned) {
   (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
 }
 
-/// A process that is worth a second look, on independent samples only.
-int thinning_step(const ProcessData& data, const GaussianProcess& process, double thin_from,
-                  double& autocorrelation) {
+VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
   VectorXd residual(data.set.pressure.size());
   for (Index k = 0; k < residual.size(); ++k) {
     residual[k] = data.set.pressure[k] - process.mean(data.set.flow[k], data.set.force[k]);
   }
-  autocorrelation = integrated_autocorrelation(residual, data.position);
+  return residual;
+}
+
+/// How many samples one independent sample is worth, as a step; 1 = all are used.
+int thinning_step(double autocorrelation, Index samples, double thin_from) {
   if (thin_from <= 0.0 || autocorrelation < thin_from) return 1;
   // Enough must remain to see the shape, however alike the samples are.
-  constexpr double kLeast = 150.0;
-  const double most = static_cast<double>(residual.size()) / kLeast;
+  constexpr double kLeast = 400.0;
+  const double most = static_cast<double>(samples) / kLeast;
   return std::max(1, static_cast<int>(std::lround(std::min(autocorrelation, most))));
+}
+
+/// The thinned samples, without what the first fit, on all of them, calls outliers. Few samples cannot be
+/// screened again: a single motion under a rare load would look like one.
+GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int step,
+                      double threshold) {
+  const double limit = threshold * robust_std(residual);
+  std::vector<Index> rows;
+  for (const Index row : thinned(data.position, step)) {
+    if (threshold <= 0.0 || std::abs(residual[row]) <= limit) rows.push_back(row);
+  }
+  return rows_of(data.set, rows);
 }
 
 void learn_processes(const Machine& machine, const TrainingData& data, const FitOptions& options,
@@ -138,14 +159,17 @@ void learn_processes(const Machine& machine, const TrainingData& data, const Fit
     ProcessFit& fitted = pass.processes[i];
     if (!fitted.report.failure.empty()) continue;
     const CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
-    fitted.step = thinning_step(samples[i], fitted.extend ? c.extend : c.retract, options.thin_from,
-                                fitted.autocorrelation);
+    const VectorXd residual = residuals(samples[i], fitted.extend ? c.extend : c.retract);
+    fitted.autocorrelation = integrated_autocorrelation(residual, samples[i].position);
+    fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options.thin_from);
     if (fitted.step == 1) continue;
-    again.push_back(rows_of(samples[i].set, thinned(samples[i].position, fitted.step)));
+    again.push_back(thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
     which.push_back(i);
   }
   if (again.empty()) return;
-  learned = learn_gps(again, options.gp, tell(0.5), options.threads);
+  LearnGpOptions screened = options.gp;
+  screened.outlier_threshold = 0.0;
+  learned = learn_gps(again, screened, tell(0.5), options.threads);
   for (std::size_t i = 0; i < learned.size(); ++i) {
     // A first fit is better than none.
     if (learned[i].report.failure.empty()) take(pass, which[i], std::move(learned[i]));
