@@ -235,6 +235,7 @@ VectorXd sample_durations(const VectorXd& time, const std::vector<SampleRange>& 
 MachineSignals make_signals(const Machine& machine, const Log& log, const SignalOptions& options) {
   MachineSignals out;
   out.file = log.file;
+  out.sha256 = log.sha256;
   out.step = log.step;
   out.time = log.time;
   out.runs = log.runs;

@@ -66,6 +66,7 @@ struct CandidateSignal {
 
 struct MachineSignals {
   std::string file;            ///< the log's name
+  std::string sha256;          ///< of the log's bytes
   double step = 0.0;           ///< [s] median sampling interval
   Eigen::VectorXd time;        ///< [s]
   Eigen::MatrixXd q, qd, qdd;  ///< [samples x joints] smoothed, SI
