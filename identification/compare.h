@@ -32,6 +32,8 @@ struct ComparedSeries {
   Eigen::VectorXd measured, predicted;
   /// Predicted standard deviation of one measurement, noise included; empty where the model has none.
   Eigen::VectorXd deviation;
+  /// Outside the flows and loads the process was learned from; empty for other stages.
+  Mask extrapolated;
   /// Regime of each compared sample: index into `regimes`.
   Eigen::VectorXi regime;
   std::vector<std::string>
@@ -50,6 +52,10 @@ struct StageScore {
   double fit_percent = 0.0;  ///< 100 (1 - |e| / |measured - mean|); NaN when nothing varies
   double within_95_percent =
       0.0;  ///< share of samples inside the predicted 95 % interval; NaN if none
+  /// Of a pressure: share of samples outside the flows and loads it was learned from, and their share of the
+  /// squared error; NaN for other stages.
+  double extrapolated_percent = 0.0;
+  double extrapolated_error_percent = 0.0;
   long n = 0;
 };
 

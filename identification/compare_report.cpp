@@ -16,12 +16,17 @@ using Eigen::VectorXd;
 using Json = nlohmann::ordered_json;
 
 Json score_json(const StageScore& s) {
-  return {{"rmse", s.rmse / s.unit.si},
-          {"unit", s.unit.name},
-          {"fit_percent", s.fit_percent},
-          {"bias", s.bias / s.unit.si},
-          {"within_95_percent", s.within_95_percent},
-          {"n", s.n}};
+  Json out = {{"rmse", s.rmse / s.unit.si},
+              {"unit", s.unit.name},
+              {"fit_percent", s.fit_percent},
+              {"bias", s.bias / s.unit.si},
+              {"within_95_percent", s.within_95_percent},
+              {"n", s.n}};
+  if (s.stage == "pressure") {
+    out["extrapolated_percent"] = s.extrapolated_percent;
+    out["extrapolated_error_percent"] = s.extrapolated_error_percent;
+  }
+  return out;
 }
 
 void add_cylinder(const Machine& machine, const MachineSignals& signals, int index,

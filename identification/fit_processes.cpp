@@ -1,0 +1,183 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identification/fit_pass.h"
+#include "identification/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Samples of one process in order of time, with places by which stretches can be told.
+struct ProcessData {
+  GpDataset set;
+  std::vector<Index> position;  ///< running number over all logs, a gap between logs
+};
+
+GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
+  return {all.name, all.flow(rows), all.force(rows), all.pressure(rows)};
+}
+
+/// Driven samples: they move, and towards the side of the command. Pressures as logged: a process averages
+/// white noise itself, and a filter would blur the steps at starts and stops.
+ProcessData process_data(const Machine& machine, const TrainingData& data, int cylinder,
+                         bool extend) {
+  std::vector<double> flow, force, pressure;
+  ProcessData out;
+  out.set.name = process_name(machine, cylinder, extend);
+  Index offset = 0;
+  for (std::size_t l = 0; l < data.signals->size(); ++l) {
+    const MachineSignals& s = (*data.signals)[l];
+    const CylinderSignals& c = s.cylinders[static_cast<std::size_t>(cylinder)];
+    for (Index k = 0; k < s.samples() && c.has_pressure(); ++k) {
+      if (!data.counts[l][k] || !c.driven[k] || (c.direction[k] > 0) != extend) continue;
+      if (!std::isfinite(c.working_pressure[k])) continue;
+      flow.push_back(c.flow[k]);
+      force.push_back(c.static_force[k]);
+      pressure.push_back(c.working_pressure[k]);
+      out.position.push_back(offset + k);
+    }
+    offset += s.samples() + 2;
+  }
+  const auto n = static_cast<Index>(flow.size());
+  out.set.flow = Eigen::Map<Eigen::ArrayXd>(flow.data(), n);
+  out.set.force = Eigen::Map<Eigen::ArrayXd>(force.data(), n);
+  out.set.pressure = Eigen::Map<Eigen::ArrayXd>(pressure.data(), n);
+  return out;
+}
+
+/// Every `step`-th sample, evenly over each unbroken stretch and at least one of it, so that a short motion
+/// under a rare load is not lost.
+std::vector<Index> thinned(const std::vector<Index>& position, int step) {
+  std::vector<Index> rows;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= position.size(); ++i) {
+    if (i < position.size() && position[i] == position[i - 1] + 1) continue;
+    const std::size_t length = i - begin;
+    const std::size_t picks = std::max<std::size_t>(1, length / static_cast<std::size_t>(step));
+    for (std::size_t k = 0; k < picks; ++k) {
+      rows.push_back(static_cast<Index>(begin + (2 * k + 1) * length / (2 * picks)));
+    }
+    begin = i;
+  }
+  return rows;
+}
+
+void take(FitPass& pass, std::size_t i, LearnedGp learned) {
+  ProcessFit& fitted = pass.processes[i];
+  fitted.report = std::move(learned.report);
+  if (!fitted.report.failure.empty()) return;
+  CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+  (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
+}
+
+VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
+  VectorXd residual(data.set.pressure.size());
+  for (Index k = 0; k < residual.size(); ++k) {
+    residual[k] = data.set.pressure[k] - process.mean(data.set.flow[k], data.set.force[k]);
+  }
+  return residual;
+}
+
+/// How many samples one independent sample is worth, as a step; 1 = all are used.
+int thinning_step(double autocorrelation, Index samples, double thin_from) {
+  if (thin_from <= 0.0 || autocorrelation < thin_from) return 1;
+  // Enough must remain to see the shape, however alike the samples are.
+  constexpr double kLeast = 400.0;
+  const double most = static_cast<double>(samples) / kLeast;
+  return std::max(1, static_cast<int>(std::lround(std::min(autocorrelation, most))));
+}
+
+/// The thinned samples, without what the first fit, on all of them, calls outliers. Few samples cannot be
+/// screened again: a single motion under a rare load would look like one.
+GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int step,
+                      double threshold) {
+  const double limit = threshold * robust_std(residual);
+  std::vector<Index> rows;
+  for (const Index row : thinned(data.position, step)) {
+    if (threshold <= 0.0 || std::abs(residual[row]) <= limit) rows.push_back(row);
+  }
+  return rows_of(data.set, rows);
+}
+
+void process_notes(const Machine& machine, FitPass& pass) {
+  for (const ProcessFit& f : pass.processes) {
+    const std::string& name = machine.cylinders[static_cast<std::size_t>(f.cylinder)].name;
+    const char* what = f.extend ? "extending" : "retracting";
+    if (!f.report.failure.empty()) {
+      pass.notes.push_back(
+          fmt::format("pressure of {} {}: not learned, the logs hold {} sample(s) of it with a "
+                      "measured pressure; record {} {} "
+                      "at several speeds and loads, with p{}_{}_bar",
+                      name, what, f.offered, name, what, f.extend ? "A" : "B", name));
+    }
+    for (const std::string& w : f.report.warnings) {
+      pass.notes.push_back(fmt::format("pressure of {} {}: {}", name, what, w));
+    }
+  }
+}
+
+}  // namespace
+
+std::string process_name(const Machine& machine, int cylinder, bool extend) {
+  return machine.cylinders[static_cast<std::size_t>(cylinder)].name +
+         (extend ? " extend" : " retract");
+}
+
+void learn_processes(const TrainingData& data, const FitOptions& options, FitPass& pass,
+                     const std::function<void(double, const std::string&)>& progress) {
+  const Machine& machine = pass.model.machine;
+  std::vector<ProcessData> samples;
+  std::vector<GpDataset> sets;
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
+    for (const bool extend : {true, false}) {
+      samples.push_back(process_data(machine, data, i, extend));
+      sets.push_back(samples.back().set);
+      ProcessFit fitted;
+      fitted.cylinder = i;
+      fitted.extend = extend;
+      fitted.offered = static_cast<long>(samples.back().position.size());
+      pass.processes.push_back(fitted);
+    }
+  }
+  const auto tell = [&](double from) {
+    return [&progress, from](int done, int total, const std::string& name) {
+      if (progress) progress(from + 0.5 * done / total, "pressure of " + name);
+    };
+  };
+  std::vector<LearnedGp> learned = learn_gps(sets, options.gp, tell(0.0), options.threads);
+  for (std::size_t i = 0; i < learned.size(); ++i) take(pass, i, std::move(learned[i]));
+
+  std::vector<GpDataset> again;
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ProcessFit& fitted = pass.processes[i];
+    if (!fitted.report.failure.empty()) continue;
+    const CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+    const VectorXd residual = residuals(samples[i], fitted.extend ? c.extend : c.retract);
+    fitted.autocorrelation = integrated_autocorrelation(residual, samples[i].position);
+    fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options.thin_from);
+    if (fitted.step == 1) continue;
+    again.push_back(thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
+    which.push_back(i);
+  }
+  if (again.empty()) {
+    process_notes(machine, pass);
+    return;
+  }
+  LearnGpOptions screened = options.gp;
+  screened.outlier_threshold = 0.0;
+  learned = learn_gps(again, screened, tell(0.5), options.threads);
+  for (std::size_t i = 0; i < learned.size(); ++i) {
+    // A first fit is better than none.
+    if (learned[i].report.failure.empty()) take(pass, which[i], std::move(learned[i]));
+  }
+  process_notes(machine, pass);
+}
+
+}  // namespace sparflow
