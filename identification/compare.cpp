@@ -76,7 +76,9 @@ StageScore score(const std::vector<LogComparison>& logs, const std::string& stag
 void extrapolation_notes(const CraneModel& model, const std::vector<StageScore>& scores,
                          std::set<std::string>& notes) {
   for (const StageScore& s : scores) {
+    // Worth a word where it happens often and does harm.
     if (!(s.extrapolated_percent >= 5.0)) continue;
+    if (!(s.extrapolated_error_percent > 1.25 * s.extrapolated_percent)) continue;
     const bool extend = s.regime == "extend";
     const auto i = static_cast<std::size_t>(model.machine.cylinder_index(s.at));
     const CylinderModel& c = model.cylinders[i];

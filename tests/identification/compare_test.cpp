@@ -217,6 +217,27 @@ TEST(Compare, AnUnlearnedProcessIsNotCompared) {
   EXPECT_THAT(r.notes, Contains(HasSubstr("the model has no valve gain")));
 }
 
+TEST(Compare, SaysWhereAProcessWasAskedBeyondItsData) {
+  CraneModel model = arm_model();
+  GpParameters p = model.cylinders[0].extend.parameters();
+  const Log log = arm_log();
+  const MachineSignals s = make_signals(model.machine, log);
+  const double lo = s.cylinders[0].static_force.minCoeff(),
+               hi = s.cylinders[0].static_force.maxCoeff();
+  p.flow_max = 1.0;
+  p.force_min = lo;
+  p.force_max = 0.5 * (lo + hi);
+  // a tenth of a bar too much below, wrong by slope above: what a process does beyond its data
+  p.mean_slope *= 1.3;
+  p.mean_constant = extend_pressure(model.machine, lo) - p.mean_slope * lo;
+  model.cylinders[0].extend = GaussianProcess(p);
+  const CompareResult r = compare(model, {log});
+  const StageScore& score = *r.find("pressure", "arm", "extend");
+  EXPECT_GT(score.extrapolated_percent, 10.0);
+  EXPECT_GT(score.extrapolated_error_percent, score.extrapolated_percent);
+  EXPECT_THAT(r.notes, Contains(HasSubstr("lie outside what it was learned from")));
+}
+
 TEST(Compare, MeasuredFlowIsComparedWithTheSpeed) {
   Log log = arm_log();
   const Eigen::VectorXd u = channel(log, "u_arm").values;

@@ -232,7 +232,7 @@ TEST(Fit, SamplesThatRepeatEachOtherAreThinned) {
   const FitResult r = fit(arm_machine(), {log});
   ASSERT_EQ(r.processes.size(), 2u);
   EXPECT_GT(r.processes[0].autocorrelation, 5.0);
-  EXPECT_GT(r.processes[0].step, 3);
+  EXPECT_GE(r.processes[0].step, 3) << "at most so that 400 samples remain";
   EXPECT_EQ(r.processes[0].report.given, r.model.cylinders[0].extend.parameters().data_count);
   EXPECT_LT(r.processes[0].report.given, r.processes[0].offered);
 }
