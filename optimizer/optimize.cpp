@@ -174,6 +174,7 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
       start.seed = name(i);
       start.message = child.error;
     }
+    start.duration = duration;
     for (std::size_t k = 0; k < result.starts.size() && start.same_as < 0; ++k) {
       if (same_motion(problem, start.motion, result.starts[k].motion))
         start.same_as = static_cast<int>(k);

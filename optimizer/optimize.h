@@ -26,7 +26,7 @@ struct SeedMotion {
 struct OptimizeOptions {
   int intervals = 100;
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the one before.
-  std::vector<Smoothing> schedule = {{20e-3, 10e5}, {6e-3, 3e5}};
+  std::vector<Smoothing> schedule = {{20e-3, 10e5}};
   /// Iterations a smooth stage may take: its motion is a start for the modes, not the answer.
   int smooth_iterations = 150;
   int sequential_starts = 6;  ///< one-by-one motions tried besides the seeds, the cheapest guesses
@@ -62,6 +62,7 @@ struct StartResult {
   NlpStatus status = NlpStatus::kFailed;
   std::string message;
   Trajectory motion;           ///< empty when there is none
+  double duration = 0.0;       ///< [s] it was solved for
   double energy_exact = 0.0;   ///< [J]
   double energy_smooth = 0.0;  ///< [J] of the last solve's own law
   double excess = 0.0;         ///< worst relative overshoot of a limit between knots

@@ -29,12 +29,7 @@ class Start {
 
   StartResult run(const ModeCandidate& candidate) {
     result_.seed = candidate.name;
-    Smoothing exact = options_.schedule.back();
-    exact.pressure = options_.pressure_in_modes;
-    const NlpResult solved = solve(candidate.guess, exact, candidate.modes, options_.tolerance);
-    result_.status = solved.status;
-    result_.message = solved.message;
-    if (usable(solved)) keep_limits(transcription_->trajectory(solved.x), exact, candidate.modes);
+    hold(candidate.modes, candidate.guess);
     return result_;
   }
 
@@ -45,25 +40,23 @@ class Start {
         worst_excess(check_limits(model_, problem_, timed, options_.refine)) <= 1e-3;
     if (result_.seed_feasible)
       result_.seed_energy = exact_energy(model_, timed, problem_.payload, options_.refine).total;
+    // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
+    if (options_.modes) hold_modes(resampled(timed, times_));
     Trajectory motion = timed;
     for (std::size_t stage = 0; stage < options_.schedule.size(); ++stage) {
       const bool last = stage + 1 == options_.schedule.size();
+      const bool rough = options_.modes || !last;
       const NlpResult solved =
-          solve(motion, options_.schedule[stage], ModeTable(), last ? options_.tolerance : 1e-3);
-      result_.status = solved.status;
-      result_.message = solved.message;
+          solve(motion, options_.schedule[stage], ModeTable(), rough ? 1e-3 : options_.tolerance);
+      note_status(solved);
       if (solved.status == NlpStatus::kInterrupted) return result_;
-      if (!usable(solved)) {
-        if (stage > 0) break;  // the coarser motion is a good enough start for the modes
-        if (solved.max_violation_at.size()) {
-          result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
-        }
-        return result_;
-      }
+      if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
       motion = transcription_->trajectory(solved.x);
+      if (options_.modes || last) {
+        keep_limits(motion, options_.schedule[stage], ModeTable(), !options_.modes);
+      }
+      if (options_.modes) hold_modes(motion);
     }
-    keep_limits(motion, options_.schedule.back(), ModeTable());
-    if (options_.modes) finish_with_modes();
     return result_;
   }
 
@@ -183,9 +176,10 @@ class Start {
     return any;
   }
 
-  /// Solves again with limits drawn in until they hold between knots, and keeps the outcome if it is better
-  /// than what there is.
-  void keep_limits(Trajectory motion, const Smoothing& smoothing, const ModeTable& modes) {
+  /// Keeps a motion if it is better than what there is; while it breaks limits between knots, solves again with
+  /// those drawn in.
+  void keep_limits(Trajectory motion, const Smoothing& smoothing, const ModeTable& modes,
+                   bool solve_again = true) {
     for (int attempt = 0;; ++attempt) {
       const std::vector<LimitCheck> checks =
           check_limits(model_, problem_, motion, options_.refine);
@@ -204,7 +198,7 @@ class Start {
                                 problem_energy_weight();
         result_.modes_held = modes.rows() > 0;
       }
-      if (attempt == options_.tightenings || !tighten(checks)) return;
+      if (!solve_again || attempt == options_.tightenings || !tighten(checks)) return;
       ++tightenings_used_;
       const NlpResult solved = solve(motion, smoothing, modes, options_.tolerance);
       if (!usable(solved)) return;
@@ -216,11 +210,26 @@ class Start {
     return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
   }
 
-  void finish_with_modes() {
-    const ModeTable modes = modes_of(model_, problem_, result_.motion, options_.mode_options);
-    Smoothing exact = options_.schedule.back();
+  /// The outcome reported is that of the solve behind the motion, or of the last one while there is none.
+  void note_status(const NlpResult& solved) {
+    if (result_.motion.size() > 1 && result_.excess <= options_.limit_tolerance) return;
+    result_.status = solved.status;
+    result_.message = solved.message;
+    if (!solved.max_violation_at.empty()) {
+      result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
+    }
+  }
+
+  /// Holds the modes a motion shows and makes the best of them; the start's motion is the best of all.
+  void hold_modes(const Trajectory& shown) {
+    hold(modes_of(model_, problem_, shown, options_.mode_options), shown);
+  }
+
+  void hold(const ModeTable& modes, const Trajectory& from) {
+    Smoothing exact = options_.schedule.empty() ? Smoothing{} : options_.schedule.back();
     exact.pressure = options_.pressure_in_modes;
-    const NlpResult solved = solve(result_.motion, exact, modes, options_.tolerance);
+    const NlpResult solved = solve(from, exact, modes, options_.tolerance);
+    note_status(solved);
     if (usable(solved)) keep_limits(transcription_->trajectory(solved.x), exact, modes);
   }
 

@@ -229,6 +229,7 @@ void add_tables(Page& page, const OptimizeResult& result) {
   starts.title = "Starts";
   starts.columns = {{"from"},
                     {"outcome"},
+                    {"duration", "s", 4},
                     {"start itself", "kJ"},
                     {"optimised", "kJ"},
                     {"iterations", "", 5},
@@ -244,7 +245,7 @@ void add_tables(Page& page, const OptimizeResult& result) {
     if (s.same_as >= 0)
       note = "same motion as " + result.starts[static_cast<std::size_t>(s.same_as)].seed;
     starts.rows.push_back({s.seed, std::string(usable ? "kept all limits" : to_string(s.status)),
-                           s.seed_feasible ? s.seed_energy / 1e3 : std::nan(""),
+                           s.duration, s.seed_feasible ? s.seed_energy / 1e3 : std::nan(""),
                            usable ? s.energy_exact / 1e3 : std::nan(""),
                            static_cast<double>(s.iterations), s.solve_s, note});
   }

@@ -24,6 +24,7 @@ nlohmann::json start_json(const StartResult& s) {
   nlohmann::json json = {{"seed", s.seed},
                          {"status", to_string(s.status)},
                          {"message", s.message},
+                         {"duration_s", s.duration},
                          {"energy_J", s.energy_smooth},
                          {"energy_exact_J", s.energy_exact},
                          {"constraint_violation", s.excess},

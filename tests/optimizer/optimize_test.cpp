@@ -1,0 +1,290 @@
+// The whole optimisation on machines whose pressures are known: cheaper than where it started, limits kept
+// between knots, and honest when it cannot be done.
+#include "optimizer/optimize.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "optimizer/child_processes.h"
+#include "optimizer/motion_table.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+#include "tests/optimizer/synthetic_model.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+using ::testing::HasSubstr;
+
+struct Case {
+  MotionProblem problem;
+  CraneModel model;
+  std::vector<SeedMotion> seeds;
+};
+
+/// Straight joint lines to the end posture nearest to the start and to one with the first joint at rest.
+Case lift_case() {
+  Case c;
+  c.problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
+  c.model = testing::synthetic_model(c.problem.machine);
+  const Eigen::Vector3d goal = std::get<TipGoal>(c.problem.goal).tip;
+  for (const bool still : {false, true}) {
+    VectorXd end = c.problem.start;
+    std::vector<bool> free(3, true);
+    free[0] = !still;
+    if (!solve_end_posture(c.problem.machine, c.problem.limits, goal, free, end)) continue;
+    Eigen::MatrixXd path(2, 3);
+    path.row(0) = c.problem.start.transpose();
+    path.row(1) = end.transpose();
+    const TimedMotion timed = time_parametrise(c.problem, path, 0.0);
+    c.seeds.push_back({still ? "line, boom at rest" : "line", timed.motion, timed.shortest, true});
+  }
+  return c;
+}
+
+OptimizeOptions quick() {
+  OptimizeOptions options;
+  options.intervals = 60;
+  options.processes = 1;
+  return options;
+}
+
+TEST(Optimize, UsesLessExactEnergyThanSeedAndStraightLineAndKeepsAllLimits) {
+  const Case c = lift_case();
+  ASSERT_FALSE(c.seeds.empty());
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+  ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
+  ASSERT_GT(r.straight_line_energy, 0.0);
+  EXPECT_LT(r.energy.total, r.straight_line_energy);
+  EXPECT_LT(r.energy.total, r.best_seed_energy);
+  // 16 times the knots' density, as promised, and at a density the optimiser never looked at
+  for (const int refine : {16, 37}) {
+    const std::vector<LimitCheck> checks = check_limits(c.model, c.problem, r.motion, refine);
+    EXPECT_LE(worst_excess(checks), 1e-5) << checks.front().what << " at " << checks.front().time;
+  }
+}
+
+TEST(Optimize, EnergyIsThatOfTheExactLawByASecondIntegration) {
+  const Case c = lift_case();
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+  ASSERT_EQ(r.status, OptimizeStatus::kOptimal);
+  // Simpson per interval on one-sided states: knots are nudged inside, where activity cannot change
+  Chain chain(c.model);
+  double energy = 0.0;
+  const auto power = [&](Eigen::Index k, double dt) {
+    const VectorXd q =
+        (r.motion.q.row(k) + dt * r.motion.qd.row(k) + 0.5 * dt * dt * r.motion.qdd.row(k))
+            .transpose();
+    const VectorXd qd = (r.motion.qd.row(k) + dt * r.motion.qdd.row(k)).transpose();
+    return chain.evaluate(q.data(), qd.data(), c.problem.payload).power;
+  };
+  for (Eigen::Index k = 0; k + 1 < r.motion.size(); ++k) {
+    const double h = r.motion.t[k + 1] - r.motion.t[k];
+    const int parts = 40;
+    for (int i = 0; i < parts; ++i) {
+      const double a = h * (i + 1e-6) / parts, b = h * (i + 1 - 1e-6) / parts;
+      energy += (b - a) / 6.0 * (power(k, a) + 4.0 * power(k, 0.5 * (a + b)) + power(k, b));
+    }
+  }
+  // midpoint on 16 parts: error (h/16)^2/24 of the curvature of a power that varies over whole intervals
+  EXPECT_NEAR(r.energy.total, energy, 2e-4 * energy);
+}
+
+TEST(Optimize, ReportedEnergyDoesNotDependOnTheSmoothing) {
+  const Case c = lift_case();
+  OptimizeOptions options = quick();
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, options);
+  ASSERT_EQ(r.status, OptimizeStatus::kOptimal);
+  // the same motion, asked again under other smoothing: the report never looks at it
+  const double again = exact_energy(c.model, r.motion, c.problem.payload).total;
+  EXPECT_DOUBLE_EQ(r.energy.total, again);
+  // and a creeping motion is charged in full: at 1 mm/s every cylinder still asks for its whole pressure
+  Trajectory creep = r.motion;
+  creep.t *= 200.0;
+  creep.qd /= 200.0;
+  creep.qdd /= 200.0 * 200.0;
+  const double slow = exact_energy(c.model, creep, c.problem.payload).total;
+  EXPECT_GT(slow, 0.5 * r.energy.total);
+}
+
+TEST(Optimize, TooShortATimeIsNamedWithTheLimitAndAFeasibleDuration) {
+  Case c = lift_case();
+  c.problem.duration = {2.0, 2.0};
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+  EXPECT_EQ(r.status, OptimizeStatus::kInfeasible);
+  EXPECT_THAT(r.message, HasSubstr("infeasible"));
+  EXPECT_THAT(r.message, HasSubstr("keeps all limits in"));
+}
+
+TEST(Optimize, IdlePowerShortensAFreeMotion) {
+  Case c = lift_case();
+  c.problem.duration = {0.0, std::numeric_limits<double>::infinity()};
+  OptimizeOptions options = quick();
+  options.sequential_starts = 2;
+  c.seeds.resize(1);
+  c.problem.idle_power = 200.0;
+  const OptimizeResult patient = optimize(c.model, c.problem, c.seeds, options);
+  c.problem.idle_power = 20e3;
+  const OptimizeResult hurried = optimize(c.model, c.problem, c.seeds, options);
+  ASSERT_EQ(patient.status, OptimizeStatus::kOptimal) << patient.message;
+  ASSERT_EQ(hurried.status, OptimizeStatus::kOptimal) << hurried.message;
+  EXPECT_LT(hurried.duration, patient.duration);
+  // each is no worse than the other at its own price of time, up to the search's 2 % of duration
+  EXPECT_LE(hurried.energy.total + 20e3 * hurried.duration,
+            1.02 * (patient.energy.total + 20e3 * patient.duration));
+}
+
+TEST(Optimize, AModelWithoutAPressureIsRefusedByName) {
+  Case c = lift_case();
+  c.model.cylinders[1].retract = GaussianProcess();
+  try {
+    optimize(c.model, c.problem, c.seeds, quick());
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("jib retract"));
+  }
+}
+
+TEST(Optimize, ChildProcessesGiveWhatThisProcessGives) {
+  const Case c = lift_case();
+  OptimizeOptions options = quick();
+  const OptimizeResult here = optimize(c.model, c.problem, c.seeds, options);
+  options.processes = 2;
+  const OptimizeResult there = optimize(c.model, c.problem, c.seeds, options);
+  ASSERT_EQ(here.starts.size(), there.starts.size());
+  for (std::size_t i = 0; i < here.starts.size(); ++i) {
+    EXPECT_EQ(here.starts[i].energy_exact, there.starts[i].energy_exact) << here.starts[i].seed;
+    EXPECT_EQ(here.starts[i].iterations, there.starts[i].iterations);
+  }
+}
+
+TEST(SequentialModes, NeverMoveTwoCylindersAndReachTheGoal) {
+  const Case c = lift_case();
+  const VectorXd times = VectorXd::LinSpaced(81, 0.0, 16.0);
+  std::vector<VectorXd> ends;
+  for (const SeedMotion& s : c.seeds)
+    ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+  const std::vector<ModeCandidate> candidates =
+      sequential_candidates(c.model, c.problem, times, ends, 50);
+  ASSERT_GE(candidates.size(), 2u);
+  for (const ModeCandidate& m : candidates) {
+    for (Eigen::Index k = 0; k < m.modes.rows(); ++k) {
+      EXPECT_LE((m.modes.row(k).array() != CylinderMode::kRest).count(), 1) << m.name;
+    }
+    const VectorXd end = m.guess.q.row(m.guess.size() - 1).transpose();
+    EXPECT_LT((tip_position<double>(c.problem.machine, end) - std::get<TipGoal>(c.problem.goal).tip)
+                  .norm(),
+              1e-6);
+    EXPECT_LE(exact_energy(c.model, m.guess, c.problem.payload).share_moving[2], 0.0);
+  }
+  EXPECT_LE(candidates.front().energy, candidates.back().energy);
+}
+
+TEST(Modes, CreepIsPutToRestAndMovesKeepTheirSign) {
+  Case c = lift_case();
+  Trajectory m = with_duration(c.seeds.front().motion, 16.0);
+  m.qd.col(0) *= 1e-3;  // the boom now creeps by a thousandth of its way
+  m.qdd.col(0) *= 1e-3;
+  m.q.col(0) = c.problem.start[0] + 1e-3 * (m.q.col(0).array() - c.problem.start[0]);
+  const ModeTable modes = modes_of(c.model, c.problem, m);
+  EXPECT_TRUE((modes.col(0).array() == CylinderMode::kRest).all());
+  TranscriptionBounds bounds;
+  const Eigen::Index n = modes.rows();
+  bounds.qd_lower = Eigen::MatrixXd::Constant(n + 1, 3, -1.0);
+  bounds.qd_upper = Eigen::MatrixXd::Constant(n + 1, 3, 1.0);
+  bounds.qdd_lower = Eigen::MatrixXd::Constant(n, 3, -1.0);
+  bounds.qdd_upper = Eigen::MatrixXd::Constant(n, 3, 1.0);
+  apply_modes(c.model, modes, bounds);
+  EXPECT_TRUE((bounds.qd_lower.col(0).array() == 0.0).all());
+  EXPECT_TRUE((bounds.qd_upper.col(0).array() == 0.0).all());
+  const double way = m.q(n, 1) - m.q(0, 1);
+  const auto& held = way > 0.0 ? bounds.qd_lower : bounds.qd_upper;
+  EXPECT_TRUE((held.col(1).array() == 0.0).any());
+}
+
+TEST(ExactEnergy, OneHorizontalCylinderByHand) {
+  // p = 50 bar whatever the flow, margin 10 bar, no load: E = 60 bar * A * way; all but 50 bar of it throttled
+  const Machine machine = parse_machine(
+      "name: slide\njoints:\n  - {name: x, type: prismatic, parent: base, axis: [1, 0, 0], "
+      "position: [0, 2], velocity: [-1, 1], "
+      "acceleration: [-1, 1]}\ntip: {joint: x, xyz: [0, 0, 0]}\nlinks:\n  - {name: sled, joint: x, "
+      "mass: 100, cog: [0, 0, 0], inertia: 0}\n"
+      "cylinders:\n  - {name: x, joint: x, bore: 0.1, rod: 0.05, linkage: {type: direct}}\n"
+      "pumps:\n  - {name: main, feeds: [x], max_flow_lpm: 600, max_pressure_bar: 300, standby_bar: "
+      "20}\nvalves: []\n",
+      "slide", ".");
+  CraneModel model = CraneModel::untrained(machine);
+  GpParameters p;
+  p.mean_constant = 50e5;
+  p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
+  model.cylinders[0].extend = model.cylinders[0].retract = GaussianProcess(p);
+  model.cylinders[0].margin = 10e5;
+  Trajectory m;
+  m.t = (VectorXd(3) << 0.0, 1.0, 2.0).finished();
+  m.q = (Eigen::MatrixXd(3, 1) << 0.0, 0.25, 0.5).finished();
+  m.qd = (Eigen::MatrixXd(3, 1) << 0.0, 0.5, 0.0).finished();
+  m.qdd = (Eigen::MatrixXd(3, 1) << 0.5, -0.5, -0.5).finished();
+  const MotionEnergy e = exact_energy(model, m, 0.0);
+  const double volume = machine.cylinders[0].area_piston() * 0.5;
+  EXPECT_NEAR(e.total, 60e5 * volume, 1e-9 * e.total);  // linear power: the midpoint rule is exact
+  EXPECT_NEAR(e.throttling[0], 10e5 * volume, 1e-9 * e.total);
+  EXPECT_NEAR(e.useful[0] + e.throttling[0], e.total, 1e-9 * e.total);
+  EXPECT_NEAR(e.share_moving[1], 1.0, 1e-12);
+}
+
+TEST(MotionTable, RoundTripAndBrokenFiles) {
+  const Case c = lift_case();
+  const Trajectory m = with_duration(c.seeds.front().motion, 16.0);
+  const std::string path = ::testing::TempDir() + "motion.csv";
+  write_file_atomically(path, motion_csv(c.model, m, c.problem.payload));
+  const Trajectory back = load_motion(path, c.problem.machine);
+  EXPECT_LT((back.q - m.q).cwiseAbs().maxCoeff(), 1e-10);  // twelve digits
+  EXPECT_LT((back.qd - m.qd).cwiseAbs().maxCoeff(), 1e-10);
+  const auto message = [&](const std::string& text) {
+    write_file_atomically(path, text);
+    try {
+      load_motion(path, c.problem.machine);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_THAT(message("t_s\n"), HasSubstr("a header and at least two rows"));
+  EXPECT_THAT(message("t_s,q_bom_rad\n0,1\n1,1\n"),
+              HasSubstr("column is missing; did you mean \"q_bom_rad\"?"));
+  std::string good = motion_csv(c.model, m, 0.0);
+  const std::size_t second = good.find('\n', good.find('\n') + 1) + 1;
+  std::string wrong = good;
+  wrong.replace(second, 3, "abc");
+  EXPECT_THAT(message(wrong), HasSubstr(":3: t_s: got \"abc"));
+  wrong = good.substr(0, second) + good.substr(good.find('\n') + 1);
+  EXPECT_THAT(message(wrong), HasSubstr("time must increase"));
+}
+
+TEST(ChildProcesses, ResultsExceptionsAndCrashesComeBack) {
+  const auto work = [](int i) -> std::string {
+    if (i == 1) throw std::runtime_error("no luck");
+    if (i == 2) ::_exit(3);
+    return std::string(static_cast<std::size_t>(i) * 100000 + 1,
+                       'x');  // larger than a pipe's buffer
+  };
+  int calls = 0;
+  const std::vector<ChildResult> r = run_in_children(4, 2, work, [&](int, int) { ++calls; });
+  EXPECT_TRUE(r[0].ok);
+  EXPECT_EQ(r[0].bytes, "x");
+  EXPECT_EQ(r[1].error, "no luck");
+  EXPECT_FALSE(r[2].ok);
+  EXPECT_EQ(r[2].error, "the solve ended without a result");
+  EXPECT_EQ(r[3].bytes.size(), 300001u);
+  EXPECT_EQ(calls, 4);
+}
+
+}  // namespace
+}  // namespace sparflow
