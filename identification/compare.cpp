@@ -256,6 +256,7 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
 CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
                       const CompareOptions& options) {
   std::vector<MachineSignals> signals;
+  signals.reserve(logs.size());
   for (const Log& log : logs) signals.push_back(make_signals(model.machine, log, options.signals));
   return compare_signals(model, std::move(signals), {}, options);
 }

@@ -29,6 +29,7 @@ FitPass learn(const Machine& machine, const TrainingData& data, const FitOptions
 std::vector<MachineSignals> all_signals(const Machine& machine, const std::vector<Log>& logs,
                                         const SignalOptions& options) {
   std::vector<MachineSignals> out;
+  out.reserve(logs.size());
   for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
   return out;
 }
@@ -36,6 +37,7 @@ std::vector<MachineSignals> all_signals(const Machine& machine, const std::vecto
 /// Usable samples away from the runs' ends, where one-sided windows make poor speeds.
 std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   std::vector<Mask> out;
+  out.reserve(signals.size());
   for (const MachineSignals& s : signals) out.push_back(s.usable && !s.edge);
   return out;
 }

@@ -229,6 +229,7 @@ template <class Part>
 std::vector<Cursor> matched(const Cursor& root, const std::string& key,
                             const std::vector<Part>& parts) {
   std::vector<std::string> names;
+  names.reserve(parts.size());
   for (const Part& part : parts) names.push_back(part.name);
   const std::string expected =
       fmt::format("a list, one element for each of the machine's {}: {}", key, listed(names));
@@ -236,6 +237,7 @@ std::vector<Cursor> matched(const Cursor& root, const std::string& key,
   const std::vector<Cursor> elements = list.list(expected);
   if (elements.size() != parts.size()) list.fail_expected(expected);
   std::vector<Cursor> named;
+  named.reserve(parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Cursor name = elements[i].at("name", fmt::format("\"{}\"", names[i]));
     if (name.text("a name") != names[i]) {
