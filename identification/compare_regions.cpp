@@ -158,9 +158,11 @@ std::string describe(const WorstRegion& region, const ErrorGroup& group) {
   for (std::size_t i = 0; i < region.where.size(); ++i) {
     text += (i == 0 ? " with " : " and ") + interval(region.where[i]);
   }
-  return text + fmt::format(": {:.0f} % of {} in {:.0f} % of the samples (RMSE {:.3g} {})",
+  const std::string rmse = region.rmse >= 1000.0 ? fmt::format("{:.0f}", region.rmse)
+                                                 : fmt::format("{:.3g}", region.rmse);
+  return text + fmt::format(": {:.0f} % of {} in {:.0f} % of the samples (RMSE {} {})",
                             100.0 * region.share_of_error, group.pool_words,
-                            100.0 * region.share_of_samples, region.rmse, region.unit);
+                            100.0 * region.share_of_samples, rmse, region.unit);
 }
 
 WorstRegion region_of(const ErrorGroup& group, const Candidate& c, const Pool& pool) {

@@ -188,15 +188,12 @@ json chart_json(const ScatterChart& chart, Index most_points) {
   out["shown"] = shown;
   out["of"] = total;
   if (chart.trend) {
-    Eigen::VectorXd x(total), y(total);
-    Index at = 0;
-    for (const ScatterGroup& group : chart.groups) {
-      x.segment(at, group.x.size()) = group.x;
-      y.segment(at, group.y.size()) = group.y;
-      at += group.x.size();
+    out["trends"] = json::array();
+    for (const ScatterGroup& group : chart.groups) {  // before decimation: of all points
+      const BinnedMedian trend = binned_median(group.x, group.y, 24);
+      out["trends"].push_back(
+          {{"x", numbers(trend.x, kValueDigits)}, {"y", numbers(trend.y, kValueDigits)}});
     }
-    const BinnedMedian trend = binned_median(x, y, 24);  // before decimation: of all points
-    out["trend"] = {{"x", numbers(trend.x, kValueDigits)}, {"y", numbers(trend.y, kValueDigits)}};
   }
   return out;
 }

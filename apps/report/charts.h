@@ -68,7 +68,7 @@ struct ScatterGroup {
 struct ScatterChart : Figure {
   Quantity x_axis, y_axis;
   std::vector<ScatterGroup> groups;
-  bool trend = false;     ///< a line through the median of y in 24 bins of x, all groups together
+  bool trend = false;     ///< of each group, a line through the median of y in 24 bins of x
   bool diagonal = false;  ///< the line y = x, for predicted against measured
 };
 

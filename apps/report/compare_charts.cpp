@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <limits>
-#include <map>
-#include <numeric>
 
 #include "apps/report/working_area.h"
 
@@ -15,11 +13,11 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 constexpr std::size_t kMostCurveCharts = 40;  // more than anybody scrolls through
-constexpr std::size_t kSignalsPerQuantity = 2;
-constexpr std::size_t kSignalsOfTheWorst = 6;
+const char* const kCurvesExplained =
+    "Only samples that count in the scores are drawn. Bands: \u00B12 standard deviations of one "
+    "measurement. Shaded: "
+    "the regions named above. Drag to zoom; all charts of a log follow.";
 
 bool compared(const ComparedSeries& s) { return s.measured.array().isFinite().any(); }
 
@@ -68,11 +66,13 @@ LineChart curve_chart(const Machine& machine, const CompareResult& result,
                       const ComparedQuantity& quantity, const LogComparison& log,
                       const ComparedSeries& series, int color) {
   LineChart chart;
-  chart.title = quantity.words;
-  if (result.logs.size() > 1) chart.title += " \u2013 " + log.signals.file;
+  chart.title = capitalised(quantity.words);
   chart.width = FigureWidth::kHalf;
   chart.group = log.signals.file;
-  chart.y_axis = {quantity.words, quantity.unit.name};
+  chart.y_axis = {quantity.stage == "force"            ? "force"
+                  : quantity.stage.starts_with("flow") ? "flow"
+                                                       : "pressure",
+                  quantity.unit.name};
   chart.x = log.signals.time;
   const double scale = 1.0 / quantity.unit.si;
   LineSeries measured, predicted;
@@ -97,135 +97,18 @@ LineChart curve_chart(const Machine& machine, const CompareResult& result,
   return chart;
 }
 
-/// Residuals of a quantity over all logs, one row a compared sample, with every signal any log offers.
-struct ResidualTable {
-  VectorXd residual;        // in the quantity's unit
-  std::vector<int> regime;  // index into names
-  std::vector<std::string> names;
-  std::vector<RegimeSignal> signals;  // values in their unit
-};
-
-ResidualTable residual_table(const Machine& machine, const ComparedQuantity& quantity) {
-  ResidualTable table;
-  std::vector<double> residual;
-  std::vector<std::vector<double>> columns;
-  std::map<std::string, std::size_t> place;
-  for (const auto& [log, series] : quantity.logs) {
-    std::vector<Index> rows;
-    for (Index k = 0; k < series->measured.size(); ++k) {
-      if (!std::isfinite(series->measured[k])) continue;
-      rows.push_back(k);
-      residual.push_back((series->predicted[k] - series->measured[k]) / quantity.unit.si);
-      table.regime.push_back(series->regime[k]);
-    }
-    table.names = series->regimes;
-    for (const RegimeSignal& signal : regime_signals(machine, log->signals, *series)) {
-      const auto [at, is_new] = place.try_emplace(signal.key, columns.size());
-      if (is_new) {
-        table.signals.push_back({signal.key, signal.words, signal.unit, 1.0, {}});
-        columns.emplace_back();
-      }
-      std::vector<double>& column = columns[at->second];
-      column.resize(residual.size() - rows.size(), kNaN);
-      for (const Index k : rows) column.push_back(signal.values[k] / signal.scale);
-    }
-  }
-  table.residual = Eigen::Map<VectorXd>(residual.data(), static_cast<Index>(residual.size()));
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    columns[c].resize(residual.size(), kNaN);
-    table.signals[c].values =
-        Eigen::Map<VectorXd>(columns[c].data(), static_cast<Index>(columns[c].size()));
-  }
-  return table;
-}
-
-std::string regime_words(const std::string& stage, const std::string& regime) {
-  if (stage != "pump") return regime == "extend" ? "extending" : "retracting";
-  return regime == "standby" || regime == "constant" ? regime : "led by " + regime;
-}
-
-ScatterChart scatter(const ComparedQuantity& quantity, const ResidualTable& table,
-                     const RegimeSignal& signal, double share) {
-  ScatterChart chart;
-  chart.title = fmt::format("Error in {} against {}", quantity.words, signal.words);
-  chart.note =
-      fmt::format("{} explains {:.0f} % of the error's variance.", signal.words, 100.0 * share);
-  chart.note[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(chart.note[0])));
-  chart.width = FigureWidth::kHalf;
-  chart.x_axis = {signal.words, signal.unit};
-  chart.y_axis = {"predicted \u2212 measured", quantity.unit.name};
-  chart.trend = true;
-  for (std::size_t r = 0; r < table.names.size(); ++r) {
-    std::vector<double> x, y;
-    for (Index k = 0; k < table.residual.size(); ++k) {
-      if (table.regime[static_cast<std::size_t>(k)] != static_cast<int>(r)) continue;
-      x.push_back(signal.values[k]);
-      y.push_back(table.residual[k]);
-    }
-    if (x.empty()) continue;
-    const auto n = static_cast<Index>(x.size());
-    chart.groups.push_back({regime_words(quantity.stage, table.names[r]),
-                            Eigen::Map<VectorXd>(x.data(), n), Eigen::Map<VectorXd>(y.data(), n)});
-  }
-  return chart;
-}
-
-/// Whether the worst region is of this quantity, or, where there is none, its fit the poorest.
-bool is_worst(const CompareResult& result, const ComparedQuantity& quantity) {
-  if (!result.worst.empty()) {
-    return result.worst.front().stage == quantity.stage && result.worst.front().at == quantity.at;
-  }
-  const StageScore* poorest = nullptr;
-  for (const StageScore& s : result.scores) {
-    if (std::isfinite(s.fit_percent) &&
-        (poorest == nullptr || s.fit_percent < poorest->fit_percent)) {
-      poorest = &s;
-    }
-  }
-  return poorest != nullptr && poorest->stage == quantity.stage && poorest->at == quantity.at;
-}
-
 }  // namespace
+
+std::string capitalised(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
 
 std::string quantity_words(const std::string& stage, const std::string& at) {
   if (stage == "pump") return "pressure of pump " + at;
   if (stage == "pressure") return "working pressure of " + at;
   if (stage == "flow_sensor") return "flow of " + at + " at its sensor";
   return stage + " of " + at;
-}
-
-double share_explained(const VectorXd& x, const VectorXd& y) {
-  std::vector<Index> order;
-  for (Index k = 0; k < x.size(); ++k) {
-    if (std::isfinite(x[k]) && std::isfinite(y[k])) order.push_back(k);
-  }
-  const auto n = static_cast<Index>(order.size());
-  if (n < 40) return 0.0;
-  std::sort(order.begin(), order.end(),
-            [&](Index a, Index b) { return x[a] != x[b] ? x[a] < x[b] : a < b; });
-  const Index bins = std::min<Index>(24, n / 20);
-  double total = 0.0, sum = 0.0, between = 0.0;
-  for (const Index k : order) sum += y[k];
-  const double mean = sum / static_cast<double>(n);
-  for (const Index k : order) total += (y[k] - mean) * (y[k] - mean);
-  Index used = 0;
-  for (Index from = 0; from < n;) {
-    // equal values stay in one bin: how they were sorted must not matter
-    Index to = std::min(n, from + (n + bins - 1) / bins);
-    while (to < n &&
-           x[order[static_cast<std::size_t>(to)]] == x[order[static_cast<std::size_t>(to - 1)]]) {
-      ++to;
-    }
-    double part = 0.0;
-    for (Index i = from; i < to; ++i) part += y[order[static_cast<std::size_t>(i)]] - mean;
-    between += part * part / static_cast<double>(to - from);
-    ++used;
-    from = to;
-  }
-  if (!(total > 0.0) || used < 2) return 0.0;
-  const double within = (total - between) / total;
-  return std::clamp(1.0 - within * static_cast<double>(n - 1) / static_cast<double>(n - used), 0.0,
-                    1.0);
 }
 
 std::vector<ComparedQuantity> compared_quantities(const CompareResult& result) {
@@ -256,10 +139,12 @@ std::vector<ComparedQuantity> compared_quantities(const CompareResult& result) {
   return all;
 }
 
-void add_compared_curves(Page& page, const Machine& machine, const CompareResult& result) {
+void add_compared_curves(Page& page, const Machine& machine, const CompareResult& result,
+                         const std::string& heading_prefix) {
   const std::vector<ComparedQuantity> quantities = compared_quantities(result);
   std::size_t drawn = 0, left_out = 0;
   for (const LogComparison& log : result.logs) {
+    bool heading = false;
     for (std::size_t i = 0; i < quantities.size(); ++i) {
       for (const auto& [of, series] : quantities[i].logs) {
         if (of != &log) continue;
@@ -267,41 +152,28 @@ void add_compared_curves(Page& page, const Machine& machine, const CompareResult
           ++left_out;
           continue;
         }
+        if (!heading) {
+          page.section(heading_prefix + "Curves of " + log.signals.file);
+          if (drawn == 0) page.paragraph(kCurvesExplained);
+          heading = true;
+        }
         ++drawn;
         page.plot(curve_chart(machine, result, quantities[i], log, *series, static_cast<int>(i)));
       }
     }
   }
   if (left_out > 0) {
-    page.paragraph(
-        fmt::format("{} more charts are left out to keep the page small: compare fewer logs at a "
-                    "time to see them.",
-                    left_out));
+    page.paragraph(fmt::format(
+        "{} more charts are left out to keep the page small: compare fewer logs at a time to "
+        "see them.",
+        left_out));
   }
 }
 
-void add_residuals(Page& page, const Machine& machine, const CompareResult& result) {
-  std::vector<ComparedQuantity> quantities = compared_quantities(result);
-  std::stable_partition(quantities.begin(), quantities.end(),
-                        [&](const ComparedQuantity& q) { return is_worst(result, q); });
-  for (const ComparedQuantity& quantity : quantities) {
-    const ResidualTable table = residual_table(machine, quantity);
-    std::vector<std::pair<double, const RegimeSignal*>> shares;
-    for (const RegimeSignal& signal : table.signals) {
-      shares.emplace_back(share_explained(signal.values, table.residual), &signal);
-    }
-    std::stable_sort(shares.begin(), shares.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
-    const std::size_t most = is_worst(result, quantity) ? kSignalsOfTheWorst : kSignalsPerQuantity;
-    for (std::size_t i = 0; i < std::min(most, shares.size()); ++i) {
-      page.plot(scatter(quantity, table, *shares[i].second, shares[i].first));
-    }
-  }
-}
-
-int add_working_area(Page& page, const Machine& machine, const CompareResult& result) {
+void add_working_area(Page& page, const Machine& machine, const CompareResult& result,
+                      const std::string& heading_prefix) {
   constexpr double kFlat = 0.02;  // [m] an area less high or wide is a line
-  int added = 0;
+  bool heading = false;
   for (const ComparedQuantity& quantity : compared_quantities(result)) {
     std::vector<Eigen::Vector2d> tip;
     std::vector<double> residual;
@@ -335,18 +207,24 @@ int add_working_area(Page& page, const Machine& machine, const CompareResult& re
           return (a - worst).squaredNorm() < (b - worst).squaredNorm();
         });
     map.crane = drawing_frame(machine, pose[static_cast<std::size_t>(nearest - tip.begin())]).parts;
-    map.title = fmt::format("Error in {} by position of the tip", quantity.words);
-    map.note = fmt::format("Root mean square; the crane stands where it is largest, {:.3g} {}.",
-                           map.values(row, column), quantity.unit.name);
+    map.title = capitalised(quantity.words);
+    map.note = fmt::format("Largest: {} {}.", display_number(map.values(row, column), 3),
+                           quantity.unit.name);
     map.width = FigureWidth::kHalf;
     map.height = 400;
     map.x_axis = {plane.horizontal_name, "m"};
     map.z_axis = {plane.vertical_name, "m"};
     map.value = {"error (RMS)", quantity.unit.name};
+    if (!heading) {
+      page.section(heading_prefix + "Error over the working area");
+      page.paragraph(
+          "Root mean square of predicted \u2212 measured by position of the tip. The crane stands "
+          "where the error is "
+          "largest.");
+      heading = true;
+    }
     page.plot(std::move(map));
-    ++added;
   }
-  return added;
 }
 
 }  // namespace sparflow

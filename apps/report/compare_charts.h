@@ -21,19 +21,24 @@ struct ComparedQuantity {
 /// In the order of the stages, those without a single compared sample left out. The result must outlive them.
 std::vector<ComparedQuantity> compared_quantities(const CompareResult& result);
 
+/// With a capital letter, for titles.
+std::string capitalised(std::string text);
+
 /// "force of boom", "working pressure of boom", "pressure of pump main"
 std::string quantity_words(const std::string& stage, const std::string& at);
 
-/// Measured and predicted over time, one chart a log and quantity; the worst regions' times are shaded.
-void add_compared_curves(Page& page, const Machine& machine, const CompareResult& result);
+/// Measured and predicted over time, a section a log; the worst regions' times are shaded.
+void add_compared_curves(Page& page, const Machine& machine, const CompareResult& result,
+                         const std::string& heading_prefix);
 
-/// Residual against the signals that explain most of it.
-void add_residuals(Page& page, const Machine& machine, const CompareResult& result);
+/// Residual against the signals that explain most of it, the quantity (stage, at) first and with more of them.
+void add_residuals(Page& page, const Machine& machine, const CompareResult& result,
+                   const std::string& stage, const std::string& at);
 
-/// RMS residual over the positions of the tip, the crane drawn where it is largest. Nothing where the tip
+/// A section of RMS residuals over the tip's positions, the crane drawn where they are largest. Nothing where it
 /// moves along a line only.
-/// @return number of maps added
-int add_working_area(Page& page, const Machine& machine, const CompareResult& result);
+void add_working_area(Page& page, const Machine& machine, const CompareResult& result,
+                      const std::string& heading_prefix);
 
 /// Share of the variance of `y` that the means of equally filled bins of `x` explain, corrected for the
 /// number of bins (0 expected from noise; Ezekiel's adjusted R^2), 0..1. Samples with a NaN are left out; 0

@@ -7,50 +7,11 @@
 #include <limits>
 
 #include "apps/report/compare_charts.h"
+#include "apps/report/score_judgement.h"
 #include "models/model_file.h"
 
 namespace sparflow {
 namespace {
-
-// What the colours of scores mean; said below the table of scores.
-constexpr double kGoodFit = 85.0, kPoorFit = 50.0;            // [%]
-constexpr double kGoodRelative = 0.05, kPoorRelative = 0.15;  // RMSE over RMS of the measured
-constexpr double kGoodEnergy = 0.02, kPoorEnergy = 0.05;      // relative error
-const char* const kToneRule =
-    "Good: fit at least 85 %, or an RMSE of at most 5 % of the measured RMS (for quantities that "
-    "hardly vary, like "
-    "the pressure of a constant supply). Poor: fit below 50 % and more than 15 % of the measured "
-    "RMS.";
-
-double measured_rms(const CompareResult& result, const StageScore& score) {
-  double sum = 0.0, n = 0.0;
-  for (const LogComparison& log : result.logs) {
-    for (const ComparedSeries& s : log.series) {
-      if (s.stage != score.stage || s.at != score.at) continue;
-      const auto there = s.measured.array().isFinite();
-      sum += there.select(s.measured.array().square(), 0.0).sum();
-      n += static_cast<double>(there.count());
-    }
-  }
-  return std::sqrt(sum / n);
-}
-
-Tone tone_of(const CompareResult& result, const StageScore& s) {
-  const double relative = s.rmse / measured_rms(result, s);
-  if (s.fit_percent >= kGoodFit || relative <= kGoodRelative) return Tone::kGood;
-  if (!(s.fit_percent >= kPoorFit) && relative > kPoorRelative) return Tone::kBad;
-  return Tone::kWarning;
-}
-
-Tone tone_of(const EnergyScore& e) {
-  const double error = std::abs(e.relative_error);
-  if (!std::isfinite(error)) return Tone::kNeutral;
-  return error <= kGoodEnergy ? Tone::kGood : error <= kPoorEnergy ? Tone::kWarning : Tone::kBad;
-}
-
-const char* tone_word(Tone tone) {
-  return tone == Tone::kGood ? "good" : tone == Tone::kBad ? "poor" : "fair";
-}
 
 /// RMSE in the unit it reads best in: {"20.3", "kN"}.
 std::pair<std::string, std::string> error_text(const StageScore& s) {
@@ -72,76 +33,59 @@ std::string stage_words(const std::string& stage) {
   return stage;
 }
 
-/// Worse first: tone, then what of the variation stays unexplained.
-bool worse(const CompareResult& result, const StageScore& a, const StageScore& b) {
-  const Tone ta = tone_of(result, a), tb = tone_of(result, b);
-  if (ta != tb) return static_cast<int>(ta) > static_cast<int>(tb);
-  const auto open = [](const StageScore& s) {
-    return std::isfinite(s.fit_percent) ? 100.0 - s.fit_percent : 0.0;
-  };
-  return open(a) > open(b);
+/// Rounded to a step, so that what is nothing reads as 0.
+double rounded(double value, double step) { return std::round(value / step) * step; }
+
+std::string signed_percent(double share) {
+  const double percent = rounded(100.0 * share, 0.01);
+  return percent == 0.0 ? "0.00" : fmt::format("{:+.2f}", percent);
 }
 
-/// The worst score of each stage, in the order of the stages.
-std::vector<StageScore> worst_of_stages(const CompareResult& result) {
-  std::vector<StageScore> out;
-  for (const StageScore& s : result.scores) {
-    auto at = std::find_if(out.begin(), out.end(),
-                           [&](const StageScore& o) { return o.stage == s.stage; });
-    if (at == out.end()) {
-      out.push_back(s);
-    } else if (worse(result, s, *at)) {
-      *at = s;
-    }
-  }
-  return out;
-}
-
-void add_tiles(Page& page, const CompareResult& result) {
+void add_tiles(Page& page, const CompareResult& result, const std::vector<JudgedScore>& judged) {
   std::vector<Tile> tiles;
-  for (const StageScore& s : worst_of_stages(result)) {
+  for (const JudgedScore& j : worst_of_stages(judged)) {
+    const StageScore& s = j.score;
     const auto [value, unit] = error_text(s);
     const auto of_stage = std::count_if(result.scores.begin(), result.scores.end(),
                                         [&](const StageScore& o) { return o.stage == s.stage; });
     std::string note = of_stage > 1 ? "worst: " + place_words(s) : place_words(s);
-    if (std::isfinite(s.fit_percent)) note += fmt::format(", fit {:.0f} %", s.fit_percent);
-    tiles.push_back({value, unit, stage_words(s.stage) + ", RMS error", note, tone_of(result, s)});
+    if (s.fit_percent >= 0.05) note += fmt::format(", fit {:.0f} %", s.fit_percent);
+    tiles.push_back({value, unit, stage_words(s.stage) + ", RMS error", note, j.tone});
   }
   for (const EnergyScore& e : result.energy) {
     tiles.push_back(
-        {fmt::format("{:+.2f}", 100.0 * e.relative_error), "%", "energy of pump " + e.pump,
+        {signed_percent(e.relative_error), "%", "energy of pump " + e.pump,
          fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
                      display_number(e.measured / 1e3, 4)),
-         tone_of(e)});
+         judge_energy(e)});
   }
   if (!tiles.empty()) page.tiles(std::move(tiles));
 }
 
-void add_scores(Page& page, const CompareResult& result) {
+void add_scores(Page& page, const std::vector<JudgedScore>& judged) {
   Table table;
   table.title = "Predicted against measured";
-  table.columns = {{"stage"},
-                   {"at"},
-                   {"RMSE", "", 4},
-                   {"bias", "", 3},
-                   {"unit"},
-                   {"fit", "%", 3},
-                   {"inside 95 % interval", "%", 3},
-                   {"samples"},
-                   {""}};
+  table.columns = {{"stage"},       {"at"},   {"RMSE", "", 4}, {"sensor noise", "", 3},
+                   {"bias", "", 2}, {"unit"}, {"fit", "%", 3}, {"inside 95 % interval", "%", 3},
+                   {"samples"},     {""}};
   bool intervals = false;
-  for (const StageScore& s : result.scores) {
+  for (const JudgedScore& j : judged) {
+    const StageScore& s = j.score;
+    const double rmse = s.rmse / s.unit.si;
+    const double step = rmse > 0.0 ? std::pow(10.0, std::floor(std::log10(rmse)) - 2.0) : 1.0;
     intervals = intervals || std::isfinite(s.within_95_percent);
-    table.rows.push_back({stage_words(s.stage), place_words(s), s.rmse / s.unit.si,
-                          s.bias / s.unit.si, s.unit.name, s.fit_percent, s.within_95_percent,
-                          static_cast<double>(s.n), std::string(tone_word(tone_of(result, s)))});
+    table.rows.push_back({stage_words(s.stage), place_words(s), rmse, j.noise / s.unit.si,
+                          rounded(s.bias / s.unit.si, step), s.unit.name,
+                          rounded(s.fit_percent, 0.1), s.within_95_percent,
+                          static_cast<double>(s.n), std::string(tone_word(j.tone))});
   }
   table.note =
       "Samples in which the cylinder moves (a pump: any cylinder it serves). Bias: mean of "
       "predicted \u2212 measured. "
-      "Fit: 100 % when nothing is left, 0 % when a constant would do as well. ";
+      "Fit: 100 % when nothing is left, 0 % when a constant would do as well; noise alone keeps it "
+      "below 100 %. ";
   if (intervals) table.note += "Inside: share of samples within the model's own 95 % interval. ";
-  table.note += kToneRule;
+  table.note += kJudgementRule;
   if (!table.rows.empty()) page.table(std::move(table));
 }
 
@@ -157,7 +101,7 @@ void add_energy(Page& page, const CompareResult& result) {
                    {"time", "s", 4}};
   for (const EnergyScore& e : result.energy) {
     table.rows.push_back(
-        {e.pump, e.measured / 1e3, e.predicted / 1e3, 100.0 * e.relative_error,
+        {e.pump, e.measured / 1e3, e.predicted / 1e3, rounded(100.0 * e.relative_error, 0.01),
          e.from_commands ? *e.from_commands / 1e3 : std::numeric_limits<double>::quiet_NaN(),
          e.duration});
   }
@@ -191,65 +135,70 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
   page.table(std::move(table));
 }
 
-/// "working pressure 0.9 bar, pump pressure 1.1 bar, energy of main +0.4 %"
-std::string in_short(const CompareResult& result) {
+/// "force 2.3 kN, working pressure 0.9 bar, energy of main +0.40 %"
+std::string in_short(const CompareResult& result, const std::vector<JudgedScore>& judged) {
   std::string text;
-  for (const StageScore& s : worst_of_stages(result)) {
-    const auto [value, unit] = error_text(s);
-    text += fmt::format("{}{} {} {}", text.empty() ? "" : ", ", stage_words(s.stage), value, unit);
+  for (const JudgedScore& j : worst_of_stages(judged)) {
+    const auto [value, unit] = error_text(j.score);
+    text += fmt::format("{}{} {} {}", text.empty() ? "" : ", ", stage_words(j.score.stage), value,
+                        unit);
   }
   for (const EnergyScore& e : result.energy) {
-    text += fmt::format("{}energy of {} {:+.2f} %", text.empty() ? "" : ", ", e.pump,
-                        100.0 * e.relative_error);
+    text += fmt::format("{}energy of {} {} %", text.empty() ? "" : ", ", e.pump,
+                        signed_percent(e.relative_error));
   }
   return text;
 }
 
-std::string sentence(std::string text) {
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-  return text + ".";
+/// How the error of one quantity is spread, in whole sentences.
+std::string where_it_fails(const CompareResult& result, const StageScore& worst) {
+  std::string text;
+  if (std::abs(worst.bias) > 0.5 * worst.rmse) {
+    const bool kilo = worst.unit.name == "N" && std::abs(worst.bias) >= 1e3;
+    text = fmt::format("On average the prediction is {} {} too {}. ",
+                       display_number(std::abs(worst.bias) / (kilo ? 1e3 : worst.unit.si), 3),
+                       kilo ? "kN" : worst.unit.name, worst.bias < 0.0 ? "low" : "high");
+  }
+  const auto region = std::find_if(
+      result.worst.begin(), result.worst.end(),
+      [&](const WorstRegion& w) { return w.stage == worst.stage && w.at == worst.at; });
+  if (region != result.worst.end()) return text + "It fails most here: " + region->sentence + ". ";
+  text += "Its error is spread over all poses, speeds and loads. ";
+  if (!result.worst.empty()) text += "Elsewhere: " + result.worst.front().sentence + ". ";
+  return text;
 }
 
-void set_verdict(Page& page, const CompareResult& result) {
-  if (result.scores.empty()) {
+void set_verdict(Page& page, const CompareResult& result, const std::vector<JudgedScore>& judged) {
+  const JudgedScore* worst = worst_score(judged);
+  if (worst == nullptr) {
     page.verdict(Tone::kWarning, "Nothing could be compared",
                  "The notes below say which columns the log would need.");
     return;
   }
-  const StageScore* worst = &result.scores.front();
-  Tone tone = Tone::kGood;
-  for (const StageScore& s : result.scores) {
-    if (worse(result, s, *worst)) worst = &s;
-  }
-  for (const EnergyScore& e : result.energy) tone = std::max(tone, tone_of(e));
-  const Tone stages = tone_of(result, *worst);
-  tone = std::max(tone, stages);
-  const auto [value, unit] = error_text(*worst);
-  const std::string what = quantity_words(
-      worst->stage,
-      worst->regime.empty() || worst->stage == "pump" ? worst->at : place_words(*worst));
+  Tone tone = worst->tone;
+  for (const EnergyScore& e : result.energy) tone = std::max(tone, judge_energy(e));
+  const StageScore& s = worst->score;
+  const auto [value, unit] = error_text(s);
   std::string headline = "The model follows the measurements in every stage";
-  if (stages != Tone::kGood) {
-    headline =
-        fmt::format("The model {} the {}: {} {} RMS",
-                    stages == Tone::kBad ? "misses" : "follows only roughly", what, value, unit);
-    if (std::isfinite(worst->fit_percent))
-      headline += fmt::format(", {:.0f} % explained", std::max(0.0, worst->fit_percent));
-  } else if (tone != Tone::kGood) {
-    headline = "The model follows the measurements, its energy does not";
-  }
-  std::string text = fmt::format("Worst of each stage: {}. ", in_short(result));
-  if (result.worst.empty()) {
-    text += "No region of poses, speeds or loads stands out.";
+  std::string text;
+  if (worst->tone != Tone::kGood) {
+    const std::string what = quantity_words(s.stage, s.stage == "pump" ? s.at : place_words(s));
+    headline = fmt::format("The model {} the {}: {} {} RMS",
+                           worst->tone == Tone::kBad ? "misses" : "follows only roughly", what,
+                           value, unit);
+    if (std::isfinite(s.fit_percent))
+      headline += fmt::format(", {:.0f} % explained", std::max(0.0, s.fit_percent));
+    text = where_it_fails(result, s);
   } else {
-    // the region of the quantity in the headline, else the one with the highest rank
-    const WorstRegion* region = &result.worst.front();
-    for (auto w = result.worst.rbegin(); w != result.worst.rend(); ++w) {
-      if (w->stage == worst->stage && w->at == worst->at) region = &*w;
-    }
-    text += "It fails most here: " + region->sentence + ".";
+    if (tone != Tone::kGood)
+      headline = "The model follows the measurements, but its energy does not";
+    text = result.worst.empty()
+               ? "No region of poses, speeds or loads stands out. "
+               : "What error there is lies most here: " + result.worst.front().sentence + ". ";
   }
-  page.verdict(tone, headline, text);
+  page.verdict(tone, headline,
+               text + fmt::format("RMS error at the worst place of each stage: {}.",
+                                  in_short(result, judged)));
 }
 
 }  // namespace
@@ -257,35 +206,32 @@ void set_verdict(Page& page, const CompareResult& result) {
 void add_comparison(Page& page, const CraneModel& model, const CompareResult& result,
                     const std::string& heading_prefix) {
   page.section(heading_prefix + "Scores");
-  add_tiles(page, result);
-  add_scores(page, result);
+  const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
+  add_tiles(page, result, judged);
+  add_scores(page, judged);
   add_energy(page, result);
-  for (const std::string& note : result.notes) page.paragraph(sentence(note));
+  for (const std::string& note : result.notes)
+    page.paragraph(note.ends_with('.') ? note : note + ".");
   if (result.scores.empty()) return;
   add_worst_regions(page, result, heading_prefix);
-  page.section(heading_prefix + "Over the working area");
-  if (add_working_area(page, model.machine, result) == 0) {
-    page.paragraph("The tip moves along a line: there is no area to draw.");
-  }
+  add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");
   page.paragraph(
-      "Of each quantity, the signals that explain most of its error. A median line that leaves "
-      "zero is an error "
-      "that repeats, and so physics that the model lacks; a cloud about zero is noise.");
-  add_residuals(page, model.machine, result);
-  page.section(heading_prefix + "Measured and predicted");
-  page.paragraph(
-      "Only samples that count in the scores are drawn. Bands: \u00B12 standard deviations of one "
-      "measurement. Shaded: "
-      "the regions above. Drag to zoom; all charts of a log follow.");
-  add_compared_curves(page, model.machine, result);
+      "Of each quantity, the signals that explain most of its error, with the median of each "
+      "direction. A median that "
+      "leaves zero is an error that repeats: physics that the model lacks. Two medians a constant "
+      "apart are what "
+      "friction leaves. A cloud about zero is noise.");
+  const JudgedScore* worst = worst_score(judged);
+  add_residuals(page, model.machine, result, worst->score.stage, worst->score.at);
+  add_compared_curves(page, model.machine, result, heading_prefix);
 }
 
 Page compare_page(const CraneModel& model, const CompareResult& result) {
   Page page("Model against measurements: " + model.machine.name);
   page.subtitle(fmt::format("{} samples in {} log{}", result.samples, result.logs.size(),
                             result.logs.size() == 1 ? "" : "s"));
-  set_verdict(page, result);
+  set_verdict(page, result, judge_scores(model.machine, result));
   add_comparison(page, model, result);
   page.provenance("program", std::string("sparflow ") + program_version());
   page.provenance("machine", model.machine.name);

@@ -101,23 +101,24 @@ void add_valves(Page& page, const FitResult& r) {
   table.title = "Valve gains: flow against command";
   table.columns = {{"cylinder"},
                    {"direction"},
-                   {"flow at full command", "l/min", 4},
+                   {"gain", "l/min", 4},
                    {"\u00B1", "l/min", 2},
                    {"R\u00B2", "", 3},
                    {"RMSE", "l/min", 3},
-                   {"largest command seen", "%", 3},
+                   {"largest command", "%", 3},
                    {"samples"},
-                   {"dead band the data want", "%", 2}};
+                   {"dead band", "%", 2}};
   for (const ValveFit& v : r.valves) {
     table.rows.push_back(
         {cylinder_name(r, v.cylinder), direction(v.extend), v.valve.gain / kLitrePerMinute,
          v.valve.gain_standard_error / kLitrePerMinute, v.valve.r2, v.valve.rmse / kLitrePerMinute,
          100.0 * v.valve.command_max, static_cast<double>(v.valve.used),
-         v.valve.affine ? 100.0 * v.valve.dead_band : kNaN});
+         v.valve.affine ? std::round(1000.0 * v.valve.dead_band) / 10.0 : kNaN});
   }
   table.note =
-      "The gain passes through zero; the dead band is what a line with an offset would find, for "
-      "information.";
+      "Gain: flow at full command, on a line through zero. Largest command: of those learned from. "
+      "Dead band: what a "
+      "line with an offset would find, for information.";
   page.table(std::move(table));
 }
 
@@ -205,12 +206,6 @@ void add_fit(Page& page, const FitResult& result) {
   add_supplies(page, result);
   add_valves(page, result);
   for (const std::string& note : result.notes) page.paragraph(note);
-  for (const ProcessFit& f : result.processes) {
-    for (const std::string& w : f.report.warnings) {
-      page.paragraph(
-          fmt::format("{} {}: {}", cylinder_name(result, f.cylinder), direction(f.extend), w));
-    }
-  }
   add_pressures(page, result, "The pressures it learned");
 }
 

@@ -76,7 +76,7 @@
       c.stroke();
     }
     let free = -Infinity;
-    for (const { x, label } of labels) {
+    for (const { x, label } of labels.filter((l) => l.label)) {
       const at = place(x);
       const width = c.measureText(label).width;
       let from = at + 4 * ratio;
@@ -168,10 +168,11 @@
     // uPlot wants one ascending abscissa: all points sorted by x, each in the column of its group.
     const points = [];
     spec.groups.forEach((g, k) => g.x.forEach((x, i) => points.push([x, k, g.y[i]])));
-    const groupCount = spec.groups.length, trend = spec.trend && spec.trend.x.length > 1;
-    if (trend) spec.trend.x.forEach((x, i) => points.push([x, groupCount, spec.trend.y[i]]));
+    const groupCount = spec.groups.length, trends = [];
+    (spec.trends || []).forEach((t, k) => { if (t.x.length > 1) trends.push({ ...t, group: k }); });
+    trends.forEach((t, j) => t.x.forEach((x, i) => points.push([x, groupCount + j, t.y[i]])));
     points.sort((a, b) => a[0] - b[0]);
-    const columns = groupCount + (trend ? 1 : 0);
+    const columns = groupCount + trends.length;
     const data = [points.map((p) => p[0])];
     for (let k = 0; k < columns; ++k) data.push(points.map((p) => (p[1] === k ? p[2] : null)));
 
@@ -182,8 +183,10 @@
       series.push({ label: g.name, stroke: color, paths: () => null,
         points: { show: true, size: points.length > 1500 ? 3.5 : 5, width: 0, fill: faded(color, alpha) } });
     });
-    if (trend) {
-      series.push({ label: "median", stroke: theme.ink(), width: 2.2, pxAlign: 0, spanGaps: true, points: { show: false } });
+    for (const t of trends) {
+      const lone = groupCount === 1;
+      series.push({ label: "median", class: lone ? "" : "quiet", stroke: lone ? theme.ink() : theme.color(t.group),
+        width: 2.4, pxAlign: 0, spanGaps: true, points: { show: false } });
     }
     const reading = element("div", { class: "reading" });
     const chart = new uPlot({
