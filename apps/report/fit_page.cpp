@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/report/compare_charts.h"
 #include "apps/report/compare_page.h"
+#include "apps/report/score_judgement.h"
 #include "models/model_file.h"
 #include "models/units.h"
 
@@ -177,6 +179,11 @@ void add_pressures(Page& page, const FitResult& r, const std::string& heading) {
   }
 }
 
+/// What the model is judged by: data it has not seen, where there are such.
+const CompareResult& judged_on(const FitResult& r) {
+  return r.test ? *r.test : r.held_out ? *r.held_out : r.train;
+}
+
 void set_verdict(Page& page, const FitResult& r) {
   const auto learned =
       std::count_if(r.processes.begin(), r.processes.end(),
@@ -190,6 +197,13 @@ void set_verdict(Page& page, const FitResult& r) {
   }
   if (all == 0) headline = "A drive without hydraulics: forces alone are compared";
   std::string text = r.brief() + ".";
+  const std::vector<JudgedScore> judged = judge_scores(r.model.machine, judged_on(r));
+  const JudgedScore* worst = worst_score(judged);
+  if (worst != nullptr && worst->tone == Tone::kBad) {
+    tone = std::max(tone, Tone::kWarning);
+    text += fmt::format(" It misses the {}, though: see the scores.",
+                        quantity_words(worst->score.stage, worst->score.at));
+  }
   if (learned < all) {
     std::string names;
     for (const std::string& n : r.model.missing()) names += (names.empty() ? "" : ", ") + n;
@@ -215,13 +229,10 @@ Page fit_page(const FitResult& result) {
                             result.train.logs.size(), result.train.logs.size() == 1 ? "" : "s"));
   set_verdict(page, result);
   add_fit(page, result);
-  if (result.test) {
-    add_comparison(page, result.model, *result.test, "Test logs: ");
-  } else if (result.held_out) {
-    add_comparison(page, result.model, *result.held_out, "Held-out motions: ");
-  } else {
-    add_comparison(page, result.model, result.train, "Training logs: ");
-  }
+  add_comparison(page, result.model, judged_on(result),
+                 result.test       ? "Test logs: "
+                 : result.held_out ? "Held-out motions: "
+                                   : "Training logs: ");
   page.provenance("program", std::string("sparflow ") + program_version());
   page.provenance("machine", result.model.machine.name);
   for (const DataSource& d : result.model.data) {

@@ -185,7 +185,7 @@
     });
     for (const t of trends) {
       const lone = groupCount === 1;
-      series.push({ label: "median", class: lone ? "" : "quiet", stroke: lone ? theme.ink() : theme.color(t.group),
+      series.push({ label: "median", ...(lone ? {} : { class: "quiet" }), stroke: lone ? theme.ink() : theme.color(t.group),
         width: 2.4, pxAlign: 0, spanGaps: true, points: { show: false } });
     }
     const reading = element("div", { class: "reading" });
