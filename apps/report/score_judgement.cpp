@@ -64,8 +64,11 @@ Measured describe(const Machine& machine, const CompareResult& result, const Sta
   return out;
 }
 
+/// For candidates taken in the order of the stages: of two stages as poor the earlier is named, an error in the
+/// force is one in the pressure too.
 bool worse(const JudgedScore& a, const JudgedScore& b) {
   if (a.tone != b.tone) return static_cast<int>(a.tone) > static_cast<int>(b.tone);
+  if (a.score.stage != b.score.stage) return false;
   const auto open = [](const JudgedScore& s) {
     return std::isfinite(s.fit_beyond_noise) ? 100.0 - s.fit_beyond_noise : 0.0;
   };

@@ -23,8 +23,8 @@ std::vector<JudgedScore> judge_scores(const Machine& machine, const CompareResul
 Tone judge_energy(const EnergyScore& energy);
 const char* tone_word(Tone tone);  ///< "good", "fair", "poor"
 
-/// The one that needs attention most: by tone, then by what of the variation it leaves unexplained beyond
-/// noise. nullptr when there is none.
+/// The one that needs attention most: by tone, then the earlier stage (its error is carried on to the later),
+/// then by what of the variation it leaves unexplained beyond noise. nullptr when there is none.
 const JudgedScore* worst_score(const std::vector<JudgedScore>& scores);
 /// The worst of each stage, in the order of the stages.
 std::vector<JudgedScore> worst_of_stages(const std::vector<JudgedScore>& scores);
