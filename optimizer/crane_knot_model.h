@@ -25,6 +25,9 @@ struct CraneKnotOptions {
   double valve_share = 1.0;
   double pressure_share = 1.0;
   double extra_clearance = 0.0;  ///< [m]
+  /// Postures known to be clear by the exact distance, one a row. The smooth clearance rows are conservative by
+  /// some centimetres; none asks for more than it has there, or a goal near an obstacle could not be reached.
+  Eigen::MatrixXd clear_postures;
   double tip_line_share = 1.0;
   /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
   /// when a motion without them came too near.
@@ -77,6 +80,7 @@ class CraneKnotModel final : public KnotModel {
   std::vector<Row> rows_;
   std::unique_ptr<ClearanceModel> clearance_;
   int clearance_rows_ = 0;
+  Eigen::VectorXd clearance_lower_;  // [m]
   Eigen::Vector3d line_start_, line_direction_;
   std::vector<CylinderMode> mode_;
   Eigen::VectorXd speed_, force_, scratch_gradient_, scratch_multiplier_;

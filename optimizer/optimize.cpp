@@ -96,6 +96,30 @@ double shortest_seed(const std::vector<SeedMotion>& seeds) {
   return shortest;
 }
 
+/// What the seeds themselves cost, driven in the result's time, where they keep the limits in it.
+void set_baselines(const CraneModel& model, const MotionProblem& problem,
+                   const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
+  result.best_seed_energy = result.straight_line_energy = result.nearest_line_energy = 0.0;
+  constexpr double kSeedTolerance =
+      1e-3;  // time scaling of a seed on its own mesh: see time_parametrise
+  bool first_line = true;
+  for (const SeedMotion& s : seeds) {
+    const bool nearest = s.straight_line && first_line;
+    if (s.straight_line) first_line = false;
+    const Trajectory timed = with_duration(s.motion, result.duration);
+    if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
+    const double energy = exact_energy(model, timed, problem.payload, refine).total;
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy)
+      result.best_seed_energy = energy;
+    if (nearest) result.nearest_line_energy = energy;
+    if (s.straight_line &&
+        (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
+      result.straight_line_energy = energy;
+      result.straight_line_name = s.name;
+    }
+  }
+}
+
 void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
                         double duration, OptimizeResult& result) {
   const StartResult* nearest = nullptr;
@@ -179,17 +203,6 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
       if (same_motion(problem, start.motion, result.starts[k].motion))
         start.same_as = static_cast<int>(k);
     }
-    if (start.seed_feasible &&
-        (result.best_seed_energy == 0.0 || start.seed_energy < result.best_seed_energy)) {
-      result.best_seed_energy = start.seed_energy;
-    }
-    const bool straight =
-        static_cast<std::size_t>(i) < given && seeds[static_cast<std::size_t>(i)].straight_line;
-    if (start.seed_feasible && straight &&
-        (result.straight_line_energy == 0.0 || start.seed_energy < result.straight_line_energy)) {
-      result.straight_line_energy = start.seed_energy;
-      result.straight_line_name = start.seed;
-    }
     result.starts.push_back(std::move(start));
   }
   for (int i = 0; i < count; ++i) {
@@ -200,6 +213,7 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
       result.best_start = i;
     }
   }
+  set_baselines(model, problem, seeds, options.refine, result);
   result.solve_s = seconds_since(begin);
   if (result.best_start >= 0) {
     const StartResult& best = result.starts[static_cast<std::size_t>(result.best_start)];
@@ -296,20 +310,8 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
       f2 = evaluate(x2);
     }
   }
-  // straight lines and seeds at the duration that was chosen, so that the comparison is at equal time
-  best.best_seed_energy = best.straight_line_energy = 0.0;
-  for (const SeedMotion& s : seeds) {
-    const Trajectory timed = with_duration(s.motion, best.duration);
-    if (worst_excess(check_limits(model, problem, timed, options.refine)) > 1e-3) continue;
-    const double energy = exact_energy(model, timed, problem.payload, options.refine).total;
-    if (best.best_seed_energy == 0.0 || energy < best.best_seed_energy)
-      best.best_seed_energy = energy;
-    if (s.straight_line &&
-        (best.straight_line_energy == 0.0 || energy < best.straight_line_energy)) {
-      best.straight_line_energy = energy;
-      best.straight_line_name = s.name;
-    }
-  }
+  // compared with lines and seeds in the time that was chosen
+  set_baselines(model, problem, seeds, options.refine, best);
   best.evaluated_durations = durations;
   best.solve_s = seconds_since(begin);
   return best;

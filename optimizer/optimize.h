@@ -28,7 +28,7 @@ struct OptimizeOptions {
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the one before.
   std::vector<Smoothing> schedule = {{20e-3, 10e5}};
   /// Iterations a smooth stage may take: its motion is a start for the modes, not the answer.
-  int smooth_iterations = 150;
+  int smooth_iterations = 100;
   int sequential_starts = 6;  ///< one-by-one motions tried besides the seeds, the cheapest guesses
   bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
   ModeOptions mode_options;
@@ -94,6 +94,8 @@ struct OptimizeResult {
   std::vector<StartResult> starts;
   double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
+  /// [J] the straight joint line to the nearest end posture (the first straight seed); 0 = breaks a limit.
+  double nearest_line_energy = 0.0;
   std::string straight_line_name;
   double solve_s = 0.0;  ///< wall time of everything
   double evaluated_durations = 1;

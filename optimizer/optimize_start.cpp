@@ -29,6 +29,7 @@ class Start {
 
   StartResult run(const ModeCandidate& candidate) {
     result_.seed = candidate.name;
+    keep_clear_ends(candidate.guess);
     hold(candidate.modes, candidate.guess);
     return result_;
   }
@@ -40,6 +41,7 @@ class Start {
         worst_excess(check_limits(model_, problem_, timed, options_.refine)) <= 1e-3;
     if (result_.seed_feasible)
       result_.seed_energy = exact_energy(model_, timed, problem_.payload, options_.refine).total;
+    keep_clear_ends(timed);
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
     if (options_.modes) hold_modes(resampled(timed, times_));
     Trajectory motion = timed;
@@ -47,7 +49,7 @@ class Start {
       const bool last = stage + 1 == options_.schedule.size();
       const bool rough = options_.modes || !last;
       const NlpResult solved =
-          solve(motion, options_.schedule[stage], ModeTable(), rough ? 1e-3 : options_.tolerance);
+          solve(motion, options_.schedule[stage], ModeTable(), rough ? 1e-2 : options_.tolerance);
       note_status(solved);
       if (solved.status == NlpStatus::kInterrupted) return result_;
       if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
@@ -79,6 +81,7 @@ class Start {
     knot.tip_line_share = tightening_.line;
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
+    knot.clear_postures = clear_postures_;
     spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
     set_bounds(spec);
     if (modes.rows() > 0) apply_modes(model_, modes, spec.bounds);
@@ -210,6 +213,21 @@ class Start {
     return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
   }
 
+  /// Start and end posture of a motion, where the exact distance calls them clear.
+  void keep_clear_ends(const Trajectory& motion) {
+    if (problem_.obstacles.empty()) return;
+    ClearanceModel clearance(problem_);
+    const Eigen::MatrixXd& q = motion.q;
+    Eigen::VectorXd posture;
+    clear_postures_.resize(0, q.cols());
+    for (const Eigen::Index k : {Eigen::Index{0}, q.rows() - 1}) {
+      posture = q.row(k);
+      if (!clearance.clear(posture.data())) continue;
+      clear_postures_.conservativeResize(clear_postures_.rows() + 1, q.cols());
+      clear_postures_.row(clear_postures_.rows() - 1) = q.row(k);
+    }
+  }
+
   /// The outcome reported is that of the solve behind the motion, or of the last one while there is none.
   void note_status(const NlpResult& solved) {
     if (result_.motion.size() > 1 && result_.excess <= options_.limit_tolerance) return;
@@ -239,6 +257,7 @@ class Start {
   Eigen::VectorXd times_;
   Tightening tightening_;
   int tightenings_used_ = 0;
+  Eigen::MatrixXd clear_postures_;
   std::unique_ptr<Transcription> transcription_;
   StartResult result_;
 };

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "optimizer/exact_energy.h"
+#include "problems/clearance.h"
 
 namespace sparflow {
 namespace {
@@ -43,6 +45,8 @@ double joint_speed(const CraneModel& model, const MotionProblem& problem, int jo
   }
   return speed;
 }
+
+constexpr double kDeepestGuess = 0.05;  // [m] into the clearance zone that a guess may be
 
 struct Leg {
   int joint = 0;
@@ -96,7 +100,7 @@ void integrate(const VectorXd& start, Trajectory& motion) {
 
 /// Modes and guess for legs driven one after another over the whole mesh. @return false when time is too short
 bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd& times,
-           const std::vector<Leg>& legs, ModeCandidate& out) {
+           const std::vector<Leg>& legs, ClearanceModel* clearance, ModeCandidate& out) {
   const double total = times[times.size() - 1];
   const double needed = std::accumulate(legs.begin(), legs.end(), 0.0,
                                         [](double s, const Leg& l) { return s + l.shortest; });
@@ -126,6 +130,8 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
     begin = end;
   }
   integrate(problem.start, m);
+  // a start that passes through an obstacle rarely finds its way out with its modes held
+  if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess) return false;
   out.energy = exact_energy(model, m, problem.payload, 2).total;
   return true;
 }
@@ -172,6 +178,8 @@ std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
   const int n = model.machine.joint_count();
   std::vector<ModeCandidate> found;
   if (n > 7) return found;  // 7! orders are the most that is worth enumerating
+  std::unique_ptr<ClearanceModel> clearance;
+  if (!problem.obstacles.empty()) clearance = std::make_unique<ClearanceModel>(problem);
   std::vector<VectorXd> ends;
   const auto add_end = [&](const VectorXd& q) {
     for (const VectorXd& known : ends) {
@@ -207,7 +215,8 @@ std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
     do {
       ModeCandidate candidate;
       candidate.name = order_name(model.machine, legs);
-      if (build(model, problem, times, legs, candidate)) found.push_back(std::move(candidate));
+      if (build(model, problem, times, legs, clearance.get(), candidate))
+        found.push_back(std::move(candidate));
     } while (std::next_permutation(legs.begin(), legs.end(),
                                    [](const Leg& a, const Leg& b) { return a.joint < b.joint; }));
   }

@@ -75,13 +75,10 @@ int run(const std::string& folder) {
   page.subtitle(
       "One loader crane: its pressures learned from a log, compared with another log, and one "
       "reach made energy-optimal.");
-  const double line = result.straight_line_energy, best = result.energy.total;
-  const std::string saving =
-      line > 0.0
-          ? fmt::format("{:.0f} % less than the straight joint line's {:.1f} kJ in the same time",
-                        100.0 * (1.0 - best / line), line / 1e3)
-          : std::string("no straight joint line keeps the limits");
-  page.verdict(Tone::kGood, fmt::format("The reach takes {:.1f} kJ: {}.", best / 1e3, saving),
+  const std::string against = against_straight_lines(result);
+  page.verdict(Tone::kGood,
+               fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
+                           against.empty() ? "" : ": ", against),
                fmt::format("Learned from {} rows; energy on a log never seen predicted to {:.2f} "
                            "%. Energies are those of the exact law.",
                            train[0].samples(),

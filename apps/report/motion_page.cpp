@@ -169,12 +169,12 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
   for (int p = 0; p < machine.pump_count(); ++p) {
     const auto i = static_cast<std::size_t>(p);
     const std::string name = "pump " + machine.pumps[i].name;
-    flow.series.push_back(curve(name, c.pump_flow.col(p)));
+    flow.series.push_back(curve(name, c.pump_flow.col(p), machine.cylinder_count() + p));
     const double limit = problem.limits.pump_max_flow[i] / units::kLitrePerMinute;
     if (limit > 0.0)
       flow.series.push_back(
           curve(name + " limit", VectorXd::Constant(c.t.size(), limit), -1, LineStyle::kLimit));
-    pressure.series.push_back(curve(name, c.pump_pressure.col(p)));
+    pressure.series.push_back(curve(name, c.pump_pressure.col(p), machine.cylinder_count() + p));
   }
   LineChart power = chart("Power", "pump power", "kW");
   power.series.push_back(curve("power", c.power));
@@ -266,12 +266,13 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
     if (!result.starts.empty()) add_tables(page, result);
     return;
   }
-  const double line = result.straight_line_energy;
+  const double line = result.nearest_line_energy;
   double lost = 0.0;
   for (const double t : result.energy.throttling) lost += t;
   page.tiles(
       {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law",
-        line > 0.0 ? fmt::format("straight joint line: {:.1f} kJ", line / 1e3) : std::string(),
+        line > 0.0 ? fmt::format("straight line, nearest end: {:.1f} kJ", line / 1e3)
+                   : std::string(),
         Tone::kGood},
        {seconds_text(result.duration), "s", "duration"},
        {fmt::format("{:.1f}", lost / 1e3), "kJ", "lost in valves",
@@ -297,14 +298,11 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                  const std::string& baseline_name) {
   Page page("Energy-optimal motion: " + problem.name);
   if (result.status == OptimizeStatus::kOptimal) {
-    const double line = result.straight_line_energy;
-    const std::string against =
-        line > 0.0 ? fmt::format(", {:.0f} % less than the straight joint line in the same time",
-                                 100.0 * (1.0 - result.energy.total / line))
-                   : "";
+    const std::string against = against_straight_lines(result);
     page.verdict(
         Tone::kGood,
-        fmt::format("{:.1f} kJ in {:.2f} s{}", result.energy.total / 1e3, result.duration, against),
+        fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,
+                    against.empty() ? "" : ": ", against),
         "All limits are kept at 16 times the knots' density. Energies are those of the exact, "
         "unsmoothed law.");
   } else {

@@ -16,6 +16,10 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                  const OptimizeResult& result, const Trajectory* baseline = nullptr,
                  const std::string& baseline_name = "");
 
+/// "31 % less than the straight joint line to the nearest end posture (120.6 kJ) and 4 % less than the cheapest
+/// straight line (85.9 kJ) in the same time"; "" when neither keeps the limits in that time.
+std::string against_straight_lines(const OptimizeResult& result);
+
 /// `optimize`'s machine-readable result (keys: docs/commands.md).
 std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
                           const OptimizeResult& result);

@@ -41,6 +41,21 @@ nlohmann::json start_json(const StartResult& s) {
 
 }  // namespace
 
+std::string against_straight_lines(const OptimizeResult& r) {
+  std::vector<std::string> parts;
+  const auto add = [&](const std::string& what, double energy) {
+    if (energy <= 0.0) return;
+    const double saved = 100.0 * (1.0 - r.energy.total / energy);
+    parts.push_back(fmt::format("{:.{}f} % {} than {} ({:.1f} kJ)", std::abs(saved),
+                                std::abs(saved) < 9.95 ? 1 : 0, saved >= 0.0 ? "less" : "more",
+                                what, energy / 1e3));
+  };
+  add("the straight joint line to the nearest end posture", r.nearest_line_energy);
+  if (r.straight_line_energy != r.nearest_line_energy)
+    add("the cheapest straight line", r.straight_line_energy);
+  return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
+}
+
 std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
                           const OptimizeResult& r) {
   nlohmann::json json = {
@@ -71,6 +86,8 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       json["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
     json["best_seed_energy_exact_J"] =
         r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
+    json["nearest_line_energy_exact_J"] =
+        r.nearest_line_energy > 0.0 ? nlohmann::json(r.nearest_line_energy) : nlohmann::json();
     json["straight_line_energy_exact_J"] =
         r.straight_line_energy > 0.0 ? nlohmann::json(r.straight_line_energy) : nlohmann::json();
     json["limits"] = nlohmann::json::array();
@@ -105,7 +122,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
     else
       add(fmt::format("  {:<20}         -      keeps no limit set in this time", what));
   };
-  against("straight joint line", r.straight_line_energy);
+  against("straight, nearest", r.nearest_line_energy);
+  against("straight, cheapest", r.straight_line_energy);
   against("best seed path", r.best_seed_energy);
   add(fmt::format("  potential energy     {:+9.2f} kJ   end against start",
                   r.energy.potential_difference / 1e3));
