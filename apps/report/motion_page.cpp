@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/report/obstacle_drawing.h"
 #include "models/model_file.h"
 #include "models/units.h"
-#include "problems/clearance.h"
 
 namespace sparflow {
 namespace {
@@ -65,49 +65,19 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
   return c;
 }
 
-std::vector<DrawingObstacle> drawn_obstacles(const Machine& machine, const MotionProblem& problem) {
-  const DrawingPlane plane = drawing_plane(machine, problem.start);
-  std::vector<DrawingObstacle> drawn;
-  for (const Obstacle& o : problem.obstacles) {
-    if (const auto* sphere = std::get_if<Sphere>(&o.shape)) {
-      const double off = plane.normal().dot(sphere->center - plane.origin);
-      if (std::abs(off) < sphere->radius) {
-        const double r = std::sqrt(sphere->radius * sphere->radius - off * off);
-        drawn.push_back({o.name, {plane.project(sphere->center)}, r});
-      }
-    } else if (const auto* box = std::get_if<Box>(&o.shape)) {
-      // the box's shadow on the plane: its corners' convex hull
-      std::vector<Eigen::Vector2d> corners;
-      for (int i = 0; i < 8; ++i) {
-        const Eigen::Vector3d sign((i & 1) ? 0.5 : -0.5, (i & 2) ? 0.5 : -0.5,
-                                   (i & 4) ? 0.5 : -0.5);
-        corners.push_back(
-            plane.project(box->center + box->rotation * sign.cwiseProduct(box->size)));
-      }
-      const Eigen::Vector2d middle = plane.project(box->center);
-      std::sort(corners.begin(), corners.end(),
-                [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-                  return std::atan2(a[1] - middle[1], a[0] - middle[0]) <
-                         std::atan2(b[1] - middle[1], b[0] - middle[0]);
-                });
-      drawn.push_back({o.name, corners, 0.0});
-    }
-  }
-  return drawn;
-}
-
 std::vector<Eigen::Vector2d> tip_path(const Machine& machine, const Trajectory& motion) {
   std::vector<Eigen::Vector2d> points;
   for (const DrawingFrame& frame : drawing_frames(machine, motion, 80)) points.push_back(frame.tip);
   return points;
 }
 
-double ground_of(const MotionProblem& problem) {
+/// Height of the ground where the problem has one; base frames stand at all heights, so none is assumed.
+std::optional<double> ground_of(const MotionProblem& problem) {
   for (const Obstacle& o : problem.obstacles) {
     const auto* half = std::get_if<HalfSpace>(&o.shape);
     if (half != nullptr && half->normal.z() > 0.99) return half->point.z();
   }
-  return 0.0;
+  return std::nullopt;
 }
 
 void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
@@ -122,7 +92,7 @@ void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
   drawing.x_axis = {plane.horizontal_name, "m"};
   drawing.z_axis = {plane.vertical_name, "m"};
   drawing.frames = drawing_frames(machine, result.motion, 90);
-  drawing.obstacles = drawn_obstacles(machine, problem);
+  drawing.obstacles = cut_obstacles(problem.obstacles, plane);
   if (baseline != nullptr) drawing.paths.push_back({baseline_name, tip_path(machine, *baseline)});
   if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
     drawing.goal = drawing_plane(machine, result.motion.q.row(result.motion.size() - 1).transpose())
