@@ -8,7 +8,11 @@ namespace sparflow {
 CraneModel CraneModel::untrained(Machine machine) {
   CraneModel model;
   model.cylinders.resize(machine.cylinders.size());
-  for (const Pump& pump : machine.pumps) model.pumps.push_back({pump.standby});
+  for (const Pump& pump : machine.pumps) {
+    // of a constant supply nothing but its ceiling is known before a log shows its pressure
+    const bool constant = pump.type == PumpType::kConstantPressure;
+    model.pumps.push_back({constant ? pump.max_pressure : pump.standby});
+  }
   model.machine = std::move(machine);
   return model;
 }

@@ -51,7 +51,8 @@ struct CraneModel {
   std::vector<DataSource> data;
   std::vector<StageQuality> quality;
 
-  /// A model of which nothing is learned yet: margins 0, standby from the machine file.
+  /// A model of which nothing is learned yet: margins 0, standby from the machine file
+  /// (a constant-pressure supply: its largest pressure).
   static CraneModel untrained(Machine machine);
   /// Whether every hydraulic cylinder has both pressure processes.
   bool complete() const;

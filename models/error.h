@@ -44,7 +44,7 @@ std::string read_file(const std::string& path);
 }  // namespace sparflow
 
 /// Always-on invariant: a failure is a defect of the program, never of the user's input.
-#define SPARFLOW_CHECK(condition, message)                                     \
-  do {                                                                         \
+#define SPARFLOW_CHECK(condition, message)                                                 \
+  do {                                                                                     \
     if (!(condition)) ::sparflow::check_failed(#condition, __FILE__, __LINE__, (message)); \
   } while (false)

@@ -105,7 +105,7 @@ double stroke_at(const Machine& machine, int cylinder, double q);
 /// Joint coordinate at a measured stroke, the inverse C^-1 of paper eq. 3: bracketed Newton within the
 /// joint's range widened by `slack` (sensors read a little past the stops).
 /// @throws std::domain_error when no joint coordinate in that range has this stroke
-double joint_at_stroke(const Machine& machine, int cylinder, double stroke, double slack = 0.05);
+double joint_at_stroke(const Machine& machine, int cylinder, double stroke, double slack = 0.15);
 
 /// A mass carried by the linkage (barrel, rod, rocker, coupler), in the parent link's frame.
 template <class T>

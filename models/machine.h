@@ -32,8 +32,8 @@ struct Joint {
 /// joint's travel along that joint's axis, as a telescope stage does.
 struct Link {
   std::string name;
-  int joint = -1;         ///< link frame it is fixed in; -1 = base
-  double mass = 0.0;      ///< [kg]
+  int joint = -1;                                 ///< link frame it is fixed in; -1 = base
+  double mass = 0.0;                              ///< [kg]
   Eigen::Vector3d cog = Eigen::Vector3d::Zero();  ///< [m], in the frame of `joint`
   double inertia = 0.0;   ///< [kg m^2] about the joint's axis through the cog
   int slides_with = -1;   ///< joint index, -1 = none
@@ -50,9 +50,9 @@ struct PinsLinkage {
 /// Knuckle: barrel pin and rocker pin on the parent link, coupler pin on the joint's link; the rod pin
 /// is where rocker and coupler meet: a e + branch h (axis x e) from the rocker pin.
 struct FourBarLinkage {
-  Eigen::Vector3d barrel;   ///< [m], in the parent link's frame
-  Eigen::Vector3d rocker;   ///< [m], in the parent link's frame
-  Eigen::Vector3d coupler;  ///< [m], in the joint's link frame
+  Eigen::Vector3d barrel;       ///< [m], in the parent link's frame
+  Eigen::Vector3d rocker;       ///< [m], in the parent link's frame
+  Eigen::Vector3d coupler;      ///< [m], in the joint's link frame
   double rocker_length = 0.0;   ///< [m]
   double coupler_length = 0.0;  ///< [m]
   double rocker_mass = 0.0;     ///< [kg]
@@ -76,17 +76,17 @@ using Linkage = std::variant<PinsLinkage, FourBarLinkage, RackLinkage, DirectLin
 /// A = piston side, B = rod side; x grows as the cylinder extends.
 struct Cylinder {
   std::string name;
-  int joint = 0;     ///< the joint it drives
+  int joint = 0;      ///< the joint it drives
   double bore = 0.0;  ///< [m], 0 = no hydraulics
   double rod = 0.0;   ///< [m] rod diameter
   int stages = 1;     ///< equal cylinders in series: strokes add up, areas do not
   int parallel = 1;   ///< equal cylinders side by side: areas add up
   std::optional<double> length_at_zero_stroke;  ///< [m] pin to pin; absent = 0
   std::optional<double> stroke;                 ///< [m]
-  double barrel_mass = 0.0;  ///< [kg]
-  double barrel_cog = 0.0;   ///< [m] from the barrel pin towards the rod pin
-  double rod_mass = 0.0;     ///< [kg]
-  double rod_cog = 0.0;      ///< [m] from the rod pin towards the barrel pin
+  double barrel_mass = 0.0;                     ///< [kg]
+  double barrel_cog = 0.0;                      ///< [m] from the barrel pin towards the rod pin
+  double rod_mass = 0.0;                        ///< [kg]
+  double rod_cog = 0.0;                         ///< [m] from the rod pin towards the barrel pin
   Linkage linkage = DirectLinkage{};
 
   bool hydraulic() const { return bore > 0.0; }
@@ -114,7 +114,8 @@ struct Valve {
 
 struct Tip {
   int joint = -1;  ///< -1 = base
-  Eigen::Vector3d xyz = Eigen::Vector3d::Zero();  ///< [m] in the frame of `joint`; the payload hangs here
+  Eigen::Vector3d xyz =
+      Eigen::Vector3d::Zero();  ///< [m] in the frame of `joint`; the payload hangs here
 };
 
 struct Machine {
@@ -134,9 +135,9 @@ struct Machine {
   int joint_index(const std::string& joint_name) const;        ///< -1 when there is none
   int cylinder_index(const std::string& cylinder_name) const;  ///< -1 when there is none
   int pump_index(const std::string& pump_name) const;          ///< -1 when there is none
-  int cylinder_of_joint(int joint) const;                      ///< -1 when the joint has no cylinder
-  int pump_of_cylinder(int cylinder) const;                    ///< -1 when none feeds it
-  const Valve* valve_of_cylinder(int cylinder) const;          ///< nullptr when there is none
+  int cylinder_of_joint(int joint) const;              ///< -1 when the joint has no cylinder
+  int pump_of_cylinder(int cylinder) const;            ///< -1 when none feeds it
+  const Valve* valve_of_cylinder(int cylinder) const;  ///< nullptr when there is none
 };
 
 }  // namespace sparflow

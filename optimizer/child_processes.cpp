@@ -100,6 +100,7 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
       children.push_back(start_child(work, next++, children));
     }
     std::vector<pollfd> polls;
+    polls.reserve(children.size());
     for (const Child& child : children) polls.push_back({child.pipe, POLLIN, 0});
     if (::poll(polls.data(), polls.size(), -1) < 0) continue;
     for (std::size_t i = polls.size(); i-- > 0;) {

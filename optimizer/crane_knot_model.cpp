@@ -15,6 +15,8 @@ constexpr double kFlowUnit = 1e-3;     // l/s
 constexpr double kPressureUnit = 1e7;  // 100 bar
 // Rows within 2 cm of the exact distance: at 5 cm goals beside an obstacle were lost, at 2 cm rows double.
 constexpr double kRowInflation = 0.02;  // [m]
+// A row further from zero than this along the start is left out: no solve has moved a link that far.
+constexpr double kNearRow = 0.5;  // [m]
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -69,17 +71,7 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
   }
   if (!problem.obstacles.empty()) {
     clearance_ = std::make_unique<ClearanceModel>(problem, ClearanceOptions{kRowInflation});
-    clearance_rows_ = clearance_->rows();
-    clearance_lower_.setZero(clearance_rows_);
-    Eigen::VectorXd q, g(clearance_rows_);
-    for (Eigen::Index k = 0; k < options_.clear_postures.rows(); ++k) {
-      q = options_.clear_postures.row(k);
-      clearance_->values(q.data(), g.data());
-      clearance_lower_ = clearance_lower_.cwiseMin(g);
-    }
-    for (double& lower : clearance_lower_) {
-      if (lower >= 0.0) lower = options_.extra_clearance;
-    }
+    choose_clearance_rows();
   }
   mode_.assign(static_cast<std::size_t>(m_), CylinderMode::kFree);
   speed_.setZero(m_);
@@ -87,11 +79,36 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
   length_.resize(static_cast<std::size_t>(m_));
   jacobian_.setZero(2 * m_, 2 * n_);
   scratch_gradient_.setZero(2 * m_);
-  scratch_multiplier_.setZero(clearance_rows_);
   scratch_hessian_.setZero(2 * m_, 2 * m_);
   product_.setZero(2 * m_, 2 * n_);
   outer_.setZero(2 * n_, 2 * n_);
   tip_jacobian_.setZero(3, n_);
+}
+
+void CraneKnotModel::choose_clearance_rows() {
+  const int all = clearance_->rows();
+  all_clearance_.setZero(all);
+  all_multipliers_.setZero(all);
+  all_clearance_jacobian_.setZero(all, n_);
+  const auto least = [&](const Eigen::MatrixXd& postures, double start) {
+    Eigen::VectorXd low = Eigen::VectorXd::Constant(all, start), q;
+    for (Eigen::Index k = 0; k < postures.rows(); ++k) {
+      q = postures.row(k);
+      clearance_->values(q.data(), all_clearance_.data());
+      low = low.cwiseMin(all_clearance_);
+    }
+    return low;
+  };
+  const Eigen::VectorXd lower = least(options_.clear_postures, 0.0);
+  const Eigen::VectorXd reach = least(options_.near_postures, kInfinity);
+  std::vector<double> bounds;
+  for (int r = 0; r < all; ++r) {
+    if (options_.near_postures.rows() > 0 && reach[r] > kNearRow) continue;
+    near_rows_.push_back(r);
+    bounds.push_back(lower[r] < 0.0 ? lower[r] : options_.extra_clearance);
+  }
+  clearance_rows_ = static_cast<int>(near_rows_.size());
+  clearance_lower_ = Eigen::Map<const Eigen::VectorXd>(bounds.data(), clearance_rows_);
 }
 
 void CraneKnotModel::begin_node(int /*knot*/, int interval) {
@@ -286,17 +303,19 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
     }
   }
   if (clearance_rows_ == 0) return;
-  double* g_clear = g + rows_.size();
-  if (jacobian == nullptr) {
-    clearance_->values(z, g_clear);
-    return;
+  double* out =
+      jacobian == nullptr ? nullptr : jacobian + static_cast<std::ptrdiff_t>(rows_.size()) * width;
+  if (out == nullptr) {
+    clearance_->values(z, all_clearance_.data());
+  } else {
+    clearance_->jacobian(z, all_clearance_.data(), all_clearance_jacobian_.data());
   }
-  // rows of n values are spread into rows of 2 n, last row first so that nothing is overwritten
-  double* out = jacobian + static_cast<std::ptrdiff_t>(rows_.size()) * width;
-  clearance_->jacobian(z, g_clear, out);
-  for (int r = clearance_rows_ - 1; r >= 0; --r) {
-    for (int k = n_ - 1; k >= 0; --k) out[r * width + k] = out[r * n_ + k];
-    std::fill(out + r * width + n_, out + (r + 1) * width, 0.0);
+  for (std::size_t r = 0; r < near_rows_.size(); ++r) {
+    g[rows_.size() + r] = all_clearance_[near_rows_[r]];
+    if (out == nullptr) continue;
+    for (int k = 0; k < n_; ++k) out[k] = all_clearance_jacobian_(near_rows_[r], k);
+    std::fill(out + n_, out + width, 0.0);
+    out += width;
   }
 }
 
@@ -341,7 +360,10 @@ void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier,
   }
   if (clearance_rows_ > 0) {
     outer_.setZero();
-    clearance_->add_hessian(z, multiplier + rows_.size(), outer_.data());
+    for (std::size_t r = 0; r < near_rows_.size(); ++r) {
+      all_multipliers_[near_rows_[r]] = multiplier[rows_.size() + r];
+    }
+    clearance_->add_hessian(z, all_multipliers_.data(), outer_.data());
     Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
     h.topLeftCorner(n_, n_) += Eigen::Map<Eigen::MatrixXd>(outer_.data(), n_, n_);
   }

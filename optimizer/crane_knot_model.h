@@ -28,6 +28,9 @@ struct CraneKnotOptions {
   /// Postures known to be clear by the exact distance, one a row. The smooth clearance rows are conservative by
   /// some centimetres; none asks for more than it has there, or a goal near an obstacle could not be reached.
   Eigen::MatrixXd clear_postures;
+  /// Postures the solve starts from, one a row: only clearance rows within kNearRow of zero in one of them are
+  /// imposed (all, when there is none). Whoever solves checks the exact distance afterwards.
+  Eigen::MatrixXd near_postures;
   double tip_line_share = 1.0;
   /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
   /// when a motion without them came too near.
@@ -68,6 +71,7 @@ class CraneKnotModel final : public KnotModel {
   void chain_gradient(const double* g, double* gradient) const;
   void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
+  void choose_clearance_rows();
   void path_all(const double* z, double* g, double* jacobian);
 
   const CraneModel* model_;
@@ -80,10 +84,13 @@ class CraneKnotModel final : public KnotModel {
   std::vector<Row> rows_;
   std::unique_ptr<ClearanceModel> clearance_;
   int clearance_rows_ = 0;
-  Eigen::VectorXd clearance_lower_;  // [m]
+  std::vector<int> near_rows_;       // of the clearance model, those imposed
+  Eigen::VectorXd clearance_lower_;  // [m] of those
+  Eigen::VectorXd all_clearance_, all_multipliers_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all_clearance_jacobian_;
   Eigen::Vector3d line_start_, line_direction_;
   std::vector<CylinderMode> mode_;
-  Eigen::VectorXd speed_, force_, scratch_gradient_, scratch_multiplier_;
+  Eigen::VectorXd speed_, force_, scratch_gradient_;
   std::vector<Taylor3> length_;
   Eigen::MatrixXd jacobian_;  // d(v, F)/dz, [2 m x 2 n]
   Eigen::MatrixXd scratch_hessian_, product_, outer_;

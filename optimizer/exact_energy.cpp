@@ -34,7 +34,7 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
       const double dt = (part + 0.5) * step;
       q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
       qd = motion.qd.row(k) + dt * motion.qdd.row(k);
-      const MachineState& state = chain.evaluate(q.data(), qd.data(), payload, part == refine / 2);
+      const MachineState& state = chain.evaluate(q.data(), qd.data(), payload, true);
       energy.total += step * state.power;
       for (std::size_t p = 0; p < state.pumps.size(); ++p) {
         energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;

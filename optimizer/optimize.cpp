@@ -96,6 +96,25 @@ double shortest_seed(const std::vector<SeedMotion>& seeds) {
   return shortest;
 }
 
+/// The cheapest different motions that came from seeds, the winner apart.
+std::vector<SeedMotion> best_other_motions(const OptimizeResult& result, std::size_t seed_count,
+                                           double limit_tolerance, std::size_t most) {
+  std::vector<const StartResult*> kept;
+  for (std::size_t i = 0; i < std::min(seed_count, result.starts.size()); ++i) {
+    const StartResult& s = result.starts[i];
+    if (static_cast<int>(i) != result.best_start && s.same_as < 0 && s.usable(limit_tolerance))
+      kept.push_back(&s);
+  }
+  std::sort(kept.begin(), kept.end(), [](const StartResult* a, const StartResult* b) {
+    return a->energy_exact < b->energy_exact;
+  });
+  std::vector<SeedMotion> motions;
+  for (std::size_t i = 0; i < std::min(most, kept.size()); ++i) {
+    motions.push_back({kept[i]->seed, kept[i]->motion, 0.0, false});
+  }
+  return motions;
+}
+
 /// What the seeds themselves cost, driven in the result's time, where they keep the limits in it.
 void set_baselines(const CraneModel& model, const MotionProblem& problem,
                    const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
@@ -136,9 +155,10 @@ void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMoti
   }
   const double shortest = shortest_seed(seeds);
   const std::string remedy =
-      shortest > 0.0 ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.",
-                                   shortest, duration)
-                     : std::string();
+      shortest > duration
+          ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
+                        duration)
+          : std::string();
   result.status = OptimizeStatus::kInfeasible;
   result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
 }
@@ -169,6 +189,7 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
   if (options.sequential_starts > 0 && options.modes && !problem.tip_line) {
     const Eigen::VectorXd times = Eigen::VectorXd::LinSpaced(options.intervals + 1, 0.0, duration);
     std::vector<Eigen::VectorXd> ends;
+    ends.reserve(seeds.size());
     for (const SeedMotion& s : seeds) {
       ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
     }
@@ -217,8 +238,10 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
   result.solve_s = seconds_since(begin);
   if (result.best_start >= 0) {
     const StartResult& best = result.starts[static_cast<std::size_t>(result.best_start)];
-    result.status = best.status == NlpStatus::kInterrupted ? OptimizeStatus::kInterrupted
-                                                           : OptimizeStatus::kOptimal;
+    const bool stopped =
+        std::any_of(result.starts.begin(), result.starts.end(),
+                    [](const StartResult& r) { return r.status == NlpStatus::kInterrupted; });
+    result.status = stopped ? OptimizeStatus::kInterrupted : OptimizeStatus::kOptimal;
     result.motion = best.motion;
     result.energy_smooth = best.energy_smooth;
     result.energy = exact_energy(model, best.motion, problem.payload, options.refine);
@@ -270,20 +293,22 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
     return r.status == OptimizeStatus::kOptimal ? r.energy.total + problem.idle_power * r.duration
                                                 : std::numeric_limits<double>::infinity();
   };
+  // At every duration: the best so far, the best other motions of the first (driven faster or slower, modes as they
+  // are: an overlap may be what a shorter time needs) and the cheapest one-by-one motions.
+  OptimizeOptions nearby = options;
+  nearby.schedule.clear();
+  nearby.sequential_starts = std::min(options.sequential_starts, 2);
+  const std::vector<SeedMotion> others =
+      best_other_motions(best, seeds.size(), options.limit_tolerance, 2);
+  nearby.progress = {};
   int durations = 1;
   const auto evaluate = [&](double duration) {
-    SeedMotion seed{best.starts[static_cast<std::size_t>(best.best_start)].seed, best.motion,
-                    shortest, false};
-    OptimizeResult r = optimize_at(model, problem, {seed}, duration, options);
+    std::vector<SeedMotion> tried = others;
+    tried.push_back({"best so far", best.motion, shortest, false});
+    OptimizeResult r = optimize_at(model, problem, tried, duration, nearby);
     ++durations;
     const double value = cost(r);
     if (value < cost(best)) {
-      r.starts.front().seed = seed.name;
-      std::vector<StartResult> starts =
-          best.starts;  // keep what the other starts gave at the first duration
-      starts[static_cast<std::size_t>(best.best_start)] = r.starts.front();
-      r.starts = std::move(starts);
-      r.best_start = best.best_start;
       best = std::move(r);
     }
     if (options.progress)
@@ -309,6 +334,14 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
       x2 = a + kGolden * (b - a);
       f2 = evaluate(x2);
     }
+  }
+  // Everything again in the time that was chosen: every start is then of one duration, and none is missed
+  // because it was only tried in another.
+  if (!(options.interrupted && options.interrupted())) {
+    std::vector<SeedMotion> all = seeds;
+    all.push_back({"best of the duration search", best.motion, shortest, false});
+    OptimizeResult last = optimize_at(model, problem, all, best.duration, options);
+    if (last.best_start >= 0 && last.energy.total <= best.energy.total) best = std::move(last);
   }
   // compared with lines and seeds in the time that was chosen
   set_baselines(model, problem, seeds, options.refine, best);

@@ -30,6 +30,7 @@ class Start {
   StartResult run(const ModeCandidate& candidate) {
     result_.seed = candidate.name;
     keep_clear_ends(candidate.guess);
+    offer(candidate.guess, false);
     hold(candidate.modes, candidate.guess);
     return result_;
   }
@@ -42,6 +43,7 @@ class Start {
     if (result_.seed_feasible)
       result_.seed_energy = exact_energy(model_, timed, problem_.payload, options_.refine).total;
     keep_clear_ends(timed);
+    if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
     if (options_.modes) hold_modes(resampled(timed, times_));
     Trajectory motion = timed;
@@ -82,6 +84,7 @@ class Start {
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
+    if (!problem_.obstacles.empty()) knot.near_postures = from.q;
     spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
     set_bounds(spec);
     if (modes.rows() > 0) apply_modes(model_, modes, spec.bounds);
@@ -179,28 +182,36 @@ class Start {
     return any;
   }
 
+  /// Keeps a motion if it is better than what there is: limits first, then exact energy. @return its limits
+  std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
+    std::vector<LimitCheck> checks = check_limits(model_, problem_, motion, options_.refine);
+    const double excess = worst_excess(checks);
+    const double energy = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+    const bool kept = excess <= options_.limit_tolerance;
+    const bool first = result_.motion.size() < 2;
+    const bool had_kept = !first && result_.excess <= options_.limit_tolerance;
+    if (!first && !(kept && (!had_kept || energy < result_.energy_exact)) &&
+        !(!kept && !had_kept && excess < result_.excess)) {
+      return checks;
+    }
+    result_.motion = motion;
+    result_.excess = excess;
+    result_.energy_exact = energy;
+    result_.modes_held = modes_held;
+    // of the law last solved for; before the first solve there is none
+    result_.energy_smooth =
+        transcription_ ? 1e3 * transcription_->model_cost(transcription_->variables(motion)) /
+                             problem_energy_weight()
+                       : energy;
+    return checks;
+  }
+
   /// Keeps a motion if it is better than what there is; while it breaks limits between knots, solves again with
   /// those drawn in.
   void keep_limits(Trajectory motion, const Smoothing& smoothing, const ModeTable& modes,
                    bool solve_again = true) {
     for (int attempt = 0;; ++attempt) {
-      const std::vector<LimitCheck> checks =
-          check_limits(model_, problem_, motion, options_.refine);
-      const double excess = worst_excess(checks);
-      const bool kept = excess <= options_.limit_tolerance;
-      const double energy = exact_energy(model_, motion, problem_.payload, options_.refine).total;
-      const bool first = result_.motion.size() < 2;
-      const bool had_kept = !first && result_.excess <= options_.limit_tolerance;
-      if (first || (kept && (!had_kept || energy < result_.energy_exact)) ||
-          (!kept && !had_kept && excess < result_.excess)) {
-        result_.motion = motion;
-        result_.excess = excess;
-        result_.energy_exact = energy;
-        result_.energy_smooth = 1e3 *
-                                transcription_->model_cost(transcription_->variables(motion)) /
-                                problem_energy_weight();
-        result_.modes_held = modes.rows() > 0;
-      }
+      const std::vector<LimitCheck> checks = offer(motion, modes.rows() > 0);
       if (!solve_again || attempt == options_.tightenings || !tighten(checks)) return;
       ++tightenings_used_;
       const NlpResult solved = solve(motion, smoothing, modes, options_.tolerance);
@@ -230,7 +241,7 @@ class Start {
 
   /// The outcome reported is that of the solve behind the motion, or of the last one while there is none.
   void note_status(const NlpResult& solved) {
-    if (result_.motion.size() > 1 && result_.excess <= options_.limit_tolerance) return;
+    if (result_.status == NlpStatus::kOptimal && result_.modes_held) return;
     result_.status = solved.status;
     result_.message = solved.message;
     if (!solved.max_violation_at.empty()) {

@@ -59,9 +59,8 @@ Leg make_leg(const CraneModel& model, const MotionProblem& problem, int joint, d
              double to) {
   Leg leg{joint, from, to, 0.0, 0.0};
   const Range& a = problem.limits.acceleration[static_cast<std::size_t>(joint)];
-  leg.acceleration = 0.9 * std::min(a.hi, -a.lo);
-  const double speed = 0.98 * joint_speed(model, problem, joint, from, to),
-               way = std::abs(to - from);
+  leg.acceleration = std::min(a.hi, -a.lo);
+  const double speed = joint_speed(model, problem, joint, from, to), way = std::abs(to - from);
   const double ramp = speed / leg.acceleration;
   leg.shortest = way > speed * ramp ? way / speed + ramp : 2.0 * std::sqrt(way / leg.acceleration);
   return leg;
@@ -102,9 +101,12 @@ void integrate(const VectorXd& start, Trajectory& motion) {
 bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd& times,
            const std::vector<Leg>& legs, ClearanceModel* clearance, ModeCandidate& out) {
   const double total = times[times.size() - 1];
-  const double needed = std::accumulate(legs.begin(), legs.end(), 0.0,
-                                        [](double s, const Leg& l) { return s + l.shortest; });
-  if (needed > total || legs.empty()) return false;
+  // two intervals a leg for what the trapezoid loses by starting and stopping at knots
+  const double slack = 2.0 * total / static_cast<double>(times.size() - 1);
+  const double needed = std::accumulate(legs.begin(), legs.end(), 0.0, [&](double s, const Leg& l) {
+    return s + l.shortest + slack;
+  });
+  if (needed - slack * static_cast<double>(legs.size()) > total || legs.empty()) return false;
   const Eigen::Index intervals = times.size() - 1;
   out.modes = ModeTable::Constant(intervals, model.machine.cylinder_count(), CylinderMode::kRest);
   Trajectory& m = out.guess;
@@ -114,7 +116,7 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
   double until = 0.0;
   Eigen::Index begin = 0;
   for (std::size_t i = 0; i < legs.size(); ++i) {
-    until += legs[i].shortest / needed * total;
+    until += (legs[i].shortest + slack) / needed * total;
     Eigen::Index end = begin;
     while (end < intervals && times[end] < until - 1e-9) ++end;
     if (i + 1 == legs.size()) end = intervals;

@@ -184,9 +184,6 @@ void ClearanceModel::build_rows(double inflation) {
         const double h = half_piece(part, obstacle, core + radius_, inflation);
         pieces = std::max(1, static_cast<int>(std::ceil(part.length / (2.0 * h))));
         level = std::hypot(core + radius_, 0.5 * part.length / pieces) - core;
-      } else if ((!part.from_moves && signed_distance(obstacle, position(part.from, q)) < level) ||
-                 (!part.to_moves && signed_distance(obstacle, position(part.to, q)) < level)) {
-        cover_complete_ = false;
       }
       for (int i = 0; i <= pieces; ++i) {
         if ((i == 0 && !part.from_moves) || (i == pieces && !part.to_moves)) continue;
@@ -210,6 +207,19 @@ void ClearanceModel::build_rows(double inflation) {
   }
 }
 
+/// A column that stands on the ground is no collision: no motion changes the distance of its immovable end, so
+/// where that end is inside a half-space's zone the other end alone is judged.
+double ClearanceModel::part_distance(const Part& part, const Obstacle& obstacle,
+                                     const Vector3d& from, const Vector3d& to) const {
+  if (std::holds_alternative<HalfSpace>(obstacle.shape)) {
+    if (!part.from_moves && signed_distance(obstacle, from) < radius_)
+      return signed_distance(obstacle, to);
+    if (!part.to_moves && signed_distance(obstacle, to) < radius_)
+      return signed_distance(obstacle, from);
+  }
+  return segment_distance(obstacle, from, to);
+}
+
 Nearest ClearanceModel::nearest(const double* q) {
   Nearest best{std::numeric_limits<double>::infinity(), -1, -1};
   if (obstacles_.empty()) return best;
@@ -219,7 +229,7 @@ Nearest ClearanceModel::nearest(const double* q) {
     const Vector3d to = position(parts_[at(p)].to, q);
     part_distance_[p] = std::numeric_limits<double>::infinity();
     for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) {
-      const double d = segment_distance(obstacles_[at(o)], from, to) - radius_;
+      const double d = part_distance(parts_[at(p)], obstacles_[at(o)], from, to) - radius_;
       part_distance_[p] = std::min(part_distance_[p], d);
       if (d < best.distance) best = {d, p, o};
     }

@@ -41,6 +41,8 @@ struct Nearest {
 /// out; next to an immovable point pieces are shortened so that the bound holds without its row,
 /// see cover_complete().
 ///
+/// A part whose immovable end stands in a half-space (a column on the ground) is judged by its other end there.
+///
 /// A mutable workspace: one a thread. No evaluation allocates.
 class ClearanceModel {
  public:
@@ -101,6 +103,8 @@ class ClearanceModel {
     int part = 0;
     int obstacle = 0;
   };
+  double part_distance(const Part& part, const Obstacle& obstacle, const Eigen::Vector3d& from,
+                       const Eigen::Vector3d& to) const;
   void build_parts();
   void build_rows(double inflation);
   /// Longest allowed half piece h of a part before this obstacle [m].

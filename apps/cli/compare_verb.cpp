@@ -15,6 +15,17 @@ struct CompareArguments {
   Outputs outputs;
 };
 
+/// A machine alone predicts forces and flows from geometry; nothing is learned that could predict a pressure.
+void keep_statics(CompareResult& result) {
+  const auto learned = [](const auto& item) {
+    return item.stage != "force" && item.stage != "flow_sensor";
+  };
+  std::erase_if(result.scores, learned);
+  std::erase_if(result.worst, learned);
+  for (LogComparison& log : result.logs) std::erase_if(log.series, learned);
+  result.energy.clear();
+}
+
 int run(const CompareArguments& a) {
   a.outputs.check();
   if (a.model.empty() == a.machine.empty()) {
@@ -25,7 +36,8 @@ int run(const CompareArguments& a) {
   const CraneModel model =
       a.model.empty() ? CraneModel::untrained(load_machine(a.machine)) : load_model(a.model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
-  const CompareResult result = compare(model, logs);
+  CompareResult result = compare(model, logs);
+  if (a.model.empty()) keep_statics(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   fmt::print("{}\n", compare_table(result));

@@ -103,6 +103,16 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
   if (!model_path.empty()) {
     both.model = load_model(model_path);
     both.problem = load_problem(problem_path, &both.model.machine);
+    try {
+      const std::string own = load_problem(problem_path).machine.name;
+      if (own != both.model.machine.name) {
+        warn(fmt::format(
+            "the problem's machine is {}, the model was fitted for {}: the model's machine is used",
+            own, both.model.machine.name));
+      }
+    } catch (const InputError&) {
+      // a problem need not name a machine of its own when the model carries one
+    }
     return both;
   }
   both.problem = load_problem(problem_path);

@@ -34,6 +34,10 @@ nlohmann::json start_json(const StartResult& s) {
                          {"linear_solver_s", s.linear_solver_s},
                          {"modes_held", s.modes_held},
                          {"stages", stages}};
+  if (s.motion.size() < 2) {
+    for (const char* key : {"energy_J", "energy_exact_J", "constraint_violation"})
+      json[key] = nullptr;
+  }
   if (s.seed_feasible) json["seed_energy_exact_J"] = s.seed_energy;
   if (s.same_as >= 0) json["same_as"] = s.same_as;
   return json;
@@ -120,7 +124,7 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
       add(fmt::format("  {:<20} {:9.2f} kJ   the optimum saves {:.1f} %", what, energy / 1e3,
                       100.0 * (1.0 - r.energy.total / energy)));
     else
-      add(fmt::format("  {:<20}         -      keeps no limit set in this time", what));
+      add(fmt::format("  {:<20}         -      breaks a limit in this time", what));
   };
   against("straight, nearest", r.nearest_line_energy);
   against("straight, cheapest", r.straight_line_energy);

@@ -217,5 +217,24 @@ TEST(Clearance, ImmovableColumnAndUnreachableObstaclesMakeNoRows) {
   EXPECT_TRUE(ground.clear(up.data()));
 }
 
+TEST(Clearance, AColumnOnTheGroundIsNoCollision) {
+  // The slewing column stands on the ground that is also the obstacle: only what moves is judged.
+  Machine machine = arms::loader_crane();
+  machine.joints[0].origin.translation() =
+      Eigen::Vector3d(0.0, 0.0, 0.0);  // boom pivot at ground level
+  MotionProblem problem;
+  problem.machine = machine;
+  problem.limits = limits_of(machine);
+  problem.start = Eigen::Vector3d(0.6, -0.3, 0.5);
+  problem.goal = JointGoal{problem.start};
+  problem.clearance = 0.15;
+  problem.obstacles.push_back({"ground", HalfSpace{{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}});
+  ClearanceModel clearance(problem);
+  EXPECT_TRUE(clearance.clear(problem.start.data()));
+  EXPECT_TRUE(clearance.cover_complete());
+  const Eigen::Vector3d low(0.6, -2.2, 3.0);  // the jib hangs into the ground: still found
+  EXPECT_FALSE(clearance.clear(low.data()));
+}
+
 }  // namespace
 }  // namespace sparflow
