@@ -84,6 +84,8 @@ void settle_signal_names(std::vector<UnderstoodColumn>* columns,
   };
   for (UnderstoodColumn& column : *columns) {
     if (column.meaning.role == Role::kCandidate && !column.meaning.is_time) {
+      // a pressure under its old name would be the best of all explanations of that pressure
+      if (column.raw->mapped_from) continue;
       if (taken(column.meaning.signal)) column.meaning.signal = column.raw->name;
       if (taken(column.meaning.signal)) {
         warnings->push_back(

@@ -24,8 +24,8 @@ bool is_word(char c) {
 class Expression {
  public:
   Expression(const std::string& text, const RawTable& table, const FilePlace& place,
-             const std::string& key)
-      : text_(text), table_(table), place_(place), key_(key) {}
+             const std::string& key, std::set<std::string>* read)
+      : text_(text), table_(table), place_(place), key_(key), read_(read) {}
 
   Values evaluate() {
     Values result = sum();
@@ -249,6 +249,7 @@ class Expression {
       fail(fmt::format("column \"{}\" holds text (\"{}\" in line {}), expected numbers",
                        column.name, column.example, column.example_line));
     }
+    if (read_ != nullptr) read_->insert(column.name);
     return column.values;
   }
   Values constant(double value) const { return Values(table_.rows(), value); }
@@ -257,6 +258,7 @@ class Expression {
   const RawTable& table_;
   const FilePlace& place_;
   const std::string& key_;
+  std::set<std::string>* read_;
   std::size_t at_ = 0;
   int depth_ = 0;
 };
@@ -264,8 +266,9 @@ class Expression {
 }  // namespace
 
 std::vector<double> evaluate_expression(const std::string& expression, const RawTable& table,
-                                        const FilePlace& place, const std::string& key) {
-  return Expression(expression, table, place, key).evaluate();
+                                        const FilePlace& place, const std::string& key,
+                                        std::set<std::string>* read) {
+  return Expression(expression, table, place, key, read).evaluate();
 }
 
 }  // namespace sparflow

@@ -134,11 +134,12 @@ LogMapping parse_log_mapping(const std::string& path, const std::string& text) {
 void apply_mapping(const LogMapping& mapping, RawTable* table) {
   // All expressions see the file's own columns, also when one of them replaces such a column.
   std::vector<RawColumn> mapped;
+  std::set<std::string> read;
   for (const MappedColumn& column : mapping.columns) {
     RawColumn result;
     result.name = column.name;
-    result.values =
-        evaluate_expression(column.expression, *table, column.place, "columns." + column.name);
+    result.values = evaluate_expression(column.expression, *table, column.place,
+                                        "columns." + column.name, &read);
     // Division by zero, the root of a negative number: missing, like any hole in the log.
     for (double& v : result.values) {
       if (!std::isfinite(v)) v = std::numeric_limits<double>::quiet_NaN();
@@ -159,6 +160,7 @@ void apply_mapping(const LogMapping& mapping, RawTable* table) {
     }
     table->columns.erase(drop, table->columns.end());
   }
+  for (RawColumn& column : table->columns) column.mapped_from = read.count(column.name) > 0;
   for (RawColumn& column : mapped) {
     const auto same = std::find_if(table->columns.begin(), table->columns.end(),
                                    [&](const RawColumn& c) { return c.name == column.name; });

@@ -14,6 +14,7 @@ struct RawColumn {
   std::string unit;             ///< from a units row under the header, "" when there is none
   std::vector<double> values;   ///< NaN = missing
   bool text = false;            ///< most cells are not numbers
+  bool mapped_from = false;     ///< a mapping's expression reads it: no candidate signal of its own
   std::int64_t unreadable = 0;  ///< cells that are neither a number nor a mark for "missing"
   std::string example;          ///< the first such cell
   int example_line = 0;         ///< 1-based
