@@ -1,0 +1,147 @@
+#include "models/effects/effect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "models/effects/instant.h"
+#include "models/static_force.h"
+
+namespace sparflow {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+Matrix forces_of(const Machine& machine, const MachineSeries& log) {
+  StaticForce statics(machine);
+  const Eigen::Index n = log.samples();
+  Matrix result(n, machine.cylinder_count());
+  Eigen::VectorXd q(machine.joint_count());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    q = log.q.row(i);
+    if (!q.allFinite()) {
+      result.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+      continue;
+    }
+    statics.update(q.data(), log.payload[i], 0);
+    result.row(i) = statics.force().transpose();
+  }
+  return result;
+}
+
+}  // namespace
+
+const char* effect_stage_name(EffectStage stage) {
+  switch (stage) {
+    case EffectStage::kForce:
+      return "force";
+    case EffectStage::kFlow:
+      return "flow";
+    case EffectStage::kPressure:
+      return "pressure";
+    case EffectStage::kPump:
+      return "pump";
+    case EffectStage::kSensor:
+      return "sensor";
+  }
+  return "";
+}
+
+std::vector<int> Effect::places(const Machine& machine) const {
+  int count = 0;
+  switch (info().place) {
+    case EffectPlace::kMachine:
+      return {-1};
+    case EffectPlace::kJoint:
+      count = machine.joint_count();
+      break;
+    case EffectPlace::kCylinder:
+      count = machine.cylinder_count();
+      break;
+    case EffectPlace::kPump:
+      count = machine.pump_count();
+      break;
+  }
+  std::vector<int> all(static_cast<std::size_t>(count));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+                     std::span<const double> shape, Eigen::MatrixXd& columns) const {
+  const std::vector<EvidenceKind> kinds = shows_in();
+  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) return false;
+  if (kind != EvidenceKind::kForce && kind != EvidenceKind::kPump) return false;
+  const Eigen::Index n = log.samples();
+  std::vector<double> p;
+  Eigen::Index linear = 0;
+  for (const EffectParameter& parameter : info().parameters) {
+    if (parameter.linear) {
+      ++linear;
+      p.push_back(0.0);
+    }
+  }
+  p.insert(p.end(), shape.begin(), shape.end());
+  columns.setZero(n, linear);
+  if (kind == EvidenceKind::kForce && changes_machine()) {
+    const Matrix nominal = forces_of(*log.machine, log);
+    for (Eigen::Index k = 0; k < linear; ++k) {
+      // a step of the size that matters: exact for masses, the chord for angles
+      const double size = info().parameters[static_cast<std::size_t>(k)].typical;
+      Machine changed = *log.machine;
+      std::vector<double> unit = p;
+      unit[static_cast<std::size_t>(k)] = size;
+      change_machine(changed, at, unit);
+      columns.col(k) = (forces_of(changed, log).col(index) - nominal.col(index)) / size;
+    }
+    return columns.array().abs().maxCoeff() > 0.0 || !columns.allFinite();
+  }
+  Instant<double> instant = make_instant(*log.machine);
+  const auto count = static_cast<std::size_t>(
+      kind == EvidenceKind::kForce ? log.machine->cylinder_count() : log.machine->pump_count());
+  std::vector<double> out(count), demand(static_cast<std::size_t>(log.machine->cylinder_count()));
+  bool any = false;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    fill_instant(log, i, instant);
+    for (Eigen::Index k = 0; k < linear; ++k) {
+      std::fill(out.begin(), out.end(), 0.0);
+      std::fill(demand.begin(), demand.end(), 0.0);
+      p[static_cast<std::size_t>(k)] = 1.0;
+      if (kind == EvidenceKind::kForce) {
+        add_force(instant, at, p, out);
+      } else {
+        add_pump(instant, at, p, out);
+        add_demand(instant, at, p, demand);
+        const int leader = instant.leader[static_cast<std::size_t>(index)];
+        if (leader >= 0)
+          out[static_cast<std::size_t>(index)] += demand[static_cast<std::size_t>(leader)];
+      }
+      p[static_cast<std::size_t>(k)] = 0.0;
+      columns(i, k) = out[static_cast<std::size_t>(index)];
+      any = any || columns(i, k) != 0.0;
+    }
+  }
+  return any;
+}
+
+std::string effect_key(const EffectInfo& info, const Machine& machine, int at) {
+  const auto i = static_cast<std::size_t>(at);
+  switch (info.place) {
+    case EffectPlace::kMachine:
+      return info.id;
+    case EffectPlace::kJoint:
+      return info.id + ":" + machine.joints[i].name;
+    case EffectPlace::kCylinder:
+      return info.id + ":" + machine.cylinders[i].name;
+    case EffectPlace::kPump:
+      return info.id + ":" + machine.pumps[i].name;
+  }
+  return info.id;
+}
+
+std::string AppliedEffect::key(const Machine& machine) const {
+  return effect_key(effect->info(), machine, at);
+}
+
+}  // namespace sparflow

@@ -1,0 +1,14 @@
+#pragma once
+/// Filters in time over a log's runs: lags and delays.
+#include "models/effects/series.h"
+
+namespace sparflow {
+
+/// tau dy/dt + y = x, exact for x constant over each interval, started at rest (y = x) in every run. A NaN holds y.
+/// @param tau [s] > 0
+Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double tau);
+
+/// x(t - delay), linear between samples, the first value before a run's start. @param delay [s], of either sign
+Eigen::VectorXd delayed(const MachineSeries& log, const Eigen::VectorXd& x, double delay);
+
+}  // namespace sparflow

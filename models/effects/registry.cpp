@@ -1,0 +1,74 @@
+#include "models/effects/registry.h"
+
+#include <fmt/format.h>
+
+#include "models/effects/builtin.h"
+#include "models/error.h"
+
+namespace sparflow {
+namespace {
+
+std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
+  static std::vector<std::unique_ptr<Effect>> all = [] {
+    std::vector<std::unique_ptr<Effect>> list;
+    list.push_back(make_unmodelled_mass());
+    list.push_back(make_coulomb_friction());
+    list.push_back(make_pump_lag());
+    return list;
+  }();
+  return all;
+}
+
+}  // namespace
+
+const std::vector<std::unique_ptr<Effect>>& effect_catalogue() { return mutable_catalogue(); }
+
+const Effect* find_effect(const std::string& id) {
+  for (const auto& effect : effect_catalogue()) {
+    if (effect->info().id == id) return effect.get();
+  }
+  return nullptr;
+}
+
+const Effect* add_user_effect(std::unique_ptr<Effect> effect) {
+  const std::string& id = effect->info().id;
+  if (find_effect(id) != nullptr) {
+    throw InputError({}, id,
+                     fmt::format("an effect called '{}' exists already: choose another id", id));
+  }
+  mutable_catalogue().push_back(std::move(effect));
+  return mutable_catalogue().back().get();
+}
+
+EffectAt parse_effect(const std::string& key, const Machine& machine) {
+  const std::size_t colon = key.find(':');
+  const std::string id = key.substr(0, colon);
+  const Effect* effect = find_effect(id);
+  if (effect == nullptr) {
+    std::vector<std::string> ids;
+    for (const auto& known : effect_catalogue()) ids.push_back(known->info().id);
+    const std::string near = nearest_word(id, ids);
+    throw InputError({}, key,
+                     fmt::format("there is no effect '{}'{}; `sparflow effects` lists them", id,
+                                 near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near)));
+  }
+  std::vector<std::string> names;
+  for (const int at : effect->places(machine)) {
+    const std::string full = effect_key(effect->info(), machine, at);
+    if (full == key) return {effect, at};
+    names.push_back(full);
+  }
+  if (names.size() == 1 && colon == std::string::npos) return parse_effect(names.front(), machine);
+  throw InputError({}, key,
+                   fmt::format("on this machine '{}' can sit at: {}", id, fmt::join(names, ", ")));
+}
+
+std::vector<EffectAt> candidates(const Machine& machine) {
+  std::vector<EffectAt> all;
+  for (const auto& effect : effect_catalogue()) {
+    for (const int at : effect->places(machine)) all.push_back({effect.get(), at});
+  }
+  return all;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,66 @@
+#pragma once
+/// A log as the effects see it: what was measured and what the model computes from the measured pose, sample
+/// by sample, SI. Filled by identification from a log; effects with memory (lags, delays, hysteresis) work on it
+/// directly, laws without memory are evaluated sample by sample. An empty vector: not measured. NaN: not valid.
+#include <Eigen/Dense>
+#include <utility>
+#include <vector>
+
+#include "models/machine.h"
+
+namespace sparflow {
+
+struct CylinderSeries {
+  Eigen::VectorXd length;        ///< [m] pin to pin
+  Eigen::VectorXd rate;          ///< dx/dq [m/rad] or [-]
+  Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
+  Eigen::VectorXd acceleration;  ///< [m/s^2]
+  Eigen::VectorXd
+      static_force;         ///< [N] by virtual work of the machine file, positive pushes the rod in
+  Eigen::VectorXd force;    ///< [N] measured, through the position's filter
+  Eigen::VectorXd command;  ///< [-] -1..1, as logged
+  Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] chambers, through the position's filter
+  /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals.h).
+  Eigen::VectorXi direction;
+  Eigen::VectorXd flow;  ///< [m^3/s] into the chamber of that side, never negative; 0 at rest
+  Eigen::VectorXd return_flow;  ///< [m^3/s] out of the other chamber, never negative; 0 at rest
+};
+
+struct PumpSeries {
+  Eigen::VectorXd pressure;  ///< [Pa] measured, through the filter
+  /// [Pa] what the law without missing effects asks for: max(standby, measured working pressures + margins),
+  /// not filtered. Empty: working pressures or commands are not measured.
+  Eigen::VectorXd demand;
+  Eigen::VectorXi leader;  ///< cylinder that sets it, -1 = standby
+};
+
+struct MachineSeries {
+  const Machine* machine = nullptr;
+  double step = 0.0;                                        ///< [s] median sampling interval
+  Eigen::VectorXd time;                                     ///< [s]
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> runs;  ///< gap-free [first, last)
+  Eigen::MatrixXd q, qd, qdd;                               ///< [samples x joints]
+  Eigen::VectorXd payload;                                  ///< [kg]
+  Eigen::VectorXd oil;                                      ///< [degC]
+  std::vector<CylinderSeries> cylinders;
+  std::vector<PumpSeries> pumps;
+
+  Eigen::Index samples() const { return time.size(); }
+};
+
+/// Where evidence for an effect is looked for: one measured quantity against what comes before it.
+enum class EvidenceKind {
+  kForce,  ///< cylinder: measured force - static force [N]
+  kFlow,   ///< cylinder: rod speed dx/dt, given the command [m/s]
+  /// cylinder: return chamber's pressure while extending, given the return flow [Pa]; only where the
+  /// return line sets it
+  kReturnExtend,
+  kReturnRetract,  ///< the same while retracting
+  /// cylinder: supply chamber's pressure while extending, given flow and measured force [Pa]; only where a
+  /// counterbalance valve sets it, the force then appears in the return chamber
+  kSupplyExtend,
+  kSupplyRetract,  ///< the same while retracting
+  kPump            ///< pump: pressure - demand of the measured working pressures [Pa]
+};
+
+}  // namespace sparflow
