@@ -1,9 +1,11 @@
 #pragma once
 /// The one model object: a machine and what was learned about it. Identification, optimiser and pages all
 /// evaluate this, so whatever is learned once is seen by all of them. Immutable once built.
+#include <limits>
 #include <string>
 #include <vector>
 
+#include "models/effects/effect.h"
 #include "models/gaussian_process.h"
 #include "models/machine.h"
 #include "models/static_force.h"
@@ -44,10 +46,34 @@ struct StageQuality {
   long n = 0;
 };
 
+/// A parameter of an effect as it was when a step was made.
+struct StepParameter {
+  std::string name;
+  std::string unit;                                           ///< as shown, "bar/(l/min)^2"
+  double value = 0.0;                                         ///< [SI]
+  double lower95 = std::numeric_limits<double>::quiet_NaN();  ///< [SI] NaN = not known
+  double upper95 = std::numeric_limits<double>::quiet_NaN();  ///< [SI]
+};
+
+/// One step of extending a model: what was added or taken back, from which data, with which gain. A record, so it
+/// may name effects this model no longer has.
+struct ModelStep {
+  std::string added;             ///< "coulomb_friction:boom", empty when the step only removes
+  std::string removed;           ///< the same of an effect taken back, usually empty
+  std::string date;              ///< "2025-03-14", empty = not recorded
+  std::vector<DataSource> data;  ///< logs it was learned and judged on
+  std::vector<StepParameter> parameters;    ///< of the added effect
+  std::vector<StageQuality> before, after;  ///< on data held out
+  std::string stopped_because;  ///< why no step followed, with the last one; empty = one may follow
+};
+
 struct CraneModel {
-  Machine machine;
+  Machine machine;                       ///< as its file says; `effective_machine` has the effects'
   std::vector<CylinderModel> cylinders;  ///< by cylinder
   std::vector<PumpModel> pumps;          ///< by pump
+  std::vector<AppliedEffect>
+      effects;                   ///< physical effects beyond paper eqs. 2-16, in the order added
+  std::vector<ModelStep> steps;  ///< how they came in
   std::vector<DataSource> data;
   std::vector<StageQuality> quality;
 

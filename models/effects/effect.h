@@ -5,6 +5,7 @@
 /// Signs. A force effect adds to the force the cylinder must carry (measured force = static force + effects;
 /// friction while extending is positive). A pressure effect adds to a chamber, a pump effect to the pump.
 #include <Eigen/Dense>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -103,6 +104,15 @@ class Effect {
   virtual void add_pump(const Instant<double>&, int, std::span<const double>,
                         std::span<double>) const {}
   virtual void add_pump(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {}
+
+  /// Largest flow of pump `pump` that this effect leaves [m^3/s]; infinity = no say. A motion keeps below it.
+  virtual double flow_limit(const Machine& /*machine*/, int /*pump*/, int /*at*/,
+                            std::span<const double> /*p*/) const {
+    return std::numeric_limits<double>::infinity();
+  }
+
+  /// Text (YAML) that defines a user's effect, so that a model file can carry it; empty: built in.
+  virtual std::string definition() const { return {}; }
 
   // --- logs --------------------------------------------------------------------------------------------
 
