@@ -125,6 +125,8 @@ class Effect {
   /// @return false when the effect does not touch this quantity or the log lacks what it needs
   virtual bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                        std::span<const double> shape, Eigen::MatrixXd& columns) const;
+  /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
+  virtual bool columns_filtered() const { return false; }
 };
 
 /// Parameters of an effect that is part of a model.
