@@ -2,20 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
-#include "models/error.h"
 #include "models/machine_file.h"
-#include "models/yaml_reader.h"
+#include "models/model_file_cursor.h"
+#include "models/model_file_effects.h"
 
 namespace sparflow {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = ModelJson;
+using Cursor = ModelCursor;
 
 // ---------------------------------------------------------------- writing
 
@@ -72,98 +70,6 @@ Json process_json(const GaussianProcess& process) {
 }
 
 // ---------------------------------------------------------------- reading
-
-/// A value of the file with its key path, for messages.
-class Cursor {
- public:
-  Cursor(const Json& value, const std::string& file, std::string path)
-      : value_(&value), file_(&file), path_(std::move(path)) {}
-
-  [[noreturn]] void fail(const std::string& message) const {
-    throw InputError({*file_, 0, 0}, path_, message);
-  }
-  [[noreturn]] void fail_expected(const std::string& expected) const {
-    std::string found =
-        value_->is_structured()
-            ? fmt::format("{} of {} element(s)", value_->is_array() ? "a list" : "an object",
-                          value_->size())
-            : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
-    if (found.size() > 60) found = found.substr(0, 57) + "...";
-    fail("got " + found + ", expected " + expected);
-  }
-  bool is_null() const { return value_->is_null(); }
-  std::size_t size() const { return value_->size(); }
-  const std::string& path() const { return path_; }
-
-  /// Checks that the value is an object with these keys and no others.
-  const Cursor& keys(const std::vector<std::string>& known) const {
-    if (!value_->is_object()) fail_expected("an object with the keys " + listed(known));
-    for (auto it = value_->begin(); it != value_->end(); ++it) {
-      if (std::find(known.begin(), known.end(), it.key()) == known.end()) {
-        fail(fmt::format("unknown key \"{}\"{}", it.key(), suggestion(it.key(), known)));
-      }
-    }
-    return *this;
-  }
-  bool has(const std::string& key) const { return value_->is_object() && value_->contains(key); }
-  Cursor at(const std::string& key, const std::string& expected) const {
-    const std::string child = path_.empty() ? key : path_ + "." + key;
-    if (!has(key)) {
-      throw InputError({*file_, 0, 0}, child,
-                       fmt::format("missing; expected {}. Is the file complete?", expected));
-    }
-    return {value_->at(key), *file_, child};
-  }
-  Cursor element(std::size_t i, const std::string& name) const {
-    return {value_->at(i), *file_, fmt::format("{}[{}]", path_, name)};
-  }
-  std::vector<Cursor> list(const std::string& expected) const {
-    if (!value_->is_array()) fail_expected(expected);
-    std::vector<Cursor> out;
-    for (std::size_t i = 0; i < value_->size(); ++i) out.push_back(element(i, std::to_string(i)));
-    return out;
-  }
-  double number(const std::string& expected) const {
-    if (!value_->is_number()) fail_expected(expected);
-    const double v = value_->get<double>();
-    if (!std::isfinite(v)) fail_expected(expected);
-    return v;
-  }
-  double non_negative(const std::string& expected) const {
-    const double v = number(expected);
-    if (v < 0.0) fail_expected(expected);
-    return v;
-  }
-  long whole(const std::string& expected) const {
-    if (!value_->is_number_integer() || value_->get<double>() < 0.0 ||
-        value_->get<double>() > 1e15) {
-      fail_expected(expected);
-    }
-    return value_->get<long>();
-  }
-  std::string text(const std::string& expected) const {
-    if (!value_->is_string()) fail_expected(expected);
-    return value_->get<std::string>();
-  }
-  Eigen::ArrayXd numbers(const std::string& expected) const {
-    const std::vector<Cursor> values = list(expected);
-    Eigen::ArrayXd out(static_cast<Eigen::Index>(values.size()));
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      out[static_cast<Eigen::Index>(i)] = values[i].number("a finite number");
-    }
-    return out;
-  }
-  Range range(const std::string& expected) const {
-    const Eigen::ArrayXd v = numbers(expected);
-    if (v.size() != 2 || v[0] > v[1]) fail_expected(expected);
-    return {v[0], v[1]};
-  }
-
- private:
-  const Json* value_;
-  const std::string* file_;
-  std::string path_;
-};
 
 GaussianProcess read_process(const Cursor& c) {
   if (c.is_null()) return {};
@@ -248,61 +154,6 @@ std::vector<Cursor> matched(const Cursor& root, const std::string& key,
   return named;
 }
 
-void read_provenance(const Cursor& root, CraneModel& model) {
-  const std::string whole = "a whole number that is not negative";
-  for (const Cursor& d : root.at("data", "a list of logs").list("a list of logs")) {
-    d.keys({"file", "sha256", "rows", "use"});
-    DataSource source;
-    source.file = d.at("file", "a file name").text("a file name");
-    const Cursor hash = d.at("sha256", "64 hexadecimal digits");
-    source.sha256 = hash.text("64 hexadecimal digits");
-    if (source.sha256.size() != 64 ||
-        source.sha256.find_first_not_of("0123456789abcdef") != std::string::npos) {
-      hash.fail_expected("64 hexadecimal digits");
-    }
-    source.rows = d.at("rows", whole).whole(whole);
-    source.use = d.at("use", "\"train\" or \"test\"").text("\"train\" or \"test\"");
-    if (source.use != "train" && source.use != "test") {
-      d.at("use", "").fail_expected("\"train\" or \"test\"");
-    }
-    model.data.push_back(std::move(source));
-  }
-  for (const Cursor& q : root.at("quality", "a list of stages").list("a list of stages")) {
-    q.keys({"stage", "at", "data", "rmse", "unit", "fit_percent", "n"});
-    StageQuality quality;
-    quality.stage = q.at("stage", "a stage").text("a stage");
-    quality.at = q.at("at", "a name").text("a name");
-    quality.data = q.at("data", "which data").text("which data");
-    quality.rmse = q.at("rmse", "a number").non_negative("a number >= 0");
-    quality.unit = q.at("unit", "a unit").text("a unit");
-    const Cursor fit = q.at("fit_percent", "a number or null");
-    quality.fit_percent =
-        fit.is_null() ? std::numeric_limits<double>::quiet_NaN() : fit.number("a number or null");
-    quality.n = q.at("n", whole).whole(whole);
-    model.quality.push_back(std::move(quality));
-  }
-}
-
-/// Nothing of the model may be left out silently: what this program cannot evaluate is an error.
-void refuse_effects(const Cursor& root) {
-  const std::string expected = "a list of physical effects";
-  const std::vector<Cursor> effects = root.at("effects", expected).list(expected);
-  if (!effects.empty()) {
-    std::string id = "without an id";
-    if (effects[0].has("id")) id = "\"" + effects[0].at("id", "").text("an effect's id") + "\"";
-    effects[0].fail(fmt::format(
-        "this program does not know the physical effect {}; without it the model would be wrong. "
-        "Update the program, or fit the model again",
-        id));
-  }
-  const std::vector<Cursor> steps = root.at("steps", "a list").list("a list");
-  if (!steps.empty()) {
-    steps[0].fail(
-        "got a step of extending the model, expected none: no effect is in this model. "
-        "Update the program, or fit the model again");
-  }
-}
-
 FilePlace place_of_byte(const std::string& file, const std::string& text, std::size_t byte) {
   FilePlace place{file, 1, 1};
   for (std::size_t i = 0; i + 1 < byte && i < text.size(); ++i) {
@@ -349,23 +200,7 @@ std::string model_to_json(const CraneModel& model) {
   root["machine"] = {{"name", model.machine.name},
                      {"yaml", model.machine.source_text.empty() ? write_machine(model.machine)
                                                                 : model.machine.source_text}};
-  root["data"] = Json::array();
-  for (const DataSource& d : model.data) {
-    root["data"].push_back(
-        {{"file", d.file}, {"sha256", d.sha256}, {"rows", d.rows}, {"use", d.use}});
-  }
-  root["quality"] = Json::array();
-  for (const StageQuality& q : model.quality) {
-    root["quality"].push_back({{"stage", q.stage},
-                               {"at", q.at},
-                               {"data", q.data},
-                               {"rmse", q.rmse},
-                               {"unit", q.unit},
-                               {"fit_percent", q.fit_percent},  // NaN becomes null
-                               {"n", q.n}});
-  }
-  root["effects"] = Json::array();
-  root["steps"] = Json::array();
+  write_provenance(model, root);
   root["pumps"] = Json::array();
   for (std::size_t p = 0; p < model.pumps.size(); ++p) {
     root["pumps"].push_back(
@@ -404,8 +239,8 @@ CraneModel model_from_json(const std::string& text, const std::string& file) {
                     number, program_version(), kModelFileVersion));
   }
   if (number < 1) version.fail_expected(expected_version);
-  root.keys({"sparflow_model", "program", "machine", "data", "quality", "effects", "steps", "pumps",
-             "cylinders"});
+  root.keys({"sparflow_model", "program", "machine", "data", "quality", "user_effects", "effects",
+             "steps", "pumps", "cylinders"});
   root.at("program", "a program's name").text("a program's name");
   const Cursor machine = root.at("machine", "an object").keys({"name", "yaml"});
   machine.at("name", "a name").text("a name");
@@ -413,7 +248,6 @@ CraneModel model_from_json(const std::string& text, const std::string& file) {
       machine.at("yaml", "the machine file's text").text("the machine file's text");
   CraneModel model = CraneModel::untrained(parse_machine(yaml, file + " (machine.yaml)", ""));
   read_provenance(root, model);
-  refuse_effects(root);
   const std::vector<Cursor> pumps = matched(root, "pumps", model.machine.pumps);
   for (std::size_t p = 0; p < pumps.size(); ++p) {
     const std::string expected = "a pressure >= 0 [Pa]";

@@ -25,6 +25,10 @@ std::string edited(const std::string& good, void (*edit)(Json&)) {
   return root.dump();
 }
 Json& process(Json& root) { return root["cylinders"][0]["extend"]; }
+Json friction(const char* at) {
+  const Json fc = {{"name", "Fc"}, {"value", 4e3}, {"ci95", nullptr}};
+  return {{"id", "coulomb_friction"}, {"at", at}, {"parameters", Json::array({fc})}};
+}
 
 const BrokenModel kBroken[] = {
     {"empty",
@@ -117,16 +121,46 @@ const BrokenModel kBroken[] = {
        return edited(good, [](Json& r) { r["cylinders"].push_back(r["cylinders"][0]); });
      },
      {"cylinders", "2 element(s)", "one element for each", "arm"}},
-    {"effect",
+    {"effect_unknown",
      [](std::string good) {
-       return edited(good, [](Json& r) { r["effects"].push_back({{"id", "inertia"}}); });
+       return edited(good, [](Json& r) { r["effects"].push_back({{"id", "coulomb_frictoin"}}); });
      },
-     {"effects[0]", "does not know the physical effect \"inertia\"", "Update the program"}},
+     {"effects[0].id", "does not know the physical effect \"coulomb_frictoin\"",
+      "did you mean \"coulomb_friction\"", "Update the program"}},
+    {"effect_place",
+     [](std::string good) {
+       return edited(good, [](Json& r) { r["effects"].push_back(friction("boom")); });
+     },
+     {"effects[0].at", "got \"boom\"", "arm"}},
+    {"effect_parameters",
+     [](std::string good) {
+       return edited(good, [](Json& r) {
+         r["effects"].push_back(friction("arm"));
+         r["effects"][0]["parameters"] = Json::array();
+       });
+     },
+     {"effects[0].parameters", "one element for each parameter", "Fc"}},
+    {"effect_other_parameter",
+     [](std::string good) {
+       return edited(good, [](Json& r) {
+         r["effects"].push_back(friction("arm"));
+         r["effects"][0]["parameters"][0]["name"] = "mu";
+       });
+     },
+     {"effects[0].parameters[0].name", "got \"mu\"", "\"Fc\""}},
+    {"effect_interval",
+     [](std::string good) {
+       return edited(good, [](Json& r) {
+         r["effects"].push_back(friction("arm"));
+         r["effects"][0]["parameters"][0]["ci95"] = {2.0, 1.0};
+       });
+     },
+     {"effects[0].parameters[0].ci95", "[lower, upper] or null"}},
     {"step",
      [](std::string good) {
        return edited(good, [](Json& r) { r["steps"].push_back({{"added", "inertia"}}); });
      },
-     {"steps[0]", "expected none"}},
+     {"steps[0].removed", "missing"}},
     {"hash",
      [](std::string good) { return edited(good, [](Json& r) { r["data"][0]["sha256"] = "abc"; }); },
      {"data[0].sha256", "got \"abc\"", "64 hexadecimal digits"}},

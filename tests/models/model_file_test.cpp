@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "broken_model_support.h"
+#include "models/effects/registry.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -81,6 +82,61 @@ TEST(ModelFile, SavesAndLoads) {
   std::filesystem::remove(path);
   EXPECT_THROW(load_model(path), InputError);
   EXPECT_THROW(save_model(small_model(), "no/such/folder/m.json"), InputError);
+}
+
+/// Every effect of the catalogue at every place it can sit on this machine.
+TEST(ModelFile, KeepsEveryEffectAndItsSteps) {
+  CraneModel model = small_model();
+  for (const EffectAt& candidate : candidates(model.machine)) {
+    AppliedEffect e{candidate.effect, candidate.at, {}, {}, {}};
+    for (const EffectParameter& p : candidate.effect->info().parameters) {
+      e.values.push_back(p.typical / 3.0);
+      e.lower95.push_back(p.typical / 7.0);
+      e.upper95.push_back(p.typical / 1.5);
+    }
+    if (model.effects.size() % 2 == 1) {  // intervals need not be known
+      e.lower95.clear();
+      e.upper95.clear();
+    }
+    model.effects.push_back(e);
+  }
+  ASSERT_GE(model.effects.size(), 3u);
+  ModelStep step;
+  step.added = "coulomb_friction:arm";
+  step.removed = "an_effect_no_longer_known:arm";
+  step.date = "2025-03-14";
+  step.data = model.data;
+  step.parameters = {{"Fc", "N", 4e3 / 3.0, 3.5e3 / 3.0, 4.5e3 / 3.0}, {"x", "bar", 1.0}};
+  step.before = step.after = model.quality;
+  step.after[0].rmse /= 3.0;
+  step.stopped_because = "nothing more is missing";
+  model.steps = {step, step};
+  model.steps[1].stopped_because.clear();
+
+  const std::string text = model_to_json(model);
+  const CraneModel read = model_from_json(text, "m.json");
+  EXPECT_EQ(text, model_to_json(read));
+  ASSERT_EQ(read.effects.size(), model.effects.size());
+  for (std::size_t i = 0; i < model.effects.size(); ++i) {
+    const AppliedEffect &a = model.effects[i], &b = read.effects[i];
+    EXPECT_EQ(a.effect, b.effect);
+    EXPECT_EQ(a.at, b.at);
+    EXPECT_EQ(a.values, b.values);
+    EXPECT_EQ(a.lower95, b.lower95);
+    EXPECT_EQ(a.upper95, b.upper95);
+  }
+  ASSERT_EQ(read.steps.size(), 2u);
+  EXPECT_EQ(read.steps[0].added, step.added);
+  EXPECT_EQ(read.steps[0].removed, step.removed);
+  EXPECT_EQ(read.steps[0].date, step.date);
+  EXPECT_EQ(read.steps[0].stopped_because, step.stopped_because);
+  EXPECT_EQ(read.steps[0].data[0].sha256, step.data[0].sha256);
+  EXPECT_EQ(read.steps[0].parameters[0].value, step.parameters[0].value);
+  EXPECT_EQ(read.steps[0].parameters[0].upper95, step.parameters[0].upper95);
+  EXPECT_TRUE(std::isnan(read.steps[0].parameters[1].lower95));
+  EXPECT_EQ(read.steps[0].before[0].rmse, step.before[0].rmse);
+  EXPECT_EQ(read.steps[0].after[0].rmse, step.after[0].rmse);
+  EXPECT_EQ(read.steps[1].stopped_because, "");
 }
 
 TEST(ModelFile, SaysWhichVersionWroteIt) {
