@@ -9,6 +9,17 @@ namespace sparflow {
 std::unique_ptr<Effect> make_coulomb_friction();
 std::unique_ptr<Effect> make_unmodelled_mass();
 std::unique_ptr<Effect> make_pump_lag();
+std::unique_ptr<Effect> make_valve_deadband();
+std::unique_ptr<Effect> make_valve_lag();
+std::unique_ptr<Effect> make_flow_saturation();
+std::unique_ptr<Effect> make_leakage();
+std::unique_ptr<Effect> make_compressibility();
+std::unique_ptr<Effect> make_return_back_pressure();
+std::unique_ptr<Effect> make_counterbalance();
+std::unique_ptr<Effect> make_oil_temperature();
+std::unique_ptr<Effect> make_line_loss();
+std::unique_ptr<Effect> make_flow_dependent_margin();
+std::unique_ptr<Effect> make_torque_limit();
 
 /// Unit vector from a joint towards the next (or the tip), in the joint's frame: "along the link".
 Eigen::Vector3d link_direction(const Machine& machine, int joint);

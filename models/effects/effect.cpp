@@ -68,6 +68,14 @@ std::vector<int> Effect::places(const Machine& machine) const {
   return all;
 }
 
+std::vector<double> Effect::grid(const MachineSeries&, int, int shape_index) const {
+  int k = 0;
+  for (const EffectParameter& parameter : info().parameters) {
+    if (!parameter.linear && k++ == shape_index) return parameter.grid;
+  }
+  return {};
+}
+
 bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                      std::span<const double> shape, Eigen::MatrixXd& columns) const {
   const std::vector<EvidenceKind> kinds = shows_in();

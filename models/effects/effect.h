@@ -125,6 +125,10 @@ class Effect {
   /// @return false when the effect does not touch this quantity or the log lacks what it needs
   virtual bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                        std::span<const double> shape, Eigen::MatrixXd& columns) const;
+  /// Values of the nonlinear parameter `shape_index` (counted among those) to search on this log [SI]. The
+  /// default is the parameter's own grid; limits and thresholds depend on what the log reaches. Empty: the log
+  /// lacks what the effect needs.
+  virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
   /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
 };

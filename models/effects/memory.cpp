@@ -34,4 +34,30 @@ Eigen::VectorXd delayed(const MachineSeries& log, const Eigen::VectorXd& x, doub
   return y;
 }
 
+Eigen::VectorXd moving_average(const MachineSeries& log, const Eigen::VectorXd& x,
+                               const Eigen::VectorXi& state, double width) {
+  Eigen::VectorXd y = x;
+  const auto same = [&](Eigen::Index i, Eigen::Index k) {
+    return state.size() == 0 || state[i] == state[k];
+  };
+  for (const auto& [first, last] : log.runs) {
+    for (Eigen::Index i = first; i < last; ++i) {
+      if (!std::isfinite(x[i])) continue;
+      double sum = x[i];
+      int count = 1;
+      const double half = 0.5 * width;
+      Eigen::Index back = i - 1, ahead = i + 1;
+      // symmetric: as far as both sides reach, so that a slope is kept
+      while (back >= first && ahead < last && same(back, i) && same(ahead, i) &&
+             log.time[i] - log.time[back] <= half && log.time[ahead] - log.time[i] <= half &&
+             std::isfinite(x[back]) && std::isfinite(x[ahead])) {
+        sum += x[back--] + x[ahead++];
+        count += 2;
+      }
+      y[i] = sum / count;
+    }
+  }
+  return y;
+}
+
 }  // namespace sparflow

@@ -11,4 +11,10 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
 /// x(t - delay), linear between samples, the first value before a run's start. @param delay [s], of either sign
 Eigen::VectorXd delayed(const MachineSeries& log, const Eigen::VectorXd& x, double delay);
 
+/// Mean over a window centred on each sample, within its run and within a stretch of one `state` (the leader:
+/// a signal may jump where it changes), without NaN; NaN stays NaN.
+/// @param state [samples] or empty  @param width [s]
+Eigen::VectorXd moving_average(const MachineSeries& log, const Eigen::VectorXd& x,
+                               const Eigen::VectorXi& state, double width);
+
 }  // namespace sparflow

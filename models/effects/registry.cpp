@@ -13,7 +13,18 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
     std::vector<std::unique_ptr<Effect>> list;
     list.push_back(make_unmodelled_mass());
     list.push_back(make_coulomb_friction());
+    list.push_back(make_valve_deadband());
+    list.push_back(make_valve_lag());
+    list.push_back(make_flow_saturation());
+    list.push_back(make_leakage());
+    list.push_back(make_compressibility());
+    list.push_back(make_return_back_pressure());
+    list.push_back(make_counterbalance());
+    list.push_back(make_oil_temperature());
     list.push_back(make_pump_lag());
+    list.push_back(make_line_loss());
+    list.push_back(make_flow_dependent_margin());
+    list.push_back(make_torque_limit());
     return list;
   }();
   return all;

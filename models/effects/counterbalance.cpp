@@ -1,0 +1,94 @@
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+/// With pilot ratio R and setting p_set, opening needs p_load + R p_supply + (A_supply/A_hold) p_supply = p_set:
+///   p_supply = (p_set - p_load) / (R + A_supply/A_hold),
+/// so slope = 1 / (R + A_supply/A_hold) and setting = slope * p_set.
+class Counterbalance final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "counterbalance",
+        .title = "counterbalance valve sets the supply while the load helps",
+        .stage = EffectStage::kPressure,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"setting",
+                        "bar",
+                        units::kBar,
+                        0.0,
+                        200 * units::kBar,
+                        40 * units::kBar,
+                        "supply pressure that opens it without load",
+                        true,
+                        {}},
+                       {"slope",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        0.2,
+                        "fall of the supply pressure by load pressure, 1 / (pilot ratio + "
+                        "A_supply/A_hold)",
+                        true,
+                        {}}},
+        .equation =
+            "p_supply = max(static branch, setting - slope p_load), p_load = -side F/A_hold",
+        .signals = {"both chamber pressures", "position"},
+        .confused_with = {"return_back_pressure", "coulomb_friction", "load_friction"},
+        .separated_by = "lower at the same speed with three loads",
+        .citation =
+            "P. Chapple (2003), Principles of Hydraulic System Design, ch. 4 (over-centre "
+            "valves)",
+        .in_motion = "pressure: of the side towards which the load helps"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override {
+    return {EvidenceKind::kSupplyExtend, EvidenceKind::kSupplyRetract};
+  }
+
+  template <class T>
+  void add_pressure_law(const Instant<T>& s, int at, std::span<const double> p,
+                        std::span<T> out) const {
+    const auto i = static_cast<std::size_t>(at);
+    const int side = s.side[i];
+    if (side == 0) return;
+    const Cylinder& c = s.machine->cylinders[i];
+    // pressure by which the load helps, in the chamber that holds it; negative when it opposes
+    const T load = s.force[i] * (-side / return_area(c, side));
+    T rise = p[0] - p[1] * load;
+    // an opposing load asks for part of that already
+    const T opposed = s.force[i] * (side / supply_area(c, side));
+    if (opposed > T(0.0)) rise = rise - opposed;
+    if (rise > T(0.0)) out[i] += rise;
+  }
+  SPARFLOW_EFFECT_LAW(add_pressure)
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double>, Eigen::MatrixXd& columns) const override {
+    const int side = supply_side(kind);
+    if (side == 0 || index != at) return false;
+    const auto i = static_cast<std::size_t>(at);
+    const CylinderSeries& c = log.cylinders[i];
+    const double area = return_area(log.machine->cylinders[i], side);
+    const Eigen::VectorXd& force = carried_force(c);
+    columns.setZero(log.samples(), 2);
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      if (c.direction[k] != side) continue;
+      columns(k, 0) = 1.0;
+      columns(k, 1) = force[k] * side / area;  // minus the pressure by which the load helps
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_counterbalance() { return std::make_unique<Counterbalance>(); }
+
+}  // namespace sparflow

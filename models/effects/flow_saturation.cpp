@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/valve_flow.h"
+
+namespace sparflow {
+namespace {
+
+class FlowSaturation final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "flow_saturation",
+        .title = "pump cannot deliver what the valves ask for",
+        .stage = EffectStage::kFlow,
+        .place = EffectPlace::kPump,
+        .parameters = {{"share",
+                        "-",
+                        1.0,
+                        0.5,
+                        1.5,
+                        1.0,
+                        "share of the excess that is missing, about 1",
+                        true,
+                        {}},
+                       {"limit",
+                        "l/min",
+                        units::kLitrePerMinute,
+                        2 * units::kLitrePerMinute,
+                        2000 * units::kLitrePerMinute,
+                        100 * units::kLitrePerMinute,
+                        "largest flow of the pump",
+                        false,
+                        {10 * units::kLitrePerMinute, 30 * units::kLitrePerMinute,
+                         100 * units::kLitrePerMinute, 300 * units::kLitrePerMinute}}},
+        .equation = "Q_i = Q_i(u) min(1, limit / sum of Q(u))",
+        .signals = {"commands", "position"},
+        .confused_with = {"torque_limit", "valve_deadband"},
+        .separated_by = "each function at full command alone, then all together",
+        .citation =
+            "H. Murrenhoff (2011), Grundlagen der Fluidtechnik, Teil 1: Hydraulik (sections "
+            "that share the flow in proportion)",
+        .in_motion = "limit: the pump's flow stays below it"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    std::vector<int> found;
+    for (int p = 0; p < machine.pump_count(); ++p) {
+      if (!machine.pumps[static_cast<std::size_t>(p)].feeds.empty()) found.push_back(p);
+    }
+    return found;
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  double flow_limit(const Machine&, int pump, int at, std::span<const double> p) const override {
+    return pump == at ? p[1] : std::numeric_limits<double>::infinity();
+  }
+
+  std::vector<double> grid(const MachineSeries& log, int at, int) const override {
+    const Demand demand(log, at, std::numeric_limits<double>::infinity());
+    if (!demand.known || !(demand.largest > 0.0)) return {};
+    std::vector<double> limits;
+    for (const double part : {0.45, 0.53, 0.6, 0.66, 0.72, 0.78, 0.84, 0.9, 0.95}) {
+      limits.push_back(part * demand.largest);
+    }
+    return limits;
+  }
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    if (kind != EvidenceKind::kFlow || log.machine->pump_of_cylinder(index) != at) return false;
+    const Demand demand(log, at, shape[0]);
+    if (!demand.known) return false;
+    const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(index)].command;
+    const SectionFit& fit = demand.fits[static_cast<std::size_t>(index)];
+    columns.setZero(log.samples(), 1);
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      columns(k, 0) = fit.gain(command[k]) * command[k] * (demand.served[k] - 1.0);
+    }
+    return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
+  }
+
+ private:
+  /// What the sections ask for. Their gains and the served share depend on each other: in turns until settled.
+  struct Demand {
+    bool known = true;
+    std::vector<SectionFit> fits;  ///< by cylinder
+    Eigen::VectorXd served;        ///< [samples] 0..1
+    double largest = 0.0;          ///< [m^3/s] sum of what is asked for
+
+    Demand(const MachineSeries& log, int pump, double limit) {
+      const Machine& machine = *log.machine;
+      const std::vector<int>& feeds = machine.pumps[static_cast<std::size_t>(pump)].feeds;
+      fits.resize(log.cylinders.size());
+      served = Eigen::VectorXd::Ones(log.samples());
+      for (const int i : feeds) {
+        known = known && log.cylinders[static_cast<std::size_t>(i)].command.size() > 0 &&
+                machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
+      }
+      if (!known) return;
+      constexpr int kTurns = 12;
+      for (int turn = 0; turn < kTurns; ++turn) {
+        Eigen::VectorXd asked = Eigen::VectorXd::Zero(log.samples());
+        for (const int i : feeds) {
+          const auto c = static_cast<std::size_t>(i);
+          const Eigen::VectorXd& u = log.cylinders[c].command;
+          fits[c] = fit_gains(log, i, u.cwiseProduct(served));
+          for (Eigen::Index k = 0; k < u.size(); ++k) {
+            if (std::isnan(u[k])) continue;
+            asked[k] += fits[c].gain(u[k]) * std::abs(u[k]) *
+                        supply_area(machine.cylinders[c], u[k] > 0.0 ? 1 : -1);
+          }
+        }
+        largest = asked.maxCoeff();
+        if (!(largest > limit)) return;
+        served =
+            (limit / asked.array()).min(1.0).matrix();  // nothing asked: limit / 0, fully served
+      }
+    }
+  };
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_flow_saturation() { return std::make_unique<FlowSaturation>(); }
+
+}  // namespace sparflow

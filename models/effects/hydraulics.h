@@ -1,0 +1,58 @@
+#pragma once
+/// Areas, rated flows and units that the hydraulic effects share.
+#include <vector>
+
+#include "models/effects/series.h"
+#include "models/machine.h"
+#include "models/units.h"
+
+namespace sparflow {
+
+namespace units {
+inline constexpr double kBarPerLpm = kBar / kLitrePerMinute;  ///< [Pa s/m^3] in one bar/(l/min)
+inline constexpr double kBarPerLpm2 =
+    kBar / (kLitrePerMinute * kLitrePerMinute);  ///< [Pa s^2/m^6] in one bar/(l/min)^2
+}  // namespace units
+
+/// Chamber that takes oil while moving to `side` (+1 extends, -1 retracts). [m^2]
+inline double supply_area(const Cylinder& c, int side) {
+  return side > 0 ? c.area_piston() : c.area_rod();
+}
+/// Chamber that gives oil back. [m^2]
+inline double return_area(const Cylinder& c, int side) { return supply_area(c, -side); }
+
+/// Cylinders with a bore.
+std::vector<int> hydraulic_cylinders(const Machine& machine);
+/// {-1}, or nothing when no cylinder has a bore: places of an effect of the whole hydraulic circuit.
+std::vector<int> whole_circuit(const Machine& machine);
+/// Pumps of one type.
+std::vector<int> pumps_of_type(const Machine& machine, PumpType type);
+
+/// Flow a section is built for, into the chamber of `side` [m^3/s]: the valve's full flow, else the pump's
+/// largest, else 1e-3 (60 l/min).
+double rated_flow(const Machine& machine, int cylinder, int side);
+
+/// Return flow of all cylinders together. [m^3/s]
+Eigen::VectorXd total_return_flow(const MachineSeries& log);
+/// Flow a pump delivers to all its cylinders. [m^3/s]
+Eigen::VectorXd pump_flow(const MachineSeries& log, int pump);
+/// The force a cylinder carries: measured, or by virtual work where none is measured. [N]
+const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder);
+
+/// What a rise of the return pressure does to the supply. p_supply = max(static branch, counterbalance branch): all
+/// of it appears while the load asks for more than that, nothing while the load helps; between the two the
+/// load's own share, so that the law stays continuous.
+/// @param rise A_return/A_supply times the rise [Pa], >= 0 or < 0
+/// @param load side * force / A_supply: pressure the load asks for, negative when it helps [Pa]
+template <class T>
+T opposed_rise(const T& rise, const T& load) {
+  if (!(load > T(0.0))) return T(0.0);
+  if (rise > T(0.0)) return load < rise ? load : rise;
+  return load < -rise ? -load : rise;
+}
+
+/// Side whose return or supply chamber `kind` speaks of: +1, -1, 0 for other kinds.
+int return_side(EvidenceKind kind);
+int supply_side(EvidenceKind kind);
+
+}  // namespace sparflow

@@ -1,0 +1,60 @@
+#include <cmath>
+
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+class Leakage final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "leakage",
+        .title = "oil leaks out of the chamber that holds the load",
+        .stage = EffectStage::kFlow,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"k",
+                        "l/min per 100 bar",
+                        units::kLitrePerMinute / (100 * units::kBar),
+                        0.0,
+                        20 * units::kLitrePerMinute / (100 * units::kBar),
+                        0.5 * units::kLitrePerMinute / (100 * units::kBar),
+                        "laminar leak over valve and piston",
+                        true,
+                        {}}},
+        .equation = "dx/dt = Q_valve/A - sign(F) k p_load/A_hold, p_load = |F|/A_hold",
+        .signals = {"position", "command"},
+        .confused_with = {"valve_deadband", "compressibility"},
+        .separated_by = "hold a load at command zero for a minute, at two loads",
+        .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 (leakage coefficients)",
+        .in_motion =
+            "nothing: the valve replaces the oil; the flow taken from the pump is that of "
+            "the motion"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double>, Eigen::MatrixXd& columns) const override {
+    if (kind != EvidenceKind::kFlow || index != at) return false;
+    const auto i = static_cast<std::size_t>(at);
+    const Cylinder& c = log.machine->cylinders[i];
+    const Eigen::VectorXd& force = carried_force(log.cylinders[i]);
+    columns.resize(log.samples(), 1);
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // of the chamber that holds
+      columns(k, 0) = -force[k] / (area * area);
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_leakage() { return std::make_unique<Leakage>(); }
+
+}  // namespace sparflow

@@ -1,0 +1,113 @@
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+/// [degC] the losses that pressure models and margins were learned with belong to this temperature.
+constexpr double kReference = 40.0;
+
+/// Lines are sized for the flow of their section, so that losses at rated flow are alike: one pressure for the
+/// whole machine, scaled by each section's share of its rated flow.
+class OilTemperature final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "oil_temperature",
+        .title = "laminar losses follow the oil's viscosity",
+        .stage = EffectStage::kPressure,
+        .place = EffectPlace::kMachine,
+        .parameters = {{"return_loss",
+                        "bar",
+                        units::kBar,
+                        0.0,
+                        40 * units::kBar,
+                        4 * units::kBar,
+                        "laminar loss from cylinder to tank at the section's full flow and 40 degC",
+                        true,
+                        {}},
+                       {"supply_loss",
+                        "bar",
+                        units::kBar,
+                        0.0,
+                        40 * units::kBar,
+                        4 * units::kBar,
+                        "laminar loss from pump to cylinder at the section's full flow and 40 degC",
+                        true,
+                        {}},
+                       {"beta",
+                        "1/K",
+                        1.0,
+                        0.005,
+                        0.1,
+                        0.03,
+                        "viscosity falls by this share a kelvin",
+                        false,
+                        {0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075}}},
+        .equation = "dp = loss(40 degC) Q/Q_full (exp(-beta (T - 40)) - 1)",
+        .signals = {"oil temperature", "chamber pressures", "pump pressure"},
+        .confused_with = {"return_back_pressure", "flow_dependent_margin", "drift of a sensor"},
+        .separated_by = "the same motions cold and warm",
+        .citation =
+            "O. Reynolds (1886), Phil. Trans. R. Soc. 177 (mu = mu0 exp(-beta T)); Merritt "
+            "(1967), ch. 2",
+        .in_motion = "pressure and pump: at the problem's oil temperature"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override { return whole_circuit(machine); }
+  std::vector<EvidenceKind> shows_in() const override {
+    return {EvidenceKind::kReturnExtend, EvidenceKind::kReturnRetract, EvidenceKind::kPump};
+  }
+
+  template <class T>
+  void add_pressure_law(const Instant<T>& s, int, std::span<const double> p,
+                        std::span<T> out) const {
+    const double excess = factor(s.oil, p[2]);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const Cylinder& c = s.machine->cylinders[i];
+      const int side = s.side[i];
+      if (side == 0 || !c.hydraulic()) continue;
+      const double area = supply_area(c, side), back = return_area(c, side);
+      const double full = rated_flow(*s.machine, static_cast<int>(i), side) * back / area;
+      out[i] += opposed_rise<T>(s.return_flow[i] * (p[0] * excess / full * back / area),
+                                s.force[i] * (side / area));
+    }
+  }
+  template <class T>
+  void add_demand_law(const Instant<T>& s, int, std::span<const double> p, std::span<T> out) const {
+    const double excess = factor(s.oil, p[2]);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      if (s.side[i] == 0 || !s.machine->cylinders[i].hydraulic()) continue;
+      const double full = rated_flow(*s.machine, static_cast<int>(i), s.side[i]);
+      out[i] += s.flow[i] * (p[1] * excess / full);
+    }
+  }
+  SPARFLOW_EFFECT_LAW(add_pressure)
+  SPARFLOW_EFFECT_LAW(add_demand)
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    if (log.oil.size() == 0) return false;
+    const int side = return_side(kind);
+    if (side == 0) return Effect::columns(log, kind, index, at, shape, columns);
+    const Cylinder& c = log.machine->cylinders[static_cast<std::size_t>(index)];
+    if (!c.hydraulic()) return false;
+    const CylinderSeries& series = log.cylinders[static_cast<std::size_t>(index)];
+    const double full =
+        rated_flow(*log.machine, index, side) * return_area(c, side) / supply_area(c, side);
+    columns.setZero(log.samples(), 2);
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      columns(k, 0) = series.return_flow[k] / full * factor(log.oil[k], shape[0]);
+    }
+    return true;
+  }
+
+ private:
+  static double factor(double oil, double beta) { return std::expm1(-beta * (oil - kReference)); }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_oil_temperature() { return std::make_unique<OilTemperature>(); }
+
+}  // namespace sparflow

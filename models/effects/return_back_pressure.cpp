@@ -1,0 +1,73 @@
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+class ReturnBackPressure final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "return_back_pressure",
+        .title = "tank line shared by all cylinders",
+        .stage = EffectStage::kPressure,
+        .place = EffectPlace::kMachine,
+        // 12 bar at 120 l/min; a mini excavator's 20 l/min line reaches 25 bar at 6e-2 bar/(l/min)^2
+        .parameters = {{"k",
+                        "bar/(l/min)^2",
+                        units::kBarPerLpm2,
+                        0.0,
+                        0.1 * units::kBarPerLpm2,
+                        8.3e-4 * units::kBarPerLpm2,
+                        "loss of the common tank line, filter and cooler",
+                        true,
+                        {}}},
+        .equation = "p_return = p_return(own flow) + k (sum of all return flows)^2",
+        .signals = {"both chamber pressures", "position"},
+        .confused_with = {"oil_temperature", "viscous_friction", "pressure_offset"},
+        .separated_by =
+            "move another function at the same time: the chamber that only returns oil "
+            "rises with the other's flow",
+        .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (turbulent losses)",
+        .in_motion =
+            "pressure: A_return/A_supply of it while the load opposes the motion; under a "
+            "helping load the counterbalance valve sets the supply"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override { return whole_circuit(machine); }
+  std::vector<EvidenceKind> shows_in() const override {
+    return {EvidenceKind::kReturnExtend, EvidenceKind::kReturnRetract};
+  }
+
+  template <class T>
+  void add_pressure_law(const Instant<T>& s, int, std::span<const double> p,
+                        std::span<T> out) const {
+    T total = 0.0;
+    for (const T& q : s.return_flow) total += q;
+    const T back = p[0] * total * total;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const Cylinder& c = s.machine->cylinders[i];
+      if (s.side[i] == 0 || !c.hydraulic()) continue;
+      const double area = supply_area(c, s.side[i]);
+      out[i] += opposed_rise<T>(back * (return_area(c, s.side[i]) / area),
+                                s.force[i] * (s.side[i] / area));
+    }
+  }
+  SPARFLOW_EFFECT_LAW(add_pressure)
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int, std::span<const double>,
+               Eigen::MatrixXd& columns) const override {
+    if (return_side(kind) == 0) return false;
+    if (!log.machine->cylinders[static_cast<std::size_t>(index)].hydraulic()) return false;
+    columns = total_return_flow(log).array().square().matrix();
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_return_back_pressure() {
+  return std::make_unique<ReturnBackPressure>();
+}
+
+}  // namespace sparflow

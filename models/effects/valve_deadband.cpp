@@ -1,0 +1,76 @@
+#include <algorithm>
+#include <cmath>
+
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/valve_flow.h"
+
+namespace sparflow {
+namespace {
+
+/// Beyond the dead band the flow lacks gain * u0 against the straight line through zero: proportional to u0. Inside
+/// it lacks everything. Where the knee lies the log's own least squares says (models/effects/valve_flow.h), so
+/// that the column is linear in u0 and few samples inside the dead band suffice.
+class ValveDeadband final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "valve_deadband",
+        .title = "dead band of the valve",
+        .stage = EffectStage::kFlow,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"u0_extend", "-", 1.0, 0.0, 0.4, 0.06, "dead band extending", true, {}},
+                       {"u0_retract", "-", 1.0, 0.0, 0.4, 0.06, "dead band retracting", true, {}},
+                       {"full_flow",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        0.0,
+                        "1: full command still gives full flow, gain / (1 - u0); 0: it gives u0 "
+                        "less",
+                        false,
+                        {0.0, 1.0}}},
+        .equation = "Q = g max(0, |u| - u0), g = gain or gain / (1 - u0)",
+        .signals = {"command", "position"},
+        .confused_with = {"valve_lag"},
+        .separated_by = "slow ramps of the command through zero",
+        .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 5 (overlapped spools)",
+        .in_motion = "nothing: a motion prescribes flow; the command that gives it is larger"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    if (kind != EvidenceKind::kFlow || index != at) return false;
+    const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
+    if (command.size() == 0) return false;
+    const SectionFit fit = fit_dead_bands(log, at);
+    const bool full_flow = shape[0] >= 0.5;
+    columns.setZero(log.samples(), 2);
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double u = std::abs(command[k]);
+      if (!(u > 0.0)) {
+        if (std::isnan(u)) columns.row(k).setConstant(u);
+        continue;
+      }
+      const double knee = std::clamp(fit.dead_band(command[k]), 1e-3, 0.5);
+      // with full flow kept, the line through zero has the gain g (1 - u0) and meets the law again at u = 1
+      double lack = fit.gain(command[k]);
+      if (full_flow) lack *= 1.0 - std::min(u, 1.0);
+      if (u < knee) lack = fit.gain(command[k]) * (full_flow ? 1.0 - knee : 1.0) * u / knee;
+      columns(k, command[k] > 0.0 ? 0 : 1) = command[k] > 0.0 ? -lack : lack;
+    }
+    return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_valve_deadband() { return std::make_unique<ValveDeadband>(); }
+
+}  // namespace sparflow

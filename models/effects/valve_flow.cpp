@@ -1,0 +1,111 @@
+#include "models/effects/valve_flow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+/// Enough commanded samples to learn a gain from; fewer, and the machine file is the better guess.
+constexpr int kFewest = 20;
+constexpr double kWidest = 0.5;  ///< dead bands are searched up to here
+
+double file_gain(const Machine& machine, int cylinder, int side) {
+  const Valve* valve = machine.valve_of_cylinder(cylinder);
+  const double area = supply_area(machine.cylinders[static_cast<std::size_t>(cylinder)], side);
+  if (valve == nullptr || area <= 0.0) return 0.0;
+  return (side > 0 ? valve->max_flow_extend : valve->max_flow_retract) / area;
+}
+
+/// |u| and the speed towards u's side, of one direction.
+struct Samples {
+  std::vector<double> command, speed;
+  /// Least-squares gain behind a dead band. @param cost sum of squares
+  double gain(double dead_band, double* cost = nullptr) const {
+    double uu = 0.0, uv = 0.0, vv = 0.0;
+    for (std::size_t k = 0; k < command.size(); ++k) {
+      const double u = std::max(0.0, command[k] - dead_band);
+      uu += u * u;
+      uv += u * speed[k];
+      vv += speed[k] * speed[k];
+    }
+    const double g = uu > 0.0 ? uv / uu : 0.0;
+    if (cost != nullptr) *cost = vv - g * uv;
+    return g;
+  }
+};
+
+Samples of_side(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command, int side) {
+  const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+  Samples s;
+  for (Eigen::Index k = 0; k < log.samples(); ++k) {
+    const double u = command[k] * side, v = c.speed[k] * side;
+    if (!(u > 1e-6) || !std::isfinite(v)) continue;
+    s.command.push_back(u);
+    s.speed.push_back(v);
+  }
+  return s;
+}
+
+double best_dead_band(const Samples& s) {
+  const auto cost = [&](double u0) {
+    double c = 0.0;
+    s.gain(u0, &c);
+    return c;
+  };
+  // a step below the widest command leaves nothing to fit
+  const double most =
+      std::min(kWidest, 0.8 * *std::max_element(s.command.begin(), s.command.end()));
+  constexpr int kSteps = 25;
+  int best = 0;
+  double lowest = cost(0.0);
+  for (int k = 1; k <= kSteps; ++k) {
+    const double c = cost(most * k / kSteps);
+    if (c < lowest) lowest = c, best = k;
+  }
+  double lo = most * std::max(0, best - 1) / kSteps,
+         hi = most * std::min(kSteps, best + 1) / kSteps;
+  constexpr double kGolden = 0.618033988749895;
+  double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
+  double fa = cost(a), fb = cost(b);
+  while (hi - lo > 1e-4) {
+    if (fa < fb) {
+      hi = b, b = a, fb = fa;
+      a = hi - kGolden * (hi - lo), fa = cost(a);
+    } else {
+      lo = a, a = b, fa = fb;
+      b = lo + kGolden * (hi - lo), fb = cost(b);
+    }
+  }
+  return 0.5 * (lo + hi);
+}
+
+}  // namespace
+
+SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command) {
+  SectionFit fit;
+  for (const int side : {1, -1}) {
+    const Samples s = of_side(log, cylinder, command, side);
+    (side > 0 ? fit.gain_extend : fit.gain_retract) =
+        s.command.size() < kFewest ? file_gain(*log.machine, cylinder, side) : s.gain(0.0);
+  }
+  return fit;
+}
+
+SectionFit fit_dead_bands(const MachineSeries& log, int cylinder) {
+  const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+  SectionFit fit = fit_gains(log, cylinder, c.command);
+  for (const int side : {1, -1}) {
+    const Samples s = of_side(log, cylinder, c.command, side);
+    if (s.command.size() < kFewest) continue;
+    const double u0 = best_dead_band(s);
+    (side > 0 ? fit.dead_band_extend : fit.dead_band_retract) = u0;
+    (side > 0 ? fit.gain_extend : fit.gain_retract) = s.gain(u0);
+  }
+  return fit;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,79 @@
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/memory.h"
+#include "models/effects/valve_flow.h"
+
+namespace sparflow {
+namespace {
+
+class ValveLag final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "valve_lag",
+        .title = "flow follows the command late",
+        .stage = EffectStage::kFlow,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"share",
+                        "-",
+                        1.0,
+                        0.5,
+                        1.5,
+                        1.0,
+                        "share of the flow's change that comes late, about 1",
+                        true,
+                        {}},
+                       {"tau",
+                        "s",
+                        1.0,
+                        0.01,
+                        1.5,
+                        0.2,
+                        "time constant, or the delay",
+                        false,
+                        {0.03, 0.05, 0.08, 0.12, 0.16, 0.21, 0.27, 0.35, 0.46, 0.6}},
+                       {"delay",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        0.0,
+                        "0: first-order lag, 1: pure delay of tau",
+                        false,
+                        {0.0, 1.0}}},
+        .equation = "tau dQ/dt + Q = Q_valve(u), or Q(t) = Q_valve(u(t - tau))",
+        .signals = {"command", "position"},
+        .confused_with = {"valve_deadband", "sensor_delay", "compressibility"},
+        .separated_by = "steps of the command, several times",
+        .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 and 7 (valve dynamics)",
+        .in_motion = "nothing: a motion prescribes flow; a controller must lead the command"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    if (kind != EvidenceKind::kFlow || index != at) return false;
+    const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
+    if (command.size() == 0) return false;
+    const auto late = [&](const Eigen::VectorXd& x) {
+      return shape[1] >= 0.5 ? delayed(log, x, shape[0]) : first_order_lag(log, x, shape[0]);
+    };
+    // gains from the late command: from the command itself they would come out too small
+    const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
+    const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
+    const SectionFit fit = fit_gains(log, at, late_extend + late_retract);
+    columns =
+        fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_valve_lag() { return std::make_unique<ValveLag>(); }
+
+}  // namespace sparflow
