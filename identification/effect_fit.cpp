@@ -1,0 +1,229 @@
+#include "identification/effect_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Bounds {
+  VectorXd lower, upper;
+};
+
+Bounds bounds_of(const std::vector<const EffectDesign*>& designs, Index count) {
+  Bounds b{VectorXd(count), VectorXd(count)};
+  Index k = 0;
+  for (const EffectDesign* d : designs) {
+    for (const EffectParameter& p : d->effect.effect->info().parameters) {
+      if (!p.linear) continue;
+      b.lower[k] = p.lower;
+      b.upper[k++] = p.upper;
+    }
+  }
+  return b;
+}
+
+/// min 1/2 x'Nx - g'x inside a box: unconstrained, or by cyclic coordinate steps from the clamped point.
+VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* at_bound) {
+  const Index m = g.size();
+  // parameters of very different size: work in units of their curvature
+  VectorXd scale(m);
+  for (Index i = 0; i < m; ++i) scale[i] = n(i, i) > 0.0 ? 1.0 / std::sqrt(n(i, i)) : 0.0;
+  MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
+  h.diagonal().array() += 1e-10;
+  const VectorXd gs = scale.cwiseProduct(g);
+  VectorXd x = h.ldlt().solve(gs);
+  const auto lower = [&](Index i) { return scale[i] > 0.0 ? b.lower[i] / scale[i] : 0.0; };
+  const auto upper = [&](Index i) { return scale[i] > 0.0 ? b.upper[i] / scale[i] : 0.0; };
+  *at_bound = false;
+  for (Index i = 0; i < m; ++i) *at_bound = *at_bound || x[i] < lower(i) || x[i] > upper(i);
+  if (*at_bound) {
+    for (Index i = 0; i < m; ++i) x[i] = std::clamp(x[i], lower(i), upper(i));
+    for (int sweep = 0; sweep < 500; ++sweep) {
+      double moved = 0.0;
+      for (Index i = 0; i < m; ++i) {
+        const double next =
+            std::clamp(x[i] + (gs[i] - h.row(i).dot(x)) / h(i, i), lower(i), upper(i));
+        moved = std::max(moved, std::abs(next - x[i]));
+        x[i] = next;
+      }
+      if (moved < 1e-9 * (1.0 + x.norm())) break;
+    }
+  }
+  return scale.cwiseProduct(x);
+}
+
+struct Whitened {
+  MatrixXd rows;      // [rows x (parameters + 1)], baseline projected out, unit innovation variance
+  MatrixXd baseline;  // coefficients of [columns, y] on the baseline
+  double log_determinant = 0.0;
+};
+
+}  // namespace
+
+bool EffectDesign::acts() const {
+  return std::any_of(columns.begin(), columns.end(),
+                     [](const MatrixXd& c) { return c.cols() > 0; });
+}
+
+double EffectFit::total() const {
+  return std::accumulate(log_likelihood.begin(), log_likelihood.end(), 0.0);
+}
+
+EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
+                         std::vector<double> shape) {
+  EffectDesign d;
+  d.effect = effect;
+  d.shape = std::move(shape);
+  for (const EffectParameter& p : effect.effect->info().parameters) d.linear += p.linear ? 1 : 0;
+  for (const EvidenceChannel& c : evidence.channels)
+    d.columns.push_back(evidence.columns(effect, d.shape, c));
+  return d;
+}
+
+MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
+                       const MatrixXd& columns, double* log_determinant,
+                       MatrixXd* baseline_coefficients) {
+  const Index n = channel.rows(), b = channel.baseline.cols(), m = columns.cols();
+  MatrixXd all(n, b + m + 1);
+  all << channel.baseline, columns, channel.y;
+  const double l = noise.whiten(channel.blocks, all);
+  if (log_determinant != nullptr) *log_determinant = l;
+  if (b == 0) {
+    if (baseline_coefficients != nullptr) baseline_coefficients->resize(0, m + 1);
+    return all;
+  }
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(all.leftCols(b));
+  const MatrixXd coefficients = qr.solve(all.rightCols(m + 1));
+  if (baseline_coefficients != nullptr) *baseline_coefficients = coefficients;
+  return all.rightCols(m + 1) - all.leftCols(b) * coefficients;
+}
+
+EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+                      const EffectFit* start, const FitControl& control) {
+  const std::size_t channels = evidence.channels.size();
+  Index count = 0;
+  for (const EffectDesign* d : designs) count += d->linear;
+  const Bounds bounds = bounds_of(designs, count);
+
+  EffectFit fit;
+  fit.theta = VectorXd::Zero(count);
+  fit.noise.resize(channels);
+  fit.log_likelihood.assign(channels, 0.0);
+  fit.residual.resize(channels);
+  if (start != nullptr) {
+    fit.noise = start->noise;
+    fit.log_likelihood = start->log_likelihood;
+  }
+  const auto active = [&](std::size_t c) { return control.active.empty() || control.active[c]; };
+
+  // stacked columns of a channel, and which parameters they belong to
+  std::vector<MatrixXd> columns(channels);
+  std::vector<std::vector<Index>> owner(channels);
+  for (std::size_t c = 0; c < channels; ++c) {
+    if (!active(c)) continue;
+    Index width = 0, first = 0;
+    for (const EffectDesign* d : designs) width += d->columns[c].cols();
+    columns[c].resize(evidence.channels[c].rows(), width);
+    Index at = 0;
+    for (const EffectDesign* d : designs) {
+      const Index w = d->columns[c].cols();
+      if (w > 0) columns[c].middleCols(at, w) = d->columns[c];
+      for (Index k = 0; k < w; ++k) owner[c].push_back(first + k);
+      at += w;
+      first += d->linear;
+    }
+  }
+
+  std::vector<Whitened> white(channels);
+  for (int pass = 0; pass < control.noise_passes + 1; ++pass) {
+    const bool first_pass = pass == 0 && start == nullptr;
+    MatrixXd n = MatrixXd::Zero(count, count);
+    VectorXd g = VectorXd::Zero(count);
+    for (std::size_t c = 0; c < channels; ++c) {
+      if (!active(c)) continue;
+      const EvidenceChannel& channel = evidence.channels[c];
+      if (first_pass) {  // white noise of the size of what is there
+        fit.noise[c] = NoiseModel{};
+        fit.noise[c].variance =
+            std::max(channel.y.squaredNorm() / static_cast<double>(channel.rows()), 1e-300);
+      }
+      Whitened& w = white[c];
+      w.rows = whitened_rows(channel, fit.noise[c], columns[c], &w.log_determinant, &w.baseline);
+      const Index m = columns[c].cols();
+      const MatrixXd cross = w.rows.leftCols(m).transpose() * w.rows / fit.noise[c].variance;
+      for (Index i = 0; i < m; ++i) {
+        const Index oi = owner[c][static_cast<std::size_t>(i)];
+        g[oi] += cross(i, m);
+        for (Index j = 0; j < m; ++j) n(oi, owner[c][static_cast<std::size_t>(j)]) += cross(i, j);
+      }
+    }
+    if (count > 0) fit.theta = solve_box(n, g, bounds, &fit.at_bound);
+    const bool last = pass == control.noise_passes;
+    for (std::size_t c = 0; c < channels; ++c) {
+      if (!active(c)) continue;
+      const EvidenceChannel& channel = evidence.channels[c];
+      const Index m = columns[c].cols();
+      VectorXd theta(m);
+      for (Index i = 0; i < m; ++i) theta[i] = fit.theta[owner[c][static_cast<std::size_t>(i)]];
+      const Whitened& w = white[c];
+      if (last) {
+        const VectorXd r = w.rows.col(m) - w.rows.leftCols(m) * theta;
+        const auto rows = static_cast<double>(channel.rows());
+        const double v = std::max(r.squaredNorm() / rows, 1e-300);
+        // AR parameters and offset ratio as estimated; the scale at its maximum
+        fit.log_likelihood[c] =
+            w.log_determinant - 0.5 * rows * (std::log(2.0 * std::numbers::pi * v) + 1.0);
+      }
+      if (!last || control.keep_residuals) {
+        VectorXd beta = w.baseline.col(m);
+        if (m > 0) beta -= w.baseline.leftCols(m) * theta;
+        VectorXd r = channel.y;
+        if (m > 0) r -= columns[c] * theta;
+        if (beta.size() > 0) r -= channel.baseline * beta;
+        if (!last) fit.noise[c] = NoiseModel::estimate(r, channel.blocks);
+        if (control.keep_residuals) fit.residual[c] = std::move(r);
+      }
+    }
+    if (last && control.covariance && count > 0) {
+      // sandwich: bread N^-1, filling by blocks (White 1980; Liang & Zeger 1986)
+      const MatrixXd bread = n.ldlt().solve(MatrixXd::Identity(count, count));
+      MatrixXd filling = MatrixXd::Zero(count, count);
+      for (std::size_t c = 0; c < channels; ++c) {
+        if (!active(c)) continue;
+        const EvidenceChannel& channel = evidence.channels[c];
+        const Index m = columns[c].cols();
+        if (m == 0) continue;
+        VectorXd theta(m);
+        for (Index i = 0; i < m; ++i) theta[i] = fit.theta[owner[c][static_cast<std::size_t>(i)]];
+        const MatrixXd& rows = white[c].rows;
+        const VectorXd r = rows.col(m) - rows.leftCols(m) * theta;
+        for (const NoiseBlock& b : channel.blocks) {
+          const Index length = b.last - b.first;
+          const VectorXd s = rows.block(b.first, 0, length, m).transpose() *
+                             r.segment(b.first, length) / fit.noise[c].variance;
+          VectorXd full = VectorXd::Zero(count);
+          for (Index i = 0; i < m; ++i) full[owner[c][static_cast<std::size_t>(i)]] += s[i];
+          filling += full * full.transpose();
+        }
+      }
+      const MatrixXd robust = bread * filling * bread;
+      fit.covariance = bread;
+      for (Index i = 0; i < count;
+           ++i) {  // the wider of the two, correlations of the model-based one
+        const double f = std::sqrt(std::max(1.0, robust(i, i) / bread(i, i)));
+        fit.covariance.row(i) *= f;
+        fit.covariance.col(i) *= f;
+      }
+    }
+  }
+  return fit;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,416 @@
+#include "identification/evidence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "identification/branches.h"
+#include "identification/robust.h"
+#include "identification/series.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+/// Rows a third of the filter's width apart are nearly independent: keeping more costs time and tells nothing.
+constexpr double kRowsAWindow = 3.0;
+constexpr double kShortestBlock_s = 0.3;
+/// Longer motions are cut: blocks are what is held out and resampled.
+constexpr double kLongestBlock_s = 8.0;
+constexpr Index kFewestRows = 30;
+
+/// Response of the filter's `derivative` to an impulse, inside an evenly sampled run.
+VectorXd impulse_response(double step, double window, int order, int derivative) {
+  const auto half = static_cast<Index>(std::ceil(window / step)) + order + 2;
+  const VectorXd time =
+      VectorXd::LinSpaced(2 * half + 1, 0.0, 2.0 * static_cast<double>(half) * step);
+  VectorXd impulse = VectorXd::Zero(2 * half + 1);
+  impulse[half] = 1.0;
+  const SavitzkyGolay filter(time, {{0, 2 * half + 1}}, window, order);
+  VectorXd h = filter.apply(impulse, derivative);
+  // the one-sided windows at the ends are no part of the response
+  const Index reach = static_cast<Index>(std::floor(0.5 * window / step + 1e-9)) + 1;
+  for (Index i = 0; i < h.size(); ++i) {
+    if (std::abs(i - half) > reach) h[i] = 0.0;
+  }
+  return h.segment(half - reach, 2 * reach + 1);
+}
+
+/// The low-pass whose derivative (difference) of that order is the kernel: sums it up, scaled to gain one.
+VectorXd summed(VectorXd h, int times) {
+  for (int pass = 0; pass < times; ++pass) {
+    std::partial_sum(h.begin(), h.end(), h.begin());
+  }
+  // A difference shortens by half a sample: two sums are centred again after dropping one on the left
+  VectorXd g = VectorXd::Zero(h.size());
+  if (times == 2) {
+    g.tail(h.size() - 1) = h.head(h.size() - 1);
+  } else if (times == 1) {  // centred between samples: mean of both neighbours
+    for (Index i = 0; i < h.size(); ++i) g[i] = 0.5 * (h[i] + (i > 0 ? h[i - 1] : 0.0));
+  } else {
+    g = h;
+  }
+  return g / g.sum();
+}
+
+/// Convolution inside runs; NaN where the kernel reaches beyond its run or a NaN.
+VectorXd convolved(const VectorXd& x, const VectorXd& kernel,
+                   const std::vector<std::pair<Index, Index>>& runs) {
+  const Index half = kernel.size() / 2;
+  VectorXd y = VectorXd::Constant(x.size(), kNaN);
+  for (const auto& [first, last] : runs) {
+    for (Index i = first + half; i + half < last; ++i) {
+      y[i] = kernel.dot(x.segment(i - half, kernel.size()));
+    }
+  }
+  return y;
+}
+
+/// Cuts the true stretches of a mask, shortened by `margin` samples at both ends, into blocks.
+struct Builder {
+  const Evidence& evidence;
+  const std::vector<const MachineSignals*>& signals;
+  EvidenceChannel channel;
+  std::vector<double> y;
+  std::vector<VectorXd> rows;  // baseline
+
+  void add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
+           const VectorXd& values, const Eigen::MatrixXd& base, Index margin) {
+    const MachineSeries& s = evidence.series[log];
+    const Index stride = evidence.stride;
+    const auto longest = std::max<Index>(4 * stride, static_cast<Index>(kLongestBlock_s / s.step));
+    const auto shortest = static_cast<Index>(kShortestBlock_s / s.step);
+    for (const auto& [run_first, run_last] : s.runs) {
+      for (Index i = run_first; i < run_last;) {
+        if (!mask[i]) {
+          ++i;
+          continue;
+        }
+        Index end = i;
+        while (end < run_last && mask[end]) ++end;
+        const Index first = i + margin, last = end - margin;
+        i = end;
+        if (last - first < std::max<Index>(shortest, 2 * stride)) continue;
+        const Index pieces = std::max<Index>(1, (last - first + longest - 1) / longest);
+        for (Index piece = 0; piece < pieces; ++piece) {
+          block(log, first + (last - first) * piece / pieces,
+                first + (last - first) * (piece + 1) / pieces, values, base, stride);
+        }
+      }
+    }
+  }
+
+  void block(std::size_t log, Index first, Index last, const VectorXd& values,
+             const Eigen::MatrixXd& base, Index stride) {
+    NoiseBlock b{static_cast<Index>(y.size()), 0};
+    for (Index k = first; k < last; k += stride) {
+      if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a hole ends the block
+        b.last = static_cast<Index>(y.size());
+        close(log, b);
+        b.first = b.last;
+        continue;
+      }
+      y.push_back(values[k]);
+      rows.push_back(base.row(k));
+      channel.sample.push_back(k);
+    }
+    b.last = static_cast<Index>(y.size());
+    close(log, b);
+  }
+
+  void close(std::size_t log, const NoiseBlock& b) {
+    if (b.last <= b.first) return;
+    channel.blocks.push_back(b);
+    channel.log.push_back(static_cast<int>(log));
+  }
+
+  bool finish(std::vector<EvidenceChannel>& out) {
+    const auto n = static_cast<Index>(y.size());
+    if (n < kFewestRows || channel.blocks.size() < 2) return false;
+    channel.y = Eigen::Map<VectorXd>(y.data(), n);
+    channel.baseline.resize(n, rows.front().size());
+    for (Index i = 0; i < n; ++i)
+      channel.baseline.row(i) = rows[static_cast<std::size_t>(i)].transpose();
+    // learned laws that never act in these rows
+    std::vector<Index> used;
+    for (Index c = 0; c < channel.baseline.cols(); ++c) {
+      if (channel.baseline.col(c).cwiseAbs().maxCoeff() > 0.0) used.push_back(c);
+    }
+    const Eigen::MatrixXd kept = channel.baseline(Eigen::all, used);
+    channel.baseline = kept;
+    out.push_back(std::move(channel));
+    return true;
+  }
+};
+
+/// White noise of a raw channel from third differences (robust, so that motion does not count).
+double raw_noise(const VectorXd& x) {
+  std::vector<double> d;
+  for (Index i = 3; i < x.size(); ++i) {
+    const double v = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
+    if (std::isfinite(v)) d.push_back(v);
+  }
+  if (d.size() < 20) return kNaN;
+  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
+}
+
+}  // namespace
+
+const char* evidence_stage(EvidenceKind kind) {
+  switch (kind) {
+    case EvidenceKind::kForce:
+      return "force";
+    case EvidenceKind::kFlow:
+      return "flow";
+    case EvidenceKind::kPump:
+      return "pump";
+    default:
+      return "pressure";
+  }
+}
+
+std::string evidence_text(EvidenceKind kind, const std::string& at) {
+  switch (kind) {
+    case EvidenceKind::kForce:
+      return "force of " + at;
+    case EvidenceKind::kFlow:
+      return "speed of " + at;
+    case EvidenceKind::kReturnExtend:
+      return "return pressure of " + at + " extending";
+    case EvidenceKind::kReturnRetract:
+      return "return pressure of " + at + " retracting";
+    case EvidenceKind::kSupplyExtend:
+      return "supply pressure of " + at + " extending";
+    case EvidenceKind::kSupplyRetract:
+      return "supply pressure of " + at + " retracting";
+    case EvidenceKind::kPump:
+      return "pressure of pump " + at;
+  }
+  return at;
+}
+
+const EvidenceChannel* Evidence::find(EvidenceKind kind, int index) const {
+  for (const EvidenceChannel& c : channels) {
+    if (c.kind == kind && c.index == index) return &c;
+  }
+  return nullptr;
+}
+
+VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x) const {
+  const Kernels& k = kernels_[log];
+  const VectorXd& kernel = kind == EvidenceKind::kForce  ? k.force
+                           : kind == EvidenceKind::kFlow ? k.speed
+                                                         : k.pressure;
+  return convolved(x, kernel, series[log].runs);
+}
+
+Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
+                                  const EvidenceChannel& channel) const {
+  const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
+  if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
+  Eigen::MatrixXd result;
+  for (std::size_t log = 0; log < suspects; ++log) {
+    Eigen::MatrixXd raw;
+    if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
+      continue;
+    if (!effect.effect->columns_filtered()) {
+      for (Index c = 0; c < raw.cols(); ++c) {
+        raw.col(c) = filter(log, channel.kind, raw.col(c).unaryExpr([](double v) {
+          return std::isfinite(v) ? v : 0.0;  // the rows themselves were chosen where y is known
+        }));
+      }
+    }
+    if (result.size() == 0) result.setZero(channel.rows(), raw.cols());
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (channel.log[b] != static_cast<int>(log)) continue;
+      for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
+        for (Index c = 0; c < raw.cols(); ++c) {
+          const double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
+          result(r, c) = std::isfinite(v) ? v : 0.0;
+        }
+      }
+    }
+  }
+  if (result.size() > 0 && result.cwiseAbs().maxCoeff() == 0.0) return {};
+  return result;
+}
+
+Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                          const std::vector<MachineSignals>& references) {
+  Evidence e;
+  const Machine& machine = model.machine;
+  std::vector<const MachineSignals*> signals;
+  for (const MachineSignals& s : suspects) signals.push_back(&s);
+  for (const MachineSignals& s : references) signals.push_back(&s);
+  e.suspects = suspects.size();
+  std::vector<double> gain_force, gain_pressure;
+  for (const MachineSignals* s : signals) {
+    e.series.push_back(make_series(model, *s));
+    const int order = SmoothingOptions{}.order;
+    Evidence::Kernels k;
+    k.force = summed(impulse_response(s->step, s->window, order, 2), 2);
+    k.speed = summed(impulse_response(s->step, s->window, order, 1), 1);
+    k.pressure = summed(impulse_response(s->step, s->window, order, 0), 0);
+    gain_force.push_back(k.force.norm());
+    gain_pressure.push_back(k.pressure.norm());
+    e.kernels_.push_back(std::move(k));
+    e.window = std::max(e.window, s->window);
+    e.stride =
+        std::max(e.stride, static_cast<int>(std::lround(s->window / s->step / kRowsAWindow)));
+  }
+  const auto margin_of = [&](std::size_t log) {
+    return static_cast<Index>(std::lround(0.5 * signals[log]->window / signals[log]->step));
+  };
+
+  // what the model's own effects already explain
+  const auto known = [&](std::size_t log, EvidenceKind kind, int index) {
+    VectorXd sum = VectorXd::Zero(e.series[log].samples());
+    for (const AppliedEffect& effect : model.effects) {
+      const VectorXd one = effect_series(effect, e.series[log], kind, index);
+      if (one.size() > 0) sum += one;
+    }
+    return sum;
+  };
+
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const std::string& name = machine.cylinders[at].name;
+    {  // force
+      Builder b{e, signals, {}, {}, {}};
+      b.channel.kind = EvidenceKind::kForce;
+      double noise = 0.0;
+      int logs = 0;
+      for (std::size_t log = 0; log < signals.size(); ++log) {
+        const CylinderSignals& c = signals[log]->cylinders[at];
+        if (!c.has_force()) continue;
+        const VectorXd y =
+            e.filter(log, EvidenceKind::kForce, c.force - known(log, EvidenceKind::kForce, i)) -
+            c.static_force;
+        b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
+              margin_of(log));
+        const double raw = raw_noise(c.force);
+        if (log < e.suspects && std::isfinite(raw)) noise += raw * gain_force[log], ++logs;
+      }
+      b.channel.index = i;
+      b.channel.at = name;
+      b.channel.unit = {"N", 1.0};
+      b.channel.noise_floor = logs > 0 ? noise / logs : kNaN;
+      b.channel.text = evidence_text(b.channel.kind, name);
+      if (!b.finish(e.channels)) {
+        e.notes.push_back(fmt::format(
+            "{}: no measured force while it moves, force effects cannot be judged", name));
+      }
+    }
+    {  // flow
+      Builder b{e, signals, {}, {}, {}};
+      b.channel.kind = EvidenceKind::kFlow;
+      std::vector<double> still;
+      for (std::size_t log = 0; log < signals.size(); ++log) {
+        const CylinderSignals& c = signals[log]->cylinders[at];
+        if (!c.has_command()) continue;
+        Eigen::MatrixXd base(c.command.size(), 2);
+        base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
+        base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
+        const VectorXd y =
+            c.speed - e.filter(log, EvidenceKind::kFlow, known(log, EvidenceKind::kFlow, i));
+        b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
+        for (Index k = 0; k < y.size(); ++k) {
+          if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
+        }
+      }
+      b.channel.index = i;
+      b.channel.at = name;
+      b.channel.unit = {"mm/s", 1e-3};
+      b.channel.noise_floor =
+          still.size() > 50
+              ? robust_std(Eigen::Map<VectorXd>(still.data(), static_cast<Index>(still.size())))
+              : kNaN;
+      b.channel.text = evidence_text(b.channel.kind, name);
+      if (!b.finish(e.channels)) {
+        e.notes.push_back(
+            fmt::format("{}: no command is logged, valve effects cannot be judged", name));
+      }
+    }
+    // pressures: return line or counterbalance valve, by direction
+    for (const int side : {1, -1}) {
+      for (const bool returning : {true, false}) {
+        const EvidenceKind kind =
+            returning ? (side > 0 ? EvidenceKind::kReturnExtend : EvidenceKind::kReturnRetract)
+                      : (side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract);
+        Builder b{e, signals, {}, {}, {}};
+        b.channel.kind = kind;
+        double noise = kNaN;
+        for (std::size_t log = 0; log < signals.size(); ++log) {
+          const CylinderSignals& c = signals[log]->cylinders[at];
+          const CylinderSeries& s = e.series[log].cylinders[at];
+          if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) continue;
+          const bool a = (side > 0) != returning;
+          const Mask mask = c.driven && signals[log]->usable && (c.direction.array() == side);
+          const VectorXd& ret = side > 0 ? s.pressure_b : s.pressure_a;
+          const VectorXd& sup = side > 0 ? s.pressure_a : s.pressure_b;
+          const BranchSplit split = split_branches(ret, sup, s.return_flow, s.flow, s.force, mask);
+          const VectorXd& raw = a ? c.pressure_a : c.pressure_b;
+          const VectorXd y = e.filter(log, kind, raw - known(log, kind, i));
+          const VectorXd& q = returning ? s.return_flow : s.flow;
+          Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
+          const double q0 = 1e-3, f0 = 1e5;  // near one
+          base.col(0).setOnes();
+          base.col(1) = q / q0;
+          base.col(2) = (q / q0).cwiseAbs2();
+          if (!returning) {
+            base.col(3) = s.force / f0;
+            base.col(4) = (s.force / f0).cwiseProduct(q / q0);
+          }
+          b.add(log, returning ? split.return_line : split.counterbalance, y, base, margin_of(log));
+          if (log < e.suspects) noise = raw_noise(raw) * gain_pressure[log];
+        }
+        b.channel.index = i;
+        b.channel.at = name;
+        b.channel.unit = {"bar", 1e5};
+        b.channel.noise_floor = noise;
+        b.channel.text = evidence_text(kind, name);
+        b.finish(e.channels);
+      }
+    }
+  }
+  for (int p = 0; p < machine.pump_count(); ++p) {
+    const auto at = static_cast<std::size_t>(p);
+    Builder b{e, signals, {}, {}, {}};
+    b.channel.kind = EvidenceKind::kPump;
+    double noise = kNaN;
+    const std::vector<int>& feeds = machine.pumps[at].feeds;
+    for (std::size_t log = 0; log < signals.size(); ++log) {
+      const PumpSignals& s = signals[log]->pumps[at];
+      const PumpSeries& series = e.series[log].pumps[at];
+      if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
+      const VectorXd y = e.filter(log, EvidenceKind::kPump,
+                                  s.pressure - series.demand - known(log, EvidenceKind::kPump, p));
+      Eigen::MatrixXd base(y.size(), static_cast<Index>(feeds.size()) + 1);
+      for (std::size_t k = 0; k <= feeds.size(); ++k) {
+        const int leader = k < feeds.size() ? feeds[k] : -1;
+        base.col(static_cast<Index>(k)) = e.filter(
+            log, EvidenceKind::kPump, (series.leader.array() == leader).cast<double>().matrix());
+      }
+      b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
+      if (log < e.suspects) noise = raw_noise(s.pressure) * gain_pressure[log];
+    }
+    b.channel.index = p;
+    b.channel.at = machine.pumps[at].name;
+    b.channel.unit = {"bar", 1e5};
+    b.channel.noise_floor = noise;
+    b.channel.text = evidence_text(b.channel.kind, b.channel.at);
+    if (!b.finish(e.channels)) {
+      e.notes.push_back(fmt::format(
+          "pump {}: its pressure or what it feeds is not measured, pump effects cannot be judged",
+          b.channel.at));
+    }
+  }
+  return e;
+}
+
+}  // namespace sparflow

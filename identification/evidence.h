@@ -1,0 +1,72 @@
+#pragma once
+/// What a model leaves unexplained in logs, arranged for finding the missing effect: one channel for each measured
+/// quantity against what comes before it as measured, so that an effect shows at its own stage.
+/// Suspect logs and, where there are any, reference logs of the same machine without the effect stand in the same
+/// channel: the reference then pins what is learned (the baseline), the effect acts in the suspect logs only.
+///
+/// Filters. A force is compared with an acceleration that a differentiating filter made: both must have passed the
+/// same low-pass. The kernel g with g'' = h (h the filter's second-derivative kernel) does that for the force, the
+/// kernel with g' = h for a command against a speed, the smoothing kernel itself for pressures.
+#include <span>
+#include <string>
+#include <vector>
+
+#include "identification/compare.h"
+#include "identification/noise_model.h"
+#include "models/effects/registry.h"
+#include "models/effects/series.h"
+
+namespace sparflow {
+
+struct EvidenceChannel {
+  EvidenceKind kind = EvidenceKind::kForce;
+  int index = 0;                     ///< cylinder, of kPump the pump
+  std::string at;                    ///< its name
+  std::string text;                  ///< "force of boom"
+  FieldUnit unit;                    ///< to show it in
+  Eigen::VectorXd y;                 ///< [rows] measured - model, SI
+  Eigen::MatrixXd baseline;          ///< [rows x columns] what may always explain y (learned laws)
+  std::vector<NoiseBlock> blocks;    ///< stretches of motion
+  std::vector<int> log;              ///< [blocks] index into Evidence::series
+  std::vector<Eigen::Index> sample;  ///< [rows] in that log
+  double noise_floor = 0.0;  ///< standard deviation of the sensors' noise in y; NaN = not known
+
+  Eigen::Index rows() const { return y.size(); }
+};
+
+struct Evidence {
+  std::vector<MachineSeries> series;  ///< suspect logs first, then references
+  std::size_t suspects = 0;           ///< how many are suspect
+  std::vector<EvidenceChannel> channels;
+  std::vector<std::string> notes;  ///< what cannot be judged, and why; whole sentences
+  int stride = 1;                  ///< samples between rows
+  double window = 0.0;             ///< [s] of the filter
+
+  bool has_reference() const { return series.size() > suspects; }
+  const EvidenceChannel* find(EvidenceKind kind, int index) const;
+
+  /// What one unit of an effect's linear parameters adds to a channel, filtered like y; zero in reference logs.
+  /// @return [rows x linear parameters]; no columns when it does not act there
+  Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
+                          const EvidenceChannel& channel) const;
+
+ private:
+  friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
+                                   const std::vector<MachineSignals>&);
+  struct Kernels {  // of one log: low-passes for forces, speeds and pressures, centred, odd length
+    Eigen::VectorXd force, speed, pressure;
+  };
+  std::vector<Kernels> kernels_;
+  Eigen::VectorXd filter(std::size_t log, EvidenceKind kind, const Eigen::VectorXd& x) const;
+};
+
+/// @param model its effects are in every channel's model part; its margins start the pump's demand
+Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                          const std::vector<MachineSignals>& references = {});
+
+/// "force of boom", "return pressure of jib while extending"
+std::string evidence_text(EvidenceKind kind, const std::string& at);
+/// The stage's name in reports: force, flow, pressure, pump.
+const char* evidence_stage(EvidenceKind kind);
+
+}  // namespace sparflow
