@@ -268,7 +268,7 @@ std::vector<YamlValue> YamlValue::list(const std::string& what) const {
   for (const YAML::Node& element : *node_) {
     std::string label = fmt::format("{}", index++);
     if (element.IsMap()) {
-      for (const char* key : {"name", "cylinder", "joint"}) {
+      for (const char* key : {"name", "cylinder", "joint", "id"}) {
         const YAML::Node named = element[key];
         if (named && named.IsScalar() && !named.Scalar().empty()) {
           label = named.Scalar();

@@ -57,7 +57,7 @@ class YamlValue {
   Eigen::Vector3d vector3(const Quantity& what) const;
   /// [lo, hi] with lo < hi, SI.
   Range range(const Quantity& what) const;
-  /// Elements; their path names them by their `name`, `cylinder` or `joint` where they have one.
+  /// Elements; their path names them by `name`, `cylinder`, `joint` or `id` where they have one.
   std::vector<YamlValue> list(const std::string& what) const;
   /// @param keys all keys that may stand in it; empty: the keys are names (of joints, of pumps)
   /// @throws InputError at the first key that is unknown, with the nearest known one, or stands twice
