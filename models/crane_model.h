@@ -2,6 +2,7 @@
 /// The one model object: a machine and what was learned about it. Identification, optimiser and pages all
 /// evaluate this, so whatever is learned once is seen by all of them. Immutable once built.
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -86,14 +87,16 @@ struct CraneModel {
   std::vector<std::string> missing() const;
 };
 
-/// One cylinder at one instant, exact law (paper eqs. 2-13).
+/// One cylinder at one instant, exact law (paper eqs. 2-13) and the model's effects.
 struct CylinderState {
-  double length = 0.0;        ///< [m] pin to pin
-  double rate = 0.0;          ///< dx/dq [m/rad] or [-]
-  double speed = 0.0;         ///< dx/dt [m/s], positive extending
-  double force = 0.0;         ///< static force [N], positive pushes the rod in
-  double flow = 0.0;          ///< [m^3/s] into the working chamber, never negative
-  double pressure = 0.0;      ///< [Pa] working pressure, 0 at rest
+  double length = 0.0;  ///< [m] pin to pin
+  double rate = 0.0;    ///< dx/dq [m/rad] or [-]
+  double speed = 0.0;   ///< dx/dt [m/s], positive extending
+  double force = 0.0;   ///< static force of the effective machine [N], positive pushes the rod in
+  double total_force =
+      0.0;                ///< [N] the same with what the force effects add: what the processes see
+  double flow = 0.0;      ///< [m^3/s] into the working chamber, never negative
+  double pressure = 0.0;  ///< [Pa] working pressure, 0 at rest
   double pressure_std = 0.0;  ///< [Pa] of the process' mean; 0 at rest
   bool moving = false;
 };
@@ -115,25 +118,52 @@ struct MachineState {
 };
 
 /// Evaluates the exact chain; a workspace, one a thread, no allocation after construction.
+///
+/// With the model's effects: static forces of the effective machine (models/effects/effective_machine.h), + force
+/// effects, flows, working pressure p(Q, F total) + pressure effects of the moving hydraulic cylinders, demand =
+/// working pressure + margin + demand effects, pump = max(standby, demands) + pump effects. An effect of a stage
+/// sees what earlier effects of its stage do not add: all of a stage start from the same state.
+/// Effects with memory (lags, delays) and of flow and sensors say nothing here.
 class Chain {
  public:
+  /// @param model must outlive the chain
   explicit Chain(const CraneModel& model);
+
+  double oil = 40.0;  ///< [degC] for effects that look at the oil's temperature
 
   /// @param q, qd by joint  @param payload [kg]  @param with_std also predictive standard deviations
   /// @param rest_speed |dx/dt| up to which a cylinder counts as at rest [m/s]. The exact law knows only
   ///        zero; the default merely swallows rounding. Measured speeds need a threshold above noise.
+  /// @param qdd by joint, for inertia; nullptr = 0
   /// @throws std::domain_error when a four-bar cannot close at q
   const MachineState& evaluate(const double* q, const double* qd, double payload,
-                               bool with_std = false, double rest_speed = 1e-9);
+                               bool with_std = false, double rest_speed = 1e-9,
+                               const double* qdd = nullptr);
 
-  /// The pressure stages alone, from given speeds and forces of all cylinders [m/s], [N].
+  /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
+  /// [N]: for logs, where effects are series (identification/series.h).
+  /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
-                                         bool with_std = false, double rest_speed = 1e-9);
+                                         bool with_std = false, double rest_speed = 1e-9,
+                                         const double* added_pressure = nullptr);
+
+  /// The machine whose forces these are.
+  const Machine& machine() const { return *machine_; }
 
  private:
+  void set_flow(std::size_t cylinder, double rest_speed);
+  void set_pressure(std::size_t cylinder, bool with_std);
+  void add_force_effects(const double* q, const double* qd, const double* qdd, double payload);
+  void add_pressure_effects();
+  void pump_stage(bool effects);
+
   const CraneModel* model_;
+  std::shared_ptr<const Machine> machine_;
   StaticForce statics_;
   MachineState state_;
+  std::vector<AppliedEffect> laws_;  // those that act in a motion
+  Instant<double> instant_;
+  std::vector<double> added_, added_pump_;
 };
 
 }  // namespace sparflow
