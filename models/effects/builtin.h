@@ -6,8 +6,19 @@
 
 namespace sparflow {
 
-std::unique_ptr<Effect> make_coulomb_friction();
 std::unique_ptr<Effect> make_unmodelled_mass();
+std::unique_ptr<Effect> make_payload_error();
+std::unique_ptr<Effect> make_base_tilt();
+std::unique_ptr<Effect> make_angle_offset();
+std::unique_ptr<Effect> make_coulomb_friction();
+std::unique_ptr<Effect> make_viscous_friction();
+std::unique_ptr<Effect> make_stribeck_friction();
+std::unique_ptr<Effect> make_load_friction();
+std::unique_ptr<Effect> make_end_cushion();
+std::unique_ptr<Effect> make_presliding();
+std::unique_ptr<Effect> make_force_offset();
+std::unique_ptr<Effect> make_pressure_offset();
+std::unique_ptr<Effect> make_sensor_delay();
 std::unique_ptr<Effect> make_pump_lag();
 std::unique_ptr<Effect> make_valve_deadband();
 std::unique_ptr<Effect> make_valve_lag();

@@ -12,7 +12,16 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
   static std::vector<std::unique_ptr<Effect>> all = [] {
     std::vector<std::unique_ptr<Effect>> list;
     list.push_back(make_unmodelled_mass());
+    list.push_back(make_payload_error());
+    list.push_back(make_base_tilt());
+    list.push_back(make_angle_offset());
     list.push_back(make_coulomb_friction());
+    list.push_back(make_viscous_friction());
+    list.push_back(make_stribeck_friction());
+    list.push_back(make_load_friction());
+    list.push_back(make_end_cushion());
+    list.push_back(make_presliding());
+    list.push_back(make_force_offset());
     list.push_back(make_valve_deadband());
     list.push_back(make_valve_lag());
     list.push_back(make_flow_saturation());
@@ -25,6 +34,8 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
     list.push_back(make_line_loss());
     list.push_back(make_flow_dependent_margin());
     list.push_back(make_torque_limit());
+    list.push_back(make_pressure_offset());
+    list.push_back(make_sensor_delay());
     return list;
   }();
   return all;

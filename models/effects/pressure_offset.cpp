@@ -1,0 +1,92 @@
+#include <algorithm>
+
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+
+namespace sparflow {
+namespace {
+
+/// Shares of the two chambers' sensors: one of them is off, `chamber` says which.
+double share_a(double chamber) { return std::clamp(0.5 * (1.0 + chamber), 0.0, 1.0); }
+double share_b(double chamber) { return std::clamp(0.5 * (1.0 - chamber), 0.0, 1.0); }
+
+class PressureOffset final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "pressure_offset",
+        .title = "zero of a chamber's pressure sensor is off",
+        .stage = EffectStage::kSensor,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"offset",
+                        "bar",
+                        units::kBar,
+                        -20 * units::kBar,
+                        20 * units::kBar,
+                        3 * units::kBar,
+                        "reading minus true pressure",
+                        true,
+                        {}},
+                       {"chamber",
+                        "-",
+                        1.0,
+                        -1.0,
+                        1.0,
+                        1.0,
+                        "1 the piston side's sensor (A), -1 the rod side's (B)",
+                        false,
+                        {1.0, -1.0}}},
+        .equation =
+            "p_A (or p_B) read = true + offset, so measured force + A_A offset (or - A_B offset)",
+        .signals = {"both chamber pressures"},
+        .confused_with = {"force_offset", "unmodelled_mass", "flow_dependent_margin"},
+        .separated_by = "a zero check: engine off, hoses relieved, machine on its rest",
+        .citation = "Isermann (2011), Fault-Diagnosis Applications, offset faults of sensors",
+        .in_motion = "nothing: the sensor is wrong, not the machine"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override {
+    return {EvidenceKind::kForce,        EvidenceKind::kReturnExtend,  EvidenceKind::kReturnRetract,
+            EvidenceKind::kSupplyExtend, EvidenceKind::kSupplyRetract, EvidenceKind::kPump};
+  }
+
+  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) return false;  // a force is measured
+    const double a = share_a(shape[0]), b = share_b(shape[0]);
+    if (kind == EvidenceKind::kPump) {
+      // the pump is compared with what the measured pressure asks for
+      if (log.machine->pump_of_cylinder(at) != index) return false;
+      const Eigen::VectorXi& leader = log.pumps[static_cast<std::size_t>(index)].leader;
+      if (leader.size() == 0) return false;
+      columns.setZero(log.samples(), 1);
+      for (Eigen::Index k = 0; k < log.samples(); ++k) {
+        if (leader[k] == at) columns(k, 0) = c.direction[k] > 0 ? -a : -b;
+      }
+      return true;
+    }
+    if (index != at) return false;
+    double value = 0.0;
+    if (kind == EvidenceKind::kForce) {
+      const Cylinder& cylinder = log.machine->cylinders[static_cast<std::size_t>(at)];
+      value = cylinder.area_piston() * a - cylinder.area_rod() * b;
+    } else {
+      const bool supply = supply_side(kind) != 0;
+      const int side = supply ? supply_side(kind) : return_side(kind);
+      value = (side > 0) == supply ? a : b;
+    }
+    if (value == 0.0) return false;
+    columns.setConstant(log.samples(), 1, value);
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_pressure_offset() { return std::make_unique<PressureOffset>(); }
+
+}  // namespace sparflow
