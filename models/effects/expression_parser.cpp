@@ -201,8 +201,9 @@ ExpressionParser::Operand ExpressionParser::symbol(const std::string& word, std:
   if (found->unit.reading) result.kind = Kind::kReading;
   if (!found->unit_known) result.kind = Kind::kUnknown;
   if (next() == '[') {
-    fail(pos_, fmt::format("a unit in brackets follows a number only; {} comes in {}", word,
-                           shown(result)));
+    const bool pure = result.kind == Kind::kQuantity && result.dimension.none();
+    fail(pos_, fmt::format("a unit in brackets follows a number only; {} {}", word,
+                           pure ? "is a pure number" : "comes in " + shown(result)));
   }
   result.node = emit(node, at);
   return result;

@@ -158,9 +158,9 @@ std::string ExpressionParser::shown(const Operand& x) {
     case Kind::kUnknown:
       return "the unit of its joint";
     case Kind::kZero:
-      return "no unit";
+      return "(no unit)";
     default:
-      return in_brackets(x.dimension);
+      return x.dimension.none() ? "(no unit)" : in_brackets(x.dimension);
   }
 }
 

@@ -104,6 +104,10 @@ std::string meant(const std::string& word) {
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (found.empty() && known == lower) found = unit.name;
   }
+  if (found.empty() && word.size() > 3 && word.back() == 's' &&
+      find_unit(word.substr(0, word.size() - 1))) {
+    found = word.substr(0, word.size() - 1);  // bars
+  }
   for (std::size_t i = 1; found.empty() && i < word.size(); ++i) {  // Nm, Pas
     const std::string head = word.substr(0, i), tail = word.substr(i);
     if (find_unit(head) && find_unit(tail)) found = head + " " + tail;
@@ -317,25 +321,27 @@ Dimension Dimension::power(double exponent) const {
 }
 
 std::string Dimension::text() const {
-  // What people call it: the shortest way with Pa or N in place of kg, kg itself when that is no longer.
+  // What people of the field write: masses and densities in kg, the rest in N or Pa, whichever is shorter.
   const int mass = twice[1];
+  const bool in_kg = twice[2] == 0 && std::abs(twice[0]) <= 6;
   struct Head {
     const char* name;
     Dimension dimension;
   };
   static const Head kHeads[] = {
-      {"N", dimensions::kForce}, {"Pa", dimensions::kPressure}, {"kg", dimensions::kMass}};
+      {"kg", dimensions::kMass}, {"N", dimensions::kForce}, {"Pa", dimensions::kPressure}};
   std::string best;
-  int best_cost = 0;
+  int best_length = 0;
   for (const Head& head : kHeads) {
+    if (head.name == kHeads[0].name && !in_kg) continue;
     Dimension rest = *this;
+    int length = 0;
     for (std::size_t i = 0; i < rest.twice.size(); ++i) {
       rest.twice[i] -= head.dimension.twice[i] * mass / 2;
+      length += std::abs(rest.twice[i]);
     }
-    int cost = std::string(head.name) == "kg" ? 1 : 0;  // N s/m rather than kg/s
-    for (const int t : rest.twice) cost += std::abs(t);
-    if (!best.empty() && cost >= best_cost) continue;
-    best_cost = cost;
+    if (!best.empty() && length >= best_length) continue;
+    best_length = length;
     best = product_text(
         {{head.name, mass}, {"m", rest.twice[0]}, {"s", rest.twice[2]}, {"K", rest.twice[3]}});
   }
