@@ -67,6 +67,10 @@ class StaticForce {
   }
   /// d torque / d q, symmetric (the Hessian of the potential energy).
   const Eigen::MatrixXd& torque_jacobian() const { return torque_jacobian_; }
+  /// d2 torque_joint / dq dq, symmetric. [joints x joints]
+  const Eigen::MatrixXd& torque_hessian(int joint) const {
+    return torque_hessian_[static_cast<std::size_t>(joint)];
+  }
   /// Cylinder length and its three derivatives at q.
   const Taylor3& length(int cylinder) const { return lengths_[static_cast<std::size_t>(cylinder)]; }
   const ChainGeometry& chain() const { return chain_; }

@@ -10,18 +10,11 @@ namespace {
 /// Within 20 degrees of horizontal counts: a crane on a slope still tilts about its boom's pin.
 constexpr double kHorizontal = 0.35;
 
-/// Axis of the first joint that luffs, in the base frame with all joints at zero; none = zero.
-Eigen::Vector3d luffing_axis(const Machine& machine) {
+Eigen::Vector3d luffing_axis(const Machine& machine, int joint) {
   ChainGeometry chain(machine);
   const std::vector<double> zero(machine.joints.size(), 0.0);
   chain.update(machine, zero.data());
-  const double g = machine.gravity.norm();
-  for (std::size_t k = 0; k < machine.joints.size(); ++k) {
-    if (chain.revolute[k] && std::abs(chain.axis[k].dot(machine.gravity)) < kHorizontal * g) {
-      return chain.axis[k];
-    }
-  }
-  return Eigen::Vector3d::Zero();
+  return chain.axis[static_cast<std::size_t>(joint)];
 }
 
 class BaseTilt final : public Effect {
@@ -53,16 +46,30 @@ class BaseTilt final : public Effect {
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
-    return luffing_axis(machine).isZero() ? std::vector<int>{} : std::vector<int>{-1};
+    return first_luffing_joint(machine) < 0 ? std::vector<int>{} : std::vector<int>{-1};
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool changes_machine() const override { return true; }
   void change_machine(Machine& machine, int, std::span<const double> p) const override {
-    machine.gravity = Eigen::AngleAxisd(-p[0], luffing_axis(machine)) * machine.gravity;
+    const Eigen::Vector3d axis = luffing_axis(machine, first_luffing_joint(machine));
+    machine.gravity = Eigen::AngleAxisd(-p[0], axis) * machine.gravity;
   }
 };
 
 }  // namespace
+
+int first_luffing_joint(const Machine& machine) {
+  ChainGeometry chain(machine);
+  const std::vector<double> zero(machine.joints.size(), 0.0);
+  chain.update(machine, zero.data());
+  const double g = machine.gravity.norm();
+  for (int k = 0; k < machine.joint_count(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (chain.revolute[i] && std::abs(chain.axis[i].dot(machine.gravity)) < kHorizontal * g)
+      return k;
+  }
+  return -1;
+}
 
 std::unique_ptr<Effect> make_base_tilt() { return std::make_unique<BaseTilt>(); }
 

@@ -10,10 +10,13 @@ std::unique_ptr<Effect> make_unmodelled_mass();
 std::unique_ptr<Effect> make_payload_error();
 std::unique_ptr<Effect> make_base_tilt();
 std::unique_ptr<Effect> make_angle_offset();
+std::unique_ptr<Effect> make_structural_flex();
+std::unique_ptr<Effect> make_inertia();
 std::unique_ptr<Effect> make_coulomb_friction();
 std::unique_ptr<Effect> make_viscous_friction();
 std::unique_ptr<Effect> make_stribeck_friction();
 std::unique_ptr<Effect> make_load_friction();
+std::unique_ptr<Effect> make_pad_friction();
 std::unique_ptr<Effect> make_end_cushion();
 std::unique_ptr<Effect> make_presliding();
 std::unique_ptr<Effect> make_force_offset();
@@ -31,6 +34,9 @@ std::unique_ptr<Effect> make_oil_temperature();
 std::unique_ptr<Effect> make_line_loss();
 std::unique_ptr<Effect> make_flow_dependent_margin();
 std::unique_ptr<Effect> make_torque_limit();
+
+/// First joint that turns about a nearly horizontal axis with all joints at zero; -1 = none.
+int first_luffing_joint(const Machine& machine);
 
 /// Unit vector from a joint towards the next (or the tip), in the joint's frame: "along the link".
 Eigen::Vector3d link_direction(const Machine& machine, int joint);

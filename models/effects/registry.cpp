@@ -15,10 +15,13 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
     list.push_back(make_payload_error());
     list.push_back(make_base_tilt());
     list.push_back(make_angle_offset());
+    list.push_back(make_structural_flex());
+    list.push_back(make_inertia());
     list.push_back(make_coulomb_friction());
     list.push_back(make_viscous_friction());
     list.push_back(make_stribeck_friction());
     list.push_back(make_load_friction());
+    list.push_back(make_pad_friction());
     list.push_back(make_end_cushion());
     list.push_back(make_presliding());
     list.push_back(make_force_offset());
