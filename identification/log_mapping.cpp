@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/yaml_reader.h"
+
 namespace sparflow {
 namespace {
 
@@ -127,7 +129,7 @@ LogMapping parse_log_mapping(const std::string& path, const std::string& text) {
     const FilePlace place = error.mark.is_null()
                                 ? FilePlace{path, 0, 0}
                                 : FilePlace{path, error.mark.line + 1, error.mark.column + 1};
-    throw InputError(place, "", "not valid YAML: " + error.msg);
+    throw InputError(place, "", explained_yaml_error(error.msg, text, error.mark.line));
   }
 }
 

@@ -64,34 +64,20 @@ bool means_not_finite(const std::string& word) {
   return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
 }
 
-/// yaml-cpp's own words turned into what to do about it.
-std::string explained(const std::string& message) {
-  static const std::array<std::array<const char*, 2>, 12> kTable = {{
-      {YAML::ErrorMsg::TAB_IN_INDENTATION, "a tab indents this line; YAML wants spaces"},
-      {YAML::ErrorMsg::END_OF_MAP_FLOW,
-       "a `{` opened before here is not closed, or a comma is missing; write {key: value, key: "
-       "value}"},
-      {YAML::ErrorMsg::END_OF_SEQ_FLOW,
-       "a `[` opened before here is not closed, or a comma is missing; write [1, 2, 3]"},
-      {YAML::ErrorMsg::FLOW_END, "a closing `}` or `]` without its opening one; remove it"},
-      {YAML::ErrorMsg::END_OF_MAP,
-       "this line fits no mapping; every key of a mapping starts in the same column and ends with "
-       "a colon"},
-      {YAML::ErrorMsg::END_OF_SEQ,
-       "this line fits no list; every `-` of a list starts in the same column"},
-      {YAML::ErrorMsg::MAP_VALUE,
-       "a colon where none can stand; check the indentation or put the text in quotes"},
-      {YAML::ErrorMsg::MAP_KEY, "a key where none can stand; check the indentation"},
-      {YAML::ErrorMsg::BLOCK_ENTRY, "a `-` where no list can start; check the indentation"},
-      {YAML::ErrorMsg::EOF_IN_SCALAR, "a quoted text is not closed; add the missing quote"},
-      {YAML::ErrorMsg::DOC_IN_SCALAR,
-       "a quoted text opened before here is not closed; add the missing quote"},
-      {YAML::ErrorMsg::UNKNOWN_TOKEN, "a character YAML cannot read here; put the text in quotes"},
-  }};
-  for (const auto& [theirs, ours] : kTable) {
-    if (message == theirs) return ours;
+/// Line `line` (from 0) of `text`, empty when there is none.
+std::string line_of(const std::string& text, int line) {
+  std::size_t start = 0;
+  for (int i = 0; i < line && start != std::string::npos; ++i) {
+    start = text.find('\n', start);
+    if (start != std::string::npos) ++start;
   }
-  return fmt::format("not readable as YAML: {}; correct the text here", message);
+  if (line < 0 || start == std::string::npos) return "";
+  return text.substr(start, text.find('\n', start) - start);
+}
+
+bool tab_indents(const std::string& text, int line) {
+  const std::string l = line_of(text, line);
+  return l.substr(0, l.find_first_not_of(" \t")).find('\t') != std::string::npos;
 }
 
 std::string without_unit(const std::string& key) {
@@ -107,6 +93,40 @@ std::string without_unit(const std::string& key) {
 }
 
 }  // namespace
+
+std::string explained_yaml_error(const std::string& message, const std::string& text, int line) {
+  if (tab_indents(text, line)) return "a tab indents this line; YAML wants spaces";
+  static const std::array<std::array<const char*, 2>, 12> kTable = {{
+      {YAML::ErrorMsg::TAB_IN_INDENTATION, "a tab indents this line; YAML wants spaces"},
+      {YAML::ErrorMsg::END_OF_MAP_FLOW,
+       "a `{` opened before here is not closed, or a comma is missing; write {key: value, key: "
+       "value}"},
+      {YAML::ErrorMsg::END_OF_SEQ_FLOW,
+       "a `[` opened before here is not closed, or a comma is missing; write [1, 2, 3]"},
+      {YAML::ErrorMsg::FLOW_END, "a closing `}` or `]` without its opening one; remove it"},
+      {YAML::ErrorMsg::END_OF_MAP,
+       "this line fits no mapping; check its indentation: every key of a mapping starts in the "
+       "same "
+       "column and ends with a colon"},
+      {YAML::ErrorMsg::END_OF_SEQ,
+       "this line fits no list; check its indentation: every `-` of a list starts in the same "
+       "column, every key below it in the column of its first key"},
+      {YAML::ErrorMsg::MAP_VALUE,
+       "a colon where none can stand; check the indentation or put the text in quotes"},
+      {YAML::ErrorMsg::MAP_KEY, "a key where none can stand; check the indentation"},
+      {YAML::ErrorMsg::BLOCK_ENTRY, "a `-` where no list can start; check the indentation"},
+      {YAML::ErrorMsg::EOF_IN_SCALAR, "a quoted text is not closed; add the missing quote"},
+      {YAML::ErrorMsg::DOC_IN_SCALAR,
+       "a quoted text opened before here is not closed; add the missing quote"},
+      {YAML::ErrorMsg::UNKNOWN_TOKEN, "a character YAML cannot read here; put the text in quotes"},
+  }};
+  for (const auto& [theirs, ours] : kTable) {
+    if (message == theirs) return ours;
+  }
+  // anchors, aliases, tags, escapes, directives: a special character in what was meant as plain text
+  return fmt::format(
+      "not readable as YAML ({}); if this is plain text, put it in single quotes ('...')", message);
+}
 
 std::string Quantity::expected() const {
   std::string text = sign == Sign::kPositive      ? fmt::format("a positive {}", name)
@@ -370,14 +390,19 @@ YamlValue parse_yaml(const std::string& text, const std::string& file) {
     // the end mark makes yaml-cpp see a quote that is never closed; by itself it takes the rest as text
     documents = YAML::LoadAll(text + "\n...\n");
   } catch (const YAML::Exception& error) {
-    throw InputError(place_of(error.mark, file), "", explained(error.msg));
+    throw InputError(place_of(error.mark, file), "",
+                     explained_yaml_error(error.msg, text, error.mark.line));
   }
   if (documents.empty() || documents[0].IsNull()) {
     throw InputError({file, 0, 0}, "", "the file is empty; expected `key: value` lines");
   }
   if (documents.size() > 1) {
-    throw InputError(place_of(documents[1].Mark(), file), "",
-                     "a second document starts here; remove the `---` line");
+    const YAML::Mark mark = documents[1].Mark();
+    const bool marked = text.starts_with("---") || text.find("\n---") != std::string::npos;
+    throw InputError(place_of(mark, file), "",
+                     marked ? "a second document starts here; remove the `---` line"
+                            : "this line is indented less than the first key; check its "
+                              "indentation: every key of the file starts in the first column");
   }
   return YamlValue(documents[0], file, "");
 }

@@ -32,6 +32,10 @@ struct Quantity {
 
 class YamlMap;
 
+/// The YAML library's own message turned into what to do about it.
+/// @param text the file's  @param line of the error, from 0; negative = not known
+std::string explained_yaml_error(const std::string& message, const std::string& text, int line);
+
 /// One value of the file: its place, its key path and its readers. Cheap to copy; keeps the document alive.
 class YamlValue {
  public:

@@ -119,6 +119,19 @@ const std::vector<Broken> kText = {
     {"indentation", "    rod: 0.115\n", "     rod: 0.115\n",
      "crane.yaml:15:9: a colon where none can stand; check the indentation or put the text in "
      "quotes"},
+    {"tab behind a key", "    rod: 0.115\n", "\t    rod: 0.115\n",
+     "crane.yaml:15:1: a tab indents this line; YAML wants spaces"},
+    {"first key indented", "name: crane", " name: crane",
+     "crane.yaml:2:1: this line is indented less than the first key; check its indentation: every "
+     "key of the file starts in the first column"},
+    {"too little indentation", "    rod: 0.115\n", "   rod: 0.115\n",
+     "crane.yaml:15:4: this line fits no list; check its indentation: every `-` of a list starts "
+     "in "
+     "the same column, every key below it in the column of its first key"},
+    {"alias in text", "name: crane", "name: *crane",
+     "crane.yaml:1:7: not readable as YAML (the referenced anchor is not defined); if this is "
+     "plain "
+     "text, put it in single quotes ('...')"},
     {"quote not closed", "name: crane", "name: \"crane",
      "crane.yaml:35:1: a quoted text opened before here is not closed; add the missing quote"},
     {"unknown top key",
