@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <stdexcept>
 
+#include "models/linkage.h"
+#include "models/static_force.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -21,6 +25,12 @@ constexpr double kLargestCommand = 1.5;
 constexpr double kRangeTolerance = 0.02;  // of the range; geometry from drawings is not better
 constexpr double kStuck = 2.0;            // [s] of exactly equal values on a sensor that has noise
 constexpr Eigen::Index kStuckSamples = 20;
+
+constexpr double kLowPressures = 40.0 * units::kBar;  // 400 bar, the most there is, read as MPa
+/// Weight against pressures when bar are MPa: ten, with what friction, dynamics and rough masses do to it.
+constexpr Range kTenfold{5.0, 20.0};
+constexpr Eigen::Index kBalanceSamples = 200;  // evenly over the log: a mean force needs no more
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Extent {
   double lo = 0.0, hi = 0.0;
@@ -38,6 +48,20 @@ Extent extent_of(const Channel& channel) {
 }
 
 double largest(const Extent& e) { return std::max(std::abs(e.lo), std::abs(e.hi)); }
+
+/// Revolute joint: most samples outside its range, all inside once read as degrees.
+bool looks_like_degrees(const Channel& channel, Range range, const Extent& e) {
+  const double tolerance = kRangeTolerance * (range.hi - range.lo);
+  if (!(tolerance > 0.0)) return false;
+  Eigen::Index outside = 0, valid = 0;
+  for (Eigen::Index i = 0; i < channel.values.size(); ++i) {
+    if (!channel.valid[i]) continue;
+    ++valid;
+    outside += channel.values[i] < range.lo - tolerance || channel.values[i] > range.hi + tolerance;
+  }
+  return 2 * outside > valid && e.lo * units::kDegree >= range.lo - tolerance &&
+         e.hi * units::kDegree <= range.hi + tolerance;
+}
 
 /// Share of valid samples outside `range` by more than the tolerance, and how far at most.
 void check_range(const Channel& channel, Range range, const char* of_what, double unit_shown,
@@ -127,6 +151,13 @@ void check_position(const Channel& channel, const Machine& machine, const Extent
                     channel.signal, revolute ? "deg" : "mm"));
     return;
   }
+  if (revolute && looks_like_degrees(channel, joint.position, e)) {
+    log->warnings.push_back(fmt::format(
+        "{}: values from {:.4g} to {:.4g}, the joint ranges from {:.4g} to {:.4g} rad; are they in "
+        "degrees? Then name the column {}_deg",
+        channel.column, e.lo, e.hi, joint.position.lo, joint.position.hi, channel.signal));
+    return;
+  }
   check_range(channel, joint.position, "the joint's range", 1.0, revolute ? "rad" : "m", log);
   check_jumps(channel, joint, log);
 }
@@ -144,9 +175,81 @@ void check_pressure(const Channel& channel, const Extent& e, Log* log) {
   check_stuck(channel, log);
 }
 
+/// Joint coordinate of one sample, from its own channel or from its cylinder's stroke; NaN when unknown.
+double joint_position(const Machine& machine, const Log& log, int joint, Eigen::Index k) {
+  if (const Channel* q = log.find(Role::kJointPosition, joint)) return q->values[k];
+  const int cylinder = machine.cylinder_of_joint(joint);
+  const Channel* x = cylinder >= 0 ? log.find(Role::kStroke, cylinder) : nullptr;
+  if (x == nullptr || !x->valid[k]) return kNaN;
+  return joint_at_stroke(machine, cylinder, x->values[k]);
+}
+
+/// What the machine's weight and the pressures say about each other, summed over samples and cylinders. [N]
+struct ForceBalance {
+  double weight = 0.0;     ///< |static force| by virtual work
+  double pressures = 0.0;  ///< |pA A_A - pB A_B|
+};
+
+ForceBalance force_balance(const Machine& machine, const Log& log) {
+  ForceBalance sum;
+  StaticForce statics(machine);
+  std::vector<double> q(machine.joints.size());
+  const Channel* payload = log.find(Role::kPayload);
+  const Eigen::Index step = std::max<Eigen::Index>(1, log.samples() / kBalanceSamples);
+  for (Eigen::Index k = 0; k < log.samples(); k += step) {
+    try {
+      for (int j = 0; j < machine.joint_count(); ++j)
+        q[static_cast<std::size_t>(j)] = joint_position(machine, log, j, k);
+      statics.update(q.data(), payload != nullptr && payload->valid[k] ? payload->values[k] : 0.0,
+                     0);
+    } catch (const std::domain_error&) {
+      continue;  // the geometry does not reach this stroke: judged elsewhere
+    }
+    for (int i = 0; i < machine.cylinder_count(); ++i) {
+      const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(i)];
+      const Channel* a = log.find(Role::kPressureA, i);
+      const Channel* b = log.find(Role::kPressureB, i);
+      if (!cylinder.hydraulic() || a == nullptr || b == nullptr) continue;
+      const double weight = std::abs(statics.force()[i]);
+      const double pressures =
+          std::abs(a->values[k] * cylinder.area_piston() - b->values[k] * cylinder.area_rod());
+      if (!std::isfinite(weight) || !std::isfinite(pressures)) continue;
+      sum.weight += weight;
+      sum.pressures += pressures;
+    }
+  }
+  return sum;
+}
+
+/// Pressures named bar that are a tenth of what carries the machine are MPa.
+void check_megapascal(const Machine& machine, Log* log) {
+  std::vector<std::string> columns;
+  double highest = 0.0;
+  const Channel* example = nullptr;
+  for (const Channel& c : log->channels) {
+    if (c.role != Role::kPressureA && c.role != Role::kPressureB && c.role != Role::kPumpPressure)
+      continue;
+    const Extent e = extent_of(c);
+    if (!e.any) continue;
+    highest = std::max(highest, largest(e));
+    columns.push_back(c.column);
+    if (example == nullptr) example = &c;
+  }
+  if (example == nullptr || highest >= kLowPressures) return;
+  const ForceBalance balance = force_balance(machine, *log);
+  if (!(balance.pressures > 0.0)) return;
+  const double ratio = balance.weight / balance.pressures;
+  if (ratio < kTenfold.lo || ratio > kTenfold.hi) return;
+  log->warnings.push_back(fmt::format(
+      "{}: no pressure above {:.3g} bar, but the machine's weight asks for {:.2g} times the force "
+      "they give; are they in MPa? Then name the columns {}_MPa and so on",
+      fmt::join(columns, ", "), highest / units::kBar, ratio, example->signal));
+}
+
 }  // namespace
 
 void check_plausible(const Machine& machine, Log* log) {
+  check_megapascal(machine, log);
   for (const Channel& channel : log->channels) {
     const Extent e = extent_of(channel);
     if (!e.any) continue;

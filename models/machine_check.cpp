@@ -152,10 +152,26 @@ class Checker {
     const bool has_pins = std::holds_alternative<PinsLinkage>(cylinder.linkage) ||
                           std::holds_alternative<FourBarLinkage>(cylinder.linkage);
     if (has_pins) {
+      check_less_than_a_turn(i);
       check_four_bar_plane(i);
       check_dead_centre(i);
     }
     check_stroke(i);
+  }
+
+  /// Within a whole turn every pinned cylinder passes a dead centre, so a wider range is a slip of unit; said before
+  /// the dead centre is, whose position would only puzzle.
+  void check_less_than_a_turn(std::size_t i) const {
+    const auto j = static_cast<std::size_t>(machine_.cylinders[i].joint);
+    const Joint& joint = machine_.joints[j];
+    if (joint.type != JointType::kRevolute) return;
+    const Range& r = joint.position;
+    if (r.hi - r.lo < 2.0 * std::numbers::pi) return;
+    fail(places_.joints, j, fmt::format("joints[{}].position", joint.name),
+         fmt::format(
+             "[{:g}, {:g}] rad is more than a turn, which cylinder {} cannot drive; if these "
+             "are degrees, write [{:.4f}, {:.4f}]",
+             r.lo, r.hi, machine_.cylinders[i].name, r.lo * units::kDegree, r.hi * units::kDegree));
   }
 
   /// A four-bar is computed in the plane through its rocker pin normal to the joint's axis.

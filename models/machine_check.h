@@ -16,7 +16,8 @@ struct MachinePlaces {
 
 /// Errors: names that stand twice; a cylinder fed by two pumps; a joint with two cylinders; a valve or pump for
 /// a drive without hydraulics; over the joint's range a dead centre (dx/dq changes sign or falls below
-/// 1 % of its largest value) or a four-bar that cannot close. The message names cylinder and joint position.
+/// 1 % of its largest value), a four-bar that cannot close, or more than a turn for a pinned cylinder (degrees
+/// written for radians). The message names cylinder and joint position.
 /// @return warnings, one sentence each: what is unusual but possible (no pump, no valve, stroke exceeded,
 ///   no gravity, angles that look like degrees, ...)
 /// @throws InputError at the first error
