@@ -46,6 +46,8 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
   }
   const auto n = static_cast<Index>(pressure.size()), m = static_cast<Index>(fed);
   PumpSamples out;
+  for (const int i : pump.feeds)
+    out.names.push_back(machine.cylinders[static_cast<std::size_t>(i)].name);
   out.pressure = Eigen::Map<VectorXd>(pressure.data(), n);
   out.working_pressure.resize(n, m);
   out.active.resize(n, m);
@@ -56,19 +58,6 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
     }
   }
   return out;
-}
-
-void margin_notes(const Machine& machine, const Pump& pump, const LearnedPump& learned,
-                  FitPass& pass) {
-  for (std::size_t f = 0; f < pump.feeds.size(); ++f) {
-    if (learned.margins[f].identified) continue;
-    const std::string& name = machine.cylinders[static_cast<std::size_t>(pump.feeds[f])].name;
-    pass.notes.push_back(
-        fmt::format("margin of {}: it led pump {} in only {} sample(s), {:.1f} bar is assumed; "
-                    "record {} moving alone",
-                    name, pump.name, learned.margins[f].leading,
-                    learned.margins[f].margin / units::kBar, name));
-  }
 }
 
 }  // namespace
@@ -147,7 +136,6 @@ void learn_pumps(const TrainingData& data, const FitOptions& options, FitPass& p
       pass.model.cylinders[static_cast<std::size_t>(pump.feeds[f])].margin =
           learned.margins[f].margin;
     }
-    margin_notes(machine, pump, learned, pass);
   }
 }
 

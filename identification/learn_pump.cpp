@@ -277,6 +277,15 @@ double pump_law(const Eigen::Ref<const Eigen::RowVectorXd>& working_pressure,
   return pressure;
 }
 
+namespace {
+
+std::string cylinder_name(const PumpSamples& samples, Index i) {
+  const auto k = static_cast<std::size_t>(i);
+  return k < samples.names.size() ? samples.names[k] : fmt::format("cylinder {}", i + 1);
+}
+
+}  // namespace
+
 LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& options) {
   const Index m = samples.active.cols();
   SPARFLOW_CHECK(samples.working_pressure.rows() == samples.pressure.size() &&
@@ -320,9 +329,9 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
               ? fmt::format("it is at most {:.1f} bar", margin.upper_bound / 1e5)
               : std::string("nothing bounds it");
       out.warnings.push_back(fmt::format(
-          "Cylinder {} leads the pump in {} of {} active samples: its margin is not identified, "
-          "{}; {:.1f} bar is assumed.",
-          i, margin.leading, margin.active, bound, unknown[i] / 1e5));
+          "{} leads the pump in {} of {} active samples: its margin is not identified, {}; {:.1f} "
+          "bar is assumed; record it moving alone.",
+          cylinder_name(samples, i), margin.leading, margin.active, bound, unknown[i] / 1e5));
     }
     margin.margin = unknown[i];
   }

@@ -21,6 +21,8 @@ struct PumpSamples {
       working_pressure;  ///< [samples x cylinders] P_i of the model [Pa]; read where active
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> active;  ///< [samples x cylinders]
   Eigen::VectorXd pressure;  ///< [samples] measured at the pump [Pa]
+  /// [cylinders] for warnings; empty: the columns' numbers, from 1.
+  std::vector<std::string> names = {};
 };
 
 struct LearnPumpOptions {

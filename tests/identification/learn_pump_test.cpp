@@ -136,6 +136,10 @@ TEST(LearnPump, CylinderThatNeverMoves) {
   EXPECT_EQ(pump.margins[1].active, 0);
   EXPECT_TRUE(std::isinf(pump.margins[1].upper_bound));
   EXPECT_EQ(pump.margins[1].margin, pump.margins[0].margin);
+  ASSERT_FALSE(pump.warnings.empty());
+  EXPECT_THAT(pump.warnings[0], testing::StartsWith("cylinder 2 leads the pump in 0 of 0"));
+  samples.names = {"boom", "jib"};
+  EXPECT_THAT(learn_pump(samples).warnings[0], testing::StartsWith("jib leads the pump in 0 of 0"));
 }
 
 TEST(LearnPump, StandbyNeverSeenComesFromTheDataSheet) {
