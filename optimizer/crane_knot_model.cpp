@@ -386,6 +386,16 @@ void TipAtGoal::bounds(double* lower, double* upper) const {
     lower[i] = upper[i] = directions_[i].dot(goal_);
 }
 
+std::string TipAtGoal::name(int row) const {
+  const Eigen::Vector3d& d = directions_[static_cast<std::size_t>(row)];
+  Eigen::Index axis = 0;
+  const bool along_axis = d.cwiseAbs().maxCoeff(&axis) > 1.0 - 1e-9;
+  if (along_axis)
+    return fmt::format("{} of the tip at its goal ({:.4g} m)", "xyz"[axis], goal_[axis]);
+  return fmt::format("tip along ({:.3f}, {:.3f}, {:.3f}) at its goal ({:.4g} m)", d.x(), d.y(),
+                     d.z(), d.dot(goal_));
+}
+
 void TipAtGoal::value(const double* q, double* g) {
   chain_.update(*machine_, q);
   const Eigen::Vector3d p = chain_.point(machine_->tip.joint, machine_->tip.xyz);

@@ -106,6 +106,8 @@ class TipAtGoal final : public TerminalModel {
   void value(const double* q, double* g) override;
   void jacobian(const double* q, double* jacobian) override;
   void add_hessian(const double* q, const double* multiplier, double* hessian) override;
+  /// "z of the tip at its goal (3.5 m)", or the direction where it is none of the base frame's axes.
+  std::string name(int row) const override;
 
  private:
   const Machine* machine_;

@@ -58,6 +58,8 @@ class TerminalModel {
   virtual void jacobian(const double* q, double* jacobian) = 0;
   /// Adds sum_row multiplier[row] * Hessian to `hessian` [n x n, column-major].
   virtual void add_hessian(const double* q, const double* multiplier, double* hessian) = 0;
+  /// Words for messages, e.g. "x of the tip at the goal".
+  virtual std::string name(int row) const { return "goal row " + std::to_string(row); }
 };
 
 }  // namespace sparflow

@@ -237,7 +237,7 @@ std::string Transcription::constraint_name(int index) const {
                        joint_name(d.joint), spec_.t[d.interval]);
   }
   if (index < terminal_row_ + terminal_count_) {
-    return fmt::format("goal row {}", index - terminal_row_);
+    return spec_.terminal->name(index - terminal_row_);
   }
   for (const Node& node : nodes_) {
     const std::vector<int>& rows = rows_of(node);

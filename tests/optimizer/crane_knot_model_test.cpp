@@ -175,6 +175,19 @@ TEST_P(EveryMachine, GoalDerivativesMatchFiniteDifferences) {
   TipAtGoal goal(model_.machine, std::get<TipGoal>(problem.goal).tip);
   const int n = model_.machine.joint_count(), rows = goal.count();
   ASSERT_GE(rows, 1);
+  const Vector goal_tip = std::get<TipGoal>(problem.goal).tip;
+  Vector at_goal(rows);
+  goal.bounds(at_goal.data(), at_goal.data());
+  for (int r = 0; r < rows; ++r) {  // each row is called by the coordinate it rules
+    const std::string name = goal.name(r);
+    const std::size_t axis = std::string("xyz").find(name[0]);
+    if (name.substr(1, 11) != " of the tip") {
+      EXPECT_EQ(name.rfind("tip along (", 0), 0u) << name;
+      continue;
+    }
+    ASSERT_LT(axis, 3u) << name;
+    EXPECT_NEAR(at_goal[r], goal_tip[static_cast<Eigen::Index>(axis)], 1e-12) << name;
+  }
   std::mt19937 random(31);
   const Vector q = random_state(model_.machine, random).head(n);
   Matrix jacobian_t(n, rows);
