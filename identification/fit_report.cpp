@@ -28,7 +28,12 @@ std::string figures(const CompareResult& result) {
     text += fmt::format("working pressures {:.2f} bar, ", pressure / units::kBar);
   if (std::isfinite(pump)) text += fmt::format("pump {:.2f} bar, ", pump / units::kBar);
   for (const EnergyScore& e : result.energy) {
-    text += fmt::format("energy of {} {:+.2f} %, ", e.pump, 100.0 * e.relative_error);
+    if (std::isfinite(e.relative_error)) {
+      text += fmt::format("energy of {} {:+.2f} %, ", e.pump, 100.0 * e.relative_error);
+    } else {
+      text += fmt::format("energy of {} \u2013 % (nothing delivered in {:.1f} s), ", e.pump,
+                          e.duration);
+    }
   }
   if (text.empty()) {
     const double force = stage_rmse(result, "force");

@@ -37,6 +37,7 @@ std::string stage_words(const std::string& stage) {
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
 std::string signed_percent(double share) {
+  if (!std::isfinite(share)) return "\u2013";
   const double percent = rounded(100.0 * share, 0.01);
   return percent == 0.0 ? "0.00" : fmt::format("{:+.2f}", percent);
 }
@@ -55,8 +56,10 @@ void add_tiles(Page& page, const CompareResult& result, const std::vector<Judged
   for (const EnergyScore& e : result.energy) {
     tiles.push_back(
         {signed_percent(e.relative_error), "%", "energy of pump " + e.pump,
-         fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
-                     display_number(e.measured / 1e3, 4)),
+         std::isfinite(e.relative_error)
+             ? fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
+                           display_number(e.measured / 1e3, 4))
+             : fmt::format("nothing was delivered in {:.1f} s: no cylinder is driven", e.duration),
          judge_energy(e)});
   }
   if (!tiles.empty()) page.tiles(std::move(tiles));

@@ -105,7 +105,7 @@
     const unit = spec.y_axis.unit ? " " + spec.y_axis.unit : "";
     const xUnit = spec.x_axis.unit ? " " + spec.x_axis.unit : "";
     const data = [spec.x];
-    const series = [{ label: spec.x_axis.label, value: (u, v) => (v == null ? "" : number(v, 5) + xUnit) }];
+    const series = [{ label: spec.x_axis.label, class: "instant", value: (u, v) => (v == null ? "" : number(v, 5) + xUnit) }];
     const bands = [];
     for (const s of spec.series) {
       if (!s.lower) continue;  // bands lie under all curves
@@ -137,6 +137,7 @@
         drawClear: [(u) => drawSpans(u, spec)],
         draw: [(u) => { drawLabels(u, spec); emptyNote(u, isEmpty); }],
         setCursor: [(u) => {
+          u.root.classList.toggle("read", u.cursor.idx != null);
           if (u.cursor.left >= 0 && u.cursor.event) page.tellInstant(spec.group, u.posToVal(u.cursor.left, "x"), u);
         }],
       },
