@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sched.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <exception>
 
@@ -59,9 +61,13 @@ Child start_child(const std::function<std::string(int)>& work, int index,
                   const std::vector<Child>& others) {
   int ends[2];
   SPARFLOW_CHECK(::pipe(ends) == 0, "no pipe for a child process");
+  const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
   SPARFLOW_CHECK(pid >= 0, "no child process");
   if (pid == 0) {
+    // whoever asked is gone, killed or interrupted: nobody waits for the answer
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(1);
     ::close(ends[0]);
     for (const Child& other : others) ::close(other.pipe);
     write_all(ends[1], run_here(work, index));

@@ -15,7 +15,7 @@ struct ChildResult {
 };
 
 /// Runs work(0) .. work(count-1), at most `at_once` at a time, each in a forked child whose return value
-/// comes back through a pipe. With at_once <= 1 or count == 1 everything runs in this process.
+/// comes back through a pipe; a child never outlives this process. With at_once <= 1 or count == 1 everything runs in this process.
 /// @param on_done called in this process as results arrive: (index, finished so far)
 std::vector<ChildResult> run_in_children(int count, int at_once,
                                          const std::function<std::string(int)>& work,

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "apps/cli/context.h"
 #include "apps/report/compare_page.h"
 #include "models/error.h"
@@ -26,20 +28,39 @@ void keep_statics(CompareResult& result) {
   result.energy.clear();
 }
 
+/// A table's energy needs some to be a share of: without any, the reason stands among the notes.
+void note_energies_without_work(CompareResult& result) {
+  for (const EnergyScore& e : result.energy) {
+    if (std::isfinite(e.relative_error)) continue;
+    result.notes.push_back(fmt::format(
+        "energy of pump {}: \u2013 %, nothing was delivered in the {:.1f} s compared, no "
+        "cylinder is driven in them",
+        e.pump, e.duration));
+  }
+  std::erase_if(result.energy,
+                [](const EnergyScore& e) { return !std::isfinite(e.relative_error); });
+}
+
 int run(const CompareArguments& a) {
+  std::vector<NamedFile> inputs = named("--log", a.logs);
+  inputs.push_back({"--model", a.model});
+  inputs.push_back({"--machine", a.machine});
+  inputs.push_back({"--mapping", a.mapping});
+  check_outputs_apart("compare", a.outputs.files(), inputs);
   a.outputs.check();
   if (a.model.empty() == a.machine.empty()) {
     throw UsageError(
         "compare: give either --model MODEL.json, or --machine FILE to compare static forces "
         "alone");
   }
-  const CraneModel model =
-      a.model.empty() ? CraneModel::untrained(load_machine(a.machine)) : load_model(a.model);
+  const CraneModel model = a.model.empty() ? CraneModel::untrained(load_machine_aloud(a.machine))
+                                           : load_model_aloud(a.model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
   CompareResult result = compare(model, logs);
   if (a.model.empty()) keep_statics(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
+  note_energies_without_work(result);
   fmt::print("{}\n", compare_table(result));
   return kDone;
 }

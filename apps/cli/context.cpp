@@ -1,15 +1,20 @@
 #include "apps/cli/context.h"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <new>
 
 #include "models/error.h"
+#include "models/machine_check.h"
+#include "models/machine_file.h"
 #include "models/model_file.h"
 #include "optimizer/exact_energy.h"
 #include "optimizer/transcription.h"
@@ -19,20 +24,53 @@
 namespace sparflow::cli {
 namespace {
 
-volatile std::sig_atomic_t interrupt_count = 0;
+constexpr std::chrono::seconds kTellEvery{10};
+/// Shared with the child processes: a Ctrl-C reaches all of them at a terminal, this process alone when another
+/// program sends it; either way this process counts and the children look here.
+std::atomic<int>* interrupt_count = nullptr;
+static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
+volatile std::sig_atomic_t finish_first = 0;
+pid_t main_process = 0;
 
 void on_interrupt(int) {
-  interrupt_count = interrupt_count + 1;
-  if (interrupt_count > 1) ::_exit(kInterrupted);
+  if (::getpid() != main_process) return;
+  const int before = interrupt_count->fetch_add(1);
+  if (before > 0 || finish_first == 0) ::_exit(kInterrupted);
+  constexpr char kText[] =
+      "\ninterrupted: finishing with the best so far; Ctrl-C again ends at once\n";
+  if (::write(2, kText, sizeof kText - 1) < 0) return;
 }
 
 }  // namespace
 
-void catch_interrupts() { std::signal(SIGINT, on_interrupt); }
-bool interrupted() { return interrupt_count > 0; }
+void catch_interrupts() {
+  main_process = ::getpid();
+  void* shared = ::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
+                        MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  SPARFLOW_CHECK(shared != MAP_FAILED, "no memory for one number");
+  interrupt_count = new (shared) std::atomic<int>(0);
+  std::signal(SIGINT, on_interrupt);
+}
+void finish_on_interrupt() { finish_first = 1; }
+bool interrupted() { return interrupt_count->load() > 0; }
 
 void warn(const std::string& sentence) { fmt::print(stderr, "warning: {}\n", sentence); }
 void note(const std::string& sentence) { fmt::print(stderr, "{}\n", sentence); }
+
+Machine load_machine_aloud(const std::string& path) {
+  std::vector<std::string> warnings;
+  Machine machine = load_machine(path, &warnings);
+  for (const std::string& w : warnings) warn(w);
+  return machine;
+}
+
+CraneModel load_model_aloud(const std::string& path) {
+  CraneModel model = load_model(path);
+  MachinePlaces places;
+  places.file = path;
+  for (const std::string& w : check_machine(model.machine, places)) warn(w);
+  return model;
+}
 
 void Outputs::add_to(CLI::App& verb, bool with_report) {
   verb.add_option("--json", json, "write the machine-readable result to FILE")->type_name("FILE");
@@ -61,13 +99,57 @@ void check_writable(const std::string& path) {
   }
 }
 
+bool same_file(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::equivalent(a, b, error)) return true;
+  const fs::path whole_a = fs::weakly_canonical(fs::absolute(a, error), error);
+  const fs::path whole_b = fs::weakly_canonical(fs::absolute(b, error), error);
+  return !whole_a.empty() && whole_a == whole_b;
+}
+
+std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths) {
+  std::vector<NamedFile> files;
+  for (const std::string& path : paths) files.push_back({option, path});
+  return files;
+}
+
+void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& outputs,
+                         const std::vector<NamedFile>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].path.empty()) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (outputs[j].path.empty() || !same_file(outputs[i].path, outputs[j].path)) continue;
+      throw UsageError(fmt::format("{}: {} and {} name one file, {}; give each its own", verb,
+                                   outputs[j].option, outputs[i].option, outputs[i].path));
+    }
+    for (const NamedFile& input : inputs) {
+      if (input.path.empty() || !same_file(outputs[i].path, input.path)) continue;
+      throw UsageError(fmt::format("{}: {} would overwrite the input {} (given with {})", verb,
+                                   outputs[i].option, input.path, input.option));
+    }
+  }
+}
+
 void Outputs::check() const {
   check_writable(json);
   check_writable(report);
 }
 
 Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(2) == 1) {
-  if (!terminal_) fmt::print(stderr, "{} ...\n", what_);
+  if (terminal_) return;
+  fmt::print(stderr, "{} ...\n", what_);
+  teller_ = std::jthread([this](const std::stop_token& stop) { tell_now_and_then(stop); });
+}
+
+void Progress::tell_now_and_then(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (!ended_.wait_for(lock, stop, kTellEvery, [&] { return stop.stop_requested(); })) {
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    fmt::print(stderr, "{}: {:.0f} s, {:.0f} %{}{}\n", what_, seconds, 100.0 * share_,
+               doing_.empty() ? "" : ", ", doing_);
+  }
 }
 
 Progress::~Progress() {
@@ -75,7 +157,13 @@ Progress::~Progress() {
 }
 
 void Progress::operator()(double share, const std::string& what) {
-  if (!terminal_ || (share < 1.0 && std::abs(share - last_) < 0.005)) return;
+  if (!terminal_) {
+    const std::lock_guard lock(mutex_);
+    share_ = share;
+    doing_ = what;
+    return;
+  }
+  if (share < 1.0 && std::abs(share - last_) < 0.005) return;
   last_ = share;
   const std::string line =
       fmt::format("{} {:3.0f} %  {}", what_, 100.0 * share, what).substr(0, 110);
@@ -101,7 +189,7 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
                                        const std::string& model_path) {
   ProblemAndModel both;
   if (!model_path.empty()) {
-    both.model = load_model(model_path);
+    both.model = load_model_aloud(model_path);
     both.problem = load_problem(problem_path, &both.model.machine);
     try {
       const std::string own = load_problem(problem_path).machine.name;
@@ -120,7 +208,7 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
     throw UsageError(
         "no model: give --model MODEL.json, or name one in the problem file (key `model`)");
   }
-  both.model = load_model(both.problem.model_path);
+  both.model = load_model_aloud(both.problem.model_path);
   both.problem = load_problem(problem_path, &both.model.machine);
   return both;
 }

@@ -1,8 +1,13 @@
 #pragma once
 /// What all verbs share: output conventions, progress, interruption, and the door to the seeds.
 #include <CLI/CLI.hpp>
+#include <chrono>
+#include <condition_variable>
 #include <functional>
+#include <mutex>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "identification/log.h"
@@ -22,6 +27,12 @@ enum ExitCode {
   kInterrupted = 130
 };
 
+/// A file named on the command line.
+struct NamedFile {
+  std::string option;  ///< "--json"
+  std::string path;    ///< empty: not given
+};
+
 /// Options that every verb with a result offers.
 struct Outputs {
   std::string json;
@@ -29,12 +40,25 @@ struct Outputs {
   void add_to(CLI::App& verb, bool with_report = true);
   /// Checks before any long work that the files can be written where they are asked for.
   void check() const;
+  std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
 };
 
 /// Before long work: the folder of `path` exists and can be written.
 void check_writable(const std::string& path);
 
-/// One line on stderr that is rewritten on a terminal; silent when stderr is not one, except for begin and end.
+/// No two outputs are one file, and none overwrites an input. Links and ./ are seen through.
+/// @throws UsageError
+void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& outputs,
+                         const std::vector<NamedFile>& inputs);
+
+/// True when both names lead to one file, whether it exists already or not.
+bool same_file(const std::string& a, const std::string& b);
+
+/// Every path of a repeatable option.
+std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths);
+
+/// One line on stderr that is rewritten on a terminal. Where stderr is none (a file, a job's log), a plain line
+/// at the beginning and one every ten seconds, also while nothing new is reported: the work is alive.
 class Progress {
  public:
   explicit Progress(std::string what);
@@ -44,19 +68,35 @@ class Progress {
   void operator()(double share, const std::string& what);
 
  private:
+  void tell_now_and_then(const std::stop_token& stop);
+
   std::string what_;
   bool terminal_ = false;
   std::size_t width_ = 0;
   double last_ = -1.0;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::mutex mutex_;  ///< guards share_ and doing_
+  double share_ = 0.0;
+  std::string doing_;
+  std::condition_variable_any ended_;
+  std::jthread teller_;  ///< last: ends before what it uses
 };
 
-/// True once Ctrl-C was pressed (first time: finish with the best so far; second time: the process ends).
-bool interrupted();
+/// From now on Ctrl-C ends the program with exit code 130.
 void catch_interrupts();
+/// From now on the first Ctrl-C only makes interrupted() true: finish with the best so far. The second ends the program.
+void finish_on_interrupt();
+/// True once Ctrl-C was pressed, in child processes too.
+bool interrupted();
 
 /// A sentence on stderr, "warning: ...".
 void warn(const std::string& sentence);
 void note(const std::string& sentence);
+
+/// A machine file read, with what is unusual about the machine said on stderr.
+Machine load_machine_aloud(const std::string& path);
+/// The same for a model and the machine it carries.
+CraneModel load_model_aloud(const std::string& path);
 
 std::vector<Log> load_logs(const std::vector<std::string>& paths, const Machine& machine,
                            const std::string& mapping);

@@ -8,7 +8,6 @@
 #include "apps/report/motion_page.h"
 #include "identification/fit.h"
 #include "models/error.h"
-#include "models/machine_file.h"
 #include "models/model_file.h"
 #include "optimizer/motion_table.h"
 #include "problems/bundled.h"
@@ -31,7 +30,7 @@ int run(const std::string& folder) {
   fmt::print(
       "Sparflow demo: from a measured log to an energy-optimal motion, on a simulated 21 t.m "
       "loader crane.\n\n");
-  const Machine machine = load_machine(bundled_file("machines/loader_crane.yaml"));
+  const Machine machine = load_machine_aloud(bundled_file("machines/loader_crane.yaml"));
   const std::vector<Log> train =
       load_logs({bundled_file("logs/loader_crane_train.csv")}, machine, "");
   const std::vector<Log> test =
@@ -60,6 +59,7 @@ int run(const std::string& folder) {
     SeedOptions seed_options;
     seed_options.count = 6;
     seeds = make_seeds(problem, seed_options, options.intervals);
+    finish_on_interrupt();
     options.progress = [&](int done, int all, const std::string& what) {
       progress(static_cast<double>(done) / std::max(1, all), what);
       return !interrupted();

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/context.h"
@@ -51,12 +52,69 @@ std::string fit_json(const FitResult& result) {
   return json.dump(2) + "\n";
 }
 
-int run(const FitArguments& a) {
+/// Whether any channel of any log has this role.
+bool measured(const std::vector<Log>& logs, Role role) {
+  return std::any_of(logs.begin(), logs.end(), [&](const Log& log) {
+    return std::any_of(log.channels.begin(), log.channels.end(),
+                       [&](const Channel& c) { return c.role == role && c.valid.any(); });
+  });
+}
+
+/// What the logs of a fit that learned nothing lack, in words; empty when something was learned, or when the
+/// machine has nothing to learn.
+std::string why_nothing_learned(const FitResult& r, const std::vector<Log>& logs) {
+  const auto identified = [](const std::optional<LearnedPump>& p) {
+    return p && (p->standby_identified ||
+                 std::any_of(p->margins.begin(), p->margins.end(),
+                             [](const LearnedMargin& m) { return m.identified; }));
+  };
+  const bool learned = std::any_of(r.processes.begin(), r.processes.end(),
+                                   [](const ProcessFit& p) { return p.report.failure.empty(); }) ||
+                       std::any_of(r.pumps.begin(), r.pumps.end(), identified) || !r.valves.empty();
+  if (learned || r.processes.empty()) return "";
+  std::vector<std::string> missing;
+  if (!measured(logs, Role::kPressureA) && !measured(logs, Role::kPressureB))
+    missing.emplace_back("chamber pressures (pA_<cylinder>_bar, pB_<cylinder>_bar)");
+  if (!measured(logs, Role::kPumpPressure)) missing.emplace_back("pump pressure (p_<pump>_bar)");
+  if (!measured(logs, Role::kCommand)) missing.emplace_back("commands (u_<cylinder>)");
+  const bool moves =
+      std::any_of(r.train.logs.begin(), r.train.logs.end(), [](const LogComparison& log) {
+        return std::any_of(log.signals.cylinders.begin(), log.signals.cylinders.end(),
+                           [](const CylinderSignals& c) { return c.driven.any(); });
+      });
+  if (!moves) missing.emplace_back("motion (no cylinder is driven faster than 2 mm/s)");
+  if (missing.empty()) {
+    return fmt::format("the logs hold too few samples of each motion ({} in all)", r.train.samples);
+  }
+  return fmt::format("the logs lack {}", fmt::join(missing, ", "));
+}
+
+/// Wrong usage before any work: outputs that overwrite something, a test log that was learned from.
+void check_files(const FitArguments& a) {
+  for (const std::string& test : a.tests) {
+    for (const std::string& log : a.logs) {
+      if (!same_file(test, log)) continue;
+      throw UsageError(
+          fmt::format("fit: {} is given with --log and with --test; a model is judged on what it "
+                      "was not learned from, so give it once (without --test every fourth block of "
+                      "motion is held out)",
+                      log));
+    }
+  }
+  std::vector<NamedFile> inputs = named("--log", a.logs);
+  for (const NamedFile& test : named("--test", a.tests)) inputs.push_back(test);
+  inputs.push_back({"--machine", a.machine});
+  inputs.push_back({"--mapping", a.mapping});
+  std::vector<NamedFile> outputs = a.outputs.files();
+  outputs.push_back({"--output", a.output});
+  check_outputs_apart("fit", outputs, inputs);
   check_writable(a.output);
   a.outputs.check();
-  std::vector<std::string> warnings;
-  const Machine machine = load_machine(a.machine, &warnings);
-  for (const std::string& w : warnings) warn(w);
+}
+
+int run(const FitArguments& a) {
+  check_files(a);
+  const Machine machine = load_machine_aloud(a.machine);
   const std::vector<Log> logs = load_logs(a.logs, machine, a.mapping);
   const std::vector<Log> tests = load_logs(a.tests, machine, a.mapping);
   FitOptions options;
@@ -66,6 +124,18 @@ int run(const FitArguments& a) {
     return fit(machine, logs, tests, options,
                [&](double share, const std::string& what) { progress(share, what); });
   }();
+  const std::string lacking = why_nothing_learned(result, logs);
+  if (!lacking.empty()) {
+    for (const std::string& n : result.notes) note("  " + n);
+    throw InputError({a.logs.size() == 1 ? a.logs.front() : "", 0, 0}, "fit",
+                     fmt::format("nothing was learned, no model is written: {}; record each "
+                                 "cylinder moving both ways at several speeds and loads",
+                                 lacking));
+  }
+  if (result.processes.empty()) {
+    note(fmt::format("{} has no hydraulic cylinder: nothing to learn, forces alone are compared",
+                     machine.name));
+  }
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);

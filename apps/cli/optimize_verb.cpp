@@ -39,6 +39,9 @@ OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
 }
 
 int run(const OptimizeArguments& a) {
+  std::vector<NamedFile> outputs = a.outputs.files();
+  outputs.push_back({"--output", a.output});
+  check_outputs_apart("optimize", outputs, {{"--problem", a.problem}, {"--model", a.model}});
   check_writable(a.output);
   a.outputs.check();
   const auto [problem, model] = load_problem_and_model(a.problem, a.model);
@@ -60,6 +63,8 @@ int run(const OptimizeArguments& a) {
       progress(0.2 * share, what);
     };
     seeds = make_seeds(problem, seed_options, options.intervals);
+    progress(0.2, fmt::format("solving from {} paths", seeds.motions.size()));
+    finish_on_interrupt();
     options.progress = [&](int done, int all, const std::string& what) {
       progress(0.2 + 0.8 * done / std::max(1, all), what);
       return !interrupted();

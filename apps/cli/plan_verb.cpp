@@ -32,9 +32,13 @@ std::string path_csv(const Machine& machine, const std::vector<SeedPath>& paths)
 }
 
 int run(const PlanArguments& a) {
+  std::vector<NamedFile> outputs = a.outputs.files();
+  outputs.push_back({"--output", a.output});
+  check_outputs_apart("plan", outputs, {{"--problem", a.problem}});
   check_writable(a.output);
   a.outputs.check();
   const MotionProblem problem = load_problem(a.problem);
+  for (const std::string& w : problem.machine_warnings) warn(w);
   const Seeds seeds = [&] {
     Progress progress("plan");
     SeedOptions options = a.seeds;
