@@ -80,8 +80,9 @@ class EffectReader {
       places.emplace_back(name, entry);
     }
     if (places.empty()) parameters.fail("an effect needs at least one parameter, its size");
-    read_law(map.need("law", "a formula such as Fc * sign(v)"), symbols, spec);
-    judge_parameters(places, spec);
+    const YamlValue law = map.need("law", "a formula such as Fc * sign(v)");
+    read_law(law, symbols, spec);
+    judge_parameters(places, law, spec);
     spec.equation = text_or("equation", "one line of text", spec.law.text());
     spec.citation = text_or("citation", "author (year), where", "");
     spec.separated_by = text_or("separated_by", "the motion that tells it apart", "");
@@ -196,8 +197,8 @@ class EffectReader {
     try {
       spec.law = Expression::compile(text, vocabulary(spec.stage), parameters);
     } catch (const TextError& error) {
-      value.fail(fmt::format("got \"{}\": column {}: {}{}", text, error.column, error.what(),
-                             not_of_this_stage(text, error.column, spec.stage)));
+      value.fail(fmt::format("got \"{}\": column {}: {}", text, error.column,
+                             explained(text, error, spec.stage)));
     }
     const Dimension expected = user_effect_dimension(spec.stage);
     const Dimension found = spec.law.dimension();
@@ -212,21 +213,24 @@ class EffectReader {
     }
   }
 
-  /// A law of a pump that asks for a cylinder's signal deserves to be told so.
-  static std::string not_of_this_stage(const std::string& law, int column, Stage stage) {
-    if (stage != Stage::kPump) return "";
-    std::size_t at = static_cast<std::size_t>(column) - 1;
-    std::string word;
-    while (at < law.size() &&
-           (std::isalnum(static_cast<unsigned char>(law[at])) != 0 || law[at] == '_')) {
-      word += law[at++];
+  /// A law of a pump that asks for a cylinder's signal deserves to be told so; else the parser's own words.
+  static std::string explained(const std::string& law, const TextError& error, Stage stage) {
+    const std::size_t begin = static_cast<std::size_t>(error.column) - 1;
+    std::size_t end = begin;
+    while (end < law.size() &&
+           (std::isalnum(static_cast<unsigned char>(law[end])) != 0 || law[end] == '_')) {
+      ++end;
     }
+    const std::string word = begin < end ? law.substr(begin, end - begin) : "";
     for (const SignalInfo& signal : user_effect_signals()) {
-      if (signal.of_cylinder && word == signal.name) {
-        return fmt::format(" ({} is a cylinder's, and stage pump has none)", word);
+      if (stage == Stage::kPump && signal.of_cylinder && word == signal.name) {
+        return fmt::format(
+            "{} is a signal of a cylinder, and a law of stage pump is about a pump; "
+            "use Q_pump, p_pump or signals of the machine",
+            word);
       }
     }
-    return "";
+    return error.what();
   }
 
   UserSignal signal_of(const std::string& name, Stage stage) const {
@@ -245,7 +249,7 @@ class EffectReader {
 
   /// Every parameter does something; the effect can be absent; the others have a grid.
   static void judge_parameters(const std::vector<std::pair<std::string, YamlValue>>& places,
-                               UserEffectSpec& spec) {
+                               const YamlValue& law, UserEffectSpec& spec) {
     const std::vector<std::string> sizes = spec.law.proportional_parameters();
     for (std::size_t i = 0; i < places.size(); ++i) {
       const auto& [name, value] = places[i];
@@ -270,11 +274,11 @@ class EffectReader {
       }
     }
     if (!sizes.empty()) return;
-    places.front().second.fail(
-        fmt::format("the law \"{}\" is proportional to none of its parameters, so the effect could "
-                    "never be absent; multiply it by one, as in size * (...), size: {{unit: 1, "
-                    "bounds: [0, 2], typical: 1}}",
-                    spec.law.text()));
+    law.fail(fmt::format(
+        "got \"{}\", which is proportional to none of its parameters, so the effect could never be "
+        "absent; multiply all of it by one, as in size * (...), size: {{unit: 1, bounds: [0, 2], "
+        "typical: 1}}",
+        spec.law.text()));
   }
 
   /// Evenly spaced, by ratio where all values are positive and span more than a decade.
