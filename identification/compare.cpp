@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "identification/apply_effects.h"
 #include "identification/compare_stages.h"
 #include "models/error.h"
 #include "models/units.h"
@@ -232,6 +233,7 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   for (std::size_t l = 0; l < signals.size(); ++l) {
     LogComparison log;
     log.signals = std::move(signals[l]);
+    apply_effects(model, log.signals);
     Comparison comparison(model, log.signals, only.empty() ? nullptr : &only[l]);
     log.series = comparison.series(notes);
     comparison.energy(energy);

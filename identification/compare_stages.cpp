@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/apply_effects.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -66,7 +67,7 @@ void Comparison::force(std::size_t i, std::vector<ComparedSeries>& out,
   ComparedSeries s = series_for("force", name, kNewton, signals_.samples());
   for (Index k = 0; k < signals_.samples(); ++k) {
     if (counts(k) && c.moving[k])
-      put(s, k, c.force[k], c.static_force[k], c.speed[k] > 0.0 ? 0 : 1);
+      put(s, k, c.force[k], c.predicted_force[k], c.speed[k] > 0.0 ? 0 : 1);
   }
   out.push_back(std::move(s));
 }
@@ -95,7 +96,9 @@ void Comparison::flow(std::size_t i, std::vector<ComparedSeries>& out,
       if (!counts(k) || !c.moving[k]) continue;
       const bool extend = c.direction[k] > 0;
       const double gain = extend ? m.valve_gain_extend : m.valve_gain_retract;
-      if (gain > 0.0) put(s, k, c.flow[k], gain * std::abs(c.command[k]), extend ? 0 : 1);
+      const double area = extend ? cylinder.area_piston() : -cylinder.area_rod();
+      const double predicted = gain * std::abs(c.command[k]) + area * or_zero(c.flow_effect, k);
+      if (gain > 0.0) put(s, k, c.flow[k], predicted, extend ? 0 : 1);
     }
     out.push_back(std::move(s));
   }
@@ -107,18 +110,6 @@ void Comparison::flow(std::size_t i, std::vector<ComparedSeries>& out,
       }
     }
     out.push_back(std::move(s));
-  }
-}
-
-void Comparison::speeds_from_signals(Index k, std::vector<double>& speed,
-                                     std::vector<double>& force) const {
-  // A cylinder that is asked for but stands (start, dead band) demands pressure without flow.
-  constexpr double kStanding = 1e-8;
-  for (std::size_t i = 0; i < speed.size(); ++i) {
-    const CylinderSignals& c = signals_.cylinders[i];
-    const int direction = c.direction[k];
-    force[i] = c.static_force[k];
-    speed[i] = direction == 0 ? 0.0 : direction * std::max(kStanding, c.speed[k] * direction);
   }
 }
 
@@ -135,6 +126,8 @@ bool Comparison::speeds_from_commands(Index k, const Pump& pump, std::vector<dou
     const Cylinder& cylinder = machine_.cylinders[i];
     if (gain <= 0.0 || !cylinder.hydraulic()) return false;
     speed[i] = gain * c.command[k] / (extend ? cylinder.area_piston() : cylinder.area_rod());
+    speed[i] += or_zero(c.flow_effect, k);
+    if ((speed[i] > 0.0) != extend) speed[i] = 0.0;  // inside a dead band
   }
   return true;
 }
@@ -157,7 +150,8 @@ void Comparison::pump_sample(Index k, std::size_t p, const PumpState& state,
   for (std::size_t f = 0; f < pump.feeds.size(); ++f) {
     if (pump.feeds[f] == state.leader) regime = static_cast<int>(f) + 1;
   }
-  put(pass.pump[p], k, signals_.pumps[p].pressure[k], state.pressure, regime);
+  const PumpSignals& s = signals_.pumps[p];
+  put(pass.pump[p], k, s.pressure[k], state.pressure + or_zero(s.pressure_effect, k), regime);
 }
 
 void Comparison::judge_sample(Index k, const MachineState& state, ChainPass& pass) const {
@@ -169,7 +163,8 @@ void Comparison::judge_sample(Index k, const MachineState& state, ChainPass& pas
       continue;
     }
     const CylinderState& s = state.cylinders[i];
-    put(pass.pressure[i], k, c.working_pressure[k], s.pressure, c.direction[k] > 0 ? 0 : 1);
+    put(pass.pressure[i], k, c.working_pressure[k],
+        s.pressure + or_zero(c.pressure_sensor_effect, k), c.direction[k] > 0 ? 0 : 1);
     const CylinderModel& m = model_.cylinders[i];
     const GpParameters& p = (c.direction[k] > 0 ? m.extend : m.retract).parameters();
     pass.pressure[i].deviation[k] = std::hypot(s.pressure_std, p.noise_std);
@@ -199,11 +194,11 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
   pass.pressure_missing.assign(machine_.cylinders.size(), false);
   pass.pump_missing.assign(machine_.pumps.size(), false);
   Chain chain(model_);
-  std::vector<double> speed(machine_.cylinders.size()), force(machine_.cylinders.size());
+  ChainInputs inputs(machine_.cylinders.size());
   for (Index k = 0; k < n; ++k) {
     if (!counts(k)) continue;
-    speeds_from_signals(k, speed, force);
-    judge_sample(k, chain.evaluate_pressures(speed.data(), force.data(), true), pass);
+    inputs.set(signals_, k);
+    judge_sample(k, inputs.evaluate(chain, true), pass);
   }
   for (std::size_t i = 0; i < machine_.cylinders.size(); ++i) {
     const Cylinder& cylinder = machine_.cylinders[i];
@@ -240,7 +235,7 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
 void Comparison::energy(std::vector<EnergyScore>& scores) const {
   const VectorXd duration = sample_durations(signals_.time, signals_.runs);
   Chain chain(model_);
-  std::vector<double> speed(machine_.cylinders.size()), force(machine_.cylinders.size());
+  ChainInputs inputs(machine_.cylinders.size());
   for (std::size_t p = 0; p < machine_.pumps.size(); ++p) {
     const Pump& pump = machine_.pumps[p];
     const VectorXd& pressure = signals_.pumps[p].pressure;
@@ -256,15 +251,17 @@ void Comparison::energy(std::vector<EnergyScore>& scores) const {
                               process_learned(static_cast<std::size_t>(i), direction));
       }
       if (!learned) continue;
-      speeds_from_signals(k, speed, force);
-      const PumpState state = chain.evaluate_pressures(speed.data(), force.data()).pumps[p];
+      inputs.set(signals_, k);
+      const PumpState state = inputs.evaluate(chain).pumps[p];
+      const double effect = or_zero(signals_.pumps[p].pressure_effect, k);
+      if (!std::isfinite(state.pressure + effect)) continue;
       scores[p].measured += pressure[k] * state.flow * duration[k];
-      scores[p].predicted += state.pressure * state.flow * duration[k];
+      scores[p].predicted += (state.pressure + effect) * state.flow * duration[k];
       scores[p].duration += duration[k];
-      commanded = commanded && speeds_from_commands(k, pump, speed);
+      commanded = commanded && speeds_from_commands(k, pump, inputs.speed);
       if (!commanded) continue;
-      const PumpState asked = chain.evaluate_pressures(speed.data(), force.data()).pumps[p];
-      from_commands += asked.pressure * asked.flow * duration[k];
+      const PumpState asked = inputs.evaluate(chain).pumps[p];
+      from_commands += (asked.pressure + effect) * asked.flow * duration[k];
     }
     if (!commanded || !scores[p].from_commands) {
       scores[p].from_commands.reset();

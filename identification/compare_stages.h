@@ -34,10 +34,7 @@ class Comparison {
   void flow(std::size_t i, std::vector<ComparedSeries>& out, std::set<std::string>& notes) const;
   void pressures(std::vector<ComparedSeries>& out, std::set<std::string>& notes) const;
   void judge_sample(Eigen::Index k, const MachineState& state, ChainPass& pass) const;
-  /// Signed speeds that make the chain see flow and direction of the signals. [m/s]
-  void speeds_from_signals(Eigen::Index k, std::vector<double>& speed,
-                           std::vector<double>& force) const;
-  /// The same with flow from the command by the valve gains. @return false where that cannot be told
+  /// Signed speeds with flow from the command by the valve gains [m/s]. @return false where that cannot be told
   bool speeds_from_commands(Eigen::Index k, const Pump& pump, std::vector<double>& speed) const;
   void pump_sample(Eigen::Index k, std::size_t p, const PumpState& state, ChainPass& pass) const;
 

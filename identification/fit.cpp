@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
 #include "models/error.h"
 
@@ -16,12 +17,26 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using Progress = std::function<void(double, const std::string&)>;
 
-FitPass learn(const Machine& machine, const TrainingData& data, const FitOptions& options,
-              const Progress& progress) {
+/// @param signals get the effects of the model learned
+FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
+              std::vector<Mask> counts, const FitOptions& options, const Progress& progress) {
   FitPass pass;
   pass.model = CraneModel::untrained(machine);
+  pass.model.effects = options.effects;
+  for (MachineSignals& s : signals) apply_effects(pass.model, s);
+  const TrainingData data{&signals, std::move(counts)};
   learn_processes(data, options, pass, progress);
   learn_valves(data, pass);
+  const std::vector<std::string> notes = pass.notes;
+  learn_pumps(data, options, pass);
+  const bool again = std::any_of(signals.begin(), signals.end(), [](const MachineSignals& s) {
+    return std::any_of(s.pumps.begin(), s.pumps.end(),
+                       [](const PumpSignals& p) { return p.pressure_effect.size() > 0; });
+  });
+  if (!again) return pass;
+  // effects on a pump's pressure build on its demand, which is only known with its margins
+  for (MachineSignals& s : signals) apply_effects(pass.model, s);
+  pass.notes = notes;
   learn_pumps(data, options, pass);
   return pass;
 }
@@ -42,34 +57,21 @@ std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   return out;
 }
 
-/// Every so many-th block of motion over all logs. @return the number of blocks taken
-int choose_held_out(const std::vector<MachineSignals>& signals, const FitOptions& options,
-                    std::vector<Mask>& held) {
-  int block = 0, taken = 0;
-  for (const MachineSignals& s : signals) {
-    held.push_back(Mask::Constant(s.samples(), false));
-    for (const SampleRange& r : motion_blocks(s, options.hold_out_block_s)) {
-      if (block++ % options.hold_out_every != options.hold_out_every / 2) continue;
-      held.back().segment(r.begin, r.size()).setConstant(true);
-      ++taken;
-    }
-  }
-  return taken;
-}
-
 /// A figure for data the model has not seen, from whole blocks of motion.
 std::optional<CompareResult> judge_held_out(const Machine& machine,
-                                            const std::vector<MachineSignals>& signals,
+                                            std::vector<MachineSignals>& signals,
                                             const FitOptions& options,
                                             std::vector<std::string>& notes) {
-  std::vector<Mask> held;
-  if (choose_held_out(signals, options, held) < 2) {
+  const std::vector<Mask> held = held_out_samples(signals, options);
+  if (std::none_of(held.begin(), held.end(), [](const Mask& m) { return m.any(); })) {
     notes.push_back("no held-out figure: the logs hold too few separate motions; give --test logs");
     return std::nullopt;
   }
-  TrainingData data{&signals, inside(signals)};
-  for (std::size_t l = 0; l < held.size(); ++l) data.counts[l] = data.counts[l] && !held[l];
-  const FitPass pass = learn(machine, data, options, {});
+  std::vector<Mask> counts = inside(signals);
+  for (std::size_t l = 0; l < held.size(); ++l) counts[l] = counts[l] && !held[l];
+  FitOptions without = options;
+  if (!options.effects_held_out.empty()) without.effects = options.effects_held_out;
+  const FitPass pass = learn(machine, signals, std::move(counts), without, {});
   CompareOptions compare_options;
   compare_options.signals = options.signals;
   compare_options.find_regions = false;
@@ -77,6 +79,25 @@ std::optional<CompareResult> judge_held_out(const Machine& machine,
 }
 
 }  // namespace
+
+std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
+                                   const FitOptions& options) {
+  std::vector<Mask> held;
+  int block = 0, taken = 0;
+  for (const MachineSignals& s : signals) {
+    held.push_back(Mask::Constant(s.samples(), false));
+    if (options.hold_out_every < 2) continue;
+    for (const SampleRange& r : motion_blocks(s, options.hold_out_block_s)) {
+      if (block++ % options.hold_out_every != options.hold_out_every / 2) continue;
+      held.back().segment(r.begin, r.size()).setConstant(true);
+      ++taken;
+    }
+  }
+  if (taken < 2) {
+    for (Mask& m : held) m.setConstant(false);
+  }
+  return held;
+}
 
 std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double block_s) {
   std::vector<SampleRange> out;
@@ -127,10 +148,10 @@ FitResult fit(const Machine& machine, const std::vector<Log>& logs,
   tell(0.0, "speeds and forces");
   std::vector<MachineSignals> signals = all_signals(machine, logs, options.signals);
   const bool hold_out = test_logs.empty() && options.hold_out_every > 1;
-  const TrainingData data{&signals, inside(signals)};
-  FitPass pass = learn(machine, data, options, [&](double share, const std::string& what) {
-    tell(0.05 + (hold_out ? 0.4 : 0.8) * share, what);
-  });
+  FitPass pass =
+      learn(machine, signals, inside(signals), options, [&](double share, const std::string& what) {
+        tell(0.05 + (hold_out ? 0.4 : 0.8) * share, what);
+      });
 
   FitResult result;
   result.notes = std::move(pass.notes);

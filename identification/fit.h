@@ -16,6 +16,11 @@ namespace sparflow {
 
 struct FitOptions {
   SignalOptions signals;
+  /// Physical effects of the model to be learned, with their values, which stay as they are: processes, margins and
+  /// gains are learned around them.
+  std::vector<AppliedEffect> effects;
+  /// The same as estimated without the held-out motions, for an honest figure; empty = `effects`.
+  std::vector<AppliedEffect> effects_held_out;
   LearnGpOptions gp;
   LearnPumpOptions
       pump;  ///< standby of the data sheet and largest pressure come from the machine file
@@ -68,6 +73,11 @@ struct FitResult {
 FitResult fit(const Machine& machine, const std::vector<Log>& logs,
               const std::vector<Log>& test_logs = {}, const FitOptions& options = {},
               const std::function<void(double share, const std::string& what)>& progress = {});
+
+/// Samples held out for the figure of `FitResult::held_out`, one mask a log; all false when fewer than two motions
+/// could be held out.
+std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
+                                   const FitOptions& options);
 
 /// Blocks of motion in time order: motion segments, the long ones cut into equal parts of about `block_s`.
 /// Whatever is held out is held out by whole blocks, never by rows: neighbouring rows are alike.

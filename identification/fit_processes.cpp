@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
 #include "identification/robust.h"
 
@@ -35,10 +36,12 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
     const CylinderSignals& c = s.cylinders[static_cast<std::size_t>(cylinder)];
     for (Index k = 0; k < s.samples() && c.has_pressure(); ++k) {
       if (!data.counts[l][k] || !c.driven[k] || (c.direction[k] > 0) != extend) continue;
-      if (!std::isfinite(c.working_pressure[k])) continue;
+      const double own = c.working_pressure[k] - or_zero(c.pressure_effect, k) -
+                         or_zero(c.pressure_sensor_effect, k);
+      if (!std::isfinite(own) || !std::isfinite(c.model_force[k])) continue;
       flow.push_back(c.flow[k]);
-      force.push_back(c.static_force[k]);
-      pressure.push_back(c.working_pressure[k]);
+      force.push_back(c.model_force[k]);
+      pressure.push_back(own);
       out.position.push_back(offset + k);
     }
     offset += s.samples() + 2;

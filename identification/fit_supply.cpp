@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
 #include "models/error.h"
 #include "models/units.h"
@@ -13,6 +14,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// Measured pressure less what effects add after the maximum. [Pa]
+VectorXd without_effect(const PumpSignals& pump) {
+  if (pump.pressure.size() == 0 || pump.pressure_effect.size() == 0) return pump.pressure;
+  return pump.pressure - pump.pressure_effect;
+}
+
 /// Samples at which it is beyond doubt which cylinders demand pressure, with the model's pressures.
 PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int index) {
   const Machine& machine = pass.model.machine;
@@ -22,7 +29,7 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
   std::vector<char> active;
   for (std::size_t l = 0; l < data.signals->size(); ++l) {
     const MachineSignals& s = (*data.signals)[l];
-    const VectorXd& measured = s.pumps[static_cast<std::size_t>(index)].pressure;
+    const VectorXd measured = without_effect(s.pumps[static_cast<std::size_t>(index)]);
     for (Index k = 0; k < measured.size(); ++k) {
       if (!data.counts[l][k] || !std::isfinite(measured[k])) continue;
       std::vector<double> p(fed, 0.0);
@@ -34,7 +41,10 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
         const CylinderModel& m = pass.model.cylinders[i];
         const GaussianProcess& process = c.direction[k] > 0 ? m.extend : m.retract;
         clear = c.driven[k] && !process.empty();
-        if (clear) p[f] = process.mean(c.flow[k], c.static_force[k]);
+        if (!clear) continue;
+        p[f] = process.mean(c.flow[k], c.model_force[k]) + or_zero(c.pressure_effect, k) +
+               or_zero(c.demand_effect, k);
+        clear = std::isfinite(p[f]);
       }
       if (!clear) continue;
       pressure.push_back(measured[k]);
@@ -73,8 +83,12 @@ void learn_valves(const TrainingData& data, FitPass& pass) {
         const CylinderSignals& c = s.cylinders[static_cast<std::size_t>(i)];
         for (Index k = 0; k < s.samples() && c.has_command(); ++k) {
           if (!data.counts[l][k] || !c.driven[k] || (c.direction[k] > 0) != extend) continue;
+          const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(i)];
+          const double area = extend ? cylinder.area_piston() : -cylinder.area_rod();
+          const double own = c.flow[k] - area * or_zero(c.flow_effect, k);
+          if (!std::isfinite(own)) continue;
           command.push_back(c.command[k]);
-          flow.push_back(c.flow[k]);
+          flow.push_back(own);
         }
       }
       if (command.empty()) continue;
@@ -113,7 +127,7 @@ void learn_pumps(const TrainingData& data, const FitOptions& options, FitPass& p
       } else {
         std::vector<double> all;
         for (std::size_t l = 0; l < data.signals->size(); ++l) {
-          const VectorXd& v = (*data.signals)[l].pumps[static_cast<std::size_t>(p)].pressure;
+          const VectorXd v = without_effect((*data.signals)[l].pumps[static_cast<std::size_t>(p)]);
           for (Index k = 0; k < v.size(); ++k) {
             if (data.counts[l][k] && std::isfinite(v[k])) all.push_back(v[k]);
           }

@@ -274,6 +274,7 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
     measured(machine, log, i, filter, out);
   }
   evaluate_machine(machine, out);
+  for (CylinderSignals& c : out.cylinders) c.model_force = c.predicted_force = c.static_force;
   find_motion(machine, options.motion, out);
 
   out.pumps.resize(machine.pumps.size());

@@ -47,6 +47,15 @@ struct CylinderSignals {
   Eigen::VectorXd working_pressure;
   Eigen::VectorXd working_pressure_smooth;  ///< [Pa] the same through the filter
 
+  // What a model's effects say, by apply_effects (identification/apply_effects.h); until then as without any.
+  Eigen::VectorXd model_force;      ///< [N] static force + force effects: what the processes see
+  Eigen::VectorXd predicted_force;  ///< [N] what a sensor of the force reads: + sensor effects
+  // Empty = none.
+  Eigen::VectorXd pressure_effect;         ///< [Pa] working pressure beyond the process
+  Eigen::VectorXd pressure_sensor_effect;  ///< [Pa] what its sensor reads beyond that
+  Eigen::VectorXd demand_effect;           ///< [Pa] asked of the pump beyond pressure and margin
+  Eigen::VectorXd flow_effect;             ///< [m/s] rod speed beyond valve gain * command
+
   bool has_command() const { return command.size() > 0; }
   bool has_force() const { return force.size() > 0; }
   bool has_pressure() const { return working_pressure.size() > 0; }
@@ -55,6 +64,7 @@ struct CylinderSignals {
 struct PumpSignals {
   Eigen::VectorXd pressure;         ///< [Pa]; empty: not measured
   Eigen::VectorXd pressure_smooth;  ///< [Pa]
+  Eigen::VectorXd pressure_effect;  ///< [Pa] beyond the maximum of the demands; empty = none
 };
 
 /// A column the program has no meaning for.
@@ -78,11 +88,13 @@ struct MachineSignals {
   std::vector<CylinderSignals> cylinders;
   std::vector<PumpSignals> pumps;
   std::vector<CandidateSignal> candidates;
-  std::vector<SampleRange> runs;   ///< gap-free stretches
-  std::vector<Segment> segments;   ///< motion and rest in turn, covering every sample
-  double window = 0.0;             ///< [s] full width of the filter used
-  Mask edge;                       ///< within half a filter window of a run's end
-  Mask usable;                     ///< pose, speed and payload are known
+  std::vector<SampleRange> runs;  ///< gap-free stretches
+  std::vector<Segment> segments;  ///< motion and rest in turn, covering every sample
+  double window = 0.0;            ///< [s] full width of the filter used
+  Mask edge;                      ///< within half a filter window of a run's end
+  Mask usable;                    ///< pose, speed and payload are known
+  bool of_effective_machine =
+      false;  ///< apply_effects has set speeds and flows by an effect's machine
   std::vector<std::string> notes;  ///< plain sentences: what was missing, converted, left out
 
   Eigen::Index samples() const { return time.size(); }

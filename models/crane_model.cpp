@@ -69,14 +69,22 @@ const MachineState& Chain::evaluate(const double* q, const double* qd, double pa
   }
   if (!laws_.empty()) add_force_effects(q, qd, qdd, payload);
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) set_pressure(i, with_std);
-  if (!laws_.empty()) add_pressure_effects();
-  pump_stage(!laws_.empty());
+  if (laws_.empty()) {
+    pump_stage(nullptr);
+    return state_;
+  }
+  add_pressure_effects();
+  std::fill(added_.begin(), added_.end(), 0.0);
+  for (const AppliedEffect& e : laws_) e.effect->add_demand(instant_, e.at, e.values, added_);
+  pump_stage(added_.data());
+  add_pump_effects();
   return state_;
 }
 
 const MachineState& Chain::evaluate_pressures(const double* speed, const double* force,
                                               bool with_std, double rest_speed,
-                                              const double* added_pressure) {
+                                              const double* added_pressure,
+                                              const double* added_demand) {
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {
     CylinderState& c = state_.cylinders[i];
     c.speed = speed[i];
@@ -87,7 +95,7 @@ const MachineState& Chain::evaluate_pressures(const double* speed, const double*
       c.pressure += added_pressure[i];
     }
   }
-  pump_stage(false);
+  pump_stage(added_demand);
   return state_;
 }
 
@@ -163,11 +171,8 @@ void Chain::add_pressure_effects() {
   }
 }
 
-void Chain::pump_stage(bool effects) {
-  if (effects) {
-    std::fill(added_.begin(), added_.end(), 0.0);
-    for (const AppliedEffect& e : laws_) e.effect->add_demand(instant_, e.at, e.values, added_);
-  }
+void Chain::pump_stage(const double* added_demand) {
+  state_.power = 0.0;
   for (std::size_t p = 0; p < state_.pumps.size(); ++p) {
     const Pump& pump = machine_->pumps[p];
     PumpState& s = state_.pumps[p];
@@ -179,25 +184,29 @@ void Chain::pump_stage(bool effects) {
       const CylinderState& c = state_.cylinders[i];
       s.flow += c.flow;
       if (pump.type != PumpType::kLoadSensing || !c.moving) continue;
-      const double demand = c.pressure + model_->cylinders[i].margin + (effects ? added_[i] : 0.0);
+      double demand = c.pressure + model_->cylinders[i].margin;
+      if (added_demand != nullptr) demand += added_demand[i];
       if (demand > s.pressure) {
         s.pressure = demand;
         s.leader = feed;
       }
     }
+    state_.power += s.pressure * s.flow;
   }
-  if (effects) {
-    for (std::size_t p = 0; p < state_.pumps.size(); ++p) {
-      instant_.pump_pressure[p] = state_.pumps[p].pressure;
-      instant_.leader[p] = state_.pumps[p].leader;
-    }
-    std::fill(added_pump_.begin(), added_pump_.end(), 0.0);
-    for (const AppliedEffect& e : laws_) e.effect->add_pump(instant_, e.at, e.values, added_pump_);
-    for (std::size_t p = 0; p < state_.pumps.size(); ++p)
-      state_.pumps[p].pressure += added_pump_[p];
+}
+
+void Chain::add_pump_effects() {
+  for (std::size_t p = 0; p < state_.pumps.size(); ++p) {
+    instant_.pump_pressure[p] = state_.pumps[p].pressure;
+    instant_.leader[p] = state_.pumps[p].leader;
   }
+  std::fill(added_pump_.begin(), added_pump_.end(), 0.0);
+  for (const AppliedEffect& e : laws_) e.effect->add_pump(instant_, e.at, e.values, added_pump_);
   state_.power = 0.0;
-  for (const PumpState& s : state_.pumps) state_.power += s.pressure * s.flow;
+  for (std::size_t p = 0; p < state_.pumps.size(); ++p) {
+    state_.pumps[p].pressure += added_pump_[p];
+    state_.power += state_.pumps[p].pressure * state_.pumps[p].flow;
+  }
 }
 
 }  // namespace sparflow

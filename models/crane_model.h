@@ -143,9 +143,11 @@ class Chain {
   /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
   /// [N]: for logs, where effects are series (identification/series.h).
   /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
+  /// @param added_demand [Pa] by cylinder, asked of the pump on top; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
                                          bool with_std = false, double rest_speed = 1e-9,
-                                         const double* added_pressure = nullptr);
+                                         const double* added_pressure = nullptr,
+                                         const double* added_demand = nullptr);
 
   /// The machine whose forces these are.
   const Machine& machine() const { return *machine_; }
@@ -155,7 +157,8 @@ class Chain {
   void set_pressure(std::size_t cylinder, bool with_std);
   void add_force_effects(const double* q, const double* qd, const double* qdd, double payload);
   void add_pressure_effects();
-  void pump_stage(bool effects);
+  void pump_stage(const double* added_demand);
+  void add_pump_effects();
 
   const CraneModel* model_;
   std::shared_ptr<const Machine> machine_;
