@@ -1,0 +1,135 @@
+/// Writes a case folder of simulated measurements with a hidden effect: reference.csv, train.csv, test.csv,
+/// machine.yaml, truth.json.  build/bench/hidden_log --effects coulomb_friction:boom=1,pump_lag --seed 7 -o DIR
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "problems/bundled.h"
+#include "simulator/hidden_effects/hidden_effect.h"
+#include "simulator/hidden_effects/random_machine.h"
+
+namespace {
+
+using namespace sparflow;
+using namespace sparflow::simulator;
+
+Machine chosen_machine(const std::string& name, std::uint64_t seed) {
+  if (name != "random") return load_machine(name);
+  std::vector<Machine> drawings;
+  for (const char* file : {"loader_crane", "hmf_2020_k4", "swing_crane_two_pumps", "excavator"})
+    drawings.push_back(load_machine(bundled_file(fmt::format("machines/{}.yaml", file))));
+  // the loader crane most often: its logs are the ones that can be looked at
+  drawings.push_back(drawings.front());
+  drawings[1].pumps.front().type = PumpType::kLoadSensing;
+  return random_machine(drawings, seed);
+}
+
+/// "id", "id:at", "id=size", "id:at=size", "id:at=size/law"
+HiddenEffect parse_effect(std::string text, double size) {
+  HiddenEffect effect;
+  effect.size = size;
+  const auto cut = [&text](char mark) {
+    const std::size_t at = text.find(mark);
+    if (at == std::string::npos) return std::string();
+    std::string rest = text.substr(at + 1);
+    text.resize(at);
+    return rest;
+  };
+  try {
+    const std::string law = cut('/');
+    if (!law.empty()) effect.law = std::stoi(law);
+    const std::string own = cut('=');
+    if (!own.empty()) effect.size = std::stod(own);
+  } catch (const std::exception&) {
+    throw UsageError("--effects: expected id[:at][=size][/law], got \"" + text + "\"");
+  }
+  effect.at = cut(':');
+  effect.id = text;
+  return effect;
+}
+
+void print_catalogue() {
+  for (const EffectDescription& e : effect_descriptions()) {
+    fmt::print("{:24} {:9} {:8} {}\n{:24} laws: {}\n", e.id, e.place,
+               e.in_catalogue ? "" : "outside", e.parameters, "", fmt::join(e.laws, " | "));
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Simulated measurements of a crane with a hidden effect"};
+  std::string machine = "random", folder;
+  std::vector<std::string> effects, without;
+  std::uint64_t seed = 1;
+  double size = 1.0;
+  bool list = false;
+  CaseRequest request;
+  app.add_option("--machine", machine, "machine file, or random");
+  app.add_option("--effects", effects, "id[:at][=size][/law],...; none: nothing hidden")
+      ->delimiter(',');
+  app.add_option("--size", size, "1 = clear, 0.333 = small");
+  app.add_option("--seed", seed, "crane, machine and motions");
+  app.add_option("--seconds", request.log.seconds, "of reference and training log [s]");
+  app.add_option("--test-seconds", request.test_seconds, "of the test log [s]");
+  app.add_option("--noise", request.log.noise_factor, "1 = 0.8 bar");
+  app.add_option("--rate", request.log.rate, "[Hz] 5..200");
+  app.add_option("--without", without, "commands, pB, pump, payload, oil")->delimiter(',');
+  app.add_flag("--strokes", request.log.channels.strokes, "x_<cylinder>_m in place of q");
+  app.add_flag("--list", list, "the table of effects and their laws");
+  app.add_option("-o,--out", folder, "case folder");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error);
+    return 2;
+  }
+  if (list) {
+    print_catalogue();
+    return 0;
+  }
+  if (folder.empty()) throw UsageError("-o DIR: where the case goes");
+  for (const std::string& channel : without) {
+    LogChannels& has = request.log.channels;
+    bool* column = channel == "commands"  ? &has.commands
+                   : channel == "pB"      ? &has.pressure_b
+                   : channel == "pump"    ? &has.pumps
+                   : channel == "payload" ? &has.payload
+                   : channel == "oil"     ? &has.oil
+                                          : nullptr;
+    if (!column)
+      throw UsageError("--without: expected commands, pB, pump, payload or oil, got " + channel);
+    *column = false;
+  }
+  request.log.machine = chosen_machine(machine, seed);
+  request.log.crane_seed = request.log.motion_seed = seed;
+  for (const std::string& text : effects) request.log.effects.push_back(parse_effect(text, size));
+  const GeneratedCase logs = generate_case(request);
+  write_case(request, logs, folder);
+  for (const HiddenTruth& t : logs.train.truth) {
+    fmt::print("{}{}{} size {:g}, law {} ({})\n", t.id, t.at.empty() ? "" : ":", t.at, t.size,
+               t.law, t.law_name);
+    for (const HiddenParameter& p : t.parameters)
+      fmt::print("  {} = {:.6g} {}, text-book equivalent {:.6g}\n", p.name, p.value, p.unit,
+                 p.equivalent);
+  }
+  fmt::print("{}: {}, {} + {} + {} rows\n", folder, request.log.machine.name, logs.reference.rows(),
+             logs.train.rows(), logs.test.rows());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    fmt::print(stderr, "hidden_log: {}\n", error.what());
+    return 2;
+  } catch (const InputError& error) {
+    fmt::print(stderr, "hidden_log: {}\n", error.what());
+    return 3;
+  }
+}

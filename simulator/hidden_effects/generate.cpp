@@ -1,0 +1,188 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/error.h"
+#include "simulator/hidden_effects/log_columns.h"
+#include "simulator/hidden_effects/plant.h"
+
+namespace sparflow::simulator {
+namespace {
+
+constexpr double kLongestStep = 0.01;  // [s] of the plant; fast beside every lag that is drawn
+
+int place_index(const LawEntry& entry, const Machine& machine, const std::string& at) {
+  switch (entry.place) {
+    case HiddenPlace::kJoint:
+      return machine.joint_index(at);
+    case HiddenPlace::kCylinder:
+      return machine.cylinder_index(at);
+    case HiddenPlace::kPump:
+      return machine.pump_index(at);
+    default:
+      return -1;
+  }
+}
+
+/// Draws place, law and strength of each effect; the drawn ones are written back.
+std::vector<std::unique_ptr<HiddenLaw>> make_laws(std::vector<HiddenEffect>& effects,
+                                                  const Machine& machine, const CraneLaws& laws,
+                                                  std::uint64_t crane_seed, double usual) {
+  std::vector<std::unique_ptr<HiddenLaw>> hidden;
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    HiddenEffect& effect = effects[k];
+    const LawEntry& entry = law_entry(effect.id);
+    Random random(crane_seed + 1000 * k, effect.id);
+    const std::vector<std::string> places = places_of(effect.id, machine);
+    const int picked = random.below(std::max(1, static_cast<int>(places.size())));
+    const int variant = random.below(static_cast<int>(entry.laws.size()));
+    if (places.empty())
+      throw InputError({}, "effects",
+                       effect.id + " cannot sit anywhere on machine " + machine.name);
+    if (effect.at.empty()) effect.at = places[static_cast<std::size_t>(picked)];
+    if (std::find(places.begin(), places.end(), effect.at) == places.end())
+      throw InputError({}, "effects",
+                       fmt::format("{} cannot sit at \"{}\"; possible: {}", effect.id, effect.at,
+                                   fmt::join(places, ", ")));
+    if (effect.law < 0) effect.law = variant;
+    if (effect.law >= static_cast<int>(entry.laws.size()))
+      throw InputError(
+          {}, "effects",
+          fmt::format("{} has laws 0..{}, got {}", effect.id, entry.laws.size() - 1, effect.law));
+    LawContext context{&machine,  &laws,       &random,    place_index(entry, machine, effect.at),
+                       effect.at, effect.size, effect.law, usual};
+    hidden.push_back(entry.make(context));
+  }
+  return hidden;
+}
+
+/// Load on the hook, constant over each third of a log.
+struct Payloads {
+  std::vector<double> mass, until;
+  std::size_t now = 0;
+};
+
+Payloads draw_payloads(Random& random, double usual, double seconds, bool one) {
+  Payloads p;
+  std::vector<double> menu = {0.0, 0.3 * usual, 0.6 * usual, usual};
+  const int stretches = one ? 1 : (seconds < 100.0 ? 2 : 3);
+  for (int i = 0; i < stretches; ++i) {
+    const auto pick = static_cast<std::size_t>(random.below(static_cast<int>(menu.size())));
+    p.mass.push_back(std::round(menu[pick] / 10.0) * 10.0);
+    menu.erase(menu.begin() + static_cast<std::ptrdiff_t>(pick));
+    p.until.push_back(seconds * (i + 1) / stretches + random.uniform(-0.06, 0.06) * seconds);
+  }
+  p.until.back() = 1e12;
+  return p;
+}
+
+std::vector<HiddenTruth> truths(const std::vector<HiddenEffect>& drawn,
+                                const std::vector<std::unique_ptr<HiddenLaw>>& laws) {
+  std::vector<HiddenTruth> result;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const LawEntry& entry = law_entry(drawn[i].id);
+    result.push_back({drawn[i].id, drawn[i].at, drawn[i].size, drawn[i].law,
+                      entry.laws[static_cast<std::size_t>(drawn[i].law)], entry.in_catalogue,
+                      laws[i]->parameters()});
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> places_of(const std::string& id, const Machine& machine) {
+  const LawEntry& entry = law_entry(id);
+  std::vector<std::string> places;
+  const auto add = [&](int count, auto name) {
+    for (int i = 0; i < count; ++i)
+      if (!entry.fits || entry.fits(machine, i))
+        places.push_back(name(static_cast<std::size_t>(i)));
+  };
+  switch (entry.place) {
+    case HiddenPlace::kMachine:
+      if (!entry.fits || entry.fits(machine, -1)) places.push_back("");
+      break;
+    case HiddenPlace::kJoint:
+      add(machine.joint_count(), [&](std::size_t i) { return machine.joints[i].name; });
+      break;
+    case HiddenPlace::kCylinder:
+      add(machine.cylinder_count(), [&](std::size_t i) { return machine.cylinders[i].name; });
+      break;
+    case HiddenPlace::kPump:
+      add(machine.pump_count(), [&](std::size_t i) { return machine.pumps[i].name; });
+      break;
+    case HiddenPlace::kChannel:
+      for (const Cylinder& c : machine.cylinders) {
+        if (!c.hydraulic()) continue;
+        places.push_back("pA_" + c.name);
+        places.push_back("pB_" + c.name);
+      }
+      for (const Pump& p : machine.pumps) places.push_back("p_" + p.name);
+      for (const Joint& j : machine.joints) places.push_back("q_" + j.name);
+      break;
+  }
+  return places;
+}
+
+GeneratedLog generate(const LogRequest& request) {
+  const Machine& machine = request.machine;
+  if (request.rate < 5.0 || request.rate > 200.0 || request.seconds <= 0.0)
+    throw InputError({}, "rate",
+                     fmt::format("got {} Hz for {} s, expected 5..200 Hz and a "
+                                 "positive duration",
+                                 request.rate, request.seconds));
+  const double usual = usual_payload(machine, request.crane_seed);
+  CraneLaws laws = draw_crane_laws(machine, request.crane_seed);
+  std::vector<HiddenEffect> drawn = request.effects, absent = request.absent;
+  std::vector<std::unique_ptr<HiddenLaw>> hidden =
+      make_laws(drawn, machine, laws, request.crane_seed, usual);
+  for (const auto& law : make_laws(absent, machine, laws, request.crane_seed, usual))
+    law->prepare_crane(laws);
+  for (const auto& law : hidden) law->prepare_crane(laws);
+
+  Random load_random(request.motion_seed, "loads");
+  Payloads payloads = draw_payloads(load_random, usual, request.seconds, request.warm);
+  OperatorMotion motion(machine, laws, request.motion_seed);
+  const int substeps =
+      std::max(1, static_cast<int>(std::ceil(1.0 / request.rate / kLongestStep - 1e-9)));
+  const double h = 1.0 / request.rate / substeps;
+  Plant plant(machine, laws, hidden, motion.start_posture(), h);
+  const auto rows = static_cast<std::size_t>(std::llround(request.seconds * request.rate));
+  LogRecorder recorder(machine, request, rows);
+
+  std::vector<double> command(machine.cylinders.size(), 0.0), rate(machine.cylinders.size());
+  const double oil_before = request.warm ? 0.6 * request.seconds + 0.5 * laws.oil_time : 0.0;
+  SensorState sensors;
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (int sub = 0; sub < substeps; ++sub) {
+      const PlantState& s = plant.state();
+      if (motion.resting() && s.t > payloads.until[payloads.now]) ++payloads.now;
+      for (std::size_t i = 0; i < rate.size(); ++i) rate[i] = s.cylinders[i].rate;
+      motion.levers(s.t, h, s.q, rate, command);
+      for (std::size_t i = 0; i < command.size(); ++i) {
+        // over a dead band the lever is thrown: the operator has learned most of it
+        for (const auto& law : hidden) {
+          const double gap = laws.operator_deadband_share *
+                             law->lever_deadband(static_cast<int>(i), sign_of(command[i]));
+          const double small = std::min(1.0, std::abs(command[i]) / 0.03);
+          command[i] =
+              std::clamp(command[i] * (1.0 - gap) + sign_of(command[i]) * gap * small, -1.0, 1.0);
+        }
+        command[i] = std::round(command[i] * 1e4) / 1e4;  // what is logged is what the valve gets
+      }
+      const double oil = laws.oil_end - (laws.oil_end - laws.oil_start) *
+                                            std::exp(-(s.t + oil_before) / laws.oil_time);
+      plant.step(payloads.mass[payloads.now], oil, command);
+    }
+    plant.sense(sensors);
+    recorder.add(plant.state(), sensors, payloads.mass[payloads.now]);
+  }
+  Random noise(request.motion_seed, "noise");
+  recorder.finish(hidden, noise);
+  GeneratedLog log = recorder.log();
+  log.truth = truths(drawn, hidden);
+  return log;
+}
+
+}  // namespace sparflow::simulator

@@ -1,0 +1,22 @@
+#pragma once
+/// What the sensors make of the plant: sampling, noise, rounding, the log's columns.
+#include "simulator/hidden_effects/hidden_law.h"
+
+namespace sparflow::simulator {
+
+class LogRecorder {
+ public:
+  LogRecorder(const Machine& machine, const LogRequest& request, std::size_t rows);
+  void add(const PlantState& state, const SensorState& sensors, double payload);
+  /// Draws the noise, lets laws act on whole channels (delays, stuck values), then adds the noise.
+  void finish(std::vector<std::unique_ptr<HiddenLaw>>& hidden, Random& random);
+  GeneratedLog log() const;  ///< columns rounded, without truth
+
+ private:
+  const Machine& machine_;
+  const LogRequest& request_;
+  Recording r_;
+  std::vector<std::vector<double>> force_;  ///< of drives without chambers [N]
+};
+
+}  // namespace sparflow::simulator

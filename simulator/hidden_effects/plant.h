@@ -1,0 +1,41 @@
+#pragma once
+/// The crane with its base laws and hidden laws, stepped in time: lever -> spool -> flow -> rod -> load -> chambers
+/// -> pump -> sensors. Quasi-static: inertia is an effect.
+#include "simulator/hidden_effects/hidden_law.h"
+#include "simulator/hidden_effects/operator_motion.h"
+
+namespace sparflow::simulator {
+
+class Plant {
+ public:
+  /// @param machine as drawn, what the log's reader knows; hidden laws may change the bodies
+  Plant(const Machine& machine, const CraneLaws& laws,
+        std::vector<std::unique_ptr<HiddenLaw>>& hidden, std::vector<double> start, double step);
+
+  /// One step of state().h: levers in, everything else follows.
+  void step(double payload, double oil, const std::vector<double>& command);
+  void sense(SensorState& sensors);
+  const PlantState& state() const { return state_; }
+
+ private:
+  void move();
+  void load();
+  void pressurise();
+  void supply();
+  template <class Hook>
+  void each(Hook hook) {
+    for (auto& law : hidden_) hook(*law);
+  }
+
+  const Machine& machine_;
+  const CraneLaws& laws_;
+  std::vector<std::unique_ptr<HiddenLaw>>& hidden_;
+  BodyForces bodies_;
+  bool inertia_ = false;
+  PlantState state_;
+  JointLoads loads_;
+  std::vector<double> speed_before_, speed_before2_, loaded_at_;
+  double loaded_with_ = -1.0;
+};
+
+}  // namespace sparflow::simulator
