@@ -20,10 +20,9 @@ Bounds bounds_of(const std::vector<const EffectDesign*>& designs, Index count) {
   Bounds b{VectorXd(count), VectorXd(count)};
   Index k = 0;
   for (const EffectDesign* d : designs) {
-    for (const EffectParameter& p : d->effect.effect->info().parameters) {
-      if (!p.linear) continue;
-      b.lower[k] = p.lower;
-      b.upper[k++] = p.upper;
+    for (std::size_t i = 0; i < d->lower.size(); ++i) {
+      b.lower[k] = d->lower[i];
+      b.upper[k++] = d->upper[i];
     }
   }
   return b;
@@ -81,7 +80,12 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   EffectDesign d;
   d.effect = effect;
   d.shape = std::move(shape);
-  for (const EffectParameter& p : effect.effect->info().parameters) d.linear += p.linear ? 1 : 0;
+  for (const EffectParameter& p : effect.effect->info().parameters) {
+    if (!p.linear) continue;
+    ++d.linear;
+    d.lower.push_back(p.lower);
+    d.upper.push_back(p.upper);
+  }
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c));
   return d;

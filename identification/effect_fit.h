@@ -13,6 +13,7 @@ struct EffectDesign {
   EffectAt effect;
   std::vector<double> shape;             ///< [SI]
   std::vector<Eigen::MatrixXd> columns;  ///< [channels]: [rows x linear], or no columns
+  std::vector<double> lower, upper;      ///< [SI] bounds of the linear parameters
   int linear = 0;
 
   bool acts() const;

@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
+#include <numeric>
+#include <thread>
+
+#include "identification/effect_proof.h"
+#include "identification/null_gate.h"
 
 namespace sparflow {
 namespace {
@@ -14,7 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-bool verbose() {
+/// Diagnosis of the diagnosis: SPARFLOW_TRACE=1 prints every step to stderr.
+bool tracing() {
   static const bool on = std::getenv("SPARFLOW_TRACE") != nullptr;
   return on;
 }
@@ -25,13 +30,21 @@ struct Candidate {
   double penalty = 0.0;               // [nats]
 };
 
-std::vector<std::vector<double>> grid_of(const Effect& effect) {
+std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
+  // limits depend on what a log reaches: the longest suspect log decides
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < evidence.suspects; ++k) {
+    if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
+  }
   std::vector<std::vector<double>> points = {{}};
-  for (const EffectParameter& p : effect.info().parameters) {
+  int shape = 0;
+  for (const EffectParameter& p : effect.effect->info().parameters) {
     if (p.linear) continue;
+    const std::vector<double> values =
+        effect.effect->grid(evidence.series[longest], effect.at, shape++);
     std::vector<std::vector<double>> next;
     for (const auto& point : points) {
-      for (const double v : p.grid) {
+      for (const double v : values) {
         next.push_back(point);
         next.back().push_back(v);
       }
@@ -46,20 +59,22 @@ class Search {
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
          const SearchOptions& options, const SearchProgress& progress)
       : evidence_(evidence), options_(options), progress_(progress), random_(options.seed) {
-    double rows = 0.0;
+    double rows = 10.0;
     for (const EvidenceChannel& c : evidence.channels)
       rows = std::max(rows, static_cast<double>(c.rows()));
-    for (const EffectAt& e : effects) {
-      Candidate c;
-      c.effect = e;
-      for (auto& shape : grid_of(*e.effect)) {
-        EffectDesign d = make_design(evidence, e, shape);
-        if (d.acts()) c.designs.push_back(std::move(d));
+    std::vector<Candidate> all(effects.size());
+    parallel(effects.size(), [&](std::size_t i) {
+      all[i].effect = effects[i];
+      for (auto& shape : grid_of(effects[i], evidence)) {
+        EffectDesign d = make_design(evidence, effects[i], std::move(shape));
+        if (d.acts()) all[i].designs.push_back(std::move(d));
       }
+    });
+    for (Candidate& c : all) {
       if (c.designs.empty()) continue;
       // Schwarz (1978): half a log of the rows for each parameter
-      c.penalty = 0.5 * static_cast<double>(e.effect->info().parameters.size()) *
-                  std::log(std::max(rows, 10.0));
+      c.penalty =
+          0.5 * static_cast<double>(c.effect.effect->info().parameters.size()) * std::log(rows);
       candidates_.push_back(std::move(c));
     }
   }
@@ -69,110 +84,105 @@ class Search {
     EffectFit current = fit_effects(evidence_, {});
     result.null = current;
     std::vector<FoundEffect> found;
-    for (int step = 0; step < options_.max_effects; ++step) {
-      struct Score {
-        const Candidate* candidate;
-        const EffectDesign* design;
-        double gain;
-      };
-      std::vector<Score> scores;
+    std::vector<bool> refused(candidates_.size(), false);
+    for (int step = 0; static_cast<int>(found.size()) < options_.max_effects &&
+                       step < 3 * options_.max_effects;) {
+      report(found.size(), "searching");
       const std::vector<const EffectDesign*> base = designs_of(found);
-      for (const Candidate& c : candidates_) {
-        if (is_in(found, c.effect)) continue;
-        Score best{&c, nullptr, -1e300};
-        for (const EffectDesign& d : c.designs) {
-          const double g = gain(base, d, current);
-          if (g > best.gain) best = {&c, &d, g};
-        }
-        best.gain -= c.penalty;
-        scores.push_back(best);
-      }
+      std::vector<Score> scores = score_all(base, current, found, refused);
       if (scores.empty()) break;
-      std::sort(scores.begin(), scores.end(),
-                [](const Score& a, const Score& b) { return a.gain > b.gain; });
-      if (step == 0) {
-        for (const Score& s : scores) result.ranking.emplace_back(s.candidate->effect, s.gain);
+      if (result.ranking.empty()) {
+        for (const Score& s : scores)
+          result.ranking.emplace_back(candidates_[s.candidate].effect, s.gain);
       }
-      const Gate gate = null_gate(base, current);
-      if (verbose()) {
-        fmt::print(stderr, "step {} threshold {:.1f} (flip {:.1f})\n", step,
-                   gate.threshold(options_.false_alarm), gate.flip_threshold(options_.false_alarm));
-        for (std::size_t i = 0; i < std::min<std::size_t>(8, scores.size()); ++i) {
-          const Score& s = scores[i];
-          fmt::print(stderr, "   {:28s} gain {:10.1f} shape {} \n", key(s.candidate->effect),
-                     s.gain, s.design->shape.empty() ? 0.0 : s.design->shape[0]);
-        }
-      }
-      const double level = step == 0 ? options_.false_alarm : 0.5 * options_.false_alarm;
-      if (step == 0) {
+      std::vector<GateCandidate> gated;
+      for (const Candidate& c : candidates_) gated.push_back({&c.designs, c.penalty});
+      const NullGate gate =
+          make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
+      const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
+      const Score& best = scores.front();
+      const double p = gate.p_value(best.gain);
+      if (tracing()) trace_scores(step, scores, gate);
+      if (step++ == 0) {
         result.threshold = gate.threshold(level);
-        result.p_value = gate.p_value(scores[0].gain);
+        result.p_value = p;
       }
-      const double p = gate.p_value(scores[0].gain);
       if (p >= level) break;
       FoundEffect f;
-      f.design = *scores[0].design;
+      f.design = refined(base, candidates_[best.candidate], best.design, current);
       f.p_value = p;
       found.push_back(std::move(f));
-      current = fit_effects(evidence_, designs_of(found), nullptr, control());
-      if (verbose()) {
-        fmt::print(stderr, "  + {} theta", key(scores[0].candidate->effect));
-        for (Index i = 0; i < current.theta.size(); ++i)
-          fmt::print(stderr, " {:.5g}", current.theta[i]);
-        fmt::print(stderr, "\n");
-        for (std::size_t c = 0; c < evidence_.channels.size(); ++c) {
-          const auto& ch = evidence_.channels[c];
-          fmt::print(
-              stderr, "     {:40s} n {} sd {:.3g} floor {:.3g} {} phi {:.2f} {:.2f} off {:.3g}\n",
-              ch.text, ch.rows(), current.noise[c].deviation() / ch.unit.si,
-              ch.noise_floor / ch.unit.si, ch.unit.name, current.noise[c].phi1,
-              current.noise[c].phi2, std::sqrt(current.noise[c].offset_variance) / ch.unit.si);
-        }
+      const EffectFit next = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+      judge(found.back(), found.size() - 1, found, next);
+      if (tracing()) trace_found(found, next);
+      const std::string why = why_not(found.back());
+      if (!why.empty()) {
+        result.notes.push_back(
+            fmt::format("{} fits best but is not named: {}", key(found.back().design.effect), why));
+        if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
+        found.pop_back();
+        refused[best.candidate] = true;
+        if (is_absorbed_only(why)) continue;
+        continue;
       }
+      current = next;
     }
+    prune(found, current);
+    finish(found, current);
     result.final = current;
     result.found = std::move(found);
     return result;
   }
 
  private:
-  struct Gate {
-    std::vector<double> normal, flipped;  // largest penalised gains under the null, sorted
-    static double quantile_of(const std::vector<double>& v, double level) {
-      return v.empty()
-                 ? 0.0
-                 : v[static_cast<std::size_t>((1.0 - level) * static_cast<double>(v.size() - 1))];
-    }
-    double threshold(double level) const { return quantile_of(normal, level); }
-    double flip_threshold(double level) const { return quantile_of(flipped, level); }
-    static double p_of(const std::vector<double>& v, double gain) {
-      const auto above = v.end() - std::lower_bound(v.begin(), v.end(), gain);
-      return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(v.size()));
-    }
-    double p_value(double gain) const { return std::max(p_of(normal, gain), p_of(flipped, gain)); }
+  struct Score {
+    std::size_t candidate = 0;
+    std::size_t design = 0;
+    double gain = -1e300;  // penalised
   };
 
+  template <class F>
+  static void parallel(std::size_t count, const F& work) {
+    const unsigned threads = std::max(1U, std::min(std::thread::hardware_concurrency(), 8U));
+    std::vector<std::thread> pool;
+    for (unsigned t = 0; t < threads; ++t) {
+      pool.emplace_back([&, t] {
+        for (std::size_t i = t; i < count; i += threads) work(i);
+      });
+    }
+    for (std::thread& t : pool) t.join();
+  }
+
+  void report(std::size_t found, const std::string& what) const {
+    if (progress_) progress_(std::min(0.9, 0.15 + 0.2 * static_cast<double>(found)), what);
+  }
+  static bool is_absorbed_only(const std::string&) { return true; }
   std::string key(const EffectAt& e) const {
     return effect_key(e.effect->info(), *evidence_.series[0].machine, e.at);
   }
-  static std::vector<const EffectDesign*> designs_of(const std::vector<FoundEffect>& found) {
+  static std::vector<const EffectDesign*> designs_of(
+      const std::vector<FoundEffect>& found, std::size_t without = static_cast<std::size_t>(-1)) {
     std::vector<const EffectDesign*> d;
-    for (const FoundEffect& f : found) d.push_back(&f.design);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (i != without) d.push_back(&found[i].design);
+    }
     return d;
   }
-  static bool is_in(const std::vector<FoundEffect>& found, const EffectAt& e) {
-    return std::any_of(found.begin(), found.end(), [&](const FoundEffect& f) {
-      return f.design.effect.effect == e.effect && f.design.effect.at == e.at;
-    });
+  static bool same(const EffectAt& a, const EffectAt& b) {
+    return a.effect == b.effect && a.at == b.at;
   }
-  static FitControl control() {
+  static bool is_in(const std::vector<FoundEffect>& found, const EffectAt& e) {
+    return std::any_of(found.begin(), found.end(),
+                       [&](const FoundEffect& f) { return same(f.design.effect, e); });
+  }
+  static FitControl final_control() {
     FitControl c;
     c.keep_residuals = true;
     c.covariance = true;
     return c;
   }
 
-  /// Channels a candidate touches, and all that share a parameter with them.
+  /// Channels a design touches, and all that share a parameter with them.
   std::vector<bool> connected(const std::vector<const EffectDesign*>& designs,
                               const EffectDesign& d) const {
     std::vector<bool> active(evidence_.channels.size());
@@ -193,10 +203,12 @@ class Search {
     return active;
   }
 
+  /// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
   double gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
-              const EffectFit& current) const {
+              const EffectFit& current, const std::vector<bool>& also = {}) const {
     FitControl c;
     c.active = connected(base, d);
+    for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
     c.noise_passes = 2;
     std::vector<const EffectDesign*> with;
     for (const EffectDesign* b : base) {
@@ -209,69 +221,242 @@ class Search {
     return fit_effects(evidence_, with, &current, c).total() - current.total();
   }
 
-  /// Largest gain over all candidates when nothing is missing: white noise in the whitened rows, and the rows'
-  /// own residuals with the signs of whole blocks drawn at random (no shape of the noise is assumed there).
-  Gate null_gate(const std::vector<const EffectDesign*>& base, const EffectFit& current) {
-    const int sims = options_.simulations;
-    const std::size_t channels = evidence_.channels.size();
-    std::vector<MatrixXd> noise(channels), fixed(channels);
-    std::normal_distribution<double> normal;
-    for (std::size_t c = 0; c < channels; ++c) {
-      const EvidenceChannel& channel = evidence_.channels[c];
-      Index width = 0;
-      for (const EffectDesign* d : base) width += d->columns[c].cols();
-      MatrixXd columns(channel.rows(), width);
-      Index at = 0;
-      for (const EffectDesign* d : base) {
-        if (d->columns[c].cols() == 0) continue;
-        columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
-        at += d->columns[c].cols();
+  std::vector<Score> score_all(const std::vector<const EffectDesign*>& base,
+                               const EffectFit& current, const std::vector<FoundEffect>& found,
+                               const std::vector<bool>& refused) const {
+    std::vector<Score> scores(candidates_.size());
+    parallel(candidates_.size(), [&](std::size_t i) {
+      scores[i].candidate = i;
+      if (refused[i] || is_in(found, candidates_[i].effect)) return;
+      for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
+        const double g = gain(base, candidates_[i].designs[k], current) - candidates_[i].penalty;
+        if (g > scores[i].gain) scores[i] = {i, k, g};
       }
-      MatrixXd rows = whitened_rows(channel, current.noise[c], columns);
-      fixed[c] = rows.leftCols(width);
-      VectorXd r = rows.col(width);
-      if (width > 0) r -= fixed[c] * fixed[c].colPivHouseholderQr().solve(r);
-      r /= std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
-      noise[c].resize(channel.rows(), 2 * sims);
-      for (Index i = 0; i < channel.rows(); ++i) {
-        for (int s = 0; s < sims; ++s) noise[c](i, s) = normal(random_);
-      }
-      // a block's sign is the same in all channels: logs' blocks of different channels overlap, so draw by time
-      for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
-        const NoiseBlock& block = channel.blocks[b];
-        for (int s = 0; s < sims; ++s) {
-          const double sign = (random_() & 1U) != 0U ? 1.0 : -1.0;
-          noise[c].col(sims + s).segment(block.first, block.last - block.first) =
-              sign * r.segment(block.first, block.last - block.first);
+    });
+    std::erase_if(scores, [](const Score& s) { return s.gain <= -1e299; });
+    std::sort(scores.begin(), scores.end(),
+              [](const Score& a, const Score& b) { return a.gain > b.gain; });
+    return scores;
+  }
+
+  /// Nonlinear parameters between grid points, by golden section in each in turn.
+  EffectDesign refined(const std::vector<const EffectDesign*>& base, const Candidate& candidate,
+                       std::size_t best, const EffectFit& current) const {
+    EffectDesign d = candidate.designs[best];
+    if (d.shape.empty()) return d;
+    double at_best = gain(base, d, current);
+    for (std::size_t k = 0; k < d.shape.size(); ++k) {
+      std::vector<double> values;
+      for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
+      std::sort(values.begin(), values.end());
+      values.erase(std::unique(values.begin(), values.end()), values.end());
+      const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
+      if (here == values.end()) continue;
+      double lo = here == values.begin() ? *here : *(here - 1);
+      double hi = here + 1 == values.end() ? *here : *(here + 1);
+      const double golden = 0.381966;
+      for (int i = 0; i < 14 && hi - lo > 2e-3 * std::max(std::abs(hi), 1e-12); ++i) {
+        const bool right = hi - d.shape[k] > d.shape[k] - lo;
+        EffectDesign trial = d;
+        const double x = right ? d.shape[k] + golden * (hi - d.shape[k])
+                               : d.shape[k] - golden * (d.shape[k] - lo);
+        std::vector<double> shape = d.shape;
+        shape[k] = x;
+        trial = make_design(evidence_, d.effect, shape);
+        const double g = trial.acts() ? gain(base, trial, current) : -1e300;
+        if (g > at_best) {
+          (right ? lo : hi) = d.shape[k];
+          d = std::move(trial);
+          at_best = g;
+        } else {
+          (right ? hi : lo) = x;
         }
       }
     }
-    VectorXd largest = VectorXd::Constant(2 * sims, -1e300);
-    for (const Candidate& candidate : candidates_) {
-      VectorXd best = VectorXd::Constant(2 * sims, -1e300);
-      for (const EffectDesign& d : candidate.designs) {
-        MatrixXd n = MatrixXd::Zero(d.linear, d.linear), z = MatrixXd::Zero(d.linear, 2 * sims);
-        for (std::size_t c = 0; c < channels; ++c) {
-          if (!d.touches(c)) continue;
-          MatrixXd x = whitened_rows(evidence_.channels[c], current.noise[c], d.columns[c])
-                           .leftCols(d.linear);
-          if (fixed[c].cols() > 0) x -= fixed[c] * fixed[c].colPivHouseholderQr().solve(x);
-          const double s2 = current.noise[c].variance;
-          n += x.transpose() * x / s2;
-          z += x.transpose() * noise[c] / std::sqrt(s2);
-        }
-        n.diagonal().array() *= 1.0 + 1e-9;
-        const MatrixXd solved = n.ldlt().solve(z);
-        best = best.cwiseMax(0.5 * (z.cwiseProduct(solved)).colwise().sum().transpose());
-      }
-      largest = largest.cwiseMax((best.array() - candidate.penalty).matrix());
+    return d;
+  }
+
+  void judge(FoundEffect& f, std::size_t index, const std::vector<FoundEffect>& found,
+             const EffectFit& fit) const {
+    const std::vector<const EffectDesign*> designs = designs_of(found);
+    const EffectAction action = effect_action(evidence_, designs, index, fit);
+    f.size = action.size;
+    f.absorbed = action.absorbed;
+    const HeldOutGain held = held_out_gain(evidence_, designs, index, fit, options_.folds);
+    f.held_out = held.gain;
+    f.held_out_error = held.error;
+  }
+
+  std::string why_not(const FoundEffect& f) const {
+    if (f.absorbed > options_.largest_absorbed) {
+      return fmt::format(
+          "what is learned (pressures, margins, gains) can imitate {:.0f} % of it; a reference log "
+          "would tell",
+          100.0 * f.absorbed);
     }
-    Gate gate;
-    gate.normal.assign(largest.begin(), largest.begin() + sims);
-    gate.flipped.assign(largest.begin() + sims, largest.end());
-    std::sort(gate.normal.begin(), gate.normal.end());
-    std::sort(gate.flipped.begin(), gate.flipped.end());
-    return gate;
+    if (f.size < options_.smallest_effect) {
+      return fmt::format("it is {:.2f} times the noise where it acts, too small to matter", f.size);
+    }
+    if (f.held_out <= f.held_out_error) {
+      return fmt::format("on motions left out it gains {:.1f} +- {:.1f} nats, not proven",
+                         f.held_out, f.held_out_error);
+    }
+    return {};
+  }
+
+  double penalty_of(const EffectAt& e) const {
+    for (const Candidate& c : candidates_) {
+      if (same(c.effect, e)) return c.penalty;
+    }
+    return 0.0;
+  }
+
+  /// Drop what the others made superfluous.
+  void prune(std::vector<FoundEffect>& found, EffectFit& current) {
+    for (bool changed = true; changed && found.size() > 1;) {
+      changed = false;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        const EffectFit without =
+            fit_effects(evidence_, designs_of(found, i), nullptr, final_control());
+        found[i].gain = current.total() - without.total() - penalty_of(found[i].design.effect);
+        if (found[i].gain > 3.0) continue;
+        if (tracing())
+          fmt::print(stderr, "  dropped {} ({:.1f})\n", key(found[i].design.effect), found[i].gain);
+        found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+        current = without;
+        changed = true;
+        break;
+      }
+    }
+  }
+
+  /// Swap moves and indistinguishable alternatives, then intervals.
+  void finish(std::vector<FoundEffect>& found, EffectFit& current) {
+    for (int round = 0; round < 2; ++round) {
+      bool swapped = false;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        report(found.size(), "telling " + key(found[i].design.effect) + " from its rivals");
+        swapped = rivals(found, i, current) || swapped;
+      }
+      if (!swapped) break;
+    }
+    for (std::size_t i = 0; i < found.size(); ++i) judge(found[i], i, found, current);
+    intervals(found);
+  }
+
+  /// @return whether a rival took the place of found[i]
+  bool rivals(std::vector<FoundEffect>& found, std::size_t i, EffectFit& current) {
+    FoundEffect& f = found[i];
+    const std::vector<const EffectDesign*> others = designs_of(found, i);
+    const EffectFit without = fit_effects(evidence_, others, &current, {});
+    std::vector<bool> touched(evidence_.channels.size());
+    for (std::size_t c = 0; c < touched.size(); ++c) touched[c] = f.design.touches(c);
+    std::vector<Score> scores(candidates_.size());
+    parallel(candidates_.size(), [&](std::size_t k) {
+      scores[k].candidate = k;
+      const Candidate& c = candidates_[k];
+      if (is_in(found, c.effect)) return;
+      for (std::size_t d = 0; d < c.designs.size(); ++d) {
+        bool meets = false;
+        for (std::size_t ch = 0; ch < touched.size(); ++ch)
+          meets = meets || (touched[ch] && c.designs[d].touches(ch));
+        if (!meets) return;
+        const double g = gain(others, c.designs[d], without, touched) - c.penalty;
+        if (g > scores[k].gain) scores[k] = {k, d, g};
+      }
+    });
+    const double own = gain(others, f.design, without, touched) - penalty_of(f.design.effect);
+    f.gain = own;
+    std::sort(scores.begin(), scores.end(),
+              [](const Score& a, const Score& b) { return a.gain > b.gain; });
+    if (scores.front().gain > own + 1.0) {
+      FoundEffect rival;
+      rival.design =
+          refined(others, candidates_[scores.front().candidate], scores.front().design, without);
+      rival.p_value = f.p_value;
+      std::vector<FoundEffect> trial = found;
+      trial[i] = rival;
+      const EffectFit fit = fit_effects(evidence_, designs_of(trial), nullptr, final_control());
+      judge(trial[i], i, trial, fit);
+      if (why_not(trial[i]).empty() && fit.total() > current.total()) {
+        if (tracing())
+          fmt::print(stderr, "  {} takes the place of {}\n", key(rival.design.effect),
+                     key(f.design.effect));
+        found = std::move(trial);
+        current = fit;
+        return true;
+      }
+    }
+    f.alternatives.clear();
+    for (const Score& s : scores) {
+      if (s.gain < own - 50.0) break;
+      f.alternatives.emplace_back(candidates_[s.candidate].effect, own - s.gain);
+    }
+    return false;
+  }
+
+  /// Values and 95 % intervals, nonlinear parameters by the slope of the effect in them.
+  void intervals(std::vector<FoundEffect>& found) {
+    std::vector<EffectDesign> augmented;
+    const EffectFit plain_fit = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+    Index first = 0;
+    for (FoundEffect& f : found) {
+      const VectorXd theta = plain_fit.theta.segment(first, f.design.linear);
+      augmented.push_back(with_shape_slopes(evidence_, f.design, theta));
+      first += f.design.linear;
+    }
+    std::vector<const EffectDesign*> designs;
+    for (const EffectDesign& d : augmented) designs.push_back(&d);
+    const EffectFit fit = fit_effects(evidence_, designs, nullptr, final_control());
+    Index at = 0;
+    Index linear_at = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      FoundEffect& f = found[i];
+      const auto count = static_cast<Index>(f.design.linear);
+      f.values = parameter_values(*f.design.effect.effect,
+                                  plain_fit.theta.segment(linear_at, count), f.design.shape);
+      const auto shapes = static_cast<Index>(f.design.shape.size());
+      VectorXd sd = VectorXd::Zero(count + shapes);
+      for (Index k = 0; k < augmented[i].linear; ++k)
+        sd[k] = std::sqrt(std::max(0.0, fit.covariance(at + k, at + k)));
+      const std::vector<double> spread =
+          parameter_values(*f.design.effect.effect, sd.head(count),
+                           std::vector<double>(sd.data() + count, sd.data() + count + shapes));
+      f.lower95.resize(f.values.size());
+      f.upper95.resize(f.values.size());
+      for (std::size_t k = 0; k < f.values.size(); ++k) {
+        f.lower95[k] = f.values[k] - 1.96 * spread[k];
+        f.upper95[k] = f.values[k] + 1.96 * spread[k];
+      }
+      at += augmented[i].linear;
+      linear_at += count;
+    }
+  }
+
+  void trace_scores(int step, const std::vector<Score>& scores, const NullGate& gate) const {
+    fmt::print(stderr, "step {} threshold {:.1f}\n", step, gate.threshold(options_.false_alarm));
+    for (std::size_t i = 0; i < std::min<std::size_t>(8, scores.size()); ++i) {
+      const Candidate& c = candidates_[scores[i].candidate];
+      fmt::print(stderr, "   {:28s} gain {:9.1f} shape [{:.4g}]\n", key(c.effect), scores[i].gain,
+                 fmt::join(c.designs[scores[i].design].shape, " "));
+    }
+  }
+  void trace_found(const std::vector<FoundEffect>& found, const EffectFit& fit) const {
+    const FoundEffect& f = found.back();
+    fmt::print(stderr,
+               "  + {} shape [{:.4g}] theta [{:.5g}] size {:.2f} absorbed {:.2f} held out {:.1f} "
+               "+- {:.1f}\n",
+               key(f.design.effect), fmt::join(f.design.shape, " "),
+               fmt::join(std::vector<double>(fit.theta.begin(), fit.theta.end()), " "), f.size,
+               f.absorbed, f.held_out, f.held_out_error);
+    for (std::size_t c = 0; c < evidence_.channels.size(); ++c) {
+      const EvidenceChannel& ch = evidence_.channels[c];
+      fmt::print(stderr,
+                 "     {:40s} n {} sd {:.3g} floor {:.3g} {} phi {:.2f} {:.2f} off {:.3g}\n",
+                 ch.text, ch.rows(), fit.noise[c].deviation() / ch.unit.si,
+                 ch.noise_floor / ch.unit.si, ch.unit.name, fit.noise[c].phi1, fit.noise[c].phi2,
+                 std::sqrt(fit.noise[c].offset_variance) / ch.unit.si);
+    }
   }
 
   const Evidence& evidence_;
@@ -282,6 +467,16 @@ class Search {
 };
 
 }  // namespace
+
+std::vector<double> parameter_values(const Effect& effect, const VectorXd& linear,
+                                     const std::vector<double>& shape) {
+  std::vector<double> values;
+  Index l = 0;
+  std::size_t s = 0;
+  for (const EffectParameter& p : effect.info().parameters)
+    values.push_back(p.linear ? linear[l++] : shape[s++]);
+  return values;
+}
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options, const SearchProgress& progress) {

@@ -1,8 +1,11 @@
 #pragma once
 /// Searches the catalogue for what explains the evidence: forward selection by profile likelihood, a gate with
-/// controlled false alarm, drop and swap moves, indistinguishable sets. docs/diagnose.md has the method.
+/// controlled false alarm, held-out proof, drop and swap moves, indistinguishable sets. docs/diagnose.md has the
+/// method and what each number was measured to be worth.
 #include <functional>
-#include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "identification/effect_fit.h"
 
@@ -12,21 +15,27 @@ struct SearchOptions {
   double false_alarm = 0.05;  ///< of the whole search on logs with nothing missing
   int max_effects = 5;
   int simulations = 300;  ///< of the null, for the gate
-  /// An effect that explains less than this share of a channel's noise is not worth a name, however significant.
-  double smallest_effect = 0.15;
+  /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
+  double smallest_effect = 0.25;
+  double largest_absorbed =
+      0.9;  ///< an effect that learned laws imitate to more than this share is not named
   double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart
+  int folds = 5;
   unsigned seed = 1;
 };
 
 /// One effect judged missing.
 struct FoundEffect {
   EffectDesign design;
-  double gain = 0.0;     ///< [nats] log likelihood without it - with it, all others refitted
-  double p_value = 1.0;  ///< of the gate it passed
-  double size = 0.0;  ///< largest over channels: its RMS over its own samples / the channel's noise
+  double gain =
+      0.0;  ///< [nats] penalised log likelihood with all found - the same without this one
+  double p_value = 1.0;   ///< of the gate it passed
+  double size = 0.0;      ///< largest over channels: its size where it acts / the channel's noise
   double absorbed = 0.0;  ///< share of its action that the learned baselines imitate
+  double held_out = 0.0,
+         held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
-  /// Others that explain as much, best first, with how much worse they are. [nats]
+  /// Others that could stand in its place, best first, with how much worse they are. [nats]
   std::vector<std::pair<EffectAt, double>> alternatives;
 };
 
@@ -35,7 +44,7 @@ struct SearchResult {
   EffectFit null, final;           ///< without and with them
   double p_value = 1.0;            ///< of the first gate
   double threshold = 0.0;          ///< [nats] of the first gate
-  /// Best gain of every candidate in the first step: the ranking's raw numbers.
+  /// Best penalised gain of every candidate in the first step.
   std::vector<std::pair<EffectAt, double>> ranking;
   std::vector<std::string> notes;
 };
@@ -44,5 +53,9 @@ using SearchProgress = std::function<void(double share, const std::string& what)
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options = {}, const SearchProgress& progress = {});
+
+/// Linear parameters, then nonlinear ones, in the order of info().parameters. [SI]
+std::vector<double> parameter_values(const Effect& effect, const Eigen::VectorXd& linear,
+                                     const std::vector<double>& shape);
 
 }  // namespace sparflow

@@ -159,6 +159,35 @@ double raw_noise(const VectorXd& x) {
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
 }
 
+std::vector<BranchSplit> branches_of(const Evidence& e,
+                                     const std::vector<const MachineSignals*>& signals,
+                                     std::size_t cylinder, int side) {
+  std::vector<BranchData> data;
+  std::vector<std::size_t> owner;
+  std::vector<BranchSplit> result(signals.size());
+  for (std::size_t log = 0; log < signals.size(); ++log) {
+    const CylinderSignals& c = signals[log]->cylinders[cylinder];
+    const CylinderSeries& s = e.series[log].cylinders[cylinder];
+    if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0 || s.force.size() == 0) continue;
+    BranchData d;
+    d.p_return = side > 0 ? s.pressure_b : s.pressure_a;
+    d.p_supply = side > 0 ? s.pressure_a : s.pressure_b;
+    d.q_return = s.return_flow;
+    d.q_supply = s.flow;
+    d.force = s.force;
+    d.q_return_total = VectorXd::Zero(s.return_flow.size());
+    for (const CylinderSeries& other : e.series[log].cylinders)
+      d.q_return_total += other.return_flow;
+    d.moving = c.driven && signals[log]->usable && (c.direction.array() == side);
+    data.push_back(std::move(d));
+    owner.push_back(log);
+  }
+  if (data.empty()) return result;
+  std::vector<BranchSplit> splits = split_branches(data);
+  for (std::size_t k = 0; k < owner.size(); ++k) result[owner[k]] = std::move(splits[k]);
+  return result;
+}
+
 }  // namespace
 
 const char* evidence_stage(EvidenceKind kind) {
@@ -337,6 +366,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
       }
     }
     // pressures: return line or counterbalance valve, by direction
+    std::vector<BranchSplit> splits[2];
+    for (const int side : {1, -1}) splits[side > 0 ? 0 : 1] = branches_of(e, signals, at, side);
     for (const int side : {1, -1}) {
       for (const bool returning : {true, false}) {
         const EvidenceKind kind =
@@ -348,13 +379,10 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         for (std::size_t log = 0; log < signals.size(); ++log) {
           const CylinderSignals& c = signals[log]->cylinders[at];
           const CylinderSeries& s = e.series[log].cylinders[at];
-          if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) continue;
-          const bool a = (side > 0) != returning;
-          const Mask mask = c.driven && signals[log]->usable && (c.direction.array() == side);
-          const VectorXd& ret = side > 0 ? s.pressure_b : s.pressure_a;
-          const VectorXd& sup = side > 0 ? s.pressure_a : s.pressure_b;
-          const BranchSplit split = split_branches(ret, sup, s.return_flow, s.flow, s.force, mask);
-          const VectorXd& raw = a ? c.pressure_a : c.pressure_b;
+          const BranchSplit& split = splits[side > 0 ? 0 : 1][log];
+          if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0 || split.return_line.size() == 0)
+            continue;
+          const VectorXd& raw = (side > 0) != returning ? c.pressure_a : c.pressure_b;
           const VectorXd y = e.filter(log, kind, raw - known(log, kind, i));
           const VectorXd& q = returning ? s.return_flow : s.flow;
           Eigen::MatrixXd base(y.size(), returning ? 3 : 5);

@@ -1,0 +1,167 @@
+#include "identification/effect_proof.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Layout {  // of the designs' parameters
+  std::vector<Index> first;
+  Index count = 0;
+  explicit Layout(const std::vector<const EffectDesign*>& designs) {
+    for (const EffectDesign* d : designs) {
+      first.push_back(count);
+      count += d->linear;
+    }
+  }
+};
+
+/// Ridge so small that it only decides what no data decide.
+VectorXd solve(MatrixXd n, const VectorXd& g) {
+  if (g.size() == 0) return g;
+  const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  n = scale.asDiagonal() * n * scale.asDiagonal();
+  n.diagonal().array() += 1e-9;
+  return scale.cwiseProduct(n.ldlt().solve(scale.cwiseProduct(g)));
+}
+
+}  // namespace
+
+EffectAction effect_action(const Evidence& evidence,
+                           const std::vector<const EffectDesign*>& designs, std::size_t index,
+                           const EffectFit& fit) {
+  const Layout layout(designs);
+  const EffectDesign& d = *designs[index];
+  const VectorXd theta = fit.theta.segment(layout.first[index], d.linear);
+  EffectAction action;
+  double whole = 0.0, left = 0.0;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    if (!d.touches(c)) continue;
+    const EvidenceChannel& channel = evidence.channels[c];
+    const double noise = fit.noise[c].deviation();
+    VectorXd action_here = d.columns[c] * theta;
+    whole += action_here.squaredNorm() / (noise * noise);
+    if (channel.baseline.cols() > 0) {
+      action_here -= channel.baseline * channel.baseline.colPivHouseholderQr().solve(action_here);
+    }
+    const double squares = action_here.squaredNorm();
+    left += squares / (noise * noise);
+    if (squares > 0.0) {
+      action.size =
+          std::max(action.size, std::sqrt(action_here.array().pow(4).sum() / squares) / noise);
+    }
+  }
+  action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
+  return action;
+}
+
+HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+                          std::size_t index, const EffectFit& fit, int folds) {
+  const Layout layout(designs);
+  const std::size_t channels = evidence.channels.size();
+  std::vector<MatrixXd> rows(channels);
+  std::vector<std::vector<Index>> owner(channels);
+  const auto count = static_cast<std::size_t>(folds);
+  std::vector<MatrixXd> n(count, MatrixXd::Zero(layout.count, layout.count));
+  std::vector<VectorXd> g(count, VectorXd::Zero(layout.count));
+  std::vector<bool> used(channels, false);
+  for (std::size_t c = 0; c < channels; ++c) {
+    Index width = 0;
+    for (const EffectDesign* d : designs) width += d->columns[c].cols();
+    if (width == 0) continue;
+    used[c] = true;
+    MatrixXd columns(evidence.channels[c].rows(), width);
+    Index at = 0;
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      const Index w = designs[k]->columns[c].cols();
+      if (w > 0) columns.middleCols(at, w) = designs[k]->columns[c];
+      for (Index i = 0; i < w; ++i) owner[c].push_back(layout.first[k] + i);
+      at += w;
+    }
+    rows[c] = whitened_rows(evidence.channels[c], fit.noise[c], columns) /
+              std::sqrt(fit.noise[c].variance);
+    for (std::size_t b = 0; b < evidence.channels[c].blocks.size(); ++b) {
+      const NoiseBlock& block = evidence.channels[c].blocks[b];
+      const MatrixXd part = rows[c].middleRows(block.first, block.last - block.first);
+      const MatrixXd cross = part.leftCols(width).transpose() * part;
+      for (Index i = 0; i < width; ++i) {
+        const Index oi = owner[c][static_cast<std::size_t>(i)];
+        g[b % count][oi] += cross(i, width);
+        for (Index j = 0; j < width; ++j)
+          n[b % count](oi, owner[c][static_cast<std::size_t>(j)]) += cross(i, j);
+      }
+    }
+  }
+  MatrixXd n_all = MatrixXd::Zero(layout.count, layout.count);
+  VectorXd g_all = VectorXd::Zero(layout.count);
+  for (std::size_t f = 0; f < count; ++f) {
+    n_all += n[f];
+    g_all += g[f];
+  }
+  std::vector<Index> others;
+  for (Index i = 0; i < layout.count; ++i) {
+    if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
+      others.push_back(i);
+  }
+  std::vector<double> gains;
+  for (std::size_t f = 0; f < count; ++f) {
+    const MatrixXd nf = n_all - n[f];
+    const VectorXd gf = g_all - g[f];
+    const VectorXd with = solve(nf, gf);
+    VectorXd without = VectorXd::Zero(layout.count);
+    const VectorXd reduced = solve(nf(others, others), gf(others));
+    for (std::size_t i = 0; i < others.size(); ++i)
+      without[others[i]] = reduced[static_cast<Index>(i)];
+    // squared error on the fold: constant - 2 g'theta + theta'N theta
+    const auto error = [&](const VectorXd& theta) {
+      return theta.dot(n[f] * theta) - 2.0 * g[f].dot(theta);
+    };
+    gains.push_back(0.5 * (error(without) - error(with)));
+  }
+  HeldOutGain result;
+  double squares = 0.0;
+  for (const double v : gains) result.gain += v;
+  const double mean = result.gain / static_cast<double>(folds);
+  for (const double v : gains) squares += (v - mean) * (v - mean);
+  result.error = std::sqrt(squares * static_cast<double>(folds) /
+                           std::max(1.0, static_cast<double>(folds) - 1.0));
+  return result;
+}
+
+EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
+                               const VectorXd& theta) {
+  EffectDesign result = design;
+  for (std::size_t s = 0; s < design.shape.size(); ++s) {
+    const double h = 0.02 * std::max(std::abs(design.shape[s]), 1e-9);
+    std::vector<double> up = design.shape, down = design.shape;
+    up[s] += h;
+    down[s] -= h;
+    const EffectDesign a = make_design(evidence, design.effect, up),
+                       b = make_design(evidence, design.effect, down);
+    bool acts = false;
+    for (std::size_t c = 0; c < design.columns.size(); ++c) {
+      if (!design.touches(c)) continue;
+      VectorXd slope = VectorXd::Zero(evidence.channels[c].rows());
+      if (a.touches(c)) slope += a.columns[c] * theta;
+      if (b.touches(c)) slope -= b.columns[c] * theta;
+      slope /= 2.0 * h;
+      acts = acts || slope.cwiseAbs().maxCoeff() > 0.0;
+      MatrixXd wider(slope.size(), result.columns[c].cols() + 1);
+      wider << result.columns[c], slope;
+      result.columns[c] = std::move(wider);
+    }
+    (void)acts;
+    ++result.linear;
+    result.lower.push_back(-std::numeric_limits<double>::max());
+    result.upper.push_back(std::numeric_limits<double>::max());
+  }
+  return result;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,34 @@
+#pragma once
+/// Proofs of one effect beside its likelihood: how large it is where it acts, how much of it learned laws
+/// imitate, what it gains on motions left out, and the slopes that give nonlinear parameters an interval.
+#include <vector>
+
+#include "identification/effect_fit.h"
+
+namespace sparflow {
+
+struct EffectAction {
+  /// Largest over channels: sqrt(sum c^4 / sum c^2) of its action c (baseline taken out) / noise. The weighting
+  /// measures it where it acts: a lag shows for a second after a step and nowhere else.
+  double size = 0.0;
+  double absorbed = 0.0;  ///< 0..1, over all channels, each in units of its noise
+};
+
+/// @param index which of the designs
+EffectAction effect_action(const Evidence& evidence,
+                           const std::vector<const EffectDesign*>& designs, std::size_t index,
+                           const EffectFit& fit);
+
+struct HeldOutGain {
+  double gain = 0.0, error = 0.0;  ///< [nats], sum over folds and its standard error
+};
+
+/// Blocks of motion in turn left out of the estimate; noise as in `fit`.
+HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+                          std::size_t index, const EffectFit& fit, int folds);
+
+/// The design with one more column for each nonlinear parameter: d(action)/d(parameter) at `theta`.
+EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
+                               const Eigen::VectorXd& theta);
+
+}  // namespace sparflow

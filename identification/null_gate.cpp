@@ -1,0 +1,99 @@
+#include "identification/null_gate.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double p_of(const std::vector<double>& sorted, double gain) {
+  const auto above = sorted.end() - std::lower_bound(sorted.begin(), sorted.end(), gain);
+  return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(sorted.size()));
+}
+
+}  // namespace
+
+double NullGate::threshold(double level) const {
+  const auto quantile = [&](const std::vector<double>& v) {
+    return v.empty()
+               ? 0.0
+               : v[static_cast<std::size_t>((1.0 - level) * static_cast<double>(v.size() - 1))];
+  };
+  return std::max(quantile(normal), quantile(flipped));
+}
+
+double NullGate::p_value(double gain) const {
+  return std::max(p_of(normal, gain), p_of(flipped, gain));
+}
+
+NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidate>& candidates,
+                        const std::vector<const EffectDesign*>& accepted, const EffectFit& fit,
+                        int simulations, std::mt19937_64& random) {
+  const std::size_t channels = evidence.channels.size();
+  std::vector<MatrixXd> noise(channels), fixed(channels);
+  std::normal_distribution<double> normal;
+  for (std::size_t c = 0; c < channels; ++c) {
+    const EvidenceChannel& channel = evidence.channels[c];
+    Index width = 0;
+    for (const EffectDesign* d : accepted) width += d->columns[c].cols();
+    MatrixXd columns(channel.rows(), width);
+    Index at = 0;
+    for (const EffectDesign* d : accepted) {
+      const Index w = d->columns[c].cols();
+      if (w > 0) columns.middleCols(at, w) = d->columns[c];
+      at += w;
+    }
+    const MatrixXd rows = whitened_rows(channel, fit.noise[c], columns);
+    fixed[c] = rows.leftCols(width);
+    VectorXd r = rows.col(width);
+    if (width > 0) {  // orthonormal, so that projecting later is one product
+      fixed[c] = MatrixXd(fixed[c].householderQr().householderQ() *
+                          MatrixXd::Identity(channel.rows(), width));
+      r -= fixed[c] * (fixed[c].transpose() * r);
+    }
+    r /= std::sqrt(std::max(r.squaredNorm() / static_cast<double>(r.size()), 1e-300));
+    noise[c].resize(channel.rows(), 2 * simulations);
+    for (Index i = 0; i < channel.rows() * simulations; ++i) noise[c].data()[i] = normal(random);
+    for (const NoiseBlock& block : channel.blocks) {
+      const Index n = block.last - block.first;
+      for (int s = 0; s < simulations; ++s) {
+        const double sign = (random() & 1U) != 0U ? 1.0 : -1.0;
+        noise[c].col(simulations + s).segment(block.first, n) = sign * r.segment(block.first, n);
+      }
+    }
+  }
+  VectorXd largest = VectorXd::Constant(2 * simulations, -1e300);
+  for (const GateCandidate& candidate : candidates) {
+    VectorXd best = VectorXd::Constant(2 * simulations, -1e300);
+    for (const EffectDesign& d : *candidate.designs) {
+      MatrixXd n = MatrixXd::Zero(d.linear, d.linear),
+               z = MatrixXd::Zero(d.linear, 2 * simulations);
+      for (std::size_t c = 0; c < channels; ++c) {
+        if (!d.touches(c)) continue;
+        MatrixXd x =
+            whitened_rows(evidence.channels[c], fit.noise[c], d.columns[c]).leftCols(d.linear);
+        if (fixed[c].cols() > 0) x -= fixed[c] * (fixed[c].transpose() * x);
+        n += x.transpose() * x / fit.noise[c].variance;
+        z += x.transpose() * noise[c] / std::sqrt(fit.noise[c].variance);
+      }
+      const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+      n = scale.asDiagonal() * n * scale.asDiagonal();
+      n.diagonal().array() += 1e-9;
+      z = scale.asDiagonal() * z;
+      best = best.cwiseMax((0.5 * z.cwiseProduct(n.ldlt().solve(z)).colwise().sum()).transpose());
+    }
+    largest = largest.cwiseMax((best.array() - candidate.penalty).matrix());
+  }
+  NullGate gate;
+  gate.normal.assign(largest.begin(), largest.begin() + simulations);
+  gate.flipped.assign(largest.begin() + simulations, largest.end());
+  std::sort(gate.normal.begin(), gate.normal.end());
+  std::sort(gate.flipped.begin(), gate.flipped.end());
+  return gate;
+}
+
+}  // namespace sparflow

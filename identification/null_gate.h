@@ -1,0 +1,31 @@
+#pragma once
+/// How large the best gain of a whole search gets when nothing is missing: covers the number of candidates, their
+/// grids and their dependence on each other, on the user's own motions.
+#include <random>
+#include <vector>
+
+#include "identification/effect_fit.h"
+
+namespace sparflow {
+
+struct NullGate {
+  std::vector<double> normal;  ///< [nats] simulated with independent normal innovations, sorted
+  std::vector<double>
+      flipped;  ///< [nats] the log's own residuals, signs of whole motions drawn at random, sorted
+
+  double threshold(double level) const;
+  /// The larger of the two ways' p-values.
+  double p_value(double gain) const;
+};
+
+/// One candidate: its designs (grid) and its penalty.
+struct GateCandidate {
+  const std::vector<EffectDesign>* designs = nullptr;
+  double penalty = 0.0;  ///< [nats]
+};
+
+NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidate>& candidates,
+                        const std::vector<const EffectDesign*>& accepted, const EffectFit& fit,
+                        int simulations, std::mt19937_64& random);
+
+}  // namespace sparflow
