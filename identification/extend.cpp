@@ -221,6 +221,22 @@ std::string percent_text(double ratio) {
                       : fmt::format("{:.1f} % larger", 100.0 * (ratio - 1.0));
 }
 
+/// A diagnosis together with the model it speaks of: its evidence refers to that model's machine.
+std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
+                                               const std::vector<Log>& logs,
+                                               const std::vector<Log>& references,
+                                               const DiagnoseOptions& options,
+                                               const SearchProgress& progress) {
+  struct Kept {
+    CraneModel model;
+    Diagnosis diagnosis;
+  };
+  const auto kept = std::make_shared<Kept>();
+  kept->model = model;
+  kept->diagnosis = diagnose(kept->model, logs, references, options, progress);
+  return {kept, &kept->diagnosis};
+}
+
 /// Why a diagnosis leads no further.
 std::string why_stopped(const Diagnosis& d) {
   switch (d.verdict) {
@@ -290,7 +306,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
     }
     all.push_back(e);
   }
-  const Workshop workshop(model, logs, {}, tests, options);
+  const Workshop workshop(model, logs, options.references, tests, options);
   const double parts = static_cast<double>(add.size()) + 1.0;
   const auto part = [&](std::size_t i) {
     return [&progress, i, parts](double share, const std::string& what) {
@@ -335,7 +351,7 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
   }
   const AppliedEffect was = model.effects[static_cast<std::size_t>(at - rest.begin())];
   rest.erase(at);
-  const Workshop workshop(model, logs, {}, tests, options);
+  const Workshop workshop(model, logs, options.references, tests, options);
   const auto part = [&](double first) {
     return [&progress, first](double share, const std::string& what) {
       if (progress) progress(first + 0.5 * share, what);
@@ -377,8 +393,8 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
   ExtendResult result;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
   while (result.stopped_because.empty()) {
-    const auto diagnosis = std::make_shared<const Diagnosis>(
-        diagnose(current.model, logs, references, options.diagnose, round(0.4)));
+    const std::shared_ptr<const Diagnosis> diagnosis =
+        diagnose_kept(current.model, logs, references, options.diagnose, round(0.4));
     done += (1.0 - done) * 0.4;
     result.last = diagnosis;
     std::vector<EffectAt> wanted;

@@ -50,8 +50,11 @@ struct ExtendResult {
 struct ExtendOptions {
   FitOptions fit;            ///< its effects are not looked at
   DiagnoseOptions diagnose;  ///< of `improve`
-  int max_steps = 6;         ///< of `improve`
-  std::string date;          ///< "2025-03-14" for the record; empty = not recorded
+  /// Logs of the same machine without the effects: what the model has learned then stays as it is and only effects'
+  /// parameters are estimated. `improve` has a parameter of its own for them.
+  std::vector<Log> references;
+  int max_steps = 6;  ///< of `improve`
+  std::string date;   ///< "2025-03-14" for the record; empty = not recorded
 };
 
 /// @param add effects in the order they are added, one step each; none that the model has already
@@ -65,8 +68,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
 
 /// Adds what `diagnose` finds and diagnoses again, until it finds nothing more, a change makes the error worse
 /// (that one is not kept), data is bad, or `max_steps` are done; `stopped_because` says which.
-/// @param references logs of the same machine without what may be missing: what the model has learned then stays as
-///        it is and only effects' parameters are estimated
+/// @param references as in ExtendOptions
 ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
                      const std::vector<Log>& references, const std::vector<Log>& tests,
                      const ExtendOptions& options = {}, const SearchProgress& progress = {});

@@ -24,6 +24,10 @@ int main(int argc, char** argv) {
   cli::add_demo_verb(app, code);
   cli::add_fit_verb(app, code);
   cli::add_compare_verb(app, code);
+  cli::add_diagnose_verb(app, code);
+  cli::add_extend_verb(app, code);
+  cli::add_improve_verb(app, code);
+  cli::add_effects_verb(app, code);
   cli::add_plan_verb(app, code);
   cli::add_optimize_verb(app, code);
   try {
