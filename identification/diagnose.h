@@ -20,7 +20,7 @@ struct ParameterEstimate {
   double value = 0.0, lower95 = 0.0, upper95 = 0.0;  ///< in `unit`
 };
 
-/// Fit of one evidence channel with and without one effect (all others in), on motions left out of the estimate.
+/// Error of one evidence channel without and with one effect, all others in.
 struct ChannelGain {
   std::size_t channel = 0;                                        ///< index into Evidence::channels
   double rmse_before = 0.0, rmse_after = 0.0, noise_floor = 0.0;  ///< SI; floor NaN = not known
@@ -81,6 +81,10 @@ struct Diagnosis {
   std::string table() const;     ///< one screen for a terminal
   std::string json() const;      ///< keys of the contract and more
 };
+
+/// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
+/// cause is not in the catalogue.
+inline constexpr double kLargestLeftoverShare = 0.2;
 
 struct DiagnoseOptions {
   SignalOptions signals;

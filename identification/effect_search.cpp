@@ -81,7 +81,7 @@ class Search {
 
   SearchResult run() {
     SearchResult result;
-    EffectFit current = fit_effects(evidence_, {});
+    EffectFit current = fit_effects(evidence_, {}, nullptr, final_control());
     result.null = current;
     std::vector<FoundEffect> found;
     std::vector<bool> refused(candidates_.size(), false);
@@ -122,7 +122,6 @@ class Search {
         if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
         found.pop_back();
         refused[best.candidate] = true;
-        if (is_absorbed_only(why)) continue;
         continue;
       }
       current = next;
@@ -156,7 +155,6 @@ class Search {
   void report(std::size_t found, const std::string& what) const {
     if (progress_) progress_(std::min(0.9, 0.15 + 0.2 * static_cast<double>(found)), what);
   }
-  static bool is_absorbed_only(const std::string&) { return true; }
   std::string key(const EffectAt& e) const {
     return effect_key(e.effect->info(), *evidence_.series[0].machine, e.at);
   }
@@ -288,7 +286,9 @@ class Search {
   }
 
   std::string why_not(const FoundEffect& f) const {
-    if (f.absorbed > options_.largest_absorbed) {
+    const EffectStage stage = f.design.effect.effect->info().stage;
+    const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+    if (behind_process && f.absorbed > options_.largest_absorbed) {
       return fmt::format(
           "what is learned (pressures, margins, gains) can imitate {:.0f} % of it; a reference log "
           "would tell",

@@ -1,0 +1,221 @@
+#include "identification/diagnose.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "identification/unexplained.h"
+#include "models/error.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Residual rows of suspect logs.
+double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd& residual) {
+  const EvidenceChannel& c = evidence.channels[channel];
+  double squares = 0.0, n = 0.0;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(c.log[b]) >= evidence.suspects) continue;
+    const Index length = c.blocks[b].last - c.blocks[b].first;
+    squares += residual.segment(c.blocks[b].first, length).squaredNorm();
+    n += static_cast<double>(length);
+  }
+  return n > 0.0 ? std::sqrt(squares / n) : 0.0;
+}
+
+EffectFit fit_without(const Diagnosis& d, std::size_t index) {
+  std::vector<const EffectDesign*> others;
+  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+    if (i != index) others.push_back(&d.search.found[i].design);
+  }
+  FitControl control;
+  control.keep_residuals = true;
+  return fit_effects(d.evidence, others, nullptr, control);
+}
+
+DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOptions& options) {
+  const FoundEffect& f = d.search.found[index];
+  const Machine& machine = *d.evidence.series[0].machine;
+  const EffectInfo& info = f.design.effect.effect->info();
+  DiagnosedEffect e;
+  e.effect = f.design.effect;
+  e.id = info.id;
+  const std::string key = effect_key(info, machine, e.effect.at);
+  e.at = key.size() > info.id.size() ? key.substr(info.id.size() + 1) : "";
+  e.stage = effect_stage_name(info.stage);
+  e.applied = {e.effect.effect, e.effect.at, f.values, f.lower95, f.upper95};
+  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+    const EffectParameter& p = info.parameters[k];
+    e.parameters.push_back(
+        {p.name, p.unit, p.meaning, f.values[k] / p.si, f.lower95[k] / p.si, f.upper95[k] / p.si});
+  }
+  e.p_value = f.p_value;
+  e.gain = f.gain;
+  e.held_out_gain = f.held_out;
+  e.held_out_error = f.held_out_error;
+  e.absorbed = f.absorbed;
+  double odds = 0.0;
+  for (const auto& [rival, worse] : f.alternatives) {
+    odds += std::exp(-std::max(0.0, worse));
+    if (worse < options.same_nats)
+      e.rivals.emplace_back(effect_key(rival.effect->info(), machine, rival.at), worse);
+  }
+  e.probability = (1.0 - f.p_value) / (1.0 + odds);
+
+  const EffectFit without = fit_without(d, index);
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!f.design.touches(c)) continue;
+    e.channels.push_back({c, suspect_rms(d.evidence, c, without.residual[c]),
+                          suspect_rms(d.evidence, c, d.search.final.residual[c]),
+                          d.evidence.channels[c].noise_floor});
+  }
+  std::sort(e.channels.begin(), e.channels.end(), [](const ChannelGain& a, const ChannelGain& b) {
+    return a.rmse_before / a.rmse_after > b.rmse_before / b.rmse_after;
+  });
+  for (const ChannelGain& g : e.channels) {
+    const EvidenceChannel& c = d.evidence.channels[g.channel];
+    if (g.rmse_before < 1.02 * g.rmse_after) continue;
+    e.evidence.push_back(
+        fmt::format("{}: error {:.3g} -> {:.3g} {}{}", c.text, g.rmse_before / c.unit.si,
+                    g.rmse_after / c.unit.si, c.unit.name,
+                    std::isfinite(g.noise_floor)
+                        ? fmt::format(" (sensor noise {:.2g})", g.noise_floor / c.unit.si)
+                        : ""));
+  }
+  e.evidence.push_back(
+      fmt::format("motions left out of the estimate: likelihood gains {:.0f} +- {:.0f} nats",
+                  e.held_out_gain, e.held_out_error));
+  return e;
+}
+
+/// What the catalogue explained of a channel and what a flexible model explains beyond it, as variances.
+bool left_over_dominates(const Diagnosis& d, const Leftover& left) {
+  const double before = suspect_rms(d.evidence, left.channel, d.search.null.residual[left.channel]);
+  const double after = suspect_rms(d.evidence, left.channel, d.search.final.residual[left.channel]);
+  const double catalogue = std::max(0.0, before * before - after * after);
+  const double flexible = left.rms * left.rms;
+  return flexible > kLargestLeftoverShare * (catalogue + flexible);
+}
+
+Unexplained describe(const Evidence& evidence, const Leftover& left) {
+  const EvidenceChannel& c = evidence.channels[left.channel];
+  Unexplained u;
+  u.stage = evidence_stage(c.kind);
+  u.at = c.at;
+  u.depends_on = left.depends_on;
+  u.share = left.explained;
+  u.rmse = left.rms;
+  u.noise_floor = c.noise_floor;
+  u.unit = c.unit;
+  u.sentence =
+      fmt::format("{}: {:.2g} {} (RMS) that follow {} and that nothing in the catalogue explains",
+                  c.text, left.rms / c.unit.si, c.unit.name, fmt::join(left.depends_on, ", "));
+  return u;
+}
+
+}  // namespace
+
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kMissing:
+      return "missing";
+    case Verdict::kNone:
+      return "none";
+    case Verdict::kUnknown:
+      return "unknown";
+    case Verdict::kBadData:
+      return "bad_data";
+  }
+  return "";
+}
+
+Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                           const std::vector<MachineSignals>& references,
+                           const DiagnoseOptions& options, const SearchProgress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  Diagnosis d;
+  if (progress) progress(0.02, "arranging the evidence");
+  d.evidence = collect_evidence(model, suspects, references);
+  d.notes = d.evidence.notes;
+  std::vector<EffectAt> candidates_here = options.candidates;
+  if (candidates_here.empty()) {
+    for (const EffectAt& c : candidates(model.machine)) {
+      const bool known =
+          std::any_of(model.effects.begin(), model.effects.end(),
+                      [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
+      if (!known) candidates_here.push_back(c);
+    }
+  }
+  d.search = search_effects(d.evidence, candidates_here, options.search, progress);
+  d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
+  d.p_value = d.search.p_value;
+  for (const auto& [effect, gain] : d.search.ranking) {
+    d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
+  }
+  if (progress) progress(0.92, "looking at what is left");
+  const std::vector<Leftover> left = find_leftovers(d.evidence, d.search.final);
+  bool unknown = false;
+  for (const Leftover& l : left) {
+    if (!left_over_dominates(d, l)) continue;
+    bool touched = d.search.found.empty();
+    for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
+    if (!d.unexplained) d.unexplained = describe(d.evidence, l);
+    unknown = unknown || touched;
+  }
+  for (std::size_t i = 0; i < d.search.found.size(); ++i)
+    d.effects.push_back(describe(d, i, options.search));
+  d.verdict = unknown              ? Verdict::kUnknown
+              : !d.effects.empty() ? Verdict::kMissing
+              : d.unexplained      ? Verdict::kUnknown
+                                   : Verdict::kNone;
+  for (const DiagnosedEffect& e : d.effects) {
+    if (e.rivals.empty()) continue;
+    std::vector<std::string> set = {e.key()};
+    for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
+    if (!d.experiment) {
+      d.experiment = Experiment{fmt::format("tells {} apart", fmt::join(set, " and ")),
+                                e.effect.effect->info().separated_by};
+    }
+    d.indistinguishable.push_back(std::move(set));
+  }
+  std::stable_sort(
+      d.effects.begin(), d.effects.end(),
+      [](const DiagnosedEffect& a, const DiagnosedEffect& b) { return a.gain > b.gain; });
+  d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (progress) progress(1.0, "done");
+  return d;
+}
+
+Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
+                   const std::vector<Log>& references, const DiagnoseOptions& options,
+                   const SearchProgress& progress) {
+  if (logs.empty())
+    throw InputError({}, "logs", "no log to diagnose: give at least one with --log");
+  std::vector<MachineSignals> suspects, pinned;
+  std::vector<BadChannel> bad;
+  for (const Log& log : logs) {
+    suspects.push_back(make_signals(model.machine, log, options.signals));
+    if (!options.check_data) continue;
+    for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back()))
+      bad.push_back(std::move(b));
+  }
+  for (const Log& log : references)
+    pinned.push_back(make_signals(model.machine, log, options.signals));
+  if (!bad.empty()) {
+    Diagnosis d;
+    d.verdict = Verdict::kBadData;
+    d.evidence = collect_evidence(model, suspects, pinned);
+    d.notes = d.evidence.notes;
+    d.bad = std::move(bad);
+    return d;
+  }
+  return diagnose_signals(model, suspects, pinned, options, progress);
+}
+
+}  // namespace sparflow
