@@ -1,0 +1,38 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/cli/context.h"
+#include "models/effects/effect_text.h"
+#include "models/error.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct EffectsArguments {
+  std::string effect;
+  Outputs outputs;
+};
+
+int run(const EffectsArguments& a) {
+  a.outputs.check();
+  const std::string text = a.effect.empty() ? effect_table() : effect_entry(a.effect);
+  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, effects_json(a.effect));
+  fmt::print("{}", text);
+  return kDone;
+}
+
+}  // namespace
+
+void add_effects_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<EffectsArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "effects",
+      "the catalogue of physical effects: equation, parameters, what it is confused with");
+  verb->add_option("effect", a->effect, "id of one effect for its whole entry")
+      ->type_name("EFFECT");
+  a->outputs.add_to(*verb, false);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli
