@@ -67,6 +67,7 @@ class Compressibility final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
+  bool columns_filtered() const override { return true; }  // differences of filtered pressures
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double>, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;

@@ -69,6 +69,8 @@ class Counterbalance final : public Effect {
   }
   SPARFLOW_EFFECT_LAW(add_pressure)
 
+  /// The force has passed the filter already; twice, and its own noise would explain the chamber's.
+  bool columns_filtered() const override { return true; }
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double>, Eigen::MatrixXd& columns) const override {
     const int side = supply_side(kind);
