@@ -237,6 +237,29 @@ std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
   return {kept, &kept->diagnosis};
 }
 
+/// What a diagnosis asks for, that which explains most first. Where logs cannot tell several effects apart, the
+/// one that explains them best stands for all.
+std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel& model) {
+  std::vector<const DiagnosedEffect*> out;
+  if (d.verdict == Verdict::kBadData || d.verdict == Verdict::kNone) return out;
+  for (const DiagnosedEffect& e : d.effects) {
+    const bool has = std::any_of(model.effects.begin(), model.effects.end(), [&](const auto& o) {
+      return o.effect == e.effect.effect && o.at == e.effect.at;
+    });
+    if (!has && (d.verdict == Verdict::kMissing || e.probability >= 0.5)) out.push_back(&e);
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const auto* a, const auto* b) { return a->gain > b->gain; });
+  return out;
+}
+
+std::string stands_for(const DiagnosedEffect& e) {
+  std::string rivals;
+  for (const auto& [key, worse] : e.rivals) rivals += (rivals.empty() ? "" : ", ") + key;
+  return fmt::format("{} stands for a set that these logs cannot tell apart: {} would do as well",
+                     e.key(), rivals);
+}
+
 /// Why a diagnosis leads no further.
 std::string why_stopped(const Diagnosis& d) {
   switch (d.verdict) {
@@ -284,12 +307,12 @@ std::string effect_title(const EffectInfo& info, const Machine& machine, int at)
     case EffectPlace::kMachine:
       break;
     case EffectPlace::kJoint:
-      return info.title + ", " + machine.joints[i].name;
+      return info.title + " of " + machine.joints[i].name;
     case EffectPlace::kCylinder:
-      if (at >= 0) return info.title + ", " + machine.cylinders[i].name;
+      if (at >= 0) return info.title + " of " + machine.cylinders[i].name;
       break;
     case EffectPlace::kPump:
-      return info.title + ", pump " + machine.pumps[i].name;
+      return info.title + " of pump " + machine.pumps[i].name;
   }
   return info.title;
 }
@@ -397,25 +420,17 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
         diagnose_kept(current.model, logs, references, options.diagnose, round(0.4));
     done += (1.0 - done) * 0.4;
     result.last = diagnosis;
-    std::vector<EffectAt> wanted;
-    if (diagnosis->verdict != Verdict::kBadData) {
-      const std::vector<EffectAt> has = places_of(current.model.effects);
-      for (const DiagnosedEffect& e : diagnosis->effects) {
-        const auto is = [&](const EffectAt& o) { return same(o, e.effect); };
-        if (e.probability >= 0.5 && std::none_of(has.begin(), has.end(), is))
-          wanted.push_back(e.effect);
-      }
-    }
+    const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
     if (wanted.empty()) result.stopped_because = why_stopped(*diagnosis);
-    for (const EffectAt& e : wanted) {
+    for (const DiagnosedEffect* e : wanted) {
       if (!steps_left()) {
         result.stopped_because =
             fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
-                        effect_title(e.effect->info(), model.machine, e.at));
+                        effect_title(e->effect.effect->info(), model.machine, e->effect.at));
         break;
       }
       std::vector<std::string> notes;
-      auto [step, next] = one_step(workshop, current, e, notes, round(0.2));
+      auto [step, next] = one_step(workshop, current, e->effect, notes, round(0.2));
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
       if (step.change.worse()) {
@@ -426,6 +441,7 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
         result.rejected.push_back(std::move(step));
         continue;
       }
+      if (!e->rivals.empty()) notes.push_back(stands_for(*e));
       add_notes(std::move(notes), result);
       keep(std::move(step), std::move(next), workshop, options.date, current, result);
     }

@@ -67,7 +67,17 @@ int run(const DiagnoseArguments& a) {
     write_file_atomically(a.outputs.json, json.dump(2) + "\n");
   }
   if (!a.outputs.report.empty()) {
-    diagnose_page(model, result, tested ? &*tested : nullptr).write(a.outputs.report);
+    Page page = diagnose_page(model, result, tested ? &*tested : nullptr);
+    const auto name = [&page](const char* what, const std::vector<Log>& some) {
+      for (const Log& l : some) {
+        page.provenance(what, fmt::format("{}, {} rows, sha256 {}", l.file, l.samples(),
+                                          l.sha256.substr(0, 16)));
+      }
+    };
+    name("diagnosed log", logs);
+    name("reference log", references);
+    name("test log", tests);
+    page.write(a.outputs.report);
   }
   fmt::print("{}", result.table());
   if (tested)

@@ -41,7 +41,7 @@ std::string sentence(std::string text) {
   return capitalised(std::move(text));
 }
 
-std::string title_of(const Diagnosis&, const Machine& machine, const DiagnosedEffect& e) {
+std::string title_of(const Machine& machine, const DiagnosedEffect& e) {
   return effect_title(e.effect.effect->info(), machine, e.effect.at);
 }
 
@@ -65,14 +65,17 @@ std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
 void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
   std::string text;
   for (const DiagnosedEffect& e : d.effects) {
-    text +=
-        fmt::format("{}: {}", capitalised(title_of(d, machine, e)), parameters_text(e.parameters));
+    text += fmt::format("{}: {}", capitalised(title_of(machine, e)), parameters_text(e.parameters));
     if (!e.channels.empty())
       text += fmt::format("; left-out error of the {}", gain_text(d, e.channels.front()));
     text += ". ";
   }
-  for (const BadChannel& b : d.bad) text += sentence(bad_channel_sentence(b)) + " ";
-  if (d.verdict == Verdict::kUnknown && d.unexplained) text += sentence(d.unexplained->sentence);
+  for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline has the first
+    if (i > 0) text += sentence(bad_channel_sentence(d.bad[i])) + " ";
+    text += sentence(d.bad[i].remedy) + " ";
+  }
+  if (d.verdict == Verdict::kUnknown && d.unexplained && !d.unexplained->depends_on.empty())
+    text += "It depends on " + joined(d.unexplained->depends_on, ", ") + ".";
   if (d.verdict == Verdict::kNone) {
     text += fmt::format("What the model leaves is what chance leaves (p = {:.2g}). ", d.p_value);
   } else if (d.verdict == Verdict::kMissing) {
@@ -96,7 +99,7 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                    {"left-out gain", "nats"},
                    {"absorbed", "%", 2}};
   for (const DiagnosedEffect& e : d.effects) {
-    table.rows.push_back({title_of(d, machine, e), e.stage, parameters_text(e.parameters),
+    table.rows.push_back({title_of(machine, e), e.stage, parameters_text(e.parameters),
                           std::round(100.0 * e.probability), e.gain,
                           std::isfinite(e.held_out_error) && e.held_out_error > 0.0
                               ? fmt::format("{} \u00B1 {}", display_number(e.held_out_gain, 3),
@@ -132,7 +135,7 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
 void add_proofs(Page& page, const Machine& machine, const Diagnosis& d) {
   for (std::size_t i = 0; i < d.effects.size(); ++i) {
     const DiagnosedEffect& e = d.effects[i];
-    page.section(capitalised(title_of(d, machine, e)));
+    page.section(capitalised(title_of(machine, e)));
     const EffectInfo& info = e.effect.effect->info();
     page.paragraph(fmt::format("Law: {}. {}", info.equation, info.citation));
     for (const std::string& s : e.evidence) page.paragraph(sentence(s));
