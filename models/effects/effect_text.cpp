@@ -109,7 +109,7 @@ std::string parameter_words(const EffectParameter& p) {
 
 std::string row(const std::string& signature, const std::string& title,
                 const std::string& parameters) {
-  return fmt::format("  {:<28}{:<56}{}\n", signature, title, parameters);
+  return fmt::format("  {:<29} {:<58} {}\n", signature, title, parameters);
 }
 
 nlohmann::json fault_json() {
@@ -178,8 +178,7 @@ std::string effect_table() {
       if (info.stage != stage) continue;
       std::vector<std::string> names;
       for (const EffectParameter& p : info.parameters) {
-        names.push_back(p.unit == "-" || p.unit.empty() ? p.name
-                                                        : fmt::format("{} [{}]", p.name, p.unit));
+        names.push_back(p.name);
       }
       rows += row(effect_signature(info), info.title, joined(names));
     }

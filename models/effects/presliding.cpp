@@ -13,7 +13,7 @@ class Presliding final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "presliding",
-        .title = "friction that builds up over some millimetres after a reversal",
+        .title = "friction that builds up some millimetres after a reversal",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters =
