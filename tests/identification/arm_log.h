@@ -154,6 +154,17 @@ inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
   return log;
 }
 
+/// The same with dry friction [N] that no part of the model knows: the measured force is larger extending.
+inline Log arm_log_with_friction(double friction, unsigned seed = 1) {
+  Log log = arm_log(0.8, seed);
+  const double area = arm_machine().cylinders[0].area_piston();
+  const Eigen::VectorXd u = channel(log, "u_arm").values;
+  const Eigen::VectorXd side = (u.array() > 0.0).cast<double>() - (u.array() < 0.0).cast<double>();
+  channel(log, "pA_arm").values += side * (friction / area);
+  log.sha256 = std::string(64, static_cast<char>('0' + seed % 10));
+  return log;
+}
+
 inline void remove_channel(Log& log, const std::string& signal) {
   std::erase_if(log.channels, [&](const Channel& c) { return c.signal == signal; });
 }

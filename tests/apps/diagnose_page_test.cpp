@@ -1,0 +1,201 @@
+// Pages of diagnose and improve, on a diagnosis put together by hand: what is drawn must not depend on the search.
+#include "apps/report/diagnose_page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "apps/report/diagnose_charts.h"
+#include "apps/report/effect_text.h"
+#include "apps/report/improve_page.h"
+#include "models/error.h"
+#include "tests/apps/browser_check.h"
+#include "tests/identification/arm_log.h"
+
+namespace sparflow {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing_support::arm_log;
+using testing_support::arm_model;
+
+constexpr double kFriction = 5e3;  // [N]
+
+Log log_with_friction(unsigned seed = 1) {
+  return testing_support::arm_log_with_friction(kFriction, seed);
+}
+
+std::size_t force_channel(const Evidence& evidence) {
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    if (evidence.channels[c].kind == EvidenceKind::kForce) return c;
+  }
+  throw std::logic_error("no force in the evidence");
+}
+
+/// Real evidence with an answer written down by hand.
+Diagnosis missing_friction(const CraneModel& model) {
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(model.machine, log_with_friction())});
+  d.verdict = Verdict::kMissing;
+  d.p_value = 0.003;
+  DiagnosedEffect e;
+  e.effect = parse_effect("coulomb_friction:arm", model.machine);
+  e.id = "coulomb_friction";
+  e.at = "arm";
+  e.stage = "force";
+  e.probability = 0.99;
+  e.parameters = {{"force", "N", "dry friction", 5010.0, 4890.0, 5130.0}};
+  e.applied = {e.effect.effect, e.effect.at, {5010.0}, {4890.0}, {5130.0}};
+  e.channels = {{force_channel(d.evidence), 5100.0, 420.0, 400.0}};
+  e.p_value = 0.003;
+  e.gain = 812.0;
+  e.held_out_gain = 790.0;
+  e.held_out_error = 31.0;
+  e.rivals = {{"load_friction:arm", 55.0}};
+  e.evidence = {"The force is 5 kN larger extending than the statics say, and smaller retracting"};
+  d.effects.push_back(e);
+  d.ranking = {{"coulomb_friction:arm", 812.0},
+               {"load_friction:arm", 757.0},
+               {"viscous_friction:arm", 310.0},
+               {"sensor_delay", -4.0}};
+  d.search.threshold = 6.5;
+  d.indistinguishable = {{"coulomb_friction:arm", "load_friction:arm"}};
+  d.experiment = Experiment{"Dry friction and friction with the load differ with the load only",
+                            "lift and lower slowly with no load and with the largest"};
+  d.notes = {"pump main: nothing to say"};
+  return d;
+}
+
+/// Written, opened and checked: no script errors, all plots drawn, the verdict in the first 900 px of a page as
+/// wide as a laptop's.
+void expect_good_in_browser(const Page& page, const std::string& name) {
+  const std::string path = (std::filesystem::path(SPARFLOW_BINARY_DIR) / (name + ".html")).string();
+  std::string html = page.html();
+  EXPECT_LT(html.size(), 3'000'000u);
+  const std::string probe = R"(<script>
+    const box = document.querySelector('.verdict').getBoundingClientRect();
+    document.body.dataset.verdict = String(box.height > 20 && box.top >= 0 && box.bottom <= 900);
+    </script></body>)";
+  html.replace(html.find("</body>"), 7, probe);
+  write_file_atomically(path, html);
+  const testing::BrowserReport report = testing::check_page(path);
+  std::filesystem::remove(path);
+  if (!report.available) GTEST_SKIP() << "chromium is absent";
+  EXPECT_THAT(report.errors, IsEmpty());
+  EXPECT_GT(report.plots_expected, 0);
+  EXPECT_EQ(report.plots_expected, page.plot_count());
+  EXPECT_EQ(report.plots_drawn, report.plots_expected);
+  EXPECT_EQ(report.body_data("verdict"), "true");
+}
+
+TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
+  const CraneModel model = arm_model();
+  const std::string html = diagnose_page(model, missing_friction(model)).html();
+  EXPECT_THAT(html, HasSubstr("force 5.01 \u00B1 0.12 kN"));
+  EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
+  EXPECT_THAT(html, HasSubstr("Chance that nothing is missing: below 0.5 %"));
+  EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
+  EXPECT_THAT(html, HasSubstr("lift and lower slowly"));
+  EXPECT_THAT(html, HasSubstr("against arm rod speed"));
+}
+
+TEST(DiagnosePage, PictureTakesTheEffectAway) {
+  const CraneModel model = arm_model();
+  const Diagnosis d = missing_friction(model);
+  const ChannelPicture p = channel_picture(d, 0, force_channel(d.evidence));
+  const auto rms = [](const Eigen::VectorXd& x) {
+    return std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
+  };
+  // without: the friction and the noise; with: the noise and what the filter rounds off at starts
+  EXPECT_NEAR(rms(p.without), kFriction, 0.1 * kFriction);
+  EXPECT_LT(rms(p.with), 0.2 * kFriction);
+  // measured - residual = the model: static force, which the log was made of
+  EXPECT_TRUE(p.measured.allFinite());
+  EXPECT_LT(rms(p.measured - p.without) / rms(p.measured), 1.0);
+}
+
+TEST(DiagnosePage, HeadlineOfEveryVerdict) {
+  const CraneModel model = arm_model();
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(model.machine, arm_log(0.8))});
+  d.verdict = Verdict::kNone;
+  d.p_value = 0.4;
+  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("what chance leaves (p = 0.4)"));
+  d.verdict = Verdict::kUnknown;
+  d.unexplained =
+      Unexplained{"force", "arm", {"arm angle"}, 0.8,
+                  900.0,   300.0, {"N", 1.0},    "the force of arm swings with its angle"};
+  const std::string html = diagnose_page(model, d).html();
+  EXPECT_THAT(html, HasSubstr("The force of arm swings with its angle."));
+  EXPECT_THAT(html, HasSubstr("900 N RMS are left, the sensors\u0026#39; noise is 300"));
+  d.verdict = Verdict::kBadData;
+  d.unexplained.reset();
+  d.bad = {{"pA_arm", BadDataKind::kStuck, 12.0, 15.0, 0.05, "It rests at 81.2 bar for 3 s",
+            "Check the cable"}};
+  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("Check the cable"));
+}
+
+TEST(EffectText, ParametersShowTheirInterval) {
+  EXPECT_EQ(parameter_text({"force", "N", "", 5010.0, 4890.0, 5130.0}),
+            "force 5.01 \u00B1 0.12 kN");
+  EXPECT_EQ(parameter_text({"limit", "l/min", "", 41.0, 38.0, 49.0}), "limit 41 (38 to 49) l/min");
+  EXPECT_EQ(parameter_text({"scale", "", "", 0.97, std::nan(""), std::nan("")}), "scale 0.9700");
+}
+
+TEST(EffectText, BestStretchHoldsTheGain) {
+  const Eigen::VectorXd time = Eigen::VectorXd::LinSpaced(1001, 0.0, 100.0);
+  Eigen::VectorXd gain = Eigen::VectorXd::Zero(1001);
+  gain.segment(620, 50).setConstant(1.0);
+  gain.segment(100, 20).setConstant(-1.0);
+  const Stretch at = best_stretch(time, gain, 20.0);
+  EXPECT_LE(at.first, 620);
+  EXPECT_GE(at.last, 670);
+  EXPECT_LE(time[at.last - 1] - time[at.first], 20.0 + 1e-9);
+}
+
+TEST(DiagnosePageInBrowser, MissingEffect) {
+  const CraneModel model = arm_model();
+  const Page page = diagnose_page(model, missing_friction(model));
+  EXPECT_EQ(page.plot_count(), 3);  // curves, residual against speed, ranking
+  expect_good_in_browser(page, "diagnose page");
+}
+
+TEST(DiagnosePageInBrowser, Unknown) {
+  const CraneModel model = arm_model();
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(model.machine, log_with_friction())});
+  d.verdict = Verdict::kUnknown;
+  d.unexplained = Unexplained{
+      "force", "arm", {"arm rod speed"}, 0.9,
+      5e3,     300.0, {"N", 1.0},        "the force of arm changes sides with its speed"};
+  const Page page = diagnose_page(model, d);
+  EXPECT_EQ(page.plot_count(), 2);  // the two telling signals
+  expect_good_in_browser(page, "diagnose page unknown");
+}
+
+TEST(ImprovePageInBrowser, StepsOfExtend) {
+  const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
+  const ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
+                                     {log_with_friction(1)}, {log_with_friction(2)});
+  const Page page = improve_page(result);
+  const std::string html = page.html();
+  EXPECT_THAT(html, HasSubstr("Error falling step by step"));
+  EXPECT_THAT(html, HasSubstr("sensor noise"));
+  EXPECT_GE(page.plot_count(), 3);  // overview, the force's error, its curves
+  expect_good_in_browser(page, "improve page");
+}
+
+TEST(ImprovePage, NothingAddedSaysWhy) {
+  ExtendResult result;
+  result.model = arm_model();
+  result.stopped_because = "nothing more is missing that these logs could show";
+  const std::string html = improve_page(result).html();
+  EXPECT_THAT(html, HasSubstr("Nothing was added"));
+  EXPECT_THAT(html, HasSubstr("Nothing more is missing"));
+}
+
+}  // namespace
+}  // namespace sparflow

@@ -1,0 +1,130 @@
+// diagnose, extend, improve as a stranger meets them: usage, exit codes, JSON keys, files that read back.
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+#include "cli_fixture.h"
+
+namespace sparflow::test {
+namespace {
+
+class CliDiagnose : public Cli {
+ protected:
+  /// A bundled log with dry friction on the boom cylinder: `bar` more on its piston side extending, less retracting.
+  std::string with_friction(const std::string& log, const std::string& name, double bar) const {
+    std::istringstream in(slurp(log));
+    std::string line, out;
+    std::getline(in, line);
+    std::vector<std::string> header = fields(line);
+    const auto column = [&](const std::string& key) {
+      return std::find(header.begin(), header.end(), key) - header.begin();
+    };
+    const auto u = column("u_boom"), a = column("pA_boom_bar");
+    out = line + "\n";
+    while (std::getline(in, line)) {
+      std::vector<std::string> row = fields(line);
+      const double command = std::stod(row[static_cast<std::size_t>(u)]);
+      double p = std::stod(row[static_cast<std::size_t>(a)]);
+      p += command > 0.0 ? bar : command < 0.0 ? -bar : 0.0;
+      row[static_cast<std::size_t>(a)] = std::to_string(p);
+      for (std::size_t i = 0; i < row.size(); ++i) out += (i > 0 ? "," : "") + row[i];
+      out += "\n";
+    }
+    write(name, out);
+    return at(name);
+  }
+
+ private:
+  static std::vector<std::string> fields(const std::string& line) {
+    std::vector<std::string> out;
+    std::istringstream in(line);
+    for (std::string field; std::getline(in, field, ',');) out.push_back(field);
+    return out;
+  }
+};
+
+TEST_F(CliDiagnose, HelpHasExamples) {
+  for (const char* verb : {"diagnose", "extend", "improve"}) {
+    const Outcome o = run(std::string(verb) + " --help");
+    EXPECT_EQ(o.code, 0) << verb;
+    EXPECT_THAT(o.out, HasSubstr("Examples:")) << verb;
+    EXPECT_THAT(o.out, HasSubstr(std::string("sparflow ") + verb)) << verb;
+  }
+}
+
+TEST_F(CliDiagnose, WrongUsageIsTwo) {
+  EXPECT_EQ(run("diagnose --log " + kTest).code, 2);
+  EXPECT_EQ(run("improve --model " + model() + " --log " + kTest).code, 2);  // no output
+  Outcome o = run("extend --model " + model() + " --log " + kTest + " -o " + at("m.json"));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_THAT(o.err, HasSubstr("--add"));
+  EXPECT_THAT(o.err, HasSubstr("--remove"));
+  o = run("diagnose --model " + model() + " --log " + kTest + " --test " + kTest);
+  EXPECT_EQ(o.code, 2);
+  EXPECT_THAT(o.err, HasSubstr("given as --log and as --test"));
+  o = run("improve --model " + model() + " --log " + kTest + " -o " + model());
+  EXPECT_EQ(o.code, 2);
+  EXPECT_THAT(o.err, HasSubstr("overwrite"));
+}
+
+TEST_F(CliDiagnose, BadInputIsThree) {
+  const std::string extend =
+      "extend --model " + model() + " --log " + kTest + " -o " + at("m.json") + " --add ";
+  Outcome o = run(extend + "colomb_friction:boom");
+  EXPECT_EQ(o.code, 3);
+  EXPECT_THAT(o.err, HasSubstr("coulomb_friction"));
+  o = run(extend + "coulomb_friction:bom");
+  EXPECT_EQ(o.code, 3);
+  EXPECT_THAT(o.err, HasSubstr("coulomb_friction:boom"));
+  o = run("extend --model " + model() + " --log " + kTest + " -o " + at("m.json") +
+          " --remove coulomb_friction:boom");
+  EXPECT_EQ(o.code, 3);
+  EXPECT_THAT(o.err, HasSubstr("no effects to take back"));
+  EXPECT_EQ(run("diagnose --model nowhere.json --log " + kTest).code, 3);
+  EXPECT_EQ(run("diagnose --model " + model() + " --log nowhere.csv").code, 3);
+  EXPECT_FALSE(fs::exists(at("m.json")));
+}
+
+TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
+  const std::string log = with_friction(kTrain, "train.csv", 6.0);
+  const std::string test = with_friction(kTest, "test.csv", 6.0);
+  // two candidates: the whole catalogue is the diagnosis' own test
+  const std::string few = " --candidates coulomb_friction:boom unmodelled_mass:jib";
+  Outcome o = run("diagnose --model " + model() + " --log " + log + few + " --json " +
+                  at("d.json") + " --report " + at("d.html"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(o.err, HasSubstr("reference for forces only"));
+  json d = json::parse(slurp(at("d.json")));
+  EXPECT_EQ(d.at("verdict"), "missing");
+  EXPECT_EQ(d.at("effects").at(0).at("id"), "coulomb_friction");
+  EXPECT_EQ(d.at("effects").at(0).at("at"), "boom");
+  EXPECT_THAT(slurp(at("d.html")), HasSubstr("train.csv"));
+
+  o = run("improve --model " + model() + " --log " + log + " --test " + test + few + " -o " +
+          at("m2.json") + " --json " + at("i.json") + " --report " + at("i.html"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  json i = json::parse(slurp(at("i.json")));
+  ASSERT_EQ(i.at("steps").size(), 1u);
+  EXPECT_EQ(i.at("steps").at(0).at("added"), "coulomb_friction:boom");
+  const json& force = i.at("steps").at(0).at("stages").at("force").at("boom");
+  EXPECT_LT(force.at("after").at("rmse").get<double>(),
+            0.5 * force.at("before").at("rmse").get<double>());
+  EXPECT_FALSE(i.at("stopped_because").get<std::string>().empty());
+  EXPECT_THAT(slurp(at("m2.json")), HasSubstr("coulomb_friction"));
+  EXPECT_THAT(slurp(at("i.html")), HasSubstr("step by step"));
+
+  // the same model is read by the other verbs
+  o = run("compare --model " + at("m2.json") + " --log " + test + " --json " + at("c.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  json c = json::parse(slurp(at("c.json")));
+  EXPECT_NEAR(c.at("stages").at("force").at("boom").at("rmse").get<double>(),
+              force.at("after").at("rmse").get<double>(), 1.0);  // [N] one computation, two doors
+
+  o = run("extend --model " + at("m2.json") + " --remove coulomb_friction:boom --log " + log +
+          " --test " + test + " -o " + at("m3.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(o.out, HasSubstr("taken back"));
+}
+
+}  // namespace
+}  // namespace sparflow::test

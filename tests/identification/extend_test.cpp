@@ -1,0 +1,247 @@
+#include "identification/extend.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "identification/effect_estimate.h"
+#include "models/error.h"
+#include "models/model_file.h"
+#include "tests/identification/arm_log.h"
+
+namespace sparflow {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using testing_support::arm_log;
+using testing_support::arm_log_with_friction;
+using testing_support::arm_machine;
+using testing_support::arm_model;
+
+constexpr double kFriction = 5e3;  // [N]
+
+EffectAt coulomb() { return parse_effect("coulomb_friction:arm", arm_machine()); }
+
+/// Learned from a log with friction, without knowing of it.
+const CraneModel& ignorant_model() {
+  static const CraneModel model = fit(arm_machine(), {arm_log_with_friction(kFriction, 1)}).model;
+  return model;
+}
+
+const ExtendResult& extended() {
+  static const ExtendResult result =
+      extend(ignorant_model(), {coulomb()}, {arm_log_with_friction(kFriction, 1)},
+             {arm_log_with_friction(kFriction, 2)});
+  return result;
+}
+
+double force_error(const CompareResult& r) { return r.find("force", "arm")->rmse; }
+
+TEST(EstimateEffects, FindsTheForceThatWasPutIn) {
+  const CraneModel model = arm_model();
+  const std::vector<MachineSignals> signals = {
+      make_signals(model.machine, arm_log_with_friction(kFriction))};
+  const EffectEstimate e = estimate_effects(model, {coulomb()}, signals);
+  ASSERT_THAT(e.effects, SizeIs(1));
+  // 0.8 bar on 113 cm^2 is 0.9 kN a sample, some hundred independent ones: 2 % of 5 kN is two deviations
+  EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.03 * kFriction);
+  EXPECT_LT(e.effects[0].lower95[0], e.effects[0].values[0]);
+  EXPECT_LT(e.effects[0].upper95[0] - e.effects[0].lower95[0], 0.2 * kFriction);
+  EXPECT_THAT(e.notes, IsEmpty());
+}
+
+TEST(EstimateEffects, AllEffectsTogether) {
+  // a mass the file does not know and friction at once: each alone would be wrong
+  CraneModel model = arm_model();
+  model.machine.links[0].mass -= 60.0;  // the log was made with it
+  const std::vector<MachineSignals> signals = {
+      make_signals(model.machine, arm_log_with_friction(kFriction))};
+  const EffectEstimate e = estimate_effects(
+      model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, signals);
+  ASSERT_THAT(e.effects, SizeIs(2));
+  EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
+  // its moment is what one joint can tell: 60 kg at 1.5 m
+  EXPECT_NEAR(e.effects[1].values[1], 90.0, 9.0);
+}
+
+TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
+  const CraneModel model = arm_model();
+  Log log = arm_log_with_friction(kFriction);
+  // the second half has another friction; left out, it must not be seen
+  const Eigen::Index n = log.time.size(), half = n / 2;
+  const Eigen::VectorXd& u = testing_support::channel(log, "u_arm").values;
+  const double area = arm_machine().cylinders[0].area_piston();
+  for (Eigen::Index k = half; k < n; ++k) {
+    const double side = u[k] > 0.0 ? 1.0 : u[k] < 0.0 ? -1.0 : 0.0;
+    testing_support::channel(log, "pA_arm").values[k] += side * 20e3 / area;
+  }
+  const std::vector<MachineSignals> signals = {make_signals(model.machine, log)};
+  Mask second = Mask::Constant(n, false);
+  second.tail(n - half).setConstant(true);
+  const EffectEstimate e = estimate_effects(model, {coulomb()}, signals, {}, {second});
+  EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
+}
+
+TEST(EstimateEffects, SaysWhatTheLogsLack) {
+  Log log = arm_log();
+  testing_support::remove_channel(log, "pA_arm");
+  testing_support::remove_channel(log, "pB_arm");
+  const CraneModel model = arm_model();
+  const std::vector<MachineSignals> signals = {make_signals(model.machine, log)};
+  try {
+    estimate_effects(model, {coulomb()}, signals);
+    FAIL() << "friction from a log without a force";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("coulomb_friction:arm"));
+    EXPECT_THAT(e.what(), HasSubstr("it needs"));
+  }
+}
+
+TEST(Extend, ErrorFallsOnTestLogsAndNothingElseRises) {
+  const ExtendResult& r = extended();
+  ASSERT_THAT(r.steps, SizeIs(1));
+  const ExtendStep& step = r.steps[0];
+  EXPECT_EQ(step.added, "coulomb_friction:arm");
+  EXPECT_EQ(step.judged_on, "test logs");
+  // from 5 kN to the noise of one sample, 0.8 bar on both chambers: 1.1 kN
+  EXPECT_NEAR(force_error(step.before), kFriction, 0.15 * kFriction);
+  EXPECT_LT(force_error(step.after), 0.3 * kFriction);
+  EXPECT_LT(step.change.own_stage, 0.3);
+  EXPECT_FALSE(step.change.worse());
+  for (const StageScore& after : step.after.scores) {
+    const StageScore* before = step.before.find(after.stage, after.at, after.regime);
+    ASSERT_NE(before, nullptr);
+    // the processes are learned again from the same samples around other forces
+    EXPECT_LT(after.rmse, 1.05 * before->rmse) << after.stage << " " << after.regime;
+  }
+}
+
+TEST(Extend, ModelKeepsEffectAndRecordAndSurvivesItsFile) {
+  const CraneModel& model = extended().model;
+  ASSERT_THAT(model.effects, SizeIs(1));
+  EXPECT_NEAR(model.effects[0].values[0], kFriction, 0.03 * kFriction);
+  ASSERT_THAT(model.steps, SizeIs(1));
+  EXPECT_EQ(model.steps[0].added, "coulomb_friction:arm");
+  EXPECT_THAT(model.steps[0].data, SizeIs(2));
+  EXPECT_EQ(model.steps[0].before.size(), model.steps[0].after.size());
+  EXPECT_FALSE(model.steps[0].stopped_because.empty());
+  const CraneModel again = model_from_json(model_to_json(model), "model.json");
+  EXPECT_EQ(again.steps[0].added, "coulomb_friction:arm");
+  EXPECT_EQ(again.effects[0].values, model.effects[0].values);
+}
+
+TEST(Extend, WithoutTestLogsMotionsAreHeldOut) {
+  const ExtendResult r =
+      extend(ignorant_model(), {coulomb()}, {arm_log_with_friction(kFriction, 1)}, {});
+  ASSERT_THAT(r.steps, SizeIs(1));
+  EXPECT_EQ(r.steps[0].judged_on, "held-out motions");
+  // fewer samples than the log has: only every fourth motion counts
+  EXPECT_LT(r.steps[0].after.find("force", "arm")->n, 1500);
+  EXPECT_LT(r.steps[0].change.own_stage, 0.3);
+}
+
+TEST(Extend, WithReferencesWhatWasLearnedStays) {
+  ExtendOptions options;
+  options.references = {arm_log(0.8, 3)};
+  const CraneModel model = fit(arm_machine(), options.references).model;
+  const ExtendResult r = extend(model, {coulomb()}, {arm_log_with_friction(kFriction, 1)},
+                                {arm_log_with_friction(kFriction, 2)}, options);
+  EXPECT_NEAR(r.model.effects[0].values[0], kFriction, 0.03 * kFriction);
+  EXPECT_EQ(r.model.cylinders[0].margin, model.cylinders[0].margin);
+  EXPECT_EQ(r.model.cylinders[0].extend.mean(1e-3, 5e4), model.cylinders[0].extend.mean(1e-3, 5e4));
+}
+
+TEST(Extend, EffectTheModelHasIsRefused) {
+  EXPECT_THROW(extend(extended().model, {coulomb()}, {arm_log_with_friction(kFriction, 1)}, {}),
+               InputError);
+}
+
+TEST(Extend, JsonHasTheContractsKeys) {
+  const nlohmann::json j = nlohmann::json::parse(extended().json());
+  const nlohmann::json& step = j.at("steps").at(0);
+  EXPECT_EQ(step.at("added"), "coulomb_friction:arm");
+  const nlohmann::json& force = step.at("stages").at("force").at("arm");
+  EXPECT_LT(force.at("after").at("rmse").get<double>(),
+            force.at("before").at("rmse").get<double>());
+  EXPECT_EQ(force.at("after").at("unit"), "N");
+  EXPECT_TRUE(step.at("stages").at("pressure").at("arm").contains("extend"));
+  EXPECT_TRUE(step.at("stages").at("energy").at("main").at("after").contains("relative_error"));
+  EXPECT_TRUE(j.contains("stopped_because"));
+  EXPECT_EQ(step.at("parameters").at(0).at("ci95").size(), 2u);
+}
+
+TEST(Extend, TableIsOneScreenWithUnits) {
+  const std::string table = extended().table();
+  EXPECT_THAT(table, HasSubstr(" N"));
+  EXPECT_THAT(table, HasSubstr("->"));
+  EXPECT_THAT(table, HasSubstr("stopped because"));
+  EXPECT_LE(std::count(table.begin(), table.end(), '\n'), 24);
+}
+
+TEST(TakeBack, RestoresTheErrorAndKeepsTheRecord) {
+  const ExtendResult r =
+      take_back(extended().model, coulomb(), {arm_log_with_friction(kFriction, 1)},
+                {arm_log_with_friction(kFriction, 2)});
+  EXPECT_THAT(r.model.effects, IsEmpty());
+  ASSERT_THAT(r.model.steps, SizeIs(2));
+  EXPECT_EQ(r.model.steps[1].removed, "coulomb_friction:arm");
+  EXPECT_TRUE(r.model.steps[1].added.empty());
+  // the same logs without the effect give what they gave before it came
+  EXPECT_NEAR(force_error(r.steps[0].after), force_error(extended().steps[0].before), 1.0);
+  EXPECT_TRUE(r.steps[0].change.worse());
+}
+
+TEST(TakeBack, EffectTheModelDoesNotHaveIsRefused) {
+  EXPECT_THROW(take_back(ignorant_model(), coulomb(), {arm_log_with_friction(kFriction, 1)}, {}),
+               InputError);
+}
+
+TEST(ErrorChange, IsTheGeometricMeanByStage) {
+  CompareResult before, after;
+  before.scores.resize(2);
+  before.scores[0].stage = "force";
+  before.scores[1].stage = "pump";
+  for (StageScore& s : before.scores) {
+    s.at = "x";
+    s.rmse = 4.0;
+    s.n = 100;
+  }
+  after = before;
+  after.scores[0].rmse = 1.0;
+  const ErrorChange c = error_change(before, after, "force");
+  EXPECT_DOUBLE_EQ(c.own_stage, 0.25);
+  EXPECT_DOUBLE_EQ(c.overall, 0.5);  // sqrt(0.25 * 1)
+  EXPECT_DOUBLE_EQ(error_change(before, after, "sensor").own_stage, 0.5);
+  EXPECT_FALSE(c.worse());
+  EXPECT_TRUE((ErrorChange{1.02, 0.9}.worse()));
+  EXPECT_TRUE((ErrorChange{0.9, 1.02}.worse()));
+}
+
+TEST(Improve, AddsTheFrictionAndStops) {
+  const ExtendResult r = improve(ignorant_model(), {arm_log_with_friction(kFriction, 1)}, {},
+                                 {arm_log_with_friction(kFriction, 2)});
+  ASSERT_FALSE(r.steps.empty());
+  EXPECT_THAT(r.steps[0].added, HasSubstr("friction:arm"));
+  EXPECT_LT(force_error(r.steps.back().after), 0.3 * kFriction);
+  for (const ExtendStep& s : r.steps) EXPECT_FALSE(s.change.worse()) << s.added;
+  EXPECT_FALSE(r.stopped_because.empty());
+  ASSERT_NE(r.last, nullptr);
+  // its evidence still refers to a machine that lives
+  EXPECT_EQ(r.last->evidence.series.front().machine->name, "lift");
+  EXPECT_EQ(r.model.steps.back().stopped_because, r.stopped_because);
+}
+
+TEST(Improve, AddsNothingWhereNothingIsMissing) {
+  const CraneModel model = fit(arm_machine(), {arm_log(0.8, 4)}).model;
+  const ExtendResult r = improve(model, {arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)});
+  EXPECT_THAT(r.steps, IsEmpty());
+  EXPECT_THAT(r.model.effects, IsEmpty());
+  EXPECT_THAT(r.stopped_because, HasSubstr("nothing more is missing"));
+}
+
+}  // namespace
+}  // namespace sparflow
