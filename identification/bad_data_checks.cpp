@@ -228,15 +228,27 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
   const double caution = twins.size() == 1 ? 2.0 : 1.0;
   const double least =
       few && c.family == "position" ? std::max(c.least_noise, kShaking * c.scale) : c.least_noise;
-  const double base = twin_noise > 0.0 ? caution * twin_noise : noise.quiet;
-  const double reference = twin_noise > 0.0 ? twin_noise : noise.quiet;
+  const bool has_twins = twin_noise > 0.0;
+  const double reference = has_twins ? twin_noise : noise.quiet;
+  // Over many blocks the level is known well: less than the ratio of one block will do.
+  constexpr double kThroughout = 0.83, kThroughoutBlock = 0.5;
+  const double ratio = context.options.noise_ratio * caution;
+  const bool throughout = has_twins && noise.typical > kThroughout * ratio * twin_noise;
+  // A burst, far above the channel's own quiet blocks (their lower quartile is 0.87 of the median).
+  constexpr double kOwn = 1.33, kBurstTwins = 0.67;
+  const auto noisy = [&](double level) {
+    if (!has_twins) return level > ratio * noise.quiet;
+    if (level > (throughout ? kThroughoutBlock : 1.0) * ratio * twin_noise) return true;
+    return noise.quiet > 0.0 && level > kOwn * ratio * noise.quiet &&
+           level > kBurstTwins * ratio * twin_noise;
+  };
   Finding found;
   found.kind = BadDataKind::kNoisy;
   found.affected = Mask::Constant(context.log.samples(), false);
   double seconds = 0.0, worst = 0.0, squares = 0.0, blocks = 0.0;
   for (Index b = 0; b < noise.level.size(); ++b) {
     const double level = noise.level[b];
-    if (!(level > context.options.noise_ratio * base && level > least)) continue;
+    if (!(level > least && noisy(level))) continue;
     if (!(noise.whiteness[b] > kWhite)) continue;
     if (reference > 0.0 && level / reference < kLivelier * twins_disturbance(context, twins, b)) {
       continue;
@@ -324,6 +336,9 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
   const VectorXd& values = c.channel->values;
   const VectorXd known = finite_values(values);
   if (known.size() == 0) return {};
+  // without noise a standby or a relief valve looks the same
+  constexpr double kNoiseless = 1e-4;
+  if (context.noise[channel].quiet < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
   Repeats all;
   const Mask state = driven(context, c);
   for (const SampleRange& run : context.log.runs) all.add(values, state, run);

@@ -1,0 +1,281 @@
+#include "identification/bad_data.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <random>
+
+#include "arm_log.h"
+#include "models/machine_file.h"
+
+namespace sparflow {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing_support::arm_log;
+using testing_support::arm_machine;
+using testing_support::channel;
+
+const std::filesystem::path kShared = SPARFLOW_SOURCE_DIR "/../shared";
+constexpr double kBar = units::kBar;
+
+std::vector<BadChannel> bad_of(const Machine& machine, const Log& log) {
+  return find_bad_channels(machine, log, make_signals(machine, log));
+}
+
+std::vector<std::string> names(const std::vector<BadChannel>& bad) {
+  std::vector<std::string> out;
+  for (const BadChannel& b : bad) out.push_back(b.channel + " " + bad_data_word(b.kind));
+  return out;
+}
+
+/// The arm with 0.5 bar of noise on its pressures and 0.2 mrad on its angle: third differences of real sensors.
+Log noisy_arm(unsigned seed = 1) {
+  Log log = arm_log(0.5, seed);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 2e-4);
+  for (double& q : channel(log, "q_arm").values) q += normal(random);
+  return log;
+}
+
+void add_noise(Log& log, const std::string& signal, double deviation, Eigen::Index from,
+               Eigen::Index to) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, deviation);
+  for (Eigen::Index k = from; k < to; ++k) channel(log, signal).values[k] += normal(random);
+}
+
+TEST(BadData, HealthyLogsAreNotAccused) {
+  EXPECT_THAT(names(bad_of(arm_machine(), arm_log())), IsEmpty()) << "without any noise";
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    EXPECT_THAT(names(bad_of(arm_machine(), noisy_arm(seed))), IsEmpty()) << seed;
+  }
+}
+
+TEST(BadData, NoiseAllAlongIsSeenAgainstTheTwins) {
+  Log log = noisy_arm();
+  add_noise(log, "pA_arm", 2.5 * kBar, 0, log.samples());
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("pA_arm noisy"));
+  EXPECT_GT(bad[0].share, 0.9);  // single blocks may fall short of three times
+  EXPECT_THAT(bad[0].evidence, HasSubstr("fellow pressure channels"));
+}
+
+TEST(BadData, NoiseInAStretchIsPlacedThere) {
+  Log log = noisy_arm();
+  add_noise(log, "pB_arm", 3.0 * kBar, 1000, 1500);  // 20 to 30 s
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("pB_arm noisy"));
+  EXPECT_NEAR(bad[0].from_s, 20.0, 1.01);  // blocks of a second
+  EXPECT_NEAR(bad[0].to_s, 30.0, 1.01);
+  EXPECT_NEAR(bad[0].share, 500.0 / 3000.0, 0.04);
+}
+
+TEST(BadData, SensorsTwiceAsNoisyAsTheirTwinsPass) {
+  Log log = noisy_arm();
+  add_noise(log, "pA_arm", std::sqrt(3.0) * 0.5 * kBar, 0, log.samples());
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, AnOscillationIsNotNoise) {
+  // 5 Hz of 4 bar, as a boom that swings: ten times what the twins have, but not white
+  Log log = noisy_arm();
+  for (Eigen::Index k = 0; k < log.samples(); ++k) {
+    channel(log, "pA_arm").values[k] += 4.0 * kBar * std::sin(2.0 * M_PI * 5.0 * log.time[k]);
+  }
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, ShakingOfAllPressuresIsTheMachines) {
+  Log log = noisy_arm();
+  for (const char* signal : {"pA_arm", "pB_arm", "p_main"})
+    add_noise(log, signal, 3.0 * kBar, 1000, 1500);
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, AStuckChannelIsFoundWithItsPlaceAndLength) {
+  for (const char* signal : {"pA_arm", "pB_arm", "p_main", "q_arm"}) {
+    Log log = noisy_arm();
+    Eigen::VectorXd& x = channel(log, signal).values;
+    x.segment(1000, 250).setConstant(x[1000]);  // 5 s from 20 s on
+    const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+    ASSERT_THAT(names(bad), ElementsAre(std::string(signal) + " stuck"));
+    EXPECT_NEAR(bad[0].from_s, 20.0, 0.021);  // a neighbour may have the same value
+    EXPECT_NEAR(bad[0].to_s, 24.98, 0.021);
+    EXPECT_THAT(bad_channel_sentence(bad[0]), HasSubstr(signal));
+  }
+}
+
+TEST(BadData, WithoutNoiseStandingStillIsNotStuckButMovingIs) {
+  Log log = arm_log();
+  Eigen::VectorXd& x = channel(log, "pA_arm").values;
+  x.segment(1600, 100).setConstant(x[1600]);  // 2 s of a stroke
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pA_arm stuck"));
+}
+
+TEST(BadData, AChannelThatNeverChangesWhileItsCylinderMoves) {
+  Log log = noisy_arm();
+  channel(log, "pB_arm").values.setZero();
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("pB_arm drop_out"));
+  EXPECT_EQ(bad[0].share, 1.0);
+}
+
+TEST(BadData, JumpsThatComeBack) {
+  for (const char* signal : {"pA_arm", "p_main"}) {
+    Log log = noisy_arm();
+    for (const Eigen::Index k : {700, 1300, 2200})
+      channel(log, signal).values.segment(k, 3).array() += 12.0 * kBar;
+    const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+    ASSERT_THAT(names(bad), ElementsAre(std::string(signal) + " jumping"));
+    EXPECT_THAT(bad[0].evidence, HasSubstr("3 times"));
+    EXPECT_DOUBLE_EQ(bad[0].share, 9.0 / 3000.0);
+  }
+  Log log = noisy_arm();
+  channel(log, "q_arm").values[1300] += 0.05;
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("q_arm jumping"));
+}
+
+TEST(BadData, APressureStepThatAnotherChannelSeesIsNoJump) {
+  Log log = noisy_arm();
+  for (const Eigen::Index k : {700, 1300, 2200}) {
+    channel(log, "pA_arm").values.segment(k, 20).array() += 12.0 * kBar;
+    channel(log, "p_main").values.segment(k, 20).array() += 12.0 * kBar;
+  }
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, ALevelThatDoesNotComeBackIsNoJump) {
+  Log log = noisy_arm();
+  channel(log, "pA_arm").values.tail(1300).array() += 12.0 * kBar;
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, DropOutsToZeroAndMissingValues) {
+  Log log = noisy_arm();
+  for (const Eigen::Index k : {700, 1300, 2200})
+    channel(log, "pA_arm").values.segment(k, 10).setZero();
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pA_arm drop_out"));
+  log = noisy_arm();
+  channel(log, "pB_arm").values.head(900).setConstant(std::nan(""));
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pB_arm drop_out"));
+}
+
+TEST(BadData, APressureClippedAtZeroWhereItIsLowAnywayPasses) {
+  Log log = noisy_arm();
+  Eigen::VectorXd& x = channel(log, "pB_arm").values;
+  for (Eigen::Index k = 0; k < x.size(); ++k)
+    x[k] = std::max(0.0, x[k] - x.minCoeff() - 3.0 * kBar);
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
+TEST(BadData, ASensorAtTheEndOfItsRange) {
+  Log log = noisy_arm();
+  Eigen::VectorXd& x = channel(log, "p_main").values;
+  x = x.cwiseMin(0.6 * x.maxCoeff());
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("p_main saturated"));
+}
+
+TEST(BadData, ACommandTheMachineDoesNotFollow) {
+  Log log = noisy_arm();
+  Eigen::VectorXd& u = channel(log, "u_arm").values;
+  Eigen::Index at = 0;
+  u.head(2000).maxCoeff(&at);
+  u.segment(at, 250).setConstant(u[at]);  // the stroke ends 1.2 s later
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("u_arm stuck"));
+}
+
+// ---- logs of real and simulated cranes -------------------------------------------------------------------------
+
+std::vector<std::filesystem::path> logs_below(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> out;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == ".csv") out.push_back(entry.path());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+TEST(BadDataOnCranes, NoRealOrSimulatedLogIsAccused) {
+  if (!std::filesystem::exists(kShared / "data")) GTEST_SKIP() << "no logs of cranes here";
+  for (const char* name : {"hmf_2020_k4", "emps", "loader_crane"}) {
+    const Machine machine =
+        load_machine((kShared / "machines" / (std::string(name) + ".yaml")).string());
+    for (const auto& path : logs_below(kShared / "data" / name)) {
+      const Log log = load_log(path.string(), machine);
+      for (const BadChannel& b : bad_of(machine, log))
+        ADD_FAILURE() << path.filename() << ": " << bad_channel_sentence(b);
+    }
+  }
+}
+
+/// Faults put into every position and pressure channel of the simulated cranes' logs, where its cylinder moves.
+TEST(BadDataOnCranes, InjectedFaultsAreFound) {
+  if (!std::filesystem::exists(kShared / "data/loader_crane")) GTEST_SKIP() << "no logs here";
+  const Machine machine = load_machine((kShared / "machines/loader_crane.yaml").string());
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  int injected = 0, found = 0, others = 0;
+  for (const auto& path : logs_below(kShared / "data/loader_crane")) {
+    if (path.filename() != "test.csv") continue;
+    const Log log = load_log(path.string(), machine);
+    const MachineSignals signals = make_signals(machine, log);
+    std::vector<Eigen::Index> moving;
+    for (Eigen::Index k = 50; k + 300 < log.samples(); ++k) {
+      bool all = true;  // a place where any channel would have to change
+      for (const CylinderSignals& c : signals.cylinders) all = all && c.direction[k] != 0;
+      if (all) moving.push_back(k);
+    }
+    ASSERT_FALSE(moving.empty());
+    for (const Channel& c : log.channels) {
+      const bool position = c.role == Role::kJointPosition;
+      if (!position && c.role != Role::kPressureA && c.role != Role::kPressureB &&
+          c.role != Role::kPumpPressure) {
+        continue;
+      }
+      // the generator's sensors: 0.8 bar, 0.3 mrad, 1 mm
+      const double noise = !position ? 0.8 * kBar : c.signal == "q_extension" ? 1e-3 : 3e-4;
+      for (const std::string fault : {"noise", "burst", "stuck", "jumps"}) {
+        Log faulty = log;
+        Eigen::VectorXd& x = channel(faulty, c.signal).values;
+        const auto pick = [&] { return moving[random() % moving.size()]; };
+        if (fault == "noise") {
+          for (double& v : x) v += std::sqrt(24.0) * noise * normal(random);  // five times in all
+        } else if (fault == "burst") {
+          for (double& v : x.segment(pick() - 50, 300))
+            v += std::sqrt(24.0) * noise * normal(random);
+        } else if (fault == "stuck") {
+          const Eigen::Index k = pick();
+          x.segment(k, 250).setConstant(x[k]);
+        } else {
+          for (int i = 0; i < 6; ++i) {
+            const double sign = random() % 2 == 0 ? 1.0 : -1.0;
+            x.segment(pick(), 1 + static_cast<Eigen::Index>(random() % 4)).array() +=
+                sign * (position ? 100.0 : 25.0) * noise;
+          }
+        }
+        ++injected;
+        bool hit = false;
+        for (const BadChannel& b : bad_of(machine, faulty)) {
+          if (b.channel == c.signal) {
+            hit = true;
+          } else {
+            ++others;
+          }
+        }
+        if (hit) ++found;
+        EXPECT_TRUE(hit || fault == "jumps") << path << " " << c.signal << " " << fault;
+      }
+    }
+  }
+  EXPECT_GE(found, 0.98 * injected);
+  EXPECT_LE(others, 0.01 * injected) << "channels accused in place of the faulty one";
+  RecordProperty("injected", injected);
+  RecordProperty("found", found);
+}
+
+}  // namespace
+}  // namespace sparflow
