@@ -198,6 +198,39 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
   return groups;
 }
 
+/// Quantities whose prediction is off to one side nearly always, as regions without bounds: no place explains that.
+std::vector<WorstRegion> biased_everywhere(const std::vector<ComparedPart>& parts,
+                                           const ResidualTests& tests) {
+  constexpr double kShare = 0.5;     // of the squared error that is the mean's
+  constexpr double kOneSided = 0.9;  // of the samples
+  std::vector<WorstRegion> out;
+  for (const ResidualTest& t : tests.tests) {
+    if (!t.depends_on.empty() || t.p_value > kAlarm || t.share_explained < kShare) continue;
+    for (const ComparedPart& part : parts) {
+      if (part.stage != t.stage || part.at != t.at || part.regime != t.regime) continue;
+      const auto positive = (part.error.array() > 0.0).cast<double>().mean();
+      if (std::max(positive, 1.0 - positive) < kOneSided) continue;
+      WorstRegion w;
+      w.stage = t.stage;
+      w.at = t.at;
+      w.regime = t.regime;
+      w.rmse =
+          std::sqrt(part.error.squaredNorm() / static_cast<double>(part.error.size())) / part.scale;
+      w.unit = t.unit;
+      w.share_of_error = w.share_of_samples = 1.0;
+      const bool kilo = t.unit == "N" && std::abs(t.size) >= 1e3;
+      w.sentence = fmt::format(
+          "the {} is predicted {:.3g} {} too {} everywhere: {:.0f} % of its error is this one "
+          "offset (RMSE {:.3g} {})",
+          part.words, std::abs(t.size) / (kilo ? 1e3 : 1.0), kilo ? "kN" : t.unit,
+          t.size > 0.0 ? "high" : "low", 100.0 * t.share_explained, w.rmse / (kilo ? 1e3 : 1.0),
+          kilo ? "kN" : t.unit);
+      out.push_back(std::move(w));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 const StageScore* CompareResult::find(const std::string& stage, const std::string& at,
@@ -251,6 +284,16 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   if (options.find_regions) {
     result.worst = worst_regions(error_groups(model.machine, result), options.regions);
   }
+  if (options.find_regions && options.find_causes) {
+    const std::vector<CompareBlock> blocks = compare_blocks(result);
+    const std::vector<ComparedPart> parts = compare_parts(model.machine, result, blocks);
+    result.tests = test_residuals(parts, static_cast<int>(blocks.size()), options.tests);
+    result.fault = find_stage_at_fault(model, result);
+    result.regimes = errors_by_regime(result, parts, blocks);
+    result.segments = worst_segments(model.machine, result, parts, blocks);
+    const std::vector<WorstRegion> biased = biased_everywhere(parts, result.tests);
+    result.worst.insert(result.worst.begin(), biased.begin(), biased.end());
+  }
   result.notes.assign(notes.begin(), notes.end());
   return result;
 }
@@ -259,8 +302,15 @@ CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
                       const CompareOptions& options) {
   std::vector<MachineSignals> signals;
   signals.reserve(logs.size());
-  for (const Log& log : logs) signals.push_back(make_signals(model.machine, log, options.signals));
-  return compare_signals(model, std::move(signals), {}, options);
+  std::vector<BadChannelOfLog> bad;
+  for (const Log& log : logs) {
+    signals.push_back(make_signals(model.machine, log, options.signals));
+    for (BadChannel& b : find_bad_channels(model.machine, log, signals.back()))
+      bad.push_back({log.file, std::move(b)});
+  }
+  CompareResult result = compare_signals(model, std::move(signals), {}, options);
+  result.bad_data = std::move(bad);
+  return result;
 }
 
 }  // namespace sparflow

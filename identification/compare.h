@@ -12,8 +12,12 @@
 #include <string>
 #include <vector>
 
+#include "identification/bad_data.h"
 #include "identification/compare_regions.h"
+#include "identification/residual_tests.h"
 #include "identification/signals.h"
+#include "identification/stage_at_fault.h"
+#include "identification/worst_segments.h"
 #include "models/crane_model.h"
 
 namespace sparflow {
@@ -80,6 +84,15 @@ struct CompareOptions {
   SignalOptions signals;
   RegionOptions regions;
   bool find_regions = true;
+  /// Residual tests, stage at fault, errors by regime, worst segments; only together with regions.
+  bool find_causes = true;
+  ResidualTestOptions tests;
+};
+
+/// A bad channel and the log it is in.
+struct BadChannelOfLog {
+  std::string file;
+  BadChannel bad;
 };
 
 struct CompareResult {
@@ -87,7 +100,12 @@ struct CompareResult {
   std::vector<StageScore> scores;  ///< in the order of the stages, then of the machine
   std::vector<EnergyScore> energy;
   std::vector<WorstRegion> worst;
-  std::vector<std::string> notes;  ///< what was not compared, and why; whole sentences
+  ResidualTests tests;                    ///< what of the error repeats, false alarms controlled
+  StageAtFault fault;                     ///< where it arises
+  std::vector<RegimeError> regimes;       ///< in which regimes, with 95 % intervals
+  std::vector<WorstSegment> segments;     ///< in which motions
+  std::vector<BadChannelOfLog> bad_data;  ///< only from `compare`, which has the logs
+  std::vector<std::string> notes;         ///< what was not compared, and why; whole sentences
   std::vector<LogComparison> logs;
 
   const StageScore* find(const std::string& stage, const std::string& at,
@@ -109,6 +127,9 @@ std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSi
 
 /// The scores as they are kept in a model file. @param data "train", "test" or "held out"
 std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data);
+
+/// p below which a residual test is an alarm.
+inline constexpr double kAlarm = 0.05;
 
 /// Machine-readable result; keys as in docs/fit_and_compare.md.
 std::string compare_json(const CompareResult& result);

@@ -79,9 +79,115 @@ VectorXd other_flow(const Machine& machine, const MachineSignals& signals, int p
   return sum;
 }
 
+Json range_json(const Range& r) {
+  if (!std::isfinite(r.lo)) return nullptr;
+  return {r.lo, r.hi};
+}
+
+/// Everything beyond the scores: what repeats, where it arises, in which regimes and motions, bad channels.
+void causes_json(const CompareResult& result, Json& root) {
+  Json& tests = root["residual_tests"];
+  tests = {{"blocks", result.tests.blocks},
+           {"tested", result.tests.tested},
+           {"p_value", result.tests.smallest_p()},
+           {"tests", Json::array()}};
+  for (const ResidualTest& t : result.tests.tests) {
+    Json test = {{"stage", t.stage},     {"at", t.at},
+                 {"regime", t.regime},   {"depends_on", t.depends_on},
+                 {"p_value", t.p_value}, {"size", t.size},
+                 {"unit", t.unit},       {"share_explained", t.share_explained},
+                 {"samples", t.samples}, {"effective_samples", t.effective_samples},
+                 {"blocks", t.blocks},   {"sentence", t.sentence}};
+    if (t.depends_on.empty()) test["ci95"] = range_json(t.ci95);
+    tests["tests"].push_back(std::move(test));
+  }
+  Json& fault = root["stage_at_fault"];
+  fault = {{"stage", nullptr}, {"at", nullptr}, {"sentence", result.fault.sentence}};
+  if (result.fault.fault >= 0) {
+    const StageSplit& f = result.fault.stages[static_cast<std::size_t>(result.fault.fault)];
+    fault["stage"] = f.stage;
+    fault["at"] = f.at;
+    fault["regime"] = f.regime;
+  }
+  fault["stages"] = Json::array();
+  for (const StageSplit& s : result.fault.stages) {
+    fault["stages"].push_back({{"stage", s.stage},
+                               {"at", s.at},
+                               {"regime", s.regime},
+                               {"error", s.error},
+                               {"own", s.own},
+                               {"inherited", s.inherited},
+                               {"noise", s.noise},
+                               {"unit", s.unit},
+                               {"severity", s.severity},
+                               {"n", s.n}});
+  }
+  root["regimes"] = Json::array();
+  for (const RegimeError& r : result.regimes) {
+    root["regimes"].push_back({{"stage", r.stage},
+                               {"at", r.at},
+                               {"regime", r.regime},
+                               {"factor", r.factor},
+                               {"level", r.level},
+                               {"rmse", r.rmse},
+                               {"rmse_ci95", range_json(r.rmse_ci95)},
+                               {"bias", r.bias},
+                               {"bias_ci95", range_json(r.bias_ci95)},
+                               {"unit", r.unit},
+                               {"samples", r.samples},
+                               {"blocks", r.blocks}});
+  }
+  root["worst_segments"] = Json::array();
+  for (const WorstSegment& w : result.segments) {
+    root["worst_segments"].push_back({{"stage", w.stage},
+                                      {"at", w.at},
+                                      {"regime", w.regime},
+                                      {"file", w.file},
+                                      {"from_s", w.from_s},
+                                      {"to_s", w.to_s},
+                                      {"moved", w.moved},
+                                      {"rmse", w.rmse},
+                                      {"bias", w.bias},
+                                      {"unit", w.unit},
+                                      {"share_of_error", w.share_of_error},
+                                      {"share_of_samples", w.share_of_samples},
+                                      {"sentence", w.sentence}});
+  }
+  root["bad_data"] = Json::array();
+  for (const BadChannelOfLog& b : result.bad_data) {
+    root["bad_data"].push_back({{"file", b.file},
+                                {"channel", b.bad.channel},
+                                {"kind", bad_data_word(b.bad.kind)},
+                                {"from_s", b.bad.from_s},
+                                {"to_s", b.bad.to_s},
+                                {"share", b.bad.share},
+                                {"evidence", b.bad.evidence},
+                                {"remedy", b.bad.remedy}});
+  }
+}
+
 std::string duration_text(double seconds) {
   return seconds < 120.0 ? fmt::format("{:.1f} s", seconds)
                          : fmt::format("{:.1f} min", seconds / 60.0);
+}
+
+std::string repeats_text(const CompareResult& result) {
+  constexpr std::size_t kMost = 6;
+  const ResidualTests& tests = result.tests;
+  if (tests.tests.empty()) return "";
+  std::string text = "\nwhat repeats in the error";
+  text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
+                      tests.tested, tests.blocks, 100.0 * kAlarm);
+  if (tests.smallest_p() > kAlarm) return text + "  nothing: no bias, no signal it depends on\n";
+  std::size_t shown = 0, alarms = 0;
+  for (const ResidualTest& t : tests.tests) {
+    if (t.p_value > kAlarm) continue;
+    ++alarms;
+    if (shown < kMost) text += wrapped(t.stage + ": " + t.sentence);
+    shown += shown < kMost ? 1 : 0;
+  }
+  if (alarms > shown) text += fmt::format("  and {} more, in --json\n", alarms - shown);
+  return text;
 }
 
 std::string number(double value) {
@@ -165,11 +271,12 @@ std::string compare_json(const CompareResult& result) {
                     {"samples", log.signals.samples()},
                     {"filter_window_s", log.signals.window}});
   }
-  const Json root = {{"samples", result.samples},
-                     {"stages", stages},
-                     {"worst", worst},
-                     {"notes", result.notes},
-                     {"logs", logs}};
+  Json root = {{"samples", result.samples},
+               {"stages", stages},
+               {"worst", worst},
+               {"notes", result.notes},
+               {"logs", logs}};
+  causes_json(result, root);
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -201,8 +308,16 @@ std::string compare_table(const CompareResult& result) {
     text += fmt::format(" in {}\n", duration_text(e.duration));
   }
   text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
+  if (!result.bad_data.empty())
+    text += "\nbad data: repair this before anything is learned from it\n";
+  for (const BadChannelOfLog& b : result.bad_data)
+    text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
+  if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);
   if (!result.worst.empty()) text += "\nwhere it fails most\n";
   for (const WorstRegion& w : result.worst) text += wrapped(w.stage + ": " + w.sentence);
+  if (!result.segments.empty()) text += "\nwhen it fails most\n";
+  for (const WorstSegment& w : result.segments) text += wrapped(w.stage + ": " + w.sentence);
+  text += repeats_text(result);
   if (!result.notes.empty()) text += "\nnot compared, or with care\n";
   for (const std::string& note : result.notes) text += wrapped(note);
   return text;

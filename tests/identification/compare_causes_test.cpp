@@ -1,0 +1,161 @@
+// What `compare` says beyond its scores: the stage at fault, regimes with intervals, worst motions, bad data.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "arm_log.h"
+#include "identification/compare.h"
+
+namespace sparflow {
+namespace {
+
+using testing::HasSubstr;
+using testing_support::arm_log;
+using testing_support::arm_model;
+using testing_support::channel;
+constexpr double kNoise = 0.5;  // [bar]
+
+/// Both pressures of a load that weighs `extra` newtons more on the cylinder than the model knows.
+Log heavier(double extra) {
+  Log log = arm_log(kNoise);
+  const CraneModel model = arm_model();
+  Eigen::VectorXd& a = channel(log, "pA_arm").values;
+  Eigen::VectorXd& b = channel(log, "pB_arm").values;
+  Eigen::VectorXd& pump = channel(log, "p_main").values;
+  const Eigen::VectorXd& u = channel(log, "u_arm").values;
+  const double area_a = model.machine.cylinders[0].area_piston();
+  const double area_b = model.machine.cylinders[0].area_rod();
+  for (Eigen::Index k = 0; k < log.samples(); ++k) {
+    if (u[k] > 0.0) {  // the plant's law at the larger force: the working side by its slope
+      a[k] += extra / area_a;
+      pump[k] += extra / area_a;
+    } else if (u[k] < 0.0) {
+      b[k] -= 50.0 * extra;
+      a[k] += (extra - 50.0 * extra * area_b) / area_a;
+      pump[k] -= 50.0 * extra;
+    } else {
+      a[k] += extra / area_a;
+    }
+  }
+  return log;
+}
+
+const StageSplit& stage(const CompareResult& r, const std::string& name,
+                        const std::string& regime) {
+  for (const StageSplit& s : r.fault.stages) {
+    if (s.stage == name && s.regime == regime) return s;
+  }
+  throw std::logic_error("no stage " + name);
+}
+
+TEST(StageAtFault, AWrongForceIsItsOwnAndThePressuresInheritIt) {
+  const CompareResult r = compare(arm_model(), {heavier(20e3)});
+  ASSERT_GE(r.fault.fault, 0);
+  EXPECT_EQ(r.fault.stages[static_cast<std::size_t>(r.fault.fault)].stage, "force");
+  EXPECT_THAT(r.fault.sentence, HasSubstr("arises in the force of arm"));
+  EXPECT_THAT(r.fault.sentence, HasSubstr("inherits"));
+  const StageSplit& force = stage(r, "force", "");
+  EXPECT_NEAR(force.own, 20e3, 400.0);
+  EXPECT_EQ(force.inherited, 0.0);
+  const StageSplit& up = stage(r, "pressure", "extend");
+  // 20 kN over the piston's area, 17.7 bar; own: sensor's noise 0.5 bar and what of it the smoothed force keeps
+  EXPECT_NEAR(up.inherited, 17.7, 0.3);
+  EXPECT_LT(up.own, 0.8);
+  const StageSplit& pump = stage(r, "pump", "");
+  EXPECT_GT(pump.inherited, 8.0 * pump.own);
+}
+
+TEST(StageAtFault, AWrongPressureProcessIsNotTheForces) {
+  CraneModel model = arm_model();
+  model.cylinders[0].extend = testing_support::linear_process(
+      14.0 * units::kBar, 1.0 / model.machine.cylinders[0].area_piston());  // 10 bar too much
+  const CompareResult r = compare(model, {arm_log(kNoise)});
+  ASSERT_GE(r.fault.fault, 0);
+  const StageSplit& f = r.fault.stages[static_cast<std::size_t>(r.fault.fault)];
+  EXPECT_EQ(f.stage + " " + f.regime, "pressure extend");
+  EXPECT_NEAR(f.own, 10.0, 0.3);
+  EXPECT_LT(f.inherited, 0.5);
+}
+
+TEST(StageAtFault, AWrongMarginIsThePumps) {
+  CraneModel model = arm_model();
+  model.cylinders[0].margin += 12.0 * units::kBar;
+  const CompareResult r = compare(model, {arm_log(kNoise)});
+  ASSERT_GE(r.fault.fault, 0);
+  EXPECT_EQ(r.fault.stages[static_cast<std::size_t>(r.fault.fault)].stage, "pump");
+}
+
+TEST(StageAtFault, NoneWhereTheModelIsRight) {
+  const CompareResult r = compare(arm_model(), {arm_log(kNoise)});
+  EXPECT_EQ(r.fault.fault, -1);
+  EXPECT_THAT(r.fault.sentence, HasSubstr("No stage stands out"));
+  EXPECT_GT(r.tests.smallest_p(), 0.05);
+  EXPECT_TRUE(r.bad_data.empty());
+}
+
+TEST(WhereItFails, AStageThatIsBiasedEverywhereLeads) {
+  const CompareResult r = compare(arm_model(), {heavier(20e3)});
+  ASSERT_FALSE(r.worst.empty());
+  EXPECT_TRUE(r.worst[0].where.empty());
+  EXPECT_EQ(r.worst[0].stage, "force");
+  EXPECT_THAT(r.worst[0].sentence, HasSubstr("everywhere"));
+  EXPECT_THAT(r.worst[0].sentence, HasSubstr("20 kN too low"));
+  for (const WorstRegion& w : compare(arm_model(), {arm_log(kNoise)}).worst)
+    EXPECT_THAT(w.sentence, Not(HasSubstr("everywhere")));
+}
+
+TEST(WorstSegments, TheMotionThatFailsIsNamedWithItsTime) {
+  Log log = arm_log(kNoise);
+  channel(log, "pA_arm").values.segment(1260, 60).array() += 30.0 * units::kBar;  // 25.2 to 26.4 s
+  const CompareResult r = compare(arm_model(), {log});
+  ASSERT_FALSE(r.segments.empty());
+  const WorstSegment& w = r.segments[0];
+  EXPECT_LT(w.from_s, 25.3);
+  EXPECT_GT(w.to_s, 26.2);
+  EXPECT_EQ(w.moved, "arm extending");
+  EXPECT_GT(w.share_of_error, 0.9);
+}
+
+TEST(Regimes, IntervalsHoldTheErrorAndTheLoadThatFailsStandsOut) {
+  Log log = arm_log(kNoise);
+  const Eigen::VectorXd payload = channel(log, "payload").values;
+  Eigen::VectorXd& a = channel(log, "pA_arm").values;
+  for (Eigen::Index k = 0; k < a.size(); ++k) {
+    if (payload[k] == 200.0) a[k] += 4.0 * units::kBar;
+  }
+  const CompareResult r = compare(arm_model(), {log});
+  double light = 0.0, heavy = 0.0;
+  for (const RegimeError& e : r.regimes) {
+    if (std::isfinite(e.rmse_ci95.lo)) {
+      EXPECT_LE(e.rmse_ci95.lo, e.rmse * (1.0 + 1e-9));
+      EXPECT_GE(e.rmse_ci95.hi, e.rmse * (1.0 - 1e-9));
+    }
+    if (e.stage != "pressure" || e.regime != "extend" || e.factor != "payload_kg") continue;
+    (e.level == "200" ? heavy : light) = e.rmse;
+  }
+  EXPECT_NEAR(light, kNoise, 0.1);
+  EXPECT_NEAR(heavy, 4.0, 0.2);
+}
+
+TEST(CompareJson, HasTheCauses) {
+  Log log = heavier(20e3);
+  Eigen::VectorXd& pump = channel(log, "p_main").values;
+  pump.segment(1000, 250).setConstant(pump[1000]);
+  const CompareResult r = compare(arm_model(), {log});
+  const auto json = nlohmann::json::parse(compare_json(r));
+  EXPECT_EQ(json["stage_at_fault"]["stage"], "force");
+  EXPECT_LE(json["residual_tests"]["p_value"], 0.05);
+  EXPECT_FALSE(json["regimes"].empty());
+  EXPECT_FALSE(json["worst_segments"].empty());
+  ASSERT_EQ(json["bad_data"].size(), 1u);
+  EXPECT_EQ(json["bad_data"][0]["channel"], "p_main");
+  EXPECT_EQ(json["bad_data"][0]["kind"], "stuck");
+  const std::string table = compare_table(r);
+  EXPECT_THAT(table, HasSubstr("stage at fault"));
+  EXPECT_THAT(table, HasSubstr("p_main is stuck"));
+  EXPECT_THAT(table, HasSubstr("what repeats in the error"));
+}
+
+}  // namespace
+}  // namespace sparflow

@@ -1,0 +1,139 @@
+#include "identification/residual_tests.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Coloured residuals (AR(1), correlation 0.9 a sample: 19 samples' worth) of two quantities in 30 motions of
+/// 100 samples, with three signals that are as coloured and have nothing to do with them.
+std::vector<ComparedPart> ar_parts(unsigned seed, double bias = 0.0, double slope = 0.0) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const auto coloured = [&](Index n, double rho) {
+    VectorXd x(n);
+    double state = normal(random);
+    for (double& v : x) {
+      state = rho * state + std::sqrt(1.0 - rho * rho) * normal(random);
+      v = state;
+    }
+    return x;
+  };
+  constexpr Index kBlocks = 30, kSamples = 100;
+  std::vector<ComparedPart> parts(2);
+  for (ComparedPart& part : parts) {
+    part.stage = "pressure";
+    part.at = "arm";
+    part.words = "working pressure of arm";
+    part.unit = "bar";
+    part.scale = 1e5;
+    part.error.resize(kBlocks * kSamples);
+    for (Index b = 0; b < kBlocks; ++b) {
+      part.error.segment(b * kSamples, kSamples) = 1e5 * coloured(kSamples, 0.9);
+      part.block.insert(part.block.end(), kSamples, static_cast<int>(b));
+    }
+    for (const char* key : {"load", "speed", "oil"})
+      part.signals.push_back({key, key, "", 1.0, coloured(kBlocks * kSamples, 0.995)});
+  }
+  parts[0].error.array() += bias * 1e5;
+  parts[0].error += slope * 1e5 * parts[0].signals[1].values;
+  return parts;
+}
+
+TEST(ResidualTests, FalseAlarmsOnColouredResidualsAreFiveInAHundredAtMost) {
+  constexpr int kReplicates = 400;
+  int alarms = 0;
+  for (unsigned seed = 1; seed <= kReplicates; ++seed) {
+    if (test_residuals(ar_parts(seed), 30, {199, seed, 6}).smallest_p() <= 0.05) ++alarms;
+  }
+  // 5 % of 400 are 20, binomial deviation 4.4: 33 would be three of them above
+  EXPECT_LE(alarms, 33);
+  EXPECT_GE(alarms, 7) << "far fewer than 5 %: the tests have lost their power";
+  RecordProperty("alarms_of_400", alarms);
+}
+
+TEST(ResidualTests, StudentsTestWouldAlarmOnTheSameResiduals) {
+  int alarms = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    const VectorXd e = ar_parts(seed)[0].error;
+    const double std = std::sqrt((e.array() - e.mean()).square().mean());
+    if (std::abs(e.mean()) > 1.96 * std / std::sqrt(static_cast<double>(e.size()))) ++alarms;
+  }
+  EXPECT_GT(alarms, 40);  // 1.96 / sqrt(19) deviations: expected two in three
+}
+
+TEST(ResidualTests, ABiasIsFoundAndNamed) {
+  const ResidualTests found = test_residuals(ar_parts(3, 1.0), 30);
+  ASSERT_FALSE(found.tests.empty());
+  const ResidualTest& first = found.tests.front();
+  EXPECT_EQ(first.depends_on, "");
+  EXPECT_LE(first.p_value, 0.01);
+  // 3000 samples of correlation 0.9 are 158 independent ones: deviation 0.08
+  EXPECT_NEAR(first.size, 1.0, 0.25);
+  EXPECT_LT(first.ci95.lo, 1.0);
+  EXPECT_GT(first.ci95.hi, 1.0);
+  EXPECT_THAT(first.sentence, testing::HasSubstr("too high on average"));
+}
+
+TEST(ResidualTests, ADependenceIsFoundOnItsSignalAlone) {
+  const ResidualTests found = test_residuals(ar_parts(4, 0.0, 0.8), 30);
+  const ResidualTest& first = found.tests.front();
+  EXPECT_EQ(first.depends_on, "speed");
+  EXPECT_LE(first.p_value, 0.01);
+  EXPECT_NEAR(first.share_explained, 0.64 / 1.64, 0.15);
+  for (const ResidualTest& t : found.tests) {
+    if (t.p_value <= 0.05) {
+      EXPECT_EQ(t.depends_on, "speed") << t.sentence;
+    }
+  }
+}
+
+TEST(ResidualTests, AFewBlocksProveNothing) {
+  std::vector<ComparedPart> parts = ar_parts(5, 3.0);
+  for (int& b : parts[0].block) b %= 5;
+  parts.resize(1);
+  EXPECT_TRUE(test_residuals(parts, 5).tests.empty());
+}
+
+TEST(ResidualTests, FlipsWithBlocksOfOneSignReachTheSmallestPossibleValue) {
+  const Eigen::MatrixXd sums = Eigen::MatrixXd::Ones(20, 1);
+  const Eigen::MatrixXd judged = max_t_sign_flip(sums, 999, 1);
+  EXPECT_DOUBLE_EQ(judged(0, 0), std::sqrt(20.0));
+  EXPECT_LE(judged(0, 1), 0.002);  // 2^-19 of all flips are as large: none or one of 999
+  // a test of nothing but zeros is no evidence
+  EXPECT_EQ(max_t_sign_flip(Eigen::MatrixXd::Zero(20, 1), 99, 1)(0, 1), 1.0);
+}
+
+TEST(ResidualTests, EffectiveSamplesOfAnAutoregression) {
+  const ComparedPart part = ar_parts(6)[0];
+  // (1 - rho) / (1 + rho) of 3000; cutting the sum at 0.05 and its own scatter leave about a fifth
+  EXPECT_NEAR(effective_samples(part.error, part.block), 3000.0 * 0.1 / 1.9, 60.0);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  VectorXd white(3000);
+  for (double& v : white) v = normal(random);
+  EXPECT_NEAR(effective_samples(white, part.block), 3000.0, 1.0);
+}
+
+TEST(BlockInterval, CoversTheMeanOfBlocks) {
+  int covered = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(2.0, 1.0);
+    VectorXd sums(30);
+    for (double& v : sums) v = 10.0 * normal(random);
+    const Range r = block_interval(sums, VectorXd::Constant(30, 10.0), false);
+    if (r.lo < 2.0 && r.hi > 2.0) ++covered;
+  }
+  EXPECT_GE(covered, 87);  // 93 expected of a percentile bootstrap of 30; three deviations below
+  EXPECT_TRUE(std::isnan(block_interval(VectorXd::Ones(4), VectorXd::Ones(4), false).lo));
+}
+
+}  // namespace
+}  // namespace sparflow
