@@ -146,6 +146,15 @@ void expect_motion_costs(const std::string& csv, const json& model, double energ
   EXPECT_NEAR(sum, energy, 3e-4 * energy);
 }
 
+TEST_F(Cli, AMachineAloneIsComparedByItsForcesOnly) {
+  const Outcome o = run("compare -m " + kCrane + " -l " + kTest + " --json " + at("c.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json stages = json::parse(slurp(at("c.json"))).at("stages");
+  EXPECT_EQ(stages.at("force").size(), 3u);
+  for (const char* learned : {"flow", "pressure", "pump", "energy"})
+    EXPECT_TRUE(stages.at(learned).empty()) << learned;
+}
+
 TEST_F(Cli, OptimizeWritesMotionPageAndTheContractsKeys) {
   const Outcome o =
       run("optimize -p " + kData +
@@ -192,8 +201,9 @@ TEST_F(Cli, InfeasibleIsFourAndNamed) {
   hurried.replace(hurried.find("duration_s: 16"), 14, "duration_s: 2");
   write("hurried.yaml", hurried);
   Outcome o = run("optimize -p " + at("hurried.yaml") + " --paths 2 --intervals 40 --model " +
-                  model() + " --json " + at("h.json"));
+                  model() + " --json " + at("h.json") + " -o " + at("h.csv"));
   EXPECT_EQ(o.code, 4);
+  EXPECT_FALSE(fs::exists(at("h.csv"))) << "there is no motion to write";
   EXPECT_THAT(o.out, HasSubstr("infeasible"));
   EXPECT_EQ(json::parse(slurp(at("h.json"))).at("status"), "infeasible");
 

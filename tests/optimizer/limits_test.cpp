@@ -1,0 +1,239 @@
+// Limits and energies of motions small enough to know by hand: what a wrong sign, a look at the knots alone or a
+// mode that is not held would change.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "models/machine_file.h"
+#include "models/units.h"
+#include "optimizer/optimize.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+#include "tests/optimizer/synthetic_model.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+using ::testing::HasSubstr;
+
+/// A sled on a level rail, its tip 1 m above; the valve gives 300 l/min out and 100 l/min in.
+struct Slide {
+  MotionProblem problem;
+  CraneModel model;
+
+  Slide() {
+    const Machine machine = parse_machine(
+        "name: slide\njoints:\n  - {name: x, type: prismatic, parent: base, axis: [1, 0, 0], "
+        "position: [0, 2], velocity: [-1, 1], acceleration: [-1, 1]}\n"
+        "tip: {joint: x, xyz: [0, 0, 1]}\nlinks:\n  - {name: sled, joint: x, mass: 100, cog: [0, "
+        "0, "
+        "0], inertia: 0}\ncylinders:\n  - {name: x, joint: x, bore: 0.1, rod: 0.05, linkage: "
+        "{type: "
+        "direct}}\npumps:\n  - {name: main, feeds: [x], max_flow_lpm: 600, max_pressure_bar: 300, "
+        "standby_bar: 20}\nvalves:\n  - {cylinder: x, max_flow_lpm: {extend: 300, retract: 100}}\n",
+        "slide", ".");
+    model = CraneModel::untrained(machine);
+    GpParameters p;
+    p.mean_constant = 50e5;
+    p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
+    p.flow_min = 0.0;
+    p.flow_max = 1.0;
+    p.force_min = -1e6;
+    p.force_max = 1e6;
+    model.cylinders[0].extend = model.cylinders[0].retract = GaussianProcess(p);
+    problem.machine = machine;
+    problem.limits = limits_of(machine);
+  }
+
+  /// Rest to rest over `way` from `start` in two intervals of one second.
+  Trajectory hop(double start, double way) {
+    Trajectory m;
+    m.t = (VectorXd(3) << 0.0, 1.0, 2.0).finished();
+    m.q = (Eigen::MatrixXd(3, 1) << start, start + 0.5 * way, start + way).finished();
+    m.qd = (Eigen::MatrixXd(3, 1) << 0.0, way, 0.0).finished();
+    m.qdd = (Eigen::MatrixXd(3, 1) << way, -way, -way).finished();
+    problem.start = VectorXd::Constant(1, start);
+    problem.goal = JointGoal{VectorXd::Constant(1, start + way)};
+    return m;
+  }
+
+  LimitCheck check(const Trajectory& m, const std::string& what, int refine = 16) const {
+    for (const LimitCheck& c : check_limits(model, problem, m, refine)) {
+      if (c.what == what) return c;
+    }
+    ADD_FAILURE() << "no limit called " << what;
+    return {};
+  }
+};
+
+TEST(Limits, AreSeenBetweenTheKnots) {
+  // At rest at 1.9 m at both knots, half-way at 1.9 + 0.25 m: beyond the end at 2 m, seen by no knot.
+  Slide s;
+  Trajectory m = s.hop(1.9, 0.0);
+  m.t = (VectorXd(2) << 0.0, 1.0).finished();
+  m.q = Eigen::MatrixXd::Constant(2, 1, 1.9);
+  m.qd = (Eigen::MatrixXd(2, 1) << 1.0, -1.0).finished();
+  m.qdd = Eigen::MatrixXd::Constant(2, 1, -2.0);
+  const LimitCheck c = s.check(m, "position of joint x");
+  EXPECT_NEAR(c.value, 2.15, 1e-12);  // the top lies on one of sixteen parts
+  EXPECT_NEAR(c.time, 0.5, 1e-12);
+  EXPECT_NEAR(c.excess, 0.15 / 2.0, 1e-12);
+  EXPECT_LT(s.check(m, "position of joint x", 1).excess, 0.0);
+}
+
+TEST(Limits, EachDirectionHasItsOwnValveLimit) {
+  Slide s;
+  const double piston = s.problem.machine.cylinders[0].area_piston();
+  const double rod = s.problem.machine.cylinders[0].area_rod();
+  const LimitCheck out = s.check(s.hop(0.5, 0.5), "flow through valve x");
+  EXPECT_NEAR(out.limit, 300.0, 1e-9);
+  EXPECT_NEAR(out.value, 0.5 * piston / units::kLitrePerMinute, 1e-6);
+  EXPECT_LT(out.excess, 0.0);
+  const LimitCheck in = s.check(s.hop(1.5, -0.5), "flow through valve x");
+  EXPECT_NEAR(in.limit, 100.0, 1e-9);
+  EXPECT_NEAR(in.value, 0.5 * rod / units::kLitrePerMinute, 1e-6);  // 177 l/min
+  EXPECT_GT(in.excess, 0.7);
+}
+
+TEST(Limits, EndsInThePlaceThatWasAskedFor) {
+  Slide s;
+  const Trajectory m = s.hop(0.5, 0.5);
+  EXPECT_LE(s.check(m, "distance from the goal posture").excess, 0.0);
+  EXPECT_LE(s.check(m, "distance from the start posture").excess, 0.0);
+  s.problem.start[0] = 0.4;
+  EXPECT_NEAR(s.check(m, "distance from the start posture").excess, 0.1, 1e-6);
+  s.problem.goal = JointGoal{VectorXd::Constant(1, 1.2)};
+  EXPECT_NEAR(s.check(m, "distance from the goal posture").excess, 0.2, 1e-5);
+  s.problem.goal = TipGoal{{1.0, 0.0, 1.0}};
+  EXPECT_LE(s.check(m, "distance of the tip from its goal").excess, 0.0);
+  s.problem.goal = TipGoal{{1.3, 0.0, 1.0}};
+  EXPECT_NEAR(s.check(m, "distance of the tip from its goal").excess, 0.3, 1e-4);
+}
+
+TEST(Limits, ObstaclesAndPressureCount) {
+  Slide s;
+  const Trajectory m = s.hop(0.5, 0.5);
+  s.problem.limits.pump_max_pressure[0] = 40e5;  // the pump gives 50 bar
+  EXPECT_NEAR(s.check(m, "pressure of pump main").excess, 0.25, 1e-9);
+  s.problem.obstacles.push_back({"post", Sphere{{1.0, 0.0, 1.0}, 0.2}});
+  EXPECT_GT(s.check(m, "clearance beyond the required distance").excess, 0.1);
+  s.problem.obstacles[0].shape = Sphere{{10.0, 0.0, 1.0}, 0.2};
+  EXPECT_LT(s.check(m, "clearance beyond the required distance").excess, 0.0);
+}
+
+TEST(ExactEnergy, SharesOfPumpsUsefulWorkAndDataAddUp) {
+  Slide s;
+  const Trajectory m = s.hop(0.5, 0.5);
+  const MotionEnergy e = exact_energy(s.model, m, 0.0);
+  EXPECT_NEAR(e.pump[0], e.total, 1e-9 * e.total);
+  EXPECT_NEAR(e.useful[0], e.total, 1e-9 * e.total);  // one cylinder, no margin: nothing throttled
+  EXPECT_EQ(e.moving_share_outside_data, 0.0);
+  GpParameters p = s.model.cylinders[0].extend.parameters();
+  // half the highest speed: exceeded in the middle half of a triangle of speed
+  p.flow_max = 0.25 * s.problem.machine.cylinders[0].area_piston();
+  s.model.cylinders[0].extend = GaussianProcess(p);
+  EXPECT_NEAR(exact_energy(s.model, m, 0.0).moving_share_outside_data, 0.5, 1e-12);
+}
+
+/// The bundled lift under a known model, with straight lines to two end postures.
+struct Lift {
+  MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
+  CraneModel model = testing::synthetic_model(problem.machine);
+  std::vector<SeedMotion> seeds;
+  OptimizeOptions options;
+
+  Lift() {
+    options.intervals = 40;
+    options.processes = 1;
+    const Eigen::Vector3d goal = std::get<TipGoal>(problem.goal).tip;
+    for (const bool still : {false, true}) {
+      VectorXd end = problem.start;
+      if (!solve_end_posture(problem.machine, problem.limits, goal, {!still, true, true}, end))
+        continue;
+      Eigen::MatrixXd path(2, 3);
+      path << problem.start.transpose(), end.transpose();
+      const TimedMotion timed = time_parametrise(problem, path, 0.0);
+      seeds.push_back({still ? "still" : "line", timed.motion, timed.shortest, true});
+    }
+  }
+};
+
+TEST(ExactEnergy, PotentialEnergyIsThatOfTheLift) {
+  const Lift c;
+  ASSERT_EQ(c.seeds.size(), 2u);
+  for (const SeedMotion& s : c.seeds) {
+    const double empty = exact_energy(c.model, s.motion, 0.0).potential_difference;
+    const double loaded = exact_energy(c.model, s.motion, 1000.0).potential_difference;
+    const auto height = [&](Eigen::Index k) {
+      const VectorXd q = s.motion.q.row(k).transpose();
+      return tip_position<double>(c.problem.machine, q).z();
+    };
+    EXPECT_NEAR(loaded - empty, 1000.0 * 9.81 * (height(s.motion.size() - 1) - height(0)), 1e-3);
+  }
+}
+
+TEST(Optimize, BaselinesAreTheCheapestOfTheirKind) {
+  Lift c;
+  c.options.sequential_starts = 0;
+  c.options.smooth_iterations = 5;  // the baselines do not depend on how well it is solved
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
+  double cheapest = INFINITY, nearest = 0.0;
+  for (const SeedMotion& s : c.seeds) {
+    const Trajectory timed = with_duration(s.motion, r.duration);
+    if (worst_excess(check_limits(c.model, c.problem, timed)) > 1e-3) continue;
+    const double energy = exact_energy(c.model, timed, c.problem.payload).total;
+    if (&s == &c.seeds.front()) nearest = energy;
+    cheapest = std::min(cheapest, energy);
+  }
+  EXPECT_GT(std::abs(nearest - cheapest), 0.01 * cheapest) << "the case cannot tell them apart";
+  EXPECT_EQ(r.straight_line_energy, cheapest);
+  EXPECT_EQ(r.best_seed_energy, cheapest);
+  EXPECT_EQ(r.nearest_line_energy, nearest);
+}
+
+TEST(Optimize, HeldModesAreKeptBySolver) {
+  // The solver may shift and reshape the legs of a one-by-one motion, never drive two cylinders at once.
+  const Lift c;
+  const VectorXd times = VectorXd::LinSpaced(41, 0.0, 16.0);
+  std::vector<VectorXd> ends;
+  for (const SeedMotion& s : c.seeds)
+    ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+  const std::vector<ModeCandidate> candidates =
+      sequential_candidates(c.model, c.problem, times, ends, 3);
+  ASSERT_FALSE(candidates.empty());
+  for (const ModeCandidate& candidate : candidates) {
+    const StartResult r = optimize_with_modes(c.model, c.problem, candidate, c.options);
+    ASSERT_TRUE(r.usable(c.options.limit_tolerance)) << candidate.name << ": " << r.message;
+    EXPECT_TRUE(r.modes_held) << candidate.name;
+    EXPECT_LT(r.energy_exact, candidate.energy * (1.0 + 1e-9));
+    const MotionEnergy e = exact_energy(c.model, r.motion, c.problem.payload);
+    EXPECT_LE(e.share_moving[2] + e.share_moving[3], 1e-9) << candidate.name;
+  }
+}
+
+TEST(Optimize, AnInterruptedSearchSaysSoAndKeepsWhatItHas) {
+  Lift c;
+  int asked = 0;
+  c.options.interrupted = [&] { return ++asked > 3; };
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
+  EXPECT_EQ(r.status, OptimizeStatus::kInterrupted);
+  ASSERT_GT(r.motion.size(), 1);
+  EXPECT_LE(worst_excess(r.checks), 1e-5);
+}
+
+TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
+  Lift c;
+  c.problem.duration = {2.0, 2.0};
+  c.options.sequential_starts = 0;
+  c.seeds[0].shortest_duration = 11.25;
+  c.seeds[1].shortest_duration = 14.75;
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
+  EXPECT_EQ(r.status, OptimizeStatus::kInfeasible);
+  EXPECT_THAT(r.message, HasSubstr("keeps all limits in 11.2 s"));
+}
+
+}  // namespace
+}  // namespace sparflow
