@@ -117,6 +117,9 @@ struct MachineState {
   double throttling(const Machine& machine, int cylinder) const;
 };
 
+/// |dx/dt| up to which a cylinder counts as at rest [m/s]: swallows rounding, no more.
+inline constexpr double kRestSpeed = 1e-9;
+
 /// Evaluates the exact chain; a workspace, one a thread, no allocation after construction.
 ///
 /// With the model's effects: static forces of the effective machine (models/effects/effective_machine.h), + force
@@ -137,7 +140,7 @@ class Chain {
   /// @param qdd by joint, for inertia; nullptr = 0
   /// @throws std::domain_error when a four-bar cannot close at q
   const MachineState& evaluate(const double* q, const double* qd, double payload,
-                               bool with_std = false, double rest_speed = 1e-9,
+                               bool with_std = false, double rest_speed = kRestSpeed,
                                const double* qdd = nullptr);
 
   /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
@@ -145,7 +148,7 @@ class Chain {
   /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
   /// @param added_demand [Pa] by cylinder, asked of the pump on top; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
-                                         bool with_std = false, double rest_speed = 1e-9,
+                                         bool with_std = false, double rest_speed = kRestSpeed,
                                          const double* added_pressure = nullptr,
                                          const double* added_demand = nullptr);
 

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "models/effects/registry.h"
+#include "models/effects/user_effect.h"
 
 namespace sparflow {
 namespace {
@@ -218,7 +219,7 @@ void write_provenance(const CraneModel& model, ModelJson& root) {
   std::set<std::string> written;
   for (const AppliedEffect& e : model.effects) {
     const std::string text = e.effect->definition();
-    if (!text.empty() && written.insert(e.effect->info().id).second) definitions.push_back(text);
+    if (!text.empty() && written.insert(text).second) definitions.push_back(text);
   }
   if (!definitions.empty()) root["user_effects"] = std::move(definitions);
   root["effects"] = rows_json(
@@ -229,6 +230,17 @@ void write_provenance(const CraneModel& model, ModelJson& root) {
 void read_provenance(const ModelCursor& root, CraneModel& model) {
   model.data = read_rows<DataSource>(root, "data", "a list of logs", read_source);
   model.quality = read_rows<StageQuality>(root, "quality", "a list of stages", read_quality);
+  if (root.has("user_effects")) {
+    const char* expected = "a list of YAML texts that define effects";
+    for (const Cursor& d : root.at("user_effects", expected).list(expected)) {
+      const std::string text = d.text("a YAML text that defines effects");
+      try {
+        register_user_effects(text, "its YAML", model.machine);
+      } catch (const InputError& error) {
+        d.fail(error.what());
+      }
+    }
+  }
   for (const Cursor& e :
        root.at("effects", "a list of physical effects").list("a list of physical effects")) {
     model.effects.push_back(read_effect(e, model.machine));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "models/effects/effective_machine.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -19,23 +20,40 @@ constexpr double kRowInflation = 0.02;  // [m]
 constexpr double kNearRow = 0.5;  // [m]
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Adds factor times the derivatives of a jet over all of z; null: not asked for. @param hessian symmetric
+void add_jet(const Jet& jet, double factor, double* gradient, double* hessian) {
+  const int n = jet.variables();  // 0 for a constant
+  for (int i = 0; i < n; ++i) {
+    if (gradient != nullptr) gradient[i] += factor * jet.gradient(i);
+    for (int j = 0; j < n && hessian != nullptr; ++j)
+      hessian[i * n + j] += factor * jet.hessian(i, j);
+  }
+}
+
 }  // namespace
 
 CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& problem,
                                CraneKnotOptions options)
     : model_(&model),
       problem_(&problem),
+      machine_(effective_machine(model.machine, model.effects)),
       options_(std::move(options)),
       n_(model.machine.joint_count()),
       m_(model.machine.cylinder_count()),
       power_(model),
-      statics_(model.machine),
+      statics_(*machine_),
       tip_chain_(model.machine) {
   const Machine& machine = model.machine;
   power_.smoothing = options_.smoothing;
+  if (SmoothEffects::needed(model)) {
+    effects_ = std::make_unique<SmoothEffects>(model);
+    effects_->smoothing = options_.smoothing;
+    effects_->oil = options_.oil;
+  }
   for (int p = 0; p < machine.pump_count(); ++p) {
     const auto i = static_cast<std::size_t>(p);
-    const double flow = problem.limits.pump_max_flow[i];
+    const double flow =
+        effect_flow_limit(machine, model.effects, p, problem.limits.pump_max_flow[i]);
     if (flow > 0.0) {
       rows_.push_back({RowKind::kPumpFlow, p, -kInfinity, options_.flow_share * flow / kFlowUnit});
     }
@@ -77,6 +95,7 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
   speed_.setZero(m_);
   force_.setZero(m_);
   length_.resize(static_cast<std::size_t>(m_));
+  effects_z_.setConstant(size(), std::numeric_limits<double>::quiet_NaN());
   jacobian_.setZero(2 * m_, 2 * n_);
   scratch_gradient_.setZero(2 * m_);
   scratch_hessian_.setZero(2 * m_, 2 * m_);
@@ -128,7 +147,7 @@ void CraneKnotModel::update(const double* z, int order, bool forces) {
   for (int c = 0; c < m_; ++c) {
     const auto i = static_cast<std::size_t>(c);
     const int j = model_->machine.cylinders[i].joint;
-    length_[i] = forces ? statics_.length(c) : linkage_rates(model_->machine, c, z[j]);
+    length_[i] = forces ? statics_.length(c) : linkage_rates(*machine_, c, z[j]);
     const double qd = z[n_ + j];
     speed_[c] = length_[i].d1 * qd;
     if (forces) force_[c] = statics_.force()[c];
@@ -150,7 +169,8 @@ void CraneKnotModel::chain_gradient(const double* g, double* gradient) const {
 
 void CraneKnotModel::chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h,
                                    double* hessian) {
-  Eigen::Map<Eigen::MatrixXd> out(hessian, 2 * n_, 2 * n_);
+  Eigen::Map<Eigen::MatrixXd> whole(hessian, size(), size());
+  auto out = whole.topLeftCorner(2 * n_, 2 * n_);
   product_.noalias() = h.lazyProduct(jacobian_);
   outer_.noalias() = jacobian_.transpose().lazyProduct(product_);
   out += outer_;
@@ -164,22 +184,41 @@ void CraneKnotModel::chain_hessian(const double* z, const double* g, const Eigen
   }
 }
 
+void CraneKnotModel::update_effects(const double* z, bool derivatives) {
+  const Eigen::Map<const Eigen::VectorXd> at(z, size());
+  const bool known = effects_z_ == at && effects_mode_ == mode_;
+  if (known && (effects_derivatives_ || !derivatives)) return;
+  effects_->evaluate(z, problem_->payload, mode_.data(), derivatives);
+  effects_z_ = at;
+  effects_mode_ = mode_;
+  effects_derivatives_ = derivatives;
+}
+
 double CraneKnotModel::cost(const double* z) {
+  if (effects_) {
+    update_effects(z, false);
+    return options_.energy_weight * effects_->power().value / kPowerUnit;
+  }
   update(z, 0, true);
   const double power = power_.value(speed_.data(), force_.data(), mode_.data());
   return options_.energy_weight * power / kPowerUnit;
 }
 
 double CraneKnotModel::cost_derivatives(const double* z, double* gradient, double* hessian) {
-  update(z, 2, true);
-  const double power = power_.derivatives(speed_.data(), force_.data(), mode_.data());
-  Eigen::Map<Eigen::VectorXd> g(gradient, 2 * n_);
-  Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+  Eigen::Map<Eigen::VectorXd> g(gradient, size());
+  Eigen::Map<Eigen::MatrixXd> h(hessian, size(), size());
   g.setZero();
   h.setZero();
+  const double scale = options_.energy_weight / kPowerUnit;
+  if (effects_) {
+    update_effects(z, true);
+    add_jet(effects_->power(), scale, gradient, hessian);
+    return scale * effects_->power().value;
+  }
+  update(z, 2, true);
+  const double power = power_.derivatives(speed_.data(), force_.data(), mode_.data());
   chain_gradient(power_.gradient().data(), gradient);
   chain_hessian(z, power_.gradient().data(), power_.hessian(), hessian);
-  const double scale = options_.energy_weight / kPowerUnit;
   g *= scale;
   h *= scale;
   return scale * power;
@@ -200,6 +239,11 @@ void CraneKnotModel::path_bounds(double* lower, double* upper) const {
 bool CraneKnotModel::path_uses_velocity(int row) const {
   return row < static_cast<int>(rows_.size()) &&
          rows_[static_cast<std::size_t>(row)].kind != RowKind::kTipLine;
+}
+
+bool CraneKnotModel::path_uses_acceleration(int row) const {
+  return uses_acceleration() && row < static_cast<int>(rows_.size()) &&
+         rows_[static_cast<std::size_t>(row)].kind == RowKind::kPumpPressure;
 }
 
 std::string CraneKnotModel::path_name(int row) const {
@@ -235,7 +279,7 @@ double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessi
     if (gradient != nullptr) gradient[k] = 2.0 * scale * off.dot(tip_jacobian_.col(k));
   }
   if (hessian != nullptr) {
-    Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+    Eigen::Map<Eigen::MatrixXd> h(hessian, size(), size());
     for (int k = 0; k < n_; ++k) {
       for (int i = 0; i <= k; ++i) {
         const Eigen::Vector3d a = tip_jacobian_.col(i), b = tip_jacobian_.col(k);
@@ -251,7 +295,8 @@ double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessi
 }
 
 void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
-  const bool forces = options_.limit_pressure;
+  const bool forces = options_.limit_pressure && !effects_;
+  if (options_.limit_pressure && effects_) update_effects(z, jacobian != nullptr);
   update(z, jacobian != nullptr ? 1 : 0, forces);
   if (forces) {
     if (jacobian != nullptr) {
@@ -260,7 +305,7 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
       power_.value(speed_.data(), force_.data(), mode_.data());
     }
   }
-  const int width = 2 * n_;
+  const int width = size();
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Row& row = rows_[r];
     double* out = jacobian == nullptr ? nullptr : jacobian + static_cast<std::ptrdiff_t>(r) * width;
@@ -289,6 +334,12 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
         break;
       }
       case RowKind::kPumpPressure: {
+        if (effects_) {
+          const Jet& pressure = effects_->pump_pressure(row.index);
+          g[r] = pressure.value / kPressureUnit;
+          if (out != nullptr) add_jet(pressure, 1.0 / kPressureUnit, out, nullptr);
+          break;
+        }
         g[r] = power_.pump_pressure(row.index) / kPressureUnit;
         if (out != nullptr) {
           scratch_gradient_.setZero();
@@ -326,7 +377,8 @@ void CraneKnotModel::path_jacobian(const double* z, double* g, double* jacobian)
 }
 
 void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
-  const bool forces = options_.limit_pressure;
+  const bool forces = options_.limit_pressure && !effects_;
+  if (options_.limit_pressure && effects_) update_effects(z, true);
   update(z, forces ? 2 : 1, forces);
   scratch_gradient_.setZero();
   scratch_hessian_.setZero();
@@ -347,6 +399,10 @@ void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier,
         scratch_gradient_[row.index] += factor;
         break;
       case RowKind::kPumpPressure:
+        if (effects_) {
+          add_jet(effects_->pump_pressure(row.index), factor / kPressureUnit, nullptr, hessian);
+          break;
+        }
         power_.add_pressure_gradient(row.index, factor / kPressureUnit, scratch_gradient_.data());
         power_.add_pressure_hessian(row.index, factor / kPressureUnit, scratch_hessian_);
         break;
@@ -364,7 +420,7 @@ void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier,
       all_multipliers_[near_rows_[r]] = multiplier[rows_.size() + r];
     }
     clearance_->add_hessian(z, all_multipliers_.data(), outer_.data());
-    Eigen::Map<Eigen::MatrixXd> h(hessian, 2 * n_, 2 * n_);
+    Eigen::Map<Eigen::MatrixXd> h(hessian, size(), size());
     h.topLeftCorner(n_, n_) += Eigen::Map<Eigen::MatrixXd>(outer_.data(), n_, n_);
   }
 }

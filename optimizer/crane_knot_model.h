@@ -1,11 +1,13 @@
 #pragma once
 /// The machine as a KnotModel: power of its pumps under the smooth law and every limit that is not a plain
-/// bound (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks.
+/// bound (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks. A model's
+/// effects are in it: masses and angles in the forces, laws by models/smooth_effects.h, limits in the rows.
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "models/crane_model.h"
+#include "models/smooth_effects.h"
 #include "models/smooth_power.h"
 #include "optimizer/knot_model.h"
 #include "problems/clearance.h"
@@ -35,6 +37,7 @@ struct CraneKnotOptions {
   /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
   /// when a motion without them came too near.
   bool limit_pressure = false;
+  double oil = 40.0;  ///< [degC] for effects that look at it
 };
 
 /// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m: all
@@ -45,6 +48,8 @@ class CraneKnotModel final : public KnotModel {
   CraneKnotModel(const CraneModel& model, const MotionProblem& problem, CraneKnotOptions options);
 
   int joint_count() const override { return n_; }
+  /// True when an effect of the model depends on the joint accelerations.
+  bool uses_acceleration() const override { return effects_ && effects_->uses_acceleration(); }
   void begin_node(int knot, int interval) override;
   bool split_at(int knot) const override;
   double cost(const double* z) override;
@@ -52,6 +57,7 @@ class CraneKnotModel final : public KnotModel {
   int path_count() const override { return static_cast<int>(rows_.size()) + clearance_rows_; }
   void path_bounds(double* lower, double* upper) const override;
   bool path_uses_velocity(int row) const override;
+  bool path_uses_acceleration(int row) const override;
   std::string path_name(int row) const override;
   void path(const double* z, double* g) override;
   void path_jacobian(const double* z, double* g, double* jacobian) override;
@@ -70,15 +76,23 @@ class CraneKnotModel final : public KnotModel {
   /// gradient += D^T g and hessian += D^T H D + sum g_a Hess(z_a), for a function of (v, F).
   void chain_gradient(const double* g, double* gradient) const;
   void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
+  /// The law with effects at z, unless it was evaluated there last.
+  void update_effects(const double* z, bool derivatives);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
   void choose_clearance_rows();
   void path_all(const double* z, double* g, double* jacobian);
 
   const CraneModel* model_;
   const MotionProblem* problem_;
+  std::shared_ptr<const Machine>
+      machine_;  // that carries the loads; goals and obstacles are the problem's
   CraneKnotOptions options_;
   int n_, m_;
   SmoothPower power_;
+  std::unique_ptr<SmoothEffects> effects_;  // for a model with effects that act in a motion
+  Eigen::VectorXd effects_z_;               // where it was evaluated last, with
+  std::vector<CylinderMode> effects_mode_;  // these modes and
+  bool effects_derivatives_ = false;
   StaticForce statics_;
   ChainGeometry tip_chain_;
   std::vector<Row> rows_;

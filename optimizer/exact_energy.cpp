@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "models/effects/effective_machine.h"
 #include "models/units.h"
 #include "problems/clearance.h"
 
@@ -26,15 +27,17 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
   energy.share_moving.assign(cylinders + 1, 0.0);
   if (motion.size() < 2) return energy;
   Chain chain(model);
-  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols());
+  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
   double moving_time = 0.0, outside_time = 0.0;
   for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
     const double step = (motion.t[k + 1] - motion.t[k]) / refine;
+    qdd = motion.qdd.row(k);
     for (int part = 0; part < refine; ++part) {
       const double dt = (part + 0.5) * step;
       q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
       qd = motion.qd.row(k) + dt * motion.qdd.row(k);
-      const MachineState& state = chain.evaluate(q.data(), qd.data(), payload, true);
+      const MachineState& state =
+          chain.evaluate(q.data(), qd.data(), payload, true, kRestSpeed, qdd.data());
       energy.total += step * state.power;
       for (std::size_t p = 0; p < state.pumps.size(); ++p) {
         energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
@@ -50,7 +53,7 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
         const GaussianProcess& process =
             c.speed > 0.0 ? model.cylinders[i].extend : model.cylinders[i].retract;
         moving_time += step;
-        if (!process.empty() && outside_data(process.parameters(), c.flow, c.force))
+        if (!process.empty() && outside_data(process.parameters(), c.flow, c.total_force))
           outside_time += step;
       }
       energy.share_moving[moving] += step;
@@ -60,8 +63,8 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
   energy.moving_share_outside_data = moving_time > 0.0 ? outside_time / moving_time : 0.0;
   const Eigen::Index last = motion.size() - 1;
   energy.potential_difference =
-      potential_energy(model.machine, motion.q.row(last).transpose(), payload) -
-      potential_energy(model.machine, motion.q.row(0).transpose(), payload);
+      potential_energy(chain.machine(), motion.q.row(last).transpose(), payload) -
+      potential_energy(chain.machine(), motion.q.row(0).transpose(), payload);
   return energy;
 }
 
@@ -136,10 +139,11 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
     line_direction = (end - line_start).normalized();
   }
   const auto width = [](const Range& r) { return std::max(r.hi - r.lo, 1e-12); };
-  Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols());
+  Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols()), qdd(fine.q.cols());
   for (Eigen::Index k = 0; k < fine.size(); ++k) {
     q = fine.q.row(k);
     qd = fine.qd.row(k);
+    qdd = fine.qdd.row(k);
     const double t = fine.t[k];
     for (int j = 0; j < machine.joint_count(); ++j) {
       const auto i = static_cast<std::size_t>(j);
@@ -153,7 +157,8 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       book.range("acceleration of joint " + name, fine.qdd(k, j), l.acceleration[i],
                  width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
     }
-    const MachineState& state = chain.evaluate(q.data(), qd.data(), problem.payload);
+    const MachineState& state =
+        chain.evaluate(q.data(), qd.data(), problem.payload, false, kRestSpeed, qdd.data());
     using units::kBar;
     using units::kLitrePerMinute;
     for (int c = 0; c < machine.cylinder_count(); ++c) {
@@ -170,7 +175,8 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
     }
     for (int p = 0; p < machine.pump_count(); ++p) {
       const auto i = static_cast<std::size_t>(p);
-      const double flow_limit = problem.limits.pump_max_flow[i];
+      const double flow_limit =
+          effect_flow_limit(machine, model.effects, p, problem.limits.pump_max_flow[i]);
       const double pressure_limit = problem.limits.pump_max_pressure[i];
       const PumpState& s = state.pumps[i];
       if (flow_limit > 0.0) {

@@ -44,16 +44,18 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
   for (const Pump& p : machine.pumps) text += fmt::format(",p_{}_bar", p.name);
   text += ",power_W\n";
   Chain chain(model);
-  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols());
+  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
   for (Eigen::Index k = 0; k < motion.size(); ++k) {
     q = motion.q.row(k);
     qd = motion.qd.row(k);
+    qdd = motion.qdd.row(k);
     fmt::format_to(std::back_inserter(text), "{:.6f}", motion.t[k]);
     for (const Eigen::MatrixXd* m : {&motion.q, &motion.qd, &motion.qdd}) {
       for (Eigen::Index j = 0; j < m->cols(); ++j)
         fmt::format_to(std::back_inserter(text), ",{:.12g}", (*m)(k, j));
     }
-    const MachineState& state = chain.evaluate(q.data(), qd.data(), payload);
+    const MachineState& state =
+        chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
     for (const CylinderState& c : state.cylinders) {
       fmt::format_to(std::back_inserter(text), ",{:.6g}", c.flow / units::kLitrePerMinute);
     }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <numeric>
 
+#include "models/effects/effective_machine.h"
 #include "optimizer/exact_energy.h"
 #include "problems/clearance.h"
 
@@ -38,7 +39,9 @@ double joint_speed(const CraneModel& model, const MotionProblem& problem, int jo
       if (full > 0.0) flow = problem.limits.valve_fraction * full;
     }
     if (pump >= 0) {
-      const double most = problem.limits.pump_max_flow[static_cast<std::size_t>(pump)];
+      const double most =
+          effect_flow_limit(model.machine, model.effects, pump,
+                            problem.limits.pump_max_flow[static_cast<std::size_t>(pump)]);
       if (most > 0.0) flow = std::min(flow, most);
     }
     speed = std::min(speed, flow / (area * std::abs(rate)));

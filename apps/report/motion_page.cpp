@@ -46,11 +46,13 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
   c.pump_flow.resize(rows, pumps);
   c.power.resize(rows);
   Chain chain(model);
-  VectorXd q, qd;
+  VectorXd q, qd, qdd;
   for (Eigen::Index k = 0; k < rows; ++k) {
     q = fine.q.row(k);
     qd = fine.qd.row(k);
-    const MachineState& s = chain.evaluate(q.data(), qd.data(), payload);
+    qdd = fine.qdd.row(k);
+    const MachineState& s =
+        chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
     for (Eigen::Index i = 0; i < cylinders; ++i) {
       const CylinderState& cylinder = s.cylinders[static_cast<std::size_t>(i)];
       c.flow(k, i) = cylinder.flow / units::kLitrePerMinute;

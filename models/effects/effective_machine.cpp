@@ -1,6 +1,7 @@
 #include "models/effects/effective_machine.h"
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "models/effects/instant.h"
@@ -89,12 +90,13 @@ bool uses_acceleration(const Machine& machine, std::span<const AppliedEffect> ef
   return false;
 }
 
-double effect_flow_limit(const Machine& machine, std::span<const AppliedEffect> effects, int pump) {
-  double limit = std::numeric_limits<double>::infinity();
+double effect_flow_limit(const Machine& machine, std::span<const AppliedEffect> effects, int pump,
+                         double own) {
+  double limit = own > 0.0 ? own : std::numeric_limits<double>::infinity();
   for (const AppliedEffect& e : effects) {
     limit = std::min(limit, e.effect->flow_limit(machine, pump, e.at, e.values));
   }
-  return limit;
+  return std::isfinite(limit) ? limit : 0.0;
 }
 
 }  // namespace sparflow

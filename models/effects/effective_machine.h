@@ -20,7 +20,9 @@ bool acts_in_motion(const Effect& effect);
 /// them at a few states with different accelerations, so that it holds for user effects, too.
 bool uses_acceleration(const Machine& machine, std::span<const AppliedEffect> effects);
 
-/// Largest flow the effects leave a pump [m^3/s]; infinity = no say.
-double effect_flow_limit(const Machine& machine, std::span<const AppliedEffect> effects, int pump);
+/// The smallest of a pump's own largest flow and what the effects leave it. [m^3/s]
+/// @param own 0 = not limited  @return 0 = not limited
+double effect_flow_limit(const Machine& machine, std::span<const AppliedEffect> effects, int pump,
+                         double own);
 
 }  // namespace sparflow

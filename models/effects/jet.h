@@ -34,6 +34,20 @@ class Jet {
     return j;
   }
 
+  /// From known derivatives. @param gradient(i), hessian(i, j) callables, the second asked for j <= i
+  template <class Gradient, class Hessian>
+  static Jet of(double v, int count, const Gradient& gradient, const Hessian& hessian) {
+    Jet r(v);
+    r.n_ = count;
+    double* rg = r.data_.data();
+    double* rh = rg + count;
+    for (int i = 0, p = 0; i < count; ++i) {
+      rg[i] = gradient(i);
+      for (int j = 0; j <= i; ++j, ++p) rh[p] = hessian(i, j);
+    }
+    return r;
+  }
+
   int variables() const { return n_; }
   double gradient(int i) const { return i < n_ ? data_[static_cast<std::size_t>(i)] : 0.0; }
   double hessian(int i, int j) const {
@@ -53,6 +67,27 @@ class Jet {
       rg[i] = f1 * g[i];
       const double w = f2 * g[i];
       for (int j = 0; j <= i; ++j, ++p) rh[p] = f1 * h[p] + w * g[j];
+    }
+    return r;
+  }
+
+  /// f(a, b) from its value and partial derivatives.
+  static Jet chain(const Jet& a, const Jet& b, double f0, double fa, double fb, double faa,
+                   double fab, double fbb) {
+    if (b.n_ == 0) return a.chain(f0, fa, faa);
+    if (a.n_ == 0) return b.chain(f0, fb, fbb);
+    Jet r(f0);
+    r.n_ = a.n_;
+    const double *ag = a.data_.data(), *bg = b.data_.data();
+    const double *ah = ag + a.n_, *bh = bg + a.n_;
+    double* rg = r.data_.data();
+    double* rh = rg + a.n_;
+    for (int i = 0, p = 0; i < a.n_; ++i) {
+      rg[i] = fa * ag[i] + fb * bg[i];
+      const double wa = faa * ag[i] + fab * bg[i], wb = fab * ag[i] + fbb * bg[i];
+      for (int j = 0; j <= i; ++j, ++p) {
+        rh[p] = fa * ah[p] + fb * bh[p] + wa * ag[j] + wb * bg[j];
+      }
     }
     return r;
   }
