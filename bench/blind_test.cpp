@@ -125,6 +125,7 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
   run.answer = fmt::format("{}", fmt::join(answer, " + "));
   if (d.verdict == Verdict::kUnknown && d.unexplained)
     run.answer += "unknown: " + d.unexplained->sentence;
+  if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
   run.exact = answer == truth;
   run.all_found = std::includes(answer.begin(), answer.end(), truth.begin(), truth.end());
   // valve_lag may be asked for a cylinder or for all: the place then does not count
@@ -147,6 +148,9 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
             run.errors.push_back(std::abs(e.applied.values[k] / p.equivalent - 1.0));
             run.covered.push_back(p.equivalent >= e.applied.lower95[k] &&
                                   p.equivalent <= e.applied.upper95[k]);
+            run.truth +=
+                fmt::format(" {} {:.4g} ({:.4g}..{:.4g}) for {:.4g}", p.name, e.applied.values[k],
+                            e.applied.lower95[k], e.applied.upper95[k], p.equivalent);
           }
         }
       }

@@ -207,15 +207,22 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
   }
   for (const Log& log : references)
     pinned.push_back(make_signals(model.machine, log, options.signals));
-  if (!bad.empty()) {
-    Diagnosis d;
-    d.verdict = Verdict::kBadData;
-    d.evidence = collect_evidence(model, suspects, pinned);
-    d.notes = d.evidence.notes;
+  // Steps that no other channel shares may be a sensor's or a late pump's: where known physics explains the
+  // channel down to its noise, they were physics. Other faults leave nothing to explain.
+  const bool surely_bad = std::any_of(
+      bad.begin(), bad.end(), [](const BadChannel& b) { return b.kind != BadDataKind::kJumping; });
+  if (!surely_bad) {
+    Diagnosis d = diagnose_signals(model, suspects, pinned, options, progress);
+    if (!bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
     d.bad = std::move(bad);
     return d;
   }
-  return diagnose_signals(model, suspects, pinned, options, progress);
+  Diagnosis d;
+  d.verdict = Verdict::kBadData;
+  d.evidence = collect_evidence(model, suspects, pinned);
+  d.notes = d.evidence.notes;
+  d.bad = std::move(bad);
+  return d;
 }
 
 }  // namespace sparflow

@@ -144,19 +144,18 @@ EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& des
     down[s] -= h;
     const EffectDesign a = make_design(evidence, design.effect, up),
                        b = make_design(evidence, design.effect, down);
-    bool acts = false;
+    const bool choice = design.shape[s] == std::round(design.shape[s]);  // of variants: no slope
     for (std::size_t c = 0; c < design.columns.size(); ++c) {
       if (!design.touches(c)) continue;
       VectorXd slope = VectorXd::Zero(evidence.channels[c].rows());
       if (a.touches(c)) slope += a.columns[c] * theta;
       if (b.touches(c)) slope -= b.columns[c] * theta;
       slope /= 2.0 * h;
-      acts = acts || slope.cwiseAbs().maxCoeff() > 0.0;
+      if (choice) slope.setZero();
       MatrixXd wider(slope.size(), result.columns[c].cols() + 1);
       wider << result.columns[c], slope;
       result.columns[c] = std::move(wider);
     }
-    (void)acts;
     ++result.linear;
     result.lower.push_back(-std::numeric_limits<double>::max());
     result.upper.push_back(std::numeric_limits<double>::max());

@@ -54,6 +54,11 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
   return points;
 }
 
+/// A parameter with whole numbers only names variants of a law (with or without rescaling): nothing lies between.
+bool is_choice(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return v == std::round(v); });
+}
+
 class Search {
  public:
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
@@ -248,6 +253,7 @@ class Search {
       for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
       std::sort(values.begin(), values.end());
       values.erase(std::unique(values.begin(), values.end()), values.end());
+      if (is_choice(values)) continue;
       const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
       if (here == values.end()) continue;
       double lo = here == values.begin() ? *here : *(here - 1);

@@ -23,6 +23,7 @@ constexpr double kShortestBlock_s = 0.3;
 /// Longer motions are cut: blocks are what is held out and resampled.
 constexpr double kLongestBlock_s = 8.0;
 constexpr Index kFewestRows = 30;
+constexpr double kFlowUnit = 1e-3, kForceUnit = 1e5;  ///< of the baselines: near one
 
 /// Response of the filter's `derivative` to an impulse, inside an evenly sampled run.
 VectorXd impulse_response(double step, double window, int order, int derivative) {
@@ -159,6 +160,14 @@ double raw_noise(const VectorXd& x) {
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
 }
 
+/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the builder's units.
+void slope_of(EvidenceChannel& channel) {
+  channel.force_slope = VectorXd::Zero(channel.rows());
+  if (channel.baseline.cols() != 5) return;
+  const VectorXd b = channel.baseline.colPivHouseholderQr().solve(channel.y);
+  channel.force_slope = (b[3] + b[4] * channel.baseline.col(1).array()) / kForceUnit;
+}
+
 std::vector<BranchSplit> branches_of(const Evidence& e,
                                      const std::vector<const MachineSignals*>& signals,
                                      std::size_t cylinder, int side) {
@@ -247,6 +256,12 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     Eigen::MatrixXd raw;
     if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
       continue;
+    Eigen::MatrixXd through_force;  // of a sensor: what its error does by way of the measured force
+    if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
+        !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,
+                                through_force)) {
+      through_force.resize(0, 0);
+    }
     if (!effect.effect->columns_filtered()) {
       for (Index c = 0; c < raw.cols(); ++c) {
         raw.col(c) = filter(log, channel.kind, raw.col(c).unaryExpr([](double v) {
@@ -259,7 +274,11 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
       if (channel.log[b] != static_cast<int>(log)) continue;
       for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
         for (Index c = 0; c < raw.cols(); ++c) {
-          const double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
+          double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
+          if (through_force.size() > 0) {
+            v -= channel.force_slope[r] *
+                 through_force(channel.sample[static_cast<std::size_t>(r)], c);
+          }
           result(r, c) = std::isfinite(v) ? v : 0.0;
         }
       }
@@ -320,6 +339,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         const VectorXd y =
             e.filter(log, EvidenceKind::kForce, c.force - known(log, EvidenceKind::kForce, i)) -
             c.static_force;
+        if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
         b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
               margin_of(log));
         const double raw = raw_noise(c.force);
@@ -386,7 +406,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           const VectorXd y = e.filter(log, kind, raw - known(log, kind, i));
           const VectorXd& q = returning ? s.return_flow : s.flow;
           Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
-          const double q0 = 1e-3, f0 = 1e5;  // near one
+          const double q0 = kFlowUnit, f0 = kForceUnit;
           base.col(0).setOnes();
           base.col(1) = q / q0;
           base.col(2) = (q / q0).cwiseAbs2();
@@ -402,7 +422,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         b.channel.unit = {"bar", 1e5};
         b.channel.noise_floor = noise;
         b.channel.text = evidence_text(kind, name);
-        b.finish(e.channels);
+        if (b.finish(e.channels) && !returning) slope_of(e.channels.back());
       }
     }
   }
@@ -425,6 +445,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
             log, EvidenceKind::kPump, (series.leader.array() == leader).cast<double>().matrix());
       }
       b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
+      if (log < e.suspects) b.channel.raw.push_back(s.pressure - series.demand);
       if (log < e.suspects) noise = raw_noise(s.pressure) * gain_pressure[log];
     }
     b.channel.index = p;

@@ -29,6 +29,11 @@ struct EvidenceChannel {
   std::vector<NoiseBlock> blocks;    ///< stretches of motion
   std::vector<int> log;              ///< [blocks] index into Evidence::series
   std::vector<Eigen::Index> sample;  ///< [rows] in that log
+  /// Of forces and pumps, by suspect log: y before the filter [samples]; oscillations are looked for there.
+  std::vector<Eigen::VectorXd> raw;
+  /// Of supply channels: what one newton of measured force adds to y by the baseline [rows, Pa/N]. A sensor that
+  /// reads wrong shifts the force too, and with it the baseline's answer.
+  Eigen::VectorXd force_slope;
   double noise_floor = 0.0;  ///< standard deviation of the sensors' noise in y; NaN = not known
 
   Eigen::Index rows() const { return y.size(); }

@@ -83,6 +83,66 @@ Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<in
   return best;
 }
 
+/// An oscillation whose frequency wanders draws no line: the deepest dip of the autocorrelation between a twentieth
+/// and one second of what is faster than a second. White noise has none, a step decays without one.
+struct Swing {
+  double dip = 0.0;        // autocorrelation there, of what exceeds white noise
+  double frequency = 0.0;  // [Hz] half a period to the dip
+  double rms = 0.0, noise = 0.0;
+};
+
+Swing strongest_swing(const Evidence& evidence, const EvidenceChannel& channel) {
+  Swing best;
+  for (std::size_t log = 0; log < channel.raw.size(); ++log) {
+    const MachineSeries& s = evidence.series[log];
+    const auto half = static_cast<Index>(std::lround(0.5 / s.step));
+    const auto longest = static_cast<Index>(std::lround(0.7 / s.step)),
+               shortest = std::max<Index>(2, static_cast<Index>(std::lround(0.05 / s.step)));
+    VectorXd c = VectorXd::Zero(longest + 1);
+    double n = 0.0, white = 0.0;
+    for (const auto& [first, last] : s.runs) {
+      const Index length = last - first;
+      if (length < 8 * half) continue;
+      const VectorXd x = channel.raw[log].segment(first, length);
+      VectorXd h = VectorXd::Constant(length, std::numeric_limits<double>::quiet_NaN());
+      for (Index i = half; i + half < length; ++i)
+        h[i] = x[i] - x.segment(i - half, 2 * half + 1).mean();
+      // starts and stops of motions are steps, not swings: larger than five times the usual is left out
+      std::vector<double> sizes;
+      for (const double v : h) {
+        if (std::isfinite(v)) sizes.push_back(std::abs(v));
+      }
+      if (sizes.size() < 200) continue;
+      const double usual =
+          1.4826 * median(Eigen::Map<VectorXd>(sizes.data(), static_cast<Index>(sizes.size())));
+      for (Index i = 0; i + longest < length; ++i) {
+        if (!(std::abs(h[i]) < 5.0 * usual)) continue;
+        bool whole = true;
+        for (Index l = 0; l <= longest && whole; ++l) whole = std::abs(h[i + l]) < 5.0 * usual;
+        if (!whole) continue;
+        for (Index l = 0; l <= longest; ++l) c[l] += h[i] * h[i + l];
+        n += 1.0;
+      }
+      for (Index i = 3; i < length; ++i) {
+        const double d = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
+        if (std::isfinite(d)) white += std::min(d * d / 20.0, 25.0 * usual * usual);
+      }
+      white /= static_cast<double>(length);
+    }
+    if (n < 200.0) continue;
+    c /= n;
+    const double coloured = c[0] - white;
+    if (coloured < 0.5 * white) continue;  // no larger than the noise
+    for (Index l = shortest; l < longest; ++l) {
+      if (c[l] / coloured < best.dip && c[l] <= c[l - 1] && c[l] <= c[l + 1]) {
+        best = {c[l] / coloured, 0.5 / (static_cast<double>(l) * s.step), std::sqrt(coloured),
+                std::sqrt(white)};
+      }
+    }
+  }
+  return best;
+}
+
 std::vector<int> folds_of(const EvidenceChannel& channel, int folds) {
   std::vector<int> fold(static_cast<std::size_t>(channel.rows()));
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
@@ -170,7 +230,11 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
   std::vector<SignalColumn> out;
   const Machine& machine = *evidence.series[0].machine;
   // A signal that shares its sensor with the channel explains the sensor's noise, nothing else.
+  const bool pressures = channel.kind != EvidenceKind::kForce &&
+                         channel.kind != EvidenceKind::kFlow && channel.kind != EvidenceKind::kPump;
   const auto shares_sensor = [&](std::size_t cylinder, bool pressure) {
+    if (pressures && static_cast<int>(cylinder) == channel.index)
+      return true;  // the learned process' own inputs
     const bool own =
         channel.kind != EvidenceKind::kPump && static_cast<int>(cylinder) == channel.index;
     if (channel.kind == EvidenceKind::kPump) return pressure;
@@ -205,8 +269,10 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
       cylinder("v_" + name, [&](C& c, Index k) { return c.speed[k]; });
       cylinder("a_" + name, [&](C& c, Index k) { return c.acceleration[k]; });
     }
-    cylinder("F_" + name, [&](C& c, Index k) { return c.static_force[k]; });
-    cylinder("u_" + name, [&](C& c, Index k) { return at(c.command, k); });
+    if (!(pressures && static_cast<int>(i) == channel.index)) {
+      cylinder("F_" + name, [&](C& c, Index k) { return c.static_force[k]; });
+      cylinder("u_" + name, [&](C& c, Index k) { return at(c.command, k); });
+    }
     if (!shares_sensor(i, true)) {
       cylinder("pA_" + name, [&](C& c, Index k) { return at(c.pressure_a, k); });
       cylinder("pB_" + name, [&](C& c, Index k) { return at(c.pressure_b, k); });
@@ -216,6 +282,7 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
     });
   }
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
+    if (channel.kind == EvidenceKind::kPump) continue;
     add("p_" + machine.pumps[p].name, [&](const MachineSeries& s, Index k, const NoiseBlock&,
                                           Index) { return at(s.pumps[p].pressure, k); });
   }
@@ -236,6 +303,33 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
   return out;
 }
 
+namespace {
+
+/// Products of hat functions of own flow and own measured force.
+MatrixXd own_process_basis(const Evidence& evidence, const EvidenceChannel& channel,
+                           const std::vector<Index>& rows) {
+  VectorXd flow(channel.rows()), force(channel.rows());
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    const CylinderSeries& c = evidence.series[static_cast<std::size_t>(channel.log[b])]
+                                  .cylinders[static_cast<std::size_t>(channel.index)];
+    for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) {
+      const Index k = channel.sample[static_cast<std::size_t>(i)];
+      flow[i] = c.flow[k];
+      force[i] = c.force.size() > k ? c.force[k] : c.static_force[k];
+    }
+  }
+  const MatrixXd a = hats(flow(rows)), b = hats(force(rows));
+  if (a.cols() == 0 || b.cols() == 0) return MatrixXd::Ones(static_cast<Index>(rows.size()), 1);
+  MatrixXd basis(static_cast<Index>(rows.size()), a.cols() * b.cols());
+  for (Index i = 0; i < a.cols(); ++i) {
+    for (Index j = 0; j < b.cols(); ++j)
+      basis.col(i * b.cols() + j) = a.col(i).cwiseProduct(b.col(j));
+  }
+  return basis;
+}
+
+}  // namespace
+
 std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& fit,
                                      const LeftoverOptions& options) {
   std::vector<Leftover> found;
@@ -244,7 +338,16 @@ std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& 
     const VectorXd& whole = fit.residual[c];
     const std::vector<Index> rows = suspect_rows(evidence, channel);
     if (rows.size() < 80 || whole.size() == 0) continue;
-    const VectorXd y = whole(rows).array() - whole(rows).mean();
+    VectorXd y = whole(rows).array() - whole(rows).mean();
+    if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow &&
+        channel.kind != EvidenceKind::kPump) {
+      // a learned process follows any smooth law of the cylinder's own flow and force: that is no riddle
+      const MatrixXd own = own_process_basis(evidence, channel, rows);
+      MatrixXd gram = own.transpose() * own;
+      gram.diagonal().array() += 1e-3 * gram.diagonal().mean();
+      y -= own * gram.llt().solve(own.transpose() * y);
+      y.array() -= y.mean();
+    }
     const std::vector<int> all_folds = folds_of(channel, options.folds);
     std::vector<int> fold;
     for (const Index i : rows) fold.push_back(all_folds[static_cast<std::size_t>(i)]);
@@ -289,6 +392,16 @@ std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& 
     left.explained = std::max(ridge.explained, line.share);
     left.rms = std::sqrt(std::max(0.0, left.explained) * variance);
     left.noise = std::sqrt(std::max(0.0, 1.0 - left.explained) * variance);
+    const Swing swing = strongest_swing(evidence, channel);
+    if (swing.dip < options.deepest_dip && left.explained < options.least_share) {
+      left.explained = swing.rms * swing.rms / (swing.rms * swing.rms + swing.noise * swing.noise);
+      left.rms = swing.rms;
+      left.noise = swing.noise;
+      left.frequency = swing.frequency;
+      left.depends_on.push_back(fmt::format("time, a swing near {:.1f} Hz", swing.frequency));
+      found.push_back(std::move(left));
+      continue;
+    }
     if (left.explained < options.least_share || left.rms < options.least_size * left.noise)
       continue;
     if (line.share > 0.5 * left.explained) {

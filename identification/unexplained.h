@@ -25,6 +25,7 @@ struct Leftover {
 struct LeftoverOptions {
   double least_share = 0.10;  ///< of the residual's variance, on motions left out
   double least_size = 0.35;   ///< RMS of the explained part / noise of the rest
+  double deepest_dip = -0.3;  ///< of the autocorrelation of what is fast, below which it swings
   int folds = 5;
 };
 
