@@ -47,7 +47,7 @@ struct BadDataOptions {
   /// Noise or jumps below these do no harm, whatever their twins do.
   double least_pressure = 5e3;      ///< [Pa] noise; jumps: twenty times
   double least_command = 0.03;      ///< [-] noise; jumps: five times
-  double least_speed_share = 0.04;  ///< position noise, as filtered speed over the joint's limit
+  double least_speed_share = 0.02;  ///< position noise, as filtered speed over the joint's limit
 };
 
 /// Every measured channel of the log that is bad, worst (largest share) first; at most one entry a channel.

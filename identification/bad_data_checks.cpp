@@ -338,7 +338,8 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
   if (known.size() == 0) return {};
   // without noise a standby or a relief valve looks the same
   constexpr double kNoiseless = 1e-4;
-  if (context.noise[channel].quiet < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
+  const double lively = quantile(finite_values(context.noise[channel].level), 0.75);
+  if (lively < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
   Repeats all;
   const Mask state = driven(context, c);
   for (const SampleRange& run : context.log.runs) all.add(values, state, run);

@@ -120,6 +120,8 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
       unit = s.unit;
       for (Index k = 0; k < s.measured.size(); ++k) {
         if (!std::isfinite(s.measured[k])) continue;
+        // outside what a process was learned from neither of its two answers means anything
+        if (s.extrapolated.size() > 0 && s.extrapolated[k]) continue;
         if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) continue;
         const double e = s.predicted[k] - s.measured[k], from_before = before.at(s, k);
         if (!std::isfinite(from_before)) continue;

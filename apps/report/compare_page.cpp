@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/report/compare_causes.h"
 #include "apps/report/compare_charts.h"
 #include "apps/report/score_judgement.h"
 #include "models/model_file.h"
@@ -171,6 +172,22 @@ std::string where_it_fails(const CompareResult& result, const StageScore& worst)
   return text;
 }
 
+const char* bad_words(BadDataKind kind) {
+  switch (kind) {
+    case BadDataKind::kStuck:
+      return "is stuck";
+    case BadDataKind::kJumping:
+      return "jumps";
+    case BadDataKind::kNoisy:
+      return "is noisy";
+    case BadDataKind::kDropOut:
+      return "drops out";
+    case BadDataKind::kSaturated:
+      return "is cut off";
+  }
+  return "";
+}
+
 void set_verdict(Page& page, const CompareResult& result, const std::vector<JudgedScore>& judged) {
   const JudgedScore* worst = worst_score(judged);
   if (worst == nullptr) {
@@ -199,6 +216,13 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
                ? "No region of poses, speeds or loads stands out. "
                : "What error there is lies most here: " + result.worst.front().sentence + ". ";
   }
+  if (!result.bad_data.empty()) {
+    tone = Tone::kBad;
+    headline = "Bad data: " + result.bad_data.front().bad.channel + " " +
+               bad_words(result.bad_data.front().bad.kind);
+    text = bad_channel_sentence(result.bad_data.front().bad) + " " + text;
+  }
+  if (!result.fault.sentence.empty()) text = result.fault.sentence + " " + text;
   page.verdict(tone, headline,
                text + fmt::format("RMS error at the worst place of each stage: {}.",
                                   in_short(result, judged)));
@@ -216,6 +240,7 @@ void add_comparison(Page& page, const CraneModel& model, const CompareResult& re
   for (const std::string& note : result.notes)
     page.paragraph(note.ends_with('.') ? note : note + ".");
   if (result.scores.empty()) return;
+  add_causes(page, result, heading_prefix);
   add_worst_regions(page, result, heading_prefix);
   add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");
