@@ -1,5 +1,7 @@
 #include "simulator/hidden_effects/body_forces.h"
 
+#include <algorithm>
+
 #include "models/linkage.h"
 
 namespace sparflow::simulator {
@@ -7,6 +9,7 @@ namespace {
 
 // central differences of smooth functions of order 1 over 1 rad or 1 m: truncation 1e-9, rounding 1e-11, relative
 constexpr double kStep = 1e-4;
+constexpr double kSlack = 1e-3;  // [rad] or [m]
 
 Eigen::Vector3d towards(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double distance) {
   return from + (to - from).normalized() * distance;
@@ -78,8 +81,11 @@ void BodyForces::place(const double* q, std::vector<Eigen::Vector3d>& positions)
     const bool massless = bodies_[b].mass == 0.0 && bodies_[b + 1].mass == 0.0 &&
                           bodies_[b + 2].mass == 0.0 && bodies_[b + 3].mass == 0.0;
     if (!massless) {
-      const auto pins = linkage_pins<double>(machine_, i, q[c.joint]);
       const Joint& joint = machine_.joints[static_cast<std::size_t>(c.joint)];
+      // a posture that gives way under load may lie beyond the range in which a four-bar closes
+      const double reached =
+          std::clamp(q[c.joint], joint.position.lo - kSlack, joint.position.hi + kSlack);
+      const auto pins = linkage_pins<double>(machine_, i, reached);
       // a direct cylinder lies along its joint's axis, also at zero stroke where the pins coincide
       const Eigen::Vector3d along = std::holds_alternative<DirectLinkage>(c.linkage)
                                         ? Eigen::Vector3d(joint.origin.linear() * joint.axis)

@@ -46,7 +46,7 @@ class PadFriction final : public HiddenLaw {
   }
   std::vector<HiddenParameter> parameters() const override {
     const double per_metre = mu_ / spacing_;
-    return {{"mu_per_spacing", per_metre, "1/m", equivalent_.value(per_metre)}};
+    return {{"mu_by_spacing", per_metre, "1/m", equivalent_.value(per_metre)}};
   }
 
  private:
@@ -82,7 +82,7 @@ class EndCushion final : public HiddenLaw {
     if (speed > kMoving) equivalent_.add(f, depth * depth * sign_of(c.speed));
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"F_end", force_, "N", equivalent_.value(force_)}, {"zone", zone_, "m", zone_}};
+    return {{"force", force_, "N", equivalent_.value(force_)}, {"zone", zone_, "m", zone_}};
   }
 
  private:
@@ -108,7 +108,7 @@ class ForceOffset final : public HiddenLaw {
     equivalent_.add(f, 1.0);
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"F", force_, "N", equivalent_.value(force_)}};
+    return {{"offset", force_, "N", equivalent_.value(force_)}};
   }
 
  private:
@@ -153,20 +153,20 @@ std::vector<LawEntry> contact_laws() {
            at,
            true,
            {"fixed pad spacing", "overlap shrinks as the telescope runs out"},
-           "mu_per_spacing [1/m]: friction per bending moment",
+           "mu_by_spacing [1/m]: friction per bending moment",
            make_law<PadFriction>,
            on_telescope},
           {"end_cushion",
            at,
            true,
            {"quadratic in depth", "power 2.5 and speed", "quadratic to cubic"},
-           "F_end [N] at the stop, zone [m]; both ends, towards the stop only",
+           "force [N] at the stop, zone [m]; both ends, towards the stop only",
            make_law<EndCushion>},
           {"force_offset",
            at,
            true,
            {"constant", "weak spring"},
-           "F [N], positive adds to the load",
+           "offset [N], positive adds to the load",
            make_law<ForceOffset>},
           {"inertia",
            HiddenPlace::kMachine,

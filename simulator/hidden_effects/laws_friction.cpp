@@ -110,8 +110,8 @@ class Stribeck final : public OnCylinder {
  public:
   explicit Stribeck(LawContext& c)
       : OnCylinder(c),
-        force_(c.size * c.draw(3.0, 10.0) * kBar * drive_area(c.cylinder())),
-        speed_(c.draw(4e-3, 12e-3)) {}
+        force_(c.size * c.draw(6.0, 10.0) * kBar * drive_area(c.cylinder())),
+        speed_(c.draw(6e-3, 16e-3)) {}
   void force(PlantState& s, BodyForces&) override {
     CylinderState& c = here(s);
     const double r = std::abs(c.speed) / speed_;
@@ -182,7 +182,7 @@ class Presliding final : public OnCylinder {
     c.force += force_ * state;
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"F", force_, "N", force_}, {"distance", distance_, "m", distance_}};
+    return {{"Fc", force_, "N", force_}, {"distance", distance_, "m", distance_}};
   }
 
  private:
@@ -227,7 +227,7 @@ std::vector<LawEntry> friction_laws() {
            at,
            true,
            {"Dahl", "Maxwell slip, four elements"},
-           "F [N] after full slip, distance [m] of memory",
+           "Fc [N] after full slip, distance [m] of memory",
            make_law<Presliding>}};
 }
 

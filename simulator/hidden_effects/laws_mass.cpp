@@ -26,7 +26,7 @@ Eigen::Vector3d bone(const Machine& machine, int joint) {
 double mass_beyond(const Machine& machine, int joint) {
   double mass = 0.0;
   for (const Link& l : machine.links)
-    if (l.joint >= joint) mass += l.mass;
+    if (l.joint >= joint || l.slides_with >= joint) mass += l.mass;
   return std::max(mass, 20.0);
 }
 
@@ -67,7 +67,7 @@ class UnmodelledMass final : public HiddenLaw {
  public:
   explicit UnmodelledMass(LawContext& c) : joint_(c.at), law_(c.law) {
     const double reach = bone(*c.machine, c.at).norm();
-    mass_ = c.size * c.draw(0.04, 0.10) * mass_beyond(*c.machine, c.at);
+    mass_ = c.size * c.draw(0.07, 0.12) * mass_beyond(*c.machine, c.at);
     cog_ = c.draw(0.25, 0.8) * std::max(reach, 0.5);
   }
   void change_machine(Machine& machine) const override {
@@ -186,7 +186,8 @@ class StructuralFlex final : public HiddenLaw {
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"compliance", compliance_, "rad/(N m)", compliance_}};
+    return {{"kappa_first", compliance_, "rad/(N m)", compliance_},
+            {"kappa_rest", compliance_, "rad/(N m)", compliance_}};
   }
 
  private:
@@ -239,7 +240,7 @@ std::vector<LawEntry> mass_laws() {
            HiddenPlace::kMachine,
            true,
            {"linear in every revolute joint's torque", "slightly stiffening"},
-           "compliance [rad/(N m)]: posture of the bodies = q - compliance * torque",
+           "kappa_first, kappa_rest [rad/(N m)]: posture of the bodies = q - kappa * torque",
            make_law<StructuralFlex>,
            luffs}};
 }

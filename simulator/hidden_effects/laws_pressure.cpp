@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {
@@ -83,10 +84,7 @@ class LineLoss final : public HiddenLaw {
 class Counterbalance final : public HiddenLaw {
  public:
   explicit Counterbalance(LawContext& c)
-      : at_(static_cast<std::size_t>(c.at)),
-        law_(c.law),
-        opening_(c.size * c.draw(40.0, 80.0) * kBar),
-        slope_(c.draw(0.15, 0.33)) {
+      : at_(static_cast<std::size_t>(c.at)), law_(c.law), slope_(c.draw(0.15, 0.33)) {
     // the side that holds the load most of the time is the one that is lowered against
     const Cylinder& drive = c.cylinder();
     BodyForces bodies(*c.machine);
@@ -94,8 +92,13 @@ class Counterbalance final : public HiddenLaw {
     std::vector<double> q;
     for (const Joint& j : c.machine->joints) q.push_back(0.5 * (j.position.lo + j.position.hi));
     bodies.gravity(q.data(), 0.5 * c.payload, loads);
-    lowering_ = loads.gravity[static_cast<std::size_t>(drive.joint)] >= 0.0 ? -1 : 1;
+    const auto j = static_cast<std::size_t>(drive.joint);
+    const double rate = linkage_rates(*c.machine, c.at, q[j]).d1;
+    const double weight = loads.gravity[j] / rate;
+    lowering_ = weight >= 0.0 ? -1 : 1;
     holding_area_ = lowering_ < 0 ? drive.area_piston() : drive.area_rod();
+    // set so that the usual load still needs some tens of bar of supply pressure to be lowered
+    opening_ = slope_ * std::abs(weight) / holding_area_ + c.size * c.draw(25.0, 60.0) * kBar;
   }
   void prepare_crane(CraneLaws& laws) const override {
     laws.cylinders[at_].direction[lowering_ > 0 ? 0 : 1].counterbalance = false;
@@ -111,13 +114,13 @@ class Counterbalance final : public HiddenLaw {
     c.pilot_pressure = std::max(c.pilot_pressure, std::max(p, 0.0));
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"opening", opening_, "Pa", opening_}, {"slope", slope_, "-", slope_}};
+    return {{"setting", opening_, "Pa", opening_}, {"slope", slope_, "-", slope_}};
   }
 
  private:
   std::size_t at_;
   int law_, lowering_ = -1;
-  double opening_, slope_, holding_area_ = 1.0;
+  double opening_ = 0.0, slope_, holding_area_ = 1.0;
 };
 
 class OilTemperature final : public HiddenLaw {
@@ -137,7 +140,7 @@ class OilTemperature final : public HiddenLaw {
       for (std::size_t d = 0; d < 2; ++d) {
         DirectionLaws& law = laws.cylinders[i].direction[d];
         const double full = law.valve_gain * (d == 0 ? ratio_[i] : 1.0 / ratio_[i]);
-        law.return_laminar = 10.0 * kBar / full;
+        law.return_laminar = kLaminarLoss / full;
       }
     }
   }
@@ -151,11 +154,12 @@ class OilTemperature final : public HiddenLaw {
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"beta", beta_, "1/K", beta_}, {"T0", kReference, "degC", kReference}};
+    return {{"beta", beta_, "1/K", beta_}, {"return_loss", kLaminarLoss, "Pa", kLaminarLoss}};
   }
 
  private:
-  static constexpr double kReference = 40.0;  // [degC]
+  static constexpr double kReference = 40.0;           // [degC]
+  static constexpr double kLaminarLoss = 16.0 * kBar;  // at full flow and 40 degC
   double viscosity(double oil) const {
     if (law_ == 0) return std::exp(-beta_ * (oil - kReference));
     if (law_ == 1) {  // Walther: log log viscosity linear in log T; same slope at 40 degC
@@ -217,7 +221,7 @@ std::vector<LawEntry> pressure_laws() {
            HiddenPlace::kCylinder,
            true,
            {"linear in load", "with a flow-dependent opening", "soft knee"},
-           "opening [Pa] supply pressure without load, slope [-] its fall with load pressure; the "
+           "setting [Pa] supply pressure without load, slope [-] its fall with load pressure; the "
            "reference crane "
            "has no such valve on this side",
            make_law<Counterbalance>,
@@ -226,7 +230,7 @@ std::vector<LawEntry> pressure_laws() {
            HiddenPlace::kMachine,
            true,
            {"exponential", "Walther (ASTM D341)", "table of straight pieces"},
-           "beta [1/K] of laminar return losses, T0 [degC]",
+           "beta [1/K], return_loss [Pa] laminar loss of every section at full flow and 40 degC",
            make_law<OilTemperature>,
            any_hydraulic}};
 }

@@ -26,7 +26,8 @@ class PressureOffset final : public HiddenLaw {
     p += offset_ + (law_ == 1 ? 1e-3 * p : 0.0);
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{side_a_ ? "offset_A" : "offset_B", offset_, "Pa", offset_}};
+    return {{"offset", offset_, "Pa", offset_},
+            {"chamber", side_a_ ? 1.0 : -1.0, "-", side_a_ ? 1.0 : -1.0}};
   }
 
  private:
@@ -53,8 +54,8 @@ class SensorDelay final : public HiddenLaw {
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    // positive: positions come late against pressures
-    return {{"delay", law_ == 1 ? -delay_ : delay_, "s", law_ == 1 ? -delay_ : delay_}};
+    const double late = law_ == 1 ? -1.0 : 1.0;
+    return {{"delay", delay_, "s", delay_}, {"late", late, "-", late}};
   }
 
  private:
@@ -146,14 +147,14 @@ std::vector<LawEntry> sensor_laws() {
            HiddenPlace::kCylinder,
            true,
            {"constant", "with a gain error of 0.1 %"},
-           "offset_A or offset_B [Pa] added to that chamber's reading",
+           "offset [Pa] added to the reading of chamber 1 (A) or -1 (B)",
            make_law<PressureOffset>,
            hydraulic},
           {"sensor_delay",
            HiddenPlace::kMachine,
            true,
            {"all positions late", "all pressures late", "one position late"},
-           "delay [s], positive: positions late against pressures",
+           "delay [s]; late 1: positions, -1: pressures",
            make_law<SensorDelay>},
           {"sensor_fault",
            HiddenPlace::kChannel,

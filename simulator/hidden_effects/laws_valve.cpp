@@ -33,7 +33,10 @@ class Deadband final : public HiddenLaw {
     return side > 0 ? extend_ : (side < 0 ? retract_ : 0.0);
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"u0_extend", extend_, "-", extend_}, {"u0_retract", retract_, "-", retract_}};
+    const double full = law_ == 1 ? 1.0 : 0.0;
+    return {{"u0_extend", extend_, "-", extend_},
+            {"u0_retract", retract_, "-", retract_},
+            {"full_flow", full, "-", full}};
   }
 
  private:
@@ -68,7 +71,10 @@ class Lag final : public HiddenLaw {
     CylinderState& c = s.cylinders[at_];
     if (law_ == 0) c.asked = sign_of(c.command);
   }
-  std::vector<HiddenParameter> parameters() const override { return {{"tau", time_, "s", time_}}; }
+  std::vector<HiddenParameter> parameters() const override {
+    const double pure = law_ == 1 ? 1.0 : 0.0;
+    return {{"tau", time_, "s", time_}, {"delay", pure, "-", pure}};
+  }
 
  private:
   std::size_t at_;
@@ -120,14 +126,14 @@ std::vector<LawEntry> valve_laws() {
            HiddenPlace::kCylinder,
            true,
            {"|u| - u0", "(|u| - u0) / (1 - u0)", "smooth knee"},
-           "u0_extend, u0_retract [-]",
+           "u0_extend, u0_retract [-], full_flow 1: rescaled",
            make_law<Deadband>,
            hydraulic},
           {"valve_lag",
            HiddenPlace::kCylinder,
            true,
            {"first order, pump follows the lever", "pure delay", "two stages"},
-           "tau [s] (two stages: their sum)",
+           "tau [s] (two stages: their sum), delay 1: pure delay",
            make_law<Lag>,
            hydraulic},
           {"flow_saturation",

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {
@@ -47,7 +48,14 @@ class Compressibility final : public HiddenLaw {
         law_(c.law),
         area_a_(c.cylinder().area_piston()),
         area_b_(c.cylinder().area_rod()),
-        stiffness_(c.size * c.draw(2.0, 6.0) * area_a_ / 0.02 * 1e-11) {}
+        inverse_modulus_(c.size * c.draw(1.5, 4.0) * 1e-9) {
+    const Range range = c.machine->joints[static_cast<std::size_t>(c.cylinder().joint)].position;
+    const double a = cylinder_length<double>(*c.machine, c.at, range.lo);
+    const double b = cylinder_length<double>(*c.machine, c.at, range.hi);
+    shortest_ = c.cylinder().length_at_zero_stroke.value_or(std::min(a, b));
+    travel_ = c.cylinder().stroke.value_or(std::abs(b - a));
+    hose_ = c.draw(0.03, 0.1) * travel_;
+  }
   void drift(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
     // the column that carries the load yields; filtered over 40 ms, the line's own time
@@ -59,22 +67,28 @@ class Compressibility final : public HiddenLaw {
     }
     const double slope = (pressure - smooth_) / kFilter;
     smooth_ += slope * s.h;
-    double volume_per_pressure = stiffness_;
+    const double area = side > 0 ? area_a_ : area_b_;
+    const double stroke = std::clamp(c.length - shortest_, 0.0, travel_);
+    const double column = side > 0 ? stroke : travel_ - stroke;
+    double softness = inverse_modulus_;
     if (law_ == 1)  // free air: softer at low pressure, the same at 100 bar
-      volume_per_pressure *= 0.8 + 0.4 / (1.0 + std::max(0.0, pressure) / (100.0 * kBar));
-    const double flow = volume_per_pressure * slope;
-    c.drift += side > 0 ? -flow / area_a_ : flow / area_b_;
-    if (c.side != 0) equivalent_.add(flow, slope);
+      softness *= 0.8 + 0.4 / (1.0 + std::max(0.0, pressure) / (100.0 * kBar));
+    const double flow = area * (column + hose_) * softness * slope;
+    // a column can only give what a jump of friction asks of it within its own time
+    c.drift += (side > 0 ? -1.0 : 1.0) * std::clamp(flow / area, -kFastest, kFastest);
+    equivalent_.add(flow, area * (column + 0.05 * travel_) * slope);
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"V_over_E", stiffness_, "m^3/Pa", equivalent_.value(stiffness_)}};
+    return {{"1/E", inverse_modulus_, "1/Pa", equivalent_.value(inverse_modulus_)}};
   }
 
  private:
-  static constexpr double kFilter = 0.04;  // [s]
+  static constexpr double kFilter = 0.04;   // [s]
+  static constexpr double kFastest = 0.01;  // [m/s]
   std::size_t at_;
   int law_, side_ = 0;
-  double area_a_, area_b_, stiffness_, smooth_ = 0.0;
+  double area_a_, area_b_, inverse_modulus_, shortest_ = 0.0, travel_ = 1.0, hose_ = 0.0,
+                                             smooth_ = 0.0;
   Equivalent equivalent_;
 };
 
@@ -98,7 +112,7 @@ std::vector<LawEntry> volume_laws() {
            at,
            true,
            {"constant bulk modulus", "softer at low pressure"},
-           "V_over_E [m^3/Pa] of the fed (at rest: loaded) chamber",
+           "1/E [1/Pa]; volume of the fed (at rest: loaded) chamber and its hose",
            make_law<Compressibility>,
            hydraulic}};
 }

@@ -81,6 +81,8 @@ void Plant::move() {
     // a drive without chambers moves at the joint's largest speed with its lever fully open
     double speed =
         drive.hydraulic() ? c.side * c.flow / area : c.opening * machine_.joints[j].velocity.hi;
+    // oil that is displaced through the valve; leaks and compression bypass the return line
+    c.return_flow = c.side == 0 ? 0.0 : std::abs(speed) * other;
     speed += c.drift;
     double joint_speed = speed / c.rate;
     const Range range = machine_.joints[j].position;
@@ -88,12 +90,11 @@ void Plant::move() {
       speed = joint_speed = 0.0;  // the stop
     c.acceleration = (speed - c.speed) / s.h;
     c.speed = speed;
-    c.return_flow = c.side == 0 ? 0.0 : std::abs(speed) * other;
     speed_before2_[j] = speed_before_[j];
     speed_before_[j] = s.qd[j];
     // second order backward difference: no delay against the trapezoidal position
     s.qdd[j] = (3.0 * joint_speed - 4.0 * speed_before_[j] + speed_before2_[j]) / (2.0 * s.h);
-    s.q[j] += 0.5 * s.h * (s.qd[j] + joint_speed);
+    s.q[j] = std::clamp(s.q[j] + 0.5 * s.h * (s.qd[j] + joint_speed), range.lo, range.hi);
     s.qd[j] = joint_speed;
     if (joint_speed != 0.0 || speed_before_[j] != 0.0) {
       const Taylor3 x = linkage_rates(machine_, static_cast<int>(i), s.q[j]);
