@@ -15,6 +15,7 @@ namespace {
 double lifted(double value, const auto&, const auto&, const std::vector<double>&) { return value; }
 Jet lifted(double value, const auto& gradient, const auto& hessian, const std::vector<Jet>& q) {
   std::vector<Jet> away;
+  away.reserve(q.size());
   for (const Jet& x : q) away.push_back(x - Jet(x.value));
   Jet result(value);
   for (std::size_t i = 0; i < q.size(); ++i) {
@@ -34,6 +35,7 @@ Jet chained(const Jet& q, const Taylor3& x) { return q.chain(x.d1, x.d2, x.d3); 
 std::vector<double> plain_values(const std::vector<double>& q) { return q; }
 std::vector<double> plain_values(const std::vector<Jet>& q) {
   std::vector<double> values;
+  values.reserve(q.size());
   for (const Jet& x : q) values.push_back(x.value);
   return values;
 }
