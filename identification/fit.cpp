@@ -34,10 +34,22 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
                        [](const PumpSignals& p) { return p.pressure_effect.size() > 0; });
   });
   if (!again) return pass;
-  // effects on a pump's pressure build on its demand, which is only known with its margins
-  for (MachineSignals& s : signals) apply_effects(pass.model, s);
-  pass.notes = notes;
-  learn_pumps(data, options, pass);
+  // effects on a pump's pressure build on its demand, which is only known with its margins: in turns until settled
+  constexpr int kTurns = 6;
+  constexpr double kSettled = 1e3;  // [Pa]
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const CraneModel before = pass.model;
+    for (MachineSignals& s : signals) apply_effects(before, s);
+    pass.notes = notes;
+    learn_pumps(data, options, pass);
+    double change = 0.0;
+    for (std::size_t i = 0; i < before.cylinders.size(); ++i)
+      change =
+          std::max(change, std::abs(pass.model.cylinders[i].margin - before.cylinders[i].margin));
+    for (std::size_t p = 0; p < before.pumps.size(); ++p)
+      change = std::max(change, std::abs(pass.model.pumps[p].standby - before.pumps[p].standby));
+    if (change < kSettled) break;
+  }
   return pass;
 }
 

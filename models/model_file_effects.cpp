@@ -217,10 +217,12 @@ void write_provenance(const CraneModel& model, ModelJson& root) {
   root["quality"] = rows_json(model.quality, quality_json);
   Json definitions = Json::array();
   std::set<std::string> written;
-  for (const AppliedEffect& e : model.effects) {
-    const std::string text = e.effect->definition();
+  const auto carry = [&](const Effect& effect) {
+    const std::string text = effect.definition();
     if (!text.empty() && written.insert(text).second) definitions.push_back(text);
-  }
+  };
+  for (const Effect* e : model.user_effects) carry(*e);
+  for (const AppliedEffect& e : model.effects) carry(*e.effect);
   if (!definitions.empty()) root["user_effects"] = std::move(definitions);
   root["effects"] = rows_json(
       model.effects, [&](const AppliedEffect& e) { return effect_json(e, model.machine); });
@@ -235,7 +237,9 @@ void read_provenance(const ModelCursor& root, CraneModel& model) {
     for (const Cursor& d : root.at("user_effects", expected).list(expected)) {
       const std::string text = d.text("a YAML text that defines effects");
       try {
-        register_user_effects(text, "its YAML", model.machine);
+        for (const Effect* e : register_user_effects(text, "its YAML", model.machine)) {
+          model.user_effects.push_back(e);
+        }
       } catch (const InputError& error) {
         d.fail(error.what());
       }

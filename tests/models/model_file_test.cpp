@@ -10,6 +10,7 @@
 
 #include "broken_model_support.h"
 #include "models/effects/registry.h"
+#include "models/effects/user_effect.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -137,6 +138,48 @@ TEST(ModelFile, KeepsEveryEffectAndItsSteps) {
   EXPECT_EQ(read.steps[0].before[0].rmse, step.before[0].rmse);
   EXPECT_EQ(read.steps[0].after[0].rmse, step.after[0].rmse);
   EXPECT_EQ(read.steps[1].stopped_because, "");
+}
+
+constexpr const char* kSealFriction = R"yaml(effects:
+  - id: seal_friction_of_model_file_test
+    stage: force
+    law: "Fc * tanh(v / v0)"
+    parameters:
+      v0: {unit: mm/s, bounds: [0.5, 50], typical: 5}
+      Fc: {unit: N, bounds: [0, 20000], typical: 3000}
+)yaml";
+
+TEST(ModelFile, CarriesEffectsOfTheUsersOwn) {
+  CraneModel model = small_model();
+  const Effect* seal = register_user_effects(kSealFriction, "mine.yaml", model.machine).front();
+  EXPECT_EQ(register_user_effects(kSealFriction, "again.yaml", model.machine).front(), seal);
+  // proportional parameters come first, whatever the file's order
+  ASSERT_EQ(seal->info().parameters[0].name, "Fc");
+  model.effects = {{seal, 0, {2500.0, 4e-3}, {}, {}}};
+  const std::string text = model_to_json(model);
+  EXPECT_THAT(text, HasSubstr("\"user_effects\": ["));
+  const CraneModel read = model_from_json(text, "m.json");
+  EXPECT_EQ(model_to_json(read), text);
+  const double q = 0.4, qd = 0.03;
+  const CraneModel bare = small_model();
+  Chain with(read), without(bare);
+  const CylinderState c = with.evaluate(&q, &qd, 0.0).cylinders[0];
+  EXPECT_EQ(c.force, without.evaluate(&q, &qd, 0.0).cylinders[0].force);
+  EXPECT_NEAR(c.total_force - c.force, 2500.0 * std::tanh(c.speed / 4e-3), 1e-9);
+
+  // in a process that does not have it yet, the file itself brings it: here under another name
+  std::string other = text;
+  for (std::size_t at; (at = other.find("seal_friction_of")) != std::string::npos;) {
+    other.replace(at, 4, "ring");
+  }
+  const CraneModel brought = model_from_json(other, "m.json");
+  EXPECT_EQ(brought.effects[0].effect->info().id, "ring_friction_of_model_file_test");
+  EXPECT_NE(brought.effects[0].effect, seal);
+
+  // an id that means something else already
+  std::string changed = text;
+  changed.replace(changed.find("tanh(v"), 6, "tanh(2*v");
+  EXPECT_THROW(model_from_json(changed, "m.json"), InputError);
 }
 
 TEST(ModelFile, SaysWhichVersionWroteIt) {

@@ -266,9 +266,13 @@ TEST(EffectsInKnots, OtherMassesAloneKeepTheFastLaw) {
   const CraneModel bare = loader();
   CraneKnotModel without(bare, problem, {});
   std::mt19937 random(5);
-  const Vector z = random_state(model.machine, random);
-  EXPECT_EQ(a.cost(z.data()), b.cost(z.data()));
-  EXPECT_GT(std::abs(a.cost(z.data()) - without.cost(z.data())), 1e-3);  // [kW] 60 kg are seen
+  double largest = 0.0;
+  for (int trial = 0; trial < 20; ++trial) {  // the boom does not lead in every state
+    const Vector z = random_state(model.machine, random);
+    EXPECT_EQ(a.cost(z.data()), b.cost(z.data()));
+    largest = std::max(largest, std::abs(a.cost(z.data()) - without.cost(z.data())));
+  }
+  EXPECT_GT(largest, 1e-3);  // [kW] 60 kg are seen
 }
 
 TEST(EffectsInKnots, SaturationLowersThePumpsFlowLimit) {

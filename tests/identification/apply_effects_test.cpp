@@ -1,0 +1,170 @@
+// A model's effects on logs: the same numbers as the exact chain's, sample by sample, and a fit that learns
+// everything else around them.
+#include "identification/apply_effects.h"
+
+#include <gtest/gtest.h>
+
+#include "arm_log.h"
+#include "identification/fit.h"
+#include "identification/series.h"
+#include "models/effects/effective_machine.h"
+#include "models/effects/memory.h"
+#include "models/effects/registry.h"
+
+namespace sparflow {
+namespace {
+
+using namespace testing_support;
+using Eigen::Index;
+
+AppliedEffect typical(const std::string& key, const Machine& machine) {
+  const EffectAt place = parse_effect(key, machine);
+  AppliedEffect e{place.effect, place.at, {}, {}, {}};
+  for (const EffectParameter& p : place.effect->info().parameters) e.values.push_back(p.typical);
+  return e;
+}
+
+/// The arm's motion with what the exact chain of `truth` says in its pressures. Poses and speeds are the filtered
+/// ones, so that program and plant agree to rounding.
+Log log_of(const CraneModel& truth, double noise = 0.0, unsigned seed = 1) {
+  Log log = arm_log(noise, seed);
+  const Log clean = arm_log();
+  const MachineSignals s = make_signals(truth.machine, log);
+  const Cylinder& c = truth.machine.cylinders[0];
+  const double a = c.area_piston(), b = c.area_rod();
+  Eigen::VectorXd& pa = channel(log, "pA_arm").values;
+  Eigen::VectorXd& pb = channel(log, "pB_arm").values;
+  Eigen::VectorXd& pump = channel(log, "p_main").values;
+  pa -= channel(const_cast<Log&>(clean), "pA_arm").values;  // what is left is noise
+  pb -= channel(const_cast<Log&>(clean), "pB_arm").values;
+  pump -= channel(const_cast<Log&>(clean), "p_main").values;
+  Chain chain(truth);
+  for (Index k = 0; k < s.samples(); ++k) {
+    const double q = s.q(k, 0), qdd = s.qdd(k, 0);
+    // where the command is zero the filter's rest of speed is no motion
+    const double qd = s.cylinders[0].direction[k] == 0 ? 0.0 : s.qd(k, 0);
+    const MachineState& state = chain.evaluate(&q, &qd, s.payload[k], false, kRestSpeed, &qdd);
+    const CylinderState& x = state.cylinders[0];
+    const bool retracts = x.speed < 0.0;
+    pa[k] += retracts ? (x.total_force + x.pressure * b) / a : x.pressure;
+    pb[k] += retracts ? x.pressure : (x.pressure * a - x.total_force) / b;
+    pump[k] += state.pumps[0].pressure;
+  }
+  return log;
+}
+
+double rmse(const CompareResult& r, const std::string& stage, const std::string& at) {
+  const auto* score = r.find(stage, at);
+  return score == nullptr ? std::nan("") : score->rmse;
+}
+
+TEST(ApplyEffects, ForcesAreTheExactChains) {
+  const CraneModel bare = arm_model();
+  int checked = 0;
+  for (const EffectAt& place : candidates(bare.machine)) {
+    const EffectInfo& info = place.effect->info();
+    // presliding remembers where it turned; the chain, which knows no past, says what it is when slid
+    if (info.stage != EffectStage::kForce || info.id == "presliding") continue;
+    CraneModel model = bare;
+    const std::string key = effect_key(info, bare.machine, place.at);
+    model.effects = {typical(key, bare.machine)};
+    MachineSignals s = make_signals(bare.machine, arm_log());
+    apply_effects(model, s);
+    Chain chain(model), without(bare);
+    double largest = 0.0, difference = 0.0;
+    for (Index k = 0; k < s.samples(); ++k) {
+      if (!s.usable[k] || s.edge[k] || !s.cylinders[0].driven[k]) continue;
+      const double q = s.q(k, 0), qd = s.qd(k, 0), qdd = s.qdd(k, 0);
+      const double force =
+          chain.evaluate(&q, &qd, s.payload[k], false, kRestSpeed, &qdd).cylinders[0].total_force;
+      difference = std::max(difference, std::abs(force - s.cylinders[0].model_force[k]));
+      largest = std::max(
+          largest, std::abs(force - without.evaluate(&q, &qd, s.payload[k]).cylinders[0].force));
+    }
+    // rounding of forces of 10 kN; flex is not quite proportional to its parameters, which logs take it to be
+    EXPECT_LT(difference, info.id == "structural_flex" ? 5e-2 * largest : 1e-4) << key;
+    if (largest > 1.0) ++checked;
+  }
+  EXPECT_GE(checked, 6) << "effects that do something on this arm";
+}
+
+TEST(ApplyEffects, NothingIsLeftWhenTheModelHasThem) {
+  CraneModel truth = arm_model();
+  for (const char* key : {"coulomb_friction:arm", "unmodelled_mass:arm", "return_back_pressure",
+                          "flow_dependent_margin:main"}) {
+    truth.effects.push_back(typical(key, truth.machine));
+  }
+  const Log log = log_of(truth);
+  const CompareResult with = compare(truth, {log}), without = compare(arm_model(), {log});
+  // rounding of pressures of 1e7 Pa and forces of 1e4 N
+  EXPECT_LT(rmse(with, "force", "arm"), 1e-3);
+  for (const char* regime : {"extend", "retract"}) {
+    EXPECT_LT(with.find("pressure", "arm", regime)->rmse, 1.0) << regime;
+  }
+  EXPECT_LT(rmse(with, "pump", "main"), 1.0);
+  EXPECT_GT(rmse(without, "force", "arm"), 2e3);
+  EXPECT_GT(without.find("pressure", "arm", "extend")->rmse, 1e5);
+  EXPECT_GT(rmse(without, "pump", "main"), 1e5);
+}
+
+TEST(ApplyEffects, FitLearnsTheRestAroundThem) {
+  CraneModel truth = arm_model();
+  for (const char* key :
+       {"coulomb_friction:arm", "return_back_pressure", "flow_dependent_margin:main"}) {
+    truth.effects.push_back(typical(key, truth.machine));
+  }
+  FitOptions options;
+  options.effects = truth.effects;
+  const FitResult r = fit(truth.machine, {log_of(truth, 0.3, 1)}, {log_of(truth, 0.3, 2)}, options);
+  ASSERT_EQ(r.model.effects.size(), 3u);
+  // as for a log without effects (fit_test.cpp): 0.3 bar noise
+  EXPECT_NEAR(r.model.cylinders[0].margin, kMargin, 0.1 * units::kBar);
+  for (const double force : {1.6e4, 1.8e4, 2.0e4}) {  // with 8 kN of friction
+    EXPECT_NEAR(r.model.cylinders[0].extend.mean(5e-4, force),
+                extend_pressure(truth.machine, force), 0.2 * units::kBar);
+  }
+  ASSERT_TRUE(r.test.has_value());
+  EXPECT_NEAR(rmse(*r.test, "pump", "main"), 0.3 * units::kBar, 0.1 * units::kBar);
+  const FitResult blind = fit(truth.machine, {log_of(truth, 0.3, 1)}, {log_of(truth, 0.3, 2)});
+  EXPECT_GT(rmse(*blind.test, "force", "arm"), 5.0 * rmse(*r.test, "force", "arm"));
+}
+
+TEST(ApplyEffects, APumpThatLagsIsLearnedInstant) {
+  const CraneModel truth = arm_model();
+  Log log = log_of(truth);
+  CraneModel model = truth;
+  model.effects = {typical("pump_lag:main", truth.machine)};
+  MachineSignals s = make_signals(truth.machine, log);
+  MachineSeries series = make_series(truth, s);
+  Eigen::VectorXd& pump = channel(log, "p_main").values;
+  pump = first_order_lag(series, pump, model.effects[0].values[1]);
+  EXPECT_GT(rmse(compare(truth, {log}), "pump", "main"), 1e5);
+  EXPECT_LT(rmse(compare(model, {log}), "pump", "main"), 1e3);
+  FitOptions options;
+  options.effects = model.effects;
+  const FitResult r = fit(truth.machine, {log}, {log}, options);
+  EXPECT_NEAR(r.model.cylinders[0].margin, kMargin, 0.05 * units::kBar);
+  EXPECT_NEAR(r.model.pumps[0].standby, kStandby, 0.05 * units::kBar);
+}
+
+TEST(ApplyEffects, CalledAgainItStartsAfresh) {
+  CraneModel model = arm_model();
+  const MachineSignals plain = make_signals(model.machine, arm_log());
+  MachineSignals s = plain;
+  model.effects = {typical("angle_offset:arm", model.machine),
+                   typical("coulomb_friction:arm", model.machine)};
+  apply_effects(model, s);
+  const Eigen::VectorXd once = s.cylinders[0].model_force, speed = s.cylinders[0].speed;
+  EXPECT_GT((speed - plain.cylinders[0].speed).cwiseAbs().maxCoeff(), 1e-5) << "another lever";
+  apply_effects(model, s);
+  EXPECT_EQ(s.cylinders[0].model_force, once);
+  apply_effects(arm_model(), s);
+  EXPECT_EQ(s.cylinders[0].model_force, plain.cylinders[0].static_force);
+  EXPECT_EQ(s.cylinders[0].static_force, plain.cylinders[0].static_force);
+  EXPECT_EQ(s.cylinders[0].speed, plain.cylinders[0].speed);
+  EXPECT_EQ(s.cylinders[0].flow, plain.cylinders[0].flow);
+  EXPECT_EQ(s.cylinders[0].pressure_effect.size(), 0);
+}
+
+}  // namespace
+}  // namespace sparflow
