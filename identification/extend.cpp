@@ -79,11 +79,20 @@ class Workshop {
   const std::string& judged_on() const { return judged_on_; }
   const std::vector<Log>& logs() const { return logs_; }
 
-  /// The model as it is. Without test logs it may have seen everything: it is learned again without the motions held
-  /// out, for a fair figure.
-  Judged as_it_is(const CraneModel& model, const SearchProgress& progress) const {
-    if (!held_.empty()) return {model, with(model, places_of(model.effects), progress).error};
-    return {model, judge(model)};
+  /// What a step is to be compared with: the model as it is, where it was learned from these very logs and test
+  /// logs judge it, or where it stays (references). Else the model learned from them with the effects it has: what
+  /// other logs or other samples change is no gain of an effect.
+  Judged as_it_is(const CraneModel& model, std::vector<std::string>& notes,
+                  const SearchProgress& progress) const {
+    const bool stays = !references_.empty();
+    const bool knows = knows_logs(model);
+    if (held_.empty() && (stays || knows)) return {model, judge(model)};
+    if (!stays && !knows) {
+      notes.push_back(
+          "the model was not learned from these logs; \"before\" is the model learned again from "
+          "them without the effect, so that the change shown is the effect's alone");
+    }
+    return {model, with(model, places_of(model.effects), progress).error};
   }
 
   /// Estimates these effects and learns everything around them.
@@ -133,6 +142,13 @@ class Workshop {
   }
 
  private:
+  bool knows_logs(const CraneModel& model) const {
+    return std::all_of(logs_.begin(), logs_.end(), [&](const Log& log) {
+      return std::any_of(model.data.begin(), model.data.end(), [&](const DataSource& d) {
+        return d.use == "train" && d.sha256 == log.sha256;
+      });
+    });
+  }
   CompareOptions compare_options() const {
     CompareOptions o;
     o.signals = options_.fit.signals;
@@ -336,8 +352,8 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
       if (progress) progress((static_cast<double>(i) + share) / parts, what);
     };
   };
-  Judged current = workshop.as_it_is(model, part(0));
   ExtendResult result;
+  Judged current = workshop.as_it_is(model, result.notes, part(0));
   for (std::size_t i = 0; i < add.size(); ++i) {
     std::vector<std::string> notes;
     auto [step, next] = one_step(workshop, current, add[i], notes, part(i + 1));
@@ -380,9 +396,11 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
       if (progress) progress(first + 0.5 * share, what);
     };
   };
-  const Judged current = workshop.as_it_is(model, part(0.0));
   ExtendResult result;
-  Judged next = workshop.with(model, rest, part(0.5), &result.notes);
+  const Judged current = workshop.as_it_is(model, result.notes, part(0.0));
+  std::vector<std::string> notes;
+  Judged next = workshop.with(model, rest, part(0.5), &notes);
+  add_notes(std::move(notes), result);
   ExtendStep step;
   step.removed = key;
   step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " taken back";
@@ -411,9 +429,9 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       if (progress) progress(done + (1.0 - done) * width * share, what);
     };
   };
-  Judged current = workshop.as_it_is(model, round(0.05));
-  done = 0.05;
   ExtendResult result;
+  Judged current = workshop.as_it_is(model, result.notes, round(0.05));
+  done = 0.05;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
   while (result.stopped_because.empty()) {
     const std::shared_ptr<const Diagnosis> diagnosis =

@@ -237,10 +237,40 @@ TEST(Improve, AddsTheFrictionAndStops) {
 
 TEST(Improve, AddsNothingWhereNothingIsMissing) {
   const CraneModel model = fit(arm_machine(), {arm_log(0.8, 4)}).model;
-  const ExtendResult r = improve(model, {arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)});
+  ExtendOptions options;
+  // the log's positions are exact: what a valve effect would explain of them is rounding, not physics
+  for (const char* key : {"coulomb_friction:arm", "viscous_friction:arm", "unmodelled_mass:arm"})
+    options.diagnose.candidates.push_back(parse_effect(key, model.machine));
+  const ExtendResult r = improve(model, {arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)}, options);
   EXPECT_THAT(r.steps, IsEmpty());
   EXPECT_THAT(r.model.effects, IsEmpty());
   EXPECT_THAT(r.stopped_because, HasSubstr("nothing more is missing"));
+}
+
+TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {
+  // the test log is of a machine without the friction: whatever the diagnosis says, it must not come in
+  ExtendOptions options;
+  options.diagnose.candidates = {coulomb()};
+  const ExtendResult r = improve(ignorant_model(), {arm_log_with_friction(kFriction, 1)}, {},
+                                 {arm_log(0.8, 2)}, options);
+  EXPECT_THAT(r.steps, IsEmpty());
+  EXPECT_THAT(r.model.effects, IsEmpty());
+  ASSERT_THAT(r.rejected, SizeIs(1));
+  EXPECT_TRUE(r.rejected[0].change.worse());
+  EXPECT_THAT(r.stopped_because, HasSubstr("not kept"));
+  EXPECT_THAT(r.table(), HasSubstr("not kept"));
+}
+
+TEST(Extend, BeforeIsLearnedFromTheSameLogs) {
+  // the model comes from other logs, of a machine with other margins: what refitting alone changes is no gain
+  CraneModel other = ignorant_model();
+  other.cylinders[0].margin += 20e5;
+  other.data.clear();
+  const ExtendResult r = extend(other, {coulomb()}, {arm_log_with_friction(kFriction, 1)},
+                                {arm_log_with_friction(kFriction, 2)});
+  EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("not learned from these logs")));
+  const double before = r.steps[0].before.find("pump", "main")->rmse;
+  EXPECT_LT(before, 5e5);  // [Pa] not the 20 bar of the foreign margin
 }
 
 }  // namespace
