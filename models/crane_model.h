@@ -73,7 +73,10 @@ struct CraneModel {
   std::vector<CylinderModel> cylinders;  ///< by cylinder
   std::vector<PumpModel> pumps;          ///< by pump
   std::vector<AppliedEffect>
-      effects;                   ///< physical effects beyond paper eqs. 2-16, in the order added
+      effects;  ///< physical effects beyond paper eqs. 2-16, in the order added
+  /// Effects that users describe in YAML and that the model file carries, in the model or not: who reads the file
+  /// can choose them.
+  std::vector<const Effect*> user_effects;
   std::vector<ModelStep> steps;  ///< how they came in
   std::vector<DataSource> data;
   std::vector<StageQuality> quality;

@@ -167,6 +167,12 @@ bool YamlValue::is_map() const { return node_->IsMap(); }
 bool YamlValue::is_list() const { return node_->IsSequence(); }
 std::string YamlValue::word() const { return node_->IsScalar() ? node_->Scalar() : ""; }
 
+std::string YamlValue::yaml() const {
+  YAML::Emitter out;
+  out << *node_;
+  return out.c_str();
+}
+
 void YamlValue::fail(const std::string& message) const { throw InputError(place_, path_, message); }
 
 void YamlValue::fail_expected(const std::string& what) const {

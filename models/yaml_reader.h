@@ -46,6 +46,8 @@ class YamlValue {
   bool is_list() const;
   /// The plain word, whatever it means; "" when it is no scalar.
   std::string word() const;
+  /// The value written anew as YAML: comments, line breaks and quotes of the file no longer show.
+  std::string yaml() const;
 
   /// SI. Rejects text, units behind the number, decimal commas, NaN, infinity and what `what` rules out.
   double number(const Quantity& what) const;

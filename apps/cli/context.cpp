@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <new>
 
+#include "models/effects/user_effect.h"
 #include "models/error.h"
 #include "models/machine_check.h"
 #include "models/machine_file.h"
@@ -77,6 +78,31 @@ void Outputs::add_to(CLI::App& verb, bool with_report) {
   if (with_report) {
     verb.add_option("--report", report, "write a self-contained page to FILE.html")
         ->type_name("FILE.html");
+  }
+}
+
+void OwnEffects::add_to(CLI::App& verb) {
+  verb.add_option("--effects", files,
+                  "effects of your own (YAML), beside the catalogue; may be repeated")
+      ->type_name("FILE.yaml")
+      ->allow_extra_args(false);
+}
+
+std::vector<const Effect*> OwnEffects::load(const Machine* machine) const {
+  std::vector<const Effect*> all;
+  for (const std::string& file : files) {
+    for (const Effect* e : register_user_effects_file(file, machine)) all.push_back(e);
+  }
+  return all;
+}
+
+void OwnEffects::load_into(CraneModel& model) const {
+  for (const Effect* e : load(&model.machine)) {
+    const auto known = std::find(model.user_effects.begin(), model.user_effects.end(), e);
+    if (known == model.user_effects.end()) model.user_effects.push_back(e);
+    if (!e->places(model.machine).empty()) continue;
+    warn(fmt::format("{} cannot sit anywhere on {}: it is not looked for", e->info().id,
+                     model.machine.name));
   }
 }
 

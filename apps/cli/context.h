@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "identification/log.h"
+#include "models/crane_model.h"
 #include "optimizer/optimize.h"
 #include "planners/seed_paths.h"
 
@@ -41,6 +42,17 @@ struct Outputs {
   /// Checks before any long work that the files can be written where they are asked for.
   void check() const;
   std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
+};
+
+/// Option --effects: files with effects of the user's own (docs/user_effects.md).
+struct OwnEffects {
+  std::vector<std::string> files;
+  void add_to(CLI::App& verb);
+  /// Puts them into the catalogue. @param machine their joints and units are checked against it; may be null
+  /// @throws InputError
+  std::vector<const Effect*> load(const Machine* machine) const;
+  /// The same; from then on the model carries them.
+  void load_into(CraneModel& model) const;
 };
 
 /// Before long work: the folder of `path` exists and can be written.

@@ -16,6 +16,7 @@ struct DiagnoseArguments {
   std::string model, mapping;
   std::vector<std::string> logs, references, tests, candidates;
   bool skip_data_checks = false;
+  OwnEffects own;
   Outputs outputs;
 };
 
@@ -42,9 +43,11 @@ int run(const DiagnoseArguments& a) {
   for (const NamedFile& f : named("--test", a.tests)) inputs.push_back(f);
   inputs.push_back({"--model", a.model});
   inputs.push_back({"--mapping", a.mapping});
+  for (const NamedFile& f : named("--effects", a.own.files)) inputs.push_back(f);
   check_outputs_apart("diagnose", a.outputs.files(), inputs);
   a.outputs.check();
-  const CraneModel model = load_model_aloud(a.model);
+  CraneModel model = load_model_aloud(a.model);
+  a.own.load_into(model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
   const std::vector<Log> references = load_logs(a.references, model.machine, a.mapping);
   const std::vector<Log> tests = load_logs(a.tests, model.machine, a.mapping);
@@ -142,6 +145,7 @@ void add_diagnose_verb(CLI::App& app, int& code) {
                  "do not look for stuck, jumping or noisy channels first");
   verb->add_option("--mapping", a->mapping, "mapping file for logs with other column names (YAML)")
       ->type_name("FILE");
+  a->own.add_to(*verb);
   a->outputs.add_to(*verb);
   verb->footer(
       "Examples:\n"

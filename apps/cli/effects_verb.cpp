@@ -11,11 +11,14 @@ namespace {
 
 struct EffectsArguments {
   std::string effect;
+  OwnEffects own;
   Outputs outputs;
 };
 
 int run(const EffectsArguments& a) {
+  check_outputs_apart("effects", a.outputs.files(), named("--effects", a.own.files));
   a.outputs.check();
+  a.own.load(nullptr);
   const std::string text = a.effect.empty() ? effect_table() : effect_entry(a.effect);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, effects_json(a.effect));
   fmt::print("{}", text);
@@ -31,7 +34,12 @@ void add_effects_verb(CLI::App& app, int& code) {
       "the catalogue of physical effects: equation, parameters, what it is confused with");
   verb->add_option("effect", a->effect, "id of one effect for its whole entry")
       ->type_name("EFFECT");
+  a->own.add_to(*verb);
   a->outputs.add_to(*verb, false);
+  verb->footer(
+      "Examples:\n"
+      "  sparflow effects coulomb_friction\n"
+      "  sparflow effects seal_friction --effects mine.yaml");
   verb->callback([a, &code] { code = run(*a); });
 }
 

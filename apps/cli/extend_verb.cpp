@@ -16,6 +16,7 @@ struct ExtendArguments {
   std::string model, output, mapping, remove;
   std::vector<std::string> add, logs, tests;
   int threads = 0;
+  OwnEffects own;
   Outputs outputs;
 };
 
@@ -26,13 +27,15 @@ int run(const ExtendArguments& a) {
   std::vector<NamedFile> inputs = named("--log", a.logs);
   for (const NamedFile& f : named("--test", a.tests)) inputs.push_back(f);
   inputs.push_back({"--mapping", a.mapping});
+  for (const NamedFile& f : named("--effects", a.own.files)) inputs.push_back(f);
   inputs.push_back({"--model", a.model});
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
   check_outputs_apart("extend", outputs, inputs);
   check_writable(a.output);
   a.outputs.check();
-  const CraneModel model = load_model_aloud(a.model);
+  CraneModel model = load_model_aloud(a.model);
+  a.own.load_into(model);
   std::vector<EffectAt> add;
   for (const std::string& key : a.add) add.push_back(parse_effect(key, model.machine));
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
@@ -87,6 +90,7 @@ void add_extend_verb(CLI::App& app, int& code) {
       ->type_name("FILE");
   verb->add_option("--threads", a->threads, "threads for learning, 0 = one a processor")
       ->check(CLI::Range(0, 256));
+  a->own.add_to(*verb);
   a->outputs.add_to(*verb);
   verb->footer(
       "Examples:\n"

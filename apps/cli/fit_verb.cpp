@@ -18,6 +18,7 @@ struct FitArguments {
   std::string machine, output, mapping;
   std::vector<std::string> logs, tests;
   int threads = 0;
+  OwnEffects own;
   Outputs outputs;
 };
 
@@ -105,6 +106,7 @@ void check_files(const FitArguments& a) {
   for (const NamedFile& test : named("--test", a.tests)) inputs.push_back(test);
   inputs.push_back({"--machine", a.machine});
   inputs.push_back({"--mapping", a.mapping});
+  for (const NamedFile& f : named("--effects", a.own.files)) inputs.push_back(f);
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
   check_outputs_apart("fit", outputs, inputs);
@@ -115,6 +117,7 @@ void check_files(const FitArguments& a) {
 int run(const FitArguments& a) {
   check_files(a);
   const Machine machine = load_machine_aloud(a.machine);
+  a.own.load(&machine);  // refused before the work, not after it
   const std::vector<Log> logs = load_logs(a.logs, machine, a.mapping);
   const std::vector<Log> tests = load_logs(a.tests, machine, a.mapping);
   FitOptions options;
@@ -136,6 +139,7 @@ int run(const FitArguments& a) {
     note(fmt::format("{} has no hydraulic cylinder: nothing to learn, forces alone are compared",
                      machine.name));
   }
+  a.own.load_into(result.model);
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
@@ -164,6 +168,7 @@ void add_fit_verb(CLI::App& app, int& code) {
       ->type_name("FILE");
   verb->add_option("--threads", a->threads, "threads for learning, 0 = one a processor")
       ->check(CLI::Range(0, 256));
+  a->own.add_to(*verb);
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }

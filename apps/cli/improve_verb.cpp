@@ -13,6 +13,7 @@ struct ImproveArguments {
   std::string model, output, mapping;
   std::vector<std::string> logs, references, tests, candidates;
   int max_steps = 6, threads = 0;
+  OwnEffects own;
   Outputs outputs;
 };
 
@@ -21,13 +22,15 @@ int run(const ImproveArguments& a) {
   for (const NamedFile& f : named("--reference", a.references)) inputs.push_back(f);
   for (const NamedFile& f : named("--test", a.tests)) inputs.push_back(f);
   inputs.push_back({"--mapping", a.mapping});
+  for (const NamedFile& f : named("--effects", a.own.files)) inputs.push_back(f);
   inputs.push_back({"--model", a.model});
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
   check_outputs_apart("improve", outputs, inputs);
   check_writable(a.output);
   a.outputs.check();
-  const CraneModel model = load_model_aloud(a.model);
+  CraneModel model = load_model_aloud(a.model);
+  a.own.load_into(model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
   const std::vector<Log> references = load_logs(a.references, model.machine, a.mapping);
   const std::vector<Log> tests = load_logs(a.tests, model.machine, a.mapping);
@@ -81,6 +84,7 @@ void add_improve_verb(CLI::App& app, int& code) {
       ->type_name("FILE");
   verb->add_option("--threads", a->threads, "threads for learning, 0 = one a processor")
       ->check(CLI::Range(0, 256));
+  a->own.add_to(*verb);
   a->outputs.add_to(*verb);
   verb->footer(
       "Examples:\n"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <sstream>
 
 #include "models/error.h"
 #include "models/yaml_reader.h"
@@ -297,6 +298,15 @@ class EffectReader {
   const std::vector<std::string>& reserved_;
 };
 
+/// A file with this effect alone.
+std::string alone(const YamlValue& effect) {
+  std::string text = "effects:\n";
+  std::istringstream lines(effect.yaml());
+  const char* before = "  - ";
+  for (std::string line; std::getline(lines, line); before = "    ") text += before + line + "\n";
+  return text;
+}
+
 }  // namespace
 
 bool UserEffectSpec::in_motion() const {
@@ -320,6 +330,7 @@ std::vector<UserEffectSpec> parse_user_effects(const std::string& text, const st
       }
     }
     spec.source_text = text;
+    spec.definition = alone(value);
     specs.push_back(std::move(spec));
   }
   if (specs.empty()) list.fail("the list is empty; expected at least one effect");

@@ -41,9 +41,11 @@ struct UserEffectSpec {
   std::string equation;                   ///< one line of text; the law when the file gives none
   std::string citation, separated_by;     ///< may be empty
   std::vector<std::string> confused_with;
-  FilePlace where;  ///< of the effect in its file
-  std::string
-      source_text;  ///< the whole file as read, so that a fitted model can carry its effects
+  FilePlace where;          ///< of the effect in its file
+  std::string source_text;  ///< the whole file as read
+  /// A file with this effect alone, in one form whatever the layout of the source: what a fitted model carries, and
+  /// what tells whether two definitions are the same.
+  std::string definition;
 
   bool in_motion() const;  ///< every signal is known for a planned motion
 };

@@ -10,6 +10,7 @@
 #include "models/effects/hydraulics.h"
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
+#include "models/error.h"
 #include "models/linkage.h"
 
 namespace sparflow {
@@ -90,7 +91,7 @@ class UserEffect final : public Effect {
   }
 
   const EffectInfo& info() const override { return info_; }
-  std::string definition() const override { return spec_.source_text; }
+  std::string definition() const override { return spec_.definition; }
 
   std::vector<int> places(const Machine& machine) const override {
     for (const UserSignal& s : spec_.signals) {
@@ -298,21 +299,42 @@ class UserEffect final : public Effect {
   int linear_ = 0;
 };
 
+/// Adds all of them or, when one is refused, none.
+std::vector<const Effect*> add_to_catalogue(const std::string& text, const std::string& file,
+                                            const Machine* machine) {
+  std::vector<std::string> built_in;
+  for (const auto& effect : effect_catalogue()) {
+    if (effect->definition().empty()) built_in.push_back(effect->info().id);
+  }
+  std::vector<UserEffectSpec> specs = parse_user_effects(text, file, machine, built_in);
+  for (const UserEffectSpec& spec : specs) {
+    const Effect* known = find_effect(spec.id);
+    if (known == nullptr || known->definition() == spec.definition) continue;
+    throw InputError(spec.where, fmt::format("effects[{}]", spec.id),
+                     fmt::format("another definition of \"{0}\" is in use already, from another "
+                                 "file or carried by the model: law \"{1}\" there, \"{2}\" here; "
+                                 "make the two alike or choose another id, such as {0}_2",
+                                 spec.id, known->info().equation, spec.equation));
+  }
+  std::vector<const Effect*> all;
+  for (UserEffectSpec& spec : specs) {
+    const Effect* known = find_effect(spec.id);
+    all.push_back(
+        known != nullptr ? known : add_user_effect(std::make_unique<UserEffect>(std::move(spec))));
+  }
+  return all;
+}
+
 }  // namespace
 
 std::vector<const Effect*> register_user_effects(const std::string& text, const std::string& file,
                                                  const Machine& machine) {
-  std::vector<const Effect*> added;
-  std::vector<std::string> taken;
-  for (const auto& effect : effect_catalogue()) {
-    if (effect->definition() != text) taken.push_back(effect->info().id);
-  }
-  for (UserEffectSpec& spec : parse_user_effects(text, file, &machine, taken)) {
-    const Effect* known = find_effect(spec.id);
-    added.push_back(
-        known != nullptr ? known : add_user_effect(std::make_unique<UserEffect>(std::move(spec))));
-  }
-  return added;
+  return add_to_catalogue(text, file, &machine);
+}
+
+std::vector<const Effect*> register_user_effects_file(const std::string& path,
+                                                      const Machine* machine) {
+  return add_to_catalogue(read_file(path), path, machine);
 }
 
 }  // namespace sparflow
