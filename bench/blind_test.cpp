@@ -126,6 +126,10 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
   if (d.verdict == Verdict::kUnknown && d.unexplained)
     run.answer += "unknown: " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
+  if (d.leftover_share > 0.0) run.answer += fmt::format(" (left {:.2f})", d.leftover_share);
+  for (const DiagnosedEffect& e : d.effects) {
+    for (const auto& [rival, worse] : e.rivals) run.answer += fmt::format(" ~{}", rival);
+  }
   run.exact = answer == truth;
   run.all_found = std::includes(answer.begin(), answer.end(), truth.begin(), truth.end());
   // valve_lag may be asked for a cylinder or for all: the place then does not count

@@ -95,12 +95,12 @@ DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOpti
 }
 
 /// What the catalogue explained of a channel and what a flexible model explains beyond it, as variances.
-bool left_over_dominates(const Diagnosis& d, const Leftover& left) {
+double leftover_share(const Diagnosis& d, const Leftover& left) {
   const double before = suspect_rms(d.evidence, left.channel, d.search.null.residual[left.channel]);
   const double after = suspect_rms(d.evidence, left.channel, d.search.final.residual[left.channel]);
   const double catalogue = std::max(0.0, before * before - after * after);
   const double flexible = left.rms * left.rms;
-  return flexible > kLargestLeftoverShare * (catalogue + flexible);
+  return flexible / std::max(catalogue + flexible, 1e-300);
 }
 
 Unexplained describe(const Evidence& evidence, const Leftover& left) {
@@ -116,6 +116,38 @@ Unexplained describe(const Evidence& evidence, const Leftover& left) {
   u.sentence =
       fmt::format("{}: {:.2g} {} (RMS) that follow {} and that nothing in the catalogue explains",
                   c.text, left.rms / c.unit.si, c.unit.name, fmt::join(left.depends_on, ", "));
+  return u;
+}
+
+/// Evidence that only an implausible effect would fit: place and size, without a name.
+Unexplained describe_unnamed(const Diagnosis& d) {
+  const FoundEffect& f = d.search.unnamed.front();
+  const std::string key =
+      effect_key(f.design.effect.effect->info(), *d.evidence.series[0].machine, f.design.effect.at);
+  Unexplained u;
+  std::size_t worst = 0;
+  double ratio = -1.0;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!f.design.touches(c)) continue;
+    const double here = suspect_rms(d.evidence, c, d.search.final.residual[c]) /
+                        std::max(d.evidence.channels[c].noise_floor, 1e-300);
+    if (here > ratio) {
+      ratio = here;
+      worst = c;
+    }
+  }
+  const EvidenceChannel& c = d.evidence.channels[worst];
+  u.stage = evidence_stage(c.kind);
+  u.at = c.at;
+  u.depends_on = f.design.effect.effect->info().signals;
+  u.rmse = suspect_rms(d.evidence, worst, d.search.final.residual[worst]);
+  u.noise_floor = c.noise_floor;
+  u.unit = c.unit;
+  u.share = 1.0;
+  u.sentence = fmt::format(
+      "{}: {:.2g} {} (RMS) that are no noise; {} comes nearest, but only with implausible "
+      "parameters",
+      c.text, u.rmse / c.unit.si, c.unit.name, key);
   return u;
 }
 
@@ -162,9 +194,11 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   const std::vector<Leftover> left = find_leftovers(d.evidence, d.search.final);
   bool unknown = false;
   for (const Leftover& l : left) {
-    if (!left_over_dominates(d, l)) continue;
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
+    const double share = leftover_share(d, l);
+    if (touched) d.leftover_share = std::max(d.leftover_share, share);
+    if (share < kLargestLeftoverShare) continue;
     if (!d.unexplained) d.unexplained = describe(d.evidence, l);
     unknown = unknown || touched;
   }

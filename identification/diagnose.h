@@ -68,6 +68,8 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> indistinguishable;
   std::optional<Experiment> experiment;
   std::optional<Unexplained> unexplained;
+  /// Largest share of what can be explained in a channel of a found effect that the catalogue does not explain.
+  double leftover_share = 0.0;
   std::vector<BadChannel> bad;
   std::vector<std::pair<std::string, double>>
       ranking;  ///< first step: key, penalised gain [nats], best first

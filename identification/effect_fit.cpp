@@ -191,7 +191,14 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         VectorXd r = channel.y;
         if (m > 0) r -= columns[c] * theta;
         if (beta.size() > 0) r -= channel.baseline * beta;
-        if (!last) fit.noise[c] = NoiseModel::estimate(r, channel.blocks);
+        if (!last) {
+          fit.noise[c] = NoiseModel::estimate(r, channel.blocks);
+          if (control.ordinary) {
+            fit.noise[c] = NoiseModel{};
+            fit.noise[c].variance =
+                std::max(r.squaredNorm() / static_cast<double>(channel.rows()), 1e-300);
+          }
+        }
         if (control.keep_residuals) fit.residual[c] = std::move(r);
       }
     }

@@ -39,6 +39,9 @@ struct FitControl {
   int noise_passes = 3;
   bool keep_residuals = false;
   bool covariance = false;
+  /// Ordinary least squares: every row counts the same. Where the model itself is wrong by more than noise, a fit that
+  /// trusts differences between neighbouring rows (as autoregressive noise does) follows the error's shape.
+  bool ordinary = false;
   /// By channel; a channel that is not active keeps likelihood and noise of `start`. Empty = all.
   std::vector<bool> active;
 };

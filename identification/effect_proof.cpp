@@ -52,6 +52,20 @@ EffectAction effect_action(const Evidence& evidence,
     }
     const double squares = action_here.squaredNorm();
     left += squares / (noise * noise);
+    const double size_here =
+        squares > 0.0 ? std::sqrt(action_here.array().pow(4).sum() / squares) / noise : 0.0;
+    if (size_here > action.size) {
+      double largest = 0.0;
+      for (std::size_t k = 0; k < designs.size(); ++k) {
+        if (k == index || !designs[k]->touches(c)) continue;
+        VectorXd other =
+            designs[k]->columns[c] * fit.theta.segment(layout.first[k], designs[k]->linear);
+        const double sum = other.squaredNorm();
+        if (sum > 0.0)
+          largest = std::max(largest, std::sqrt(other.array().pow(4).sum() / sum) / noise);
+      }
+      action.share = largest > 0.0 ? size_here / largest : 1e9;
+    }
     if (squares > 0.0) {
       action.size =
           std::max(action.size, std::sqrt(action_here.array().pow(4).sum() / squares) / noise);
@@ -126,7 +140,10 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   }
   HeldOutGain result;
   double squares = 0.0;
-  for (const double v : gains) result.gain += v;
+  for (const double v : gains) {
+    result.gain += v;
+    result.improved += v > 0.0 ? 1.0 / static_cast<double>(folds) : 0.0;
+  }
   const double mean = result.gain / static_cast<double>(folds);
   for (const double v : gains) squares += (v - mean) * (v - mean);
   result.error = std::sqrt(squares * static_cast<double>(folds) /

@@ -12,6 +12,8 @@ struct EffectAction {
   /// measures it where it acts: a lag shows for a second after a step and nowhere else.
   double size = 0.0;
   double absorbed = 0.0;  ///< 0..1, over all channels, each in units of its noise
+  double share =
+      1e9;  ///< of the largest other effect's size, in the channel where this one is largest
 };
 
 /// @param index which of the designs
@@ -21,6 +23,7 @@ EffectAction effect_action(const Evidence& evidence,
 
 struct HeldOutGain {
   double gain = 0.0, error = 0.0;  ///< [nats], sum over folds and its standard error
+  double improved = 0.0;           ///< share of the folds it improved
 };
 
 /// Blocks of motion in turn left out of the estimate; noise as in `fit`.

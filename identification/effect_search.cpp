@@ -54,6 +54,27 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
   return points;
 }
 
+/// Linear parameters with independent columns (a mass on the first link acts by its moment alone) and the
+/// nonlinear ones.
+Index parameters_at_work(const Candidate& candidate) {
+  Index linear = 1;
+  for (const EffectDesign& d : candidate.designs) {
+    MatrixXd gram = MatrixXd::Zero(d.linear, d.linear);
+    for (const MatrixXd& c : d.columns) {
+      if (c.cols() > 0) gram += c.transpose() * c / std::max(c.squaredNorm(), 1e-300);
+    }
+    const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Index here = 0;
+    for (Index i = 0; i < d.linear; ++i)
+      here += gram(i, i) > 1e-12 * gram.diagonal().maxCoeff() ? 1 : 0;
+    const MatrixXd correlation = scale.asDiagonal() * gram * scale.asDiagonal();
+    here =
+        std::min(here, Eigen::ColPivHouseholderQR<MatrixXd>(correlation).setThreshold(1e-6).rank());
+    linear = std::max(linear, here);
+  }
+  return linear + static_cast<Index>(candidate.designs.front().shape.size());
+}
+
 /// A parameter with whole numbers only names variants of a law (with or without rescaling): nothing lies between.
 bool is_choice(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v == std::round(v); });
@@ -77,9 +98,8 @@ class Search {
     });
     for (Candidate& c : all) {
       if (c.designs.empty()) continue;
-      // Schwarz (1978): half a log of the rows for each parameter
-      c.penalty =
-          0.5 * static_cast<double>(c.effect.effect->info().parameters.size()) * std::log(rows);
+      // Schwarz (1978): half a log of the rows for each parameter that does something
+      c.penalty = 0.5 * static_cast<double>(parameters_at_work(c)) * std::log(rows);
       candidates_.push_back(std::move(c));
     }
   }
@@ -125,6 +145,9 @@ class Search {
         result.notes.push_back(
             fmt::format("{} fits best but is not named: {}", key(found.back().design.effect), why));
         if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
+        if (found.back().at_bound && found.back().size >= options_.smallest_effect) {
+          result.unnamed.push_back(found.back());
+        }
         found.pop_back();
         refused[best.candidate] = true;
         continue;
@@ -286,9 +309,20 @@ class Search {
     const EffectAction action = effect_action(evidence_, designs, index, fit);
     f.size = action.size;
     f.absorbed = action.absorbed;
+    f.share = action.share;
+    f.at_bound = false;
+    Index first = 0;
+    for (std::size_t i = 0; i < index; ++i) first += found[i].design.linear;
+    for (Index k = 0; k < f.design.linear; ++k) {
+      const double v = fit.theta[first + k], lo = f.design.lower[static_cast<std::size_t>(k)];
+      const double hi = f.design.upper[static_cast<std::size_t>(k)];
+      const double edge = 1e-6 * (hi - lo);
+      f.at_bound = f.at_bound || v > hi - edge || (lo > 0.0 && v < lo + edge);
+    }
     const HeldOutGain held = held_out_gain(evidence_, designs, index, fit, options_.folds);
     f.held_out = held.gain;
     f.held_out_error = held.error;
+    f.held_out_share = held.improved;
   }
 
   std::string why_not(const FoundEffect& f) const {
@@ -303,7 +337,14 @@ class Search {
     if (f.size < options_.smallest_effect) {
       return fmt::format("it is {:.2f} times the noise where it acts, too small to matter", f.size);
     }
-    if (f.held_out <= f.held_out_error) {
+    if (f.at_bound) return "its parameter would lie at the edge of what is plausible";
+    if (f.share < options_.smallest_share) {
+      return fmt::format(
+          "it is {:.0f} % of another effect in the same place: it only mends that one's form",
+          100.0 * f.share);
+    }
+    // one standard error beyond zero, or (a few large steps carry all the evidence) better nearly everywhere
+    if (f.held_out <= f.held_out_error && !(f.held_out > 0.0 && f.held_out_share > 0.79)) {
       return fmt::format("on motions left out it gains {:.1f} +- {:.1f} nats, not proven",
                          f.held_out, f.held_out_error);
     }
@@ -404,7 +445,9 @@ class Search {
   /// Values and 95 % intervals, nonlinear parameters by the slope of the effect in them.
   void intervals(std::vector<FoundEffect>& found) {
     std::vector<EffectDesign> augmented;
-    const EffectFit plain_fit = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+    FitControl control = final_control();
+    control.ordinary = true;
+    const EffectFit plain_fit = fit_effects(evidence_, designs_of(found), nullptr, control);
     Index first = 0;
     for (FoundEffect& f : found) {
       const VectorXd theta = plain_fit.theta.segment(first, f.design.linear);
@@ -413,7 +456,7 @@ class Search {
     }
     std::vector<const EffectDesign*> designs;
     for (const EffectDesign& d : augmented) designs.push_back(&d);
-    const EffectFit fit = fit_effects(evidence_, designs, nullptr, final_control());
+    const EffectFit fit = fit_effects(evidence_, designs, nullptr, control);
     Index at = 0;
     Index linear_at = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -431,8 +474,13 @@ class Search {
       f.lower95.resize(f.values.size());
       f.upper95.resize(f.values.size());
       for (std::size_t k = 0; k < f.values.size(); ++k) {
-        f.lower95[k] = f.values[k] - 1.96 * spread[k];
-        f.upper95[k] = f.values[k] + 1.96 * spread[k];
+        const bool choice = spread[k] == 0.0;
+        const double half =
+            choice ? 0.0
+                   : std::hypot(1.96 * spread[k],
+                                f.design.effect.effect->info().form_error * f.values[k]);
+        f.lower95[k] = f.values[k] - half;
+        f.upper95[k] = f.values[k] + half;
       }
       at += augmented[i].linear;
       linear_at += count;

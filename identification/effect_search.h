@@ -13,10 +13,12 @@ namespace sparflow {
 
 struct SearchOptions {
   double false_alarm = 0.05;  ///< of the whole search on logs with nothing missing
-  int max_effects = 5;
+  int max_effects = 8;
   int simulations = 300;  ///< of the null, for the gate
   /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
-  double smallest_effect = 0.25;
+  double smallest_effect = 0.15;
+  /// A further effect smaller than this share of the largest in the same channel only mends that one's form.
+  double smallest_share = 0.08;
   double largest_absorbed =
       0.9;  ///< an effect that learned laws imitate to more than this share is not named
   double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart
@@ -34,6 +36,9 @@ struct FoundEffect {
   double absorbed = 0.0;  ///< share of its action that the learned baselines imitate
   double held_out = 0.0,
          held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
+  double held_out_share = 0.0;  ///< of the parts left out in turn that it improved
+  double share = 1.0;  ///< its size / the largest other effect's in the channel where it is largest
+  bool at_bound = false;  ///< a parameter rests on the edge of what is plausible
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
   /// Others that could stand in its place, best first, with how much worse they are. [nats]
   std::vector<std::pair<EffectAt, double>> alternatives;
@@ -41,9 +46,11 @@ struct FoundEffect {
 
 struct SearchResult {
   std::vector<FoundEffect> found;  ///< in the order found
-  EffectFit null, final;           ///< without and with them
-  double p_value = 1.0;            ///< of the first gate
-  double threshold = 0.0;          ///< [nats] of the first gate
+  /// Beyond the gate, but only with parameters that no machine has: something is there, and not this.
+  std::vector<FoundEffect> unnamed;
+  EffectFit null, final;   ///< without and with them
+  double p_value = 1.0;    ///< of the first gate
+  double threshold = 0.0;  ///< [nats] of the first gate
   /// Best penalised gain of every candidate in the first step.
   std::vector<std::pair<EffectAt, double>> ranking;
   std::vector<std::string> notes;

@@ -59,6 +59,7 @@ class Compressibility final : public Effect {
         .confused_with = {"valve_lag", "leakage"},
         .separated_by = "load steps at rest and fast starts with and without load",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 2 and 6 (bulk modulus)",
+        .form_error = 0.2,
         .in_motion = "nothing: the compressed volume is taken and given back"};
     return info;
   }

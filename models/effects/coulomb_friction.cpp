@@ -20,6 +20,7 @@ class CoulombFriction final : public Effect {
         .citation =
             "C. A. Coulomb (1785); Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica "
             "30(7), sec. 2",
+        .form_error = 0.05,
         .in_motion = "force"};
     return info;
   }

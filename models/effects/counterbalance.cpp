@@ -42,6 +42,7 @@ class Counterbalance final : public Effect {
         .citation =
             "P. Chapple (2003), Principles of Hydraulic System Design, ch. 4 (over-centre "
             "valves)",
+        .form_error = 0.2,
         .in_motion = "pressure: of the side towards which the load helps"};
     return info;
   }

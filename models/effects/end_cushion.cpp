@@ -59,6 +59,7 @@ class EndCushion final : public Effect {
         .citation =
             "Murrenhoff (2001), Grundlagen der Fluidtechnik, cylinders; Schwartz, De Negri, "
             "Climaco (2005), J. Braz. Soc. Mech. Sci. & Eng. 27(4), stroke end cushioning",
+        .form_error = 0.45,
         .in_motion = "force"};
     return info;
   }

@@ -28,6 +28,7 @@ class FlowDependentMargin final : public Effect {
         .citation =
             "P. Krus (1988), On Load Sensing Fluid Power Systems, Linkoping (margin and "
             "losses between pump and sensing point)",
+        .form_error = 0.05,
         .in_motion = "pump: what every cylinder of this pump asks for"};
     return info;
   }

@@ -20,8 +20,8 @@ class FlowSaturation final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.5,
-                        1.5,
+                        0.7,
+                        1.35,
                         1.0,
                         "share of the excess that is missing, about 1",
                         true,
@@ -43,6 +43,7 @@ class FlowSaturation final : public Effect {
         .citation =
             "H. Murrenhoff (2011), Grundlagen der Fluidtechnik, Teil 1: Hydraulik (sections "
             "that share the flow in proportion)",
+        .form_error = 0.05,
         .in_motion = "limit: the pump's flow stays below it"};
     return info;
   }

@@ -30,6 +30,7 @@ class Inertia final : public Effect {
         .citation =
             "Luh, Walker, Paul (1980), J. Dyn. Syst. Meas. Control 102(2); Craig (2005), "
             "Introduction to Robotics, sec. 6.5",
+        .form_error = 0.03,
         .in_motion = "force"};
     return info;
   }

@@ -28,6 +28,7 @@ class Leakage final : public Effect {
         .confused_with = {"valve_deadband", "compressibility"},
         .separated_by = "hold a load at command zero for a minute, at two loads",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 (leakage coefficients)",
+        .form_error = 0.5,
         .in_motion =
             "nothing: the valve replaces the oil; the flow taken from the pump is that of "
             "the motion"};

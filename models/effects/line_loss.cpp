@@ -51,6 +51,7 @@ class LineLoss final : public Effect {
         .citation =
             "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (laminar and turbulent "
             "losses in lines)",
+        .form_error = 0.2,
         .in_motion =
             "pump: what the cylinder asks for (sensors at the cylinder), or force, and "
             "with it working pressure (at the valve)"};

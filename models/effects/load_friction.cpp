@@ -29,6 +29,7 @@ class LoadFriction final : public Effect {
         .citation =
             "Hamon, Gautier, Garrec (2010), IROS, dynamic identification of robots with a "
             "dry friction model depending on load and velocity",
+        .form_error = 0.05,
         .in_motion = "force"};
     return info;
   }

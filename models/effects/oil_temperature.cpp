@@ -51,6 +51,7 @@ class OilTemperature final : public Effect {
         .citation =
             "O. Reynolds (1886), Phil. Trans. R. Soc. 177 (mu = mu0 exp(-beta T)); Merritt "
             "(1967), ch. 2",
+        .form_error = 0.3,
         .in_motion = "pressure and pump: at the problem's oil temperature"};
     return info;
   }

@@ -87,6 +87,7 @@ class PadFriction final : public Effect {
         .separated_by = "a sweep of the reach at two luffing angles, out and in",
         .citation =
             "statics of a guided beam with Coulomb friction at its pads (C. A. Coulomb 1785)",
+        .form_error = 0.1,
         .in_motion = "force"};
     return info;
   }

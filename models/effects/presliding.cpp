@@ -34,6 +34,7 @@ class Presliding final : public Effect {
         .citation =
             "P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158; "
             "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3)",
+        .form_error = 0.3,
         .in_motion = "force: as Coulomb friction, its memory is over after some millimetres"};
     return info;
   }

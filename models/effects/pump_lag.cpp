@@ -16,8 +16,8 @@ class PumpLag final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.5,
-                        1.5,
+                        0.7,
+                        1.35,
                         1.0,
                         "share of the demand's change that comes late, about 1",
                         true,
@@ -36,6 +36,7 @@ class PumpLag final : public Effect {
         .confused_with = {"sensor_delay"},
         .separated_by = "steps of one function, several times",
         .citation = "Kumar, Dasgupta, Ghoshal (2015); first-order lag",
+        .form_error = 0.1,
         .in_motion = "nothing: motions are quasi-static; the exact energy follows it in time"};
     return info;
   }

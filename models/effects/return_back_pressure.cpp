@@ -29,6 +29,7 @@ class ReturnBackPressure final : public Effect {
             "move another function at the same time: the chamber that only returns oil "
             "rises with the other's flow",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (turbulent losses)",
+        .form_error = 0.07,
         .in_motion =
             "pressure: A_return/A_supply of it while the load opposes the motion; under a "
             "helping load the counterbalance valve sets the supply"};

@@ -1,32 +1,11 @@
-#include <limits>
-
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
 
 namespace sparflow {
 namespace {
 
-/// Half the span of the difference that stands for the time derivative: near the middle of plausible delays
-/// (20..200 ms), so that neither end is off by its curvature.
-constexpr double kHalfSpan_s = 0.08;
-
-Eigen::VectorXd time_derivative(const MachineSeries& log, const Eigen::VectorXd& x) {
-  Eigen::VectorXd d =
-      (delayed(log, x, -kHalfSpan_s) - delayed(log, x, kHalfSpan_s)) / (2.0 * kHalfSpan_s);
-  for (const auto& [first, last] : log.runs) {  // no other side to look at near the ends
-    for (Eigen::Index k = first; k < last; ++k) {
-      if (log.time[k] - log.time[first] < kHalfSpan_s ||
-          log.time[last - 1] - log.time[k] < kHalfSpan_s) {
-        d[k] = std::numeric_limits<double>::quiet_NaN();
-      }
-    }
-  }
-  return d;
-}
-
-/// To first order in the delay d. Positions late: q_log(t) = q(t - d), so the force carried now is that of the
-/// pose logged d later, F_static(q_log(t + d)) = F_static + d dF_static/dt; the logged speed is v - d dv/dt.
-/// Pressures late: the measured force is that of d ago, F_static - d dF_static/dt; speeds are right.
+/// Positions late by d: q_log(t) = q(t - d), so the force carried now is that of the pose logged d later,
+/// F_static(q_log(t + d)), and the logged speed is that of d ago. Forces late: the measured force is that of d ago.
 class SensorDelay final : public Effect {
  public:
   const EffectInfo& info() const override {
@@ -35,7 +14,24 @@ class SensorDelay final : public Effect {
         .title = "positions and pressures are not of the same instant",
         .stage = EffectStage::kSensor,
         .place = EffectPlace::kMachine,
-        .parameters = {{"delay", "ms", 1e-3, 0.0, 0.5, 0.1, "age of the late channels", true, {}},
+        .parameters = {{"share",
+                        "-",
+                        1.0,
+                        0.7,
+                        1.35,
+                        1.0,
+                        "share of the shift that is seen, about 1",
+                        true,
+                        {}},
+                       {"delay",
+                        "ms",
+                        1e-3,
+                        0.0,
+                        0.5,
+                        0.1,
+                        "age of the late channels",
+                        false,
+                        {0.015, 0.025, 0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2, 0.25, 0.32}},
                        {"late",
                         "-",
                         1.0,
@@ -46,17 +42,15 @@ class SensorDelay final : public Effect {
                         false,
                         {1.0, -1.0}}},
         .equation =
-            "F = F_static + late delay dF_static/dt; v = dx/dt - delay dv/dt where positions "
-            "are late",
+            "F(t) = F_static(t + late delay); positions late: dx/dt logged is that of delay ago",
         .signals = {"cylinder force or both chamber pressures", "position",
                     "command, for the flow"},
         .confused_with = {"inertia", "viscous_friction", "valve_lag"},
         .separated_by =
             "reversals at several speeds: a delay follows the speed times the slope of "
             "the static force, inertia the acceleration",
-        .citation =
-            "first-order Taylor expansion in the delay; Ljung (1999), System "
-            "Identification, on unknown time delays",
+        .citation = "Ljung (1999), System Identification, on unknown time delays",
+        .form_error = 0.05,
         .in_motion = "nothing: the log is late, not the machine"};
     return info;
   }
@@ -67,14 +61,14 @@ class SensorDelay final : public Effect {
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(index)];
+    const bool positions = shape[1] > 0.0;
+    const double shift = positions ? -shape[0] : shape[0];
     if (kind == EvidenceKind::kForce) {
-      columns.resize(log.samples(), 1);
-      columns.col(0) = shape[0] * time_derivative(log, c.static_force);
+      columns = delayed(log, c.static_force, shift) - c.static_force;
       return true;
     }
-    if (kind != EvidenceKind::kFlow || !(shape[0] > 0.0)) return false;
-    columns.resize(log.samples(), 1);
-    columns.col(0) = -shape[0] * time_derivative(log, c.speed);
+    if (kind != EvidenceKind::kFlow || !positions) return false;
+    columns = c.speed - delayed(log, c.speed, shift);
     return true;
   }
 };

@@ -32,6 +32,7 @@ class StribeckFriction final : public Effect {
         .citation =
             "R. Stribeck (1902), Z. VDI 46; Bo & Pavelescu (1982), Wear 82, exponential "
             "form; Armstrong-Helouvry, Dupont, Canudas de Wit (1994)",
+        .form_error = 0.2,
         .in_motion = "force"};
     return info;
   }

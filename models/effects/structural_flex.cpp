@@ -87,6 +87,7 @@ class StructuralFlex final : public Effect {
         .citation =
             "Spong (1987), J. Dyn. Syst. Meas. Control 109(4), elastic joints; Khalil & "
             "Dombre (2002), ch. 11, joint compliance in calibration",
+        .form_error = 0.1,
         .in_motion = "force"};
     return info;
   }

@@ -21,8 +21,8 @@ class TorqueLimit final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.5,
-                        1.5,
+                        0.7,
+                        1.35,
                         1.0,
                         "share of the excess that is cut off, about 1",
                         true,
@@ -43,6 +43,7 @@ class TorqueLimit final : public Effect {
         .citation =
             "H. Murrenhoff (2011), Grundlagen der Fluidtechnik 1, ch. 4 (power control of "
             "variable pumps)",
+        .form_error = 0.05,
         .in_motion = "pump: pressure held below power / flow"};
     return info;
   }

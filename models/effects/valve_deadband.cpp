@@ -36,6 +36,7 @@ class ValveDeadband final : public Effect {
         .confused_with = {"valve_lag"},
         .separated_by = "slow ramps of the command through zero",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 5 (overlapped spools)",
+        .form_error = 0.1,
         .in_motion = "nothing: a motion prescribes flow; the command that gives it is larger"};
     return info;
   }

@@ -17,8 +17,8 @@ class ValveLag final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.5,
-                        1.5,
+                        0.7,
+                        1.35,
                         1.0,
                         "share of the flow's change that comes late, about 1",
                         true,
@@ -46,6 +46,7 @@ class ValveLag final : public Effect {
         .confused_with = {"valve_deadband", "sensor_delay", "compressibility"},
         .separated_by = "steps of the command, several times",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 and 7 (valve dynamics)",
+        .form_error = 0.1,
         .in_motion = "nothing: a motion prescribes flow; a controller must lead the command"};
     return info;
   }

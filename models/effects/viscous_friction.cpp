@@ -20,6 +20,7 @@ class ViscousFriction final : public Effect {
         .citation =
             "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), sec. 2; "
             "Jelali & Kroll (2003), Hydraulic Servo-systems",
+        .form_error = 0.05,
         .in_motion = "force"};
     return info;
   }
