@@ -202,6 +202,9 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     if (!d.unexplained) d.unexplained = describe(d.evidence, l);
     unknown = unknown || touched;
   }
+  if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
+    d.unexplained = describe_unnamed(d);
+  }
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe(d, i, options.search));
   d.verdict = unknown              ? Verdict::kUnknown
