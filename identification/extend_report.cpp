@@ -34,8 +34,8 @@ std::string parameters_text(const AppliedEffect& e) {
   const auto& parameters = e.effect->info().parameters;
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = parameters[p];
-    text +=
-        fmt::format("{}{} {:.4g} {}", text.empty() ? "" : ", ", q.name, e.values[p] / q.si, q.unit);
+    text += fmt::format("{}{} {:.4g}{}", text.empty() ? "" : ", ", q.name, e.values[p] / q.si,
+                        q.unit.empty() || q.unit == "-" ? "" : " " + q.unit);
     if (p < e.lower95.size() && std::isfinite(e.lower95[p])) {
       text += fmt::format(" ({:.4g} .. {:.4g})", e.lower95[p] / q.si, e.upper95[p] / q.si);
     }

@@ -21,8 +21,6 @@ constexpr double kStretchSeconds = 30.0;  // of a log, as much as the eye can co
 constexpr std::size_t kMostRanked = 10;
 constexpr std::size_t kMostChannels = 2;  // of an effect that shows in several
 
-const char* const kDash = "\u2014";
-
 VectorXd contribution(const Evidence& evidence, const AppliedEffect& effect,
                       const EvidenceChannel& channel) {
   std::vector<double> linear, shape;
@@ -125,7 +123,7 @@ std::string shows_against(const Effect& effect) {
       {"valve_deadband", "command"},
       {"leakage", "load"},
       {"valve_lag", "command_slope"},
-      {"pump_lag", "demand_slope"},
+      {"pump_lag", "pressure_slope"},
       {"compressibility", "command_slope"},
       {"sensor_delay", "acceleration"}};
   const auto at = known.find(effect.info().id);
@@ -324,8 +322,8 @@ std::vector<TellingSignal> telling_signals(const Evidence& evidence,
     if (is_pump) {
       add("demand", "pressure asked for", "bar", units::kBar,
           [p](const MachineSeries& log) { return log.pumps[p].demand; });
-      add("demand_slope", "rate of the pressure asked for", "bar/s", units::kBar,
-          [p](const MachineSeries& log) { return slope(log, log.pumps[p].demand); });
+      add("pressure_slope", "rate of the pump's pressure", "bar/s", units::kBar,
+          [p](const MachineSeries& log) { return slope(log, log.pumps[p].pressure); });
     }
   }
   add("payload", "payload", "kg", 1.0, [](const MachineSeries& log) { return log.payload; });

@@ -80,7 +80,7 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
     text += fmt::format("What the model leaves is what chance leaves (p = {:.2g}). ", d.p_value);
   } else if (d.verdict == Verdict::kMissing) {
     text +=
-        fmt::format("Chance that nothing is missing: {}.",
+        fmt::format("Chance of such evidence with nothing missing: {}.",
                     d.p_value < 0.005 ? "below 0.5 %" : fmt::format("{:.1f} %", 100 * d.p_value));
   }
   page.verdict(tone_of(d.verdict), sentence(d.headline()), text);

@@ -34,7 +34,7 @@ std::string parameter_text(const ParameterEstimate& p) {
     unit = "kN";
   }
   const double value = scale * p.value, lower = scale * p.lower95, upper = scale * p.upper95;
-  const std::string tail = unit.empty() ? "" : " " + unit;
+  const std::string tail = unit.empty() || unit == "-" ? "" : " " + unit;
   if (!std::isfinite(lower) || !std::isfinite(upper))
     return fmt::format("{} {}{}", p.name, display_number(value, 4), tail);
   const double half = 0.5 * (upper - lower);

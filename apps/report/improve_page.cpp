@@ -91,12 +91,12 @@ void add_overview(Page& page, const ExtendResult& result, const std::vector<Erro
   LineChart chart = over_steps(result);
   chart.title = "Error falling step by step, as a multiple of the sensor's noise";
   chart.note = fmt::format(
-      "RMS error on the {}; step 0 is the model before. At 1 nothing is left but noise; a "
-      "quantity whose noise is not known is left out.",
+      "RMS error on the {}; step 0 is the model before. At 1 nothing is left but noise. "
+      "Quantities that did not move, or whose noise is not known, are left out.",
       result.steps.front().judged_on);
   chart.y_axis = {"RMS error / noise", ""};
   for (const ErrorTrace& t : traces) {
-    if (!(t.noise > 0.0)) continue;
+    if (!(t.noise > 0.0) || !(t.largest_change() > kMoved)) continue;
     chart.series.push_back({t.words, t.rmse / t.noise, LineStyle::kPlain, -1, {}, {}});
   }
   if (chart.series.empty()) return;

@@ -98,7 +98,7 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
   EXPECT_THAT(html, HasSubstr("Chance that nothing is missing: below 0.5 %"));
   EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
-  EXPECT_THAT(html, HasSubstr("lift and lower slowly"));
+  EXPECT_THAT(html, HasSubstr("Lift and lower slowly"));
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 
