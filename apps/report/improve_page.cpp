@@ -240,7 +240,7 @@ void set_verdict(Page& page, const ExtendResult& r) {
   std::string names, text;
   for (const ExtendStep& s : r.steps) {
     names += (names.empty() ? "" : ", then ") + s.title;
-    text += fmt::format("{}: {}. ", s.title, parameters_text(estimates_of(s.effect)));
+    text += fmt::format("{}: {}. ", capitalised(s.title), parameters_text(estimates_of(s.effect)));
   }
   const std::string change = change_text(all.overall);
   page.verdict(
