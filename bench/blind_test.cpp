@@ -1,6 +1,7 @@
 /// The blind test of diagnosis: logs with a hidden effect from simulator/hidden_effects (which shares no law with the
 /// catalogue), one line a run, then the table of shares with their 95 % limits.
 ///   build/bench/blind_test --runs 40 --seed 1000 [--rows none,clear,small,outside,pairs,fault] [--way both] [--json F]
+/// --ways ours,bic,gp,correlation also judges the simple ways (bench/simple_ways.h), on the same logs.
 /// Thresholds were chosen on seeds below 1000 only.
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@
 #include <set>
 
 #include "bench/share.h"
+#include "bench/simple_ways.h"
 #include "identification/diagnose.h"
 #include "identification/fit.h"
 #include "models/error.h"
@@ -30,6 +32,7 @@ struct Options {
   std::uint64_t seed = 1000;
   double seconds = 300.0, noise = 1.0;
   std::vector<std::string> rows = {"none", "clear", "small", "outside", "pairs", "fault"};
+  std::vector<std::string> ways = {"ours"};
   std::string way = "both", only, json;
   bool verbose = false;
 };
@@ -40,6 +43,8 @@ struct Run {
   double set_size = 1.0, seconds = 0.0, rows = 0.0;
   std::vector<double> errors;  // relative, of parameters
   std::vector<bool> covered;   // truth inside the 95 % interval
+  std::string judge = "ours";  // which way gave the answer
+  std::vector<sparflow::bench::Swallowed> swallowed;
 };
 
 Machine draw_machine(std::uint64_t seed) {
@@ -67,11 +72,34 @@ std::vector<std::string> ids_for(const Machine& machine, bool outside, const std
   return ids;
 }
 
-Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Options& options) {
+/// A simple way's answer in the form of a diagnosis.
+Diagnosis simple_diagnosis(const std::string& judge, const CraneModel& model,
+                           const std::vector<Log>& logs, const std::vector<Log>& references) {
+  const sparflow::bench::RawEvidence evidence(model, logs, references);
+  const sparflow::bench::SimpleAnswer answer =
+      judge == "bic" ? evidence.iid_bic() : evidence.strongest_correlation();
+  Diagnosis d;
+  d.verdict = answer.found.empty() ? Verdict::kNone : Verdict::kMissing;
+  for (std::size_t k = 0; k < answer.found.size(); ++k) {
+    const EffectAt& e = answer.found[k];
+    const std::string key = effect_key(e.effect->info(), model.machine, e.at);
+    DiagnosedEffect one;
+    one.effect = e;
+    one.id = e.effect->info().id;
+    one.at = key.size() > one.id.size() ? key.substr(one.id.size() + 1) : "";
+    one.applied = {e.effect, e.at, answer.values[k], {}, {}};
+    d.effects.push_back(one);
+  }
+  return d;
+}
+
+Run one_run(const std::string& row, bool reference, std::uint64_t seed, const std::string& judge,
+            const Options& options) {
   std::mt19937_64 random(seed * 7919 + std::hash<std::string>()(row) % 1000);
   Run run;
   run.row = row;
   run.reference = reference;
+  run.judge = judge;
   CaseRequest request;
   request.log.seconds = options.seconds;
   request.log.noise_factor = options.noise;
@@ -111,7 +139,17 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
   fit_options.hold_out_every = 0;
   const FitResult fitted = fit(machine, reference ? references : train, {}, fit_options);
   const auto start = std::chrono::steady_clock::now();
-  const Diagnosis d = diagnose(fitted.model, train, references);
+  Diagnosis d;
+  if (judge == "ours") {
+    d = diagnose(fitted.model, train, references);
+  } else if (judge == "gp") {
+    const std::vector<Log> tests = {log_from_text("test.csv", csv_text(logs.test), machine)};
+    run.swallowed = sparflow::bench::swallowed_by_refit(fitted.model, references, train, tests);
+    for (const auto& s : run.swallowed)
+      run.answer += fmt::format("{} error {:+.0f} % ", s.stage, -100.0 * s.share);
+  } else {
+    d = simple_diagnosis(judge, fitted.model, train, references);
+  }
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   run.verdict = verdict_name(d.verdict);
 
@@ -122,7 +160,7 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
   }
   run.truth = fmt::format("{}", fmt::join(truth, " + "));
   for (const HiddenTruth& t : logs.train.truth) run.truth += fmt::format(" [{}]", t.law_name);
-  run.answer = fmt::format("{}", fmt::join(answer, " + "));
+  run.answer += fmt::format("{}", fmt::join(answer, " + "));
   if (d.verdict == Verdict::kUnknown && d.unexplained)
     run.answer += "unknown: " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
@@ -150,6 +188,7 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const Op
           for (const HiddenParameter& p : t.parameters) {
             if (p.name != info.parameters[k].name || p.equivalent == 0.0) continue;
             run.errors.push_back(std::abs(e.applied.values[k] / p.equivalent - 1.0));
+            if (e.applied.lower95.empty()) continue;
             run.covered.push_back(p.equivalent >= e.applied.lower95[k] &&
                                   p.equivalent <= e.applied.upper95[k]);
             run.truth +=
@@ -186,7 +225,24 @@ double median_of(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
+/// What learning again swallows of the error, by stage.
+void print_swallowed(const std::vector<Run>& runs, nlohmann::json& json) {
+  std::map<std::string, std::vector<double>> shares;
+  for (const Run& r : runs) {
+    for (const auto& s : r.swallowed) shares[s.stage].push_back(s.share);
+  }
+  fmt::print(
+      "\nlearning again instead of a cause: share of the added error that is gone, median\n");
+  for (const auto& [stage, all] : shares) {
+    fmt::print("{:52s} {:5.1f} %  ({} runs)\n", "  " + stage, 100.0 * median_of(all), all.size());
+    json["swallowed"].push_back(
+        {{"stage", stage}, {"median", median_of(all)}, {"runs", all.size()}});
+  }
+}
+
 void print_table(const std::vector<Run>& runs, nlohmann::json& json) {
+  const std::string judge = runs.empty() ? "ours" : runs.front().judge;
+  if (judge == "gp") return print_swallowed(runs, json);
   const auto share = [&](const std::string& text, const char* least, const auto& pick,
                          const auto& hit) {
     int n = 0, k = 0;
@@ -199,7 +255,8 @@ void print_table(const std::vector<Run>& runs, nlohmann::json& json) {
     const auto [lo, hi] = sparflow::bench::share_limits(k, n);
     fmt::print("{:52s} {:5.1f} %  ({:.0f} .. {:.0f} %, {} of {})   asked {}\n", text, 100.0 * k / n,
                100.0 * lo, 100.0 * hi, k, n, least);
-    json["table"].push_back({{"measure", text},
+    json["table"].push_back({{"by", judge},
+                             {"measure", text},
                              {"share", 1.0 * k / n},
                              {"limits95", {lo, hi}},
                              {"hits", k},
@@ -207,7 +264,7 @@ void print_table(const std::vector<Run>& runs, nlohmann::json& json) {
   };
   const auto is = [](const char* row) { return [row](const Run& r) { return r.row == row; }; };
   const auto single = [](const Run& r) { return r.row == "clear" || r.row == "small"; };
-  fmt::print("\n");
+  fmt::print("\n{}", judge == "ours" ? "" : "judged by " + judge + "\n");
   share("false alarm, nothing missing", "<= 5 %", is("none"),
         [](const Run& r) { return r.verdict != "none"; });
   share("top-1 id and place, clear effect", ">= 97 %", is("clear"), good);
@@ -257,11 +314,15 @@ int run(int argc, char** argv) {
   app.add_option("--rows", options.rows, "none, clear, small, outside, pairs, fault")
       ->delimiter(',');
   app.add_option("--way", options.way, "reference, alone or both");
+  app.add_option("--ways", options.ways,
+                 "who judges: ours, and for comparison bic, gp, correlation (docs/diagnose.md)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"ours", "bic", "gp", "correlation"}));
   app.add_option("--only", options.only, "this effect alone");
   app.add_option("--json", options.json, "all runs as JSON");
   app.add_flag("-v,--verbose", options.verbose, "the whole diagnosis of each run");
   CLI11_PARSE(app, argc, argv);
-  std::vector<Run> runs;
+  std::map<std::string, std::vector<Run>> runs;
   nlohmann::json json;
   for (const std::string& row : options.rows) {
     for (const bool reference : {true, false}) {
@@ -270,32 +331,37 @@ int run(int argc, char** argv) {
       for (int i = 0; i < options.runs; ++i) {
         const std::uint64_t seed =
             options.seed + static_cast<std::uint64_t>(2 * i + (reference ? 0 : 1));
-        try {
-          runs.push_back(one_run(row, reference, seed, options));
-        } catch (const InputError& error) {
-          fmt::print("{:8s} {:9s} {:5d} left out: {}\n", row, reference ? "reference" : "alone",
-                     seed, error.what());
-          continue;
+        for (const std::string& judge : options.ways) {
+          if (judge == "gp" && !reference) continue;  // no model before the effect to compare with
+          const char* way = reference ? "reference" : "alone";
+          try {
+            runs[judge].push_back(one_run(row, reference, seed, judge, options));
+          } catch (const InputError& error) {
+            fmt::print("{:8s} {:9s} {:5d} left out: {}\n", row, way, seed, error.what());
+            continue;
+          }
+          const Run& r = runs[judge].back();
+          fmt::print("{} {:8s} {:9s} {:5d} {:24s} {:60s} -> {}{}{}\n",
+                     good(r) || judge == "gp" ? "  " : "X ", row, way, seed, r.machine, r.truth,
+                     judge == "ours" ? "" : judge + ": ",
+                     r.verdict == "missing" ? "" : r.verdict + " ", r.answer);
+          std::fflush(stdout);
+          json["runs"].push_back({{"row", row},
+                                  {"by", judge},
+                                  {"reference", reference},
+                                  {"seed", seed},
+                                  {"machine", r.machine},
+                                  {"truth", r.truth},
+                                  {"answer", r.answer},
+                                  {"verdict", r.verdict},
+                                  {"good", good(r)},
+                                  {"seconds", r.seconds},
+                                  {"errors", r.errors}});
         }
-        const Run& r = runs.back();
-        fmt::print("{} {:8s} {:9s} {:5d} {:24s} {:60s} -> {}{}\n", good(r) ? "  " : "X ", row,
-                   reference ? "reference" : "alone", seed, r.machine, r.truth,
-                   r.verdict == "missing" ? "" : r.verdict + " ", r.answer);
-        std::fflush(stdout);
-        json["runs"].push_back({{"row", row},
-                                {"reference", reference},
-                                {"seed", seed},
-                                {"machine", r.machine},
-                                {"truth", r.truth},
-                                {"answer", r.answer},
-                                {"verdict", r.verdict},
-                                {"good", good(r)},
-                                {"seconds", r.seconds},
-                                {"errors", r.errors}});
       }
     }
   }
-  print_table(runs, json);
+  for (const std::string& judge : options.ways) print_table(runs[judge], json);
   if (!options.json.empty()) write_file_atomically(options.json, json.dump(1) + "\n");
   return 0;
 }
