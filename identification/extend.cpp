@@ -21,6 +21,7 @@ constexpr double kRefitMoves = 1.005;
 
 std::vector<EffectAt> places_of(const std::vector<AppliedEffect>& effects) {
   std::vector<EffectAt> out;
+  out.reserve(effects.size());
   for (const AppliedEffect& e : effects) out.push_back({e.effect, e.at});
   return out;
 }
@@ -30,6 +31,7 @@ bool same(const EffectAt& a, const EffectAt& b) { return a.effect == b.effect &&
 std::vector<MachineSignals> signals_of(const Machine& machine, const std::vector<Log>& logs,
                                        const SignalOptions& options) {
   std::vector<MachineSignals> out;
+  out.reserve(logs.size());
   for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
   return out;
 }

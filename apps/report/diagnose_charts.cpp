@@ -358,6 +358,7 @@ void add_left_over(Page& page, const Diagnosis& d, const std::string& stage,
     const ChannelPicture p = channel_picture(d, -1, c);
     const std::vector<TellingSignal> signals = telling_signals(d.evidence, channel);
     std::vector<std::pair<double, const TellingSignal*>> ranked;
+    ranked.reserve(signals.size());
     for (const TellingSignal& s : signals)
       ranked.emplace_back(share_explained(s.values, p.with), &s);
     std::stable_sort(ranked.begin(), ranked.end(),
