@@ -193,20 +193,28 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   if (progress) progress(0.92, "looking at what is left");
   const std::vector<Leftover> left = find_leftovers(d.evidence, d.search.final);
   bool unknown = false;
+  std::vector<std::size_t> dominated;
   for (const Leftover& l : left) {
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
     const double share = leftover_share(d, l);
     if (touched) d.leftover_share = std::max(d.leftover_share, share);
     if (share < kLargestLeftoverShare) continue;
-    if (!d.unexplained) d.unexplained = describe(d.evidence, l);
+    if (!d.unexplained || (touched && !unknown)) d.unexplained = describe(d.evidence, l);
     unknown = unknown || touched;
+    dominated.push_back(l.channel);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
   }
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe(d, i, options.search));
+  // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
+  for (const DiagnosedEffect& e : d.effects) {
+    const bool doubtful = std::find(dominated.begin(), dominated.end(),
+                                    e.channels.front().channel) != dominated.end();
+    unknown = unknown && doubtful;
+  }
   d.verdict = unknown              ? Verdict::kUnknown
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown

@@ -109,12 +109,27 @@ class Search {
     EffectFit current = fit_effects(evidence_, {}, nullptr, final_control());
     result.null = current;
     std::vector<FoundEffect> found;
-    std::vector<bool> refused(candidates_.size(), false);
+    refused_.assign(candidates_.size(), false);
+    for (int round = 0; round < 3; ++round) {
+      select(found, current, result);
+      prune(found, current);
+      finish(found, current);
+      if (!drop_unproven(found, current, result)) break;
+    }
+    intervals(found);
+    result.final = current;
+    result.found = std::move(found);
+    return result;
+  }
+
+ private:
+  /// Adds the best candidate while it passes the gate and its proofs.
+  void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (int step = 0; static_cast<int>(found.size()) < options_.max_effects &&
                        step < 3 * options_.max_effects;) {
       report(found.size(), "searching");
       const std::vector<const EffectDesign*> base = designs_of(found);
-      std::vector<Score> scores = score_all(base, current, found, refused);
+      std::vector<Score> scores = score_all(base, current, found);
       if (scores.empty()) break;
       if (result.ranking.empty()) {
         for (const Score& s : scores)
@@ -125,10 +140,11 @@ class Search {
       const NullGate gate =
           make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
       const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
-      const Score& best = scores.front();
+      const Score& best = plainer(scores);
       const double p = gate.p_value(best.gain);
       if (tracing()) trace_scores(step, scores, gate);
-      if (step++ == 0) {
+      ++step;
+      if (found.empty() && result.threshold == 0.0) {
         result.threshold = gate.threshold(level);
         result.p_value = p;
       }
@@ -149,19 +165,44 @@ class Search {
           result.unnamed.push_back(found.back());
         }
         found.pop_back();
-        refused[best.candidate] = true;
+        refused_[best.candidate] = true;
         continue;
       }
       current = next;
     }
-    prune(found, current);
-    finish(found, current);
-    result.final = current;
-    result.found = std::move(found);
-    return result;
   }
 
- private:
+  /// The best candidate, or the plainer effect it contains when that explains most of the same: what is left then
+  /// decides whether the refinement is needed, and `prune` drops whichever becomes superfluous.
+  const Score& plainer(const std::vector<Score>& scores) const {
+    const EffectAt& best = candidates_[scores.front().candidate].effect;
+    for (const Score& s : scores) {
+      const EffectAt& e = candidates_[s.candidate].effect;
+      if (e.at == best.at && e.effect->info().id == best.effect->info().refines &&
+          s.gain > 0.5 * scores.front().gain) {
+        return s;
+      }
+    }
+    return scores.front();
+  }
+
+  /// What the later ones turned into a remnant. @return whether any was dropped
+  bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const std::string why = why_not(found[i]);
+      if (why.empty()) continue;
+      result.notes.push_back(fmt::format("{} is taken back: {}", key(found[i].design.effect), why));
+      if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
+      for (std::size_t c = 0; c < candidates_.size(); ++c) {
+        if (same(candidates_[c].effect, found[i].design.effect)) refused_[c] = true;
+      }
+      found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+      current = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+      return true;
+    }
+    return false;
+  }
+
   struct Score {
     std::size_t candidate = 0;
     std::size_t design = 0;
@@ -231,7 +272,8 @@ class Search {
 
   /// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
   double gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
-              const EffectFit& current, const std::vector<bool>& also = {}) const {
+              const EffectFit& current, const std::vector<bool>& also = {},
+              bool only_there = false) const {
     FitControl c;
     c.active = connected(base, d);
     for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
@@ -244,16 +286,22 @@ class Search {
       if (needed) with.push_back(b);
     }
     with.push_back(&d);
-    return fit_effects(evidence_, with, &current, c).total() - current.total();
+    const EffectFit fit = fit_effects(evidence_, with, &current, c);
+    if (!only_there) return fit.total() - current.total();
+    double sum = 0.0;  // a rival must explain the same evidence, not other evidence as much
+    for (std::size_t k = 0; k < also.size(); ++k) {
+      if (also[k]) sum += fit.log_likelihood[k] - current.log_likelihood[k];
+    }
+    return sum;
   }
 
   std::vector<Score> score_all(const std::vector<const EffectDesign*>& base,
-                               const EffectFit& current, const std::vector<FoundEffect>& found,
-                               const std::vector<bool>& refused) const {
+                               const EffectFit& current,
+                               const std::vector<FoundEffect>& found) const {
     std::vector<Score> scores(candidates_.size());
     parallel(candidates_.size(), [&](std::size_t i) {
       scores[i].candidate = i;
-      if (refused[i] || is_in(found, candidates_[i].effect)) return;
+      if (refused_[i] || is_in(found, candidates_[i].effect)) return;
       for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
         const double g = gain(base, candidates_[i].designs[k], current) - candidates_[i].penalty;
         if (g > scores[i].gain) scores[i] = {i, k, g};
@@ -388,7 +436,6 @@ class Search {
       if (!swapped) break;
     }
     for (std::size_t i = 0; i < found.size(); ++i) judge(found[i], i, found, current);
-    intervals(found);
   }
 
   /// @return whether a rival took the place of found[i]
@@ -402,17 +449,17 @@ class Search {
     parallel(candidates_.size(), [&](std::size_t k) {
       scores[k].candidate = k;
       const Candidate& c = candidates_[k];
-      if (is_in(found, c.effect)) return;
+      if (refused_[k] || is_in(found, c.effect)) return;
       for (std::size_t d = 0; d < c.designs.size(); ++d) {
         bool meets = false;
         for (std::size_t ch = 0; ch < touched.size(); ++ch)
           meets = meets || (touched[ch] && c.designs[d].touches(ch));
         if (!meets) return;
-        const double g = gain(others, c.designs[d], without, touched) - c.penalty;
+        const double g = gain(others, c.designs[d], without, touched, true) - c.penalty;
         if (g > scores[k].gain) scores[k] = {k, d, g};
       }
     });
-    const double own = gain(others, f.design, without, touched) - penalty_of(f.design.effect);
+    const double own = gain(others, f.design, without, touched, true) - penalty_of(f.design.effect);
     f.gain = own;
     std::sort(scores.begin(), scores.end(),
               [](const Score& a, const Score& b) { return a.gain > b.gain; });
@@ -518,6 +565,7 @@ class Search {
   const SearchProgress& progress_;
   std::mt19937_64 random_;
   std::vector<Candidate> candidates_;
+  std::vector<bool> refused_;  // candidates that failed a proof in this search
 };
 
 }  // namespace

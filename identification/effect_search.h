@@ -18,7 +18,7 @@ struct SearchOptions {
   /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
   double smallest_effect = 0.15;
   /// A further effect smaller than this share of the largest in the same channel only mends that one's form.
-  double smallest_share = 0.08;
+  double smallest_share = 0.02;
   double largest_absorbed =
       0.9;  ///< an effect that learned laws imitate to more than this share is not named
   double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart

@@ -42,8 +42,10 @@ struct EffectInfo {
   std::string equation;                     ///< one line of text
   std::vector<std::string> signals;         ///< what a log must hold, in words: "chamber pressures"
   std::vector<std::string> confused_with;   ///< ids or words
-  std::string separated_by;                 ///< the motion that tells them apart
-  std::string citation;                     ///< author (year), equation or chapter
+  /// Id of the plainer effect that this one contains; that one is tried first.
+  std::string refines = {};
+  std::string separated_by;  ///< the motion that tells them apart
+  std::string citation;      ///< author (year), equation or chapter
   /// Share by which other published laws of the same effect differ in these parameters when both are fitted to the
   /// same data; part of every interval. Measured on simulated logs with other laws (bench/blind_test).
   double form_error = 0.02;

@@ -30,6 +30,7 @@ class Presliding final : public Effect {
         .equation = "F = F_static + z, dz/dx = (Fc - z sign(v)) / distance",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"coulomb_friction", "stribeck_friction"},
+        .refines = "coulomb_friction",
         .separated_by = "small reversals, and full strokes for comparison",
         .citation =
             "P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158; "
