@@ -123,6 +123,12 @@ class Search {
   }
 
  private:
+  struct Score {
+    std::size_t candidate = 0;
+    std::size_t design = 0;
+    double gain = -1e300;  // penalised
+  };
+
   /// Adds the best candidate while it passes the gate and its proofs.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (int step = 0; static_cast<int>(found.size()) < options_.max_effects &&
@@ -202,12 +208,6 @@ class Search {
     }
     return false;
   }
-
-  struct Score {
-    std::size_t candidate = 0;
-    std::size_t design = 0;
-    double gain = -1e300;  // penalised
-  };
 
   template <class F>
   static void parallel(std::size_t count, const F& work) {
