@@ -126,5 +126,48 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
   EXPECT_THAT(o.out, HasSubstr("taken back"));
 }
 
+TEST_F(CliDiagnose, AnEffectOfTheUsersOwnIsFoundAndCarried) {
+  // friction in all but name: the catalogue's stands in no --candidates here
+  write("mine.yaml",
+        "effects:\n"
+        "  - id: seal_drag\n"
+        "    stage: force\n"
+        "    law: Fc * direction\n"
+        "    parameters:\n"
+        "      Fc: {unit: kN, bounds: [0, 60], typical: 8}\n");
+  const std::string log = with_friction(kTrain, "train.csv", 6.0);
+  const std::string own = " --effects " + at("mine.yaml");
+  const std::string few = " --candidates seal_drag:boom unmodelled_mass:jib";
+  const std::string diagnose = "diagnose --model " + model() + " --log " + log + few;
+  EXPECT_EQ(run(diagnose).code, 3);  // nobody knows seal_drag
+  Outcome o = run(diagnose + own + " --json " + at("d.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json effect = json::parse(slurp(at("d.json"))).at("effects").at(0);
+  EXPECT_EQ(effect.at("id"), "seal_drag");
+  EXPECT_EQ(effect.at("parameters").at(0).at("unit"), "kN");
+
+  o = run("extend --model " + model() + " --add seal_drag:boom --log " + log + own + " -o " +
+          at("m2.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(slurp(at("m2.json")), HasSubstr("\"user_effects\": ["));
+  // the model brings it along
+  o = run("extend --model " + at("m2.json") + " --remove seal_drag:boom --log " + log + " -o " +
+          at("m3.json"));
+  EXPECT_EQ(o.code, 0) << o.err;
+  // another law under the same name
+  write("other.yaml",
+        "effects:\n"
+        "  - {id: seal_drag, stage: force, law: B * v, parameters: {B: {unit: N s/m, bounds: [0, "
+        "1e6], typical: 1e4}}}\n");
+  o = run("diagnose --model " + at("m2.json") + " --log " + log + " --effects " + at("other.yaml"));
+  EXPECT_EQ(o.code, 3);
+  EXPECT_THAT(o.err, HasSubstr("other.yaml:2"));
+  EXPECT_THAT(o.err, HasSubstr("seal_drag_2"));
+  o = run("extend --model " + model() + " --add seal_drag:boom --log " + log + own + " -o " +
+          at("mine.yaml"));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_THAT(o.err, HasSubstr("overwrite"));
+}
+
 }  // namespace
 }  // namespace sparflow::test

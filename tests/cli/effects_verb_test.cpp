@@ -60,6 +60,43 @@ TEST_F(EffectsVerb, PrintsOneEntryAndItsJson) {
   EXPECT_EQ(result["effects"][0]["parameters"][0]["unit"], "N");
 }
 
+constexpr const char* kSeal =
+    "effects:\n"
+    "  - id: seal_drag\n"
+    "    title: Drag of the seal\n"
+    "    stage: force\n"
+    "    law: Fc * tanh(v / v0)\n"
+    "    parameters:\n"
+    "      Fc: {unit: N, bounds: [0, 20000], typical: 3000, meaning: friction force}\n"
+    "      v0: {unit: mm/s, bounds: [0.5, 50], typical: 5, meaning: speed at which it is full}\n";
+
+TEST_F(EffectsVerb, PrintsAnEffectOfTheUsersOwn) {
+  const std::string file = (folder / "mine.yaml").string();
+  std::ofstream(file) << kSeal;
+  ASSERT_EQ(run("seal_drag --effects " + file + " --json " + (folder / "e.json").string()), 0)
+      << read("err");
+  EXPECT_THAT(read("out"), HasSubstr("seal_drag:<cyl>: Drag of the seal"));
+  EXPECT_THAT(read("out"), HasSubstr("Fc * tanh(v / v0)"));
+  EXPECT_THAT(read("out"), HasSubstr("searched from 0.5, "));
+  const json entry = json::parse(read("e.json"))["effects"][0];
+  EXPECT_EQ(entry["built_in"], false);
+  EXPECT_EQ(entry["shows_in"][0], "force");
+  ASSERT_EQ(run("--effects " + file), 0) << read("err");
+  EXPECT_THAT(read("out"), HasSubstr("seal_drag:<cyl>"));
+  EXPECT_EQ(run("seal_drag"), 2);  // without the file nobody knows it
+}
+
+TEST_F(EffectsVerb, AWrongUnitIsBadInputAndSaysWhere) {
+  const std::string file = (folder / "mine.yaml").string();
+  std::string text = kSeal;
+  text.replace(text.find("unit: N,"), 8, "unit: bar,");
+  std::ofstream(file) << text;
+  EXPECT_EQ(run("--effects " + file), 3);
+  EXPECT_THAT(read("err"), HasSubstr("mine.yaml:5:10: effects[seal_drag].law"));
+  EXPECT_THAT(read("err"), HasSubstr("expected [N], the unit of stage force"));
+  EXPECT_EQ(run("--effects " + (folder / "none.yaml").string()), 3);
+}
+
 TEST_F(EffectsVerb, SuggestsForATypingError) {
   EXPECT_EQ(run("viscous_frction"), 2);
   EXPECT_THAT(read("err"), HasSubstr("did you mean \"viscous_friction\"?"));
