@@ -76,7 +76,13 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
         if (!d.touches(c)) continue;
         MatrixXd x =
             whitened_rows(evidence.channels[c], fit.noise[c], d.columns[c]).leftCols(d.linear);
-        if (fixed[c].cols() > 0) x -= fixed[c] * (fixed[c].transpose() * x);
+        if (fixed[c].cols() > 0) {
+          const VectorXd whole = x.colwise().squaredNorm();
+          x -= fixed[c] * (fixed[c].transpose() * x);
+          for (Index i = 0; i < x.cols(); ++i) {  // accepted already: rounding is no candidate
+            if (x.col(i).squaredNorm() < 1e-16 * whole[i]) x.col(i).setZero();
+          }
+        }
         n += x.transpose() * x / fit.noise[c].variance;
         z += x.transpose() * noise[c] / std::sqrt(fit.noise[c].variance);
       }

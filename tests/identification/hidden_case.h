@@ -1,0 +1,50 @@
+#pragma once
+/// Simulated logs with a hidden effect, in memory. The simulator shares no law with the catalogue.
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "identification/log.h"
+#include "models/machine_file.h"
+#include "simulator/hidden_effects/hidden_effect.h"
+
+namespace sparflow::testing_support {
+
+inline Machine drawn_machine(const std::string& name) {
+  return load_machine(SPARFLOW_SOURCE_DIR "/problems/machines/" + name + ".yaml");
+}
+
+struct HiddenCase {
+  simulator::GeneratedCase logs;
+  Log train, reference;
+
+  double truth(const std::string& id, const std::string& parameter) const {
+    for (const simulator::HiddenTruth& t : logs.train.truth) {
+      if (t.id != id) continue;
+      for (const simulator::HiddenParameter& p : t.parameters) {
+        if (p.name == parameter) return p.equivalent;
+      }
+    }
+    throw std::logic_error("no hidden " + id + " " + parameter);
+  }
+};
+
+inline HiddenCase hidden_case(const Machine& machine,
+                              const std::vector<simulator::HiddenEffect>& effects,
+                              std::uint64_t seed, double seconds,
+                              const simulator::LogChannels& channels = {}) {
+  simulator::CaseRequest request;
+  request.log.machine = machine;
+  request.log.effects = effects;
+  request.log.crane_seed = request.log.motion_seed = seed;
+  request.log.seconds = seconds;
+  request.log.channels = channels;
+  request.test_seconds = 5.0;
+  HiddenCase c;
+  c.logs = simulator::generate_case(request);
+  c.train = log_from_text("train.csv", simulator::csv_text(c.logs.train), machine);
+  c.reference = log_from_text("reference.csv", simulator::csv_text(c.logs.reference), machine);
+  return c;
+}
+
+}  // namespace sparflow::testing_support
