@@ -144,6 +144,7 @@ const SeedMotion* cheapest_straight_line(const Seeds& seeds, const OptimizeResul
 void add_fit_verb(CLI::App& app, int& code);
 void add_compare_verb(CLI::App& app, int& code);
 void add_diagnose_verb(CLI::App& app, int& code);
+void add_selftest_verb(CLI::App& app, int& code);
 void add_extend_verb(CLI::App& app, int& code);
 void add_improve_verb(CLI::App& app, int& code);
 void add_effects_verb(CLI::App& app, int& code);

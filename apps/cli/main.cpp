@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   cli::add_fit_verb(app, code);
   cli::add_compare_verb(app, code);
   cli::add_diagnose_verb(app, code);
+  cli::add_selftest_verb(app, code);
   cli::add_extend_verb(app, code);
   cli::add_improve_verb(app, code);
   cli::add_effects_verb(app, code);

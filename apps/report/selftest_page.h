@@ -1,0 +1,11 @@
+#pragma once
+/// What logs could reveal, as a page: power of every effect, what would be confused, what is missing from the logs.
+#include "apps/report/page.h"
+#include "identification/selftest.h"
+#include "models/crane_model.h"
+
+namespace sparflow {
+
+Page selftest_page(const CraneModel& model, const Selftest& result);
+
+}  // namespace sparflow

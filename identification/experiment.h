@@ -1,0 +1,48 @@
+#pragma once
+/// The motion that would tell two effects apart: a menu of motions an operator can drive, each synthesised on the
+/// machine inside its limits, both effects put on it at their typical size, and what neither could take over from the
+/// other measured in the noise of the user's own channels.
+#include <string>
+#include <vector>
+
+#include "identification/effect_fit.h"
+
+namespace sparflow {
+
+/// One leg of a motion: joints go together, rest to rest.
+struct MotionLeg {
+  std::vector<int> joints;  ///< empty: a pause
+  double to = 0.5;          ///< where to, as share of each joint's range
+  double speed = 0.5;       ///< mean speed, as share of what joint, valve and pump allow
+  double pause = 1.0;       ///< [s] at rest afterwards
+  double payload = 0.0;     ///< [kg]
+};
+
+struct MotionRecipe {
+  std::string words;            ///< what to record, as one says it to an operator
+  std::vector<MotionLeg> legs;  ///< repeated in turn until a minute is full
+  bool steps = false;           ///< speeds change as fast as the joints can, else smoothly
+  bool warms_up = false;        ///< the oil goes from 20 to 60 degC meanwhile
+};
+
+/// Motions worth recording on this machine; joints the two effects sit at come first.
+/// @param heaviest [kg] the larger of two loads
+std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest);
+
+/// A log of the recipe: joint positions, commands, both chamber pressures, pump pressures, payload and oil temperature
+/// of the model's machine, quasi-static and without noise.
+/// @param step [s]  @param duration [s]
+Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
+                      double duration = 60.0);
+
+struct BetterMotion {
+  std::string words;             ///< empty: no motion of the menu tells them apart
+  double nats_per_minute = 0.0;  ///< likelihood the wrong one of the two would lose
+  double nats_here = 0.0;        ///< the same on the user's own logs, per minute
+};
+
+/// @param fit gives the noise of the evidence's channels; what is not measured there is not counted on either
+BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
+                           const EffectAt& one, const EffectAt& other);
+
+}  // namespace sparflow
