@@ -204,8 +204,9 @@ class Study {
     out.times80 = t80;
     out.times95 = t95;
     std::vector<double> values = v80;
-    // the estimate of its size must also pass what is worth a name; its relative error is 1 / sqrt(2 gain)
-    const double deviation = out.gain > 0.0 ? 1.0 / std::sqrt(2.0 * out.gain) : kInfinity;
+    // the estimate of its size must also pass what is worth a name; its relative error is that of a known noise
+    const double squares = typical.squares();
+    const double deviation = squares > 0.0 ? 1.0 / std::sqrt(squares) : kInfinity;
     const auto large_enough = [&](double quantile) {
       return options_.smallest_effect / std::max(out.size, 1e-12) + quantile * deviation;
     };
@@ -301,8 +302,14 @@ InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
         return std::find(kinds.begin(), kinds.end(), c.kind) != kinds.end() &&
                (!placed || c.kind == EvidenceKind::kPump || c.index == effect.at);
       });
-  out.reason = measured ? "no motion of these logs provokes it"
-                        : fmt::format("not measured: it needs {}", fmt::join(info.signals, ", "));
+  const bool oil = std::any_of(info.signals.begin(), info.signals.end(), [](const std::string& w) {
+    return w.find("oil temperature") != std::string::npos;
+  });
+  const bool no_oil = std::all_of(evidence.series.begin(), evidence.series.end(),
+                                  [](const MachineSeries& s) { return s.oil.size() == 0; });
+  out.reason = oil && no_oil ? "not measured: it needs the oil temperature"
+               : measured    ? "no motion of these logs provokes it"
+                          : fmt::format("not measured: it needs {}", fmt::join(info.signals, ", "));
   return out;
 }
 
