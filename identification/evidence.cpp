@@ -340,6 +340,10 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
             e.filter(log, EvidenceKind::kForce, c.force - known(log, EvidenceKind::kForce, i)) -
             c.static_force;
         if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
+        for (const double f : c.static_force) {
+          if (std::isfinite(f))
+            b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
+        }
         b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
               margin_of(log));
         const double raw = raw_noise(c.force);

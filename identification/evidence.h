@@ -34,7 +34,8 @@ struct EvidenceChannel {
   /// Of supply channels: what one newton of measured force adds to y by the baseline [rows, Pa/N]. A sensor that
   /// reads wrong shifts the force too, and with it the baseline's answer.
   Eigen::VectorXd force_slope;
-  double noise_floor = 0.0;  ///< standard deviation of the sensors' noise in y; NaN = not known
+  double largest_force = 0.0;  ///< [N] of force channels: largest static force
+  double noise_floor = 0.0;    ///< standard deviation of the sensors' noise in y; NaN = not known
 
   Eigen::Index rows() const { return y.size(); }
 };

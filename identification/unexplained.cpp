@@ -330,6 +330,17 @@ MatrixXd own_process_basis(const Evidence& evidence, const EvidenceChannel& chan
 
 }  // namespace
 
+namespace {
+
+/// Below these nobody cares, however regular it is: 0.05 bar, 0.05 mm/s, a tenth of a percent of the largest force.
+double smallest_of_interest(const EvidenceChannel& channel) {
+  if (channel.kind == EvidenceKind::kFlow) return 5e-5;
+  if (channel.kind != EvidenceKind::kForce) return 5e3;
+  return 1e-3 * channel.largest_force;
+}
+
+}  // namespace
+
 std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& fit,
                                      const LeftoverOptions& options) {
   std::vector<Leftover> found;
@@ -402,6 +413,7 @@ std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& 
       found.push_back(std::move(left));
       continue;
     }
+    if (left.rms < smallest_of_interest(channel)) continue;
     if (left.explained < options.least_share || left.rms < options.least_size * left.noise)
       continue;
     if (line.share > 0.5 * left.explained) {

@@ -96,7 +96,7 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   const std::string html = diagnose_page(model, missing_friction(model)).html();
   EXPECT_THAT(html, HasSubstr("force 5.01 \u00B1 0.12 kN"));
   EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
-  EXPECT_THAT(html, HasSubstr("Chance that nothing is missing: below 0.5 %"));
+  EXPECT_THAT(html, HasSubstr("Chance of such evidence with nothing missing: below 0.5 %"));
   EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
   EXPECT_THAT(html, HasSubstr("Lift and lower slowly"));
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));

@@ -77,7 +77,7 @@ TEST_F(EffectsVerb, PrintsAnEffectOfTheUsersOwn) {
       << read("err");
   EXPECT_THAT(read("out"), HasSubstr("seal_drag:<cyl>: Drag of the seal"));
   EXPECT_THAT(read("out"), HasSubstr("Fc * tanh(v / v0)"));
-  EXPECT_THAT(read("out"), HasSubstr("searched from 0.5, "));
+  EXPECT_THAT(read("out"), HasSubstr("searched from 0.5,"));
   const json entry = json::parse(read("e.json"))["effects"][0];
   EXPECT_EQ(entry["built_in"], false);
   EXPECT_EQ(entry["shows_in"][0], "force");
