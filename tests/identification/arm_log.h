@@ -55,6 +55,9 @@ inline GaussianProcess linear_process(double constant, double slope) {
   p.mean_slope = slope;
   p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
   p.data_count = 1;
+  p.flow_max = 1.0;  // right everywhere
+  p.force_min = -1e9;
+  p.force_max = 1e9;
   return GaussianProcess(p);
 }
 
