@@ -143,8 +143,7 @@ Run one_run(const std::string& row, bool reference, std::uint64_t seed, const st
   if (judge == "ours") {
     d = diagnose(fitted.model, train, references);
   } else if (judge == "gp") {
-    const std::vector<Log> tests = {log_from_text("test.csv", csv_text(logs.test), machine)};
-    run.swallowed = sparflow::bench::swallowed_by_refit(fitted.model, references, train, tests);
+    run.swallowed = sparflow::bench::swallowed_by_refit(fitted.model, references, train);
     for (const auto& s : run.swallowed)
       run.answer += fmt::format("{} error {:+.0f} % ", s.stage, -100.0 * s.share);
   } else {

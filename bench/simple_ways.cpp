@@ -347,14 +347,11 @@ SimpleAnswer RawEvidence::strongest_correlation() const {
 
 std::vector<Swallowed> swallowed_by_refit(const CraneModel& model,
                                           const std::vector<Log>& references,
-                                          const std::vector<Log>& suspects,
-                                          const std::vector<Log>& tests) {
-  FitOptions options;
-  options.hold_out_every = 0;
-  const CraneModel again = fit(model.machine, suspects, {}, options).model;
+                                          const std::vector<Log>& suspects) {
+  const FitResult again = fit(model.machine, suspects);
   const auto own = squared_errors(scores_only(model, references));
-  const auto before = squared_errors(scores_only(model, tests));
-  const auto after = squared_errors(scores_only(again, tests));
+  const auto before = squared_errors(scores_only(model, suspects));
+  const auto after = squared_errors(again.held_out ? *again.held_out : again.train);
   std::vector<Swallowed> shares;
   for (const auto& [stage, error] : before) {
     const auto floor = own.find(stage), left = after.find(stage);

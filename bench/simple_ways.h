@@ -58,8 +58,8 @@ class RawEvidence {
 };
 
 /// What learning again does instead of finding a cause: by stage, the share of the error beyond the reference's own
-/// that is gone on the test logs once everything is fitted again on the suspect logs. Stages in which the effect adds
-/// less than a tenth to the error are left out.
+/// that is gone once everything is fitted again on the suspect logs, judged on motions left out of that fit. Stages in
+/// which the effect adds less than a tenth to the error are left out.
 struct Swallowed {
   std::string stage;  ///< force, flow, pressure, pump
   double share = 0.0;
@@ -67,7 +67,6 @@ struct Swallowed {
 /// @param model learned from the references
 std::vector<Swallowed> swallowed_by_refit(const CraneModel& model,
                                           const std::vector<Log>& references,
-                                          const std::vector<Log>& suspects,
-                                          const std::vector<Log>& tests);
+                                          const std::vector<Log>& suspects);
 
 }  // namespace sparflow::bench
