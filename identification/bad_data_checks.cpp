@@ -51,6 +51,7 @@ std::vector<std::size_t> twins_of(const CheckContext& context, std::size_t chann
 double twins_noise(const CheckContext& context, std::size_t channel,
                    const std::vector<std::size_t>& twins) {
   std::vector<double> levels;
+  levels.reserve(twins.size());
   for (const std::size_t i : twins) {
     levels.push_back(context.noise[i].typical / context.channels[i].scale);
   }

@@ -502,6 +502,7 @@ class Search {
       first += f.design.linear;
     }
     std::vector<const EffectDesign*> designs;
+    designs.reserve(augmented.size());
     for (const EffectDesign& d : augmented) designs.push_back(&d);
     const EffectFit fit = fit_effects(evidence_, designs, nullptr, control);
     Index at = 0;

@@ -293,6 +293,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
   Evidence e;
   const Machine& machine = model.machine;
   std::vector<const MachineSignals*> signals;
+  signals.reserve(suspects.size() + references.size());
   for (const MachineSignals& s : suspects) signals.push_back(&s);
   for (const MachineSignals& s : references) signals.push_back(&s);
   e.suspects = suspects.size();

@@ -89,7 +89,8 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
 
 double NoiseModel::whiten(const std::vector<NoiseBlock>& blocks,
                           Eigen::Ref<Eigen::MatrixXd> columns) const {
-  const auto [k1, k2] = reflections(*this);
+  const Reflection reflection = reflections(*this);
+  const double k1 = reflection.k1, k2 = reflection.k2;
   // standard deviations of the first two samples in units of the innovation's
   const double s1 = 1.0 / std::sqrt(1.0 - k2 * k2);
   const double s0 = s1 / std::sqrt(1.0 - k1 * k1);

@@ -426,6 +426,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   }
   report(0.3, "the gate on these motions");
   std::vector<GateCandidate> gated;
+  gated.reserve(all.size());
   for (const SearchCandidate& c : all) gated.push_back({&c.designs, c.penalty});
   std::mt19937_64 random(options.search.seed);
   const NullGate gate =

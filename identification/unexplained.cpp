@@ -361,6 +361,7 @@ std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& 
     }
     const std::vector<int> all_folds = folds_of(channel, options.folds);
     std::vector<int> fold;
+    fold.reserve(rows.size());
     for (const Index i : rows) fold.push_back(all_folds[static_cast<std::size_t>(i)]);
     const std::vector<SignalColumn> signals = channel_signals(evidence, channel);
     std::vector<MatrixXd> parts;

@@ -159,6 +159,7 @@ AppliedEffect read_effect(const Cursor& element, const Machine& machine) {
   applied.at = read_place(element, effect, machine);
   const std::vector<EffectParameter>& parameters = effect.info().parameters;
   std::vector<std::string> names;
+  names.reserve(parameters.size());
   for (const EffectParameter& p : parameters) names.push_back(p.name);
   const std::string expected =
       fmt::format("a list, one element for each parameter: {}", listed(names));

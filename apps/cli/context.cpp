@@ -136,6 +136,7 @@ bool same_file(const std::string& a, const std::string& b) {
 
 std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths) {
   std::vector<NamedFile> files;
+  files.reserve(paths.size());
   for (const std::string& path : paths) files.push_back({option, path});
   return files;
 }

@@ -400,7 +400,8 @@ TEST(Expression, WrongLawsAreExplained) {
       {"max(0, F, v)", 1,
        "max() compares \"0, F\" [N] with \"v\" [m/s]; both must have the same unit"},
       {"Fc * step(v > 0.01)", 13,
-       "compares \"v\" [m/s] with \"0.01\" (no unit); both must have the same unit: write 0.01[m/s]"},
+       "compares \"v\" [m/s] with \"0.01\" (no unit); both must have the same unit: write "
+       "0.01[m/s]"},
       {"F^u", 2, "\"F\" has the unit [N], so its exponent must be a number, not \"u\""},
       {"2^x", 3, "an exponent wants a number without unit, \"x\" has [m]; ..."},
       {"F^0.3", 2, "[N] to the power 0.3 has no exponents that are whole or half"},
