@@ -229,9 +229,9 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     }
     d.indistinguishable.push_back(std::move(set));
   }
-  std::stable_sort(
-      d.effects.begin(), d.effects.end(),
-      [](const DiagnosedEffect& a, const DiagnosedEffect& b) { return a.gain > b.gain; });
+  // Found in the order of what they explain: that order stays; one of a set that is not even half sure goes last.
+  std::stable_partition(d.effects.begin(), d.effects.end(),
+                        [](const DiagnosedEffect& e) { return e.probability >= 0.5; });
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (progress) progress(1.0, "done");
   return d;
