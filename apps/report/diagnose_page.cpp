@@ -67,7 +67,7 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
   for (const DiagnosedEffect& e : d.effects) {
     text += fmt::format("{}: {}", capitalised(title_of(machine, e)), parameters_text(e.parameters));
     if (!e.channels.empty())
-      text += fmt::format("; left-out error of the {}", gain_text(d, e.channels.front()));
+      text += fmt::format("; error of the {}", gain_text(d, e.channels.front()));
     text += ". ";
   }
   for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline has the first
@@ -115,7 +115,7 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
   page.table(std::move(table));
 
   Table errors;
-  errors.title = "Error on motions left out of the estimate";
+  errors.title = "Error on these logs, without and with it";
   errors.columns = {
       {"effect"}, {"quantity"}, {"without it", "", 3}, {"with it", "", 3}, {"sensor noise", "", 3},
       {"unit"}};
