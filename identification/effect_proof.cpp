@@ -151,9 +151,18 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   return result;
 }
 
+std::vector<bool> shape_choices(const Effect& effect) {
+  std::vector<bool> choices;
+  for (const EffectParameter& p : effect.info().parameters) {
+    if (!p.linear) choices.push_back(p.choice);
+  }
+  return choices;
+}
+
 EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
                                const VectorXd& theta) {
   EffectDesign result = design;
+  const std::vector<bool> choices = shape_choices(*design.effect.effect);
   for (std::size_t s = 0; s < design.shape.size(); ++s) {
     const double h = 0.02 * std::max(std::abs(design.shape[s]), 1e-9);
     std::vector<double> up = design.shape, down = design.shape;
@@ -161,7 +170,7 @@ EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& des
     down[s] -= h;
     const EffectDesign a = make_design(evidence, design.effect, up),
                        b = make_design(evidence, design.effect, down);
-    const bool choice = design.shape[s] == std::round(design.shape[s]);  // of variants: no slope
+    const bool choice = choices[s];
     for (std::size_t c = 0; c < design.columns.size(); ++c) {
       if (!design.touches(c)) continue;
       VectorXd slope = VectorXd::Zero(evidence.channels[c].rows());

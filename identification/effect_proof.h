@@ -30,6 +30,9 @@ struct HeldOutGain {
 HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                           std::size_t index, const EffectFit& fit, int folds);
 
+/// By nonlinear parameter: whether it only chooses among variants of a law.
+std::vector<bool> shape_choices(const Effect& effect);
+
 /// The design with one more column for each nonlinear parameter: d(action)/d(parameter) at `theta`.
 EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
                                const Eigen::VectorXd& theta);

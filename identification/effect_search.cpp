@@ -8,8 +8,10 @@
 #include <numeric>
 #include <thread>
 
+#include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
 #include "identification/null_gate.h"
+#include "identification/search_candidates.h"
 
 namespace sparflow {
 namespace {
@@ -24,85 +26,15 @@ bool tracing() {
   return on;
 }
 
-struct Candidate {
-  EffectAt effect;
-  std::vector<EffectDesign> designs;  // one a point of the grid
-  double penalty = 0.0;               // [nats]
-};
-
-std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
-  // limits depend on what a log reaches: the longest suspect log decides
-  std::size_t longest = 0;
-  for (std::size_t k = 1; k < evidence.suspects; ++k) {
-    if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
-  }
-  std::vector<std::vector<double>> points = {{}};
-  int shape = 0;
-  for (const EffectParameter& p : effect.effect->info().parameters) {
-    if (p.linear) continue;
-    const std::vector<double> values =
-        effect.effect->grid(evidence.series[longest], effect.at, shape++);
-    std::vector<std::vector<double>> next;
-    for (const auto& point : points) {
-      for (const double v : values) {
-        next.push_back(point);
-        next.back().push_back(v);
-      }
-    }
-    points = std::move(next);
-  }
-  return points;
-}
-
-/// Linear parameters with independent columns (a mass on the first link acts by its moment alone) and the
-/// nonlinear ones.
-Index parameters_at_work(const Candidate& candidate) {
-  Index linear = 1;
-  for (const EffectDesign& d : candidate.designs) {
-    MatrixXd gram = MatrixXd::Zero(d.linear, d.linear);
-    for (const MatrixXd& c : d.columns) {
-      if (c.cols() > 0) gram += c.transpose() * c / std::max(c.squaredNorm(), 1e-300);
-    }
-    const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Index here = 0;
-    for (Index i = 0; i < d.linear; ++i)
-      here += gram(i, i) > 1e-12 * gram.diagonal().maxCoeff() ? 1 : 0;
-    const MatrixXd correlation = scale.asDiagonal() * gram * scale.asDiagonal();
-    here =
-        std::min(here, Eigen::ColPivHouseholderQR<MatrixXd>(correlation).setThreshold(1e-6).rank());
-    linear = std::max(linear, here);
-  }
-  return linear + static_cast<Index>(candidate.designs.front().shape.size());
-}
-
-/// A parameter with whole numbers only names variants of a law (with or without rescaling): nothing lies between.
-bool is_choice(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return v == std::round(v); });
-}
-
 class Search {
  public:
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
          const SearchOptions& options, const SearchProgress& progress)
-      : evidence_(evidence), options_(options), progress_(progress), random_(options.seed) {
-    double rows = 10.0;
-    for (const EvidenceChannel& c : evidence.channels)
-      rows = std::max(rows, static_cast<double>(c.rows()));
-    std::vector<Candidate> all(effects.size());
-    parallel(effects.size(), [&](std::size_t i) {
-      all[i].effect = effects[i];
-      for (auto& shape : grid_of(effects[i], evidence)) {
-        EffectDesign d = make_design(evidence, effects[i], std::move(shape));
-        if (d.acts()) all[i].designs.push_back(std::move(d));
-      }
-    });
-    for (Candidate& c : all) {
-      if (c.designs.empty()) continue;
-      // Schwarz (1978): half a log of the rows for each parameter that does something
-      c.penalty = 0.5 * static_cast<double>(parameters_at_work(c)) * std::log(rows);
-      candidates_.push_back(std::move(c));
-    }
-  }
+      : evidence_(evidence),
+        options_(options),
+        progress_(progress),
+        random_(options.seed),
+        candidates_(search_candidates(evidence, effects)) {}
 
   SearchResult run() {
     SearchResult result;
@@ -114,9 +46,10 @@ class Search {
       select(found, current, result);
       prune(found, current);
       finish(found, current);
+      estimate_intervals(evidence_, found);
       if (!drop_unproven(found, current, result)) break;
     }
-    intervals(found);
+    estimate_intervals(evidence_, found);
     result.final = current;
     result.found = std::move(found);
     return result;
@@ -142,7 +75,7 @@ class Search {
           result.ranking.emplace_back(candidates_[s.candidate].effect, s.gain);
       }
       std::vector<GateCandidate> gated;
-      for (const Candidate& c : candidates_) gated.push_back({&c.designs, c.penalty});
+      for (const SearchCandidate& c : candidates_) gated.push_back({&c.designs, c.penalty});
       const NullGate gate =
           make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
       const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
@@ -195,7 +128,10 @@ class Search {
   /// What the later ones turned into a remnant. @return whether any was dropped
   bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const std::string why = why_not(found[i]);
+      std::string why = why_not(found[i]);
+      if (why.empty() && found[i].could_be_nothing) {
+        why = "the interval of a parameter without which it is nothing holds zero";
+      }
       if (why.empty()) continue;
       result.notes.push_back(fmt::format("{} is taken back: {}", key(found[i].design.effect), why));
       if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
@@ -314,17 +250,19 @@ class Search {
   }
 
   /// Nonlinear parameters between grid points, by golden section in each in turn.
-  EffectDesign refined(const std::vector<const EffectDesign*>& base, const Candidate& candidate,
-                       std::size_t best, const EffectFit& current) const {
+  EffectDesign refined(const std::vector<const EffectDesign*>& base,
+                       const SearchCandidate& candidate, std::size_t best,
+                       const EffectFit& current) const {
     EffectDesign d = candidate.designs[best];
     if (d.shape.empty()) return d;
     double at_best = gain(base, d, current);
+    const std::vector<bool> choices = shape_choices(*d.effect.effect);
     for (std::size_t k = 0; k < d.shape.size(); ++k) {
+      if (choices[k]) continue;
       std::vector<double> values;
       for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
       std::sort(values.begin(), values.end());
       values.erase(std::unique(values.begin(), values.end()), values.end());
-      if (is_choice(values)) continue;
       const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
       if (here == values.end()) continue;
       double lo = here == values.begin() ? *here : *(here - 1);
@@ -400,7 +338,7 @@ class Search {
   }
 
   double penalty_of(const EffectAt& e) const {
-    for (const Candidate& c : candidates_) {
+    for (const SearchCandidate& c : candidates_) {
       if (same(c.effect, e)) return c.penalty;
     }
     return 0.0;
@@ -448,7 +386,7 @@ class Search {
     std::vector<Score> scores(candidates_.size());
     parallel(candidates_.size(), [&](std::size_t k) {
       scores[k].candidate = k;
-      const Candidate& c = candidates_[k];
+      const SearchCandidate& c = candidates_[k];
       if (refused_[k] || is_in(found, c.effect)) return;
       for (std::size_t d = 0; d < c.designs.size(); ++d) {
         bool meets = false;
@@ -489,56 +427,10 @@ class Search {
     return false;
   }
 
-  /// Values and 95 % intervals, nonlinear parameters by the slope of the effect in them.
-  void intervals(std::vector<FoundEffect>& found) {
-    std::vector<EffectDesign> augmented;
-    FitControl control = final_control();
-    control.ordinary = true;
-    const EffectFit plain_fit = fit_effects(evidence_, designs_of(found), nullptr, control);
-    Index first = 0;
-    for (FoundEffect& f : found) {
-      const VectorXd theta = plain_fit.theta.segment(first, f.design.linear);
-      augmented.push_back(with_shape_slopes(evidence_, f.design, theta));
-      first += f.design.linear;
-    }
-    std::vector<const EffectDesign*> designs;
-    designs.reserve(augmented.size());
-    for (const EffectDesign& d : augmented) designs.push_back(&d);
-    const EffectFit fit = fit_effects(evidence_, designs, nullptr, control);
-    Index at = 0;
-    Index linear_at = 0;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      FoundEffect& f = found[i];
-      const auto count = static_cast<Index>(f.design.linear);
-      f.values = parameter_values(*f.design.effect.effect,
-                                  plain_fit.theta.segment(linear_at, count), f.design.shape);
-      const auto shapes = static_cast<Index>(f.design.shape.size());
-      VectorXd sd = VectorXd::Zero(count + shapes);
-      for (Index k = 0; k < augmented[i].linear; ++k)
-        sd[k] = std::sqrt(std::max(0.0, fit.covariance(at + k, at + k)));
-      const std::vector<double> spread =
-          parameter_values(*f.design.effect.effect, sd.head(count),
-                           std::vector<double>(sd.data() + count, sd.data() + count + shapes));
-      f.lower95.resize(f.values.size());
-      f.upper95.resize(f.values.size());
-      for (std::size_t k = 0; k < f.values.size(); ++k) {
-        const bool choice = spread[k] == 0.0;
-        const double half =
-            choice ? 0.0
-                   : std::hypot(1.96 * spread[k],
-                                f.design.effect.effect->info().form_error * f.values[k]);
-        f.lower95[k] = f.values[k] - half;
-        f.upper95[k] = f.values[k] + half;
-      }
-      at += augmented[i].linear;
-      linear_at += count;
-    }
-  }
-
   void trace_scores(int step, const std::vector<Score>& scores, const NullGate& gate) const {
     fmt::print(stderr, "step {} threshold {:.1f}\n", step, gate.threshold(options_.false_alarm));
     for (std::size_t i = 0; i < std::min<std::size_t>(8, scores.size()); ++i) {
-      const Candidate& c = candidates_[scores[i].candidate];
+      const SearchCandidate& c = candidates_[scores[i].candidate];
       fmt::print(stderr, "   {:28s} gain {:9.1f} shape [{:.4g}]\n", key(c.effect), scores[i].gain,
                  fmt::join(c.designs[scores[i].design].shape, " "));
     }
@@ -565,21 +457,11 @@ class Search {
   const SearchOptions& options_;
   const SearchProgress& progress_;
   std::mt19937_64 random_;
-  std::vector<Candidate> candidates_;
+  std::vector<SearchCandidate> candidates_;
   std::vector<bool> refused_;  // candidates that failed a proof in this search
 };
 
 }  // namespace
-
-std::vector<double> parameter_values(const Effect& effect, const VectorXd& linear,
-                                     const std::vector<double>& shape) {
-  std::vector<double> values;
-  Index l = 0;
-  std::size_t s = 0;
-  for (const EffectParameter& p : effect.info().parameters)
-    values.push_back(p.linear ? linear[l++] : shape[s++]);
-  return values;
-}
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options, const SearchProgress& progress) {

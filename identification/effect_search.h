@@ -38,6 +38,9 @@ struct FoundEffect {
          held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
   double held_out_share = 0.0;  ///< of the parts left out in turn that it improved
   double share = 1.0;  ///< its size / the largest other effect's in the channel where it is largest
+  /// The 95 % interval (sampling error alone) of every linear parameter holds zero, or, where the effect refines a
+  /// plainer one, that of a nonlinear parameter does: the plainer effect, or none, would do.
+  bool could_be_nothing = false;
   bool at_bound = false;  ///< a parameter rests on the edge of what is plausible
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
   /// Others that could stand in its place, best first, with how much worse they are. [nats]
@@ -60,9 +63,5 @@ using SearchProgress = std::function<void(double share, const std::string& what)
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options = {}, const SearchProgress& progress = {});
-
-/// Linear parameters, then nonlinear ones, in the order of info().parameters. [SI]
-std::vector<double> parameter_values(const Effect& effect, const Eigen::VectorXd& linear,
-                                     const std::vector<double>& shape);
 
 }  // namespace sparflow

@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "identification/effect_intervals.h"
 #include "identification/effect_power.h"
 #include "identification/effect_proof.h"
 #include "identification/null_gate.h"

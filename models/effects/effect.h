@@ -31,6 +31,7 @@ struct EffectParameter {
   /// Whether the effect is proportional to it. One that is not is searched over `grid` (then refined).
   bool linear = true;
   std::vector<double> grid;  ///< [SI] empty for linear ones
+  bool choice = false;  ///< the grid's values name variants of the law: nothing lies between them
 };
 
 struct EffectInfo {

@@ -48,7 +48,8 @@ class EndCushion final : public Effect {
                         0.0,
                         "0 at both ends, 1 only where it is extended, -1 only where retracted",
                         false,
-                        {0.0, 1.0, -1.0}}},
+                        {0.0, 1.0, -1.0},
+                        true}},
         .equation =
             "F = F_static + force ((zone - distance to the stop)/zone)^2 sign(v) inside the "
             "zone, towards the stop only",

@@ -41,7 +41,8 @@ class LineLoss final : public Effect {
                         0.0,
                         "0: pressure sensors at the cylinder, 1: at the valve",
                         false,
-                        {0.0, 1.0}}},
+                        {0.0, 1.0},
+                        true}},
         .equation =
             "dp = k Q^2 + k1 Q; p_pump += dp while it leads, or (sensor at the valve) "
             "p_supply += dp and F += A_supply dp",

@@ -35,7 +35,8 @@ class PressureOffset final : public Effect {
                         1.0,
                         "1 the piston side's sensor (A), -1 the rod side's (B)",
                         false,
-                        {1.0, -1.0}}},
+                        {1.0, -1.0},
+                        true}},
         .equation =
             "p_A (or p_B) read = true + offset, so measured force + A_A offset (or - A_B offset)",
         .signals = {"both chamber pressures"},

@@ -40,7 +40,8 @@ class SensorDelay final : public Effect {
                         1.0,
                         "1 positions are late, -1 forces or pressures are late",
                         false,
-                        {1.0, -1.0}}},
+                        {1.0, -1.0},
+                        true}},
         .equation =
             "F(t) = F_static(t + late delay); positions late: dx/dt logged is that of delay ago",
         .signals = {"cylinder force or both chamber pressures", "position",

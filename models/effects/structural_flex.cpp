@@ -78,7 +78,8 @@ class StructuralFlex final : public Effect {
                         "cylinder's lever "
                         "turns as well",
                         false,
-                        {0.0, 1.0}}},
+                        {0.0, 1.0},
+                        true}},
         .equation = "F = tau(q') / (dx/dq), q' = q - kappa tau(q): the load bends the arm down",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"unmodelled_mass", "angle_offset", "payload_error"},

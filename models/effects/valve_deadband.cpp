@@ -30,7 +30,8 @@ class ValveDeadband final : public Effect {
                         "1: full command still gives full flow, gain / (1 - u0); 0: it gives u0 "
                         "less",
                         false,
-                        {0.0, 1.0}}},
+                        {0.0, 1.0},
+                        true}},
         .equation = "Q = g max(0, |u| - u0), g = gain or gain / (1 - u0)",
         .signals = {"command", "position"},
         .confused_with = {"valve_lag"},

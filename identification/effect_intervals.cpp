@@ -1,0 +1,97 @@
+#include "identification/effect_intervals.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "identification/effect_proof.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kTwoSided95 = 1.96;
+
+FitControl all_rows_alike() {
+  FitControl control;
+  control.covariance = true;
+  control.ordinary = true;
+  return control;
+}
+
+std::vector<const EffectDesign*> pointers(const std::vector<EffectDesign>& designs) {
+  std::vector<const EffectDesign*> out;
+  out.reserve(designs.size());
+  for (const EffectDesign& d : designs) out.push_back(&d);
+  return out;
+}
+
+/// Whether the effect is told from nothing, and from the plainer effect it contains.
+bool could_be_nothing(const Effect& effect, const std::vector<double>& values,
+                      const std::vector<double>& half) {
+  bool any_linear = false, shape_at_zero = false;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const EffectParameter& p = effect.info().parameters[k];
+    const bool holds_zero = std::abs(values[k]) <= half[k];
+    if (p.linear) any_linear = any_linear || !holds_zero;
+    if (!p.linear && !p.choice) shape_at_zero = shape_at_zero || holds_zero;
+  }
+  return !any_linear || (!effect.info().refines.empty() && shape_at_zero);
+}
+
+}  // namespace
+
+void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& found) {
+  std::vector<EffectDesign> designs;
+  designs.reserve(found.size());
+  for (const FoundEffect& f : found) designs.push_back(f.design);
+  const EffectFit fit = fit_effects(evidence, pointers(designs), nullptr, all_rows_alike());
+  Index first = 0;
+  for (EffectDesign& d : designs) {  // one more column for each nonlinear parameter
+    const VectorXd theta = fit.theta.segment(first, d.linear);
+    first += d.linear;
+    d = with_shape_slopes(evidence, d, theta);
+  }
+  const EffectFit sloped = fit_effects(evidence, pointers(designs), nullptr, all_rows_alike());
+
+  Index plain = 0, at = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    FoundEffect& f = found[i];
+    const Effect& effect = *f.design.effect.effect;
+    const auto linear = static_cast<Index>(f.design.linear);
+    f.values = parameter_values(effect, fit.theta.segment(plain, linear), f.design.shape);
+    VectorXd sd(designs[i].linear);
+    for (Index k = 0; k < sd.size(); ++k)
+      sd[k] = std::sqrt(std::max(0.0, sloped.covariance(at + k, at + k)));
+    const std::vector<bool> choices = shape_choices(effect);
+    std::vector<double> shape_sd(sd.begin() + linear, sd.end());
+    for (std::size_t k = 0; k < shape_sd.size(); ++k) shape_sd[k] = choices[k] ? 0.0 : shape_sd[k];
+    std::vector<double> half = parameter_values(effect, sd.head(linear), shape_sd);
+    for (double& h : half) h *= kTwoSided95;
+    f.could_be_nothing = could_be_nothing(effect, f.values, half);
+    f.lower95 = f.upper95 = f.values;
+    for (std::size_t k = 0; k < half.size(); ++k) {
+      const double whole = effect.info().parameters[k].choice
+                               ? 0.0
+                               : std::hypot(half[k], effect.info().form_error * f.values[k]);
+      f.lower95[k] -= whole;
+      f.upper95[k] += whole;
+    }
+    plain += linear;
+    at += designs[i].linear;
+  }
+}
+
+std::vector<double> parameter_values(const Effect& effect, const VectorXd& linear,
+                                     const std::vector<double>& shape) {
+  std::vector<double> values;
+  values.reserve(effect.info().parameters.size());
+  Index l = 0;
+  std::size_t s = 0;
+  for (const EffectParameter& p : effect.info().parameters) {
+    values.push_back(p.linear ? linear[l++] : shape[s++]);
+  }
+  return values;
+}
+
+}  // namespace sparflow
