@@ -19,7 +19,7 @@ constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kFinest =
     100.0;  // [Pa] to which an unknown is searched: a hundredth of sensor resolution
 constexpr int kGrid = 96;
-constexpr int kMinSamples = 10;
+constexpr int kFewestPumpSamples = 10;
 
 /// Unknowns of the law in one array: margins of the m cylinders, then standby.
 /// Term k of sample t is offset(t, k) + unknown[k]; -infinity where the cylinder is not active.
@@ -138,7 +138,7 @@ VectorXd initial_unknowns(const Law& law) {
   for (Index t = 0; t < law.samples(); ++t) {
     if (law.offset.row(t).head(m).maxCoeff() == kNever) idle.push_back(law.pressure[t]);
   }
-  unknown[m] = static_cast<int>(idle.size()) >= kMinSamples
+  unknown[m] = static_cast<int>(idle.size()) >= kFewestPumpSamples
                    ? median(Eigen::Map<VectorXd>(idle.data(), static_cast<Index>(idle.size())))
                    : quantile(law.pressure, 0.02);
   for (Index i = 0; i < m; ++i) {
@@ -251,11 +251,11 @@ double upper_bound(const Law& law, const VectorXd& unknown, Index i) {
 }
 
 void check_enough(Index usable, const LearnedPump& out) {
-  if (usable >= kMinSamples) return;
+  if (usable >= kFewestPumpSamples) return;
   throw InputError({}, "pump pressure",
                    fmt::format("got {} usable samples ({} given, {} not finite, {} at the pump's "
                                "limit), expected at least {}",
-                               usable, out.given, out.invalid, out.saturated, kMinSamples));
+                               usable, out.given, out.invalid, out.saturated, kFewestPumpSamples));
 }
 
 double rms(const VectorXd& r) { return std::sqrt(r.squaredNorm() / static_cast<double>(r.size())); }

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
+
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 VectorXd block_sums(const VectorXd& values, const std::vector<int>& block, int blocks) {
   VectorXd out = VectorXd::Zero(blocks);

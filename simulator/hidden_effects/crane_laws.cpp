@@ -9,7 +9,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
 constexpr double kLpm = 1.0 / 60000.0;
 
 }  // namespace

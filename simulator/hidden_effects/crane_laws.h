@@ -9,6 +9,8 @@
 
 namespace sparflow::simulator {
 
+inline constexpr double kBar = 1e5;  ///< [Pa]
+
 /// One direction of one cylinder; index 0 = extending, 1 = retracting.
 struct DirectionLaws {
   double valve_gain = 0.0;      ///< [m^3/s] flow at full command

@@ -39,7 +39,7 @@ void expect_good_in_browser(const Page& page, const std::string& name) {
   const std::string path = (std::filesystem::path(SPARFLOW_BINARY_DIR) / (name + ".html")).string();
   page.write(path);
   EXPECT_LT(std::filesystem::file_size(path), 3'000'000u);
-  const testing::BrowserReport report = testing::check_page(path);
+  const test_support::BrowserReport report = test_support::check_page(path);
   std::filesystem::remove(path);
   if (!report.available) GTEST_SKIP() << "chromium is absent";
   EXPECT_THAT(report.errors, IsEmpty());

@@ -114,7 +114,7 @@ TEST(UnitAlgebra, DimensionsArePrintedTheWayPeopleWriteThem) {
 }
 
 TEST(UnitAlgebra, PrintedDimensionsAreReadBack) {
-  testing::Random random(7);
+  test_support::Random random(7);
   for (int i = 0; i < 2000; ++i) {
     Dimension d;
     for (int& twice : d.twice) twice = random.integer(-8, 8);
