@@ -104,7 +104,7 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
   const NoiseModel slow = by_moments(residual, blocks, offsets, false);
   // Blocks at levels of their own look like noise that never forgets, and the other way round. Where either may be
   // meant the likelihood says which: as slow noise, levels would prove nothing about what sets them.
-  constexpr double kSlow = 0.9;  // of one lag's correlation
+  constexpr double kSlow = 0.5;  // of one lag's correlation
   if (!offsets || blocks.size() < 4 || reflections(slow).k1 < kSlow) return slow;
   const NoiseModel levels = by_moments(residual, blocks, offsets, true);
   return likelihood(levels, residual, blocks) > likelihood(slow, residual, blocks) ? levels : slow;
