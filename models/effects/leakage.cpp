@@ -20,9 +20,19 @@ class Leakage final : public Effect {
                         0.0,
                         20 * units::kLitrePerMinute / (100 * units::kBar),
                         0.5 * units::kLitrePerMinute / (100 * units::kBar),
-                        "laminar leak over valve and piston",
+                        "laminar leak out of the chamber that holds the load",
                         true,
-                        {}}},
+                        {}},
+                       {"moving",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        0.0,
+                        "0: past the closed spool, at rest alone; 1: past the piston, moving too",
+                        false,
+                        {0.0, 1.0},
+                        true}},
         .equation = "dx/dt = Q_valve/A - sign(F) k p_load/A_hold, p_load = |F|/A_hold",
         .signals = {"position", "command"},
         .confused_with = {"valve_deadband", "compressibility"},
@@ -40,13 +50,15 @@ class Leakage final : public Effect {
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
-               std::span<const double>, Eigen::MatrixXd& columns) const override {
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;
     const auto i = static_cast<std::size_t>(at);
     const Cylinder& c = log.machine->cylinders[i];
     const Eigen::VectorXd& force = carried_force(log.cylinders[i]);
-    columns.resize(log.samples(), 1);
+    const Eigen::VectorXi& direction = log.cylinders[i].direction;
+    columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      if (shape[0] < 0.5 && direction[k] != 0) continue;
       const double area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // of the chamber that holds
       columns(k, 0) = -force[k] / (area * area);
     }

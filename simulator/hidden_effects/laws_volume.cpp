@@ -64,17 +64,19 @@ class Compressibility final : public HiddenLaw {
       side_ = side;
       smooth_ = pressure;
     }
-    const double slope = (pressure - smooth_) / kFilter;
-    smooth_ += slope * s.h;
     const double area = side > 0 ? area_a_ : area_b_;
     const double stroke = std::clamp(c.length - shortest_, 0.0, travel_);
     const double column = side > 0 ? stroke : travel_ - stroke;
     double softness = inverse_modulus_;
     if (law_ == 1)  // free air: softer at low pressure, the same at 100 bar
       softness *= 0.8 + 0.4 / (1.0 + std::max(0.0, pressure) / (100.0 * kBar));
-    const double flow = area * (column + hose_) * softness * slope;
-    // a column can only give what a jump of friction asks of it within its own time
-    c.drift += (side > 0 ? -1.0 : 1.0) * std::clamp(flow / area, -kFastest, kFastest);
+    // what a jump asks of the column comes at the speed the line lets through: all of it, but later
+    const double give = (column + hose_) * softness;  // [m/Pa]
+    const double most = kFastest / give;
+    const double slope = std::clamp((pressure - smooth_) / kFilter, -most, most);
+    smooth_ += slope * s.h;
+    const double flow = area * give * slope;
+    c.drift += (side > 0 ? -1.0 : 1.0) * flow / area;
     equivalent_.add(flow, area * (column + 0.05 * travel_) * slope);
   }
   std::vector<HiddenParameter> parameters() const override {
@@ -91,6 +93,16 @@ class Compressibility final : public HiddenLaw {
   Equivalent equivalent_;
 };
 
+/// A cylinder about a vertical axis holds no load: nothing presses oil out of it or squeezes it.
+bool carries_load(const Machine& machine, int i) {
+  const Cylinder& c = machine.cylinders[static_cast<std::size_t>(i)];
+  const Joint& joint = machine.joints[static_cast<std::size_t>(c.joint)];
+  if (!c.hydraulic()) return false;
+  if (joint.type != JointType::kRevolute || c.joint > 0) return true;
+  const Eigen::Vector3d axis = joint.origin.linear() * joint.axis;
+  return std::abs(axis.dot(machine.gravity.normalized())) < 0.9;
+}
+
 }  // namespace
 
 std::vector<LawEntry> volume_laws() {
@@ -102,14 +114,14 @@ std::vector<LawEntry> volume_laws() {
             "laminar past the piston, moving too"},
            "k [m^3/s/Pa] per load pressure",
            make_law<Leakage>,
-           hydraulic},
+           carries_load},
           {"compressibility",
            at,
            true,
            {"constant bulk modulus", "softer at low pressure"},
            "1/E [1/Pa]; volume of the fed (at rest: loaded) chamber and its hose",
            make_law<Compressibility>,
-           hydraulic}};
+           carries_load}};
 }
 
 }  // namespace sparflow::simulator

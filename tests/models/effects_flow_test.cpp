@@ -120,10 +120,16 @@ TEST_F(FlowEffects, LeakLetsTheLoadSink) {
   c.command.setZero();
   c.force.setConstant(100e5 * a);
   c.force.tail(800).setConstant(-100e5 * b);
-  const MatrixXd col = columns("leakage", 0, 0);
+  const MatrixXd col = columns("leakage", 0, 0, {1.0});
   const double k = effect_named("leakage").info().parameters[0].si * 0.5;
   EXPECT_NEAR(col(0, 0) * k, -0.5e-3 / 60.0 / a, 1e-12);
   EXPECT_NEAR(col(1999, 0) * k, 0.5e-3 / 60.0 / b, 1e-12);
+  // past the spool it leaks only while that is closed
+  c.direction.setZero();
+  c.direction.head(1000).setConstant(1);
+  const MatrixXd closed = columns("leakage", 0, 0, {0.0});
+  EXPECT_EQ(closed(0, 0), 0.0);
+  EXPECT_EQ(closed(1999, 0), col(1999, 0));
 }
 
 // A chamber of 1.0 m + 5 % of 2 m at 1 GPa: 10 bar/s take 1.1 mm/s.
