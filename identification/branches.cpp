@@ -28,7 +28,10 @@ constexpr double kClear = 3.0;
 /// The supply takes all of a load (slope 1) where the return line rules, 1/(1 + R A_hold/A_supply) < 0.6 of it
 /// where a counterbalance valve of pilot ratio R > 1 does.
 constexpr double kSteepest = 0.75;
-constexpr Index kGuard = 2;  ///< samples dropped either side of a switch
+constexpr Index kGuard = 2;          ///< samples dropped either side of a switch
+constexpr double kAlikeRows = 10.0;  ///< neighbouring samples that tell no more than one
+/// [nats] by which laws of their own must explain two states of a machine better than common ones.
+constexpr double kApart = 10.0;
 
 /// Rows of all logs; pressures [bar], regressors near one.
 struct Rows {
@@ -141,8 +144,6 @@ struct Mixture {
 
   /// Expectation maximisation from a first assignment.
   void settle(const Rows& r, VectorXd on_line, VectorXd on_valve) {
-    range_return = spread(r.p_return);
-    range_supply = spread(r.p_supply);
     double before = -std::numeric_limits<double>::infinity();
     constexpr int kMostSteps = 60;
     for (int step = 0; step < kMostSteps; ++step) {
@@ -161,7 +162,7 @@ struct Mixture {
       before = likelihood;
     }
     // each law's coefficients cost; samples are alike over about ten
-    const double cost = 0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / 10.0));
+    const double cost = 0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / kAlikeRows));
     if (line.share > 0.0) likelihood -= cost * static_cast<double>(line.coefficients.size() + 1);
     if (valve.share > 0.0) likelihood -= cost * static_cast<double>(valve.coefficients.size() + 1);
   }
@@ -177,31 +178,50 @@ struct Mixture {
   }
 };
 
-Rows thinned(const Rows& all) {
-  const Index stride = (all.count() + kMostFitted - 1) / kMostFitted;
-  if (stride <= 1) return all;
-  std::vector<Index> keep;
-  for (Index i = 0; i < all.count(); i += stride) keep.push_back(i);
+Rows chosen(const Rows& all, const std::vector<Index>& keep) {
   Rows r;
   r.p_return = all.p_return(keep);
   r.p_supply = all.p_supply(keep);
   r.line = all.line(keep, Eigen::all);
   r.valve = all.valve(keep, Eigen::all);
   r.load = all.load(keep);
+  for (const Index i : keep) r.where.push_back(all.where[static_cast<std::size_t>(i)]);
   return r;
 }
 
-Mixture most_likely(const Rows& r) {
+Rows thinned(const Rows& all) {
+  const Index stride = (all.count() + kMostFitted - 1) / kMostFitted;
+  if (stride <= 1) return all;
+  std::vector<Index> keep;
+  for (Index i = 0; i < all.count(); i += stride) keep.push_back(i);
+  return chosen(all, keep);
+}
+
+/// Rows of some logs.
+Rows of_logs(const Rows& all, int first, int last) {
+  std::vector<Index> keep;
+  for (Index i = 0; i < all.count(); ++i) {
+    const int log = all.where[static_cast<std::size_t>(i)].first;
+    if (log >= first && log < last) keep.push_back(i);
+  }
+  return chosen(all, keep);
+}
+
+/// @param range_return, range_supply [bar] of all samples, so that likelihoods of parts of them compare
+Mixture most_likely(const Rows& r, double range_return, double range_supply) {
   const Index n = r.count();
   const VectorXd none = VectorXd::Zero(n), every = VectorXd::Ones(n);
-  Mixture best;
+  Mixture fresh;
+  fresh.range_return = range_return;
+  fresh.range_supply = range_supply;
+  Mixture best = fresh;
   best.settle(r, every, none);
   const auto consider = [&](const VectorXd& on_line, const VectorXd& on_valve) {
-    Mixture m;
+    Mixture m = fresh;
     m.settle(r, on_line, on_valve);
     if (m.likelihood > best.likelihood) best = m;
   };
-  Mixture valve_alone;
+  Mixture valve_alone = fresh;
   valve_alone.settle(r, none, every);
   if (valve_alone.likelihood > best.likelihood) best = valve_alone;
   if (valve_alone.valve.share >
@@ -218,9 +238,30 @@ Mixture most_likely(const Rows& r) {
   return best;
 }
 
+/// Appends one label a row: 1 return line, 2 valve, 0 not sure.
+void label_rows(const Rows& rows, Mixture& laws, std::vector<int>& label) {
+  VectorXd on_line, on_valve;
+  laws.expect(rows, on_line, on_valve);
+  const bool both = laws.line.share > 0.0 && laws.valve.share > 0.0;
+  for (Index i = 0; i < rows.count(); ++i) {
+    int own = on_line[i] > kSure ? 1 : (on_valve[i] > kSure ? 2 : 0);
+    if (both) {
+      const double above_line =
+          (rows.p_return[i] - rows.line.row(i).dot(laws.line.coefficients)) / laws.line.deviation;
+      const double above_valve =
+          (rows.p_supply[i] - rows.valve.row(i).dot(laws.valve.coefficients)) /
+          laws.valve.deviation;
+      if (own == 1 && above_valve < kClear) own = 0;
+      if (own == 2 && above_line < kClear) own = 0;
+    }
+    label.push_back(own);
+  }
+}
+
 }  // namespace
 
-std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs) {
+std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
+                                        std::size_t first_machine) {
   std::vector<BranchSplit> splits;
   for (const BranchData& d : logs) {
     const Mask none = Mask::Constant(d.moving.size(), false);
@@ -228,24 +269,24 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs) {
   }
   const Rows rows = gather(logs);
   if (rows.count() == 0) return splits;
-  Mixture laws = most_likely(thinned(rows));
-  VectorXd on_line, on_valve;
-  laws.expect(rows, on_line, on_valve);
-
-  const bool both = laws.line.share > 0.0 && laws.valve.share > 0.0;
-  std::vector<int> label(rows.where.size(), 0);  // 1 line, 2 valve
-  for (Index i = 0; i < rows.count(); ++i) {
-    if (on_line[i] > kSure) label[static_cast<std::size_t>(i)] = 1;
-    if (on_valve[i] > kSure) label[static_cast<std::size_t>(i)] = 2;
-    if (!both) continue;
-    const double above_line =
-        (rows.p_return[i] - rows.line.row(i).dot(laws.line.coefficients)) / laws.line.deviation;
-    const double above_valve =
-        (rows.p_supply[i] - rows.valve.row(i).dot(laws.valve.coefficients)) / laws.valve.deviation;
-    int& own = label[static_cast<std::size_t>(i)];
-    if (own == 1 && above_valve < kClear) own = 0;
-    if (own == 2 && above_line < kClear) own = 0;
+  const double range_return = spread(rows.p_return), range_supply = spread(rows.p_supply);
+  const auto laws_of = [&](const Rows& r) { return most_likely(r, range_return, range_supply); };
+  const Rows some = thinned(rows);
+  Mixture laws = laws_of(some);
+  std::vector<int> label;
+  const auto cut = static_cast<int>(std::min(first_machine, logs.size()));
+  const Rows before = of_logs(some, 0, cut),
+             after = of_logs(some, cut, static_cast<int>(logs.size()));
+  bool apart = before.count() >= kFewest && after.count() >= kFewest;
+  if (apart) {
+    Mixture one = laws_of(before), other = laws_of(after);
+    apart = one.likelihood + other.likelihood > laws.likelihood + kApart * kAlikeRows;
+    if (apart) {
+      label_rows(of_logs(rows, 0, cut), one, label);
+      label_rows(of_logs(rows, cut, static_cast<int>(logs.size())), other, label);
+    }
   }
+  if (!apart) label_rows(rows, laws, label);
   // hysteresis: near a switch the filter mixes both
   for (std::size_t i = 0; i < label.size(); ++i) {
     const auto& [log, sample] = rows.where[i];

@@ -33,8 +33,11 @@ struct BranchData {
 
 /// Several logs of one machine together: the laws are common, the tank line's share is each log's own. Logs
 /// with other loads show the valve's law far better than one log alone.
+/// @param first_machine so many of the logs are of the machine in one state, the rest (a reference) in another. A
+///        valve may have come in between: each state gets laws of its own where that explains clearly more.
 /// @return one split a log; empty masks where fewer than 60 samples can be judged
-std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs);
+std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
+                                        std::size_t first_machine = 0);
 
 /// One log alone.
 BranchSplit split_branches(const Eigen::VectorXd& p_return, const Eigen::VectorXd& p_supply,

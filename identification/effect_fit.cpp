@@ -157,6 +157,9 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         fit.noise[c] = NoiseModel{};
         fit.noise[c].variance =
             std::max(channel.y.squaredNorm() / static_cast<double>(channel.rows()), 1e-300);
+      } else if (pass == 0) {
+        // Without the effect its levels were offsets of the blocks; kept, they would go on hiding it.
+        fit.noise[c].offset_variance = 0.0;
       }
       Whitened& w = white[c];
       w.rows = whitened_rows(channel, fit.noise[c], columns[c], &w.log_determinant, &w.baseline);

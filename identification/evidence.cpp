@@ -191,7 +191,9 @@ std::vector<BranchSplit> branches_of(const Evidence& e,
     owner.push_back(log);
   }
   if (data.empty()) return result;
-  std::vector<BranchSplit> splits = split_branches(data);
+  const auto suspects =
+      std::count_if(owner.begin(), owner.end(), [&](std::size_t log) { return log < e.suspects; });
+  std::vector<BranchSplit> splits = split_branches(data, static_cast<std::size_t>(suspects));
   for (std::size_t k = 0; k < owner.size(); ++k) result[owner[k]] = std::move(splits[k]);
   return result;
 }

@@ -166,6 +166,31 @@ void judge_motion(const Cylinder& cylinder, const SegmentOptions& options, const
   }
 }
 
+/// A command that is zero throughout while its cylinder clearly moves was not recorded (open-loop tests, a lever
+/// past the logger): the cylinder is then judged as one without a logged command, by its speed.
+void drop_dead_commands(const Machine& machine, const SegmentOptions& options,
+                        MachineSignals& out) {
+  constexpr double kClearly = 5.0;  // times the speed of moving: no leak, no sensor's noise
+  constexpr double kLeast_s = 1.0;
+  for (std::size_t i = 0; i < out.cylinders.size(); ++i) {
+    CylinderSignals& c = out.cylinders[i];
+    if (!c.has_command() || !c.command.array().isFinite().any()) continue;
+    if ((c.command.array().abs() > options.command).any()) continue;
+    double moves = 0.0, fastest = 0.0;
+    for (Index k = 0; k < out.samples(); ++k) {
+      if (!(std::abs(c.speed[k]) > kClearly * options.speed) || out.edge[k]) continue;
+      moves += out.step;
+      fastest = std::max(fastest, std::abs(c.speed[k]));
+    }
+    if (moves < kLeast_s) continue;
+    out.notes.push_back(
+        fmt::format("u_{0} is zero throughout although {0} moves by up to {1:.0f} mm/s: that "
+                    "command was not logged and is left out",
+                    machine.cylinders[i].name, 1e3 * fastest));
+    c.command.resize(0);
+  }
+}
+
 void find_motion(const Machine& machine, const SegmentOptions& options, MachineSignals& out) {
   const Index n = out.samples(), cylinders = machine.cylinder_count();
   Eigen::MatrixXd speed(n, cylinders), command = Eigen::MatrixXd::Constant(n, cylinders, kNaN);
@@ -274,6 +299,7 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
   }
   evaluate_machine(machine, out);
   for (CylinderSignals& c : out.cylinders) c.model_force = c.predicted_force = c.static_force;
+  drop_dead_commands(machine, options.motion, out);
   find_motion(machine, options.motion, out);
 
   out.pumps.resize(machine.pumps.size());

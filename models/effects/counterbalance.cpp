@@ -4,6 +4,7 @@
 namespace sparflow {
 namespace {
 
+/// One valve sits on one side: a cylinder with two of them has the effect's law learned already on the other.
 /// With pilot ratio R and setting p_set, opening needs p_load + R p_supply + (A_supply/A_hold) p_supply = p_set:
 ///   p_supply = (p_set - p_load) / (R + A_supply/A_hold),
 /// so slope = 1 / (R + A_supply/A_hold) and setting = slope * p_set.
@@ -21,7 +22,7 @@ class Counterbalance final : public Effect {
                         0.0,
                         200 * units::kBar,
                         40 * units::kBar,
-                        "supply pressure that opens it without load",
+                        "supply pressure beyond an unloaded chamber's that opens it without load",
                         true,
                         {}},
                        {"slope",
@@ -33,7 +34,17 @@ class Counterbalance final : public Effect {
                         "fall of the supply pressure by load pressure, 1 / (pilot ratio + "
                         "A_supply/A_hold)",
                         true,
-                        {}}},
+                        {}},
+                       {"side",
+                        "-",
+                        1.0,
+                        -1.0,
+                        1.0,
+                        -1.0,
+                        "-1 it is lowered against while retracting, 1 while extending",
+                        false,
+                        {-1.0, 1.0},
+                        true}},
         .equation =
             "p_supply = max(static branch, setting - slope p_load), p_load = -side F/A_hold",
         .signals = {"both chamber pressures", "position"},
@@ -58,7 +69,7 @@ class Counterbalance final : public Effect {
                         std::span<T> out) const {
     const auto i = static_cast<std::size_t>(at);
     const int side = s.side[i];
-    if (side == 0) return;
+    if (side == 0 || side != side_of(p[2])) return;
     const Cylinder& c = s.machine->cylinders[i];
     // pressure by which the load helps, in the chamber that holds it; negative when it opposes
     const T load = s.force[i] * (-side / return_area(c, side));
@@ -73,9 +84,9 @@ class Counterbalance final : public Effect {
   /// The force has passed the filter already; twice, and its own noise would explain the chamber's.
   bool columns_filtered() const override { return true; }
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
-               std::span<const double>, Eigen::MatrixXd& columns) const override {
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const int side = supply_side(kind);
-    if (side == 0 || index != at) return false;
+    if (side == 0 || index != at || side != side_of(shape[0])) return false;
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
     const double area = return_area(log.machine->cylinders[i], side);
@@ -88,6 +99,9 @@ class Counterbalance final : public Effect {
     }
     return true;
   }
+
+ private:
+  static int side_of(double parameter) { return parameter > 0.0 ? 1 : -1; }
 };
 
 }  // namespace

@@ -37,7 +37,9 @@ class PumpLag final : public Effect {
         .separated_by = "steps of one function, several times",
         .citation = "Kumar, Dasgupta, Ghoshal (2015); first-order lag",
         .form_error = 0.1,
-        .in_motion = "nothing: motions are quasi-static; the exact energy follows it in time"};
+        .in_motion =
+            "nothing: a planned motion's pump is at its demand; late by tenths of a second it "
+            "spends at falls what it saved at rises"};
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kPump}; }

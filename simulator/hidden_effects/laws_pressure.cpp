@@ -1,6 +1,7 @@
 /// Pressure losses in lines and valves.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "models/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
@@ -78,6 +79,22 @@ class LineLoss final : public HiddenLaw {
   Equivalent equivalent_;
 };
 
+/// Least squares y = a + b x.
+class StraightLine {
+ public:
+  void add(double y, double x) { n_ += 1.0, x_ += x, y_ += y, xx_ += x * x, xy_ += x * y; }
+  /// @param otherwise where x varied too little to say
+  std::pair<double, double> line(std::pair<double, double> otherwise) const {
+    const double variance = n_ > 0.0 ? xx_ / n_ - x_ / n_ * x_ / n_ : 0.0;
+    if (variance < 1e-4 * xx_ / std::max(1.0, n_) || variance <= 0.0) return otherwise;
+    const double b = (xy_ / n_ - x_ / n_ * y_ / n_) / variance;
+    return {y_ / n_ - b * x_ / n_, b};
+  }
+
+ private:
+  double n_ = 0.0, x_ = 0.0, y_ = 0.0, xx_ = 0.0, xy_ = 0.0;
+};
+
 class Counterbalance final : public HiddenLaw {
  public:
   explicit Counterbalance(LawContext& c)
@@ -94,6 +111,8 @@ class Counterbalance final : public HiddenLaw {
     const double weight = loads.gravity[j] / rate;
     lowering_ = weight >= 0.0 ? -1 : 1;
     holding_area_ = lowering_ < 0 ? drive.area_piston() : drive.area_rod();
+    fed_area_ = lowering_ < 0 ? drive.area_rod() : drive.area_piston();
+    tank_ = c.laws->cylinders[at_].rest_tank;
     // set so that the usual load still needs some tens of bar of supply pressure to be lowered
     opening_ = slope_ * std::abs(weight) / holding_area_ + c.size * c.draw(25.0, 60.0) * kBar;
   }
@@ -109,15 +128,21 @@ class Counterbalance final : public HiddenLaw {
       p += 0.08 * opening_ * std::tanh(c.flow / 5e-4);  // spool opens against its spring
     if (law_ == 2) p = opening_ * 0.05 * std::log1p(std::exp(p / (0.05 * opening_)));  // soft knee
     c.pilot_pressure = std::max(c.pilot_pressure, std::max(p, 0.0));
+    const double static_supply = (c.side * c.force + holding_area_ * c.return_pressure) / fed_area_;
+    if (std::abs(c.speed) > kMoving && c.pilot_pressure > std::max(static_supply, tank_))
+      rise_.add(c.pilot_pressure - tank_, load);
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"setting", opening_, "Pa", opening_}, {"slope", slope_, "-", slope_}};
+    // beyond the pressure an unloaded chamber has without the valve, as a straight line in the load
+    const auto [setting, slope] = rise_.line({opening_ - tank_, -slope_});
+    return {{"setting", opening_, "Pa", setting}, {"slope", slope_, "-", -slope}};
   }
 
  private:
   std::size_t at_;
   int law_, lowering_ = -1;
-  double opening_ = 0.0, slope_, holding_area_ = 1.0;
+  double opening_ = 0.0, slope_, holding_area_ = 1.0, fed_area_ = 1.0, tank_ = 0.0;
+  StraightLine rise_;
 };
 
 class OilTemperature final : public HiddenLaw {

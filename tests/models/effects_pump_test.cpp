@@ -87,18 +87,23 @@ TEST_F(PumpEffects, CounterbalanceOpensAtItsBalance) {
   Instant<double> s = two_cylinder_instant<double>(machine);
   const double ratio = 4.0, set = 200 * kBar, phi = b / a;  // push retracts: supply rod side
   const double slope = 1.0 / (ratio + phi), load = 10e3 / a;
-  const double p = pressure("counterbalance", s, {slope * set, slope}, 1)[1];
+  const double p = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
   EXPECT_NEAR(load + ratio * p + phi * p, set, 1e-3);
   // continuous through zero load, gone where the load alone asks for more
   s.force[1] = 1e-6;
-  const double below = pressure("counterbalance", s, {slope * set, slope}, 1)[1];
+  const double below = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
   s.force[1] = -1e-6;
-  EXPECT_NEAR(pressure("counterbalance", s, {slope * set, slope}, 1)[1], below, 1.0);
+  EXPECT_NEAR(pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1], below, 1.0);
+  EXPECT_EQ(pressure("counterbalance", s, {slope * set, slope, 1.0}, 1)[1], 0.0)
+      << "the valve of the other side";
   s.force[1] = -100e3;
-  EXPECT_EQ(pressure("counterbalance", s, {slope * set, slope}, 1)[1], 0.0);
+  EXPECT_EQ(pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1], 0.0);
   MatrixXd c;
+  const double lowers[] = {-1.0}, lifts[] = {1.0};
+  EXPECT_FALSE(
+      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lifts, c));
   ASSERT_TRUE(
-      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, {}, c));
+      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lowers, c));
   for (Index i = 0; i < log.samples(); ++i) {
     const bool there = log.cylinders[1].direction[i] < 0;
     ASSERT_EQ(c(i, 0), there ? 1.0 : 0.0);
@@ -204,7 +209,7 @@ TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
       {"return_back_pressure", -1, {1e-3 * kBarPerLpm2}},
       {"line_loss", 0, {2e-3 * kBarPerLpm2, 0.1 * kBarPerLpm, 0.0}},
       {"line_loss", 0, {2e-3 * kBarPerLpm2, 0.1 * kBarPerLpm, 1.0}},
-      {"counterbalance", 1, {40 * kBar, 0.2}},
+      {"counterbalance", 1, {40 * kBar, 0.2, -1.0}},
       {"oil_temperature", -1, {4 * kBar, 6 * kBar, 0.03}},
       {"flow_dependent_margin", 0, {7e-4 * kBarPerLpm2}},
       {"torque_limit", 0, {1.0, 3e3}},
