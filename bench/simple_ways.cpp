@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "identification/effect_intervals.h"
 #include "identification/effect_search.h"
 #include "identification/fit.h"
 #include "models/error.h"
