@@ -2,18 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identification/series.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 void add(const VectorXd& what, VectorXd& to) {
   if (what.size() == 0) return;

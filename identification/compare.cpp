@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include "identification/apply_effects.h"
 #include "identification/compare_stages.h"
 #include "models/error.h"
+#include "models/nan.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -17,7 +17,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Sums over all logs of one quantity.
 StageScore score(const std::vector<LogComparison>& logs, const std::string& stage,

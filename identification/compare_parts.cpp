@@ -9,13 +9,13 @@
 
 #include "identification/compare.h"
 #include "identification/robust.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 std::string part_words(const ComparedSeries& s, const std::string& regime) {
   const std::string side = regime.empty() ? "" : regime == "extend" ? " extending" : " retracting";

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identification/apply_effects.h"
+#include "models/nan.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -21,7 +21,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const FieldUnit kNewton{"N", 1.0};
 const FieldUnit kBarUnit{"bar", units::kBar};
 const FieldUnit kFlowUnit{"l/min", units::kLitrePerMinute};

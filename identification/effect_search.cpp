@@ -70,16 +70,8 @@ class Search {
       const NullGate gate =
           make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
       const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
-      // the best that passes: errors of form in one channel hide no effect in another
-      std::size_t first = 0;
-      const auto p_of = [&](const Score& s) {
-        return gate.p_value(gate.calibrated(s.candidate, s.gain));
-      };
-      while (first + 1 < scores.size() && scores[first].gain > 0.0 && p_of(scores[first]) >= level)
-        ++first;
-      if (p_of(scores[first]) >= level) first = 0;
-      const Score& best = plainer(scores, first);
-      const double p = p_of(best);
+      const Score& best = plainer(scores, gate, level);
+      const double p = gate.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(step, scores, gate);
       ++step;
       if (found.empty() && result.threshold == 0.0) {
@@ -110,18 +102,26 @@ class Search {
     }
   }
 
-  /// The best candidate, or the plainer effect it contains when that explains most of the same: what is left then
-  /// decides whether the refinement is needed, and `prune` drops whichever becomes superfluous.
-  const Score& plainer(const std::vector<Score>& scores, std::size_t first) const {
-    const EffectAt& best = candidates_[scores[first].candidate].effect;
+  /// The best candidate that passes the gate (the best of all if none does), or the plainer effect it contains when
+  /// that explains most of the same: what is left then decides whether the refinement is needed, and `prune` drops
+  /// whichever becomes superfluous.
+  const Score& plainer(const std::vector<Score>& scores, const NullGate& gate, double level) const {
+    const Score* first = &scores.front();
+    for (const Score& s : scores) {
+      if (gate.p_value(s.gain, s.candidate) < level) {
+        first = &s;
+        break;
+      }
+    }
+    const EffectAt& best = candidates_[first->candidate].effect;
     for (const Score& s : scores) {
       const EffectAt& e = candidates_[s.candidate].effect;
       if (e.at == best.at && e.effect->info().id == best.effect->info().refines &&
-          s.gain > 0.5 * scores[first].gain) {
+          s.gain > 0.5 * first->gain) {
         return s;
       }
     }
-    return scores[first];
+    return *first;
   }
 
   /// What the later ones turned into a remnant. @return whether any was dropped

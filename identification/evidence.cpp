@@ -4,26 +4,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "identification/branches.h"
 #include "identification/robust.h"
 #include "identification/series.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Rows a third of the filter's width apart are nearly independent: keeping more costs time and tells nothing.
 constexpr double kRowsAWindow = 3.0;
 constexpr double kShortestBlock_s = 0.3;
 /// Longer motions are cut: blocks are what is held out and resampled.
 constexpr double kLongestBlock_s = 8.0;
 constexpr Index kFewestRows = 30;
-constexpr double kFlowUnit = 1e-3, kForceUnit = 1e5;  ///< of the baselines: near one
+constexpr double kFlowScale = 1e-3, kForceScale = 1e5;  ///< of the baselines: near one
 
 /// Response of the filter's `derivative` to an impulse, inside an evenly sampled run.
 VectorXd impulse_response(double step, double window, int order, int derivative) {
@@ -165,7 +164,7 @@ void slope_of(EvidenceChannel& channel) {
   channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
   const VectorXd b = channel.baseline.colPivHouseholderQr().solve(channel.y);
-  channel.force_slope = (b[3] + b[4] * channel.baseline.col(1).array()) / kForceUnit;
+  channel.force_slope = (b[3] + b[4] * channel.baseline.col(1).array()) / kForceScale;
 }
 
 std::vector<BranchSplit> branches_of(const Evidence& e,
@@ -413,7 +412,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           const VectorXd y = e.filter(log, kind, raw - known(log, kind, i));
           const VectorXd& q = returning ? s.return_flow : s.flow;
           Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
-          const double q0 = kFlowUnit, f0 = kForceUnit;
+          const double q0 = kFlowScale, f0 = kForceScale;
           base.col(0).setOnes();
           base.col(1) = q / q0;
           base.col(2) = (q / q0).cwiseAbs2();

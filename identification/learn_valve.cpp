@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMinSamples = 10;
+constexpr int kFewestValveSamples = 10;
 
 struct RobustFit {
   VectorXd coefficients;
@@ -65,11 +65,11 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
   u.conservativeResize(n);
   q.conservativeResize(n);
   out.used = static_cast<int>(n);
-  if (n < kMinSamples) {
+  if (n < kFewestValveSamples) {
     throw InputError({}, "command",
                      fmt::format("got {} samples with a command and a flow ({} given), expected at "
                                  "least {}; log more motion in this direction",
-                                 n, out.given, kMinSamples));
+                                 n, out.given, kFewestValveSamples));
   }
   const RobustFit line = robust_fit(u, q);
   out.gain = line.coefficients[0];

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "models/linkage.h"
+#include "models/nan.h"
 #include "models/static_force.h"
 #include "models/units.h"
 
@@ -30,7 +30,6 @@ constexpr double kLowPressures = 40.0 * units::kBar;  // 400 bar, the most there
 /// Weight against pressures when bar are MPa: ten, with what friction, dynamics and rough masses do to it.
 constexpr Range kTenfold{5.0, 20.0};
 constexpr Eigen::Index kBalanceSamples = 200;  // evenly over the log: a mean force needs no more
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Extent {
   double lo = 0.0, hi = 0.0;

@@ -19,7 +19,7 @@ struct Unit {
   double offset = 0.0;
 };
 
-struct Quantity {
+struct ColumnQuantity {
   std::string_view what;  ///< with article, for messages
   std::string_view si;
   std::string_view usual;  ///< suffix of the usual column name
@@ -27,36 +27,37 @@ struct Quantity {
 };
 
 // Spellings are compared after `plain_unit`.
-const Quantity kTime = {
+const ColumnQuantity kTime = {
     "a time", "s", "s", {{"s", 1.0}, {"sec", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"min", 60.0}}};
-const Quantity kAngle = {
+const ColumnQuantity kAngle = {
     "an angle", "rad", "rad", {{"rad", 1.0}, {"deg", units::kDegree}, {"mrad", 1e-3}}};
-const Quantity kLength = {"a length", "m", "m", {{"m", 1.0}, {"mm", 1e-3}, {"cm", 1e-2}}};
-const Quantity kCommand = {
+const ColumnQuantity kLength = {"a length", "m", "m", {{"m", 1.0}, {"mm", 1e-3}, {"cm", 1e-2}}};
+const ColumnQuantity kCommand = {
     "a command",
     "",
     "",
     {{"", 1.0}, {"1", 1.0}, {"percent", 0.01}, {"pct", 0.01}, {"permille", 1e-3}}};
-const Quantity kPressure = {"a pressure",
-                            "Pa",
-                            "bar",
-                            {{"bar", units::kBar},
-                             {"mbar", 100.0},
-                             {"Pa", 1.0},
-                             {"kPa", 1e3},
-                             {"MPa", 1e6},
-                             {"psi", 6894.757293168361}}};
-const Quantity kForce = {"a force", "N", "N", {{"N", 1.0}, {"kN", 1e3}}};
-const Quantity kFlow = {
+const ColumnQuantity kPressure = {"a pressure",
+                                  "Pa",
+                                  "bar",
+                                  {{"bar", units::kBar},
+                                   {"mbar", 100.0},
+                                   {"Pa", 1.0},
+                                   {"kPa", 1e3},
+                                   {"MPa", 1e6},
+                                   {"psi", 6894.757293168361}}};
+const ColumnQuantity kForce = {"a force", "N", "N", {{"N", 1.0}, {"kN", 1e3}}};
+const ColumnQuantity kFlow = {
     "a flow",
     "m^3/s",
     "lpm",
     {{"lpm", units::kLitrePerMinute}, {"m3_s", 1.0}, {"l_s", 1e-3}, {"m3_h", 1.0 / 3600.0}}};
-const Quantity kMass = {"a mass", "kg", "kg", {{"kg", 1.0}, {"t", 1e3}, {"g", 1e-3}}};
-const Quantity kTemperature = {"a temperature",
-                               "degC",
-                               "C",
-                               {{"C", 1.0}, {"K", 1.0, -273.15}, {"F", 5.0 / 9.0, -160.0 / 9.0}}};
+const ColumnQuantity kMass = {"a mass", "kg", "kg", {{"kg", 1.0}, {"t", 1e3}, {"g", 1e-3}}};
+const ColumnQuantity kTemperature = {
+    "a temperature",
+    "degC",
+    "C",
+    {{"C", 1.0}, {"K", 1.0, -273.15}, {"F", 5.0 / 9.0, -160.0 / 9.0}}};
 
 /// Units as people write them, to the spelling of column suffixes: "l/min" -> "lpm", "°" -> "deg".
 std::string plain_unit(std::string_view written) {
@@ -73,7 +74,7 @@ std::string plain_unit(std::string_view written) {
   return std::string(written);
 }
 
-const Unit* find_unit(const Quantity& quantity, std::string_view written) {
+const Unit* find_unit(const ColumnQuantity& quantity, std::string_view written) {
   const std::string plain = plain_unit(written);
   for (const Unit& unit : quantity.units) {
     if (unit.spelling == plain) return &unit;
@@ -81,7 +82,7 @@ const Unit* find_unit(const Quantity& quantity, std::string_view written) {
   return nullptr;
 }
 
-std::string unit_list(const Quantity& quantity) {
+std::string unit_list(const ColumnQuantity& quantity) {
   std::string list;
   for (const Unit& unit : quantity.units) {
     if (unit.spelling == "1") continue;
@@ -127,7 +128,7 @@ constexpr std::array<Single, 3> kSingles = {{{"payload", Role::kPayload},
                                              {"oil", Role::kOilTemperature},
                                              {"p_return", Role::kReturnPressure}}};
 
-const Quantity& quantity_of(Role role, int index, const Machine& machine) {
+const ColumnQuantity& quantity_of(Role role, int index, const Machine& machine) {
   switch (role) {
     case Role::kJointPosition:
       return machine.joints[static_cast<std::size_t>(index)].type == JointType::kRevolute ? kAngle
@@ -165,7 +166,7 @@ std::optional<std::string_view> suffix_behind(std::string_view name, std::string
 
 /// Settles the unit of a column whose quantity is known.
 /// @return false when the suffix says it is another signal: "pA_boom_valve_bar", "u_boom_filtered_percent"
-bool settle_unit(const Quantity& quantity, std::string_view suffix, const std::string& beside,
+bool settle_unit(const ColumnQuantity& quantity, std::string_view suffix, const std::string& beside,
                  const std::string& column, ColumnMeaning* meaning) {
   const Unit* unit = find_unit(quantity, suffix);
   meaning->unit = quantity.si;
@@ -211,7 +212,8 @@ void settle_candidate(const std::string& column, const std::string& beside,
     suffix = std::string_view(column).substr(mark + 1);
     if (suffix == "s" && column.ends_with("_m3_s")) suffix = "m3_s";
   }
-  for (const Quantity* quantity : {&kPressure, &kAngle, &kLength, &kForce, &kFlow, &kTemperature}) {
+  for (const ColumnQuantity* quantity :
+       {&kPressure, &kAngle, &kLength, &kForce, &kFlow, &kTemperature}) {
     const Unit* unit = find_unit(*quantity, suffix);
     // "_K" and "_F" behind an unknown name are as likely a gain or a force.
     if (unit == nullptr || (beside.empty() && unit->offset != 0.0)) continue;
@@ -295,7 +297,7 @@ std::string usual_name(Role role, int index, const Machine& machine) {
   }
   for (const Family& family : families(machine)) {
     if (family.role != role) continue;
-    const Quantity& quantity = quantity_of(role, index, machine);
+    const ColumnQuantity& quantity = quantity_of(role, index, machine);
     return fmt::format("{}{}{}{}", family.prefix, family.parts[static_cast<std::size_t>(index)],
                        quantity.usual.empty() ? "" : "_", quantity.usual);
   }

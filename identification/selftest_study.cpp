@@ -100,7 +100,7 @@ Signature SelftestStudy::typical_signature(std::size_t i) const {
 }
 
 double SelftestStudy::price(std::size_t i) const {
-  return gate_.inflation[i] * (threshold_ + candidates_[i].penalty);
+  return gate_.scale[i] * (threshold_ + candidates_[i].penalty);
 }
 
 /// Chance that a gain of that mean passes the gate.

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "models/error.h"
 #include "models/kinematics.h"
 #include "models/linkage.h"
+#include "models/nan.h"
 #include "models/static_force.h"
 
 namespace sparflow {
@@ -16,7 +16,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// One Newton solve from a neighbour; NaN when it does not settle inside the joint's range.
 double newton_from(const Machine& machine, int cylinder, double length, double start) {

@@ -4,17 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identification/compare.h"
 #include "identification/robust.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// What the errors of the stages before change in one series; NaN where the measured inputs are not known.
 class Inheritance {

@@ -1,17 +1,16 @@
 #include "models/model_file_effects.h"
 
-#include <limits>
 #include <set>
 
 #include "models/effects/registry.h"
 #include "models/effects/user_effect.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Json = ModelJson;
 using Cursor = ModelCursor;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const char* const kWhole = "a whole number that is not negative";
 
 Json source_json(const DataSource& d) {

@@ -11,9 +11,6 @@
 namespace sparflow {
 namespace {
 
-/// Shares below this change no pressure by more than 1e-11 bar (models/smooth_power.cpp).
-constexpr double kNegligibleShare = 1e-14;
-
 Jet process_mean(const GaussianProcess& process, const Jet& flow, const Jet& force) {
   if (flow.variables() == 0 && force.variables() == 0) {
     return process.mean(flow.value, force.value);

@@ -19,10 +19,6 @@ GpDerivatives in_speed(const GaussianProcess& process, double area, double m, do
           g.d_force_force};
 }
 
-/// Below this share a side's pressure changes the demand by less than 1e-11 bar for pressures up to
-/// 1000 bar, far under any tolerance of the solver, so its process is not evaluated.
-constexpr double kNegligibleShare = 1e-14;
-
 }  // namespace
 
 SmoothPower::SmoothPower(const CraneModel& model)

@@ -16,6 +16,10 @@ namespace sparflow {
 /// kRetract are exact for v of their sign, kRest takes no flow and demands nothing.
 enum class CylinderMode : unsigned char { kFree, kRest, kExtend, kRetract };
 
+/// Below this share a side's pressure changes the demand by less than 1e-11 bar for pressures up to
+/// 1000 bar, far under any tolerance of the solver, so its process is not evaluated.
+inline constexpr double kNegligibleShare = 1e-14;
+
 struct Smoothing {
   double speed = 2e-3;    ///< eps [m/s]
   double pressure = 1e5;  ///< beta [Pa]

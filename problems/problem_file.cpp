@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace quantities;
 
-constexpr Quantity kPoint{"coordinate", "m", Sign::kAny, 1.0, 1000.0};
+constexpr Quantity kTipPoint{"coordinate", "m", Sign::kAny, 1.0, 1000.0};
 constexpr Quantity kDistance{"distance", "m", Sign::kNonNegative, 1.0, 100.0};
 constexpr Quantity kTolerance{"tolerance", "m", Sign::kPositive, 1.0, 100.0};
 constexpr Quantity kTime{"duration", "s", Sign::kPositive};
@@ -160,7 +160,7 @@ class ProblemReader {
       return;
     }
     const YamlValue tip = *map.find("tip");
-    const Eigen::Vector3d goal = tip.vector3(kPoint);
+    const Eigen::Vector3d goal = tip.vector3(kTipPoint);
     const Eigen::Vector3d now = tip_position<double>(problem_.machine, problem_.start);
     const auto rounded = [](double x) { return std::abs(x) < 1e-9 ? 0.0 : x; };
     for (const Eigen::Vector3d& fixed : fixed_tip_directions(problem_.machine)) {

@@ -25,11 +25,11 @@ constexpr double kBendShare =
 constexpr double kMissed = 1e-3;         // [m] clearance that a motion check may miss (clear_share)
 constexpr double kLeastInterval = 1e-3;  // [s] for paths without length
 
-std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+std::size_t slot(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
 /// The smaller of a joint's two acceleration limits.
 double least_acceleration(const MotionProblem& problem, Eigen::Index joint) {
-  const Range& a = problem.limits.acceleration[at(joint)];
+  const Range& a = problem.limits.acceleration[slot(joint)];
   return std::min(a.hi, -a.lo);
 }
 

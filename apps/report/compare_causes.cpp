@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "apps/report/compare_charts.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 void add_bad_data(Page& page, const CompareResult& result) {
   if (result.bad_data.empty()) return;

@@ -4,18 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "apps/report/compare_charts.h"
 #include "apps/report/effect_text.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kStretchSeconds = 30.0;  // of a log, as much as the eye can compare
 constexpr std::size_t kMostRanked = 10;
 constexpr std::size_t kMostChannels = 2;  // of an effect that shows in several

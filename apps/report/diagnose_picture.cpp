@@ -1,8 +1,8 @@
 // Numbers behind the pictures of a diagnosis: residuals with and without an effect, signals that may tell.
 #include <cmath>
-#include <limits>
 
 #include "apps/report/diagnose_charts.h"
+#include "models/nan.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -10,7 +10,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 VectorXd contribution(const Evidence& evidence, const AppliedEffect& effect,
                       const EvidenceChannel& channel) {

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "apps/report/compare_charts.h"
 #include "apps/report/compare_page.h"
 #include "apps/report/score_judgement.h"
 #include "models/model_file.h"
+#include "models/nan.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -17,7 +17,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using units::kBar;
 using units::kLitrePerMinute;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 const std::string& cylinder_name(const FitResult& r, int cylinder) {
   return r.model.machine.cylinders[static_cast<std::size_t>(cylinder)].name;

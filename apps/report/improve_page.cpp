@@ -4,19 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "apps/report/compare_charts.h"
 #include "apps/report/effect_text.h"
 #include "apps/report/score_judgement.h"
 #include "models/model_file.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMoved = 0.02;         // [-] an error that changes less is not worth a picture
 constexpr double kStretchSeconds = 30;  // of a log, as much as the eye can compare
 constexpr std::size_t kMostErrorCharts = 12;
@@ -259,7 +258,8 @@ void add_last(Page& page, const Diagnosis& d) {
     for (const std::string& s : d.unexplained->depends_on) on += (on.empty() ? "" : ", ") + s;
     page.paragraph(d.unexplained->sentence + (on.empty() ? "" : " It depends on: " + on + "."));
   }
-  if (d.experiment) page.paragraph(d.experiment->reason + " Record: " + d.experiment->motion);
+  for (const Experiment& e : d.experiments)
+    page.paragraph(capitalised(e.sentence()) + ".");
 }
 
 }  // namespace

@@ -3,17 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "apps/report/compare_charts.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kCharts = 2, kChartsOfTheFirst = 6;
 constexpr double kTelling =
     0.01;  // a signal that explains less of the variance is not worth a picture

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kGoodFit = 85.0, kPoorFit = 50.0;            // [%]
 constexpr double kGoodRelative = 0.05, kPoorRelative = 0.15;  // error over RMS of the measured
 constexpr double kGoodEnergy = 0.02, kPoorEnergy = 0.05;      // relative error

@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "models/model_file.h"
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 std::string values_text(const std::vector<ShownValue>& values) {
   std::string text;

@@ -1,6 +1,7 @@
 #pragma once
 /// One hidden effect at work: what it changes at each step of the plant. Hooks are called in this order, once a step.
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "simulator/hidden_effects/body_forces.h"
@@ -108,6 +109,20 @@ std::vector<LawEntry> outside_hydraulic_laws();
 std::vector<LawEntry> outside_mechanical_laws();
 const std::vector<LawEntry>& all_laws();
 const LawEntry& law_entry(const std::string& id);
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kMoving =
+    2e-3;  ///< [m/s] equivalents count samples that move, as the error measures do
+
+/// Area that turns a force into a pressure; of a drive without hydraulics a usual one. [m^2]
+inline double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }
+/// Machines an effect can be hidden in: by cylinder `i`, by pump `p`.
+inline bool hydraulic(const Machine& machine, int i) {
+  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
+}
+inline bool load_sensing(const Machine& machine, int p) {
+  return machine.pumps[static_cast<std::size_t>(p)].type == PumpType::kLoadSensing;
+}
 
 template <class Law>
 std::unique_ptr<HiddenLaw> make_law(LawContext& context) {

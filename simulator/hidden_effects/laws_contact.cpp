@@ -8,9 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kMoving = 2e-3;  // [m/s]
-
 bool on_telescope(const Machine& machine, int cylinder) {
   const int j = machine.cylinders[static_cast<std::size_t>(cylinder)].joint;
   if (machine.joints[static_cast<std::size_t>(j)].type != JointType::kPrismatic) return false;
@@ -18,8 +15,6 @@ bool on_telescope(const Machine& machine, int cylinder) {
     if (machine.joints[static_cast<std::size_t>(k)].type == JointType::kRevolute) return true;
   return false;
 }
-
-double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }
 
 class PadFriction final : public HiddenLaw {
  public:

@@ -7,12 +7,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kMoving =
-    2e-3;  // [m/s] equivalents count samples that move, as the error measures do
-
-double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }
-
 /// sign(v) without its jump: 0 at rest, 1 within 1 % at three times `width`.
 double soft_sign(double v, double width) { return std::tanh(v / width); }
 

@@ -8,9 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
-
 std::vector<HiddenParameter> one(const char* name, double value, const char* unit) {
   return {{name, value, unit, value}};
 }
@@ -222,9 +219,6 @@ class PressureDrift final : public HiddenLaw {
   double rise_, period_, phase_;
 };
 
-bool hydraulic(const Machine& machine, int i) {
-  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
-}
 bool one_of_several(const Machine& machine, int i) {
   return hydraulic(machine, i) && machine.cylinder_count() > 1;
 }
@@ -234,10 +228,6 @@ bool shares_pump(const Machine& machine, int i) {
   const Pump& pump = machine.pumps[static_cast<std::size_t>(p)];
   return pump.feeds.size() > 1 && pump.type == PumpType::kLoadSensing;
 }
-bool load_sensing(const Machine& machine, int p) {
-  return machine.pumps[static_cast<std::size_t>(p)].type == PumpType::kLoadSensing;
-}
-
 }  // namespace
 
 std::vector<LawEntry> outside_hydraulic_laws() {

@@ -10,11 +10,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
-
-double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }
-
 /// Boom on its cylinder's oil spring: a light damped oscillator driven by the rod's acceleration.
 class Vibration final : public HiddenLaw {
  public:

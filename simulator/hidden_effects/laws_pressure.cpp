@@ -8,9 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kMoving = 2e-3;  // [m/s]
-
 /// Return flow of a usual simultaneous move. [m^3/s]
 double usual_return(const LawContext& c) {
   double most = 0.0;
@@ -186,15 +183,12 @@ class OilTemperature final : public HiddenLaw {
   std::vector<double> ratio_;
 };
 
-bool hydraulic(const Machine& machine, int i) {
-  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
-}
 bool any_hydraulic(const Machine& machine, int) {
   for (const Cylinder& c : machine.cylinders)
     if (c.hydraulic()) return true;
   return false;
 }
-bool load_sensing(const Machine& machine, int i) {
+bool fed_by_load_sensing_pump(const Machine& machine, int i) {
   const int p = machine.pump_of_cylinder(i);
   return hydraulic(machine, i) && p >= 0 &&
          machine.pumps[static_cast<std::size_t>(p)].type == PumpType::kLoadSensing;
@@ -216,7 +210,7 @@ std::vector<LawEntry> pressure_laws() {
            {"orifice", "hose and orifice", "orifice with a laminar start"},
            "k [Pa/(m^3/s)^2] between pump and cylinder (sensors at the cylinder)",
            make_law<LineLoss>,
-           load_sensing},
+           fed_by_load_sensing_pump},
           {"counterbalance",
            HiddenPlace::kCylinder,
            true,

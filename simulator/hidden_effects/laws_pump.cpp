@@ -7,8 +7,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-
 class PumpLag final : public HiddenLaw {
  public:
   explicit PumpLag(LawContext& c)
@@ -112,10 +110,6 @@ class TorqueLimit final : public HiddenLaw {
   int law_;
   double power_ = 0.0, most_ = 1.0;
 };
-
-bool load_sensing(const Machine& machine, int p) {
-  return machine.pumps[static_cast<std::size_t>(p)].type == PumpType::kLoadSensing;
-}
 
 }  // namespace
 

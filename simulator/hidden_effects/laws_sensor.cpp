@@ -8,8 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-
 class PressureOffset final : public HiddenLaw {
  public:
   explicit PressureOffset(LawContext& c)
@@ -135,10 +133,6 @@ class SensorFault final : public HiddenLaw {
   double size_;
   std::uint64_t seed_;
 };
-
-bool hydraulic(const Machine& machine, int i) {
-  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
-}
 
 }  // namespace
 

@@ -115,10 +115,6 @@ class Saturation final : public HiddenLaw {
   double limit_ = 0.0;
 };
 
-bool hydraulic(const Machine& machine, int i) {
-  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
-}
-
 }  // namespace
 
 std::vector<LawEntry> valve_laws() {

@@ -8,9 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
-constexpr double kLpm = 1.0 / 60000.0;
-
 class Leakage final : public HiddenLaw {
  public:
   explicit Leakage(LawContext& c)
@@ -91,10 +88,6 @@ class Compressibility final : public HiddenLaw {
                                              smooth_ = 0.0;
   Equivalent equivalent_;
 };
-
-bool hydraulic(const Machine& machine, int i) {
-  return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
-}
 
 }  // namespace
 

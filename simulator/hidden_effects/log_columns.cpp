@@ -11,7 +11,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kBar = 1e5;
 constexpr double kPressureNoise =
     0.8 * kBar;                          // [Pa] standard deviation, white, as in the shared logs
 constexpr double kAngleNoise = 3.0e-4;   // [rad]

@@ -10,7 +10,7 @@
 
 #include "models/error.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 namespace {
 
 namespace fs = std::filesystem;
@@ -102,4 +102,4 @@ BrowserReport check_page(const std::string& path, const std::string& options) {
   return report;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

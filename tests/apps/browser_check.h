@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 struct BrowserReport {
   bool available = false;           ///< false: no chromium on this machine, nothing else is filled
@@ -21,4 +21,4 @@ struct BrowserReport {
 /// Use: `const auto report = check_page(path); if (!report.available) GTEST_SKIP() << "no chromium";`
 BrowserReport check_page(const std::string& path, const std::string& options = "");
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

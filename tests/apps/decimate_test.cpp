@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "models/nan.h"
 
 namespace sparflow {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool contains(const std::vector<Index>& rows, Index row) {
   return std::binary_search(rows.begin(), rows.end(), row);

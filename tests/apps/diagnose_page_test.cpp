@@ -81,7 +81,7 @@ void expect_good_in_browser(const Page& page, const std::string& name) {
     </script></body>)";
   html.replace(html.find("</body>"), 7, probe);
   write_file_atomically(path, html);
-  const testing::BrowserReport report = testing::check_page(path);
+  const test_support::BrowserReport report = test_support::check_page(path);
   std::filesystem::remove(path);
   if (!report.available) GTEST_SKIP() << "chromium is absent";
   EXPECT_THAT(report.errors, IsEmpty());

@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/report/assets.h"
 #include "models/error.h"
+#include "models/nan.h"
 #include "tests/apps/browser_check.h"
 #include "tests/apps/sample_page.h"
 
@@ -19,8 +19,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A file that lives as long as the test.
 class PageFile {
@@ -68,11 +66,11 @@ TEST(Page, AssetsAreEmbeddedWholeAndCannotEndTheirScript) {
 }
 
 TEST(Page, SameInputMakesTheSameBytes) {
-  EXPECT_EQ(testing::sample_page().html(), testing::sample_page().html());
+  EXPECT_EQ(test_support::sample_page().html(), test_support::sample_page().html());
 }
 
 TEST(Page, AsksForNothingFromANetwork) {
-  const std::string html = testing::sample_page().html();
+  const std::string html = test_support::sample_page().html();
   EXPECT_NE(html.find("default-src 'none'"), std::string::npos);
   for (const char* request :
        {"src=\"http", "href=\"http", "@import", "url(http", "fetch(", "XMLHttp"}) {
@@ -146,15 +144,16 @@ TEST(Page, UnwritableFolderIsTheUsersError) {
 }
 
 TEST(PageInBrowser, SampleDrawsEveryFigureWithoutErrors) {
-  const PageFile file(testing::sample_page().html());
-  const auto report = testing::check_page(file.path());
+  const PageFile file(test_support::sample_page().html());
+  const auto report = test_support::check_page(file.path());
   EXPECT_GOOD_PAGE(report);
   EXPECT_EQ(report.plots_expected, 8);
 }
 
 TEST(PageInBrowser, DarkThemeDrawsToo) {
-  const PageFile file(testing::sample_page().html());
-  const auto report = testing::check_page(file.path(), "--blink-settings=preferredColorScheme=0");
+  const PageFile file(test_support::sample_page().html());
+  const auto report =
+      test_support::check_page(file.path(), "--blink-settings=preferredColorScheme=0");
   EXPECT_GOOD_PAGE(report);
 }
 
@@ -205,7 +204,7 @@ TEST(PageInBrowser, EmptyFiguresAreDrawnAsEmpty) {
   page.plot(crane);
 
   const PageFile file(page.html());
-  const auto report = testing::check_page(file.path());
+  const auto report = test_support::check_page(file.path());
   EXPECT_GOOD_PAGE(report);
   EXPECT_EQ(report.plots_expected, 18);
 }
@@ -246,14 +245,14 @@ TEST(PageInBrowser, HostileNamesAreText) {
   const std::string html = page.html();
   EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
   const PageFile file(html);
-  const auto report = testing::check_page(file.path());
+  const auto report = test_support::check_page(file.path());
   EXPECT_GOOD_PAGE(report);
   EXPECT_THAT(report.dom, HasSubstr("\u00D6lzylinder \u6CB9\u7F38 \uFFFD\uFFFD"));
 }
 
 /// Every button of every figure gives a file that is not empty; pictures are PNGs.
 TEST(PageInBrowser, FiguresCanBeSaved) {
-  std::string html = testing::sample_page().html();
+  std::string html = test_support::sample_page().html();
   const std::string probe = R"(<script>
     const saved = [];
     URL.createObjectURL = (blob) => { saved.push(blob.type + (blob.size > 40 ? '' : ' empty')); return '#'; };
@@ -263,7 +262,7 @@ TEST(PageInBrowser, FiguresCanBeSaved) {
     </script></body>)";
   html.replace(html.find("</body>"), 7, probe);
   const PageFile file(html);
-  const auto report = testing::check_page(file.path());
+  const auto report = test_support::check_page(file.path());
   EXPECT_GOOD_PAGE(report);
   std::string expected;
   for (const char* type : {"image/png", "text/csv"}) {
@@ -275,7 +274,7 @@ TEST(PageInBrowser, FiguresCanBeSaved) {
 
 /// Moving the slider moves the crane and the cursors of the charts of its group, and no others.
 TEST(PageInBrowser, SliderMovesCraneAndChartsOfItsGroup) {
-  std::string html = testing::sample_page().html();
+  std::string html = test_support::sample_page().html();
   const std::string probe = R"(<script>
     const before = document.querySelector('.player output').textContent;
     const slider = document.querySelector('.player input');
@@ -291,7 +290,7 @@ TEST(PageInBrowser, SliderMovesCraneAndChartsOfItsGroup) {
     </script></body>)";
   html.replace(html.find("</body>"), 7, probe);
   const PageFile file(html);
-  const auto report = testing::check_page(file.path());
+  const auto report = test_support::check_page(file.path());
   EXPECT_GOOD_PAGE(report);
   EXPECT_EQ(report.body_data("moved"), "true");
   EXPECT_EQ(report.body_data("instant"), "t = 2.00 s");
@@ -302,13 +301,13 @@ TEST(PageInBrowser, SliderMovesCraneAndChartsOfItsGroup) {
 
 /// The check itself must be able to fail.
 TEST(PageInBrowser, CheckSeesErrorsAndFiguresThatAreNotDrawn) {
-  std::string html = testing::sample_page().html();
+  std::string html = test_support::sample_page().html();
   const std::string figure = "\"kind\":\"heat\"";
   html.replace(html.find(figure), figure.size(), "\"kind\":\"none\"");
   html.replace(html.find("</body>"), 7,
                "<script>null.x</script><img src=\"http://127.0.0.1:9/a.png\"></body>");
   const PageFile file(html);
-  const auto report = testing::check_page(file.path());
+  const auto report = test_support::check_page(file.path());
   if (!report.available) GTEST_SKIP() << "chromium is absent";
   EXPECT_EQ(report.plots_drawn, report.plots_expected - 1);
   EXPECT_THAT(report.errors, ::testing::Contains(HasSubstr("null")));

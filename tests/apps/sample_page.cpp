@@ -1,20 +1,18 @@
 #include "tests/apps/sample_page.h"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 
+#include "models/nan.h"
 #include "tests/models/test_machines.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 namespace {
 
 using Eigen::Index;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// From low and near to high and far in eight seconds.
 Trajectory reach() {
@@ -211,4 +209,4 @@ Page sample_page() {
   return page;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -2,8 +2,8 @@
 /// A page with every kind of figure, filled with made-up but realistic data.
 #include "apps/report/page.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 Page sample_page();
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -11,7 +11,7 @@ using test::LogFiles;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-struct Case {
+struct BrokenLog {
   const char* name;
   std::string text;
   const char* message;
@@ -25,7 +25,7 @@ std::string rows(int from, int to) {
   return text;
 }
 
-std::vector<Case> broken_logs() {
+std::vector<BrokenLog> broken_logs() {
   return {
       {"empty", "", "log.csv: the file is empty"},
       {"blank", "\n  \n\n", "log.csv: the file is empty"},
@@ -144,7 +144,7 @@ std::vector<Case> broken_logs() {
 
 TEST_F(LogFiles, BrokenLogsAreRefusedWithASentence) {
   EXPECT_GE(broken_logs().size(), 20u);
-  for (const Case& broken : broken_logs()) {
+  for (const BrokenLog& broken : broken_logs()) {
     EXPECT_EQ(error_of(broken.text), broken.message) << broken.name;
   }
 }
@@ -177,7 +177,7 @@ TEST_F(LogFiles, OddLogsAreReadWithAWarning) {
     outside += fmt::format("{:.2f},{},1.5\n", 0.02 * i, 1.40 - 0.001 * i);
   }
   std::string repeated = "t_s,q_boom_rad,q_extension_m,rpm,rpm\n0,0.5,1,7,8\n0.02,0.5,1,7,8\n";
-  for (const Case& odd : std::vector<Case>{
+  for (const BrokenLog& odd : std::vector<BrokenLog>{
            {"cut off", one_short,
             "1 row left out: line 52 has 2 values where the header names 4 columns"},
            {"a cell that is no number", one_error,

@@ -31,15 +31,15 @@ NoiseModel friction_noise() {
 }
 
 /// Two channels with baselines; the first effect acts in both, the second in the first channel only.
-struct Case {
+struct FitCase {
   Evidence evidence;
   EffectDesign shared, single;
   VectorXd truth;
 };
 
-Case make_case(unsigned seed, const VectorXd& truth, Index blocks_each = 12) {
+FitCase make_case(unsigned seed, const VectorXd& truth, Index blocks_each = 12) {
   std::mt19937_64 random(seed);
-  Case c;
+  FitCase c;
   c.truth = truth;
   std::vector<MatrixXd> shared, single;
   for (int k = 0; k < 2; ++k) {
@@ -62,7 +62,7 @@ Case make_case(unsigned seed, const VectorXd& truth, Index blocks_each = 12) {
 }
 
 TEST(EffectFit, IsGeneralisedLeastSquares) {
-  const Case c = make_case(1, Eigen::Vector2d(0.8, -0.5));
+  const FitCase c = make_case(1, Eigen::Vector2d(0.8, -0.5));
   FitControl control;
   control.covariance = true;
   control.keep_residuals = true;
@@ -106,7 +106,7 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
 }
 
 TEST(EffectFit, BoundsHoldAndTheOthersAreAtTheirBestBeside) {
-  Case c = make_case(2, Eigen::Vector2d(-0.6, 0.9));
+  FitCase c = make_case(2, Eigen::Vector2d(-0.6, 0.9));
   c.shared.lower = {0.0};  // the truth is not allowed
   const EffectFit fit = fit_effects(c.evidence, {&c.shared, &c.single});
   EXPECT_TRUE(fit.at_bound);
@@ -121,7 +121,7 @@ TEST(EffectFit, BoundsHoldAndTheOthersAreAtTheirBestBeside) {
 
 TEST(EffectFit, UnitsDoNotMatter) {
   // parameters of 1e12 Pa/(m^3/s)^2 stand beside parameters of 1e-8 rad/(N m)
-  Case c = make_case(3, Eigen::Vector2d(0.8, -0.5));
+  FitCase c = make_case(3, Eigen::Vector2d(0.8, -0.5));
   const EffectFit plain = fit_effects(c.evidence, {&c.shared, &c.single});
   for (MatrixXd& m : c.shared.columns) m *= 1e-12;
   c.single.columns[0] *= 1e8;
@@ -133,7 +133,7 @@ TEST(EffectFit, UnitsDoNotMatter) {
 }
 
 TEST(EffectFit, ChannelsThatAreNotActiveKeepTheirLikelihood) {
-  const Case c = make_case(4, Eigen::Vector2d(0.8, -0.5));
+  const FitCase c = make_case(4, Eigen::Vector2d(0.8, -0.5));
   const EffectFit without = fit_effects(c.evidence, {});
   FitControl control;
   control.active = {true, false};
@@ -144,7 +144,7 @@ TEST(EffectFit, ChannelsThatAreNotActiveKeepTheirLikelihood) {
 }
 
 TEST(EffectFit, MoreNoisePassesThanNeededChangeNothing) {
-  const Case c = make_case(5, Eigen::Vector2d(0.8, -0.5));
+  const FitCase c = make_case(5, Eigen::Vector2d(0.8, -0.5));
   FitControl many;
   many.noise_passes = 12;
   const EffectFit a = fit_effects(c.evidence, {&c.shared, &c.single}),
@@ -161,7 +161,7 @@ TEST(EffectFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
   int held = 0, count = 0;
   VectorXd sum = VectorXd::Zero(2);
   for (unsigned seed = 100; seed < 300; ++seed) {
-    const Case c = make_case(seed, truth);
+    const FitCase c = make_case(seed, truth);
     const EffectFit fit = fit_effects(c.evidence, {&c.shared, &c.single}, nullptr, control);
     sum += fit.theta - truth;
     for (Index i = 0; i < 2; ++i) {
@@ -185,7 +185,7 @@ TEST(EffectFit, NoChannelAndNoEffectIsNoError) {
 }
 
 TEST(WhitenedRows, BaselineIsTakenOut) {
-  const Case c = make_case(6, Eigen::Vector2d(0.0, 0.0));
+  const FitCase c = make_case(6, Eigen::Vector2d(0.0, 0.0));
   const EvidenceChannel& channel = c.evidence.channels[0];
   MatrixXd columns(channel.rows(), 2);
   columns << c.shared.columns[0], channel.baseline.col(1);

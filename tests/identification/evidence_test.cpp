@@ -122,16 +122,16 @@ INSTANTIATE_TEST_SUITE_P(WindowsAndRates, MatchedFilters,
 
 // ------------------------------------------------------------------------------------ channels and blocks
 
-const Machine& crane() {
+const Machine& arm() {
   static const Machine machine = testing_support::drawn_machine("loader_crane");
   return machine;
 }
 const HiddenCase& plain_case() {
-  static const HiddenCase c = hidden_case(crane(), {}, 3, 60.0);
+  static const HiddenCase c = hidden_case(arm(), {}, 3, 60.0);
   return c;
 }
 CraneModel crane_model() {
-  CraneModel model = CraneModel::untrained(crane());
+  CraneModel model = CraneModel::untrained(arm());
   for (auto& c : model.cylinders) c.margin = 15e5;
   return model;
 }
@@ -150,7 +150,7 @@ TEST(Evidence, EachMeasuredQuantityHasItsChannel) {
     ASSERT_NE(e.find(EvidenceKind::kForce, i), nullptr);
     ASSERT_NE(e.find(EvidenceKind::kFlow, i), nullptr);
     EXPECT_EQ(e.find(EvidenceKind::kForce, i)->at,
-              crane().cylinders[static_cast<std::size_t>(i)].name);
+              arm().cylinders[static_cast<std::size_t>(i)].name);
   }
   ASSERT_NE(e.find(EvidenceKind::kPump, 0), nullptr);
   EXPECT_EQ(e.find(EvidenceKind::kPump, 1), nullptr);
@@ -205,7 +205,7 @@ TEST(Evidence, ReferenceRowsFeelNoEffect) {
   const Evidence e = evidence_of(model, {plain_case().train}, {plain_case().reference});
   ASSERT_TRUE(e.has_reference());
   int acting = 0;
-  for (const EffectAt& effect : candidates(crane())) {
+  for (const EffectAt& effect : candidates(arm())) {
     // nonlinear parameters at the first value of their grids
     std::vector<double> shape;
     bool whole = true;

@@ -18,15 +18,15 @@ using testing::HasSubstr;
 
 constexpr double kGain = 100.0 / 60000.0;  // 100 l/min
 
-struct Data {
+struct ValveData {
   VectorXd command, flow;
 };
 
-Data make_data(Index n, double dead_band, double outliers) {
+ValveData make_data(Index n, double dead_band, double outliers) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> uniform;
   std::normal_distribution<double> normal;
-  Data d{VectorXd(n), VectorXd(n)};
+  ValveData d{VectorXd(n), VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
     const double u = uniform(random);
     d.command[i] = -u;  // retracting: only the magnitude counts
@@ -37,7 +37,7 @@ Data make_data(Index n, double dead_band, double outliers) {
 }
 
 TEST(LearnValve, GainThroughZero) {
-  const Data d = make_data(1000, 0.0, 0.0);
+  const ValveData d = make_data(1000, 0.0, 0.0);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Standard error 0.01 / sqrt(1000 * mean u^2 = 333) = 0.0005 of the gain; four of them.
   EXPECT_NEAR(valve.gain / kGain, 1.0, 0.0022);
@@ -49,15 +49,15 @@ TEST(LearnValve, GainThroughZero) {
 }
 
 TEST(LearnValve, OutliersDoNotMoveIt) {
-  const Data d = make_data(1000, 0.0, 0.1);
+  const ValveData d = make_data(1000, 0.0, 0.1);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Huber's influence: 10 % outliers move it by at most 1.4 * 0.1 noise deviations = 0.2 % of the gain.
   EXPECT_NEAR(valve.gain / kGain, 1.0, 0.006);
 }
 
 TEST(LearnValve, DeadBandIsReportedNotModelled) {
-  const Data d = make_data(1000, 0.0, 0.0);
-  Data shifted = d;
+  const ValveData d = make_data(1000, 0.0, 0.0);
+  ValveData shifted = d;
   for (Index i = 0; i < 1000; ++i) {  // moving samples only, as the learner is given
     shifted.command[i] = -(0.08 + 0.92 * std::abs(d.command[i]));
     shifted.flow[i] = kGain * (std::abs(shifted.command[i]) - 0.08) +
@@ -85,7 +85,7 @@ TEST(LearnValve, ExactDataAndConstantCommand) {
 }
 
 TEST(LearnValve, UnusableSamples) {
-  Data d = make_data(30, 0.0, 0.0);
+  ValveData d = make_data(30, 0.0, 0.0);
   d.command.head(10).setZero();
   d.flow[15] = NAN;
   EXPECT_EQ(learn_valve(d.command, d.flow).used, 19);

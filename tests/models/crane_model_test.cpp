@@ -11,8 +11,8 @@
 namespace sparflow {
 namespace {
 
-using testing::Random;
-using testing::random_configuration;
+using test_support::Random;
+using test_support::random_configuration;
 using units::kBar;
 
 /// A process of three centres around (1e-3 m^3/s, 50 kN), small enough to be summed by hand.
@@ -56,7 +56,7 @@ CraneModel trained(const Machine& machine) {
 constexpr double kPressureTolerance = 1e-5;  // [Pa]
 
 TEST(CraneModel, UntrainedKnowsWhatItMisses) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   CraneModel model = CraneModel::untrained(machine);
   EXPECT_FALSE(model.complete());
   EXPECT_EQ(model.missing().size(), 6u);
@@ -72,7 +72,7 @@ TEST(CraneModel, UntrainedKnowsWhatItMisses) {
 }
 
 TEST(CraneModel, FlowsAndPressuresByHand) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const CraneModel model = trained(machine);
   Chain chain(model);
   const double q[] = {0.4, -1.1, 2.0};
@@ -109,7 +109,7 @@ TEST(CraneModel, FlowsAndPressuresByHand) {
 }
 
 TEST(CraneModel, TheNeediestMovingCylinderLeads) {
-  const CraneModel model = trained(testing::loader_crane());
+  const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   Random random(1);
   bool led[3] = {false, false, false};
@@ -139,7 +139,7 @@ TEST(CraneModel, TheNeediestMovingCylinderLeads) {
 }
 
 TEST(CraneModel, AtRestNothingFlowsAndThePumpStandsBy) {
-  const CraneModel model = trained(testing::loader_crane());
+  const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   const double q[] = {0.4, -1.1, 2.0}, moving[] = {0.1, 0.1, 0.1}, rest[] = {0, 0, 0};
   chain.evaluate(q, moving, 500, true);  // leaves values behind that must not survive
@@ -157,7 +157,7 @@ TEST(CraneModel, AtRestNothingFlowsAndThePumpStandsBy) {
 }
 
 TEST(CraneModel, LowDemandsLeaveThePumpAtStandby) {
-  CraneModel model = trained(testing::loader_crane());
+  CraneModel model = trained(test_support::loader_crane());
   model.pumps[0].standby = 400 * kBar;
   Chain chain(model);
   const double speed[] = {0.05, 0.05, 0.05}, force[] = {1e4, 1e4, 1e4};
@@ -167,7 +167,7 @@ TEST(CraneModel, LowDemandsLeaveThePumpAtStandby) {
 }
 
 TEST(CraneModel, ConstantPressureSupplyDoesNotListen) {
-  CraneModel model = trained(testing::knuckle_crane());
+  CraneModel model = trained(test_support::knuckle_crane());
   model.pumps[0].standby = 142 * kBar;
   Chain chain(model);
   // both processes ask for more than the supply gives
@@ -181,7 +181,7 @@ TEST(CraneModel, ConstantPressureSupplyDoesNotListen) {
 
 TEST(CraneModel, PumpPowerIsUsefulPowerPlusThrottling) {
   for (const Machine& machine :
-       {testing::loader_crane(), testing::knuckle_crane(), testing::swing_crane()}) {
+       {test_support::loader_crane(), test_support::knuckle_crane(), test_support::swing_crane()}) {
     SCOPED_TRACE(machine.name);
     const CraneModel model = trained(machine);
     Chain chain(model);
@@ -213,7 +213,7 @@ TEST(CraneModel, PumpPowerIsUsefulPowerPlusThrottling) {
 
 TEST(CraneModel, TwoPumpsDoNotFeelEachOther) {
   const Machine machine =
-      testing::swing_crane();  // front feeds swing and jib, rear boom and extension
+      test_support::swing_crane();  // front feeds swing and jib, rear boom and extension
   const CraneModel model = trained(machine);
   Chain chain(model);
   const double force[] = {2e4, 9e4, -3e4, 5e3};
@@ -235,7 +235,7 @@ TEST(CraneModel, TwoPumpsDoNotFeelEachOther) {
 }
 
 TEST(CraneModel, ParallelCylindersNeedTwiceTheFlow) {
-  const Machine machine = testing::swing_crane();
+  const Machine machine = test_support::swing_crane();
   ASSERT_EQ(machine.cylinders[1].parallel, 2);
   const CraneModel model = trained(machine);
   Chain chain(model);
@@ -248,7 +248,7 @@ TEST(CraneModel, ParallelCylindersNeedTwiceTheFlow) {
 }
 
 TEST(CraneModel, RestSpeedSetsWhatCountsAsMoving) {
-  const CraneModel model = trained(testing::loader_crane());
+  const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   const double speed[] = {0.0015, -0.0025, 0.0}, force[] = {5e4, 5e4, 5e4};
   const MachineState& s = chain.evaluate_pressures(speed, force, false, 2e-3);
@@ -259,7 +259,7 @@ TEST(CraneModel, RestSpeedSetsWhatCountsAsMoving) {
 }
 
 TEST(CraneModel, StandardDeviationIsThatOfTheProcess) {
-  const CraneModel model = trained(testing::loader_crane());
+  const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   const double speed[] = {0.03, 0.02, 0.04}, force[] = {5e4, 5e4, 5e4};
   const MachineState& s = chain.evaluate_pressures(speed, force, true);
@@ -273,10 +273,10 @@ TEST(CraneModel, StandardDeviationIsThatOfTheProcess) {
 TEST(CraneModel, WithoutHydraulicsThereIsForceButNoFlow) {
   Machine machine;
   machine.joints = {
-      testing::make_joint("axis", JointType::kPrismatic, {0, 0, 0}, {1, 0, 0}, {-1, 1})};
-  machine.links = {testing::make_link("carriage", 0, 95, {0, 0, 0})};
+      test_support::make_joint("axis", JointType::kPrismatic, {0, 0, 0}, {1, 0, 0}, {-1, 1})};
+  machine.links = {test_support::make_link("carriage", 0, 95, {0, 0, 0})};
   machine.gravity = {-1.0, 0, 0};
-  machine.cylinders = {testing::make_cylinder("axis", 0, 0, 0, DirectLinkage{})};
+  machine.cylinders = {test_support::make_cylinder("axis", 0, 0, 0, DirectLinkage{})};
   const CraneModel model = CraneModel::untrained(machine);
   EXPECT_TRUE(model.complete());
   Chain chain(model);

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 // Sums of a few rotations of points some ten metres away: 1e-12 m is a thousand rounding errors.
-constexpr double kRounding = 1e-12;
+constexpr double kGeometryRounding = 1e-12;
 
 std::vector<MachinePart> of_kind(const std::vector<MachinePart>& parts, PartKind kind) {
   std::vector<MachinePart> found;
@@ -29,12 +29,12 @@ std::vector<MachinePart> of_kind(const std::vector<MachinePart>& parts, PartKind
 double length(const MachinePart& part) { return (part.points[1] - part.points[0]).norm(); }
 
 TEST(DrawingGeometry, KindsAndTheirOrderDoNotDependOnTheConfiguration) {
-  testing::Random random(5);
-  for (const Machine& machine : testing::all_test_machines()) {
-    const auto first = machine_parts(machine, testing::random_configuration(machine, random));
+  test_support::Random random(5);
+  for (const Machine& machine : test_support::all_test_machines()) {
+    const auto first = machine_parts(machine, test_support::random_configuration(machine, random));
     for (int i = 0; i < 5; ++i) {
       // twice the range: some four-bars do not close there
-      const VectorXd q = 2.0 * testing::random_configuration(machine, random);
+      const VectorXd q = 2.0 * test_support::random_configuration(machine, random);
       const auto parts = machine_parts(machine, q);
       ASSERT_EQ(parts.size(), first.size()) << machine.name;
       for (std::size_t k = 0; k < parts.size(); ++k) EXPECT_EQ(parts[k].kind, first[k].kind);
@@ -43,10 +43,10 @@ TEST(DrawingGeometry, KindsAndTheirOrderDoNotDependOnTheConfiguration) {
 }
 
 TEST(DrawingGeometry, RodsAreAsLongAsTheCylinderAndBarsKeepTheirLength) {
-  testing::Random random(6);
-  for (const Machine& machine : testing::all_test_machines()) {
+  test_support::Random random(6);
+  for (const Machine& machine : test_support::all_test_machines()) {
     for (int i = 0; i < 5; ++i) {
-      const VectorXd q = testing::random_configuration(machine, random);
+      const VectorXd q = test_support::random_configuration(machine, random);
       const auto parts = machine_parts(machine, q);
       const auto rods = of_kind(parts, PartKind::kRod), barrels = of_kind(parts, PartKind::kBarrel);
       const auto rockers = of_kind(parts, PartKind::kRocker);
@@ -56,15 +56,17 @@ TEST(DrawingGeometry, RodsAreAsLongAsTheCylinderAndBarsKeepTheirLength) {
         const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(c)];
         const auto* four_bar = std::get_if<FourBarLinkage>(&cylinder.linkage);
         if (four_bar == nullptr && !std::holds_alternative<PinsLinkage>(cylinder.linkage)) continue;
-        EXPECT_NEAR(length(rods[drawn]), cylinder_length(machine, c, q[cylinder.joint]), kRounding);
-        EXPECT_LE(length(barrels[drawn]), length(rods[drawn]) + kRounding);
-        EXPECT_NEAR((rods[drawn].points[0] - barrels[drawn].points[0]).norm(), 0.0, kRounding);
+        EXPECT_NEAR(length(rods[drawn]), cylinder_length(machine, c, q[cylinder.joint]),
+                    kGeometryRounding);
+        EXPECT_LE(length(barrels[drawn]), length(rods[drawn]) + kGeometryRounding);
+        EXPECT_NEAR((rods[drawn].points[0] - barrels[drawn].points[0]).norm(), 0.0,
+                    kGeometryRounding);
         ++drawn;
         if (four_bar == nullptr) continue;
-        EXPECT_NEAR(length(rockers[bars]), four_bar->rocker_length, kRounding);
+        EXPECT_NEAR(length(rockers[bars]), four_bar->rocker_length, kGeometryRounding);
         // the coupler of a random machine may lie a little off the plane of the four-bar
         if (machine.name.rfind("random", 0) != 0) {
-          EXPECT_NEAR(length(couplers[bars]), four_bar->coupler_length, kRounding);
+          EXPECT_NEAR(length(couplers[bars]), four_bar->coupler_length, kGeometryRounding);
         }
         ++bars;
       }
@@ -75,7 +77,7 @@ TEST(DrawingGeometry, RodsAreAsLongAsTheCylinderAndBarsKeepTheirLength) {
 }
 
 TEST(DrawingGeometry, PlanarCraneIsDrawnInBaseCoordinates) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const Vector3d q(0.4, -0.9, 2.0);
   const DrawingPlane plane = drawing_plane(machine, q);
   EXPECT_FALSE(plane.turns);
@@ -84,32 +86,32 @@ TEST(DrawingGeometry, PlanarCraneIsDrawnInBaseCoordinates) {
   const Vector3d tip = tip_position<double>(machine, q);
   const DrawingFrame frame = drawing_frame(machine, q, 1.5);
   EXPECT_EQ(frame.time, 1.5);
-  EXPECT_NEAR((frame.tip - Vector2d(tip.x(), tip.z())).norm(), 0.0, kRounding);
+  EXPECT_NEAR((frame.tip - Vector2d(tip.x(), tip.z())).norm(), 0.0, kGeometryRounding);
   // closed form: two booms and the telescope
   const Vector2d expected = Vector2d(0, 2) + 3.4 * Vector2d(std::cos(0.4), std::sin(0.4)) +
                             5.0 * Vector2d(std::cos(-0.5), std::sin(-0.5));
-  EXPECT_NEAR((frame.tip - expected).norm(), 0.0, kRounding);
+  EXPECT_NEAR((frame.tip - expected).norm(), 0.0, kGeometryRounding);
 }
 
 TEST(DrawingGeometry, TelescopeStagesFollowOneAnotherToTheTip) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const auto stages =
       of_kind(machine_parts(machine, Vector3d(0.4, -0.9, 2.0)), PartKind::kTelescope);
   ASSERT_EQ(stages.size(), 4u);
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_NEAR(length(stages[i]), 0.5, kRounding);  // a quarter of 2 m
+    EXPECT_NEAR(length(stages[i]), 0.5, kGeometryRounding);  // a quarter of 2 m
     if (i == 0) continue;
-    EXPECT_NEAR((stages[i].points[0] - stages[i - 1].points[1]).norm(), 0.0, kRounding);
+    EXPECT_NEAR((stages[i].points[0] - stages[i - 1].points[1]).norm(), 0.0, kGeometryRounding);
   }
   EXPECT_NEAR(
       (stages[3].points[1] - tip_position<double>(machine, VectorXd(Vector3d(0.4, -0.9, 2.0))))
           .norm(),
-      0.0, kRounding);
+      0.0, kGeometryRounding);
 }
 
 /// Swinging the arm turns the plane with it, so the picture stays the same on level ground.
 TEST(DrawingGeometry, SwingCraneIsDrawnByRadiusAndHeight) {
-  Machine machine = testing::swing_crane();
+  Machine machine = test_support::swing_crane();
   machine.joints[0].origin.linear().setIdentity();
   VectorXd q(4);
   q << 0.0, 0.6, -0.8, 1.2;
@@ -122,25 +124,26 @@ TEST(DrawingGeometry, SwingCraneIsDrawnByRadiusAndHeight) {
     const DrawingFrame turned = drawing_frame(machine, q);
     for (std::size_t k = 0; k < ahead.parts.size(); ++k) {
       for (std::size_t i = 0; i < ahead.parts[k].points.size(); ++i) {
-        EXPECT_NEAR((turned.parts[k].points[i] - ahead.parts[k].points[i]).norm(), 0.0, kRounding);
+        EXPECT_NEAR((turned.parts[k].points[i] - ahead.parts[k].points[i]).norm(), 0.0,
+                    kGeometryRounding);
       }
     }
   }
 }
 
 TEST(DrawingGeometry, PlaneIsUprightAndOrthonormalForAnyMachine) {
-  testing::Random random(8);
-  for (const Machine& machine : testing::all_test_machines()) {
+  test_support::Random random(8);
+  for (const Machine& machine : test_support::all_test_machines()) {
     const DrawingPlane plane =
-        drawing_plane(machine, testing::random_configuration(machine, random));
-    EXPECT_NEAR(plane.horizontal.norm(), 1.0, kRounding) << machine.name;
-    EXPECT_NEAR(plane.horizontal.dot(plane.up), 0.0, kRounding) << machine.name;
+        drawing_plane(machine, test_support::random_configuration(machine, random));
+    EXPECT_NEAR(plane.horizontal.norm(), 1.0, kGeometryRounding) << machine.name;
+    EXPECT_NEAR(plane.horizontal.dot(plane.up), 0.0, kGeometryRounding) << machine.name;
     EXPECT_NEAR(plane.up.dot(machine.gravity), -machine.gravity.norm(), 1e-9) << machine.name;
   }
 }
 
 TEST(DrawingGeometry, FourBarThatDoesNotCloseLeavesTheRest) {
-  const Machine machine = testing::knuckle_crane();
+  const Machine machine = test_support::knuckle_crane();
   // At 1.76 rad the jib's coupler pin is 0.11 m from the rocker pin; bars of 0.49 m and 0.22 m need 0.27 m.
   const auto parts = machine_parts(machine, Eigen::Vector2d(0.2, 1.76));
   for (const PartKind kind :
@@ -154,7 +157,7 @@ TEST(DrawingGeometry, FourBarThatDoesNotCloseLeavesTheRest) {
 }
 
 TEST(DrawingGeometry, FramesAreEvenInTimeAndEndAtTheMotionsEnds) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   Trajectory motion;
   motion.t = Vector3d(1.0, 1.5, 4.0);
   motion.q.resize(3, 3);
@@ -162,11 +165,11 @@ TEST(DrawingGeometry, FramesAreEvenInTimeAndEndAtTheMotionsEnds) {
   const auto frames = drawing_frames(machine, motion, 7);
   ASSERT_EQ(frames.size(), 7u);
   for (std::size_t i = 0; i < 7; ++i) {
-    EXPECT_NEAR(frames[i].time, 1.0 + 0.5 * static_cast<double>(i), kRounding);
+    EXPECT_NEAR(frames[i].time, 1.0 + 0.5 * static_cast<double>(i), kGeometryRounding);
   }
   const VectorXd middle = motion.q.row(1), last = motion.q.row(2);
-  EXPECT_NEAR((frames[1].tip - drawing_frame(machine, middle).tip).norm(), 0.0, kRounding);
-  EXPECT_NEAR((frames[6].tip - drawing_frame(machine, last).tip).norm(), 0.0, kRounding);
+  EXPECT_NEAR((frames[1].tip - drawing_frame(machine, middle).tip).norm(), 0.0, kGeometryRounding);
+  EXPECT_NEAR((frames[6].tip - drawing_frame(machine, last).tip).norm(), 0.0, kGeometryRounding);
   EXPECT_TRUE(drawing_frames(machine, Trajectory{}, 7).empty());
 }
 

@@ -12,8 +12,8 @@
 namespace sparflow {
 namespace {
 
-using testing::kDerivativeTolerance;
-using testing::numeric_derivative;
+using test_support::kDerivativeTolerance;
+using test_support::numeric_derivative;
 
 // Functions of two variables, written once and evaluated with doubles and with duals.
 struct Binary {

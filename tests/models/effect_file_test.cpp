@@ -18,7 +18,7 @@ namespace sparflow {
 namespace {
 
 // clang-format off
-const std::string kGood =
+const std::string kGoodEffects =
 /* 1*/ "effects:\n"
 /* 2*/ "  - id: rod_friction\n"
 /* 3*/ "    title: Seal friction of the rod\n"
@@ -53,7 +53,7 @@ std::vector<UserEffectSpec> parse(const std::string& text) {
 }
 
 TEST(EffectFile, WhatIsWrittenIsRead) {
-  const std::vector<UserEffectSpec> specs = parse(kGood);
+  const std::vector<UserEffectSpec> specs = parse(kGoodEffects);
   ASSERT_EQ(specs.size(), 3u);
   const UserEffectSpec& rod = specs[0];
   EXPECT_EQ(rod.id, "rod_friction");
@@ -65,7 +65,7 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
   EXPECT_EQ(rod.confused_with, (std::vector<std::string>{"coulomb_friction", "viscous_friction"}));
   EXPECT_EQ(rod.separated_by, "slow moves");
   EXPECT_EQ(rod.where.line, 2);
-  EXPECT_EQ(rod.source_text, kGood);
+  EXPECT_EQ(rod.source_text, kGoodEffects);
   ASSERT_EQ(rod.parameters.size(), 2u);
   const UserParameter& fc = rod.parameters[0];
   EXPECT_EQ(fc.name, "Fc");
@@ -106,7 +106,7 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
 }
 
 TEST(EffectFile, LawsGiveSiValuesAndDerivatives) {
-  const std::vector<UserEffectSpec> specs = parse(kGood);
+  const std::vector<UserEffectSpec> specs = parse(kGoodEffects);
   const std::vector<double> p = {3e3, 5e-3};
   const std::vector<Dual2<1>> v = {Dual2<1>::variable(4e-3, 0)};
   const Dual2<1> force = specs[0].law.evaluate<Dual2<1>>(v, p);
@@ -180,16 +180,16 @@ TEST(EffectFile, JointsOfAMachineGiveTheUnitsOfTheirSignals) {
   }
 }
 
-struct Broken {
+struct BrokenEffects {
   std::string what;
   std::string find,
       replace;  ///< one edit of the good file; `find` empty: `replace` is the whole file
   std::string message;
 };
 
-void PrintTo(const Broken& broken, std::ostream* out) { *out << broken.what; }
+void PrintTo(const BrokenEffects& broken, std::ostream* out) { *out << broken.what; }
 
-std::string case_name(const ::testing::TestParamInfo<Broken>& info) {
+std::string broken_effect_name(const ::testing::TestParamInfo<BrokenEffects>& info) {
   std::string name = info.param.what;
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
@@ -197,15 +197,15 @@ std::string case_name(const ::testing::TestParamInfo<Broken>& info) {
   return name;
 }
 
-class BrokenEffectFile : public ::testing::TestWithParam<Broken> {};
+class BrokenEffectFile : public ::testing::TestWithParam<BrokenEffects> {};
 
 TEST_P(BrokenEffectFile, IsExplained) {
-  const Broken& broken = GetParam();
+  const BrokenEffects& broken = GetParam();
   std::string text = broken.replace;
   if (!broken.find.empty()) {
-    const std::size_t at = kGood.find(broken.find);
+    const std::size_t at = kGoodEffects.find(broken.find);
     ASSERT_NE(at, std::string::npos);
-    text = kGood;
+    text = kGoodEffects;
     text.replace(at, broken.find.size(), broken.replace);
   }
   try {
@@ -218,99 +218,99 @@ TEST_P(BrokenEffectFile, IsExplained) {
 
 // clang-format off
 INSTANTIATE_TEST_SUITE_P(All, BrokenEffectFile, ::testing::Values(
-  Broken{"empty file", "", "",
+  BrokenEffects{"empty file", "", "",
     "mine.yaml: the file is empty; expected `key: value` lines"},
-  Broken{"no list", "", "effects: friction\n",
+  BrokenEffects{"no list", "", "effects: friction\n",
     "mine.yaml:1:10: effects: got \"friction\", expected a list of effects, each beginning with - id: ..."},
-  Broken{"empty list", "", "effects: []\n",
+  BrokenEffects{"empty list", "", "effects: []\n",
     "mine.yaml:1:10: effects: the list is empty; expected at least one effect"},
-  Broken{"other top key", "effects:", "effect:",
+  BrokenEffects{"other top key", "effects:", "effect:",
     "mine.yaml:1:1: unknown key \"effect\"; did you mean \"effects\"?"},
-  Broken{"unknown key", "    stage: force", "    phase: force",
+  BrokenEffects{"unknown key", "    stage: force", "    phase: force",
     "mine.yaml:4:5: effects[rod_friction]: unknown key \"phase\"; known here: id, title, stage, at, law, parameters, equation, citation, confused_with, separated_by"},
-  Broken{"no id", "  - id: rod_friction\n    title", "  - title",
+  BrokenEffects{"no id", "  - id: rod_friction\n    title", "  - title",
     "mine.yaml:2:5: effects[0].id: missing; expected a name for the effect, such as my_friction"},
-  Broken{"id with a colon", "id: rod_friction", "id: \"rod:friction\"",
+  BrokenEffects{"id with a colon", "id: rod_friction", "id: \"rod:friction\"",
     "mine.yaml:2:9: effects[rod:friction].id: got \"rod:friction\", expected an id of letters, digits and _ that does not begin with a digit"},
-  Broken{"id of the catalogue", "id: rod_friction", "id: coulomb_friction",
+  BrokenEffects{"id of the catalogue", "id: rod_friction", "id: coulomb_friction",
     "mine.yaml:2:9: effects[coulomb_friction].id: an effect \"coulomb_friction\" exists already; choose another id, such as my_coulomb_friction"},
-  Broken{"id twice", "id: cold_hose", "id: rod_friction",
+  BrokenEffects{"id twice", "id: cold_hose", "id: rod_friction",
     "mine.yaml:13:5: effects[rod_friction]: the id \"rod_friction\" is taken by the effect on line 2; choose another"},
-  Broken{"unknown stage", "stage: force", "stage: froce",
+  BrokenEffects{"unknown stage", "stage: force", "stage: froce",
     "mine.yaml:4:12: effects[rod_friction].stage: got \"froce\", expected one of force, flow, pressure, pump; did you mean \"force\"?"},
-  Broken{"stage missing", "    stage: force\n", "",
+  BrokenEffects{"stage missing", "    stage: force\n", "",
     "mine.yaml:2:5: effects[rod_friction].stage: missing; expected one of force, flow, pressure, pump"},
-  Broken{"unknown place", "at: cylinder", "at: boom",
+  BrokenEffects{"unknown place", "at: cylinder", "at: boom",
     "mine.yaml:5:9: effects[rod_friction].at: got \"boom\", expected one of cylinder, pump, machine"},
-  Broken{"force at a pump", "at: cylinder", "at: pump",
+  BrokenEffects{"force at a pump", "at: cylinder", "at: pump",
     "mine.yaml:5:9: effects[rod_friction].at: got pump, expected cylinder or machine: stage force adds to each cylinder"},
-  Broken{"law missing", "    law: \"Fc * tanh(v / v0)\"\n", "",
+  BrokenEffects{"law missing", "    law: \"Fc * tanh(v / v0)\"\n", "",
     "mine.yaml:2:5: effects[rod_friction].law: missing; expected a formula such as Fc * sign(v)"},
-  Broken{"law without value", "    law: \"Fc * tanh(v / v0)\"\n", "    law:\n",
+  BrokenEffects{"law without value", "    law: \"Fc * tanh(v / v0)\"\n", "    law:\n",
     "mine.yaml:6:5: effects[rod_friction].law: has no value; give one or remove the key"},
-  Broken{"unknown name", "tanh(v / v0)", "tanh(w / v0)",
+  BrokenEffects{"unknown name", "tanh(v / v0)", "tanh(w / v0)",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(w / v0)\": column 11: unknown name \"w\"; known here: Fc, v0, v, a, x, stroke, F, Q, Q_return, u, direction, pA, pB, payload, oil, t, Q_pump, p_pump, Q_return_sum, q.*, qd.*, qdd.*"},
-  Broken{"unknown parameter", "tanh(v / v0)", "tanh(v / vs0)",
+  BrokenEffects{"unknown parameter", "tanh(v / v0)", "tanh(v / vs0)",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v / vs0)\": column 15: unknown name \"vs0\"; did you mean \"v0\"?"},
-  Broken{"unknown function", "tanh(v / v0)", "tahn(v / v0)",
+  BrokenEffects{"unknown function", "tanh(v / v0)", "tahn(v / v0)",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tahn(v / v0)\": column 6: unknown function \"tahn\"; did you mean \"tanh\"?"},
-  Broken{"parenthesis", "tanh(v / v0)", "tanh(v / v0",
+  BrokenEffects{"parenthesis", "tanh(v / v0)", "tanh(v / v0",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v / v0\": column 10: this ( is never closed"},
-  Broken{"units do not meet", "Fc * tanh(v / v0)", "Fc + v / v0",
+  BrokenEffects{"units do not meet", "Fc * tanh(v / v0)", "Fc + v / v0",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc + v / v0\": column 4: adds \"v / v0\" (no unit) to \"Fc\" [N]; both must have the same unit"},
-  Broken{"function wants none", "tanh(v / v0)", "tanh(v) * v0",
+  BrokenEffects{"function wants none", "tanh(v / v0)", "tanh(v) * v0",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v) * v0\": column 11: tanh() wants a number without unit, \"v\" has [m/s]; divide it by a parameter or a number of that unit"},
-  Broken{"unit of the stage", "Fc * tanh(v / v0)", "Fc * v / v0^2",
+  BrokenEffects{"unit of the stage", "Fc * tanh(v / v0)", "Fc * v / v0^2",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * v / v0^2\", which gives [N s/m], expected [N], the unit of stage force; it lacks a factor of [m/s]"},
-  Broken{"pressure where a force is due", "unit: kN", "unit: bar",
+  BrokenEffects{"pressure where a force is due", "unit: kN", "unit: bar",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v / v0)\", which gives [Pa], expected [N], the unit of stage force; it lacks a factor of [m^2]"},
-  Broken{"a cylinder signal at a pump", "(p_pump - 20[bar])", "(pA - 20[bar])",
+  BrokenEffects{"a cylinder signal at a pump", "(p_pump - 20[bar])", "(pA - 20[bar])",
     "mine.yaml:22:10: effects[pump_ripple].law: got \"dp * square(Q_pump / Q0) + slope * (pA - 20[bar])\": column 37: pA is a signal of a cylinder, and a law of stage pump is about a pump; use Q_pump, p_pump or signals of the machine"},
-  Broken{"oil as a factor", "(oil - 40[degC])", "oil",
+  BrokenEffects{"oil as a factor", "(oil - 40[degC])", "oil",
     "mine.yaml:16:10: effects[cold_hose].law: got \"k * Q * exp(-beta * oil)\": column 21: \"oil\" is a reading on the Celsius scale and is multiplied; take a difference first, as in (oil - 20[degC]), and give differences in K"},
-  Broken{"unit missing", "{unit: kN, bounds", "{bounds",
+  BrokenEffects{"unit missing", "{unit: kN, bounds", "{bounds",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc.unit: missing; expected a unit such as N, bar/(l/min)^2 or 1 for a pure number"},
-  Broken{"unit misspelt", "unit: kN", "unit: KN",
+  BrokenEffects{"unit misspelt", "unit: kN", "unit: KN",
     "mine.yaml:8:18: effects[rod_friction].parameters.Fc.unit: got \"KN\": column 1: unknown unit \"KN\"; did you mean \"kN\"?"},
-  Broken{"unit ambiguous", "unit: bar/(l/min)", "unit: bar/l min",
+  BrokenEffects{"unit ambiguous", "unit: bar/(l/min)", "unit: bar/l min",
     "mine.yaml:18:17: effects[cold_hose].parameters.k.unit: got \"bar/l min\": column 7: it is not clear whether \"min\" stands above or below the /; put what stands below in parentheses, as in J/(kg K)"},
-  Broken{"bounds missing", "bounds: [0, 20], ", "",
+  BrokenEffects{"bounds missing", "bounds: [0, 20], ", "",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc.bounds: missing; expected the plausible range [lo, hi], each a number [kN]"},
-  Broken{"bounds swapped", "bounds: [0, 20]", "bounds: [20, 0]",
+  BrokenEffects{"bounds swapped", "bounds: [0, 20]", "bounds: [20, 0]",
     "mine.yaml:8:30: effects[rod_friction].parameters.Fc.bounds: got [20, 0], expected [lo, hi] with lo < hi; swap the two"},
-  Broken{"bounds with a unit", "bounds: [0, 20]", "bounds: [0, 20 kN]",
+  BrokenEffects{"bounds with a unit", "bounds: [0, 20]", "bounds: [0, 20 kN]",
     "mine.yaml:8:34: effects[rod_friction].parameters.Fc.bounds[1]: got \"20 kN\", expected a number [kN]; write the number alone, in kN"},
-  Broken{"bounds infinite", "bounds: [0, 20]", "bounds: [0, .inf]",
+  BrokenEffects{"bounds infinite", "bounds: [0, 20]", "bounds: [0, .inf]",
     "mine.yaml:8:34: effects[rod_friction].parameters.Fc.bounds[1]: got .inf, expected a number [kN]; give a finite number"},
-  Broken{"typical missing", ", typical: 3,", ",",
+  BrokenEffects{"typical missing", ", typical: 3,", ",",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc.typical: missing; expected the value at which the effect is clearly seen [kN]"},
-  Broken{"typical outside", "typical: 3,", "typical: 3000,",
+  BrokenEffects{"typical outside", "typical: 3,", "typical: 3000,",
     "mine.yaml:8:48: effects[rod_friction].parameters.Fc.typical: got 3000, expected a number inside the bounds [0, 20] kN"},
-  Broken{"typical zero", "typical: 3,", "typical: 0,",
+  BrokenEffects{"typical zero", "typical: 3,", "typical: 0,",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc: got typical 0, at which the effect is absent; give the value at which it is clearly seen"},
-  Broken{"grid for a size", "typical: 3,", "typical: 3, grid: [1, 2],",
+  BrokenEffects{"grid for a size", "typical: 3,", "typical: 3, grid: [1, 2],",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc: has a grid, but the law is proportional to it, so it is found without a search; remove the grid"},
-  Broken{"grid of one", "grid: [0.01, 0.03, 0.06]", "grid: [0.01]",
+  BrokenEffects{"grid of one", "grid: [0.01, 0.03, 0.06]", "grid: [0.01]",
     "mine.yaml:19:67: effects[cold_hose].parameters.beta.grid: expected two values or more, from which the search starts"},
-  Broken{"grid outside", "grid: [0.01, 0.03, 0.06]", "grid: [0.01, 0.3]",
+  BrokenEffects{"grid outside", "grid: [0.01, 0.03, 0.06]", "grid: [0.01, 0.3]",
     "mine.yaml:19:74: effects[cold_hose].parameters.beta.grid[1]: got 0.3, expected a number inside the bounds [0, 0.1] 1/degC"},
-  Broken{"unused parameter", "tanh(v / v0)", "sign(v)",
+  BrokenEffects{"unused parameter", "tanh(v / v0)", "sign(v)",
     "mine.yaml:9:11: effects[rod_friction].parameters.v0: does not stand in the law; use it or remove it"},
-  Broken{"never absent", "Fc * tanh(v / v0)", "Fc * tanh(v / v0) + 100[N]",
+  BrokenEffects{"never absent", "Fc * tanh(v / v0)", "Fc * tanh(v / v0) + 100[N]",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v / v0) + 100[N]\", which is proportional to none of its parameters, so the effect could never be absent; multiply all of it by one, as in size * (...), size: {unit: 1, bounds: [0, 2], typical: 1}"},
-  Broken{"parameter named like a signal", "      Fc:", "      F:",
+  BrokenEffects{"parameter named like a signal", "      Fc:", "      F:",
     "mine.yaml:8:10: effects[rod_friction].parameters.F: \"F\" is a signal: static force, positive when the load pushes the rod in; give the parameter another name, such as F0"},
-  Broken{"parameter named like a function", "      Fc:", "      exp:",
+  BrokenEffects{"parameter named like a function", "      Fc:", "      exp:",
     "mine.yaml:8:12: effects[rod_friction].parameters.exp: \"exp\" is a function; give the parameter another name"},
-  Broken{"parameter with a dash", "      Fc:", "      F-c:",
+  BrokenEffects{"parameter with a dash", "      Fc:", "      F-c:",
     "mine.yaml:8:12: effects[rod_friction].parameters.F-c: \"F-c\" cannot stand in a law; expected a parameter's name of letters, digits and _ that does not begin with a digit"},
-  Broken{"no parameters", "    parameters:\n      Fc: {unit: kN, bounds: [0, 20], typical: 3, meaning: friction force}\n      v0: {unit: mm/s, bounds: [0.5, 50], typical: 5}\n", "    parameters: {}\n",
+  BrokenEffects{"no parameters", "    parameters:\n      Fc: {unit: kN, bounds: [0, 20], typical: 3, meaning: friction force}\n      v0: {unit: mm/s, bounds: [0.5, 50], typical: 5}\n", "    parameters: {}\n",
     "mine.yaml:7:17: effects[rod_friction].parameters: an effect needs at least one parameter, its size"},
-  Broken{"parameter as a number", "Fc: {unit: kN, bounds: [0, 20], typical: 3, meaning: friction force}", "Fc: 3000",
+  BrokenEffects{"parameter as a number", "Fc: {unit: kN, bounds: [0, 20], typical: 3, meaning: friction force}", "Fc: 3000",
     "mine.yaml:8:11: effects[rod_friction].parameters.Fc: got 3000, expected a parameter {unit, bounds, typical}"},
-  Broken{"confused with a word", "confused_with: [coulomb_friction, viscous_friction]", "confused_with: coulomb_friction",
+  BrokenEffects{"confused with a word", "confused_with: [coulomb_friction, viscous_friction]", "confused_with: coulomb_friction",
     "mine.yaml:11:20: effects[rod_friction].confused_with: got \"coulomb_friction\", expected a list of ids of effects or words"}
-), case_name);
+), broken_effect_name);
 // clang-format on
 
 // The page users read: its example is read, its tables say what the program does.
@@ -355,7 +355,7 @@ TEST(EffectFile, LoadsFromDisk) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("effects_" + std::to_string(::getpid()) + ".yaml"))
           .string();
-  write_file_atomically(path, kGood);
+  write_file_atomically(path, kGoodEffects);
   EXPECT_EQ(load_user_effects(path).size(), 3u);
   std::filesystem::remove(path);
 }

@@ -9,7 +9,7 @@
 #include "models/effects/registry.h"
 #include "tests/models/test_machines.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 inline Machine two_direct_cylinders() {
   Machine m;
@@ -131,4 +131,4 @@ Instant<T> two_cylinder_instant(const Machine& m) {
   return s;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

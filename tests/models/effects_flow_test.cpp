@@ -4,7 +4,7 @@
 #include "models/effects/hydraulics.h"
 #include "tests/models/effect_series.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 namespace {
 
 using Eigen::Index;
@@ -162,4 +162,4 @@ TEST_F(FlowEffects, SitWhereThereIsOilAndSayNothingWithoutACommand) {
 }
 
 }  // namespace
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

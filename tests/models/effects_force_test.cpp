@@ -14,11 +14,11 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::instant_at;
-using testing::log_of;
-using testing::numeric_derivative;
-using testing::Random;
-using testing::stacked;
+using test_support::instant_at;
+using test_support::log_of;
+using test_support::numeric_derivative;
+using test_support::Random;
+using test_support::stacked;
 
 const Effect& effect(const std::string& id) {
   const Effect* found = find_effect(id);
@@ -70,7 +70,7 @@ VectorXd changed_force(const Machine& machine, const Effect& e, int at, std::vec
 // --- hand cases --------------------------------------------------------------------------------------------
 
 struct OneCylinder : ::testing::Test {
-  Machine machine = testing::loader_crane();
+  Machine machine = test_support::loader_crane();
   Instant<double> s = make_instant(machine);
   OneCylinder() {
     s.side = {1, -1, 0};
@@ -124,7 +124,7 @@ TEST_F(OneCylinder, CushionActsTowardsItsStopOnly) {
 TEST(PadFriction, IsTheBeamsMomentByHand) {
   // jib level, extension 2 m, nothing but a payload of 100 kg at the tip: moment about the joint's frame at zero
   // travel 100 g 2 m; 1 m further back 100 g 3 m
-  Machine machine = testing::loader_crane();
+  Machine machine = test_support::loader_crane();
   machine.links.clear();
   const VectorXd x =
       stacked(Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0, 0, 0.1), Eigen::Vector3d::Zero());
@@ -134,11 +134,11 @@ TEST(PadFriction, IsTheBeamsMomentByHand) {
   EXPECT_NEAR(added(e, s, 2, {0.1, 0.0})[2], 0.1 * 100 * 9.81 * 2, 0.1 * 10);
   EXPECT_NEAR(added(e, s, 2, {0.1, 1.0})[2], 0.1 * 100 * 9.81 * 3, 0.1 * 10);
   EXPECT_EQ(e.places(machine), std::vector<int>{2});
-  EXPECT_TRUE(e.places(testing::knuckle_crane()).empty());
+  EXPECT_TRUE(e.places(test_support::knuckle_crane()).empty());
 }
 
 TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const VectorXd x = stacked(Eigen::Vector3d(0.4, -0.8, 2), Eigen::Vector3d::Constant(0.1),
                              Eigen::Vector3d::Zero());
   const Instant<double> s = instant_at(machine, x, 500.0);
@@ -161,9 +161,9 @@ TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
 }
 
 TEST(MachineEffects, AreTheMachineTheyDescribe) {
-  const Machine machine = testing::swing_crane();
+  const Machine machine = test_support::swing_crane();
   Random random(4);
-  const VectorXd q = testing::usable_state(machine, random).head(4);
+  const VectorXd q = test_support::usable_state(machine, random).head(4);
   const double payload = 200.0;
   const VectorXd force = static_force<double>(machine, q, payload);
   const auto near = [](const VectorXd& a, const VectorXd& b) {
@@ -176,7 +176,7 @@ TEST(MachineEffects, AreTheMachineTheyDescribe) {
   EXPECT_TRUE(near(changed_force(machine, effect("angle_offset"), 2, {0.02}, q, payload),
                    static_force<double>(machine, turned, payload)));
   // the boom is the first joint to luff: a tilt of the base is an angle of the boom but for the linkage
-  const Machine crane = testing::loader_crane();
+  const Machine crane = test_support::loader_crane();
   const VectorXd pose = Eigen::Vector3d(0.3, -0.7, 1.0);
   VectorXd raised = pose;
   raised[0] += 0.03;
@@ -188,7 +188,7 @@ TEST(MachineEffects, AreTheMachineTheyDescribe) {
 }
 
 TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const MachineSeries log = swinging_log(machine);
   const Effect& e = effect("angle_offset");
   MatrixXd column;
@@ -207,11 +207,11 @@ TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
 // --- over the registry ---------------------------------------------------------------------------------------
 
 TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
-  for (const Machine& machine : testing::effect_machines()) {
+  for (const Machine& machine : test_support::effect_machines()) {
     Random random(21);
-    const VectorXd x = testing::usable_state(machine, random);
+    const VectorXd x = test_support::usable_state(machine, random);
     const double payload = 400.0;
-    const Instant<Jet> jets = testing::jets_at(machine, x, payload);
+    const Instant<Jet> jets = test_support::jets_at(machine, x, payload);
     const Index n = x.size();
     for (const auto& e : effect_catalogue()) {
       const EffectInfo& info = e->info();
@@ -241,7 +241,7 @@ TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
           };
           const auto jet_slope = [&](double t) {
             std::vector<Jet> moved(machine.cylinders.size(), Jet(0.0));
-            e->add_force(testing::jets_at(machine, x + t * direction, payload), at, p, moved);
+            e->add_force(test_support::jets_at(machine, x + t * direction, payload), at, p, moved);
             double sum = 0.0;
             for (int a = 0; a < n; ++a) sum += moved[i].gradient(a) * direction[a];
             return sum;
@@ -257,9 +257,9 @@ TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
 }
 
 TEST(ForceEffects, ZeroParametersChangeNothing) {
-  for (const Machine& machine : testing::effect_machines()) {
+  for (const Machine& machine : test_support::effect_machines()) {
     Random random(5);
-    const VectorXd x = testing::usable_state(machine, random);
+    const VectorXd x = test_support::usable_state(machine, random);
     const Instant<double> s = instant_at(machine, x, 250.0);
     const VectorXd force = static_force<double>(machine, x.head(machine.joint_count()), 250.0);
     for (const auto& e : effect_catalogue()) {
@@ -281,7 +281,7 @@ TEST(ForceEffects, ZeroParametersChangeNothing) {
 
 /// columns times parameters is the law, at sizes where the law is nearly linear.
 TEST(ForceEffects, ColumnsAreTheLaw) {
-  for (const Machine& machine : {testing::loader_crane(), testing::swing_crane()}) {
+  for (const Machine& machine : {test_support::loader_crane(), test_support::swing_crane()}) {
     const MachineSeries log = swinging_log(machine);
     for (const auto& e : effect_catalogue()) {
       const EffectInfo& info = e->info();
@@ -325,7 +325,7 @@ TEST(ForceEffects, ColumnsAreTheLaw) {
 // --- memory and sensors ----------------------------------------------------------------------------------------
 
 TEST(Presliding, ReversalBuildsUpOverItsDistance) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   // extension out for 1 s at 0.1 m/s, then back
   const MachineSeries log = log_of(
       machine,
@@ -347,7 +347,7 @@ TEST(Presliding, ReversalBuildsUpOverItsDistance) {
 }
 
 TEST(PressureOffset, ShowsInForceChambersAndPump) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   MachineSeries log = swinging_log(machine);
   const Index n = log.samples();
   log.pumps[0].leader.setZero(n);
@@ -372,7 +372,7 @@ TEST(PressureOffset, ShowsInForceChambersAndPump) {
 
 /// Positions read late by d: what is left between the true force and that of the logged pose gives d back.
 TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   for (const double delay : {0.02, 0.1, 0.2}) {
     const auto late = [&](double t) { return swinging(machine, t - delay); };
     const MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);

@@ -6,7 +6,7 @@
 #include "models/effects/hydraulics.h"
 #include "tests/models/effect_series.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 namespace {
 
 using Eigen::Index;
@@ -268,4 +268,4 @@ TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
 }
 
 }  // namespace
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -5,7 +5,7 @@
 #include "models/static_force.h"
 #include "tests/models/test_machines.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 /// Joint states in one vector: q, then qd, then qdd.
 inline Eigen::VectorXd stacked(const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
@@ -145,4 +145,4 @@ inline std::vector<Machine> effect_machines() {
           random_machine(5, 501)};
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -18,7 +18,7 @@
 namespace sparflow {
 namespace {
 
-using testing::kDerivativeTolerance;
+using test_support::kDerivativeTolerance;
 
 std::vector<Symbol> numbers(const std::vector<std::string>& names) {
   std::vector<Symbol> symbols;
@@ -162,11 +162,12 @@ TEST(Expression, DerivativesMatchNumericTwinsInEveryScalar) {
                   1e-14 * (1.0 + std::abs(j.value)));
       for (int i = 0; i < 4; ++i) {
         const auto si = static_cast<std::size_t>(i);
-        const double slope = testing::numeric_partial(f, at, i);
+        const double slope = test_support::numeric_partial(f, at, i);
         EXPECT_NEAR(d.gradient[si], slope, kDerivativeTolerance * (1.0 + std::abs(slope)));
         for (int k = 0; k < 4; ++k) {
-          const double bend = testing::numeric_partial(
-              [&](const Eigen::VectorXd& z) { return testing::numeric_partial(f, z, i); }, at, k);
+          const double bend = test_support::numeric_partial(
+              [&](const Eigen::VectorXd& z) { return test_support::numeric_partial(f, z, i); }, at,
+              k);
           // two nested differences: rounding of the inner one, 1e-13, is divided by the outer step 1e-2 / 4
           EXPECT_NEAR(d.hess(i, k), bend, 1e-8 * (1.0 + std::abs(bend)));
           if (i < 2 && k < 2) {
@@ -467,7 +468,7 @@ TEST(Expression, AnyTextIsCompiledOrExplained) {
       "F",    "v",     "Fc",    "oil", "2", "0",  "(",   ")",        "+", "-",
       "*",    "/",     "^",     ",",   "<", ">=", "[N]", "[",        "]", "sign(",
       "max(", "step(", "tanh(", "q.",  "'", ".",  " ",   "\xc2\xb2", "1e"};
-  testing::Random random(11);
+  test_support::Random random(11);
   int compiled_count = 0;
   for (int i = 0; i < 20000; ++i) {
     std::string law;

@@ -13,9 +13,9 @@ namespace sparflow {
 namespace {
 
 using Eigen::VectorXd;
-using testing::numeric_derivative;
-using testing::numeric_partial;
-using testing::Random;
+using test_support::numeric_derivative;
+using test_support::numeric_partial;
+using test_support::Random;
 
 VectorXd torque_of(const Machine& machine, const VectorXd& x, double payload) {
   const Eigen::Index n = machine.joint_count();
@@ -78,12 +78,12 @@ Machine with_inertias(Machine machine) {
 }
 
 TEST(InertialTorque, SatisfiesLagrangesEquation) {
-  for (const Machine& plain : testing::effect_machines()) {
+  for (const Machine& plain : test_support::effect_machines()) {
     SCOPED_TRACE(plain.name);
     const Machine machine = with_inertias(plain);
     Random random(3);
     const Eigen::Index n = machine.joint_count();
-    const VectorXd x = testing::usable_state(machine, random);
+    const VectorXd x = test_support::usable_state(machine, random);
     const VectorXd q = x.head(n), qd = x.segment(n, n), qdd = x.tail(n);
     const double payload = 350.0;
     const auto energy = [&](const VectorXd& at, const VectorXd& rate) {
@@ -115,10 +115,10 @@ TEST(InertialTorque, AgreesWithKdlOnRigidChains) {
     for (int k = 0; k < 4; ++k) {
       const bool slides = k == 2;
       machine.joints.push_back(
-          testing::make_joint("j", slides ? JointType::kPrismatic : JointType::kRevolute,
-                              random.vector(1.5), random.direction(), {-1, 1}));
+          test_support::make_joint("j", slides ? JointType::kPrismatic : JointType::kRevolute,
+                                   random.vector(1.5), random.direction(), {-1, 1}));
       machine.links.push_back(
-          testing::make_link("l", k, random.uniform(50, 300), random.vector(0.8)));
+          test_support::make_link("l", k, random.uniform(50, 300), random.vector(0.8)));
       const Joint& joint = machine.joints.back();
       const Link& link = machine.links.back();
       // KDL: fixed offset first, then the joint with its inertia
@@ -150,8 +150,8 @@ TEST(InertialTorque, AgreesWithKdlOnRigidChains) {
 TEST(InertialTorque, PendulumByHand) {
   Machine machine;
   machine.joints = {
-      testing::make_joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {-1, 1})};
-  machine.links = {testing::make_link("boom", 0, 100, {2, 0, 0})};
+      test_support::make_joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {-1, 1})};
+  machine.links = {test_support::make_link("boom", 0, 100, {2, 0, 0})};
   machine.links[0].inertia = 30.0;
   machine.tip = {0, {3, 0, 0}};
   const VectorXd x = Eigen::Vector3d(0.4, 0.7, 0.5);
@@ -160,11 +160,11 @@ TEST(InertialTorque, PendulumByHand) {
 }
 
 TEST(InertialTorque, PowerIsTheRateOfKineticEnergy) {
-  const Machine machine = with_inertias(testing::swing_crane());
+  const Machine machine = with_inertias(test_support::swing_crane());
   Random random(8);
   const Eigen::Index n = machine.joint_count();
   for (int i = 0; i < 3; ++i) {
-    const VectorXd x = testing::usable_state(machine, random);
+    const VectorXd x = test_support::usable_state(machine, random);
     const VectorXd q = x.head(n), qd = x.segment(n, n), qdd = x.tail(n);
     const double rate = numeric_derivative(
         [&](double t) {

@@ -12,9 +12,9 @@
 namespace sparflow {
 namespace {
 
-using testing::kDerivativeTolerance;
-using testing::Random;
-using testing::random_configuration;
+using test_support::kDerivativeTolerance;
+using test_support::Random;
+using test_support::random_configuration;
 
 // Seven rotations and offsets of a few metres: some tens of roundings of numbers of order ten.
 constexpr double kRounding = 1e-12;
@@ -48,9 +48,9 @@ KDL::JntArray kdl_array(const Eigen::VectorXd& q) {
 }
 
 std::vector<Machine> chains() {
-  std::vector<Machine> machines = testing::all_test_machines();
+  std::vector<Machine> machines = test_support::all_test_machines();
   for (unsigned seed = 0; seed < 20; ++seed) {
-    machines.push_back(testing::random_machine(1 + static_cast<int>(seed % 7), 1000 + seed));
+    machines.push_back(test_support::random_machine(1 + static_cast<int>(seed % 7), 1000 + seed));
   }
   return machines;
 }
@@ -123,7 +123,7 @@ TEST(Kinematics, HessianIsTheDerivativeOfTheJacobianAndAgreesWithDuals) {
           const auto jacobian_column = [&](const Eigen::VectorXd& at) -> Eigen::Vector3d {
             return point_jacobian_matrix(machine, at, link, local).col(k);
           };
-          const Eigen::Vector3d numeric = testing::numeric_partial(jacobian_column, q, i);
+          const Eigen::Vector3d numeric = test_support::numeric_partial(jacobian_column, q, i);
           // distances in a chain of seven links reach some twenty metres
           EXPECT_LT((second - numeric).norm(), 20 * kDerivativeTolerance);
 
@@ -146,7 +146,7 @@ TEST(Kinematics, HessianIsTheDerivativeOfTheJacobianAndAgreesWithDuals) {
 }
 
 TEST(Kinematics, LinksBeyondAPointDoNotMoveIt) {
-  const Machine machine = testing::swing_crane();
+  const Machine machine = test_support::swing_crane();
   Random random(6);
   const Eigen::VectorXd q = random_configuration(machine, random);
   const Eigen::Matrix3Xd jacobian = point_jacobian_matrix(machine, q, 1, {1.0, 0.2, -0.3});
@@ -159,10 +159,11 @@ TEST(Kinematics, LinksBeyondAPointDoNotMoveIt) {
 TEST(Kinematics, LoaderCraneStretchedOutByHand) {
   // boom level, jib level, 2 m out: 3.4 + 3.0 + 2.0 ahead, 2.0 up
   const Eigen::Vector3d tip =
-      tip_position<double>(testing::loader_crane(), Eigen::Vector3d(0, 0, 2.0));
+      tip_position<double>(test_support::loader_crane(), Eigen::Vector3d(0, 0, 2.0));
   EXPECT_NEAR((tip - Eigen::Vector3d(8.4, 0, 2.0)).norm(), 0.0, 1e-15);
   // positive boom angles lift: axis -y
-  EXPECT_GT(tip_position<double>(testing::loader_crane(), Eigen::Vector3d(0.1, 0, 2.0)).z(), 2.5);
+  EXPECT_GT(tip_position<double>(test_support::loader_crane(), Eigen::Vector3d(0.1, 0, 2.0)).z(),
+            2.5);
 }
 
 }  // namespace

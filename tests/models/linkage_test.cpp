@@ -10,14 +10,14 @@
 namespace sparflow {
 namespace {
 
-using testing::kDerivativeTolerance;
-using testing::make_cylinder;
-using testing::make_joint;
-using testing::numeric_derivative;
-using testing::Random;
+using test_support::kDerivativeTolerance;
+using test_support::make_cylinder;
+using test_support::make_joint;
+using test_support::numeric_derivative;
+using test_support::Random;
 
 // Closed forms and the code differ by a handful of roundings of numbers of a few metres.
-constexpr double kRounding = 1e-13;
+constexpr double kTightRounding = 1e-13;
 
 Machine one_joint(JointType type, const Eigen::Vector3d& axis, const Linkage& linkage) {
   Machine m;
@@ -35,13 +35,13 @@ TEST(Linkage, PinsFollowTheLawOfCosines) {
   for (const double q : {-0.9, -0.2, 0.0, 0.5, 0.9}) {
     const Taylor3 x = linkage_rates(m, 0, q);
     const double expected = std::sqrt(a * a + b * b + 2 * a * b * std::sin(q));
-    EXPECT_NEAR(x.value, expected, kRounding);
+    EXPECT_NEAR(x.value, expected, kTightRounding);
     // x x' = a b cos q
-    EXPECT_NEAR(x.d1, a * b * std::cos(q) / expected, kRounding);
+    EXPECT_NEAR(x.d1, a * b * std::cos(q) / expected, kTightRounding);
     // x'^2 + x x'' = -a b sin q
-    EXPECT_NEAR(x.d1 * x.d1 + x.value * x.d2, -a * b * std::sin(q), kRounding);
+    EXPECT_NEAR(x.d1 * x.d1 + x.value * x.d2, -a * b * std::sin(q), kTightRounding);
     // 3 x' x'' + x x''' = -a b cos q
-    EXPECT_NEAR(3 * x.d1 * x.d2 + x.value * x.d3, -a * b * std::cos(q), kRounding);
+    EXPECT_NEAR(3 * x.d1 * x.d2 + x.value * x.d3, -a * b * std::cos(q), kTightRounding);
   }
 }
 
@@ -51,7 +51,7 @@ TEST(Linkage, PinsWithAnAxialOffsetAddItInQuadrature) {
   const Machine offset = one_joint(JointType::kRevolute, Eigen::Vector3d::UnitZ(),
                                    PinsLinkage{{1.4, 0, -0.1}, {0, 0.6, 0.2}, true});
   const double x = cylinder_length(flat, 0, 0.3);
-  EXPECT_NEAR(cylinder_length(offset, 0, 0.3), std::hypot(x, 0.3), kRounding);
+  EXPECT_NEAR(cylinder_length(offset, 0, 0.3), std::hypot(x, 0.3), kTightRounding);
 }
 
 TEST(Linkage, PinsOfAPrismaticJoint) {
@@ -60,14 +60,15 @@ TEST(Linkage, PinsOfAPrismaticJoint) {
                               PinsLinkage{{-2, 0, 0}, {0, 0.3, 0}, true});
   for (const double q : {-0.8, 0.0, 0.7}) {
     const Taylor3 x = linkage_rates(m, 0, q);
-    EXPECT_NEAR(x.value, std::hypot(q + 2.0, 0.3), kRounding);
-    EXPECT_NEAR(x.d1, (q + 2.0) / x.value, kRounding);
+    EXPECT_NEAR(x.value, std::hypot(q + 2.0, 0.3), kTightRounding);
+    EXPECT_NEAR(x.d1, (q + 2.0) / x.value, kTightRounding);
   }
 }
 
 TEST(Linkage, LoaderCraneBoomByHand) {
   // At q = 0 the rod pin stands at (0.65, 2.0 - 0.20), the barrel pin at (0.40, 0.50).
-  EXPECT_NEAR(stroke_at(testing::loader_crane(), 0, 0.0), std::hypot(0.25, 1.3), kRounding);
+  EXPECT_NEAR(stroke_at(test_support::loader_crane(), 0, 0.0), std::hypot(0.25, 1.3),
+              kTightRounding);
 }
 
 TEST(Linkage, WhichEndHoldsTheBarrelDoesNotChangeTheLength) {
@@ -84,13 +85,13 @@ TEST(Linkage, WhichEndHoldsTheBarrelDoesNotChangeTheLength) {
 
 TEST(Linkage, FourBarClosesOnBothBars) {
   // The rod pin lies on both circles whatever the pose: the defining property of the linkage.
-  const Machine m = testing::loader_crane();
+  const Machine m = test_support::loader_crane();
   const auto& f = std::get<FourBarLinkage>(m.cylinders[1].linkage);
   Random random(1);
   for (int i = 0; i < 50; ++i) {
     const LinkagePins<double> pins = linkage_pins(m, 1, random.uniform(-2.3, 0.05));
-    EXPECT_NEAR((pins.rod - pins.rocker).norm(), f.rocker_length, kRounding);
-    EXPECT_NEAR((pins.rod - pins.coupler).norm(), f.coupler_length, kRounding);
+    EXPECT_NEAR((pins.rod - pins.rocker).norm(), f.rocker_length, kTightRounding);
+    EXPECT_NEAR((pins.rod - pins.coupler).norm(), f.coupler_length, kTightRounding);
   }
 }
 
@@ -111,8 +112,8 @@ TEST(Linkage, FourBarFollowsTheLawOfCosines) {
       const double angle = q + branch * std::acos(0.6);  // of the rod pin, from +x
       const double expected = std::sqrt(1.44 + 0.25 + 2 * 1.2 * 0.5 * std::cos(angle));
       const Taylor3 x = linkage_rates(m, 0, q);
-      EXPECT_NEAR(x.value, expected, kRounding);
-      EXPECT_NEAR(x.d1, -0.6 * std::sin(angle) / expected, kRounding);
+      EXPECT_NEAR(x.value, expected, kTightRounding);
+      EXPECT_NEAR(x.d1, -0.6 * std::sin(angle) / expected, kTightRounding);
     }
   }
 }
@@ -135,9 +136,9 @@ TEST(Linkage, MirroredFourBarHasTheMirroredLength) {
   const Machine b = one_joint(JointType::kRevolute, Eigen::Vector3d::UnitZ(), mirrored);
   for (const double q : {-0.8, 0.0, 0.6}) {
     const Taylor3 x = linkage_rates(a, 0, q), y = linkage_rates(b, 0, -q);
-    EXPECT_NEAR(x.value, y.value, kRounding);
-    EXPECT_NEAR(x.d1, -y.d1, kRounding);
-    EXPECT_NEAR(x.d2, y.d2, kRounding);
+    EXPECT_NEAR(x.value, y.value, kTightRounding);
+    EXPECT_NEAR(x.d1, -y.d1, kTightRounding);
+    EXPECT_NEAR(x.d2, y.d2, kTightRounding);
   }
   mirrored.branch = 1;  // the other branch is another linkage
   const Machine other = one_joint(JointType::kRevolute, Eigen::Vector3d::UnitZ(), mirrored);
@@ -145,7 +146,7 @@ TEST(Linkage, MirroredFourBarHasTheMirroredLength) {
 }
 
 TEST(Linkage, OpenFourBarThrows) {
-  Machine m = testing::loader_crane();
+  Machine m = test_support::loader_crane();
   auto& f = std::get<FourBarLinkage>(m.cylinders[1].linkage);
   // pins 0.5 apart at q = 0: too short to meet, and too unequal to meet
   f.rocker_length = f.coupler_length = 0.2;
@@ -172,13 +173,13 @@ TEST(Linkage, RackAndDirect) {
 }
 
 TEST(Linkage, ThreeDerivativesMatchNumericOnesOnEveryMachine) {
-  for (const Machine& m : testing::all_test_machines()) {
+  for (const Machine& m : test_support::all_test_machines()) {
     Random random(7);
     for (int c = 0; c < m.cylinder_count(); ++c) {
       SCOPED_TRACE(m.name + " " + m.cylinders[static_cast<std::size_t>(c)].name);
       for (int i = 0; i < 5; ++i) {
         const int joint = m.cylinders[static_cast<std::size_t>(c)].joint;
-        const double q = testing::random_configuration(m, random)[joint];
+        const double q = test_support::random_configuration(m, random)[joint];
         const Taylor3 x = linkage_rates(m, c, q);
         const auto length = [&](double v) { return cylinder_length(m, c, v); };
         const auto rate = [&](double v) { return linkage_rates(m, c, v).d1; };
@@ -186,7 +187,7 @@ TEST(Linkage, ThreeDerivativesMatchNumericOnesOnEveryMachine) {
         // a knuckle near its stretched pose varies over centimetres, hence the smaller step; rounding
         // then is near 1e-12 of the value differenced
         const double h = 2e-3;
-        EXPECT_NEAR(x.value, length(q), kRounding);
+        EXPECT_NEAR(x.value, length(q), kTightRounding);
         EXPECT_NEAR(x.d1, numeric_derivative(length, q, h), kDerivativeTolerance);
         EXPECT_NEAR(x.d2, numeric_derivative(rate, q, h),
                     kDerivativeTolerance * (1 + std::abs(x.d2)));
@@ -199,7 +200,7 @@ TEST(Linkage, ThreeDerivativesMatchNumericOnesOnEveryMachine) {
 
 TEST(Linkage, JointAtStrokeInvertsTheStrokeOverTheRange) {
   for (const Machine& m :
-       {testing::loader_crane(), testing::knuckle_crane(), testing::swing_crane()}) {
+       {test_support::loader_crane(), test_support::knuckle_crane(), test_support::swing_crane()}) {
     for (int c = 0; c < m.cylinder_count(); ++c) {
       SCOPED_TRACE(m.name + " " + m.cylinders[static_cast<std::size_t>(c)].name);
       const int joint = m.cylinders[static_cast<std::size_t>(c)].joint;
@@ -214,7 +215,7 @@ TEST(Linkage, JointAtStrokeInvertsTheStrokeOverTheRange) {
 }
 
 TEST(Linkage, JointAtStrokeReadsALittlePastTheStops) {
-  const Machine m = testing::loader_crane();
+  const Machine m = test_support::loader_crane();
   const double past = m.joints[0].position.hi + 0.02;
   EXPECT_NEAR(joint_at_stroke(m, 0, stroke_at(m, 0, past)), past, 1e-12);
   EXPECT_THROW(joint_at_stroke(m, 0, stroke_at(m, 0, past), 0.01), std::domain_error);
@@ -223,12 +224,12 @@ TEST(Linkage, JointAtStrokeReadsALittlePastTheStops) {
 }
 
 TEST(Linkage, LengthAtZeroStrokeIsSubtracted) {
-  const Machine m = testing::knuckle_crane();
+  const Machine m = test_support::knuckle_crane();
   EXPECT_DOUBLE_EQ(stroke_at(m, 0, 0.3), cylinder_length(m, 0, 0.3) - 1.043);
 }
 
 TEST(Linkage, MassesSitOnTheirMembers) {
-  const Machine m = testing::knuckle_crane();
+  const Machine m = test_support::knuckle_crane();
   const auto& f = std::get<FourBarLinkage>(m.cylinders[0].linkage);
   const double q = 0.4;
   std::vector<LinkageMass<double>> masses;
@@ -239,8 +240,8 @@ TEST(Linkage, MassesSitOnTheirMembers) {
   const auto expect_on = [](const LinkageMass<double>& mass, double kg, const Eigen::Vector3d& from,
                             const Eigen::Vector3d& to, double distance) {
     EXPECT_EQ(mass.mass, kg);
-    EXPECT_NEAR((mass.position - from).norm(), distance, kRounding);
-    EXPECT_NEAR((mass.position - to).norm(), (to - from).norm() - distance, kRounding);
+    EXPECT_NEAR((mass.position - from).norm(), distance, kTightRounding);
+    EXPECT_NEAR((mass.position - to).norm(), (to - from).norm() - distance, kTightRounding);
   };
   expect_on(masses[0], 57.956, pins.barrel, pins.rod, 0.4125);
   expect_on(masses[1], 43.93, pins.rod, pins.barrel, 0.429);
@@ -249,14 +250,14 @@ TEST(Linkage, MassesSitOnTheirMembers) {
 }
 
 TEST(Linkage, BarrelOfADirectCylinderStaysItsRodTravels) {
-  const Machine m = testing::swing_crane();
+  const Machine m = test_support::swing_crane();
   std::vector<LinkageMass<double>> near, far;
   append_linkage_masses(m, 3, 0.5, near);
   append_linkage_masses(m, 3, 1.7, far);
   ASSERT_EQ(near.size(), 2u);
   EXPECT_EQ(near[0].position, far[0].position);
   const Eigen::Vector3d travel = far[1].position - near[1].position;
-  EXPECT_NEAR((travel - 1.2 * Eigen::Vector3d::UnitX()).norm(), 0.0, kRounding);
+  EXPECT_NEAR((travel - 1.2 * Eigen::Vector3d::UnitX()).norm(), 0.0, kTightRounding);
 }
 
 }  // namespace

@@ -16,11 +16,11 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 // Numbers that pass through a few sums and rotations of order one.
-constexpr double kRounding = 1e-12;
+constexpr double kFileRounding = 1e-12;
 
 const std::string kMachines = SPARFLOW_SOURCE_DIR "/problems/machines/";
 
-Machine parse(const std::string& text, std::vector<std::string>* warnings = nullptr) {
+Machine parsed(const std::string& text, std::vector<std::string>* warnings = nullptr) {
   return parse_machine(text, "test.yaml", kMachines, warnings);
 }
 
@@ -73,7 +73,7 @@ TEST(MachineFile, LoaderCraneIsReadWithUnitsConverted) {
   EXPECT_DOUBLE_EQ(m.valve_of_cylinder(2)->max_flow_retract, 40.0 / 6e4);
   EXPECT_EQ(m.tip.joint, 2);
   // folded out straight: 3.4 + 3.0 + 1 ahead of the boom pin
-  EXPECT_NEAR((tip(m, {0, 0, 1}) - Eigen::Vector3d(7.4, 0, 2)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(m, {0, 0, 1}) - Eigen::Vector3d(7.4, 0, 2)).norm(), 0.0, kFileRounding);
   EXPECT_NE(m.source_text.find("A 21 t.m loader crane"), std::string::npos);
 }
 
@@ -125,27 +125,27 @@ TEST(MachineFile, SwingCranePullsItsJibOverTheWholeRange) {
   EXPECT_EQ(m.pump_of_cylinder(jib), 1);
   EXPECT_EQ(m.cylinders[0].parallel, 2);
   // boom pin 0.25 m out and 2.1 m up, boom 3.2, jib 2.2, telescope 0.3: all straight at q = 0
-  EXPECT_NEAR((tip(m, {0, 0, 0, 0}) - Eigen::Vector3d(5.95, 0, 2.1)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(m, {0, 0, 0, 0}) - Eigen::Vector3d(5.95, 0, 2.1)).norm(), 0.0, kFileRounding);
   // slewed to the left, the boom lifts the straight arm
   const Eigen::Vector3d up = tip(m, {kPi / 2, kPi / 6, 0, 0});
   EXPECT_NEAR((up - Eigen::Vector3d(0, 0.25 + 5.7 * std::cos(kPi / 6), 2.1 + 5.7 * 0.5)).norm(),
-              0.0, kRounding);
+              0.0, kFileRounding);
 }
 
 TEST(MachineFile, AxisIsNormalisedAndRpyTurnsTheFrame) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, origin: {xyz: [1, 2, 3], rpy: [0, 0, "
       "1.5707963267948966]}, axis: [0, 0, 5], position: [-1, 1], " +
       kRates + "}\ntip: {joint: a, xyz: [1, 0, 0]}\n");
   EXPECT_EQ(m.joints[0].axis, Eigen::Vector3d::UnitZ());
   EXPECT_EQ(m.gravity, Eigen::Vector3d(0, 0, -9.81));
-  EXPECT_NEAR((tip(m, {0}) - Eigen::Vector3d(1, 3, 3)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(m, {0}) - Eigen::Vector3d(1, 3, 3)).norm(), 0.0, kFileRounding);
 }
 
 // T_01 T_12 of standard Denavit-Hartenberg, written out by hand, against the converted chain.
 TEST(MachineFile, DenavitHartenbergChainIsTheTextbookProduct) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, dh: {a: 0.4, alpha: 1.2, d: 0.7, theta: "
       "0.3}, position: [-3, 3], " +
@@ -169,12 +169,12 @@ TEST(MachineFile, DenavitHartenbergChainIsTheTextbookProduct) {
   const double q1 = 0.8, q2 = -0.35;
   const Eigen::Vector4d expected = dh(q1 + 0.3, 0.7, 0.4, 1.2) * dh(0.9, 0.1 + q2, 0.2, -0.5) *
                                    Eigen::Vector4d(0.11, 0.22, 0.33, 1.0);
-  EXPECT_NEAR((tip(m, {q1, q2}) - expected.head<3>()).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(m, {q1, q2}) - expected.head<3>()).norm(), 0.0, kFileRounding);
 }
 
 // The frame of a DH joint is the far end of its link; an origin joint, a mass and a pin follow in it.
 TEST(MachineFile, DenavitHartenbergAndOriginJointsMix) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, dh: {a: 2, alpha: 0, d: 0, theta: 0}, "
       "position: [-3, 3], " +
@@ -190,12 +190,12 @@ TEST(MachineFile, DenavitHartenbergAndOriginJointsMix) {
       "  - {name: c, joint: b, bore: 0.1, rod: 0.05, linkage: {type: pins, "
       "barrel: {frame: a, xyz: [-1.5, 0.2, 0]}, rod: {frame: b, xyz: [0.4, 0, "
       "0]}}}\n");
-  EXPECT_NEAR((tip(m, {0, kPi / 2}) - Eigen::Vector3d(2.5, 1, 0)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(m, {0, kPi / 2}) - Eigen::Vector3d(2.5, 1, 0)).norm(), 0.0, kFileRounding);
   // 0.5 m back from the link's far end at 2 m
   EXPECT_EQ(m.links[0].cog, Eigen::Vector3d(1.5, 0, 0));
   EXPECT_EQ(std::get<PinsLinkage>(m.cylinders[0].linkage).parent_pin, Eigen::Vector3d(0.5, 0.2, 0));
   // at b = 90 degrees the pins are 2.0 apart along x and 0.4 - 0.2 along y
-  EXPECT_NEAR(cylinder_length(m, 0, kPi / 2), std::hypot(2.0, 0.2), kRounding);
+  EXPECT_NEAR(cylinder_length(m, 0, kPi / 2), std::hypot(2.0, 0.2), kFileRounding);
 }
 
 TEST(MachineFile, PinsMayHaveTheBarrelOnTheMovingLink) {
@@ -203,7 +203,7 @@ TEST(MachineFile, PinsMayHaveTheBarrelOnTheMovingLink) {
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, axis: [0, 0, 1], position: [0.5, 2.5], " +
       kRates + "}\ntip: {joint: a, xyz: [1, 0, 0]}\ncylinders:\n";
-  const Machine on_child = parse(
+  const Machine on_child = parsed(
       head +
       "  - {name: c, joint: a, linkage: {type: pins, barrel: {frame: a, xyz: [1, 0, 0]}, rod: "
       "{frame: base, xyz: [3, 0, 0]}}}\n");
@@ -212,11 +212,11 @@ TEST(MachineFile, PinsMayHaveTheBarrelOnTheMovingLink) {
   EXPECT_EQ(pins.parent_pin, Eigen::Vector3d(3, 0, 0));
   EXPECT_EQ(pins.child_pin, Eigen::Vector3d(1, 0, 0));
   // law of cosines at 90 degrees
-  EXPECT_NEAR(cylinder_length(on_child, 0, kPi / 2), std::sqrt(10.0), kRounding);
+  EXPECT_NEAR(cylinder_length(on_child, 0, kPi / 2), std::sqrt(10.0), kFileRounding);
 }
 
 TEST(MachineFile, RackDirectParallelAndSingleValveFlow) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, axis: [0, 0, 1], position: [-3, 3], " +
       kRates +
@@ -235,7 +235,7 @@ TEST(MachineFile, RackDirectParallelAndSingleValveFlow) {
 }
 
 TEST(MachineFile, MachineWithoutJointsIsPossible) {
-  const Machine m = parse("name: post\njoints: []\ntip: {joint: base, xyz: [0, 0, 1]}\n");
+  const Machine m = parsed("name: post\njoints: []\ntip: {joint: base, xyz: [0, 0, 1]}\n");
   EXPECT_EQ(m.joint_count(), 0);
   EXPECT_EQ(m.tip.joint, -1);
 }
@@ -245,7 +245,8 @@ TEST(UrdfImport, FoldsFixedJointsAndTakesLimits) {
   ASSERT_EQ(m.joint_count(), 3);
   EXPECT_EQ(m.joints[0].name, "boom");
   // fixed column 0.3 up, boom pin 1.2 above it
-  EXPECT_NEAR((m.joints[0].origin.translation() - Eigen::Vector3d(0, 0, 1.5)).norm(), 0, kRounding);
+  EXPECT_NEAR((m.joints[0].origin.translation() - Eigen::Vector3d(0, 0, 1.5)).norm(), 0,
+              kFileRounding);
   EXPECT_EQ(m.joints[0].position.hi, 1.25);     // the URDF's
   EXPECT_EQ(m.joints[0].velocity.lo, -0.2);     // the URDF's
   EXPECT_EQ(m.joints[0].acceleration.hi, 0.5);  // the machine file's
@@ -256,22 +257,22 @@ TEST(UrdfImport, FoldsFixedJointsAndTakesLimits) {
   EXPECT_EQ(boom.inertia, 110);  // about the joint's axis, -y
   const Link& toolbox = m.links[2];
   EXPECT_EQ(toolbox.joint, 0);
-  EXPECT_NEAR((toolbox.cog - Eigen::Vector3d(0.4, 0, 0.2)).norm(), 0, kRounding);
+  EXPECT_NEAR((toolbox.cog - Eigen::Vector3d(0.4, 0, 0.2)).norm(), 0, kFileRounding);
   const Link& tube = m.links[4];  // on the telescope: a mass that slides on the jib
   EXPECT_EQ(tube.joint, 1);
   EXPECT_EQ(tube.slides_with, 2);
   EXPECT_EQ(tube.fraction, 1.0);
-  EXPECT_NEAR((tube.cog - Eigen::Vector3d(1.3, 0, 0)).norm(), 0, kRounding);
-  EXPECT_NEAR(tube.inertia, 14, kRounding);
+  EXPECT_NEAR((tube.cog - Eigen::Vector3d(1.3, 0, 0)).norm(), 0, kFileRounding);
+  EXPECT_NEAR(tube.inertia, 14, kFileRounding);
   EXPECT_EQ(m.tip.joint, 2);
-  EXPECT_NEAR((m.tip.xyz - Eigen::Vector3d(0.1, 0, -0.05)).norm(), 0, kRounding);
+  EXPECT_NEAR((m.tip.xyz - Eigen::Vector3d(0.1, 0, -0.05)).norm(), 0, kFileRounding);
 }
 
 TEST(UrdfImport, SourceTextStandsAlone) {
   const Machine m = load_machine(kMachines + "urdf_crane.yaml");
   EXPECT_EQ(m.source_text.find("urdf:"), std::string::npos);
   const Machine again = parse_machine(m.source_text, "again.yaml", "/nowhere");
-  EXPECT_NEAR((tip(again, {0.4, -1.1, 0.7}) - tip(m, {0.4, -1.1, 0.7})).norm(), 0.0, kRounding);
+  EXPECT_NEAR((tip(again, {0.4, -1.1, 0.7}) - tip(m, {0.4, -1.1, 0.7})).norm(), 0.0, kFileRounding);
 }
 
 TEST(MachineWriter, EveryBundledMachineSurvivesWritingAndReading) {
@@ -281,7 +282,7 @@ TEST(MachineWriter, EveryBundledMachineSurvivesWritingAndReading) {
     const Machine b = parse_machine(write_machine(a), name, "");
     ASSERT_EQ(a.joint_count(), b.joint_count()) << name;
     for (std::size_t i = 0; i < a.joints.size(); ++i) {
-      EXPECT_TRUE(a.joints[i].origin.isApprox(b.joints[i].origin, kRounding)) << name;
+      EXPECT_TRUE(a.joints[i].origin.isApprox(b.joints[i].origin, kFileRounding)) << name;
       EXPECT_EQ(a.joints[i].axis, b.joints[i].axis);
       EXPECT_EQ(a.joints[i].position.hi, b.joints[i].position.hi);
     }
@@ -294,7 +295,7 @@ TEST(MachineWriter, EveryBundledMachineSurvivesWritingAndReading) {
       const auto k = static_cast<std::size_t>(i);
       const Range r = a.joints[static_cast<std::size_t>(a.cylinders[k].joint)].position;
       const double q = 0.3 * r.lo + 0.7 * r.hi;
-      EXPECT_NEAR(cylinder_length(a, i, q), cylinder_length(b, i, q), kRounding) << name;
+      EXPECT_NEAR(cylinder_length(a, i, q), cylinder_length(b, i, q), kFileRounding) << name;
       EXPECT_EQ(a.cylinders[k].area_rod(), b.cylinders[k].area_rod());
       EXPECT_EQ(a.cylinders[k].barrel_mass, b.cylinders[k].barrel_mass);
       EXPECT_EQ(a.pump_of_cylinder(i), b.pump_of_cylinder(i));
@@ -339,7 +340,7 @@ TEST(MachineCheck, WarningsSayWhatIsUnusual) {
   };
   for (const Warned& c : cases) {
     std::vector<std::string> warnings;
-    parse(c.text, &warnings);
+    parsed(c.text, &warnings);
     EXPECT_THAT(warnings, testing::Contains(c.expected)) << c.what;
   }
 }

@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 /// f'(x) by central differences at h, h/2, h/4 and two Richardson extrapolations: truncation O(h^6).
 /// f may return a number or an Eigen vector or matrix. With h = 1e-2 and functions that vary over a length of
@@ -57,4 +57,4 @@ class Random {
   std::mt19937 engine_;
 };
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -63,7 +63,7 @@ const Effect* balance_spring() {
 }
 
 TEST(OwnEffect, IsInTheCatalogueWithItsPlaces) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   EXPECT_EQ(find_effect("balance_spring"), balance_spring());
   const EffectAt place = parse_effect("balance_spring:boom", machine);
   EXPECT_EQ(place.effect, balance_spring());
@@ -72,7 +72,7 @@ TEST(OwnEffect, IsInTheCatalogueWithItsPlaces) {
 }
 
 TEST(OwnEffect, ActsInTheModel) {
-  CraneModel model = CraneModel::untrained(testing::loader_crane());
+  CraneModel model = CraneModel::untrained(test_support::loader_crane());
   const int n = model.machine.joint_count();
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(n, 0.3), qd = Eigen::VectorXd::Zero(n);
   Chain without(model);
@@ -85,7 +85,7 @@ TEST(OwnEffect, ActsInTheModel) {
 }
 
 TEST(OwnEffect, ColumnsComeFromItsLaw) {
-  const Machine machine = testing::loader_crane();
+  const Machine machine = test_support::loader_crane();
   const Eigen::Index n = machine.joint_count();
   const auto motion = [&](double t) {
     Eigen::VectorXd x = Eigen::VectorXd::Zero(3 * n);
@@ -93,7 +93,7 @@ TEST(OwnEffect, ColumnsComeFromItsLaw) {
     x.segment(n, n).setConstant(0.1);
     return x;
   };
-  const MachineSeries log = testing::log_of(machine, motion, 2.0, 0.1, 0.0);
+  const MachineSeries log = test_support::log_of(machine, motion, 2.0, 0.1, 0.0);
   const double loose[] = {log.cylinders[0].length.mean()};
   Eigen::MatrixXd columns;
   ASSERT_TRUE(balance_spring()->columns(log, EvidenceKind::kForce, 0, 0, loose, columns));

@@ -11,10 +11,10 @@
 namespace sparflow {
 namespace {
 
-using testing::kDerivativeTolerance;
-using testing::numeric_partial;
-using testing::Random;
-using testing::random_configuration;
+using test_support::kDerivativeTolerance;
+using test_support::numeric_partial;
+using test_support::Random;
+using test_support::random_configuration;
 
 using Dual = Dual2<2>;
 using DualVector = Eigen::Matrix<Dual, Eigen::Dynamic, 1>;
@@ -50,7 +50,7 @@ Eigen::VectorXd usable_configuration(const Machine& machine, Random& random) {
 /// Calls `check(machine, q, payload)` for every test machine at several random configurations.
 template <class Check>
 void for_random_states(const Check& check) {
-  for (const Machine& machine : testing::all_test_machines()) {
+  for (const Machine& machine : test_support::all_test_machines()) {
     SCOPED_TRACE(machine.name);
     Random random(11);
     for (int i = 0; i < 4; ++i) {
@@ -77,10 +77,11 @@ TEST(StaticForce, TorqueIsTheGradientOfThePotentialEnergy) {
 
 TEST(StaticForce, EnergyOfOneMassByHand) {
   Machine m;
-  m.joints = {testing::make_joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {-1, 1})};
-  m.links = {testing::make_link("boom", 0, 100, {3, 0, 0})};
-  m.cylinders = {
-      testing::make_cylinder("boom", 0, 0.1, 0.05, PinsLinkage{{0.5, 0, -1}, {0.5, 0, 0}, true})};
+  m.joints = {
+      test_support::make_joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {-1, 1})};
+  m.links = {test_support::make_link("boom", 0, 100, {3, 0, 0})};
+  m.cylinders = {test_support::make_cylinder("boom", 0, 0.1, 0.05,
+                                             PinsLinkage{{0.5, 0, -1}, {0.5, 0, 0}, true})};
   m.tip = {0, {4, 0, 0}};
   const double q = 0.3, g = 9.81;
   EXPECT_NEAR(potential_energy(m, Eigen::VectorXd::Constant(1, q), 50),
@@ -94,7 +95,7 @@ TEST(StaticForce, EnergyOfOneMassByHand) {
 }
 
 TEST(StaticForce, ACylinderThatShortensWhenTheJointRisesIsPulled) {
-  const Machine machine = testing::swing_crane();
+  const Machine machine = test_support::swing_crane();
   StaticForce statics(machine);
   Random random(12);
   for (int i = 0; i < 50; ++i) {
@@ -109,7 +110,8 @@ TEST(StaticForce, ACylinderThatShortensWhenTheJointRisesIsPulled) {
 TEST(StaticForce, TorqueOfRigidLinksAgreesWithKdl) {
   const auto kdl = [](const Eigen::Vector3d& v) { return KDL::Vector(v.x(), v.y(), v.z()); };
   for (unsigned seed = 0; seed < 20; ++seed) {
-    Machine machine = testing::random_machine(1 + static_cast<int>(seed % 7), 2000 + seed, false);
+    Machine machine =
+        test_support::random_machine(1 + static_cast<int>(seed % 7), 2000 + seed, false);
     std::erase_if(machine.links, [](const Link& link) { return link.slides_with >= 0; });
     SCOPED_TRACE(machine.name);
     const double payload = 350.0;
@@ -214,7 +216,7 @@ TEST(StaticForce, JacobianAndHessianAgreeWithNumericDerivatives) {
 }
 
 TEST(StaticForce, LowerOrdersGiveTheSameValues) {
-  const Machine machine = testing::swing_crane();
+  const Machine machine = test_support::swing_crane();
   Random random(13);
   const Eigen::VectorXd q = random_configuration(machine, random);
   StaticForce full(machine), part(machine);
@@ -226,7 +228,7 @@ TEST(StaticForce, LowerOrdersGiveTheSameValues) {
 }
 
 TEST(StaticForce, AWorkspaceForgetsThePreviousState) {
-  const Machine machine = testing::knuckle_crane();
+  const Machine machine = test_support::knuckle_crane();
   Random random(14);
   const Eigen::VectorXd a = random_configuration(machine, random);
   const Eigen::VectorXd b = random_configuration(machine, random);
@@ -268,7 +270,7 @@ TEST(StaticForce, TurningTheWholeMachineAndGravityChangesNothing) {
 }
 
 TEST(StaticForce, AnOpenFourBarThrows) {
-  Machine machine = testing::loader_crane();
+  Machine machine = test_support::loader_crane();
   std::get<FourBarLinkage>(machine.cylinders[1].linkage).rocker_length = 1.5;
   StaticForce statics(machine);
   const double q[] = {0.2, -1.0, 0.5};

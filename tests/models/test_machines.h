@@ -9,7 +9,7 @@
 #include "models/units.h"
 #include "tests/models/numeric.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 inline Joint make_joint(std::string name, JointType type, Eigen::Vector3d xyz, Eigen::Vector3d axis,
                         Range position, Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity()) {
@@ -280,4 +280,4 @@ inline std::vector<Machine> all_test_machines() {
   return machines;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

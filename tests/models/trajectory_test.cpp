@@ -12,7 +12,7 @@ namespace {
 
 /// Two joints, uneven instants, random piecewise-constant accelerations, integrated exactly.
 Trajectory random_motion(unsigned seed) {
-  testing::Random random(seed);
+  test_support::Random random(seed);
   const Eigen::Index rows = 9;
   Trajectory motion;
   motion.t.setZero(rows);
@@ -32,7 +32,7 @@ Trajectory random_motion(unsigned seed) {
 }
 
 // A dozen additions of numbers of order one.
-constexpr double kRounding = 1e-14;
+constexpr double kLastDigits = 1e-14;
 
 TEST(Trajectory, RefiningKeepsEveryOriginalInstant) {
   const Trajectory coarse = random_motion(1);
@@ -56,17 +56,17 @@ TEST(Trajectory, RefinedMotionObeysTheSameLawBetweenInstants) {
     EXPECT_GT(h, 0.0);
     const Eigen::RowVectorXd qd = fine.qd.row(k) + h * fine.qdd.row(k);
     const Eigen::RowVectorXd q = fine.q.row(k) + h * fine.qd.row(k) + 0.5 * h * h * fine.qdd.row(k);
-    EXPECT_LT((fine.qd.row(k + 1) - qd).norm(), kRounding);
-    EXPECT_LT((fine.q.row(k + 1) - q).norm(), kRounding);
+    EXPECT_LT((fine.qd.row(k + 1) - qd).norm(), kLastDigits);
+    EXPECT_LT((fine.q.row(k + 1) - q).norm(), kLastDigits);
   }
 }
 
 TEST(Trajectory, RefiningTwiceIsRefiningOnce) {
   const Trajectory motion = random_motion(3);
   const Trajectory twice = motion.refined(2).refined(3), once = motion.refined(6);
-  EXPECT_LT((twice.t - once.t).norm(), kRounding);
-  EXPECT_LT((twice.q - once.q).norm(), 4 * kRounding);
-  EXPECT_LT((twice.qd - once.qd).norm(), 4 * kRounding);
+  EXPECT_LT((twice.t - once.t).norm(), kLastDigits);
+  EXPECT_LT((twice.q - once.q).norm(), 4 * kLastDigits);
+  EXPECT_LT((twice.qd - once.qd).norm(), 4 * kLastDigits);
   EXPECT_EQ(twice.qdd, once.qdd);
 }
 

@@ -5,7 +5,7 @@
 #include "models/crane_model.h"
 #include "models/effects/registry.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 /// Typical values times `strength`; nonlinear parameters (shapes, switches) stay typical.
 inline AppliedEffect applied(const EffectAt& place, double strength = 1.0) {
@@ -21,4 +21,4 @@ inline AppliedEffect applied(const std::string& key, const Machine& machine,
   return applied(parse_effect(key, machine), strength);
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -20,15 +20,16 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-using testing::machine_files;
-using testing::numeric_gradient;
-using testing::problem_for;
-using testing::random_state;
+using test_support::machine_files;
+using test_support::numeric_gradient;
+using test_support::problem_for;
+using test_support::random_state;
 
 class EveryMachine : public ::testing::TestWithParam<std::string> {
  protected:
   EveryMachine()
-      : model_(testing::synthetic_model(load_machine(bundled_file("machines/" + GetParam())))) {}
+      : model_(
+            test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())))) {}
   CraneModel model_;
 };
 
@@ -239,7 +240,7 @@ TEST_P(EveryMachine, WholeEnergyOfATrajectoryMatchesFiniteDifferences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Bundled, EveryMachine, ::testing::ValuesIn(machine_files()),
-                         testing::machine_test_name);
+                         test_support::machine_test_name);
 
 }  // namespace
 }  // namespace sparflow

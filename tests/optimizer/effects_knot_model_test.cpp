@@ -17,11 +17,11 @@
 namespace sparflow {
 namespace {
 
-using testing::applied;
-using testing::Matrix;
-using testing::problem_for;
-using testing::random_state;
-using testing::Vector;
+using test_support::applied;
+using test_support::Matrix;
+using test_support::problem_for;
+using test_support::random_state;
+using test_support::Vector;
 
 ModeTable changing_modes(int intervals, int cylinders) {
   ModeTable modes = ModeTable::Constant(intervals, cylinders, CylinderMode::kExtend);
@@ -33,7 +33,8 @@ ModeTable changing_modes(int intervals, int cylinders) {
 class EffectsOnMachine : public ::testing::TestWithParam<std::string> {
  protected:
   EffectsOnMachine()
-      : bare_(testing::synthetic_model(load_machine(bundled_file("machines/" + GetParam())))) {}
+      : bare_(test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())))) {
+  }
 
   /// One of each effect, at the last place it can sit; loops that need all of them go over this.
   std::vector<EffectAt> one_of_each() const {
@@ -234,11 +235,12 @@ TEST_P(EffectsOnMachine, WhatAMotionDoesNotSeeHasNoLaw) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Bundled, EffectsOnMachine, ::testing::ValuesIn(testing::machine_files()),
-                         testing::machine_test_name);
+INSTANTIATE_TEST_SUITE_P(Bundled, EffectsOnMachine,
+                         ::testing::ValuesIn(test_support::machine_files()),
+                         test_support::machine_test_name);
 
 CraneModel loader() {
-  return testing::synthetic_model(load_machine(bundled_file("machines/loader_crane.yaml")));
+  return test_support::synthetic_model(load_machine(bundled_file("machines/loader_crane.yaml")));
 }
 
 TEST(EffectsInKnots, OnlyInertiaNeedsAccelerations) {
@@ -302,7 +304,7 @@ TEST(EffectsInKnots, TooManyJointsAreSaid) {
     machine.joints.push_back(joint);
     machine.joints.back().name += std::to_string(extra);
   }
-  CraneModel model = testing::synthetic_model(machine);
+  CraneModel model = test_support::synthetic_model(machine);
   model.effects = {applied("coulomb_friction:boom", machine)};
   EXPECT_NO_THROW(SmoothEffects{model});  // 8 joints, 16 variables
   model.effects.push_back(applied("inertia", machine));

@@ -9,7 +9,7 @@
 #include "problems/bundled.h"
 #include "problems/problem.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
@@ -82,4 +82,4 @@ inline std::string machine_test_name(const ::testing::TestParamInfo<std::string>
   return name;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

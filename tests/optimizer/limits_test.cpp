@@ -141,7 +141,7 @@ TEST(ExactEnergy, SharesOfPumpsUsefulWorkAndDataAddUp) {
 /// The bundled lift under a known model, with straight lines to two end postures.
 struct Lift {
   MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
-  CraneModel model = testing::synthetic_model(problem.machine);
+  CraneModel model = test_support::synthetic_model(problem.machine);
   std::vector<SeedMotion> seeds;
   OptimizeOptions options;
 

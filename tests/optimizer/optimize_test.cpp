@@ -35,7 +35,7 @@ struct Case {
 Case lift_case() {
   Case c;
   c.problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
-  c.model = testing::synthetic_model(c.problem.machine);
+  c.model = test_support::synthetic_model(c.problem.machine);
   const Eigen::Vector3d goal = std::get<TipGoal>(c.problem.goal).tip;
   for (const bool still : {false, true}) {
     VectorXd end = c.problem.start;
@@ -111,7 +111,7 @@ TEST(Optimize, WithEffectsTheReportedEnergyIsTheExactChains) {
   const double without = exact_energy(c.model, c.seeds.front().motion, c.problem.payload).total;
   for (const char* key : {"coulomb_friction:boom", "coulomb_friction:jib", "return_back_pressure",
                           "flow_dependent_margin:main"}) {
-    c.model.effects.push_back(testing::applied(key, machine));
+    c.model.effects.push_back(test_support::applied(key, machine));
   }
   // friction of 8 kN, 12 bar of tank line and a margin that grows: the same motion costs clearly more
   EXPECT_GT(exact_energy(c.model, c.seeds.front().motion, c.problem.payload).total, 1.03 * without);
@@ -132,7 +132,7 @@ TEST(Optimize, WithEffectsTheReportedEnergyIsTheExactChains) {
 
 TEST(Optimize, WithInertiaAccelerationsAreInTheLaw) {
   Case c = lift_case();
-  c.model.effects = {testing::applied("inertia", c.model.machine)};
+  c.model.effects = {test_support::applied("inertia", c.model.machine)};
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
   ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
   EXPECT_LT(r.energy.total, r.best_seed_energy);

@@ -5,7 +5,7 @@
 
 #include "models/crane_model.h"
 
-namespace sparflow::testing {
+namespace sparflow::test_support {
 
 inline GaussianProcess synthetic_process(double area, bool extend, double full_flow,
                                          double force_span, unsigned seed) {
@@ -50,4 +50,4 @@ inline CraneModel synthetic_model(Machine machine) {
   return model;
 }
 
-}  // namespace sparflow::testing
+}  // namespace sparflow::test_support

@@ -13,8 +13,8 @@
 namespace sparflow {
 namespace {
 
-using testing::applied;
-using testing::Vector;
+using test_support::applied;
+using test_support::Vector;
 
 constexpr const char* kEffects = R"yaml(effects:
   - id: knot_tight_spot
@@ -46,7 +46,7 @@ constexpr const char* kEffects = R"yaml(effects:
 
 /// Energy and limits of a motion of two intervals against central differences.
 void check_whole_energy(const CraneModel& model, const std::string& what) {
-  const MotionProblem problem = testing::problem_for(model.machine, 13);
+  const MotionProblem problem = test_support::problem_for(model.machine, 13);
   const int n = model.machine.joint_count(), intervals = 2;
   CraneKnotOptions options;
   options.smoothing = {5e-3, 4e5};
@@ -60,7 +60,7 @@ void check_whole_energy(const CraneModel& model, const std::string& what) {
   std::mt19937 random(43);
   Vector x(transcription.size().variables);
   for (int k = 0; k <= intervals; ++k) {
-    const Vector z = testing::random_state(model.machine, random);
+    const Vector z = test_support::random_state(model.machine, random);
     for (int j = 0; j < n; ++j) {
       x[transcription.q_index(k, j)] = z[j];
       x[transcription.qd_index(k, j)] = z[n + j];
@@ -78,7 +78,8 @@ void check_whole_energy(const CraneModel& model, const std::string& what) {
 class UserEffectsOnMachine : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(UserEffectsOnMachine, WholeEnergyMatchesFiniteDifferences) {
-  CraneModel bare = testing::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
+  CraneModel bare =
+      test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
   CraneModel all = bare;
   for (const Effect* effect : register_user_effects(kEffects, "mine.yaml", bare.machine)) {
     ASSERT_NE(effect->info().in_motion.substr(0, 7), "nothing") << effect->info().id;
@@ -94,12 +95,12 @@ TEST_P(UserEffectsOnMachine, WholeEnergyMatchesFiniteDifferences) {
 
 TEST_P(UserEffectsOnMachine, EnergyChangesWithThem) {
   const CraneModel bare =
-      testing::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
-  const MotionProblem problem = testing::problem_for(bare.machine, 13);
+      test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
+  const MotionProblem problem = test_support::problem_for(bare.machine, 13);
   CraneKnotOptions options;
   options.smoothing = {5e-3, 4e5};
   std::mt19937 random(5);
-  const Vector z = testing::random_state(bare.machine, random);
+  const Vector z = test_support::random_state(bare.machine, random);
   Vector whole = Vector::Zero(3 * bare.machine.joint_count());
   whole.head(z.size()) = z;
   CraneKnotModel without(bare, problem, options);
