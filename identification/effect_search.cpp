@@ -168,6 +168,8 @@ class Search {
   static FitControl final_control() {
     FitControl c;
     c.keep_residuals = true;
+    c.noise_passes =
+        12;  // to the end: what is left of the way would be taken for another effect's gain
     c.covariance = true;
     return c;
   }

@@ -83,15 +83,6 @@ NoiseModel by_moments(const Eigen::Ref<const Eigen::VectorXd>& residual,
   return m;
 }
 
-/// Log likelihood but for a constant, the scale at its maximum.
-double likelihood(const NoiseModel& m, const Eigen::Ref<const Eigen::VectorXd>& residual,
-                  const std::vector<NoiseBlock>& blocks) {
-  Eigen::MatrixXd r = residual;
-  const double log_determinant = m.whiten(blocks, r);
-  const auto n = static_cast<double>(r.size());
-  return log_determinant - 0.5 * n * std::log(std::max(r.squaredNorm() / n, 1e-300));
-}
-
 }  // namespace
 
 double NoiseModel::deviation() const {
@@ -107,7 +98,27 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
   constexpr double kSlow = 0.5;  // of one lag's correlation
   if (!offsets || blocks.size() < 4 || reflections(slow).k1 < kSlow) return slow;
   const NoiseModel levels = by_moments(residual, blocks, offsets, true);
-  return likelihood(levels, residual, blocks) > likelihood(slow, residual, blocks) ? levels : slow;
+  return levels.log_likelihood(residual, blocks) > slow.log_likelihood(residual, blocks) ? levels
+                                                                                         : slow;
+}
+
+double NoiseModel::log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                  const std::vector<NoiseBlock>& blocks) const {
+  Eigen::MatrixXd r = residual;
+  const double log_determinant = whiten(blocks, r);
+  const auto n = static_cast<double>(r.size());
+  return log_determinant - 0.5 * n * std::log(std::max(r.squaredNorm() / n, 1e-300));
+}
+
+NoiseModel NoiseModel::scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                 const std::vector<NoiseBlock>& blocks) const {
+  NoiseModel m = *this;
+  Eigen::MatrixXd r = residual;
+  m.whiten(blocks, r);
+  const double scale = std::max(r.squaredNorm() / static_cast<double>(r.size()), 1e-300) / variance;
+  m.variance *= scale;
+  m.offset_variance *= scale;
+  return m;
 }
 
 double NoiseModel::whiten(const std::vector<NoiseBlock>& blocks,
