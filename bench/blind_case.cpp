@@ -24,6 +24,8 @@ using simulator::CaseRequest;
 using simulator::GeneratedCase;
 using simulator::HiddenParameter;
 using simulator::HiddenTruth;
+/// Learning again moves errors by some tenths of a percent.
+constexpr double kRefitMoves = 1.005;
 constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
 
 Machine draw_machine(std::uint64_t seed) {
@@ -231,7 +233,9 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
   if (ours) {
     const CompareResult &before = ours->steps.front().before, &after = ours->steps.back().after;
     run.changed = true;
-    run.made_worse = error_change(before, after, ours->steps.front().stage).worse();
+    const ErrorChange change =
+        error_change(crane.model.machine, before, after, ours->steps.front().stage);
+    run.made_worse = change.overall > kRefitMoves || !change.harmed.empty();
     run.energy_before = energy_error(before);
     run.energy_after = energy_error(after);
   }
@@ -243,7 +247,8 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
   const std::optional<ExtendResult> best = learned(truth);
   if (!best) return;
   const CompareResult& known = best->steps.back().after;
-  run.rms_ratio = error_change(known, ours ? ours->steps.back().after : best->steps.front().before,
+  run.rms_ratio = error_change(crane.model.machine, known,
+                               ours ? ours->steps.back().after : best->steps.front().before,
                                best->steps.front().stage)
                       .overall;
   if (!ours) run.energy_before = run.energy_after = energy_error(best->steps.front().before);

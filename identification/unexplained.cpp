@@ -261,7 +261,8 @@ std::optional<Leftover> leftover_of(const Evidence& evidence, std::size_t index,
   const VectorXd driver = driver_of(evidence, channel, rows);
   if (driver.size() > 0 && driver.squaredNorm() > 0.0) {
     Look driven = driven_look(driver, hat, y, fold, options.folds);
-    if (driven.ridge.explained > look.ridge.explained) look = std::move(driven);
+    if (driven.ridge.explained > std::max(look.ridge.explained, options.least_share_driven))
+      look = std::move(driven);
   }
   Leftover left;
   left.channel = index;
