@@ -1,22 +1,13 @@
 #include "identification/search_scores.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "identification/effect_proof.h"
+#include "identification/parallel.h"
 
 namespace sparflow {
 namespace {
-
-template <class F>
-void parallel(std::size_t count, const F& work) {
-  const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1U, 8U);
-  std::vector<std::jthread> pool;
-  for (unsigned t = 0; t < threads; ++t) {
-    pool.emplace_back([&, t] {
-      for (std::size_t i = t; i < count; i += threads) work(i);
-    });
-  }
-}
 
 std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
   std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });

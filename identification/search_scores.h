@@ -1,7 +1,5 @@
 #pragma once
 /// Likelihood gains of candidates beside or in the place of effects already found. Used by effect_search.cpp only.
-#include <algorithm>
-#include <thread>
 #include <vector>
 
 #include "identification/search_candidates.h"

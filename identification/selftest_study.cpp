@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
 
 #include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
+#include "identification/parallel.h"
 
 namespace sparflow {
 namespace {
@@ -16,17 +15,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-template <class F>
-void parallel(std::size_t count, const F& work) {
-  std::atomic<std::size_t> next = 0;
-  std::vector<std::jthread> pool;
-  for (unsigned t = 0; t < std::clamp(std::thread::hardware_concurrency(), 1U, 8U); ++t) {
-    pool.emplace_back([&] {
-      for (std::size_t i = next++; i < count; i = next++) work(i);
-    });
-  }
-}
 
 std::vector<ShownValue> shown(const EffectInfo& info, const std::vector<double>& values) {
   std::vector<ShownValue> out;

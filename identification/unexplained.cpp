@@ -8,8 +8,8 @@
 #include <numeric>
 #include <optional>
 #include <random>
-#include <thread>
 
+#include "identification/parallel.h"
 #include "identification/robust.h"
 #include "identification/unexplained_time.h"
 
@@ -300,16 +300,8 @@ std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& 
                                      const LeftoverOptions& options) {
   const std::size_t channels = evidence.channels.size();
   std::vector<std::optional<Leftover>> each(channels);
-  {
-    std::vector<std::jthread> pool;
-    const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1U, 8U);
-    for (unsigned t = 0; t < threads; ++t) {
-      pool.emplace_back([&, t] {
-        for (std::size_t c = t; c < channels; c += threads)
-          each[c] = leftover_of(evidence, c, fit.residual[c], options);
-      });
-    }
-  }
+  parallel(channels,
+           [&](std::size_t c) { each[c] = leftover_of(evidence, c, fit.residual[c], options); });
   std::vector<Leftover> found;
   for (std::optional<Leftover>& left : each) {
     if (left) found.push_back(std::move(*left));
