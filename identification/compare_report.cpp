@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/compare.h"
+#include "identification/report_numbers.h"
 #include "models/units.h"
 
 namespace sparflow {
@@ -190,11 +191,6 @@ std::string repeats_text(const CompareResult& result) {
   return text;
 }
 
-std::string number(double value) {
-  const double size = std::abs(value);
-  return fmt::format("{:.{}f}", value, size >= 100.0 ? 0 : size >= 10.0 ? 1 : 2);
-}
-
 }  // namespace
 
 std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
@@ -296,15 +292,15 @@ std::string compare_table(const CompareResult& result) {
     text +=
         fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", s.stage,
                     s.regime.empty() ? s.at : s.at + " " + s.regime, width,
-                    number(s.rmse / s.unit.si), number(s.bias / s.unit.si), s.unit.name,
+                    short_number(s.rmse / s.unit.si), short_number(s.bias / s.unit.si), s.unit.name,
                     std::isfinite(s.fit_percent) ? fmt::format("{:.1f}", s.fit_percent) : "-", s.n);
   }
   for (const EnergyScore& e : result.energy) {
     text += fmt::format("{:<12}{:<{}}  measured {} kJ, predicted {} kJ ({:+.2f} %)", "energy",
-                        e.pump, width, number(e.measured / 1e3), number(e.predicted / 1e3),
-                        100.0 * e.relative_error);
+                        e.pump, width, short_number(e.measured / 1e3),
+                        short_number(e.predicted / 1e3), 100.0 * e.relative_error);
     if (e.from_commands)
-      text += fmt::format(", from commands {} kJ", number(*e.from_commands / 1e3));
+      text += fmt::format(", from commands {} kJ", short_number(*e.from_commands / 1e3));
     text += fmt::format(" in {}\n", duration_text(e.duration));
   }
   text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";

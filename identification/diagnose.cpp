@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/effect_estimate.h"
+#include "identification/experiment.h"
 #include "identification/unexplained.h"
 #include "models/error.h"
 
@@ -81,16 +83,18 @@ DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOpti
   for (const ChannelGain& g : e.channels) {
     const EvidenceChannel& c = d.evidence.channels[g.channel];
     if (g.rmse_before < 1.02 * g.rmse_after) continue;
-    e.evidence.push_back(
-        fmt::format("{}: error {:.3g} -> {:.3g} {}{}", c.text, g.rmse_before / c.unit.si,
-                    g.rmse_after / c.unit.si, c.unit.name,
-                    std::isfinite(g.noise_floor)
-                        ? fmt::format(" (sensor noise {:.2g})", g.noise_floor / c.unit.si)
-                        : ""));
+    e.evidence.push_back(fmt::format(
+        "{}: error {} -> {} {}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
+        plain_number(g.rmse_after / c.unit.si, 3), c.unit.name,
+        std::isfinite(g.noise_floor)
+            ? fmt::format(" (sensor noise {})", plain_number(g.noise_floor / c.unit.si, 2))
+            : ""));
   }
   e.evidence.push_back(
-      fmt::format("motions left out of the estimate: likelihood gains {:.0f} +- {:.0f} nats",
-                  e.held_out_gain, e.held_out_error));
+      fmt::format("estimated on some motions, it predicts the others better: in {:.0f} % of the "
+                  "parts left out, "
+                  "by {:.1f} standard errors",
+                  100.0 * f.held_out_share, e.held_out_gain / std::max(e.held_out_error, 1e-300)));
   return e;
 }
 
@@ -113,9 +117,9 @@ Unexplained describe(const Evidence& evidence, const Leftover& left) {
   u.rmse = left.rms;
   u.noise_floor = c.noise_floor;
   u.unit = c.unit;
-  u.sentence =
-      fmt::format("{}: {:.2g} {} (RMS) that follow {} and that nothing in the catalogue explains",
-                  c.text, left.rms / c.unit.si, c.unit.name, fmt::join(left.depends_on, ", "));
+  u.sentence = fmt::format(
+      "{}: {} {} (RMS) that follow {} and that nothing in the catalogue explains", c.text,
+      plain_number(left.rms / c.unit.si, 2), c.unit.name, fmt::join(left.depends_on, ", "));
   return u;
 }
 
@@ -145,13 +149,54 @@ Unexplained describe_unnamed(const Diagnosis& d) {
   u.unit = c.unit;
   u.share = 1.0;
   u.sentence = fmt::format(
-      "{}: {:.2g} {} (RMS) that are no noise; {} comes nearest, but only with implausible "
+      "{}: {} {} (RMS) that are no noise; {} comes nearest, but only with implausible "
       "parameters",
-      c.text, u.rmse / c.unit.si, c.unit.name, key);
+      c.text, plain_number(u.rmse / c.unit.si, 2), c.unit.name, key);
   return u;
 }
 
+/// Values as a model that is extended with the effects gets them: all together, where the search added one by one.
+void settle_values(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                   const std::vector<MachineSignals>& references, std::vector<FoundEffect>& found) {
+  std::vector<EffectAt> wanted;
+  wanted.reserve(found.size());
+  for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
+  const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
+  const EffectEstimate all =
+      estimate_effects(model, wanted, suspects, references, {}, {}, &in_references);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    found[i].values = all.effects[i].values;
+    found[i].lower95 = all.effects[i].lower95;
+    found[i].upper95 = all.effects[i].upper95;
+  }
+}
+
+/// The motion that tells a set of effects apart; where none of the menu does, the catalogue's general word.
+Experiment next_experiment(const CraneModel& model, const Diagnosis& d, const DiagnosedEffect& e,
+                           const FoundEffect& found, double same_nats) {
+  const auto name = [&](const EffectAt& at) {
+    return effect_key(at.effect->info(), model.machine, at.at);
+  };
+  std::vector<EffectAt> rivals;
+  for (const auto& [rival, worse] : found.alternatives) {
+    if (worse < same_nats) rivals.push_back(rival);
+  }
+  const BetterMotion motion = better_motion(model, d.evidence, d.search.final, e.applied, rivals);
+  std::vector<std::string> apart;
+  for (const EffectAt& at : motion.words.empty() ? rivals : motion.apart) apart.push_back(name(at));
+  const std::string reason = fmt::format("tells {} from {}", e.key(), fmt::join(apart, ", "));
+  if (motion.words.empty()) return {reason, e.effect.effect->info().separated_by, 0.0, 0.0};
+  return {reason, motion.words, motion.nats_per_minute, motion.nats_here};
+}
+
 }  // namespace
+
+std::string plain_number(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
+  if (value == 0.0) return "0";
+  const int before = static_cast<int>(std::floor(std::log10(std::abs(value)))) + 1;
+  return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 9));
+}
 
 const char* verdict_name(Verdict verdict) {
   switch (verdict) {
@@ -173,7 +218,8 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   const auto start = std::chrono::steady_clock::now();
   Diagnosis d;
   if (progress) progress(0.02, "arranging the evidence");
-  d.evidence = collect_evidence(model, suspects, references);
+  const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
+  d.evidence = collect_evidence(model, suspects, references, &in_references);
   d.notes = d.evidence.notes;
   std::vector<EffectAt> candidates_here = options.candidates;
   if (candidates_here.empty()) {
@@ -207,6 +253,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
   }
+  if (!d.search.found.empty()) settle_values(model, suspects, references, d.search.found);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe(d, i, options.search));
   // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
@@ -219,15 +266,15 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown
                                    : Verdict::kNone;
-  for (const DiagnosedEffect& e : d.effects) {
+  for (std::size_t i = 0; i < d.effects.size(); ++i) {
+    const DiagnosedEffect& e = d.effects[i];
     if (e.rivals.empty()) continue;
+    if (progress) progress(0.95, "motions that would tell effects apart");
     std::vector<std::string> set = {e.key()};
     for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
-    if (!d.experiment) {
-      d.experiment = Experiment{fmt::format("tells {} apart", fmt::join(set, " and ")),
-                                e.effect.effect->info().separated_by};
-    }
     d.indistinguishable.push_back(std::move(set));
+    d.experiments.push_back(
+        next_experiment(model, d, e, d.search.found[i], options.search.same_nats));
   }
   // Found in the order of what they explain: that order stays; one of a set that is not even half sure goes last.
   std::stable_partition(d.effects.begin(), d.effects.end(),

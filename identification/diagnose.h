@@ -56,9 +56,15 @@ struct Unexplained {
   std::string sentence;  ///< where it is largest, in words
 };
 
+/// What to record next so that one set of effects is told apart.
 struct Experiment {
   std::string reason;  ///< which effects it would tell apart
-  std::string motion;  ///< what to record, in words
+  std::string motion;  ///< what to record, in words: joint, direction, speeds, load
+  /// Likelihood the wrong ones would lose in a minute of it, and in a minute of the logs at hand [nats]; 0 = no motion
+  /// of the menu was found to tell them apart and `motion` is the catalogue's general word on the effect.
+  double nats_per_minute = 0.0, nats_here = 0.0;
+
+  std::string sentence() const;  ///< with how many minutes of it, without a full stop
 };
 
 struct Diagnosis {
@@ -66,7 +72,7 @@ struct Diagnosis {
   double p_value = 1.0;                  ///< that nothing is missing
   std::vector<DiagnosedEffect> effects;  ///< most probable first; all found, see `named`
   std::vector<std::vector<std::string>> indistinguishable;
-  std::optional<Experiment> experiment;
+  std::vector<Experiment> experiments;  ///< one for each of these sets
   std::optional<Unexplained> unexplained;
   /// Largest share of what can be explained in a channel of a found effect that the catalogue does not explain.
   double leftover_share = 0.0;
@@ -84,9 +90,12 @@ struct Diagnosis {
   std::string json() const;      ///< keys of the contract and more
 };
 
+/// With at least `digits` figures and never an exponent: 12170, 0.0123.
+std::string plain_number(double value, int digits);
+
 /// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
 /// cause is not in the catalogue.
-inline constexpr double kLargestLeftoverShare = 0.2;
+inline constexpr double kLargestLeftoverShare = 0.1;
 
 struct DiagnoseOptions {
   SignalOptions signals;

@@ -5,13 +5,16 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/diagnose.h"
+#include "identification/report_numbers.h"
 
 namespace sparflow {
 namespace {
 
 std::string with_interval(const ParameterEstimate& p) {
-  return fmt::format("{} = {:.4g} {} ({:.4g} .. {:.4g})", p.name, p.value, p.unit, p.lower95,
-                     p.upper95);
+  const std::string unit = p.unit.empty() || p.unit == "-" ? "" : " " + p.unit;
+  if (p.lower95 == p.upper95) return fmt::format("{} = {:g}{}", p.name, p.value, unit);
+  return fmt::format("{} = {}{} ({} .. {})", p.name, plain_number(p.value, 4), unit,
+                     plain_number(p.lower95, 4), plain_number(p.upper95, 4));
 }
 
 std::string title_of(const DiagnosedEffect& e) {
@@ -20,10 +23,6 @@ std::string title_of(const DiagnosedEffect& e) {
 }
 
 /// JSON has no NaN.
-nlohmann::json number(double v) {
-  return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(nullptr);
-}
-
 nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
   nlohmann::json j = {
       {"id", e.id},
@@ -38,9 +37,9 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
   j["parameters"] = nlohmann::json::array();
   for (const ParameterEstimate& p : e.parameters) {
     j["parameters"].push_back({{"name", p.name},
-                               {"value", number(p.value)},
+                               {"value", json_number(p.value)},
                                {"unit", p.unit},
-                               {"ci95", {number(p.lower95), number(p.upper95)}}});
+                               {"ci95", {json_number(p.lower95), json_number(p.upper95)}}});
   }
   j["channels"] = nlohmann::json::array();
   for (const ChannelGain& g : e.channels) {
@@ -49,14 +48,14 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
                              {"unit", c.unit.name},
                              {"rmse_before", g.rmse_before / c.unit.si},
                              {"rmse_after", g.rmse_after / c.unit.si},
-                             {"noise_floor", number(g.noise_floor / c.unit.si)}});
+                             {"noise_floor", json_number(g.noise_floor / c.unit.si)}});
   }
   if (!e.channels.empty()) {
     const ChannelGain& g = e.channels.front();
     const FieldUnit& unit = evidence.channels[g.channel].unit;
     j["rmse_before"] = g.rmse_before / unit.si;
     j["rmse_after"] = g.rmse_after / unit.si;
-    j["rmse_noise_floor"] = number(g.noise_floor / unit.si);
+    j["rmse_noise_floor"] = json_number(g.noise_floor / unit.si);
     j["rmse_unit"] = unit.name;
   }
   j["rivals"] = nlohmann::json::array();
@@ -66,6 +65,15 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
 }
 
 }  // namespace
+
+std::string Experiment::sentence() const {
+  if (!(nats_per_minute > 0.0)) return fmt::format("to tell them apart, record: {}", motion);
+  // odds of e^4 = 55 are what the search itself takes for told apart
+  constexpr double kTold = 4.0;
+  const double minutes = std::max(1.0, std::ceil(kTold / nats_per_minute));
+  return fmt::format("record {:.0f} minute{} of: {} ({})", minutes, minutes > 1.0 ? "s" : "",
+                     motion, reason);
+}
 
 std::string Diagnosis::headline() const {
   switch (verdict) {
@@ -116,9 +124,10 @@ std::string Diagnosis::table() const {
   }
   if (!indistinguishable.empty()) {
     out += "\n  Cannot be told apart on these logs:\n";
-    for (const auto& set : indistinguishable)
-      out += fmt::format("      {}\n", fmt::join(set, "  or  "));
-    if (experiment) out += fmt::format("      record: {}\n", experiment->motion);
+    for (std::size_t i = 0; i < indistinguishable.size(); ++i) {
+      out += fmt::format("      {}\n", fmt::join(indistinguishable[i], "  or  "));
+      if (i < experiments.size()) out += fmt::format("        {}\n", experiments[i].sentence());
+    }
   }
   if (unexplained) out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
   if (effects.empty() && !ranking.empty()) {
@@ -151,9 +160,17 @@ std::string Diagnosis::json() const {
     }
   }
   j["indistinguishable"] = indistinguishable;
-  j["experiment"] =
-      experiment ? nlohmann::json{{"reason", experiment->reason}, {"motion", experiment->motion}}
-                 : nullptr;
+  nlohmann::json experiment_list = nlohmann::json::array();
+  for (const Experiment& e : experiments) {
+    nlohmann::json one = {{"reason", e.reason}, {"motion", e.motion}};
+    if (e.nats_per_minute > 0.0) {
+      one["nats_per_minute"] = e.nats_per_minute;
+      one["nats_per_minute_of_these_logs"] = e.nats_here;
+    }
+    experiment_list.push_back(std::move(one));
+  }
+  j["experiment"] = experiment_list.empty() ? nlohmann::json(nullptr) : experiment_list.front();
+  j["experiments"] = std::move(experiment_list);
   j["unexplained"] = nullptr;
   if (unexplained) {
     const Unexplained& u = *unexplained;

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/effect_intervals.h"
+#include "identification/effect_proof.h"
+#include "identification/search_candidates.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -13,8 +16,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNormal95 = 1.959964;
 /// The chord converges by the share of the non-linearity each time: a tenth for angles of a few degrees.
 constexpr int kChords = 3;
 constexpr int kSections = 10;  // of the golden section: a bracket shrinks to 1 %
@@ -74,9 +75,14 @@ class Estimator {
  public:
   Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted,
             const std::vector<MachineSignals>& suspects,
-            const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out)
+            const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
+            const std::vector<AppliedEffect>* in_references)
       : base_(model), suspects_(suspects), references_(references), leave_out_(leave_out) {
-    base_.effects.clear();
+    std::erase_if(base_.effects, [&](const AppliedEffect& a) {
+      return std::any_of(wanted.begin(), wanted.end(),
+                         [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
+    });
+    in_references_ = in_references != nullptr ? *in_references : base_.effects;
     evidence_ = collect(base_);
     active_.assign(evidence_.channels.size(), false);
     for (const EffectAt& e : wanted) add_design(model, e);
@@ -92,18 +98,21 @@ class Estimator {
       for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
       tell(0.3 + 0.3 * sweep, "parameters of the effects");
     }
-    EffectFit fit = joint_fit(true);
+    const double log_likelihood = likelihood();
+    std::vector<FoundEffect> found = with_intervals();
     const bool machine = std::any_of(designs_.begin(), designs_.end(), [](const EffectDesign& d) {
       return d.effect.effect->changes_machine();
     });
     for (int chord = 0; machine && chord < kChords; ++chord) {
-      if (!correct_linearisation(applied(fit))) break;
-      fit = joint_fit(true);
+      if (!correct_linearisation(found)) break;
+      found = with_intervals();
     }
     EffectEstimate out;
-    out.effects = applied(fit);
-    out.log_likelihood = fit.total();
-    add_intervals(fit, out.effects);
+    out.log_likelihood = log_likelihood;
+    for (const FoundEffect& f : found) {
+      const EffectAt& e = f.design.effect;
+      out.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
+    }
     add_notes(out);
     tell(1.0, "parameters of the effects");
     return out;
@@ -111,7 +120,7 @@ class Estimator {
 
  private:
   Evidence collect(const CraneModel& model) const {
-    Evidence evidence = collect_evidence(model, suspects_, references_);
+    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_);
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
     return evidence;
@@ -121,38 +130,21 @@ class Estimator {
     const auto known =
         std::find_if(model.effects.begin(), model.effects.end(),
                      [&](const AppliedEffect& a) { return a.effect == e.effect && a.at == e.at; });
-    std::vector<std::vector<double>> points = {{}};
-    if (known != model.effects.end()) {
-      points = {shape_of(*known)};
-    } else {
-      const auto shapes = static_cast<int>(shape_parameters(*e.effect).size());
-      for (int s = 0; s < shapes; ++s) {
-        std::vector<std::vector<double>> next;
-        for (const auto& point : points) {
-          for (const double v : e.effect->grid(evidence_.series[0], e.at, s)) {
-            next.push_back(point);
-            next.back().push_back(v);
-          }
-        }
-        points = std::move(next);
-      }
-    }
     std::vector<EffectDesign> acting;
-    for (auto& point : points) {
-      EffectDesign d = make_design(evidence_, e, std::move(point));
-      if (!d.acts()) continue;
-      for (std::size_t c = 0; c < active_.size(); ++c) active_[c] = active_[c] || d.touches(c);
-      acting.push_back(std::move(d));
+    if (known != model.effects.end()) {
+      acting.push_back(make_design(evidence_, e, shape_of(*known)));
+      if (!acting.back().acts()) acting.clear();
+    } else {
+      for (SearchCandidate& c : search_candidates(evidence_, {e})) acting = std::move(c.designs);
     }
     if (acting.empty()) {
-      std::string needs;
-      for (const std::string& s : e.effect->info().signals)
-        needs += (needs.empty() ? "" : ", ") + s;
       throw InputError(
           {}, effect_key(e.effect->info(), base_.machine, e.at),
-          fmt::format("these logs do not show it; it needs {}, and motions in which it "
-                      "acts",
-                      needs));
+          fmt::format("these logs do not show it; it needs {}, and motions in which it acts",
+                      fmt::join(e.effect->info().signals, ", ")));
+    }
+    for (const EffectDesign& d : acting) {
+      for (std::size_t c = 0; c < active_.size(); ++c) active_[c] = active_[c] || d.touches(c);
     }
     designs_.push_back(acting.front());
     grids_.push_back(std::move(acting));
@@ -163,13 +155,18 @@ class Estimator {
     for (const EffectDesign& d : designs_) out.push_back(&d);
     return out;
   }
-  EffectFit joint_fit(bool covariance) const {
+  double likelihood() const {
     FitControl control;
-    control.covariance = covariance;
     control.active = active_;  // the others say nothing about these effects
-    return fit_effects(evidence_, pointers(), nullptr, control);
+    return fit_effects(evidence_, pointers(), nullptr, control).total();
   }
-  double likelihood() const { return joint_fit(false).total(); }
+  /// As diagnosis does it: what it prints and what a model gets are one figure.
+  std::vector<FoundEffect> with_intervals() const {
+    std::vector<FoundEffect> found(designs_.size());
+    for (std::size_t d = 0; d < designs_.size(); ++d) found[d].design = designs_[d];
+    estimate_intervals(evidence_, found);
+    return found;
+  }
 
   void search_grids() {
     for (std::size_t d = 0; d < designs_.size(); ++d) {
@@ -212,7 +209,9 @@ class Estimator {
 
   void refine(std::size_t d) {
     const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
+    const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect);
     for (std::size_t s = 0; s < designs_[d].shape.size(); ++s) {
+      if (choices[s]) continue;  // the grid has all there are
       auto [a, b] = bracket(d, s);
       if (!(b > a)) continue;
       const double start = designs_[d].shape[s], at_start = likelihood();
@@ -236,25 +235,13 @@ class Estimator {
     }
   }
 
-  std::vector<AppliedEffect> applied(const EffectFit& fit) const {
-    std::vector<AppliedEffect> out;
-    Index k = 0;
-    for (const EffectDesign& d : designs_) {
-      AppliedEffect e{d.effect.effect, d.effect.at, {}, {}, {}};
-      std::size_t s = 0;
-      for (const EffectParameter& p : d.effect.effect->info().parameters) {
-        e.values.push_back(p.linear ? fit.theta[k++] : d.shape[s++]);
-      }
-      out.push_back(std::move(e));
-    }
-    return out;
-  }
-
   /// Data = measured - exact law + its linearisation, for effects that are another machine.
-  bool correct_linearisation(const std::vector<AppliedEffect>& effects) {
+  bool correct_linearisation(const std::vector<FoundEffect>& found) {
     CraneModel exact = base_;
-    for (const AppliedEffect& e : effects) {
-      if (e.effect->changes_machine()) exact.effects.push_back(e);
+    for (const FoundEffect& f : found) {
+      const EffectAt& e = f.design.effect;
+      if (e.effect->changes_machine())
+        exact.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
     }
     Evidence left = collect(exact);
     if (left.channels.size() != evidence_.channels.size()) return false;
@@ -262,14 +249,13 @@ class Estimator {
       EvidenceChannel& channel = left.channels[c];
       // a pose that the changed machine cannot take drops out of the rows: the linearised fit stands
       if (channel.sample != evidence_.channels[c].sample) return false;
-      if (!references_.empty() && channel.kind == EvidenceKind::kForce) undo_references(c, channel);
       for (std::size_t d = 0; d < designs_.size(); ++d) {
         if (!designs_[d].effect.effect->changes_machine() || !designs_[d].touches(c)) continue;
         VectorXd theta(designs_[d].linear);
         Index k = 0;
-        const auto& parameters = effects[d].effect->info().parameters;
+        const auto& parameters = designs_[d].effect.effect->info().parameters;
         for (std::size_t p = 0; p < parameters.size(); ++p) {
-          if (parameters[p].linear) theta[k++] = effects[d].values[p];
+          if (parameters[p].linear) theta[k++] = found[d].values[p];
         }
         channel.y += designs_[d].columns[c] * theta;
       }
@@ -280,49 +266,11 @@ class Estimator {
     return true;
   }
 
-  /// References are without the effects: their rows stay as they were.
-  void undo_references(std::size_t c, EvidenceChannel& channel) const {
-    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
-      if (static_cast<std::size_t>(channel.log[b]) < evidence_.suspects) continue;
-      const NoiseBlock& block = channel.blocks[b];
-      channel.y.segment(block.first, block.last - block.first) =
-          evidence_.channels[c].y.segment(block.first, block.last - block.first);
-    }
-  }
-
-  void add_intervals(const EffectFit& fit, std::vector<AppliedEffect>& effects) {
-    Index k = 0;
-    for (std::size_t d = 0; d < effects.size(); ++d) {
-      AppliedEffect& e = effects[d];
-      std::size_t s = 0;
-      for (std::size_t p = 0; p < e.values.size(); ++p) {
-        double deviation = kNaN;
-        if (e.effect->info().parameters[p].linear) {
-          deviation = std::sqrt(std::max(0.0, fit.covariance(k, k)));
-          ++k;
-        } else {
-          deviation = shape_deviation(d, s++);
-        }
-        e.lower95.push_back(e.values[p] - kNormal95 * deviation);
-        e.upper95.push_back(e.values[p] + kNormal95 * deviation);
-      }
-    }
-  }
-
-  /// From the curvature of the profile likelihood; NaN where it has no maximum inside.
-  double shape_deviation(std::size_t d, std::size_t s) {
-    const double x = designs_[d].shape[s];
-    const double h = 0.05 * (x != 0.0 ? std::abs(x) : 1.0);
-    const double l0 = likelihood();
-    const double curvature =
-        -(likelihood_at(d, s, x - h) - 2.0 * l0 + likelihood_at(d, s, x + h)) / (h * h);
-    return curvature > 0.0 && std::isfinite(curvature) ? 1.0 / std::sqrt(curvature) : kNaN;
-  }
-
   void add_notes(EffectEstimate& out) const {
     for (const AppliedEffect& e : out.effects) {
       for (std::size_t p = 0; p < e.values.size(); ++p) {
         const EffectParameter& parameter = e.effect->info().parameters[p];
+        if (parameter.choice) continue;
         const double span = parameter.upper - parameter.lower, v = e.values[p];
         if (v > parameter.lower + 1e-6 * span && v < parameter.upper - 1e-6 * span) continue;
         out.notes.push_back(fmt::format(
@@ -337,6 +285,7 @@ class Estimator {
   const std::vector<MachineSignals>& suspects_;
   const std::vector<MachineSignals>& references_;
   const std::vector<Mask>& leave_out_;
+  std::vector<AppliedEffect> in_references_;
   Evidence evidence_;
   std::vector<bool> active_;  // by channel: touched by an effect
   std::vector<EffectDesign> designs_;
@@ -348,11 +297,11 @@ class Estimator {
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 const std::vector<MachineSignals>& suspects,
                                 const std::vector<MachineSignals>& references,
-                                const std::vector<Mask>& leave_out,
-                                const SearchProgress& progress) {
+                                const std::vector<Mask>& leave_out, const SearchProgress& progress,
+                                const std::vector<AppliedEffect>* in_references) {
   if (wanted.empty()) return {};
   SPARFLOW_CHECK(!suspects.empty(), "effects need a log to be estimated from");
-  return Estimator(model, wanted, suspects, references, leave_out).run(progress);
+  return Estimator(model, wanted, suspects, references, leave_out, in_references).run(progress);
 }
 
 }  // namespace sparflow

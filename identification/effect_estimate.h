@@ -2,6 +2,8 @@
 /// Parameters of all effects of a model at once, from logs. Linear ones by the regression of effect_fit.h; the others
 /// over their grid, then by golden section on the profile likelihood. Effects that are another machine (masses,
 /// angles) are not quite linear: the regression is repeated with its error of linearisation added to the data.
+/// Values and intervals are those of effect_intervals.h. Diagnosis and extension both end here, so that they print
+/// the same figures for the same effects on the same logs.
 #include <string>
 #include <vector>
 
@@ -16,15 +18,18 @@ struct EffectEstimate {
 };
 
 /// @param model its margins start the pumps' demand; its effects are starting values of those that are wanted, and
-///        left out otherwise
+///        stay as they are otherwise
 /// @param wanted every effect to be estimated, once each
 /// @param suspects logs with the effects  @param references of the same machine without them; may be empty
 /// @param leave_out one mask a suspect log: samples that take no part; empty = none
+/// @param in_references effects that the references have, none of them wanted; null: those of the model that are not
+///        wanted
 /// @throws InputError when the logs do not hold what one of the effects shows in
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 const std::vector<MachineSignals>& suspects,
                                 const std::vector<MachineSignals>& references = {},
                                 const std::vector<Mask>& leave_out = {},
-                                const SearchProgress& progress = {});
+                                const SearchProgress& progress = {},
+                                const std::vector<AppliedEffect>* in_references = nullptr);
 
 }  // namespace sparflow

@@ -192,7 +192,12 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         if (m > 0) r -= columns[c] * theta;
         if (beta.size() > 0) r -= channel.baseline * beta;
         if (!last) {
-          fit.noise[c] = NoiseModel::estimate(r, channel.blocks);
+          // the better of what it was and what its moments say, so that no pass makes the fit worse
+          const NoiseModel& before = fit.noise[c];
+          const NoiseModel next = NoiseModel::estimate(r, channel.blocks);
+          const bool better = first_pass || next.log_likelihood(r, channel.blocks) >
+                                                before.log_likelihood(r, channel.blocks);
+          fit.noise[c] = better ? next : before.scaled_to(r, channel.blocks);
           if (control.ordinary) {
             fit.noise[c] = NoiseModel{};
             fit.noise[c].variance =

@@ -71,9 +71,10 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     f.could_be_nothing = could_be_nothing(effect, f.values, half);
     f.lower95 = f.upper95 = f.values;
     for (std::size_t k = 0; k < half.size(); ++k) {
-      const double whole = effect.info().parameters[k].choice
-                               ? 0.0
-                               : std::hypot(half[k], effect.info().form_error * f.values[k]);
+      const double whole =
+          effect.info().parameters[k].choice
+              ? 0.0
+              : std::hypot(half[k], kTwoSided95 * effect.info().form_error * f.values[k]);
       f.lower95[k] -= whole;
       f.upper95[k] += whole;
     }

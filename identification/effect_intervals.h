@@ -1,7 +1,11 @@
 #pragma once
 /// Values of found effects and how sure they are: all effects together by ordinary least squares on every channel they
-/// touch, sampling error robust against dependence inside motions, and what other laws of the same effect would
-/// have given (EffectInfo::form_error).
+/// touch. The interval is to hold, in 95 of 100 machines, what the text-book law would have to be set to so that it
+/// does what the machine does:
+///   half width = 1.96 sqrt(sampling variance + (form_error value)^2)
+/// The sampling variance is robust against dependence inside motions. form_error (EffectInfo) is the relative standard
+/// deviation by which other published laws of the same effect come out when all are fitted to the same data; it does
+/// not shrink with the log's length.
 #include <vector>
 
 #include "identification/effect_search.h"

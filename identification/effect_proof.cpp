@@ -31,47 +31,43 @@ VectorXd solve(MatrixXd n, const VectorXd& g) {
   return scale.cwiseProduct(n.ldlt().solve(scale.cwiseProduct(g)));
 }
 
+double size_where_it_acts(const VectorXd& action) {
+  return std::sqrt(action.array().pow(4).sum() / action.squaredNorm());
+}
+
 }  // namespace
 
 EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
                            const EffectFit& fit) {
   const Layout layout(designs);
-  const EffectDesign& d = *designs[index];
-  const VectorXd theta = fit.theta.segment(layout.first[index], d.linear);
+  const auto acts_in = [&](std::size_t k, std::size_t c) {
+    return VectorXd(designs[k]->columns[c] *
+                    fit.theta.segment(layout.first[k], designs[k]->linear));
+  };
   EffectAction action;
-  double whole = 0.0, left = 0.0;
+  double whole = 0.0, left = 0.0, fourth = 0.0, form = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
-    if (!d.touches(c)) continue;
+    if (!designs[index]->touches(c)) continue;
     const EvidenceChannel& channel = evidence.channels[c];
     const double noise = fit.noise[c].deviation();
-    VectorXd action_here = d.columns[c] * theta;
-    whole += action_here.squaredNorm() / (noise * noise);
-    if (channel.baseline.cols() > 0) {
-      action_here -= channel.baseline * channel.baseline.colPivHouseholderQr().solve(action_here);
-    }
-    const double squares = action_here.squaredNorm();
+    VectorXd own = acts_in(index, c);
+    whole += own.squaredNorm() / (noise * noise);
+    if (channel.baseline.cols() > 0)
+      own -= channel.baseline * channel.baseline.colPivHouseholderQr().solve(own);
+    const double squares = own.squaredNorm();
     left += squares / (noise * noise);
-    const double size_here =
-        squares > 0.0 ? std::sqrt(action_here.array().pow(4).sum() / squares) / noise : 0.0;
-    if (size_here > action.size) {
-      double largest = 0.0;
-      for (std::size_t k = 0; k < designs.size(); ++k) {
-        if (k == index || !designs[k]->touches(c)) continue;
-        VectorXd other =
-            designs[k]->columns[c] * fit.theta.segment(layout.first[k], designs[k]->linear);
-        const double sum = other.squaredNorm();
-        if (sum > 0.0)
-          largest = std::max(largest, std::sqrt(other.array().pow(4).sum() / sum) / noise);
-      }
-      action.share = largest > 0.0 ? size_here / largest : 1e9;
-    }
-    if (squares > 0.0) {
-      action.size =
-          std::max(action.size, std::sqrt(action_here.array().pow(4).sum() / squares) / noise);
+    if (!(squares > 0.0)) continue;
+    action.size = std::max(action.size, size_where_it_acts(own) / noise);
+    fourth += own.array().pow(4).sum() / std::pow(noise, 4);
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      if (k == index || !designs[k]->touches(c)) continue;
+      const VectorXd wrong = designs[k]->effect.effect->info().form_error / noise * acts_in(k, c);
+      form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
   }
   action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
+  if (form > 0.0) action.over_form = std::sqrt(fourth / form);
   return action;
 }
 

@@ -12,8 +12,9 @@ struct EffectAction {
   /// measures it where it acts: a lag shows for a second after a step and nowhere else.
   double size = 0.0;
   double absorbed = 0.0;  ///< 0..1, over all channels, each in units of its noise
-  double share =
-      1e9;  ///< of the largest other effect's size, in the channel where this one is largest
+  /// Where it acts, its size over what the other effects' laws are known to be wrong by there (their form_error
+  /// times their action): a small one beside a large one mends that one's form and is no effect of its own.
+  double over_form = 1e9;
 };
 
 /// @param index which of the designs

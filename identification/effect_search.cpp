@@ -5,20 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
-#include <thread>
 
 #include "identification/effect_intervals.h"
-#include "identification/effect_proof.h"
 #include "identification/null_gate.h"
-#include "identification/search_candidates.h"
+#include "identification/search_proofs.h"
+#include "identification/search_scores.h"
 
 namespace sparflow {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Diagnosis of the diagnosis: SPARFLOW_TRACE=1 prints every step to stderr.
 bool tracing() {
@@ -34,7 +28,8 @@ class Search {
         options_(options),
         progress_(progress),
         random_(options.seed),
-        candidates_(search_candidates(evidence, effects)) {}
+        candidates_(search_candidates(evidence, effects)),
+        scores_(evidence, candidates_) {}
 
   SearchResult run() {
     SearchResult result;
@@ -56,11 +51,7 @@ class Search {
   }
 
  private:
-  struct Score {
-    std::size_t candidate = 0;
-    std::size_t design = 0;
-    double gain = -1e300;  // penalised
-  };
+  using Score = CandidateScore;
 
   /// Adds the best candidate while it passes the gate and its proofs.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
@@ -68,7 +59,7 @@ class Search {
                        step < 3 * options_.max_effects;) {
       report(found.size(), "searching");
       const std::vector<const EffectDesign*> base = designs_of(found);
-      std::vector<Score> scores = score_all(base, current, found);
+      std::vector<Score> scores = scores_.beside(base, current, skipped(found));
       if (scores.empty()) break;
       if (result.ranking.empty()) {
         for (const Score& s : scores)
@@ -79,8 +70,8 @@ class Search {
       const NullGate gate =
           make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
       const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
-      const Score& best = plainer(scores);
-      const double p = gate.p_value(best.gain);
+      const Score& best = plainer(scores, gate, level);
+      const double p = gate.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(step, scores, gate);
       ++step;
       if (found.empty() && result.threshold == 0.0) {
@@ -89,13 +80,13 @@ class Search {
       }
       if (p >= level) break;
       FoundEffect f;
-      f.design = refined(base, candidates_[best.candidate], best.design, current);
+      f.design = scores_.refined(base, best, current);
       f.p_value = p;
       found.push_back(std::move(f));
       const EffectFit next = fit_effects(evidence_, designs_of(found), nullptr, final_control());
-      judge(found.back(), found.size() - 1, found, next);
+      judge(found, found.size() - 1, next);
       if (tracing()) trace_found(found, next);
-      const std::string why = why_not(found.back());
+      const std::string why = why_not_named(found.back(), options_);
       if (!why.empty()) {
         result.notes.push_back(
             fmt::format("{} fits best but is not named: {}", key(found.back().design.effect), why));
@@ -111,24 +102,32 @@ class Search {
     }
   }
 
-  /// The best candidate, or the plainer effect it contains when that explains most of the same: what is left then
-  /// decides whether the refinement is needed, and `prune` drops whichever becomes superfluous.
-  const Score& plainer(const std::vector<Score>& scores) const {
-    const EffectAt& best = candidates_[scores.front().candidate].effect;
+  /// The best candidate that passes the gate (the best of all if none does), or the plainer effect it contains when
+  /// that explains most of the same: what is left then decides whether the refinement is needed, and `prune` drops
+  /// whichever becomes superfluous.
+  const Score& plainer(const std::vector<Score>& scores, const NullGate& gate, double level) const {
+    const Score* first = &scores.front();
+    for (const Score& s : scores) {
+      if (gate.p_value(s.gain, s.candidate) < level) {
+        first = &s;
+        break;
+      }
+    }
+    const EffectAt& best = candidates_[first->candidate].effect;
     for (const Score& s : scores) {
       const EffectAt& e = candidates_[s.candidate].effect;
       if (e.at == best.at && e.effect->info().id == best.effect->info().refines &&
-          s.gain > 0.5 * scores.front().gain) {
+          s.gain > 0.5 * first->gain) {
         return s;
       }
     }
-    return scores.front();
+    return *first;
   }
 
   /// What the later ones turned into a remnant. @return whether any was dropped
   bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
-      std::string why = why_not(found[i]);
+      std::string why = why_not_named(found[i], options_);
       if (why.empty() && found[i].could_be_nothing) {
         why = "the interval of a parameter without which it is nothing holds zero";
       }
@@ -143,18 +142,6 @@ class Search {
       return true;
     }
     return false;
-  }
-
-  template <class F>
-  static void parallel(std::size_t count, const F& work) {
-    const unsigned threads = std::max(1U, std::min(std::thread::hardware_concurrency(), 8U));
-    std::vector<std::thread> pool;
-    for (unsigned t = 0; t < threads; ++t) {
-      pool.emplace_back([&, t] {
-        for (std::size_t i = t; i < count; i += threads) work(i);
-      });
-    }
-    for (std::thread& t : pool) t.join();
   }
 
   void report(std::size_t found, const std::string& what) const {
@@ -181,160 +168,22 @@ class Search {
   static FitControl final_control() {
     FitControl c;
     c.keep_residuals = true;
+    c.noise_passes =
+        12;  // to the end: what is left of the way would be taken for another effect's gain
     c.covariance = true;
     return c;
   }
 
-  /// Channels a design touches, and all that share a parameter with them.
-  std::vector<bool> connected(const std::vector<const EffectDesign*>& designs,
-                              const EffectDesign& d) const {
-    std::vector<bool> active(evidence_.channels.size());
-    for (std::size_t c = 0; c < active.size(); ++c) active[c] = d.touches(c);
-    for (bool grown = true; grown;) {
-      grown = false;
-      for (const EffectDesign* other : designs) {
-        bool meets = false, outside = false;
-        for (std::size_t c = 0; c < active.size(); ++c) {
-          meets = meets || (other->touches(c) && active[c]);
-          outside = outside || (other->touches(c) && !active[c]);
-        }
-        if (!meets || !outside) continue;
-        grown = true;
-        for (std::size_t c = 0; c < active.size(); ++c) active[c] = active[c] || other->touches(c);
-      }
-    }
-    return active;
+  /// Refused before, or found already.
+  std::vector<bool> skipped(const std::vector<FoundEffect>& found) const {
+    std::vector<bool> skip = refused_;
+    for (std::size_t k = 0; k < skip.size(); ++k)
+      skip[k] = skip[k] || is_in(found, candidates_[k].effect);
+    return skip;
   }
 
-  /// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
-  double gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
-              const EffectFit& current, const std::vector<bool>& also = {},
-              bool only_there = false) const {
-    FitControl c;
-    c.active = connected(base, d);
-    for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
-    c.noise_passes = 2;
-    std::vector<const EffectDesign*> with;
-    for (const EffectDesign* b : base) {
-      bool needed = false;
-      for (std::size_t k = 0; k < c.active.size(); ++k)
-        needed = needed || (b->touches(k) && c.active[k]);
-      if (needed) with.push_back(b);
-    }
-    with.push_back(&d);
-    const EffectFit fit = fit_effects(evidence_, with, &current, c);
-    if (!only_there) return fit.total() - current.total();
-    double sum = 0.0;  // a rival must explain the same evidence, not other evidence as much
-    for (std::size_t k = 0; k < also.size(); ++k) {
-      if (also[k]) sum += fit.log_likelihood[k] - current.log_likelihood[k];
-    }
-    return sum;
-  }
-
-  std::vector<Score> score_all(const std::vector<const EffectDesign*>& base,
-                               const EffectFit& current,
-                               const std::vector<FoundEffect>& found) const {
-    std::vector<Score> scores(candidates_.size());
-    parallel(candidates_.size(), [&](std::size_t i) {
-      scores[i].candidate = i;
-      if (refused_[i] || is_in(found, candidates_[i].effect)) return;
-      for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
-        const double g = gain(base, candidates_[i].designs[k], current) - candidates_[i].penalty;
-        if (g > scores[i].gain) scores[i] = {i, k, g};
-      }
-    });
-    std::erase_if(scores, [](const Score& s) { return s.gain <= -1e299; });
-    std::sort(scores.begin(), scores.end(),
-              [](const Score& a, const Score& b) { return a.gain > b.gain; });
-    return scores;
-  }
-
-  /// Nonlinear parameters between grid points, by golden section in each in turn.
-  EffectDesign refined(const std::vector<const EffectDesign*>& base,
-                       const SearchCandidate& candidate, std::size_t best,
-                       const EffectFit& current) const {
-    EffectDesign d = candidate.designs[best];
-    if (d.shape.empty()) return d;
-    double at_best = gain(base, d, current);
-    const std::vector<bool> choices = shape_choices(*d.effect.effect);
-    for (std::size_t k = 0; k < d.shape.size(); ++k) {
-      if (choices[k]) continue;
-      std::vector<double> values;
-      for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
-      std::sort(values.begin(), values.end());
-      values.erase(std::unique(values.begin(), values.end()), values.end());
-      const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
-      if (here == values.end()) continue;
-      double lo = here == values.begin() ? *here : *(here - 1);
-      double hi = here + 1 == values.end() ? *here : *(here + 1);
-      const double golden = 0.381966;
-      for (int i = 0; i < 14 && hi - lo > 2e-3 * std::max(std::abs(hi), 1e-12); ++i) {
-        const bool right = hi - d.shape[k] > d.shape[k] - lo;
-        EffectDesign trial = d;
-        const double x = right ? d.shape[k] + golden * (hi - d.shape[k])
-                               : d.shape[k] - golden * (d.shape[k] - lo);
-        std::vector<double> shape = d.shape;
-        shape[k] = x;
-        trial = make_design(evidence_, d.effect, shape);
-        const double g = trial.acts() ? gain(base, trial, current) : -1e300;
-        if (g > at_best) {
-          (right ? lo : hi) = d.shape[k];
-          d = std::move(trial);
-          at_best = g;
-        } else {
-          (right ? hi : lo) = x;
-        }
-      }
-    }
-    return d;
-  }
-
-  void judge(FoundEffect& f, std::size_t index, const std::vector<FoundEffect>& found,
-             const EffectFit& fit) const {
-    const std::vector<const EffectDesign*> designs = designs_of(found);
-    const EffectAction action = effect_action(evidence_, designs, index, fit);
-    f.size = action.size;
-    f.absorbed = action.absorbed;
-    f.share = action.share;
-    f.at_bound = false;
-    Index first = 0;
-    for (std::size_t i = 0; i < index; ++i) first += found[i].design.linear;
-    for (Index k = 0; k < f.design.linear; ++k) {
-      const double v = fit.theta[first + k], lo = f.design.lower[static_cast<std::size_t>(k)];
-      const double hi = f.design.upper[static_cast<std::size_t>(k)];
-      const double edge = 1e-6 * (hi - lo);
-      f.at_bound = f.at_bound || v > hi - edge || (lo > 0.0 && v < lo + edge);
-    }
-    const HeldOutGain held = held_out_gain(evidence_, designs, index, fit, options_.folds);
-    f.held_out = held.gain;
-    f.held_out_error = held.error;
-    f.held_out_share = held.improved;
-  }
-
-  std::string why_not(const FoundEffect& f) const {
-    const EffectStage stage = f.design.effect.effect->info().stage;
-    const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
-    if (behind_process && f.absorbed > options_.largest_absorbed) {
-      return fmt::format(
-          "what is learned (pressures, margins, gains) can imitate {:.0f} % of it; a reference log "
-          "would tell",
-          100.0 * f.absorbed);
-    }
-    if (f.size < options_.smallest_effect) {
-      return fmt::format("it is {:.2f} times the noise where it acts, too small to matter", f.size);
-    }
-    if (f.at_bound) return "its parameter would lie at the edge of what is plausible";
-    if (f.share < options_.smallest_share) {
-      return fmt::format(
-          "it is {:.0f} % of another effect in the same place: it only mends that one's form",
-          100.0 * f.share);
-    }
-    // one standard error beyond zero, or (a few large steps carry all the evidence) better nearly everywhere
-    if (f.held_out <= f.held_out_error && !(f.held_out > 0.0 && f.held_out_share > 0.79)) {
-      return fmt::format("on motions left out it gains {:.1f} +- {:.1f} nats, not proven",
-                         f.held_out, f.held_out_error);
-    }
-    return {};
+  void judge(std::vector<FoundEffect>& found, std::size_t index, const EffectFit& fit) const {
+    judge_effect(evidence_, options_, fit, designs_of(found), index, found[index]);
   }
 
   double penalty_of(const EffectAt& e) const {
@@ -373,7 +222,7 @@ class Search {
       }
       if (!swapped) break;
     }
-    for (std::size_t i = 0; i < found.size(); ++i) judge(found[i], i, found, current);
+    for (std::size_t i = 0; i < found.size(); ++i) judge(found, i, current);
   }
 
   /// @return whether a rival took the place of found[i]
@@ -381,36 +230,19 @@ class Search {
     FoundEffect& f = found[i];
     const std::vector<const EffectDesign*> others = designs_of(found, i);
     const EffectFit without = fit_effects(evidence_, others, &current, {});
-    std::vector<bool> touched(evidence_.channels.size());
-    for (std::size_t c = 0; c < touched.size(); ++c) touched[c] = f.design.touches(c);
-    std::vector<Score> scores(candidates_.size());
-    parallel(candidates_.size(), [&](std::size_t k) {
-      scores[k].candidate = k;
-      const SearchCandidate& c = candidates_[k];
-      if (refused_[k] || is_in(found, c.effect)) return;
-      for (std::size_t d = 0; d < c.designs.size(); ++d) {
-        bool meets = false;
-        for (std::size_t ch = 0; ch < touched.size(); ++ch)
-          meets = meets || (touched[ch] && c.designs[d].touches(ch));
-        if (!meets) return;
-        const double g = gain(others, c.designs[d], without, touched, true) - c.penalty;
-        if (g > scores[k].gain) scores[k] = {k, d, g};
-      }
-    });
-    const double own = gain(others, f.design, without, touched, true) - penalty_of(f.design.effect);
+    const std::vector<Score> scores = scores_.instead_of(f.design, others, without, skipped(found));
+    const double own =
+        scores_.gain_instead(f.design, f.design, others, without) - penalty_of(f.design.effect);
     f.gain = own;
-    std::sort(scores.begin(), scores.end(),
-              [](const Score& a, const Score& b) { return a.gain > b.gain; });
-    if (scores.front().gain > own + 1.0) {
+    if (!scores.empty() && scores.front().gain > own + 1.0) {
       FoundEffect rival;
-      rival.design =
-          refined(others, candidates_[scores.front().candidate], scores.front().design, without);
+      rival.design = scores_.refined(others, scores.front(), without);
       rival.p_value = f.p_value;
       std::vector<FoundEffect> trial = found;
       trial[i] = rival;
       const EffectFit fit = fit_effects(evidence_, designs_of(trial), nullptr, final_control());
-      judge(trial[i], i, trial, fit);
-      if (why_not(trial[i]).empty() && fit.total() > current.total()) {
+      judge(trial, i, fit);
+      if (why_not_named(trial[i], options_).empty() && fit.total() > current.total()) {
         if (tracing())
           fmt::print(stderr, "  {} takes the place of {}\n", key(rival.design.effect),
                      key(f.design.effect));
@@ -458,6 +290,7 @@ class Search {
   const SearchProgress& progress_;
   std::mt19937_64 random_;
   std::vector<SearchCandidate> candidates_;
+  SearchScores scores_;
   std::vector<bool> refused_;  // candidates that failed a proof in this search
 };
 

@@ -17,8 +17,9 @@ struct SearchOptions {
   int simulations = 300;  ///< of the null, for the gate
   /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
   double smallest_effect = 0.15;
-  /// A further effect smaller than this share of the largest in the same channel only mends that one's form.
-  double smallest_share = 0.02;
+  /// A further effect smaller than this many times what the others' laws may be wrong by (EffectAction::over_form)
+  /// only mends their form.
+  double smallest_over_form = 1.5;
   double largest_absorbed =
       0.9;  ///< an effect that learned laws imitate to more than this share is not named
   double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart
@@ -37,7 +38,8 @@ struct FoundEffect {
   double held_out = 0.0,
          held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
   double held_out_share = 0.0;  ///< of the parts left out in turn that it improved
-  double share = 1.0;  ///< its size / the largest other effect's in the channel where it is largest
+  double over_form =
+      1e9;  ///< its size / what the other effects' laws may be wrong by where it acts
   /// The 95 % interval (sampling error alone) of every linear parameter holds zero, or, where the effect refines a
   /// plainer one, that of a nonlinear parameter does: the plainer effect, or none, would do.
   bool could_be_nothing = false;

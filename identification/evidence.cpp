@@ -289,8 +289,27 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   return result;
 }
 
+std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
+                                                 const std::vector<MachineSignals>& references) {
+  const auto is_reference = [&](const DataSource& d) {
+    return d.use == "train" &&
+           std::any_of(references.begin(), references.end(),
+                       [&](const MachineSignals& r) { return r.sha256 == d.sha256; });
+  };
+  std::vector<AppliedEffect> out = model.effects;
+  std::erase_if(out, [&](const AppliedEffect& e) {
+    const auto step =
+        std::find_if(model.steps.rbegin(), model.steps.rend(),
+                     [&](const ModelStep& s) { return s.added == e.key(model.machine); });
+    return step != model.steps.rend() &&
+           std::none_of(step->data.begin(), step->data.end(), is_reference);
+  });
+  return out;
+}
+
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                          const std::vector<MachineSignals>& references) {
+                          const std::vector<MachineSignals>& references,
+                          const std::vector<AppliedEffect>* in_references) {
   Evidence e;
   const Machine& machine = model.machine;
   std::vector<const MachineSignals*> signals;
@@ -320,7 +339,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
   // what the model's own effects already explain
   const auto known = [&](std::size_t log, EvidenceKind kind, int index) {
     VectorXd sum = VectorXd::Zero(e.series[log].samples());
-    for (const AppliedEffect& effect : model.effects) {
+    const bool reference = log >= e.suspects && in_references != nullptr;
+    for (const AppliedEffect& effect : reference ? *in_references : model.effects) {
       const VectorXd one = effect_series(effect, e.series[log], kind, index);
       if (one.size() > 0) sum += one;
     }

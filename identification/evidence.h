@@ -58,7 +58,8 @@ struct Evidence {
 
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
-                                   const std::vector<MachineSignals>&);
+                                   const std::vector<MachineSignals>&,
+                                   const std::vector<AppliedEffect>*);
   struct Kernels {  // of one log: low-passes for forces, speeds and pressures, centred, odd length
     Eigen::VectorXd force, speed, pressure;
   };
@@ -67,8 +68,15 @@ struct Evidence {
 };
 
 /// @param model its effects are in every channel's model part; its margins start the pump's demand
+/// @param in_references effects that the references have; null: the model's
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                          const std::vector<MachineSignals>& references = {});
+                          const std::vector<MachineSignals>& references = {},
+                          const std::vector<AppliedEffect>* in_references = nullptr);
+
+/// Effects of the model that the machine had already when the references were recorded: all but those that a step of
+/// the model's record added from other logs.
+std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
+                                                 const std::vector<MachineSignals>& references);
 
 /// "force of boom", "return pressure of jib while extending"
 std::string evidence_text(EvidenceKind kind, const std::string& at);

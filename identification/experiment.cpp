@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "identification/effect_power.h"
-#include "identification/selftest_size.h"
+#include "identification/search_candidates.h"
 
 namespace sparflow {
 namespace {
@@ -13,30 +13,40 @@ namespace {
 constexpr double kMinute = 60.0;
 constexpr double kFallbackLoad = 500.0;  ///< [kg] when the logs carry none
 
-/// What the wrong one of two effects would lose on this evidence, the smaller of both ways. [nats]
-double separation(const Evidence& evidence, const EffectFit& fit, const EffectAt& one,
-                  const EffectAt& other) {
-  const std::vector<SearchCandidate> pair = search_candidates(evidence, {one, other});
-  if (pair.empty()) return 0.0;
+/// Less than what tells effects apart in a quarter of an hour is no advice.
+constexpr double kLeastNats = 0.3;
+/// Nor is a motion hardly better than those that were recorded.
+constexpr double kBetterThanHere = 1.5;
+
+/// The found effect on this evidence; no columns where it does not act.
+EffectDesign design_of(const Evidence& evidence, const AppliedEffect& found,
+                       Eigen::VectorXd& theta) {
+  const auto& parameters = found.effect->info().parameters;
+  std::vector<double> linear, shape;
+  for (std::size_t p = 0; p < parameters.size(); ++p)
+    (parameters[p].linear ? linear : shape).push_back(found.values[p]);
+  theta =
+      Eigen::Map<const Eigen::VectorXd>(linear.data(), static_cast<Eigen::Index>(linear.size()));
+  return make_design(evidence, {found.effect, found.at}, std::move(shape));
+}
+
+/// By rival: what it would lose on this evidence if the found effect were true. [nats]
+std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
+                                const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
+  std::vector<double> nats(rivals.size(), 0.0);
+  Eigen::VectorXd theta;
+  const EffectDesign design = design_of(evidence, found, theta);
+  if (!design.acts()) return nats;
   const PowerStudy study(evidence, fit, 1);
-  std::vector<std::vector<ProjectedDesign>> projected;
-  for (const SearchCandidate& c : pair) {
-    projected.emplace_back();
-    for (const EffectDesign& d : c.designs) projected.back().push_back(study.project(d));
-  }
-  double least = 1e300;
-  for (std::size_t i = 0; i < pair.size(); ++i) {
-    const EffectSize size = size_effect(pair[i]);
-    const Signature s = signature(projected[i][size.typical], size.theta);
-    double best = study.gain(s);  // a rival without action here explains nothing
-    for (std::size_t k = 0; k < pair.size(); ++k) {
-      if (k == i) continue;
-      for (const ProjectedDesign& p : projected[k])
-        best = std::min(best, study.gain(left_by(s, p)));
+  const Signature truth = signature(study.project(design), theta);
+  for (std::size_t r = 0; r < rivals.size(); ++r) {
+    nats[r] = study.gain(truth);  // a rival without action here explains nothing
+    for (const SearchCandidate& c : search_candidates(evidence, {rivals[r]})) {
+      for (const EffectDesign& d : c.designs)
+        nats[r] = std::min(nats[r], study.gain(left_by(truth, study.project(d))));
     }
-    least = std::min(least, best);
   }
-  return least;
+  return nats;
 }
 
 /// The noise of the same channels in the user's logs; a channel that is not measured there is dropped.
@@ -58,8 +68,9 @@ EffectFit noise_of(Evidence& motion, const Evidence& evidence, const EffectFit& 
 }  // namespace
 
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const EffectAt& one, const EffectAt& other) {
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
   BetterMotion best;
+  if (rivals.empty()) return best;
   double heaviest = 0.0, minutes = 0.0;
   for (std::size_t k = 0; k < evidence.suspects; ++k) {
     const MachineSeries& s = evidence.series[k];
@@ -68,31 +79,55 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
     minutes += s.step * static_cast<double>(s.samples()) / 60.0;
   }
   if (heaviest < 50.0) heaviest = kFallbackLoad;
-  best.nats_here = separation(evidence, fit, one, other) / std::max(minutes, 1e-3);
-  CraneModel plain =
-      model;  // the motion is judged by what the two effects do beyond the machine file
+  const std::vector<MotionRecipe> menu = motion_menu(model.machine, heaviest);
+  CraneModel plain = model;  // judged by what the effects do beyond the machine file
   plain.effects.clear();
   SignalOptions options;
   options.smoothing.window_s = evidence.window;
-  for (const MotionRecipe& recipe : motion_menu(model.machine, heaviest)) {
+  std::vector<std::vector<double>> nats(menu.size());  // [motions][rivals] a minute
+  for (std::size_t m = 0; m < menu.size(); ++m) {
+    nats[m].assign(rivals.size(), 0.0);
     Evidence motion;
     try {
       motion = collect_evidence(
           plain, {make_signals(plain.machine,
-                               synthesise_motion(plain, recipe, evidence.series[0].step, kMinute),
+                               synthesise_motion(plain, menu[m], evidence.series[0].step, kMinute),
                                options)});
     } catch (const std::domain_error&) {
       continue;  // leads through poses the machine cannot take
     }
     const EffectFit noise = noise_of(motion, evidence, fit);
-    if (motion.channels.empty()) continue;
-    const double nats = separation(motion, noise, one, other);
-    if (nats <= best.nats_per_minute) continue;
-    best.nats_per_minute = nats;
-    best.words = recipe.words;
+    if (!motion.channels.empty()) nats[m] = separations(motion, noise, found, rivals);
   }
-  // less than what tells them apart in a quarter of an hour, or no better than what was recorded: no advice
-  if (best.nats_per_minute < 0.3 || best.nats_per_minute < 1.5 * best.nats_here) best.words.clear();
+  std::vector<double> here = separations(evidence, fit, found, rivals);
+  for (double& h : here) h /= std::max(minutes, 1e-3);
+  const auto worth = [&](std::size_t m, std::size_t r) {
+    return nats[m][r] >= kLeastNats && nats[m][r] >= kBetterThanHere * here[r];
+  };
+  // rivals that no motion separates are left aside, the best motion is that for the hardest of the others
+  std::vector<std::size_t> open;
+  for (std::size_t r = 0; r < rivals.size(); ++r) {
+    for (std::size_t m = 0; m < menu.size(); ++m) {
+      if (!worth(m, r)) continue;
+      open.push_back(r);
+      break;
+    }
+  }
+  for (std::size_t m = 0; m < menu.size() && !open.empty(); ++m) {
+    double least = nats[m][open.front()], least_here = here[open.front()];
+    std::vector<EffectAt> apart;
+    for (const std::size_t r : open) {
+      least = std::min(least, nats[m][r]);
+      least_here = std::min(least_here, here[r]);
+      if (worth(m, r)) apart.push_back(rivals[r]);
+    }
+    const bool more = apart.size() > best.apart.size();
+    if (apart.empty() || apart.size() < best.apart.size()) continue;
+    if (!more && least <= best.nats_per_minute) continue;
+    best = {menu[m].words, least, least_here, std::move(apart)};
+  }
+  if (best.words.empty() && !here.empty())
+    best.nats_here = *std::min_element(here.begin(), here.end());
   return best;
 }
 

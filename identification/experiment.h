@@ -1,7 +1,7 @@
 #pragma once
-/// The motion that would tell two effects apart: a menu of motions an operator can drive, each synthesised on the
-/// machine inside its limits, both effects put on it at their typical size, and what neither could take over from the
-/// other measured in the noise of the user's own channels.
+/// The motion that would tell an effect from others that explain the same logs: a menu of motions an operator can
+/// drive, each synthesised on the machine inside its limits, the effect put on it at the size that was found, and
+/// what its rivals, refitted, could not take over, measured in the noise of the user's own channels.
 #include <string>
 #include <vector>
 
@@ -37,12 +37,15 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
 
 struct BetterMotion {
   std::string words;             ///< empty: no motion of the menu tells them apart
-  double nats_per_minute = 0.0;  ///< likelihood the wrong one of the two would lose
+  double nats_per_minute = 0.0;  ///< likelihood that the best of the rivals would lose
   double nats_here = 0.0;        ///< the same on the user's own logs, per minute
+  std::vector<EffectAt>
+      apart;  ///< the rivals it tells the effect from: all, or those that any motion does
 };
 
 /// @param fit gives the noise of the evidence's channels; what is not measured there is not counted on either
+/// @param found with its values  @param rivals that explain the evidence as well
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const EffectAt& one, const EffectAt& other);
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals);
 
 }  // namespace sparflow

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
+#include <tuple>
 
 #include "identification/extend_workshop.h"
 #include "models/error.h"
@@ -15,9 +15,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Refitting with other data around moves centres and length-scales, and with them errors by some tenths of a
-/// percent, up or down.
-constexpr double kRefitMoves = 1.005;
+/// How often `improve` may try what it then does not keep: each time costs a diagnosis.
+constexpr std::size_t kMostRejected = 8;
 
 bool same(const EffectAt& a, const EffectAt& b) { return a.effect == b.effect && a.at == b.at; }
 
@@ -43,24 +42,40 @@ ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std:
   return record;
 }
 
+/// Where an effect acts, as scores call it; empty: everywhere in its stage.
+std::string place_name(const Machine& machine, const EffectAt& e) {
+  const auto i = static_cast<std::size_t>(e.at);
+  if (e.at < 0) return "";
+  if (e.effect->info().place == EffectPlace::kCylinder) return machine.cylinders[i].name;
+  if (e.effect->info().place == EffectPlace::kPump) return machine.pumps[i].name;
+  return "";
+}
+
+void set_errors(const Workshop& workshop, const Machine& machine, const EffectAt& e,
+                const CompareResult& before, const CompareResult& after, ExtendStep& step) {
+  step.stage = effect_stage_name(e.effect->info().stage);
+  step.before = before;
+  step.after = after;
+  step.judged_on = workshop.judged_on();
+  step.change = error_change(machine, before, after, step.stage, place_name(machine, e));
+}
+
 /// Adds one effect to `current`. @return the step and the model with it, which the caller may keep or not
 std::pair<ExtendStep, Judged> one_step(const Workshop& workshop, const Judged& current,
-                                       const EffectAt& add, std::vector<std::string>& notes,
+                                       const EffectAt& add, Others others,
+                                       std::vector<std::string>& notes,
                                        const SearchProgress& progress) {
   const Machine& machine = current.model.machine;
   const EffectInfo& info = add.effect->info();
   std::vector<EffectAt> effects = places_of(current.model.effects);
   effects.push_back(add);
-  Judged next = workshop.with(current.model, effects, progress, &notes);
+  Judged next = workshop.with(current, effects, others, progress, &notes);
   ExtendStep step;
   step.added = effect_key(info, machine, add.at);
   step.title = effect_title(info, machine, add.at);
-  step.stage = effect_stage_name(info.stage);
   step.effect = next.model.effects.back();
-  step.before = current.error;
-  step.after = next.error;
-  step.judged_on = workshop.judged_on();
-  step.change = error_change(step.before, step.after, step.stage);
+  step.others_kept = others == Others::kKept;
+  set_errors(workshop, machine, add, current.error, next.error, step);
   return {std::move(step), std::move(next)};
 }
 
@@ -90,6 +105,21 @@ std::string percent_text(double ratio) {
                       : fmt::format("{:.1f} % larger", 100.0 * (ratio - 1.0));
 }
 
+/// What speaks against a step, as the end of a sentence that begins with it.
+std::string against(const ExtendStep& step) {
+  if (step.change.own > 1.0) {
+    return fmt::format("where it acts the error on the {} is {} with it", step.judged_on,
+                       percent_text(step.change.own));
+  }
+  if (step.change.harmed.empty()) {
+    return fmt::format("the error on the {} is {} on the whole with it", step.judged_on,
+                       percent_text(step.change.overall));
+  }
+  std::vector<std::string> harm;
+  for (const HarmedError& h : step.change.harmed) harm.push_back(h.sentence);
+  return fmt::format("on the {} {}", step.judged_on, fmt::join(harm, ", "));
+}
+
 /// A diagnosis together with the model it speaks of: its evidence refers to that model's machine.
 std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
                                                const std::vector<Log>& logs,
@@ -106,8 +136,17 @@ std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
   return {kept, &kept->diagnosis};
 }
 
-/// What a diagnosis asks for, that which explains most first. Where logs cannot tell several effects apart, the
-/// one that explains them best stands for all.
+/// How many times smaller an effect makes the error of the channel where it does most, all others in.
+double times_smaller(const DiagnosedEffect& e) {
+  double most = 1.0;
+  for (const ChannelGain& c : e.channels)
+    most = std::max(most, c.rmse_before / std::max(c.rmse_after, 1e-300));
+  return most;
+}
+
+/// What a diagnosis asks for, that which takes most of an error away first: a likelihood counts what is sharp for
+/// more than what is large. Where logs cannot tell several effects apart, the one that explains them best stands
+/// for all.
 std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel& model) {
   std::vector<const DiagnosedEffect*> out;
   if (d.verdict == Verdict::kBadData || d.verdict == Verdict::kNone) return out;
@@ -117,8 +156,9 @@ std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel&
     });
     if (!has && (d.verdict == Verdict::kMissing || e.probability >= 0.5)) out.push_back(&e);
   }
-  std::stable_sort(out.begin(), out.end(),
-                   [](const auto* a, const auto* b) { return a->gain > b->gain; });
+  std::stable_sort(out.begin(), out.end(), [](const auto* a, const auto* b) {
+    return times_smaller(*a) > times_smaller(*b);
+  });
   return out;
 }
 
@@ -146,29 +186,49 @@ std::string why_stopped(const Diagnosis& d) {
   return {};
 }
 
-}  // namespace
-
-bool ErrorChange::worse() const { return overall > kRefitMoves || own_stage > kRefitMoves; }
-
-ErrorChange error_change(const CompareResult& before, const CompareResult& after,
-                         const std::string& stage) {
-  double all = 0.0, all_n = 0.0, own = 0.0, own_n = 0.0;
-  for (const StageScore& b : before.scores) {
-    const StageScore* a = after.find(b.stage, b.at, b.regime);
-    if (a == nullptr || a->n == 0 || b.n == 0 || !(b.rmse > 0.0) || !(a->rmse > 0.0)) continue;
-    const double n = 0.5 * static_cast<double>(a->n + b.n);
-    const double change = std::log(a->rmse / b.rmse);
-    all += n * change;
-    all_n += n;
-    if (b.stage != stage) continue;
-    own += n * change;
-    own_n += n;
+/// What explains the same evidence within what the search calls a rival.
+void add_look_alikes(const Diagnosis& d, const EffectAt& effect, std::vector<EffectAt>& aside) {
+  for (const FoundEffect& f : d.search.found) {
+    if (!same(f.design.effect, effect)) continue;
+    for (const auto& [rival, worse] : f.alternatives) aside.push_back(rival);
   }
-  ErrorChange out;
-  if (all_n > 0.0) out.overall = std::exp(all / all_n);
-  out.own_stage = own_n > 0.0 ? std::exp(own / own_n) : out.overall;
+}
+
+/// Those that were not kept in the end, and why, once each, as part of why it stopped.
+void name_rejected(ExtendResult& result) {
+  std::erase_if(result.rejected, [&](const ExtendStep& r) {
+    return std::any_of(result.steps.begin(), result.steps.end(),
+                       [&](const ExtendStep& s) { return s.added == r.added; });
+  });
+  std::vector<ExtendStep> once;
+  for (ExtendStep& r : result.rejected) {
+    const auto had = std::find_if(once.begin(), once.end(),
+                                  [&](const ExtendStep& o) { return o.added == r.added; });
+    if (had == once.end()) {
+      once.push_back(std::move(r));
+    } else {
+      *had = std::move(r);
+    }
+  }
+  result.rejected = std::move(once);
+  for (const ExtendStep& r : result.rejected)
+    result.stopped_because += fmt::format("; {} was tried and not kept: {}", r.title, against(r));
+}
+
+/// Effects to choose from: all that were asked for, or the catalogue, without those set aside.
+std::vector<EffectAt> choices(const ExtendOptions& options, const CraneModel& model,
+                              const std::vector<EffectAt>& aside) {
+  std::vector<EffectAt> out =
+      options.diagnose.candidates.empty() ? candidates(model.machine) : options.diagnose.candidates;
+  std::erase_if(out, [&](const EffectAt& c) {
+    const auto is_it = [&](const auto& o) { return o.effect == c.effect && o.at == c.at; };
+    return std::any_of(aside.begin(), aside.end(), is_it) ||
+           std::any_of(model.effects.begin(), model.effects.end(), is_it);
+  });
   return out;
 }
+
+}  // namespace
 
 std::string effect_title(const EffectInfo& info, const Machine& machine, int at) {
   const auto i = static_cast<std::size_t>(at);
@@ -209,14 +269,13 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
   Judged current = workshop.as_it_is(model, result.notes, part(0));
   for (std::size_t i = 0; i < add.size(); ++i) {
     std::vector<std::string> notes;
-    auto [step, next] = one_step(workshop, current, add[i], notes, part(i + 1));
+    auto [step, next] =
+        one_step(workshop, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
     add_notes(std::move(notes), result);
     if (step.change.worse()) {
-      result.notes.push_back(fmt::format(
-          "{} makes the error on the {} {}: it is in the model as asked, but the data speak "
-          "against it",
-          step.title, step.judged_on,
-          percent_text(std::max(step.change.overall, step.change.own_stage))));
+      result.notes.push_back(
+          fmt::format("{} is in the model as asked, but the data speak against it: {}", step.title,
+                      against(step)));
     }
     keep(std::move(step), std::move(next), workshop, options.date, current, result);
   }
@@ -252,17 +311,13 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
   ExtendResult result;
   const Judged current = workshop.as_it_is(model, result.notes, part(0.0));
   std::vector<std::string> notes;
-  Judged next = workshop.with(model, rest, part(0.5), &notes);
+  Judged next = workshop.with(current, rest, Others::kEstimatedAnew, part(0.5), &notes);
   add_notes(std::move(notes), result);
   ExtendStep step;
   step.removed = key;
   step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " taken back";
-  step.stage = effect_stage_name(effect.effect->info().stage);
   step.effect = was;
-  step.before = current.error;
-  step.after = next.error;
-  step.judged_on = workshop.judged_on();
-  step.change = error_change(step.before, step.after, step.stage);
+  set_errors(workshop, model.machine, effect, current.error, next.error, step);
   Judged kept = current;
   keep(std::move(step), std::move(next), workshop, options.date, kept, result);
   result.stopped_because = "the effect was taken back as asked";
@@ -286,9 +341,17 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
   Judged current = workshop.as_it_is(model, result.notes, round(0.05));
   done = 0.05;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
+  std::vector<EffectAt> aside;  // not kept since the last step that was
+  std::size_t tried = 0;
+  DiagnoseOptions diagnose_options = options.diagnose;
   while (result.stopped_because.empty()) {
+    diagnose_options.candidates = choices(options, current.model, aside);
+    if (diagnose_options.candidates.empty()) {  // which would mean all
+      result.stopped_because = "no other effect is left to try";
+      break;
+    }
     const std::shared_ptr<const Diagnosis> diagnosis =
-        diagnose_kept(current.model, logs, references, options.diagnose, round(0.4));
+        diagnose_kept(current.model, logs, references, diagnose_options, round(0.4));
     done += (1.0 - done) * 0.4;
     result.last = diagnosis;
     const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
@@ -301,22 +364,32 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
         break;
       }
       std::vector<std::string> notes;
-      auto [step, next] = one_step(workshop, current, e->effect, notes, round(0.2));
+      auto [step, next] =
+          one_step(workshop, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
+      if (step.change.worse() && !current.model.effects.empty()) {
+        notes.clear();
+        std::tie(step, next) =
+            one_step(workshop, current, e->effect, Others::kKept, notes, round(0.15));
+      }
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
       if (step.change.worse()) {
-        result.stopped_because +=
-            fmt::format("{}{} was tried and not kept: it made the error on the {} {}",
-                        result.stopped_because.empty() ? "" : "; ", step.title, step.judged_on,
-                        percent_text(std::max(step.change.overall, step.change.own_stage)));
+        aside.push_back(e->effect);
+        // what it does is there and harms elsewhere: another that only looks like it must not come in its place
+        if (step.change.own < 1.0) add_look_alikes(*diagnosis, e->effect, aside);
+        ++tried;
         result.rejected.push_back(std::move(step));
         continue;
       }
+      aside.clear();
       if (!e->rivals.empty()) notes.push_back(stands_for(*e));
       add_notes(std::move(notes), result);
       keep(std::move(step), std::move(next), workshop, options.date, current, result);
     }
+    if (tried > kMostRejected && result.stopped_because.empty())
+      result.stopped_because = "what is found does not hold on data that took no part";
   }
+  name_rejected(result);
   finish(std::move(current), start, result);
   return result;
 }

@@ -7,18 +7,10 @@
 #include <vector>
 
 #include "identification/diagnose.h"
+#include "identification/error_change.h"
 #include "identification/fit.h"
 
 namespace sparflow {
-
-/// How much a change moved the error: geometric means of RMS error after / before over everything compared, weighted
-/// with the number of samples. 1 = nothing changed, below 1 = better.
-struct ErrorChange {
-  double overall = 1.0;
-  double own_stage = 1.0;  ///< of the stage the change belongs to; of a sensor's, as overall
-  /// Beyond what refitting alone moves.
-  bool worse() const;
-};
 
 struct ExtendStep {
   std::string added;            ///< "coulomb_friction:boom"
@@ -29,6 +21,7 @@ struct ExtendStep {
   CompareResult before, after;  ///< what they compare: `judged_on`
   std::string judged_on;  ///< "test logs", "held-out motions" or "the logs it was learned from"
   ErrorChange change;
+  bool others_kept = false;  ///< the effects that were there before kept their values
   /// That asked for it; absent when the user did. Steps of one diagnosis share it.
   std::shared_ptr<const Diagnosis> diagnosis;
 };
@@ -36,7 +29,8 @@ struct ExtendStep {
 struct ExtendResult {
   CraneModel model;  ///< with the effects, and the steps as a record
   std::vector<ExtendStep> steps;
-  std::vector<ExtendStep> rejected;  ///< tried by `improve`, not kept: they made the error worse
+  std::vector<ExtendStep>
+      rejected;  ///< tried by `improve`, not kept: data that took no part spoke against them
   std::string stopped_because;
   std::shared_ptr<const Diagnosis> last;  ///< of `improve`: the diagnosis after the last step
   std::vector<std::string> notes;         ///< whole sentences
@@ -66,8 +60,12 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
                     const std::vector<Log>& logs, const std::vector<Log>& tests,
                     const ExtendOptions& options = {}, const SearchProgress& progress = {});
 
-/// Adds what `diagnose` finds and diagnoses again, until it finds nothing more, a change makes the error worse
-/// (that one is not kept), data is bad, or `max_steps` are done; `stopped_because` says which.
+/// Adds what `diagnose` finds and diagnoses again, until it finds nothing more, data is bad, or `max_steps` are done;
+/// `stopped_because` says which. Of several effects found the one that takes most of an error away comes first. A
+/// step is kept when data that took no part is predicted better where the effect acts and nothing else worse
+/// (error_change.h); if not, it is tried once more with the other effects as they are, for estimated anew
+/// together they may give way to an error of one place at the cost of another. What is not kept is left aside until
+/// another step is.
 /// @param references as in ExtendOptions
 ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
                      const std::vector<Log>& references, const std::vector<Log>& tests,
@@ -77,10 +75,6 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
 ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
                        const std::vector<Log>& logs, const std::vector<Log>& tests,
                        const ExtendOptions& options = {}, const SearchProgress& progress = {});
-
-/// @param stage of the change: force, flow, pressure, pump; else only `overall` is told apart
-ErrorChange error_change(const CompareResult& before, const CompareResult& after,
-                         const std::string& stage);
 
 /// "Coulomb friction of boom"
 std::string effect_title(const EffectInfo& info, const Machine& machine, int at);

@@ -5,16 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/extend.h"
+#include "identification/report_numbers.h"
 
 namespace sparflow {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string number(double value) {
-  const double size = std::abs(value);
-  return fmt::format("{:.{}f}", value, size >= 100.0 ? 0 : size >= 10.0 ? 1 : 2);
-}
 
 /// A unit of the field that keeps the number short: kN from ten kN on.
 std::pair<double, std::string> readable(double value, const FieldUnit& unit) {
@@ -34,10 +30,15 @@ std::string parameters_text(const AppliedEffect& e) {
   const auto& parameters = e.effect->info().parameters;
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = parameters[p];
-    text += fmt::format("{}{} {:.4g}{}", text.empty() ? "" : ", ", q.name, e.values[p] / q.si,
-                        q.unit.empty() || q.unit == "-" ? "" : " " + q.unit);
-    if (p < e.lower95.size() && std::isfinite(e.lower95[p])) {
-      text += fmt::format(" ({:.4g} .. {:.4g})", e.lower95[p] / q.si, e.upper95[p] / q.si);
+    const std::string unit = q.unit.empty() || q.unit == "-" ? "" : " " + q.unit;
+    const bool choice = q.choice || p >= e.lower95.size();
+    text += fmt::format(
+        "{}{} {}{}", text.empty() ? "" : ", ", q.name,
+        choice ? fmt::format("{:g}", e.values[p] / q.si) : plain_number(e.values[p] / q.si, 4),
+        unit);
+    if (!choice && std::isfinite(e.lower95[p])) {
+      text += fmt::format(" ({} .. {})", plain_number(e.lower95[p] / q.si, 4),
+                          plain_number(e.upper95[p] / q.si, 4));
     }
   }
   return text;
@@ -72,8 +73,9 @@ std::string step_table(const ExtendStep& step) {
     const auto [before, unit] = readable(rows[i].before->rmse, rows[i].before->unit);
     const double si = unit == "kN" ? 1e3 : rows[i].before->unit.si;
     text += fmt::format("   {:<12}{:<22}{:>9} -> {:>9} {:<6}{:>9}\n", rows[i].before->stage,
-                        place(*rows[i].before), number(before), number(rows[i].after->rmse / si),
-                        unit, signed_percent(std::exp(rows[i].change)));
+                        place(*rows[i].before), short_number(before),
+                        short_number(rows[i].after->rmse / si), unit,
+                        signed_percent(std::exp(rows[i].change)));
   }
   const auto rest = still + static_cast<long>(rows.size() - std::min(kMost, rows.size()));
   if (rest > 0) text += fmt::format("   {} other errors moved less\n", rest);
@@ -142,7 +144,11 @@ Json step_json(const ExtendStep& step) {
   out["stage"] = step.stage;
   out["parameters"] = std::move(parameters);
   out["judged_on"] = step.judged_on;
-  out["error_ratio"] = {{"overall", step.change.overall}, {"own_stage", step.change.own_stage}};
+  out["error_ratio"] = {{"overall", step.change.overall}, {"own", step.change.own}};
+  Json harmed = Json::array();
+  for (const HarmedError& h : step.change.harmed) harmed.push_back(h.sentence);
+  out["harmed"] = std::move(harmed);
+  out["others_kept"] = step.others_kept;
   out["stages"] = stages_json(step);
   return out;
 }
@@ -154,7 +160,7 @@ std::string ExtendResult::brief() const {
   std::string names;
   for (const ExtendStep& s : steps)
     names += (names.empty() ? "" : ", then ") + (s.added.empty() ? "minus " + s.removed : s.added);
-  const ErrorChange all = error_change(steps.front().before, steps.back().after, "");
+  const ErrorChange all = error_change(model.machine, steps.front().before, steps.back().after, "");
   return fmt::format("{}: error on the {} {} overall", names, steps.front().judged_on,
                      signed_percent(all.overall));
 }
@@ -164,12 +170,15 @@ std::string ExtendResult::table() const {
   int number_of = 0;
   for (const ExtendStep& s : steps) {
     text += fmt::format("{}. {}\n   {}\n", ++number_of, s.title, parameters_text(s.effect));
+    if (s.others_kept)
+      text +=
+          "   the effects before it keep their values: estimated anew together they fitted less\n";
     text += fmt::format("   RMS error on the {}:\n{}", s.judged_on, step_table(s));
   }
   for (const ExtendStep& s : rejected) {
-    text += fmt::format("not kept: {} ({}); its error on the {} {} at its stage, {} overall\n",
+    text += fmt::format("not kept: {} ({}); error on the {} {} where it acts, {} overall\n",
                         s.title, parameters_text(s.effect), s.judged_on,
-                        signed_percent(s.change.own_stage), signed_percent(s.change.overall));
+                        signed_percent(s.change.own), signed_percent(s.change.overall));
   }
   for (const std::string& n : notes) text += "note: " + n + "\n";
   text += "stopped because " + stopped_because + "\n";

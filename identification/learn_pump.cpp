@@ -23,7 +23,7 @@ constexpr int kFewestPumpSamples = 10;
 
 /// Unknowns of the law in one array: margins of the m cylinders, then standby.
 /// Term k of sample t is offset(t, k) + unknown[k]; -infinity where the cylinder is not active.
-struct Law {
+struct PumpLaw {
   MatrixXd offset;    // [samples x (m + 1)], the last column zero
   VectorXd pressure;  // [samples]
 
@@ -48,9 +48,9 @@ struct Law {
 };
 
 /// Rows that can be used, with counts of those that cannot.
-Law usable_samples(const PumpSamples& s, const LearnPumpOptions& options, LearnedPump& out) {
+PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, LearnedPump& out) {
   const Index m = s.active.cols();
-  Law law{MatrixXd::Constant(s.pressure.size(), m + 1, kNever), VectorXd(s.pressure.size())};
+  PumpLaw law{MatrixXd::Constant(s.pressure.size(), m + 1, kNever), VectorXd(s.pressure.size())};
   Index n = 0;
   for (Index t = 0; t < s.pressure.size(); ++t) {
     bool valid = std::isfinite(s.pressure[t]);
@@ -80,7 +80,7 @@ Law usable_samples(const PumpSamples& s, const LearnPumpOptions& options, Learne
 /// The part of the objective that one unknown moves, the others held.
 class OneUnknown {
  public:
-  OneUnknown(const Law& law, const VectorXd& unknown, Index k, double limit) : limit_(limit) {
+  OneUnknown(const PumpLaw& law, const VectorXd& unknown, Index k, double limit) : limit_(limit) {
     for (Index t = 0; t < law.samples(); ++t) {
       if (law.offset(t, k) == kNever) continue;
       samples_.push_back({law.offset(t, k), law.others(unknown, t, k), law.pressure[t]});
@@ -131,7 +131,7 @@ double minimise(const OneUnknown& f, double hi, double start) {
 }
 
 /// Where to begin: a margin no larger than almost all samples of its cylinder allow, since p >= P_i + c_i.
-VectorXd initial_unknowns(const Law& law) {
+VectorXd initial_unknowns(const PumpLaw& law) {
   const Index m = law.terms() - 1;
   VectorXd unknown = VectorXd::Zero(m + 1);
   std::vector<double> idle;
@@ -153,7 +153,7 @@ VectorXd initial_unknowns(const Law& law) {
 }
 
 /// Coordinate descent until no unknown moves. @return true when it came to rest
-bool search(const Law& law, VectorXd& unknown, int& sweeps) {
+bool search(const PumpLaw& law, VectorXd& unknown, int& sweeps) {
   double limit = 0.0;
   for (int sweep = 0; sweep < 40; ++sweep) {
     ++sweeps;
@@ -175,7 +175,7 @@ struct Lead {
   double gap = 0.0;  // to the runner-up [Pa]
 };
 
-Lead leader_of(const Law& law, const VectorXd& unknown, Index t) {
+Lead leader_of(const PumpLaw& law, const VectorXd& unknown, Index t) {
   Lead lead;
   const double value = (law.offset.row(t).transpose() + unknown).maxCoeff(&lead.term);
   lead.gap = value - law.others(unknown, t, lead.term);
@@ -210,7 +210,7 @@ Location location(const VectorXd& values) {
 
 /// With the leaders known, each unknown is the location of what its own samples ask. Near ties and outliers
 /// are left out (see the header) where enough samples remain.
-void polish(const Law& law, VectorXd& unknown, VectorXd& standard_error,
+void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
             const LearnPumpOptions& options) {
   const VectorXd residuals = law.residuals(unknown);
   const double std = std::max(robust_std(residuals), kFinest);
@@ -238,7 +238,7 @@ void polish(const Law& law, VectorXd& unknown, VectorXd& standard_error,
 
 /// How large c_i can be before the cylinder would lead where the data follow another term: nearly the smallest
 /// distance (the smallest itself hangs on one sample).
-double upper_bound(const Law& law, const VectorXd& unknown, Index i) {
+double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i) {
   std::vector<double> room;
   for (Index t = 0; t < law.samples(); ++t) {
     if (law.offset(t, i) == kNever) continue;
@@ -294,7 +294,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
                  "pump samples must be equally long");
   LearnedPump out;
   out.given = static_cast<int>(samples.pressure.size());
-  const Law law = usable_samples(samples, options, out);
+  const PumpLaw law = usable_samples(samples, options, out);
   check_enough(law.samples(), out);
 
   VectorXd unknown = initial_unknowns(law);

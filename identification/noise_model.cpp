@@ -18,15 +18,9 @@ Reflection reflections(const NoiseModel& m) {
   return {m.phi1 / (1.0 - m.phi2), m.phi2};
 }
 
-}  // namespace
-
-double NoiseModel::deviation() const {
-  const auto [k1, k2] = reflections(*this);
-  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
-}
-
-NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                const std::vector<NoiseBlock>& blocks, bool offsets) {
+/// @param about_means whether the first pass takes all of a block's mean for its offset, or none
+NoiseModel by_moments(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                      const std::vector<NoiseBlock>& blocks, bool offsets, bool about_means) {
   NoiseModel m;
   double tau2 = 0.0;
   Eigen::VectorXd means(static_cast<Eigen::Index>(blocks.size()));
@@ -42,7 +36,9 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
       const auto n = static_cast<double>(last - first);
       if (n < 1) continue;
       const double sd = m.deviation();
-      const double shrink = tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0)) : 0.0;
+      const double shrink = pass == 0 && about_means ? 1.0
+                            : tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0))
+                                         : 0.0;
       const double mean = shrink * means[static_cast<Eigen::Index>(b)];
       const auto lost = shrink / std::max(1.0, n);  // a mean taken out takes variance out
       for (Eigen::Index t = first; t < last; ++t) {
@@ -84,6 +80,44 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
     m.offset_variance = tau2;
     if (tau2 == 0.0) break;
   }
+  return m;
+}
+
+}  // namespace
+
+double NoiseModel::deviation() const {
+  const auto [k1, k2] = reflections(*this);
+  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
+}
+
+NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                const std::vector<NoiseBlock>& blocks, bool offsets) {
+  const NoiseModel slow = by_moments(residual, blocks, offsets, false);
+  // Blocks at levels of their own look like noise that never forgets, and the other way round. Where either may be
+  // meant the likelihood says which: as slow noise, levels would prove nothing about what sets them.
+  constexpr double kSlow = 0.5;  // of one lag's correlation
+  if (!offsets || blocks.size() < 4 || reflections(slow).k1 < kSlow) return slow;
+  const NoiseModel levels = by_moments(residual, blocks, offsets, true);
+  return levels.log_likelihood(residual, blocks) > slow.log_likelihood(residual, blocks) ? levels
+                                                                                         : slow;
+}
+
+double NoiseModel::log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                  const std::vector<NoiseBlock>& blocks) const {
+  Eigen::MatrixXd r = residual;
+  const double log_determinant = whiten(blocks, r);
+  const auto n = static_cast<double>(r.size());
+  return log_determinant - 0.5 * n * std::log(std::max(r.squaredNorm() / n, 1e-300));
+}
+
+NoiseModel NoiseModel::scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                 const std::vector<NoiseBlock>& blocks) const {
+  NoiseModel m = *this;
+  Eigen::MatrixXd r = residual;
+  m.whiten(blocks, r);
+  const double scale = std::max(r.squaredNorm() / static_cast<double>(r.size()), 1e-300) / variance;
+  m.variance *= scale;
+  m.offset_variance *= scale;
   return m;
 }
 

@@ -24,6 +24,14 @@ struct NoiseModel {
   static NoiseModel estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
                              const std::vector<NoiseBlock>& blocks, bool offsets = true);
 
+  /// Log likelihood of residuals but for a constant, both variances scaled together to their best. [nats]
+  double log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                        const std::vector<NoiseBlock>& blocks) const;
+
+  /// Both variances times the factor of largest likelihood.
+  NoiseModel scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                       const std::vector<NoiseBlock>& blocks) const;
+
   /// Makes rows independent with variance `variance`: the exact inverse square root of the covariance, block by block.
   /// @param columns [rows x any], in place
   /// @return log determinant of the transformation, to be added to a log likelihood

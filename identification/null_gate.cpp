@@ -15,6 +15,13 @@ double p_of(const std::vector<double>& sorted, double gain) {
   return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(sorted.size()));
 }
 
+/// A usual large value: the level exceeded by one tenth.
+double upper_decile(VectorXd v) {
+  const auto at = v.data() + static_cast<Index>(0.9 * static_cast<double>(v.size()));
+  std::nth_element(v.data(), at, v.data() + v.size());
+  return *at;
+}
+
 }  // namespace
 
 double NullGate::threshold(double level) const {
@@ -26,8 +33,9 @@ double NullGate::threshold(double level) const {
   return std::max(quantile(normal), quantile(flipped));
 }
 
-double NullGate::p_value(double gain) const {
-  return std::max(p_of(normal, gain), p_of(flipped, gain));
+double NullGate::p_value(double gain, std::size_t candidate) const {
+  const double scaled = (gain + penalty[candidate]) / scale[candidate] - penalty[candidate];
+  return std::max(p_of(normal, scaled), p_of(flipped, scaled));
 }
 
 NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidate>& candidates,
@@ -66,6 +74,7 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
       }
     }
   }
+  NullGate gate;
   VectorXd largest = VectorXd::Constant(2 * simulations, -1e300);
   for (const GateCandidate& candidate : candidates) {
     VectorXd best = VectorXd::Constant(2 * simulations, -1e300);
@@ -92,9 +101,14 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
       z = scale.asDiagonal() * z;
       best = best.cwiseMax((0.5 * z.cwiseProduct(n.ldlt().solve(z)).colwise().sum()).transpose());
     }
+    const double usual = upper_decile(best.head(simulations));
+    const double scale =
+        usual > 0.0 ? std::max(1.0, upper_decile(best.tail(simulations)) / usual) : 1.0;
+    gate.scale.push_back(scale);
+    gate.penalty.push_back(candidate.penalty);
+    best.tail(simulations) /= scale;
     largest = largest.cwiseMax((best.array() - candidate.penalty).matrix());
   }
-  NullGate gate;
   gate.normal.assign(largest.begin(), largest.begin() + simulations);
   gate.flipped.assign(largest.begin() + simulations, largest.end());
   std::sort(gate.normal.begin(), gate.normal.end());

@@ -12,10 +12,16 @@ struct NullGate {
   std::vector<double> normal;  ///< [nats] simulated with independent normal innovations, sorted
   std::vector<double>
       flipped;  ///< [nats] the log's own residuals, signs of whole motions drawn at random, sorted
+  /// By candidate: how many times larger its gains come out of the flipped residuals than of normal ones. A residual
+  /// that still holds other effects, or whole motions that are off, makes large gains in the channels it stands in;
+  /// divided by this, a candidate of another channel need not compete with those.
+  std::vector<double> scale;
+  std::vector<double> penalty;  ///< [nats] by candidate, as given
 
+  /// What a scaled gain must reach, any candidate's. [nats]
   double threshold(double level) const;
-  /// The larger of the two ways' p-values.
-  double p_value(double gain) const;
+  /// The larger of the two ways' p-values of a candidate's penalised gain [nats].
+  double p_value(double gain, std::size_t candidate) const;
 };
 
 /// One candidate: its designs (grid) and its penalty.

@@ -46,7 +46,7 @@ MatrixXd features(const VectorXd& signal) {
   return out.leftCols(columns);
 }
 
-std::string number(double value) { return fmt::format("{:.3g}", value); }
+std::string three_digits(double value) { return fmt::format("{:.3g}", value); }
 
 /// 1 - R^2's complement: share of the squared error (mean taken out) in the span of orthogonal features.
 double explained(const MatrixXd& f, const VectorXd& error) {
@@ -62,16 +62,16 @@ double explained(const MatrixXd& f, const VectorXd& error) {
 std::string sentence_of(const ResidualTest& t, const ComparedPart& part,
                         const std::string& signal) {
   if (t.depends_on.empty()) {
-    const std::string interval =
-        std::isfinite(t.ci95.lo)
-            ? fmt::format(", 95 % interval {} .. {}", number(t.ci95.lo), number(t.ci95.hi))
-            : std::string();
+    const std::string interval = std::isfinite(t.ci95.lo)
+                                     ? fmt::format(", 95 % interval {} .. {}",
+                                                   three_digits(t.ci95.lo), three_digits(t.ci95.hi))
+                                     : std::string();
     return fmt::format("{} is predicted {} {} too {} on average (p {:.2g}{})", part.words,
-                       number(std::abs(t.size)), t.unit, t.size > 0.0 ? "high" : "low", t.p_value,
-                       interval);
+                       three_digits(std::abs(t.size)), t.unit, t.size > 0.0 ? "high" : "low",
+                       t.p_value, interval);
   }
   return fmt::format("the error of the {} depends on {}, by {} {} RMS ({:.0f} % of it, p {:.2g})",
-                     part.words, signal, number(t.size), t.unit, 100.0 * t.share_explained,
+                     part.words, signal, three_digits(t.size), t.unit, 100.0 * t.share_explained,
                      t.p_value);
 }
 

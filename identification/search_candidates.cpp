@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
+
+#include "identification/parallel.h"
 
 namespace sparflow {
 namespace {
@@ -63,21 +64,13 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
   for (const EvidenceChannel& c : evidence.channels)
     rows = std::max(rows, static_cast<double>(c.rows()));
   std::vector<SearchCandidate> all(effects.size());
-  const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1U, 8U);
-  {
-    std::vector<std::jthread> pool;
-    for (unsigned t = 0; t < threads; ++t) {
-      pool.emplace_back([&, t] {
-        for (std::size_t i = t; i < effects.size(); i += threads) {
-          all[i].effect = effects[i];
-          for (auto& shape : grid_of(effects[i], evidence)) {
-            EffectDesign d = make_design(evidence, effects[i], std::move(shape));
-            if (d.acts()) all[i].designs.push_back(std::move(d));
-          }
-        }
-      });
+  parallel(effects.size(), [&](std::size_t i) {
+    all[i].effect = effects[i];
+    for (auto& shape : grid_of(effects[i], evidence)) {
+      EffectDesign d = make_design(evidence, effects[i], std::move(shape));
+      if (d.acts()) all[i].designs.push_back(std::move(d));
     }
-  }
+  });
   std::erase_if(all, [](const SearchCandidate& c) { return c.designs.empty(); });
   for (SearchCandidate& c : all) {
     c.linear = independent_columns(c);

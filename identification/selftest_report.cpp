@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "identification/report_numbers.h"
 #include "identification/selftest.h"
 
 namespace sparflow {
@@ -15,12 +16,10 @@ using nlohmann::json;
 constexpr std::size_t kMostSets = 6;  ///< on a screen; the rest is in the JSON
 
 /// JSON has no NaN and no infinity.
-json number(double v) { return std::isfinite(v) ? json(v) : json(nullptr); }
-
 json values_json(const std::vector<ShownValue>& values) {
   json out = json::array();
   for (const ShownValue& v : values)
-    out.push_back({{"name", v.name}, {"value", number(v.value)}, {"unit", v.unit}});
+    out.push_back({{"name", v.name}, {"value", json_number(v.value)}, {"unit", v.unit}});
   return out;
 }
 
@@ -129,17 +128,18 @@ std::string Selftest::json() const {
         {"reason", e.reason},
         {"typical", values_json(e.typical)},
         {"power", e.power},
-        {"log_likelihood_gain", number(e.gain)},
-        {"times_typical", {{"power80", number(e.times80)}, {"power95", number(e.times95)}}},
+        {"log_likelihood_gain", json_number(e.gain)},
+        {"times_typical",
+         {{"power80", json_number(e.times80)}, {"power95", json_number(e.times95)}}},
         {"smallest", values_json(e.smallest)},
-        {"size_by_noise", number(e.size)},
-        {"absorbed", number(e.absorbed)},
-        {"absorbed_without_reference", number(e.absorbed_alone)},
+        {"size_by_noise", json_number(e.size)},
+        {"absorbed", json_number(e.absorbed)},
+        {"absorbed_without_reference", json_number(e.absorbed_alone)},
         {"separated_by", e.separated_by}};
     one["confused_with"] = nlohmann::json::array();
     for (const Confusion& c : e.confused_with)
       one["confused_with"].push_back(
-          {{"effect", c.key}, {"nats", number(c.nats)}, {"imitated", number(c.share)}});
+          {{"effect", c.key}, {"nats", json_number(c.nats)}, {"imitated", json_number(c.share)}});
     j["effects"].push_back(std::move(one));
   }
   j["indistinguishable"] = sets;

@@ -1,8 +1,10 @@
 #pragma once
 /// What is left in a channel after model, baseline and effects that still depends on something measured: the
-/// catalogue then does not hold the cause. Two looks at the residual, both judged on motions left out:
+/// catalogue then does not hold the cause. Looks at the residual, judged on motions left out:
 ///   flexible  a ridge regression on hat functions of every signal and on random Fourier features of all of
 ///             them together (A. Rahimi, B. Recht (2007), NIPS 20), cross-validated by whole blocks of motion
+///   driven    in forces the sign of the speed, in speeds the command, times hat functions of every signal: what acts
+///             against the motion or in proportion to the opening by an amount that depends on something
 ///   periodic  a line in its periodogram far above its surroundings (N. R. Lomb (1976), Astrophys. Space Sci. 39)
 #include <optional>
 #include <string>
@@ -24,6 +26,8 @@ struct Leftover {
 
 struct LeftoverOptions {
   double least_share = 0.10;  ///< of the residual's variance, on motions left out
+  /// The same of what acts with the motion or the opening: a valve's or a seal's own small irregularities do that too.
+  double least_share_driven = 0.3;
   double least_size = 0.35;   ///< RMS of the explained part / noise of the rest
   double deepest_dip = -0.3;  ///< of the autocorrelation of what is fast, below which it swings
   int folds = 5;

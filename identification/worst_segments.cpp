@@ -38,7 +38,7 @@ std::string motions(const Machine& machine, const MachineSignals& signals, Sampl
   return out.empty() ? "hardly anything" : out;
 }
 
-std::string amount(double value, const std::string& unit) {
+std::string size_text(double value, const std::string& unit) {
   return value >= 1000.0 ? fmt::format("{:.0f} {}", value, unit)
                          : fmt::format("{:.3g} {}", value, unit);
 }
@@ -214,7 +214,7 @@ std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareRe
         "{:.1f} to {:.1f} s of {} ({}): {:.0f} % of the error of the {} in {:.0f} % of its samples "
         "(RMSE {})",
         w.from_s, w.to_s, w.file, w.moved, 100.0 * w.share_of_error, part.words,
-        100.0 * w.share_of_samples, amount(w.rmse, w.unit));
+        100.0 * w.share_of_samples, size_text(w.rmse, w.unit));
     out.push_back(std::move(w));
   }
   std::stable_sort(out.begin(), out.end(), [](const WorstSegment& a, const WorstSegment& b) {

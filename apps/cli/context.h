@@ -113,14 +113,6 @@ CraneModel load_model_aloud(const std::string& path);
 std::vector<Log> load_logs(const std::vector<std::string>& paths, const Machine& machine,
                            const std::string& mapping);
 
-/// A log is only one of: diagnosed, reference, test. @throws UsageError
-void refuse_shared_logs(const std::string& verb, const std::vector<Log>& logs,
-                        const std::vector<Log>& references, const std::vector<Log>& tests);
-/// Without references: says on stderr what a model that was not fitted on one of the logs can be a reference for.
-void say_what_is_reference(const CraneModel& model, const std::vector<Log>& logs);
-/// "2025-03-14", today, for a model's record.
-std::string today();
-
 /// Problem and model together: the model's own machine rules when there is a model.
 struct ProblemAndModel {
   MotionProblem problem;

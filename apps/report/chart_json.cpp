@@ -132,6 +132,7 @@ json chart_json(const LineChart& chart, Index most_points) {
   const std::vector<Index> rows = decimate_rows(columns, most_points);
 
   json out = base("lines", chart);
+  out["x_counts"] = chart.x_counts;
   out["x_axis"] = quantity(chart.x_axis);
   out["y_axis"] = quantity(chart.y_axis);
   out["x"] = picked(chart.x, rows, kAbscissaDigits);

@@ -54,7 +54,8 @@ struct Span {
 struct LineChart : Figure {
   Quantity x_axis = {"time", "s"};
   Quantity y_axis;
-  Eigen::VectorXd x;  ///< ascending and finite
+  Eigen::VectorXd x;      ///< ascending and finite
+  bool x_counts = false;  ///< x are whole numbers: no ticks between them
   std::vector<LineSeries> series;
   std::vector<Marker> markers;
   std::vector<Span> spans;

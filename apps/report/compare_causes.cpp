@@ -25,7 +25,8 @@ void add_bad_data(Page& page, const CompareResult& result) {
   page.table(std::move(table));
 }
 
-/// Own and inherited error as a share of what varies, so that kN and bar stand side by side.
+/// Own and inherited error as a share of what varies, so that kN and bar stand side by side. Squares, for those of
+/// causes that have nothing to do with each other add up, and RMS errors do not.
 void add_stages(Page& page, const CompareResult& result) {
   const std::vector<StageSplit>& stages = result.fault.stages;
   if (stages.empty()) return;
@@ -33,18 +34,21 @@ void add_stages(Page& page, const CompareResult& result) {
   BarChart chart;
   chart.title = "Own and inherited error of each stage";
   chart.note =
-      "RMS, as a share of the measured quantity's standard deviation. Own: with what the stage "
-      "before gives taken as measured. Inherited: what the error of the stage before changes.";
+      "Mean squared error as a share of the measured quantity's variance: at 100 a constant would "
+      "do as well. Own: with what the stage before gives taken as measured. Inherited: what the "
+      "error of the stage before changes.";
   chart.width = FigureWidth::kHalf;
-  chart.value_axis = {"error", "%"};
+  chart.value_axis = {"squared error", "%"};
   const auto n = static_cast<Index>(stages.size());
   BarSeries own{"own", VectorXd(n)}, inherited{"inherited", VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
     const StageSplit& s = stages[static_cast<std::size_t>(i)];
     chart.categories.push_back(s.words);
-    const double scale = s.spread > 0.0 ? 100.0 / s.spread : kNaN;
-    own.values[i] = s.own * scale;
-    inherited.values[i] = s.inherited * scale;
+    const auto share = [&s](double rms) {
+      return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
+    };
+    own.values[i] = share(s.own);
+    inherited.values[i] = share(s.inherited);
   }
   chart.series = {std::move(own), std::move(inherited)};
   page.plot(std::move(chart));
@@ -54,6 +58,7 @@ void add_stages(Page& page, const CompareResult& result) {
                    {"noise", "", 2}, {"unit"}};
   for (const StageSplit& s : stages)
     table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
+  table.note = "RMS. Where own and inherited errors are related, their squares do not add up.";
   table.highlighted_row = result.fault.fault;
   page.table(std::move(table));
 }

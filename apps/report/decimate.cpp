@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <unordered_set>
 #include <utility>
@@ -83,24 +84,35 @@ std::vector<Index> decimate_cloud(const Eigen::VectorXd& x, const Eigen::VectorX
   return kept;
 }
 
+/// Where the points leave out this share of their range, a line through them would be made up: a friction that jumps
+/// with the direction would look as if it grew with the speed.
+constexpr double kGapShare = 0.05;
+
 BinnedMedian binned_median(const Eigen::VectorXd& x, const Eigen::VectorXd& y, int bins) {
   std::vector<Index> points = finite_points(x, y);
   const Index count = static_cast<Index>(points.size());
   const Index used = std::min<Index>(bins, count / 20);
   if (used < 2) return {};
   std::stable_sort(points.begin(), points.end(), [&](Index a, Index b) { return x[a] < x[b]; });
-  BinnedMedian trend{Eigen::VectorXd(used), Eigen::VectorXd(used)};
+  const double range = x[points.back()] - x[points.front()];
+  std::vector<double> at, middle_of;
   for (Index bin = 0; bin < used; ++bin) {
     const auto begin = points.begin() + bin * count / used;
     const auto end = points.begin() + (bin + 1) * count / used;
-    trend.x[bin] = x[*(begin + (end - begin) / 2)];
+    if (bin > 0 && x[*begin] - x[*(begin - 1)] > kGapShare * range) {
+      at.push_back(0.5 * (x[*begin] + x[*(begin - 1)]));
+      middle_of.push_back(std::numeric_limits<double>::quiet_NaN());
+    }
+    at.push_back(x[*(begin + (end - begin) / 2)]);
     std::vector<double> values;
     for (auto i = begin; i != end; ++i) values.push_back(y[*i]);
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
-    trend.y[bin] = *middle;
+    middle_of.push_back(*middle);
   }
-  return trend;
+  const auto n = static_cast<Index>(at.size());
+  return {Eigen::Map<const Eigen::VectorXd>(at.data(), n),
+          Eigen::Map<const Eigen::VectorXd>(middle_of.data(), n)};
 }
 
 }  // namespace sparflow

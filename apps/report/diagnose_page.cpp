@@ -94,22 +94,19 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                    {"parameters, 95 % interval"},
                    {"probability", "%", 3},
                    {"gain", "nats", 3},
-                   {"left-out gain", "nats"},
+                   {"motions left out", "standard errors", 2},
                    {"absorbed", "%", 2}};
   for (const DiagnosedEffect& e : d.effects) {
     table.rows.push_back({title_of(machine, e), e.stage, parameters_text(e.parameters),
                           std::round(100.0 * e.probability), e.gain,
-                          std::isfinite(e.held_out_error) && e.held_out_error > 0.0
-                              ? fmt::format("{} \u00B1 {}", display_number(e.held_out_gain, 3),
-                                            display_number(e.held_out_error, 2))
-                              : display_number(e.held_out_gain, 3),
+                          e.held_out_error > 0.0 ? e.held_out_gain / e.held_out_error : kNaN,
                           std::round(100.0 * e.absorbed)});
   }
   table.note =
-      "Probability: that it is this effect, not chance nor a rival. Gain: how much more probable "
-      "the data are with it (log likelihood). Left-out: the same on motions that took no part in "
-      "the estimate, with its standard error. Absorbed: the share that a model fitted anew on "
-      "these logs would swallow.";
+      "Probability: that it is this effect, not chance nor a rival. Gain: logarithm of how much "
+      "more probable these logs are with it than without. Motions left out: estimated on some "
+      "motions, how much better it predicts the others, in standard errors of that. Absorbed: the "
+      "share that a model fitted anew on these logs would swallow.";
   page.table(std::move(table));
 
   Table errors;

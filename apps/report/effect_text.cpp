@@ -37,6 +37,7 @@ std::string parameter_text(const ParameterEstimate& p) {
   const std::string tail = unit.empty() || unit == "-" ? "" : " " + unit;
   if (!std::isfinite(lower) || !std::isfinite(upper))
     return fmt::format("{} {}{}", p.name, display_number(value, 4), tail);
+  if (lower == upper) return fmt::format("{} {:g}{}", p.name, value, tail);  // a variant of a law
   const double half = 0.5 * (upper - lower);
   const int digits = digits_for(value, half);
   if (std::abs(value - 0.5 * (lower + upper)) < 0.05 * half) {

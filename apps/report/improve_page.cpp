@@ -81,27 +81,25 @@ LineChart over_steps(const ExtendResult& result) {
   const auto steps = static_cast<Index>(result.steps.size());
   chart.x_axis = {"step", ""};
   chart.x = VectorXd::LinSpaced(steps + 1, 0.0, static_cast<double>(steps));
-  chart.markers = step_markers(result);
+  chart.x_counts = true;
   return chart;
 }
 
-/// All errors that have a known noise, as multiples of it: where everything ends.
+/// All errors that moved, as a share of what they were: which of them fell, and at which step.
 void add_overview(Page& page, const ExtendResult& result, const std::vector<ErrorTrace>& traces) {
   LineChart chart = over_steps(result);
-  chart.title = "Error falling step by step, as a multiple of the sensor's noise";
+  chart.title = "Error falling step by step";
+  chart.markers = step_markers(result);
   chart.note = fmt::format(
-      "RMS error on the {}; step 0 is the model before. At 1 nothing is left but noise. "
-      "Quantities that did not move, or whose noise is not known, are left out.",
+      "RMS error on the {}, as a share of what it was before the first step. Quantities that did "
+      "not move are left out.",
       result.steps.front().judged_on);
-  chart.y_axis = {"RMS error / noise", ""};
+  chart.y_axis = {"RMS error, before the first step = 100", "%"};
   for (const ErrorTrace& t : traces) {
-    if (!(t.noise > 0.0) || !(t.largest_change() > kMoved)) continue;
-    chart.series.push_back({t.words, t.rmse / t.noise, LineStyle::kPlain, -1, {}, {}});
+    if (!(t.rmse[0] > 0.0) || !(t.largest_change() > kMoved)) continue;
+    chart.series.push_back({t.words, 100.0 / t.rmse[0] * t.rmse, LineStyle::kPlain, -1, {}, {}});
   }
-  if (chart.series.empty()) return;
-  chart.series.push_back(
-      {"noise floor", VectorXd::Ones(chart.x.size()), LineStyle::kLimit, -1, {}, {}});
-  page.plot(std::move(chart));
+  if (!chart.series.empty()) page.plot(std::move(chart));
 }
 
 void add_error_charts(Page& page, const ExtendResult& result, std::vector<ErrorTrace> traces) {
@@ -151,12 +149,12 @@ Table steps_table(const std::string& title, const std::vector<ExtendStep>& steps
   Table table;
   table.title = title;
   table.columns = {
-      {"step"},          {"effect"},      {"parameters, 95 % interval"}, {"error at its stage"},
+      {"step"},          {"effect"},      {"parameters, 95 % interval"}, {"error where it acts"},
       {"error overall"}, {"energy error"}};
   double number = 0.0;
   for (const ExtendStep& s : steps) {
     table.rows.push_back({++number, s.title, parameters_text(estimates_of(s.effect)),
-                          change_text(s.change.own_stage), change_text(s.change.overall),
+                          change_text(s.change.own), change_text(s.change.overall),
                           energy_text(s)});
   }
   return table;
@@ -198,7 +196,7 @@ void add_curves(Page& page, const ExtendStep& step) {
   const VectorXd gain =
       (m.before->residual().array().square() - m.after->residual().array().square()).matrix();
   const Stretch at =
-      best_stretch(time, step.change.own_stage > 1.0 ? VectorXd(-gain) : gain, kStretchSeconds);
+      best_stretch(time, step.change.own > 1.0 ? VectorXd(-gain) : gain, kStretchSeconds);
   const Index n = at.last - at.first;
   const auto cut = [&](const VectorXd& y) { return VectorXd(y.segment(at.first, n)); };
   const double largest = cut(m.after->measured)
@@ -235,7 +233,8 @@ void set_verdict(Page& page, const ExtendResult& r) {
                  capitalised(r.stopped_because) + ".");
     return;
   }
-  const ErrorChange all = error_change(r.steps.front().before, r.steps.back().after, "");
+  const ErrorChange all =
+      error_change(r.model.machine, r.steps.front().before, r.steps.back().after, "");
   std::string names, text;
   for (const ExtendStep& s : r.steps) {
     names += (names.empty() ? "" : ", then ") + s.title;
@@ -243,7 +242,7 @@ void set_verdict(Page& page, const ExtendResult& r) {
   }
   const std::string change = change_text(all.overall);
   page.verdict(
-      all.worse() ? Tone::kBad : Tone::kGood, capitalised(names),
+      all.overall > 1.0 ? Tone::kBad : Tone::kGood, capitalised(names),
       fmt::format("The error on the {} is {} overall{}. {}{}{}.", r.steps.front().judged_on, change,
                   r.steps.size() > 1 ? " after all steps" : "", text,
                   r.last ? "Stopped because " : "",
@@ -258,8 +257,7 @@ void add_last(Page& page, const Diagnosis& d) {
     for (const std::string& s : d.unexplained->depends_on) on += (on.empty() ? "" : ", ") + s;
     page.paragraph(d.unexplained->sentence + (on.empty() ? "" : " It depends on: " + on + "."));
   }
-  for (const Experiment& e : d.experiments)
-    page.paragraph(capitalised(e.sentence()) + ".");
+  for (const Experiment& e : d.experiments) page.paragraph(capitalised(e.sentence()) + ".");
 }
 
 }  // namespace
@@ -272,7 +270,7 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
     Table table = steps_table("Steps", result.steps);
     table.note = fmt::format(
         "Errors on the {}: RMS after against before, the geometric mean over all quantities (of "
-        "the effect's own stage, and of everything).",
+        "where the effect acts, and of everything).",
         result.steps.front().judged_on);
     page.table(std::move(table));
     add_error_charts(page, result, traces);

@@ -13,7 +13,7 @@ namespace {
 constexpr double kDeadVolume = 0.05;
 
 /// Shortest and longest length the joint's range (or the stated stroke) allows. [m]
-Range length_range(const Machine& machine, int cylinder) {
+Range lengths_in_use(const Machine& machine, int cylinder) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   if (c.length_at_zero_stroke && c.stroke) {
     return {*c.length_at_zero_stroke, *c.length_at_zero_stroke + *c.stroke};
@@ -75,7 +75,7 @@ class Compressibility final : public Effect {
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
     if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) return false;
-    const Range range = length_range(*log.machine, at);
+    const Range range = lengths_in_use(*log.machine, at);
     const double dead = kDeadVolume * (range.hi - range.lo);
     const Eigen::VectorXd rate_a = rate_of(log, c.pressure_a), rate_b = rate_of(log, c.pressure_b);
     const Eigen::VectorXd& force = carried_force(c);

@@ -7,11 +7,7 @@
 #include "simulator/hidden_effects/body_forces.h"
 
 namespace sparflow::simulator {
-namespace {
-
-constexpr double kLpm = 1.0 / 60000.0;
-
-}  // namespace
+namespace {}  // namespace
 
 CraneLaws draw_crane_laws(const Machine& machine, std::uint64_t crane_seed) {
   Random random(crane_seed, "crane");

@@ -8,8 +8,6 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kLpm = 1.0 / 60000.0;
-
 class Leakage final : public HiddenLaw {
  public:
   explicit Leakage(LawContext& c)

@@ -26,7 +26,7 @@ using testing_support::channel;
 constexpr double kNoise = 0.8;  // [bar]
 
 /// The lift's log with friction that the model does not have: the measured force is larger when extending.
-Log log_with_friction(double friction) {
+Log log_with_force(double friction) {
   Log log = arm_log(kNoise);
   const double area = testing_support::arm_machine().cylinders[0].area_piston();
   const Eigen::VectorXd& u = channel(log, "u_arm").values;
@@ -35,7 +35,7 @@ Log log_with_friction(double friction) {
   return log;
 }
 
-void expect_good_in_browser(const Page& page, const std::string& name) {
+void expect_compare_page_good(const Page& page, const std::string& name) {
   const std::string path = (std::filesystem::path(SPARFLOW_BINARY_DIR) / (name + ".html")).string();
   page.write(path);
   EXPECT_LT(std::filesystem::file_size(path), 3'000'000u);
@@ -64,7 +64,7 @@ TEST(ComparePage, RightModelIsGoodInEveryStage) {
 
 TEST(ComparePage, FrictionIsNamedInTheVerdict) {
   const CraneModel model = arm_model();
-  const CompareResult result = compare(model, {log_with_friction(40e3)});
+  const CompareResult result = compare(model, {log_with_force(40e3)});
   const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
   ASSERT_NE(worst_score(judged), nullptr);
   EXPECT_EQ(worst_score(judged)->score.stage, "force");
@@ -122,7 +122,7 @@ TEST(ComparePage, ShareExplainedIsOneForALawAndNoneForNoise) {
 
 TEST(ComparePageInBrowser, EveryFigureIsDrawn) {
   const CraneModel model = arm_model();
-  expect_good_in_browser(compare_page(model, compare(model, {log_with_friction(10e3), arm_log()})),
+  expect_compare_page_good(compare_page(model, compare(model, {log_with_force(10e3), arm_log()})),
                          "compare page");
 }
 
@@ -134,7 +134,7 @@ TEST(FitPageInBrowser, EveryFigureIsDrawn) {
   EXPECT_THAT(html, HasSubstr("Held-out motions: Scores"));
   EXPECT_THAT(html, HasSubstr("Working pressure of arm retracting"));
   EXPECT_THAT(html, Not(HasSubstr("not learned")));
-  expect_good_in_browser(page, "fit page");
+  expect_compare_page_good(page, "fit page");
 }
 
 TEST(FitPage, ProcessesThatWereNotLearnedAreNamed) {

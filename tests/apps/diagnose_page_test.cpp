@@ -63,8 +63,8 @@ Diagnosis missing_friction(const CraneModel& model) {
                {"sensor_delay", -4.0}};
   d.search.threshold = 6.5;
   d.indistinguishable = {{"coulomb_friction:arm", "load_friction:arm"}};
-  d.experiment = Experiment{"Dry friction and friction with the load differ with the load only",
-                            "lift and lower slowly with no load and with the largest"};
+  d.experiments = {{"tells coulomb_friction:arm from load_friction:arm",
+                    "arm up and down slowly, with no load and with about 500 kg", 2.5, 0.2}};
   d.notes = {"pump main: nothing to say"};
   return d;
 }
@@ -98,7 +98,9 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
   EXPECT_THAT(html, HasSubstr("Chance of such evidence with nothing missing: below 0.5 %"));
   EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
-  EXPECT_THAT(html, HasSubstr("Lift and lower slowly"));
+  // 4 nats at 2.5 a minute
+  EXPECT_THAT(html, HasSubstr("Record 2 minutes of: arm up and down slowly, with no load and with "
+                              "about 500 kg (tells coulomb_friction:arm from load_friction:arm)."));
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 

@@ -246,29 +246,35 @@ TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
   Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
                    model(), "--intervals", "400", "--json", at("o.json")},
                   at("out"), at("err"));
-  ASSERT_TRUE(comes(at("err"), "optimize: 10 s, ", 30.0)) << slurp(at("err"));
+  ASSERT_TRUE(comes(at("err"), "optimize: 10 s, ", 120.0)) << slurp(at("err"));
   EXPECT_THAT(slurp(at("err")), StartsWith("optimize ...\n"));
   // another program's kill reaches the parent alone, and the children must go with it
   ::kill(program.pid(), SIGINT);
-  ASSERT_TRUE(comes(at("err"), "Ctrl-C again ends at once", 5.0));
+  ASSERT_TRUE(comes(at("err"), "Ctrl-C again ends at once", 60.0));
   ::kill(program.pid(), SIGINT);
-  const int code = program.wait(5.0);
+  const int code = program.wait(60.0);
   EXPECT_EQ(code, 130);
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  for (int k = 0; k < 100 && program.alive() > 0; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
   EXPECT_EQ(program.alive(), 0);
   EXPECT_FALSE(fs::exists(at("o.json.tmp")));
 }
 
 TEST_F(CliSays, OneCtrlCKeepsTheBestSoFar) {
   for (const bool whole_group : {false, true}) {
-    Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
-                     model(), "-o", at("motion.csv"), "--json", at("o.json")},
-                    at("out"), at("err"));
-    // seeds take a fraction of a second; their motions are the least there is to keep
-    std::this_thread::sleep_for(std::chrono::seconds(3));
-    ::kill(whole_group ? -program.pid() : program.pid(), SIGINT);
-    EXPECT_EQ(program.wait(60.0), 130) << slurp(at("err"));
-    EXPECT_THAT(slurp(at("out")), StartsWith("interrupted: "));
+    // Until the first seed is timed there is nothing to keep: the later the slower the machine is.
+    for (int seconds = 3; seconds < 60; seconds *= 2) {
+      Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
+                       model(), "-o", at("motion.csv"), "--json", at("o.json")},
+                      at("out"), at("err"));
+      std::this_thread::sleep_for(std::chrono::seconds(seconds));
+      ::kill(whole_group ? -program.pid() : program.pid(), SIGINT);
+      ASSERT_EQ(program.wait(120.0), 130) << slurp(at("err"));
+      if (!slurp(at("out")).empty()) break;
+      EXPECT_FALSE(fs::exists(at("o.json")));
+    }
+    ASSERT_THAT(slurp(at("out")), StartsWith("interrupted: ")) << slurp(at("err"));
     EXPECT_GT(json::parse(slurp(at("o.json"))).at("energy_exact_J").get<double>(), 0.0);
     EXPECT_THAT(slurp(at("motion.csv")), StartsWith("t_s,"));
     fs::remove(at("motion.csv"));

@@ -52,13 +52,14 @@ class HiddenByALaw : public ::testing::TestWithParam<HiddenLaw> {
 };
 
 /// Oil needs two minutes to warm up; of the hoses' loss the same crane shows nothing when the oil stays as it is.
-constexpr double kSeconds = 150.0;
-constexpr std::uint64_t kSeed = 7;
+constexpr double kLogSeconds = 150.0;
+constexpr std::uint64_t kLogSeed = 7;
 
 TEST_P(HiddenByALaw, IsFoundWithAndWithoutAReference) {
   const HiddenLaw& law = GetParam();
   const Machine machine = drawn_machine("loader_crane");
-  const HiddenCase logs = hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, kSeed, kSeconds);
+  const HiddenCase logs =
+      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, kLogSeed, kLogSeconds);
   FitOptions options;
   options.hold_out_every = 0;
   const auto learned = [&](const Log& log) { return fit(machine, {log}, {}, options).model; };
@@ -83,8 +84,8 @@ INSTANTIATE_TEST_SUITE_P(
                       HiddenLaw{"pump_lag", "main", 2, "slower down than up", {"tau"}},
                       HiddenLaw{"torque_limit", "main", 0, "hyperbola", {"power"}},
                       HiddenLaw{"torque_limit", "main", 1, "two springs", {"power"}}),
-    [](const ::testing::TestParamInfo<HiddenLaw>& info) {
-      return std::string(info.param.id) + "_" + std::to_string(info.param.law);
+    [](const ::testing::TestParamInfo<HiddenLaw>& tested) {
+      return std::string(tested.param.id) + "_" + std::to_string(tested.param.law);
     });
 
 }  // namespace

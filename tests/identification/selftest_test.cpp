@@ -136,6 +136,18 @@ TEST(PowerStudy, TwiceTheNoiseNeedsTwiceTheSize) {
   EXPECT_NEAR(twice, once, 1e-6 * (1.0 + once));
 }
 
+TEST(Selftest, TwiceTheNoiseNeedsTwiceTheSize) {
+  // of effects whose channel holds sensor noise alone, whatever other channels hold: the pump's starts and stops are
+  // larger than its sensor's noise and must not decide what is seen of a force
+  const Selftest quiet = test_arm(arm_log(0.4)), loud = test_arm(arm_log(1.6));
+  for (const char* key : {"coulomb_friction:arm", "force_offset:arm", "payload_error"}) {
+    const double once = effect_of(quiet, key).times80, more = effect_of(loud, key).times80;
+    ASSERT_TRUE(std::isfinite(once) && std::isfinite(more)) << key;
+    // four times; smoothing errors of the motion, which stay, and the gate's spread (100 simulations) leave 15 %
+    EXPECT_NEAR(more / once, 4.0, 0.6) << key;
+  }
+}
+
 TEST(Selftest, OneJointCannotTellAMassFromItsPayload) {
   const Selftest t = test_arm(arm_log(0.8));
   const InjectedEffect& mass = effect_of(t, "payload_error");

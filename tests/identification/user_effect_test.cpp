@@ -94,7 +94,7 @@ TEST(UserEffect, IsAddedAndCarriedByTheModelFile) {
       extend(model, {effect}, {log_with_tight_spot(1)}, {log_with_tight_spot(2)});
   ASSERT_EQ(r.steps.size(), 1u);
   // what is left is noise: 6 kN over a tenth of the stroke are gone
-  EXPECT_LT(r.steps[0].change.own_stage, 0.8);
+  EXPECT_LT(r.steps[0].change.own, 0.8);
   const std::string text = model_to_json(r.model);
   const CraneModel read = model_from_json(text, "m.json");
   EXPECT_EQ(model_to_json(read), text);

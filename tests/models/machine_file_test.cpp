@@ -20,7 +20,7 @@ constexpr double kFileRounding = 1e-12;
 
 const std::string kMachines = SPARFLOW_SOURCE_DIR "/problems/machines/";
 
-Machine parse(const std::string& text, std::vector<std::string>* warnings = nullptr) {
+Machine parsed(const std::string& text, std::vector<std::string>* warnings = nullptr) {
   return parse_machine(text, "test.yaml", kMachines, warnings);
 }
 
@@ -133,7 +133,7 @@ TEST(MachineFile, SwingCranePullsItsJibOverTheWholeRange) {
 }
 
 TEST(MachineFile, AxisIsNormalisedAndRpyTurnsTheFrame) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, origin: {xyz: [1, 2, 3], rpy: [0, 0, "
       "1.5707963267948966]}, axis: [0, 0, 5], position: [-1, 1], " +
@@ -145,7 +145,7 @@ TEST(MachineFile, AxisIsNormalisedAndRpyTurnsTheFrame) {
 
 // T_01 T_12 of standard Denavit-Hartenberg, written out by hand, against the converted chain.
 TEST(MachineFile, DenavitHartenbergChainIsTheTextbookProduct) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, dh: {a: 0.4, alpha: 1.2, d: 0.7, theta: "
       "0.3}, position: [-3, 3], " +
@@ -174,7 +174,7 @@ TEST(MachineFile, DenavitHartenbergChainIsTheTextbookProduct) {
 
 // The frame of a DH joint is the far end of its link; an origin joint, a mass and a pin follow in it.
 TEST(MachineFile, DenavitHartenbergAndOriginJointsMix) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, dh: {a: 2, alpha: 0, d: 0, theta: 0}, "
       "position: [-3, 3], " +
@@ -203,7 +203,7 @@ TEST(MachineFile, PinsMayHaveTheBarrelOnTheMovingLink) {
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, axis: [0, 0, 1], position: [0.5, 2.5], " +
       kRates + "}\ntip: {joint: a, xyz: [1, 0, 0]}\ncylinders:\n";
-  const Machine on_child = parse(
+  const Machine on_child = parsed(
       head +
       "  - {name: c, joint: a, linkage: {type: pins, barrel: {frame: a, xyz: [1, 0, 0]}, rod: "
       "{frame: base, xyz: [3, 0, 0]}}}\n");
@@ -216,7 +216,7 @@ TEST(MachineFile, PinsMayHaveTheBarrelOnTheMovingLink) {
 }
 
 TEST(MachineFile, RackDirectParallelAndSingleValveFlow) {
-  const Machine m = parse(
+  const Machine m = parsed(
       "name: m\njoints:\n"
       "  - {name: a, type: revolute, axis: [0, 0, 1], position: [-3, 3], " +
       kRates +
@@ -235,7 +235,7 @@ TEST(MachineFile, RackDirectParallelAndSingleValveFlow) {
 }
 
 TEST(MachineFile, MachineWithoutJointsIsPossible) {
-  const Machine m = parse("name: post\njoints: []\ntip: {joint: base, xyz: [0, 0, 1]}\n");
+  const Machine m = parsed("name: post\njoints: []\ntip: {joint: base, xyz: [0, 0, 1]}\n");
   EXPECT_EQ(m.joint_count(), 0);
   EXPECT_EQ(m.tip.joint, -1);
 }
@@ -340,7 +340,7 @@ TEST(MachineCheck, WarningsSayWhatIsUnusual) {
   };
   for (const Warned& c : cases) {
     std::vector<std::string> warnings;
-    parse(c.text, &warnings);
+    parsed(c.text, &warnings);
     EXPECT_THAT(warnings, testing::Contains(c.expected)) << c.what;
   }
 }

@@ -134,14 +134,14 @@ TEST(UnitAlgebra, PowersOfDimensions) {
   EXPECT_THROW(dimensions::kFlow.power(0.25), TextError);
 }
 
-struct Wrong {
+struct WrongUnit {
   std::string text;
   int column;
   std::string message;  ///< the whole of it, or its beginning when it ends in "..."
 };
 
 TEST(UnitAlgebra, WrongTextsAreExplained) {
-  const std::vector<Wrong> all = {
+  const std::vector<WrongUnit> all = {
       {"", 1, "the unit is empty; write 1 for a pure number"},
       {"  ", 3, "the unit is empty; write 1 for a pure number"},
       {"Nm", 1, "unknown unit \"Nm\"; did you mean \"N m\"?"},
@@ -168,7 +168,7 @@ TEST(UnitAlgebra, WrongTextsAreExplained) {
       {"N + m", 3, "\"+ m\" is no unit; expected a name such as bar or l/min"},
       {std::string(50, '(') + "N", 21, "too many parentheses in a unit"},
   };
-  for (const Wrong& wrong : all) {
+  for (const WrongUnit& wrong : all) {
     SCOPED_TRACE(wrong.text);
     try {
       parse_unit(wrong.text);

@@ -22,8 +22,9 @@
       grid: { stroke: theme.grid(), width: 1 }, ticks: { stroke: theme.grid(), width: 1, size: 5 },
       values: (u, splits) => tickLabels(splits),
     };
+    const counted = spec.x_counts ? { incrs: [1, 2, 5, 10, 20, 50] } : {};
     return [
-      { ...common, label: titled(spec.x_axis), size: 30, labelSize: 18, space: 70 },
+      { ...common, ...counted, label: titled(spec.x_axis), size: 30, labelSize: 18, space: 70 },
       { ...common, label: titled(spec.y_axis), size: kLeft - 18, labelSize: 18, space: 26 },
     ];
   }
@@ -175,7 +176,8 @@
     points.sort((a, b) => a[0] - b[0]);
     const columns = groupCount + trends.length;
     const data = [points.map((p) => p[0])];
-    for (let k = 0; k < columns; ++k) data.push(points.map((p) => (p[1] === k ? p[2] : null)));
+    // null breaks a line, undefined (another column's point) does not
+    for (let k = 0; k < columns; ++k) data.push(points.map((p) => (p[1] === k ? p[2] : k < groupCount ? null : undefined)));
 
     const series = [{ label: spec.x_axis.label, class: "quiet" }];
     const alpha = points.length > 1500 ? 0.35 : 0.65;
@@ -187,7 +189,7 @@
     for (const t of trends) {
       const lone = groupCount === 1;
       series.push({ label: "median", ...(lone ? {} : { class: "quiet" }), stroke: lone ? theme.ink() : theme.color(t.group),
-        width: 2.4, pxAlign: 0, spanGaps: true, points: { show: false } });
+        width: 2.4, pxAlign: 0, points: { show: false } });
     }
     const reading = element("div", { class: "reading" });
     const chart = new uPlot({

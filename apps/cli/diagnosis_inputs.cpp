@@ -1,0 +1,135 @@
+#include "apps/cli/diagnosis_inputs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+
+#include "models/error.h"
+
+namespace sparflow::cli {
+namespace {
+
+/// A log is only one of: diagnosed, reference, test. @throws UsageError
+void refuse_shared_logs(const std::string& verb, const DiagnosisFiles& files) {
+  const auto refuse = [&](const std::vector<Log>& some, const std::vector<Log>& others,
+                          const char* one, const char* other) {
+    for (const Log& a : some) {
+      for (const Log& b : others) {
+        if (a.sha256 != b.sha256) continue;
+        throw UsageError(
+            fmt::format("{}: {} is given as {} and as {}; a log can be only one of them", verb,
+                        a.file, one, other));
+      }
+    }
+  };
+  refuse(files.logs, files.references, "--log", "--reference");
+  refuse(files.logs, files.tests, "--log", "--test");
+  refuse(files.references, files.tests, "--reference", "--test");
+}
+
+}  // namespace
+
+void DiagnosisFiles::write_provenance(Page& page) const {
+  const auto name = [&page](const char* what, const std::vector<Log>& some) {
+    for (const Log& l : some) {
+      page.provenance(
+          what, fmt::format("{}, {} rows, sha256 {}", l.file, l.samples(), l.sha256.substr(0, 16)));
+    }
+  };
+  name("log", logs);
+  name("reference log", references);
+  name("test log", tests);
+}
+
+void DiagnosisInputs::add_model(CLI::App& app) {
+  app.add_option("--model", model_, "fitted model")->required()->type_name("MODEL.json");
+}
+
+void DiagnosisInputs::add_logs(CLI::App& app, const std::string& what) {
+  app.add_option("--log,-l", logs_, what)->required()->type_name("FILE...");
+}
+
+void DiagnosisInputs::add_references(CLI::App& app, const std::string& what) {
+  app.add_option("--reference,-r", references_, what)->type_name("FILE...");
+}
+
+void DiagnosisInputs::add_tests(CLI::App& app, const std::string& what) {
+  app.add_option("--test,-t", tests_, what)->type_name("FILE...");
+}
+
+void DiagnosisInputs::add_candidates(CLI::App& app, const std::string& what) {
+  app.add_option("--candidates", candidates_,
+                 what + ", as in `sparflow effects`; else the whole catalogue")
+      ->type_name("EFFECT[:AT]...");
+}
+
+void DiagnosisInputs::add_output(CLI::App& app) {
+  app.add_option("--output,-o", output_, "model to write (JSON)")
+      ->required()
+      ->type_name("MODEL2.json");
+}
+
+void DiagnosisInputs::add_threads(CLI::App& app) {
+  app.add_option("--threads", threads_, "threads for learning, 0 = one a processor")
+      ->check(CLI::Range(0, 256));
+}
+
+void DiagnosisInputs::add_rest(CLI::App& app) {
+  app.add_option("--mapping", mapping_, "mapping file for logs with other column names (YAML)")
+      ->type_name("FILE");
+  own_.add_to(app);
+  outputs_.add_to(app);
+}
+
+DiagnosisFiles DiagnosisInputs::read() const {
+  std::vector<NamedFile> inputs = {{"--model", model_}, {"--mapping", mapping_}};
+  const std::pair<const char*, const std::vector<std::string>*> lists[] = {
+      {"--log", &logs_},
+      {"--reference", &references_},
+      {"--test", &tests_},
+      {"--effects", &own_.files}};
+  for (const auto& [option, paths] : lists) {
+    for (NamedFile& f : named(option, *paths)) inputs.push_back(std::move(f));
+  }
+  std::vector<NamedFile> written = outputs_.files();
+  written.push_back({"--output", output_});
+  check_outputs_apart(verb_, written, inputs);
+  if (!output_.empty()) check_writable(output_);
+  outputs_.check();
+  DiagnosisFiles files;
+  files.model = load_model_aloud(model_);
+  own_.load_into(files.model);
+  const Machine& machine = files.model.machine;
+  for (const std::string& c : candidates_) files.candidates.push_back(parse_effect(c, machine));
+  files.logs = load_logs(logs_, machine, mapping_);
+  files.references = load_logs(references_, machine, mapping_);
+  files.tests = load_logs(tests_, machine, mapping_);
+  refuse_shared_logs(verb_, files);
+  return files;
+}
+
+void say_what_is_reference(const DiagnosisFiles& files) {
+  if (!files.references.empty()) return;
+  const auto seen = [&](const Log& log) {
+    return std::any_of(files.model.data.begin(), files.model.data.end(), [&](const DataSource& d) {
+      return d.use == "train" && d.sha256 == log.sha256;
+    });
+  };
+  const auto unseen = std::find_if_not(files.logs.begin(), files.logs.end(), seen);
+  if (unseen == files.logs.end()) return;
+  note(
+      fmt::format("{}: the model was not fitted on this log; without --reference the model counts "
+                  "as the reference for forces only, pressures and flows are learned anew",
+                  unseen->file));
+}
+
+std::string today() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  return fmt::format("{:04}-{:02}-{:02}", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday);
+}
+
+}  // namespace sparflow::cli

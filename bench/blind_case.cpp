@@ -1,0 +1,312 @@
+#include "bench/blind_case.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+#include <set>
+
+#include "identification/extend.h"
+#include "models/error.h"
+#include "models/machine_file.h"
+#include "problems/bundled.h"
+#include "simulator/hidden_effects/hidden_effect.h"
+#include "simulator/hidden_effects/random_machine.h"
+
+namespace sparflow::bench {
+namespace {
+
+using simulator::CaseRequest;
+using simulator::GeneratedCase;
+using simulator::HiddenParameter;
+using simulator::HiddenTruth;
+/// Learning again moves errors by some tenths of a percent.
+constexpr double kRefitMoves = 1.005;
+constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
+
+Machine draw_machine(std::uint64_t seed) {
+  std::vector<Machine> drawings;
+  for (const char* file :
+       {"loader_crane", "loader_crane", "hmf_2020_k4", "swing_crane_two_pumps", "excavator"}) {
+    drawings.push_back(load_machine(bundled_file(fmt::format("machines/{}.yaml", file))));
+    drawings.back().pumps.front().type = PumpType::kLoadSensing;
+  }
+  return simulator::random_machine(drawings, seed);
+}
+
+std::string key_of(const std::string& id, const std::string& at) {
+  return at.empty() ? id : id + ":" + at;
+}
+
+/// Ids that can be hidden on this machine.
+std::vector<std::string> ids_for(const Machine& machine, bool outside, const std::string& only) {
+  std::vector<std::string> ids;
+  for (const std::string& id : outside ? simulator::outside_ids() : simulator::catalogue_ids()) {
+    if (id == "sensor_fault" || simulator::places_of(id, machine).empty()) continue;
+    if (!only.empty() && id != only) continue;
+    ids.push_back(id);
+  }
+  return ids;
+}
+
+CaseRequest draw_case(const BlindCase& asked) {
+  std::mt19937_64 random(asked.seed * 7919 + std::hash<std::string>()(asked.row) % 1000);
+  CaseRequest request;
+  request.log.seconds = asked.seconds;
+  request.log.noise_factor = asked.noise;
+  request.log.crane_seed = request.log.motion_seed = asked.seed;
+  request.log.channels.pressure_b = asked.leave_out != "rod";
+  request.log.channels.payload = asked.leave_out != "payload";
+  request.log.channels.commands = asked.leave_out != "commands";
+  request.log.channels.oil = asked.leave_out != "oil";
+  request.log.channels.pumps = asked.leave_out != "pump";
+  const double size = asked.row == "small" ? 1.0 / 3.0 : 1.0;
+  for (std::uint64_t attempt = 0;; ++attempt) {
+    request.log.machine = draw_machine(asked.seed + 100000 * attempt);
+    if (asked.row == "none") return request;
+    if (asked.row == "fault") {
+      request.log.effects = {{"sensor_fault", "", 1.0, -1}};
+      return request;
+    }
+    const std::vector<std::string> ids =
+        ids_for(request.log.machine, asked.row == "outside", asked.only);
+    if (ids.empty() && attempt < 20) continue;
+    if (ids.empty()) throw UsageError("no machine can have " + asked.only);
+    request.log.effects = {{ids[random() % ids.size()], "", size, -1}};
+    while (asked.row == "pairs" && request.log.effects.size() < 2) {
+      const std::string second = ids[random() % ids.size()];
+      if (second != request.log.effects[0].id)
+        request.log.effects.push_back({second, "", size, -1});
+    }
+    return request;
+  }
+}
+
+/// A case as a user has it: logs read from text, a model fitted.
+struct Crane {
+  std::vector<HiddenTruth> truth;
+  std::vector<Log> train, references, tests;
+  CraneModel model;
+  double rows = 0.0;
+};
+
+Crane prepare(const BlindCase& asked) {
+  const CaseRequest request = draw_case(asked);
+  const GeneratedCase logs = simulator::generate_case(request);
+  const Machine& machine = request.log.machine;
+  Crane crane;
+  crane.truth = logs.train.truth;
+  crane.train = {log_from_text("train.csv", csv_text(logs.train), machine)};
+  crane.tests = {log_from_text("test.csv", csv_text(logs.test), machine)};
+  if (asked.reference)
+    crane.references = {log_from_text("reference.csv", csv_text(logs.reference), machine)};
+  crane.rows = static_cast<double>(logs.train.rows());
+  FitOptions options;
+  options.hold_out_every = 0;
+  crane.model = fit(machine, asked.reference ? crane.references : crane.train, {}, options).model;
+  return crane;
+}
+
+/// A simple way's answer in the form of a diagnosis.
+Diagnosis simple_diagnosis(const std::string& judge, const Crane& crane) {
+  const RawEvidence evidence(crane.model, crane.train, crane.references);
+  const SimpleAnswer answer =
+      judge == "bic" ? evidence.iid_bic() : evidence.strongest_correlation();
+  Diagnosis d;
+  d.verdict = answer.found.empty() ? Verdict::kNone : Verdict::kMissing;
+  for (std::size_t k = 0; k < answer.found.size(); ++k) {
+    const EffectAt& e = answer.found[k];
+    const std::string key = effect_key(e.effect->info(), crane.model.machine, e.at);
+    DiagnosedEffect one;
+    one.effect = e;
+    one.id = e.effect->info().id;
+    one.at = key.size() > one.id.size() ? key.substr(one.id.size() + 1) : "";
+    one.applied = {e.effect, e.at, answer.values[k], {}, {}};
+    d.effects.push_back(one);
+  }
+  return d;
+}
+
+/// Parameters of named effects against the hidden law's nearest text-book values.
+void judge_parameters(const Diagnosis& d, const std::vector<HiddenTruth>& truth, BlindRun& run) {
+  for (const HiddenTruth& t : truth) {
+    for (const DiagnosedEffect& e : d.effects) {
+      if (e.key() != key_of(t.id, t.at)) continue;
+      const EffectInfo& info = e.effect.effect->info();
+      for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+        for (const HiddenParameter& p : t.parameters) {
+          if (p.name != info.parameters[k].name || p.equivalent == 0.0) continue;
+          run.errors.push_back(std::abs(e.applied.values[k] / p.equivalent - 1.0));
+          if (e.applied.lower95.empty()) continue;
+          run.covered.push_back(p.equivalent >= e.applied.lower95[k] &&
+                                p.equivalent <= e.applied.upper95[k]);
+          run.parameters.push_back(t.id + "." + p.name);
+          run.truth +=
+              fmt::format(" {} {:.4g} ({:.4g}..{:.4g}) for {:.4g}", p.name, e.applied.values[k],
+                          e.applied.lower95[k], e.applied.upper95[k], p.equivalent);
+        }
+      }
+    }
+  }
+}
+
+void judge_answer(const Diagnosis& d, const std::vector<HiddenTruth>& hidden, BlindRun& run) {
+  std::set<std::string> truth, answer;
+  for (const HiddenTruth& t : hidden) truth.insert(key_of(t.id, t.at));
+  if (d.verdict == Verdict::kMissing) {
+    for (const DiagnosedEffect& e : d.effects) answer.insert(e.key());
+  }
+  run.verdict = verdict_name(d.verdict);
+  run.truth = fmt::format("{}", fmt::join(truth, " + "));
+  for (const HiddenTruth& t : hidden) run.truth += fmt::format(" [{}]", t.law_name);
+  run.answer += fmt::format("{}", fmt::join(answer, " + "));
+  if (d.verdict == Verdict::kUnknown && d.unexplained)
+    run.answer += "unknown: " + d.unexplained->sentence;
+  if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
+  if (d.leftover_share > 0.0) run.answer += fmt::format(" (left {:.2f})", d.leftover_share);
+  for (const DiagnosedEffect& e : d.effects) {
+    for (const auto& [rival, worse] : e.rivals) run.answer += fmt::format(" ~{}", rival);
+  }
+  for (const FoundEffect& f : d.search.found) {
+    const EffectAt& e = f.design.effect;
+    run.named.push_back({effect_key(e.effect->info(), *d.evidence.series[0].machine, e.at), f.size,
+                         f.over_form, f.gain});
+  }
+  run.exact = answer == truth;
+  run.all_found = std::includes(answer.begin(), answer.end(), truth.begin(), truth.end());
+  if (d.verdict != Verdict::kMissing || truth.empty()) return;
+  run.top = truth.count(d.effects.front().key()) > 0;
+  run.set_size = 0.0;
+  for (const DiagnosedEffect& e : d.effects) {
+    run.set_size += 1.0 + static_cast<double>(e.rivals.size());
+    run.in_set = run.in_set || truth.count(e.key()) > 0;
+    for (const auto& [rival, worse] : e.rivals) run.in_set = run.in_set || truth.count(rival) > 0;
+  }
+  run.set_size /= static_cast<double>(truth.size());
+  judge_parameters(d, hidden, run);
+}
+
+double energy_error(const CompareResult& result) {
+  double wrong = 0.0, measured = 0.0;
+  for (const EnergyScore& e : result.energy) {
+    if (!(e.measured > 0.0)) continue;
+    wrong += std::abs(e.predicted - e.measured);
+    measured += e.measured;
+  }
+  return measured > 0.0 ? wrong / measured : kNotJudged;
+}
+
+std::vector<EffectAt> true_effects(const Crane& crane) {
+  std::vector<EffectAt> out;
+  for (const EffectAt& e : candidates(crane.model.machine)) {
+    const std::string key = effect_key(e.effect->info(), crane.model.machine, e.at);
+    for (const HiddenTruth& t : crane.truth) {
+      if (key_of(t.id, t.at) == key) out.push_back(e);
+    }
+  }
+  return out;
+}
+
+/// Adds what was named, and what is true, and judges both on the test log.
+void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
+  std::vector<EffectAt> named;
+  if (d.verdict == Verdict::kMissing) {
+    for (const DiagnosedEffect& e : d.effects) named.push_back(e.effect);
+  }
+  ExtendOptions options;
+  options.references = crane.references;
+  options.fit.hold_out_every = 0;
+  const auto learned = [&](const std::vector<EffectAt>& effects) -> std::optional<ExtendResult> {
+    if (effects.empty()) return {};
+    try {
+      return extend(crane.model, effects, crane.train, crane.tests, options);
+    } catch (const InputError&) {  // the logs do not show it
+      return {};
+    }
+  };
+  const std::optional<ExtendResult> ours = learned(named);
+  const std::vector<EffectAt> truth = true_effects(crane);
+  if (ours) {
+    const CompareResult &before = ours->steps.front().before, &after = ours->steps.back().after;
+    run.changed = true;
+    const ErrorChange change =
+        error_change(crane.model.machine, before, after, ours->steps.front().stage);
+    run.made_worse = change.overall > kRefitMoves || !change.harmed.empty();
+    run.energy_before = energy_error(before);
+    run.energy_after = energy_error(after);
+  }
+  if (truth.empty()) return;
+  if (run.exact) {
+    run.rms_ratio = ours ? 1.0 : kNotJudged;
+    return;
+  }
+  const std::optional<ExtendResult> best = learned(truth);
+  if (!best) return;
+  const CompareResult& known = best->steps.back().after;
+  run.rms_ratio = error_change(crane.model.machine, known,
+                               ours ? ours->steps.back().after : best->steps.front().before,
+                               best->steps.front().stage)
+                      .overall;
+  if (!ours) run.energy_before = run.energy_after = energy_error(best->steps.front().before);
+}
+
+}  // namespace
+
+bool BlindRun::good() const {
+  if (asked.row == "none") return verdict == "none";
+  if (asked.row == "outside") return verdict == "unknown";
+  if (asked.row == "fault") return verdict == "bad_data";
+  if (asked.row == "pairs") return exact;
+  return top;
+}
+
+BlindRun run_blind(const BlindCase& asked) {
+  BlindRun run;
+  run.asked = asked;
+  run.rms_ratio = run.energy_before = run.energy_after = kNotJudged;
+  try {
+    const Crane crane = prepare(asked);
+    run.machine = crane.model.machine.name;
+    run.rows = crane.rows;
+    const auto start = std::chrono::steady_clock::now();
+    Diagnosis d;
+    if (asked.judge == "ours") {
+      d = diagnose(crane.model, crane.train, crane.references);
+    } else if (asked.judge == "gp") {
+      run.swallowed = swallowed_by_refit(crane.model, crane.references, crane.train);
+      for (const auto& s : run.swallowed)
+        run.answer += fmt::format("{} error {:+.0f} % ", s.stage, -100.0 * s.share);
+    } else {
+      d = simple_diagnosis(asked.judge, crane);
+    }
+    run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    judge_answer(d, crane.truth, run);
+    if (asked.judge == "ours" && asked.extend) judge_extended(d, crane, run);
+    if (asked.judge == "ours") run.details = d.table();
+    for (const HiddenTruth& t : crane.truth) {
+      for (const HiddenParameter& p : t.parameters) {
+        run.details += fmt::format("   truth {} {} = {:.5g} {} (equivalent {:.5g})\n", t.id, p.name,
+                                   p.value, p.unit, p.equivalent);
+      }
+    }
+  } catch (const InputError& error) {
+    run.left_out = error.what();
+  }
+  return run;
+}
+
+double time_of_diagnosis(std::uint64_t seed) {
+  BlindCase asked;
+  asked.row = "clear";
+  asked.reference = true;
+  asked.seed = seed;
+  asked.extend = false;
+  const BlindRun run = run_blind(asked);
+  return run.seconds * 15000.0 / std::max(1.0, run.rows);
+}
+
+}  // namespace sparflow::bench

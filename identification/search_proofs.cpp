@@ -1,0 +1,61 @@
+#include "identification/search_proofs.h"
+
+#include <fmt/format.h>
+
+#include "identification/effect_proof.h"
+
+namespace sparflow {
+
+using Eigen::Index;
+
+void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
+                  const std::vector<const EffectDesign*>& designs, std::size_t index,
+                  FoundEffect& found) {
+  const EffectAction action = effect_action(evidence, designs, index, fit);
+  found.size = action.size;
+  found.absorbed = action.absorbed;
+  found.over_form = action.over_form;
+  found.at_bound = false;
+  Index first = 0;
+  for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
+  for (Index k = 0; k < found.design.linear; ++k) {
+    const double v = fit.theta[first + k], lo = found.design.lower[static_cast<std::size_t>(k)];
+    const double hi = found.design.upper[static_cast<std::size_t>(k)];
+    const double edge = 1e-6 * (hi - lo);
+    found.at_bound = found.at_bound || v > hi - edge || (lo > 0.0 && v < lo + edge);
+  }
+  const HeldOutGain held = held_out_gain(evidence, designs, index, fit, options.folds);
+  found.held_out = held.gain;
+  found.held_out_error = held.error;
+  found.held_out_share = held.improved;
+}
+
+std::string why_not_named(const FoundEffect& found, const SearchOptions& options) {
+  const EffectStage stage = found.design.effect.effect->info().stage;
+  const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+  if (behind_process && found.absorbed > options.largest_absorbed) {
+    return fmt::format(
+        "what is learned (pressures, margins, gains) can imitate {:.0f} % of it; a reference log "
+        "would tell",
+        100.0 * found.absorbed);
+  }
+  if (found.size < options.smallest_effect) {
+    return fmt::format("it is {:.2f} times the noise where it acts, too small to matter",
+                       found.size);
+  }
+  if (found.at_bound) return "its parameter would lie at the edge of what is plausible";
+  if (found.over_form < options.smallest_over_form) {
+    return fmt::format(
+        "it is {:.1f} times what the form of another effect in the same place may be wrong by",
+        found.over_form);
+  }
+  // one standard error beyond zero, or (a few large steps carry all the evidence) better nearly everywhere
+  if (found.held_out <= found.held_out_error &&
+      !(found.held_out > 0.0 && found.held_out_share > 0.79)) {
+    return fmt::format("on motions left out it gains {:.1f} +- {:.1f} nats, not proven",
+                       found.held_out, found.held_out_error);
+  }
+  return {};
+}
+
+}  // namespace sparflow

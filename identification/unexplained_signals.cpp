@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+
+#include "identification/unexplained.h"
+
+namespace sparflow {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+std::vector<SignalColumn> channel_signals(const Evidence& evidence,
+                                          const EvidenceChannel& channel) {
+  std::vector<SignalColumn> out;
+  const Machine& machine = *evidence.series[0].machine;
+  // A signal that shares its sensor with the channel explains the sensor's noise, nothing else.
+  const bool pressures = channel.kind != EvidenceKind::kForce &&
+                         channel.kind != EvidenceKind::kFlow && channel.kind != EvidenceKind::kPump;
+  const auto shares_sensor = [&](std::size_t cylinder, bool pressure) {
+    if (pressures && static_cast<int>(cylinder) == channel.index)
+      return true;  // the learned process' own inputs
+    const bool own =
+        channel.kind != EvidenceKind::kPump && static_cast<int>(cylinder) == channel.index;
+    if (channel.kind == EvidenceKind::kPump) return pressure;
+    return own &&
+           (pressure ? channel.kind != EvidenceKind::kFlow : channel.kind == EvidenceKind::kFlow);
+  };
+  const auto add = [&](const std::string& name, auto&& of) {
+    VectorXd v = VectorXd::Zero(channel.rows());
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      const MachineSeries& s = evidence.series[static_cast<std::size_t>(channel.log[b])];
+      for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) {
+        v[i] = of(s, channel.sample[static_cast<std::size_t>(i)], channel.blocks[b], i);
+        if (!std::isfinite(v[i])) v[i] = 0.0;
+      }
+    }
+    if (v.maxCoeff() > v.minCoeff()) out.push_back({name, std::move(v)});
+  };
+  const auto at = [](const VectorXd& v, Index k) { return k < v.size() ? v[k] : 0.0; };
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    add("q_" + machine.joints[static_cast<std::size_t>(j)].name,
+        [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return s.q(k, j); });
+  }
+  for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+    const std::string& name = machine.cylinders[i].name;
+    using C = const CylinderSeries;
+    const auto cylinder = [&](const std::string& text, auto of) {
+      add(text, [&, of](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+        return of(s.cylinders[i], k);
+      });
+    };
+    if (!shares_sensor(i, false)) {
+      cylinder("v_" + name, [&](C& c, Index k) { return c.speed[k]; });
+      cylinder("a_" + name, [&](C& c, Index k) { return c.acceleration[k]; });
+    }
+    if (!(pressures && static_cast<int>(i) == channel.index)) {
+      cylinder("F_" + name, [&](C& c, Index k) { return c.static_force[k]; });
+      cylinder("u_" + name, [&](C& c, Index k) { return at(c.command, k); });
+    }
+    if (!shares_sensor(i, true)) {
+      cylinder("pA_" + name, [&](C& c, Index k) { return at(c.pressure_a, k); });
+      cylinder("pB_" + name, [&](C& c, Index k) { return at(c.pressure_b, k); });
+    }
+    cylinder("du/dt_" + name, [&](C& c, Index k) {
+      return c.command.size() > k + 1 && k > 0 ? c.command[k + 1] - c.command[k - 1] : 0.0;
+    });
+  }
+  for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
+    if (channel.kind == EvidenceKind::kPump) continue;
+    add("p_" + machine.pumps[p].name, [&](const MachineSeries& s, Index k, const NoiseBlock&,
+                                          Index) { return at(s.pumps[p].pressure, k); });
+  }
+  // of a pump: power, and what its pressure leaves over the spool of this channel's cylinder
+  for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
+    if (channel.kind == EvidenceKind::kPump) continue;
+    add("power of " + machine.pumps[p].name,
+        [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+          double flow = 0.0;
+          for (const int i : machine.pumps[p].feeds)
+            flow += s.cylinders[static_cast<std::size_t>(i)].flow[k];
+          return at(s.pumps[p].pressure, k) * flow;
+        });
+  }
+  if (channel.kind == EvidenceKind::kFlow && machine.pump_of_cylinder(channel.index) >= 0) {
+    const auto own = static_cast<std::size_t>(channel.index);
+    const auto pump = static_cast<std::size_t>(machine.pump_of_cylinder(channel.index));
+    add("pressure over the spool", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+      const CylinderSeries& c = s.cylinders[own];
+      const double u = at(c.command, k);
+      if (u == 0.0) return 0.0;
+      return at(s.pumps[pump].pressure, k) - at(u > 0.0 ? c.pressure_a : c.pressure_b, k);
+    });
+  }
+  add("total flow", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+    double sum = 0.0;
+    for (const CylinderSeries& c : s.cylinders) sum += c.flow[k];
+    return sum;
+  });
+  add("payload",
+      [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return at(s.payload, k); });
+  add("oil",
+      [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return at(s.oil, k); });
+  add("time", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return s.time[k]; });
+  add("time since the motion's start",
+      [&](const MachineSeries&, Index, const NoiseBlock& b, Index i) {
+        return std::min(20.0, static_cast<double>(i - b.first));
+      });
+  return out;
+}
+
+}  // namespace sparflow

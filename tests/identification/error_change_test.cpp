@@ -1,0 +1,129 @@
+#include "identification/error_change.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/identification/arm_log.h"
+
+namespace sparflow {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using testing_support::arm_log;
+using testing_support::arm_machine;
+using testing_support::arm_model;
+
+/// Compared on a log with sensor noise; something to put errors into.
+const CompareResult& compared() {
+  static const CompareResult result = [] {
+    CompareOptions options;
+    options.find_regions = false;
+    return compare(arm_model(), {arm_log(0.8, 7)}, options);
+  }();
+  return result;
+}
+
+/// The same with another error of one quantity: `size` [SI] times noise of its own in each sample.
+CompareResult with_error(CompareResult r, const std::string& stage, double size, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  for (ComparedSeries& s : r.logs[0].series) {
+    if (s.stage != stage) continue;
+    double squares = 0.0;
+    long n = 0;
+    for (Eigen::Index k = 0; k < s.measured.size(); ++k) {
+      if (!std::isfinite(s.measured[k])) continue;
+      s.predicted[k] = s.measured[k] + size * normal(random);
+      squares += std::pow(s.predicted[k] - s.measured[k], 2);
+      ++n;
+    }
+    for (StageScore& score : r.scores) {
+      if (score.stage == stage) score.rmse = std::sqrt(squares / static_cast<double>(n));
+    }
+  }
+  return r;
+}
+
+TEST(ErrorChange, IsTheGeometricMeanWhereItActsAndOverall) {
+  CompareResult before, after;
+  before.scores.resize(2);
+  before.scores[0].stage = "force";
+  before.scores[1].stage = "pump";
+  for (StageScore& s : before.scores) {
+    s.at = "x";
+    s.rmse = 4.0;
+    s.n = 100;
+  }
+  after = before;
+  after.scores[0].rmse = 1.0;
+  const Machine machine = arm_machine();
+  const ErrorChange c = error_change(machine, before, after, "force", "x");
+  EXPECT_DOUBLE_EQ(c.own, 0.25);
+  EXPECT_DOUBLE_EQ(c.overall, 0.5);  // sqrt(0.25 * 1)
+  EXPECT_FALSE(c.worse());
+  EXPECT_TRUE((ErrorChange{0.9, 1.02, {}}.worse())) << "not better where it acts";
+  EXPECT_TRUE((ErrorChange{1.05, 0.9, {}}.worse())) << "worse on the whole";
+  EXPECT_FALSE((ErrorChange{1.01, 0.9, {}}.worse())) << "learning again moves as much";
+}
+
+TEST(ErrorChange, GrowthOfAnotherErrorIsHarm) {
+  CompareResult before = with_error(compared(), "force", 4e3, 1);
+  before = with_error(before, "pump", 2e5, 2);
+  CompareResult after = with_error(before, "force", 1e3, 3);
+  after = with_error(after, "pump", 2.6e5, 4);
+  const ErrorChange c = error_change(arm_machine(), before, after, "force", "arm");
+  EXPECT_LT(c.own, 0.3);
+  ASSERT_THAT(c.harmed, SizeIs(1));
+  EXPECT_EQ(c.harmed[0].stage, "pump");
+  EXPECT_THAT(c.harmed[0].sentence, HasSubstr("pump main grew from 2"));
+  EXPECT_TRUE(c.worse());
+}
+
+TEST(ErrorChange, ChanceBetweenMotionsIsNoHarm) {
+  // other noise of the same size: larger or smaller by chance
+  const CompareResult before = with_error(compared(), "pump", 2e5, 2);
+  for (unsigned seed = 10; seed < 20; ++seed) {
+    const CompareResult after = with_error(before, "pump", 2e5, seed);
+    EXPECT_THAT(error_change(arm_machine(), before, after, "force", "arm").harmed, IsEmpty())
+        << seed;
+  }
+}
+
+TEST(ErrorChange, EnergyThatMovesAwayIsHarmAlthoughNoRmsGrew) {
+  // before: an error that cancels; after: a smaller one, always to one side
+  CompareResult before = with_error(compared(), "pump", 6e5, 2);
+  CompareResult after = before;
+  for (ComparedSeries& s : after.logs[0].series) {
+    if (s.stage == "pump") s.predicted = (s.measured.array() + 4e5).matrix();
+  }
+  for (StageScore& s : after.scores) {
+    if (s.stage == "pump") s.rmse = 4e5;
+  }
+  const ErrorChange c = error_change(arm_machine(), before, after, "force", "arm");
+  ASSERT_THAT(c.harmed, SizeIs(1));
+  EXPECT_EQ(c.harmed[0].stage, "energy");
+  EXPECT_GT(c.harmed[0].after, c.harmed[0].before);
+}
+
+TEST(ErrorChange, OutsideWhatWasLearnedAPressureHarmsNothing) {
+  CompareResult before = with_error(compared(), "pressure", 1e5, 2);
+  CompareResult after = with_error(before, "pressure", 4e5, 3);
+  const auto pressure_harmed = [&] {
+    const ErrorChange c = error_change(arm_machine(), before, after, "force", "arm");
+    return std::any_of(c.harmed.begin(), c.harmed.end(),
+                       [](const HarmedError& h) { return h.stage == "pressure"; });
+  };
+  EXPECT_TRUE(pressure_harmed());
+  for (ComparedSeries& s : after.logs[0].series) {
+    if (s.stage == "pressure") s.extrapolated.setConstant(true);
+  }
+  EXPECT_FALSE(pressure_harmed());
+}
+
+}  // namespace
+}  // namespace sparflow

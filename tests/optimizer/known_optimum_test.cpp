@@ -1,0 +1,247 @@
+// Optima known by hand on machines of one and two cylinders, one limit deciding at a time: what a limit that is
+// moved, forgotten or only kept at the knots would change.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/machine_file.h"
+#include "models/units.h"
+#include "optimizer/optimize.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+#include "tests/optimizer/synthetic_model.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+
+GaussianProcess constant_pressure(double pressure) {
+  GpParameters p;
+  p.mean_constant = pressure;
+  p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
+  p.flow_max = 1.0;
+  p.force_min = -1e6;
+  p.force_max = 1e6;
+  return GaussianProcess(p);
+}
+
+/// Two sleds on one level rail, the second on the first; the tip is the second's. The first works at 100 bar, the
+/// second, which has half a metre only, at 50 bar, whatever the flow: the second should do what it can, alone.
+struct Rails {
+  MotionProblem problem;
+  CraneModel model;
+  double area = 0.0;  // of either piston [m^2]
+
+  Rails() {
+    const Machine machine = parse_machine(
+        "name: rails\njoints:\n"
+        "  - {name: far, type: prismatic, parent: base, axis: [1, 0, 0], position: [0, 2], "
+        "velocity: [-1, 1], acceleration: [-1, 1]}\n"
+        "  - {name: near, type: prismatic, parent: far, axis: [1, 0, 0], position: [0, 0.5], "
+        "velocity: [-1, 1], acceleration: [-1, 1]}\n"
+        "tip: {joint: near, xyz: [0, 0, 1]}\nlinks:\n"
+        "  - {name: sled, joint: far, mass: 100, cog: [0, 0, 0], inertia: 0}\n"
+        "  - {name: top, joint: near, mass: 100, cog: [0, 0, 0], inertia: 0}\n"
+        "cylinders:\n  - {name: far, joint: far, bore: 0.1, rod: 0.05, linkage: {type: direct}}\n"
+        "  - {name: near, joint: near, bore: 0.1, rod: 0.05, linkage: {type: direct}}\n"
+        "pumps:\n  - {name: main, feeds: [far, near], max_flow_lpm: 300, max_pressure_bar: 300, "
+        "standby_bar: 20}\nvalves:\n"
+        "  - {cylinder: far, max_flow_lpm: {extend: 300, retract: 300}}\n"
+        "  - {cylinder: near, max_flow_lpm: {extend: 300, retract: 300}}\n",
+        "rails", ".");
+    area = machine.cylinders[0].area_piston();
+    model = CraneModel::untrained(machine);
+    model.cylinders[0].extend = model.cylinders[0].retract = constant_pressure(100e5);
+    model.cylinders[1].extend = model.cylinders[1].retract = constant_pressure(50e5);
+    problem.name = "rails";
+    problem.machine = machine;
+    problem.limits = limits_of(machine);
+    problem.start = VectorXd::Zero(2);
+    problem.goal = TipGoal{{1.0, 0.0, 1.0}};
+    problem.duration = {8.0, 8.0};
+  }
+
+  SeedMotion line_to(double far, double near) const {
+    Eigen::MatrixXd path(2, 2);
+    path << problem.start.transpose(), far, near;
+    const TimedMotion timed = time_parametrise(problem, path, 0.0);
+    return {"line", timed.motion, timed.shortest, true};
+  }
+
+  static OptimizeOptions options() {
+    OptimizeOptions o;
+    o.intervals = 40;
+    o.processes = 1;
+    return o;
+  }
+
+  double least_energy() const { return area * (0.5 * 50e5 + 0.5 * 100e5); }
+};
+
+TEST(KnownOptimum, TheCheapCylinderGoesToItsEndAndNotBeyond) {
+  Rails r;
+  OptimizeOptions options = Rails::options();
+  options.tightenings = 0;  // nothing may hide bounds that are not the joints' own
+  const OptimizeResult found = optimize(r.model, r.problem, {r.line_to(0.8, 0.2)}, options);
+  ASSERT_EQ(found.status, OptimizeStatus::kOptimal) << found.message;
+  // 1e-3: the soft maximum of the finish (0.3 bar) and the acceleration term, which prefers even speeds
+  EXPECT_NEAR(found.energy.total, r.least_energy(), 1e-3 * r.least_energy());
+  const double near = found.motion.q(found.motion.size() - 1, 1);
+  EXPECT_NEAR(near, 0.5, 1e-3);
+  EXPECT_LE(near, 0.5 + 1e-6);
+}
+
+TEST(KnownOptimum, OneByOneGuessesKnowEveryLimitOfSpeed) {
+  // Two legs of 0.5 m at v = 0.12 m/s and 1 m/s^2 take 2 (0.5 / v + v) = 8.573 s, whatever sets v.
+  constexpr double kSpeed = 0.12, kShortest = 2.0 * (0.5 / kSpeed + kSpeed);
+  for (const bool outwards : {true, false}) {
+    for (const std::string what : {"pump", "valve", "joint"}) {
+      SCOPED_TRACE(what + (outwards ? " outwards" : " back"));
+      Rails r;
+      const Cylinder& cylinder = r.problem.machine.cylinders[0];
+      const double flow = kSpeed * (outwards ? cylinder.area_piston() : cylinder.area_rod());
+      if (what == "pump") r.problem.limits.pump_max_flow[0] = flow;
+      if (what == "valve") {
+        r.problem.limits.valve_fraction = flow / (300.0 * units::kLitrePerMinute);
+      }
+      if (what == "joint") r.problem.limits.velocity.assign(2, {-kSpeed, kSpeed});
+      const VectorXd out = VectorXd::Constant(2, 0.5), in = VectorXd::Zero(2);
+      r.problem.start = outwards ? in : out;
+      r.problem.goal = JointGoal{outwards ? out : in};
+      const auto guesses = [&](double duration) {
+        const VectorXd times = VectorXd::LinSpaced(101, 0.0, duration);
+        return sequential_candidates(r.model, r.problem, times, {}, 10);
+      };
+      EXPECT_TRUE(guesses(0.99 * kShortest).empty());
+      // 5 %: two intervals a leg are lost by starting and stopping at knots
+      const std::vector<ModeCandidate> found = guesses(1.05 * kShortest);
+      ASSERT_EQ(found.size(), 2u) << "either order";
+      for (const ModeCandidate& c : found) {
+        const std::vector<LimitCheck> checks = check_limits(r.model, r.problem, c.guess);
+        // 0.5 %: the trapezoid, looked at at the knots, is scaled to cover the way exactly
+        EXPECT_LE(worst_excess(checks), 5e-3) << c.name << ": " << checks.front().what;
+        const MotionEnergy e = exact_energy(r.model, c.guess, 0.0);
+        EXPECT_NEAR(e.total, flow / kSpeed * (0.5 * 50e5 + 0.5 * 100e5), 1e-9 * e.total);
+      }
+    }
+  }
+}
+
+/// A bundled reach of the loader crane under a known model, from the straight joint line to an end posture with the
+/// boom free or at rest.
+struct Reach {
+  MotionProblem problem;
+  CraneModel model;
+  OptimizeOptions options;
+
+  explicit Reach(const std::string& name)
+      : problem(load_problem(bundled_file("reaches/" + name))),
+        model(test_support::synthetic_model(problem.machine)) {
+    options.intervals = 12;  // coarse: much may happen between two knots
+    options.processes = 1;
+  }
+
+  SeedMotion line(bool boom_moves) const {
+    VectorXd end = problem.start;
+    const Eigen::Vector3d goal = std::get<TipGoal>(problem.goal).tip;
+    EXPECT_TRUE(
+        solve_end_posture(problem.machine, problem.limits, goal, {boom_moves, true, true}, end));
+    Eigen::MatrixXd path(2, 3);
+    path << problem.start.transpose(), end.transpose();
+    const TimedMotion timed = time_parametrise(problem, path, 0.0);
+    return {"line", timed.motion, timed.shortest, true};
+  }
+};
+
+TEST(KnownOptimum, AStartKeepsTheCheapestMotionItSaw) {
+  // The modes of the seed (boom at rest, one joint after the other) are the best here; what the smooth law leads to
+  // afterwards costs some per cent more and must not replace it.
+  Reach r("loader_crane_lift.yaml");
+  const StartResult found = optimize_from(r.model, r.problem, r.line(false), 16.0, r.options);
+  double cheapest = INFINITY, last = 0.0;
+  for (const StageRecord& s : found.stages) {
+    if (s.energy_exact == 0.0 || s.excess > r.options.limit_tolerance) continue;
+    cheapest = std::min(cheapest, s.energy_exact);
+    last = s.energy_exact;
+  }
+  ASSERT_GT(last, 1.001 * cheapest) << "the case cannot tell the best from the last";
+  EXPECT_EQ(found.energy_exact, cheapest);
+  EXPECT_EQ(exact_energy(r.model, found.motion, r.problem.payload).total, cheapest);
+}
+
+struct Drawn {
+  StartResult without, with;  ///< limits left as they are, drawn in
+};
+
+/// Solves with and without drawing in what is broken between the knots, and expects `what` to be broken without.
+Drawn expect_drawn_in(Reach& r, const SeedMotion& seed, double duration, const std::string& what) {
+  Drawn d;
+  r.options.tightenings = 0;
+  d.without = optimize_from(r.model, r.problem, seed, duration, r.options);
+  r.options.tightenings = 5;
+  d.with = optimize_from(r.model, r.problem, seed, duration, r.options);
+  const double tolerance = r.options.limit_tolerance;
+  const auto broken = [&](const StageRecord& s) {
+    return s.what == "modes" && s.excess > 3.0 * tolerance;
+  };
+  EXPECT_TRUE(std::any_of(d.without.stages.begin(), d.without.stages.end(), broken))
+      << what << ": nothing is broken between the knots, the case shows nothing";
+  EXPECT_TRUE(d.with.usable(tolerance)) << d.with.message;
+  const std::vector<LimitCheck> checks = check_limits(r.model, r.problem, d.with.motion, 37);
+  EXPECT_LE(worst_excess(checks), tolerance) << checks.front().what;
+  EXPECT_TRUE(std::any_of(d.with.stages.begin(), d.with.stages.end(), [&](const StageRecord& s) {
+    return s.what.starts_with("modes, limits drawn in") && s.energy_exact > 0.0 &&
+           s.excess <= tolerance;
+  })) << what;
+  if (d.without.usable(tolerance)) {
+    EXPECT_LT(d.with.energy_exact, 0.999 * d.without.energy_exact) << what;
+  }
+  return d;
+}
+
+TEST(KnownOptimum, PumpFlowIsDrawnIn) {
+  Reach r("loader_crane_lift.yaml");
+  const SeedMotion seed = r.line(true);
+  expect_drawn_in(r, seed, 1.1 * seed.shortest_duration, "flow of pump");
+}
+
+TEST(KnownOptimum, ValveFlowIsDrawnIn) {
+  Reach r("loader_crane_lift.yaml");
+  r.problem.limits.pump_max_flow.assign(1, 0.0);
+  r.problem.limits.valve_fraction = 0.5;
+  const SeedMotion seed = r.line(true);
+  expect_drawn_in(r, seed, 1.1 * seed.shortest_duration, "flow through valve");
+}
+
+TEST(KnownOptimum, PumpPressureIsDrawnIn) {
+  Reach r("loader_crane_lift.yaml");
+  const SeedMotion seed = r.line(true);
+  const StartResult free = optimize_from(r.model, r.problem, seed, 16.0, r.options);
+  double most = 0.0;  // [Pa]
+  for (const LimitCheck& c : check_limits(r.model, r.problem, free.motion)) {
+    if (c.what == "pressure of pump main") most = c.value * units::kBar;
+  }
+  ASSERT_GT(most, 50e5);
+  // Its rows are only there once it was broken; then they are drawn in.
+  r.problem.limits.pump_max_pressure[0] = 0.97 * most;
+  expect_drawn_in(r, seed, 16.0, "pressure of pump");
+}
+
+TEST(KnownOptimum, TheTipsDistanceFromItsLineIsDrawnIn) {
+  Reach r("loader_crane_line.yaml");
+  expect_drawn_in(r, r.line(false), 16.0, "distance of the tip from its line");
+}
+
+TEST(KnownOptimum, ClearanceIsDrawnIn) {
+  Reach r("loader_crane_lift.yaml");
+  const SeedMotion seed = r.line(false);
+  // Beside the way of the tip; the optimum without it passes 0.2 m deep through it.
+  r.problem.obstacles = {{"ball", Sphere{{6.9, 0.0, -0.3}, 0.5}}};
+  expect_drawn_in(r, seed, 16.0, "clearance");
+}
+
+}  // namespace
+}  // namespace sparflow
