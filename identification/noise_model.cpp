@@ -18,9 +18,15 @@ Reflection reflections(const NoiseModel& m) {
   return {m.phi1 / (1.0 - m.phi2), m.phi2};
 }
 
-/// @param about_means whether the first pass takes all of a block's mean for its offset, or none
-NoiseModel by_moments(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                      const std::vector<NoiseBlock>& blocks, bool offsets, bool about_means) {
+}  // namespace
+
+double NoiseModel::deviation() const {
+  const auto [k1, k2] = reflections(*this);
+  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
+}
+
+NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                const std::vector<NoiseBlock>& blocks, bool offsets) {
   NoiseModel m;
   double tau2 = 0.0;
   Eigen::VectorXd means(static_cast<Eigen::Index>(blocks.size()));
@@ -36,9 +42,7 @@ NoiseModel by_moments(const Eigen::Ref<const Eigen::VectorXd>& residual,
       const auto n = static_cast<double>(last - first);
       if (n < 1) continue;
       const double sd = m.deviation();
-      const double shrink = pass == 0 && about_means ? 1.0
-                            : tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0))
-                                         : 0.0;
+      const double shrink = tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0)) : 0.0;
       const double mean = shrink * means[static_cast<Eigen::Index>(b)];
       const auto lost = shrink / std::max(1.0, n);  // a mean taken out takes variance out
       for (Eigen::Index t = first; t < last; ++t) {
@@ -81,25 +85,6 @@ NoiseModel by_moments(const Eigen::Ref<const Eigen::VectorXd>& residual,
     if (tau2 == 0.0) break;
   }
   return m;
-}
-
-}  // namespace
-
-double NoiseModel::deviation() const {
-  const auto [k1, k2] = reflections(*this);
-  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
-}
-
-NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                const std::vector<NoiseBlock>& blocks, bool offsets) {
-  const NoiseModel slow = by_moments(residual, blocks, offsets, false);
-  // Blocks at levels of their own look like noise that never forgets, and the other way round. Where either may be
-  // meant the likelihood says which: as slow noise, levels would prove nothing about what sets them.
-  constexpr double kSlow = 0.5;  // of one lag's correlation
-  if (!offsets || blocks.size() < 4 || reflections(slow).k1 < kSlow) return slow;
-  const NoiseModel levels = by_moments(residual, blocks, offsets, true);
-  return levels.log_likelihood(residual, blocks) > slow.log_likelihood(residual, blocks) ? levels
-                                                                                         : slow;
 }
 
 double NoiseModel::log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <map>
+
 #include "identification/diagnose.h"
 #include "identification/fit.h"
 #include "tests/identification/hidden_case.h"
@@ -51,7 +54,7 @@ class HiddenByALaw : public ::testing::TestWithParam<HiddenLaw> {
   }
 };
 
-/// Oil needs two minutes to warm up; of the hoses' loss the same crane shows nothing when the oil stays as it is.
+/// Leaks show in pauses of a second: two minutes hold enough of them.
 constexpr double kLogSeconds = 150.0;
 constexpr std::uint64_t kLogSeed = 7;
 
@@ -75,9 +78,7 @@ TEST_P(HiddenByALaw, IsFoundWithAndWithoutAReference) {
 
 INSTANTIATE_TEST_SUITE_P(
     Catalogue, HiddenByALaw,
-    ::testing::Values(HiddenLaw{"oil_temperature", "", 0, "exponential", {"beta", "return_loss"}},
-                      HiddenLaw{"oil_temperature", "", 1, "Walther", {"beta", "return_loss"}},
-                      HiddenLaw{"leakage", "boom", 0, "laminar past the spool", {"k"}},
+    ::testing::Values(HiddenLaw{"leakage", "boom", 0, "laminar past the spool", {"k"}},
                       HiddenLaw{"leakage", "boom", 1, "orifice past the spool", {"k"}},
                       HiddenLaw{"leakage", "boom", 2, "past the piston, moving too", {"k"}},
                       HiddenLaw{"pump_lag", "main", 1, "second order", {"tau"}},
@@ -87,6 +88,42 @@ INSTANTIATE_TEST_SUITE_P(
     [](const ::testing::TestParamInfo<HiddenLaw>& tested) {
       return std::string(tested.param.id) + "_" + std::to_string(tested.param.law);
     });
+
+TEST(ValveOfTheRealCrane, DeadBandsByDirection) {
+  const std::string shared = SPARFLOW_SOURCE_DIR "/../shared/";
+  if (!std::filesystem::exists(shared + "data/hmf_2020_k4"))
+    GTEST_SKIP() << "no logs of the real crane beside the source tree";
+  const Machine machine = load_machine(shared + "machines/hmf_2020_k4.yaml");
+  std::vector<Log> logs;
+  for (const char* name : {"MainSTDTest1_270325", "MainSineTest_230425", "Dual2SineTest_230425",
+                           "Dual1SineRun_230425"}) {
+    logs.push_back(load_log(shared + "data/hmf_2020_k4/" + name + ".csv", machine));
+  }
+  FitOptions options;
+  options.hold_out_every = 0;
+  const Diagnosis d = diagnose(fit(machine, logs, {}, options).model, logs);
+  // Its authors: 0.071 and 0.126 (main), 0.037 and 0.126 (jib), by another way (slow ramps); least squares by hand on
+  // these logs 0.055 and 0.12, 0.04 and 0.105.
+  std::map<std::string, std::vector<double>> found;
+  for (const DiagnosedEffect& e : d.effects) found[e.key()] = e.applied.values;
+  for (const char* at : {"main", "jib"}) {
+    const std::string key = std::string("valve_deadband:") + at;
+    ASSERT_TRUE(found.count(key)) << d.table();
+    EXPECT_NEAR(found[key][0], at[0] == 'm' ? 0.055 : 0.04, 0.02);
+    EXPECT_NEAR(found[key][1], at[0] == 'm' ? 0.12 : 0.105, 0.02);
+  }
+}
+
+TEST(ValveOfTheRealCrane, ACommandThatWasNotLoggedIsLeftOut) {
+  const std::string shared = SPARFLOW_SOURCE_DIR "/../shared/";
+  const std::string path = shared + "data/hmf_2020_k4/MainValveResponseTime_010425.csv";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no logs of the real crane";
+  const Machine machine = load_machine(shared + "machines/hmf_2020_k4.yaml");
+  const MachineSignals s = make_signals(machine, load_log(path, machine));
+  EXPECT_FALSE(s.cylinders[0].has_command()) << "u_main is zero while main moves by 30 mm/s";
+  EXPECT_TRUE((s.cylinders[0].moving.any()));
+  EXPECT_TRUE(s.cylinders[1].has_command()) << "the jib rests: its command may well be zero";
+}
 
 }  // namespace
 }  // namespace sparflow
