@@ -84,8 +84,8 @@ std::string Diagnosis::headline() const {
     case Verdict::kNone:
       return "Nothing is missing: what is left is noise, as far as these logs can tell.";
     case Verdict::kUnknown:
-      return fmt::format("Something is missing that is not in the catalogue. {}.",
-                         unexplained ? unexplained->sentence : "");
+      return fmt::format("Something is missing that is not in the catalogue{}.",
+                         unexplained ? ": " + unexplained->sentence : "");
     case Verdict::kMissing:
       break;
   }
@@ -105,8 +105,8 @@ std::string Diagnosis::headline() const {
 std::string Diagnosis::table() const {
   std::string out = headline() + "\n\n";
   if (verdict == Verdict::kBadData) {
-    for (const BadChannel& b : bad)
-      out += fmt::format("  {}\n    {}\n", bad_channel_sentence(b), b.remedy);
+    for (std::size_t i = 1; i < bad.size(); ++i)  // the headline has the first
+      out += fmt::format("  {}\n", bad_channel_sentence(bad[i]));
     return out;
   }
   for (const DiagnosedEffect& e : effects) {
@@ -129,7 +129,8 @@ std::string Diagnosis::table() const {
       if (i < experiments.size()) out += fmt::format("        {}\n", experiments[i].sentence());
     }
   }
-  if (unexplained) out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
+  if (unexplained && verdict != Verdict::kUnknown)  // else the headline has it
+    out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
   if (effects.empty() && !ranking.empty()) {
     out += "  Nearest candidates (gain in nats beyond their price; the gate is at ";
     out += fmt::format("{:.1f}):\n", search.threshold);

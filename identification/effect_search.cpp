@@ -128,7 +128,10 @@ class Search {
   bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
       std::string why = why_not_named(found[i], options_);
-      if (why.empty() && found[i].could_be_nothing) {
+      // of an effect of its own, motions left out may have shown what ordinary least squares leaves open
+      const bool refinement = !found[i].design.effect.effect->info().refines.empty();
+      const bool proven = !refinement && found[i].held_out > 2.0 * found[i].held_out_error;
+      if (why.empty() && found[i].could_be_nothing && !proven) {
         why = "the interval of a parameter without which it is nothing holds zero";
       }
       if (why.empty()) continue;

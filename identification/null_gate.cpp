@@ -22,6 +22,22 @@ double upper_decile(VectorXd v) {
   return *at;
 }
 
+/// Products of a candidate's columns with the residual that it leaves itself, in units of that residual's deviation,
+/// signs of whole blocks drawn. What the candidate explains is taken off first: an effect of a few motions (a cushion,
+/// a limit) would otherwise, flipped, compete with itself.
+MatrixXd flipped_scores(const MatrixXd& x, const VectorXd& residual, const VectorXd& own,
+                        const std::vector<NoiseBlock>& blocks, const MatrixXd& signs) {
+  const VectorXd left = residual - x * own;
+  MatrixXd by_block(x.cols(), static_cast<Index>(blocks.size()));
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const Index first = blocks[b].first, length = blocks[b].last - first;
+    by_block.col(static_cast<Index>(b)) =
+        x.middleRows(first, length).transpose() * left.segment(first, length);
+  }
+  const double variance = left.squaredNorm() / static_cast<double>(left.size());
+  return by_block * signs / std::sqrt(std::max(variance, 1e-300));
+}
+
 }  // namespace
 
 double NullGate::threshold(double level) const {
@@ -42,7 +58,8 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
                         const std::vector<const EffectDesign*>& accepted, const EffectFit& fit,
                         int simulations, std::mt19937_64& random) {
   const std::size_t channels = evidence.channels.size();
-  std::vector<MatrixXd> noise(channels), fixed(channels);
+  std::vector<MatrixXd> noise(channels), signs(channels), fixed(channels);
+  std::vector<VectorXd> residual(channels);
   std::normal_distribution<double> normal;
   for (std::size_t c = 0; c < channels; ++c) {
     const EvidenceChannel& channel = evidence.channels[c];
@@ -63,16 +80,12 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
                           MatrixXd::Identity(channel.rows(), width));
       r -= fixed[c] * (fixed[c].transpose() * r);
     }
-    r /= std::sqrt(std::max(r.squaredNorm() / static_cast<double>(r.size()), 1e-300));
-    noise[c].resize(channel.rows(), 2 * simulations);
-    for (Index i = 0; i < channel.rows() * simulations; ++i) noise[c].data()[i] = normal(random);
-    for (const NoiseBlock& block : channel.blocks) {
-      const Index n = block.last - block.first;
-      for (int s = 0; s < simulations; ++s) {
-        const double sign = (random() & 1U) != 0U ? 1.0 : -1.0;
-        noise[c].col(simulations + s).segment(block.first, n) = sign * r.segment(block.first, n);
-      }
-    }
+    residual[c] = std::move(r);
+    noise[c].resize(channel.rows(), simulations);
+    for (Index i = 0; i < noise[c].size(); ++i) noise[c].data()[i] = normal(random);
+    signs[c].resize(static_cast<Index>(channel.blocks.size()), simulations);
+    for (Index i = 0; i < signs[c].size(); ++i)
+      signs[c].data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
   }
   NullGate gate;
   VectorXd largest = VectorXd::Constant(2 * simulations, -1e300);
@@ -81,6 +94,8 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
     for (const EffectDesign& d : *candidate.designs) {
       MatrixXd n = MatrixXd::Zero(d.linear, d.linear),
                z = MatrixXd::Zero(d.linear, 2 * simulations);
+      VectorXd g = VectorXd::Zero(d.linear);
+      std::vector<MatrixXd> columns(channels);
       for (std::size_t c = 0; c < channels; ++c) {
         if (!d.touches(c)) continue;
         MatrixXd x =
@@ -92,14 +107,25 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
             if (x.col(i).squaredNorm() < 1e-16 * whole[i]) x.col(i).setZero();
           }
         }
-        n += x.transpose() * x / fit.noise[c].variance;
-        z += x.transpose() * noise[c] / std::sqrt(fit.noise[c].variance);
+        x /= std::sqrt(fit.noise[c].variance);
+        n += x.transpose() * x;
+        z.leftCols(simulations) += x.transpose() * noise[c];
+        g += x.transpose() * residual[c] / std::sqrt(fit.noise[c].variance);
+        columns[c] = std::move(x);
       }
       const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
       n = scale.asDiagonal() * n * scale.asDiagonal();
       n.diagonal().array() += 1e-9;
+      const Eigen::LDLT<MatrixXd> solver(n);
+      const VectorXd own = scale.cwiseProduct(solver.solve(scale.cwiseProduct(g)));
+      for (std::size_t c = 0; c < channels; ++c) {
+        if (columns[c].cols() == 0) continue;
+        z.rightCols(simulations) +=
+            flipped_scores(columns[c], residual[c] / std::sqrt(fit.noise[c].variance), own,
+                           evidence.channels[c].blocks, signs[c]);
+      }
       z = scale.asDiagonal() * z;
-      best = best.cwiseMax((0.5 * z.cwiseProduct(n.ldlt().solve(z)).colwise().sum()).transpose());
+      best = best.cwiseMax((0.5 * z.cwiseProduct(solver.solve(z)).colwise().sum()).transpose());
     }
     const double usual = upper_decile(best.head(simulations));
     const double scale =

@@ -139,15 +139,34 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
   }
 }
 
-void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
-                        double duration, OptimizeResult& result) {
+/// The start nearest to keeping every limit; null when none came to a motion.
+const StartResult* nearest_start(const OptimizeResult& result) {
   const StartResult* nearest = nullptr;
   for (const StartResult& s : result.starts) {
     if (s.motion.size() > 1 && (nearest == nullptr || s.excess < nearest->excess)) nearest = &s;
   }
+  return nearest;
+}
+
+/// How many times longer the motion would have to take for this limit to hold: what makes a velocity, an
+/// acceleration and a flow comparable. Lengths do not mend with time.
+double stretch_asked(const LimitCheck& c) {
+  if (c.excess <= 0.0 || c.limit == 0.0) return 1.0 + std::max(c.excess, 0.0);
+  const double ratio = std::abs(c.value / c.limit);
+  if (c.what.starts_with("acceleration of")) return std::sqrt(ratio);
+  // between equals the flow, which is why the accelerations of a shortened path are too high
+  return c.what.starts_with("flow") ? 1.01 * ratio : ratio;
+}
+
+/// @param result with the checks of its nearest motion, if there is one
+void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
+                        double duration, OptimizeResult& result) {
   std::string worst;
-  if (nearest != nullptr && !result.checks.empty()) {
-    const LimitCheck& c = result.checks.front();
+  if (!result.checks.empty()) {
+    const LimitCheck& c = *std::max_element(result.checks.begin(), result.checks.end(),
+                                            [](const LimitCheck& x, const LimitCheck& y) {
+                                              return stretch_asked(x) < stretch_asked(y);
+                                            });
     worst = fmt::format(" Worst: {} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}.", c.what,
                         c.time, c.value, c.limit, c.unit);
   } else if (!result.starts.empty()) {
@@ -253,9 +272,9 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
   bool interrupted = false;
   for (const StartResult& s : result.starts) {
     interrupted = interrupted || s.status == NlpStatus::kInterrupted;
-    if (s.motion.size() > 1 && result.checks.empty())
-      result.checks = check_limits(model, problem, s.motion, options.refine);
   }
+  if (const StartResult* nearest = nearest_start(result))
+    result.checks = check_limits(model, problem, nearest->motion, options.refine);
   if (interrupted) {
     result.status = OptimizeStatus::kInterrupted;
     result.message = problem.name + ": interrupted before any motion was found";

@@ -86,10 +86,10 @@ struct OptimizeResult {
   OptimizeStatus status = OptimizeStatus::kFailed;
   std::string message;  ///< one sentence
   Trajectory motion;
-  double duration = 0.0;       ///< [s]
-  MotionEnergy energy;         ///< under the exact law
-  double energy_smooth = 0.0;  ///< [J]
-  std::vector<LimitCheck> checks;
+  double duration = 0.0;           ///< [s]
+  MotionEnergy energy;             ///< under the exact law
+  double energy_smooth = 0.0;      ///< [J]
+  std::vector<LimitCheck> checks;  ///< of the motion, or of the start that came nearest to one
   int best_start = -1;
   std::vector<StartResult> starts;
   double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none

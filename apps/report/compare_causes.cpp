@@ -35,22 +35,24 @@ void add_stages(Page& page, const CompareResult& result) {
   chart.title = "Own and inherited error of each stage";
   chart.note =
       "Mean squared error as a share of the measured quantity's variance: at 100 a constant would "
-      "do as well. Own: with what the stage before gives taken as measured. Inherited: what the "
-      "error of the stage before changes.";
-  chart.width = FigureWidth::kHalf;
+      "do as well. Own: with what the stage before gives taken as measured, beyond the sensor's "
+      "noise. Inherited: what the error of the stage before changes. What varies little has much "
+      "noise in it; that is no fault.";
   chart.value_axis = {"squared error", "%"};
   const auto n = static_cast<Index>(stages.size());
   BarSeries own{"own", VectorXd(n)}, inherited{"inherited", VectorXd(n)};
+  BarSeries noise{"sensor noise", VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
     const StageSplit& s = stages[static_cast<std::size_t>(i)];
     chart.categories.push_back(s.words);
     const auto share = [&s](double rms) {
       return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
     };
-    own.values[i] = share(s.own);
+    noise.values[i] = share(std::min(s.noise, s.own));
+    own.values[i] = share(s.own) - noise.values[i];
     inherited.values[i] = share(s.inherited);
   }
-  chart.series = {std::move(own), std::move(inherited)};
+  chart.series = {std::move(own), std::move(inherited), std::move(noise)};
   page.plot(std::move(chart));
   Table table;
   table.title = "Where the error arises";

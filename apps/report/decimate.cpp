@@ -90,29 +90,36 @@ constexpr double kGapShare = 0.05;
 
 BinnedMedian binned_median(const Eigen::VectorXd& x, const Eigen::VectorXd& y, int bins) {
   std::vector<Index> points = finite_points(x, y);
-  const Index count = static_cast<Index>(points.size());
+  const auto count = static_cast<Index>(points.size());
   const Index used = std::min<Index>(bins, count / 20);
   if (used < 2) return {};
   std::stable_sort(points.begin(), points.end(), [&](Index a, Index b) { return x[a] < x[b]; });
-  const double range = x[points.back()] - x[points.front()];
-  std::vector<double> at, middle_of;
-  for (Index bin = 0; bin < used; ++bin) {
-    const auto begin = points.begin() + bin * count / used;
-    const auto end = points.begin() + (bin + 1) * count / used;
-    if (bin > 0 && x[*begin] - x[*(begin - 1)] > kGapShare * range) {
-      at.push_back(0.5 * (x[*begin] + x[*(begin - 1)]));
-      middle_of.push_back(std::numeric_limits<double>::quiet_NaN());
+  const auto at = [&](Index i) { return x[points[static_cast<std::size_t>(i)]]; };
+  const double gap = kGapShare * (at(count - 1) - at(0));
+  std::vector<double> middle_x, middle_y;
+  for (Index first = 0, last = 0; first < count; first = last) {
+    // a stretch without a gap, in bins of equal numbers of points
+    for (last = first + 1; last < count && at(last) - at(last - 1) <= gap;) ++last;
+    const Index n = last - first;
+    const Index own = std::max<Index>(1, (used * n + count / 2) / count);
+    if (!middle_x.empty()) {
+      middle_x.push_back(0.5 * (at(first) + at(first - 1)));
+      middle_y.push_back(std::numeric_limits<double>::quiet_NaN());
     }
-    at.push_back(x[*(begin + (end - begin) / 2)]);
-    std::vector<double> values;
-    for (auto i = begin; i != end; ++i) values.push_back(y[*i]);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    middle_of.push_back(*middle);
+    for (Index bin = 0; bin < own; ++bin) {
+      const auto begin = points.begin() + first + bin * n / own;
+      const auto end = points.begin() + first + (bin + 1) * n / own;
+      middle_x.push_back(x[*(begin + (end - begin) / 2)]);
+      std::vector<double> values;
+      for (auto i = begin; i != end; ++i) values.push_back(y[*i]);
+      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      middle_y.push_back(*middle);
+    }
   }
-  const auto n = static_cast<Index>(at.size());
-  return {Eigen::Map<const Eigen::VectorXd>(at.data(), n),
-          Eigen::Map<const Eigen::VectorXd>(middle_of.data(), n)};
+  const auto n = static_cast<Index>(middle_x.size());
+  return {Eigen::Map<const Eigen::VectorXd>(middle_x.data(), n),
+          Eigen::Map<const Eigen::VectorXd>(middle_y.data(), n)};
 }
 
 }  // namespace sparflow

@@ -184,6 +184,36 @@ ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const Tellin
   return chart;
 }
 
+/// What is left over time, in the longest block: a swing is seen there and against no signal.
+LineChart left_over_time(const Diagnosis& d, const ChannelPicture& p) {
+  const EvidenceChannel& channel = *p.channel;
+  std::size_t longest = 0;
+  Index rows = 0;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    const Index n = channel.blocks[b].last - channel.blocks[b].first;
+    if (suspect_row(d.evidence, channel, b) && n > rows) rows = n, longest = b;
+  }
+  LineChart chart;
+  chart.title = fmt::format("What is left of the {}, over time", channel.text);
+  if (rows == 0) return chart;
+  const MachineSeries& log = d.evidence.series[static_cast<std::size_t>(channel.log[longest])];
+  const FieldUnit unit = shown_unit(channel, largest_of(p.with));
+  chart.x.resize(rows);
+  for (Index i = 0; i < rows; ++i) {
+    const auto row = static_cast<std::size_t>(channel.blocks[longest].first + i);
+    chart.x[i] = log.time[channel.sample[row]];
+  }
+  chart.y_axis = {"measured \u2212 model", unit.name};
+  chart.series.push_back({"left over",
+                          p.with.segment(channel.blocks[longest].first, rows) / unit.si,
+                          LineStyle::kPredicted,
+                          0,
+                          {},
+                          {}});
+  chart.note = "One motion, the longest without a gap.";
+  return chart;
+}
+
 }  // namespace
 
 void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
@@ -205,12 +235,14 @@ void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
   }
 }
 
-void add_left_over(Page& page, const Diagnosis& d, const std::string& stage,
-                   const std::string& at) {
+void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, const std::string& at,
+                   bool swings) {
+  constexpr double kTells = 0.03;  // of the residual: less is no picture of anything
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = d.evidence.channels[c];
     if (channel.at != at || evidence_stage(channel.kind) != stage) continue;
     const ChannelPicture p = channel_picture(d, -1, c);
+    if (swings) page.plot(left_over_time(d, p));
     const std::vector<TellingSignal> signals = telling_signals(d.evidence, channel);
     std::vector<std::pair<double, const TellingSignal*>> ranked;
     ranked.reserve(signals.size());
@@ -219,6 +251,7 @@ void add_left_over(Page& page, const Diagnosis& d, const std::string& stage,
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     for (std::size_t i = 0; i < std::min<std::size_t>(2, ranked.size()); ++i) {
+      if (swings && ranked[i].first < kTells) continue;
       ScatterChart chart = residuals(d, p, *ranked[i].second, false);
       chart.width = FigureWidth::kHalf;
       page.plot(std::move(chart));

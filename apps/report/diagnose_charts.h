@@ -34,8 +34,9 @@ std::vector<TellingSignal> telling_signals(const Evidence& evidence,
 void add_effect_pictures(Page& page, const Diagnosis& diagnosis, std::size_t effect);
 
 /// What is left at a place against the two signals that explain most of it.
+/// @param swings it goes with the time: drawn over it, and against signals only where these tell something
 void add_left_over(Page& page, const Diagnosis& diagnosis, const std::string& stage,
-                   const std::string& at);
+                   const std::string& at, bool swings);
 
 /// Gains of the candidates, and what chance would reach.
 void add_ranking(Page& page, const Diagnosis& diagnosis);

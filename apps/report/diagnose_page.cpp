@@ -70,10 +70,11 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
   }
   for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline has the first
     if (i > 0) text += sentence(bad_channel_sentence(d.bad[i])) + " ";
-    text += sentence(d.bad[i].remedy) + " ";
   }
-  if (d.verdict == Verdict::kUnknown && d.unexplained && !d.unexplained->depends_on.empty())
-    text += "It depends on " + joined(d.unexplained->depends_on, ", ") + ".";
+  if (d.verdict == Verdict::kUnknown)
+    text +=
+        "Nothing is to be added to the model before its cause is known: see below what it goes "
+        "with.";
   if (d.verdict == Verdict::kNone) {
     text += fmt::format("What the model leaves is what chance leaves (p = {:.2g}). ", d.p_value);
   } else if (d.verdict == Verdict::kMissing) {
@@ -177,7 +178,10 @@ void add_unexplained(Page& page, const Diagnosis& d) {
   }
   if (!u.depends_on.empty())
     page.paragraph("It depends on: " + joined(u.depends_on, ", ") + ", strongest first.");
-  add_left_over(page, d, u.stage, u.at);
+  const bool swings =
+      std::any_of(u.depends_on.begin(), u.depends_on.end(),
+                  [](const std::string& s) { return s.find("Hz") != std::string::npos; });
+  add_left_over(page, d, u.stage, u.at, swings);
 }
 
 void add_bad_data(Page& page, const Diagnosis& d) {

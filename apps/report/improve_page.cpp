@@ -16,8 +16,8 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kMoved = 0.02;         // [-] an error that changes less is not worth a picture
-constexpr double kStretchSeconds = 30;  // of a log, as much as the eye can compare
+constexpr double kMoved = 0.02;       // [-] an error that changes less is not worth a picture
+constexpr double kCurveSeconds = 30;  // of a log, as much as the eye can compare
 constexpr std::size_t kMostErrorCharts = 12;
 
 /// One error over the steps: [0] before the first, [i] after step i.
@@ -94,7 +94,7 @@ void add_overview(Page& page, const ExtendResult& result, const std::vector<Erro
       "RMS error on the {}, as a share of what it was before the first step. Quantities that did "
       "not move are left out.",
       result.steps.front().judged_on);
-  chart.y_axis = {"RMS error, before the first step = 100", "%"};
+  chart.y_axis = {"RMS error", "% of before"};
   for (const ErrorTrace& t : traces) {
     if (!(t.rmse[0] > 0.0) || !(t.largest_change() > kMoved)) continue;
     chart.series.push_back({t.words, 100.0 / t.rmse[0] * t.rmse, LineStyle::kPlain, -1, {}, {}});
@@ -196,7 +196,7 @@ void add_curves(Page& page, const ExtendStep& step) {
   const VectorXd gain =
       (m.before->residual().array().square() - m.after->residual().array().square()).matrix();
   const Stretch at =
-      best_stretch(time, step.change.own > 1.0 ? VectorXd(-gain) : gain, kStretchSeconds);
+      best_stretch(time, step.change.own > 1.0 ? VectorXd(-gain) : gain, kCurveSeconds);
   const Index n = at.last - at.first;
   const auto cut = [&](const VectorXd& y) { return VectorXd(y.segment(at.first, n)); };
   const double largest = cut(m.after->measured)
@@ -212,7 +212,7 @@ void add_curves(Page& page, const ExtendStep& step) {
   chart.note = fmt::format(
       "{}, the {:.0f} s in which the change shows most. Only samples that "
       "count in the scores are drawn.",
-      m.log->signals.file, kStretchSeconds);
+      m.log->signals.file, kCurveSeconds);
   chart.y_axis = {m.after->stage == "force"            ? "force"
                   : m.after->stage.starts_with("flow") ? "flow"
                                                        : "pressure",
@@ -266,13 +266,13 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
   if (!result.steps.empty()) {
     const std::vector<ErrorTrace> traces = traces_of(result);
     page.section(heading_prefix + "Error step by step");
-    add_overview(page, result, traces);
     Table table = steps_table("Steps", result.steps);
     table.note = fmt::format(
-        "Errors on the {}: RMS after against before, the geometric mean over all quantities (of "
-        "where the effect acts, and of everything).",
+        "Errors on the {}: RMS after against before; overall is the geometric mean over everything "
+        "compared.",
         result.steps.front().judged_on);
     page.table(std::move(table));
+    add_overview(page, result, traces);
     add_error_charts(page, result, traces);
     page.section(heading_prefix + "Measured, before and after");
     for (const ExtendStep& s : result.steps) add_curves(page, s);

@@ -88,7 +88,9 @@ void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
   CraneDrawing drawing;
   drawing.title = "The motion";
   drawing.note =
-      "Move the slider to drive the crane; the stronger the picture, the later the instant.";
+      "Move the slider to drive the crane; the stronger the picture, the later the instant. Solid: "
+      "the tip's way" +
+      (baseline != nullptr ? "; dashed: its way along " + baseline_name : std::string()) + ".";
   drawing.group = "motion";
   const DrawingPlane plane = drawing_plane(machine, problem.start);
   drawing.x_axis = {plane.horizontal_name, "m"};
@@ -132,12 +134,7 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
   pressure.note =
       "Working pressure of each moving cylinder, and the pump's above them: the gap is what each "
       "valve throttles away.";
-  for (int i = 0; i < machine.cylinder_count(); ++i) {
-    const std::string& name = machine.cylinders[static_cast<std::size_t>(i)].name;
-    if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
-    flow.series.push_back(curve(name, c.flow.col(i), i));
-    pressure.series.push_back(curve(name, c.pressure.col(i), i));
-  }
+  // pumps first: where one cylinder moves alone, its curve lies on its pump's
   for (int p = 0; p < machine.pump_count(); ++p) {
     const auto i = static_cast<std::size_t>(p);
     const std::string name = "pump " + machine.pumps[i].name;
@@ -147,6 +144,12 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
       flow.series.push_back(
           curve(name + " limit", VectorXd::Constant(c.t.size(), limit), -1, LineStyle::kLimit));
     pressure.series.push_back(curve(name, c.pump_pressure.col(p), machine.cylinder_count() + p));
+  }
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    const std::string& name = machine.cylinders[static_cast<std::size_t>(i)].name;
+    if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
+    flow.series.push_back(curve(name, c.flow.col(i), i));
+    pressure.series.push_back(curve(name, c.pressure.col(i), i));
   }
   LineChart power = chart("Power", "pump power", "kW");
   power.series.push_back(curve("power", c.power));
@@ -197,15 +200,29 @@ TableCell margin_cell(const LimitCheck& c) {
   return -100.0 * c.excess;
 }
 
+std::string in_words(NlpStatus status) {
+  std::string words = to_string(status);
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
+}
+
 void add_tables(Page& page, const OptimizeResult& result) {
   Table limits;
   limits.title = "Limits at their worst, 16 times between the knots";
+  if (result.motion.size() < 2) {
+    const auto nearest = std::min_element(result.starts.begin(), result.starts.end(),
+                                          [](const StartResult& a, const StartResult& b) {
+                                            return (a.motion.size() > 1 ? a.excess : INFINITY) <
+                                                   (b.motion.size() > 1 ? b.excess : INFINITY);
+                                          });
+    limits.title = "Limits of the motion that came nearest (from " + nearest->seed + ")";
+  }
   limits.columns = {{"limit"}, {"value", "", 5}, {"allowed", "", 5},
                     {"unit"},  {"at", "s", 4},   {"margin", "%", 3}};
   for (const LimitCheck& c : result.checks) {
     limits.rows.push_back({c.what, c.value, c.limit, c.unit, c.time, margin_cell(c)});
   }
-  page.table(std::move(limits));
+  if (!result.checks.empty()) page.table(std::move(limits));
   Table starts;
   starts.title = "Starts";
   starts.columns = {{"from"},
@@ -219,13 +236,18 @@ void add_tables(Page& page, const OptimizeResult& result) {
   starts.note =
       "Exact energies. \"Start itself\" is the seed driven in the same time; blank where it breaks "
       "a limit at that time.";
+  if (result.motion.size() < 2) {
+    starts.note +=
+        " A defect is a step from one instant to the next that the joint cannot make with the "
+        "speeds and accelerations it is allowed: too little time, or the way is blocked.";
+  }
   for (std::size_t i = 0; i < result.starts.size(); ++i) {
     const StartResult& s = result.starts[i];
     const bool usable = s.motion.size() > 1 && s.excess <= 1e-4;
     std::string note = usable ? "" : s.message;
     if (s.same_as >= 0)
       note = "same motion as " + result.starts[static_cast<std::size_t>(s.same_as)].seed;
-    starts.rows.push_back({s.seed, std::string(usable ? "kept all limits" : to_string(s.status)),
+    starts.rows.push_back({s.seed, usable ? std::string("kept all limits") : in_words(s.status),
                            s.duration, s.seed_feasible ? s.seed_energy / 1e3 : std::nan(""),
                            usable ? s.energy_exact / 1e3 : std::nan(""),
                            static_cast<double>(s.iterations), s.solve_s, note});
@@ -243,7 +265,9 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
                 const std::string& baseline_name) {
   page.section("Motion: " + problem.name);
   if (result.motion.size() < 2) {
-    page.paragraph(result.message);
+    page.paragraph("No motion was found; " + std::string(result.starts.empty()
+                                                             ? "no path to start from either."
+                                                             : "below, how far every start came."));
     if (!result.starts.empty()) add_tables(page, result);
     return;
   }
@@ -287,7 +311,16 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
         "All limits are kept at 16 times the knots' density. Energies are those of the exact, "
         "unsmoothed law.");
   } else {
-    page.verdict(Tone::kBad, to_string(result.status), result.message);
+    // "lift: infeasible. Worst: ..." under its own headline
+    const std::string prefix = problem.name + ": infeasible. ";
+    std::string why = result.message;
+    if (why.rfind(prefix, 0) == 0) why.erase(0, prefix.size());
+    const std::string in = result.duration > 0.0 ? fmt::format(" in {:g} s", result.duration) : "";
+    page.verdict(Tone::kBad,
+                 result.status == OptimizeStatus::kInfeasible
+                     ? fmt::format("Infeasible: no motion found that keeps all limits{}", in)
+                     : std::string(to_string(result.status)),
+                 why);
   }
   add_motion(page, model, problem, result, baseline, baseline_name);
   page.provenance("program", std::string("sparflow ") + program_version());

@@ -112,7 +112,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   std::string text;
   const auto add = [&](const std::string& line) { text += line + "\n"; };
   if (r.motion.size() < 2) {
-    add(fmt::format("{}: {}", to_string(r.status), r.message));
+    const bool said = r.message.find(to_string(r.status)) != std::string::npos;
+    add(said ? r.message : fmt::format("{}: {}", to_string(r.status), r.message));
     for (const StartResult& s : r.starts) add(fmt::format("  {:<34} {}", s.seed, s.message));
     return text;
   }

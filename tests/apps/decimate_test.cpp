@@ -81,5 +81,27 @@ TEST(BinnedMedian, FollowsAStepAndIgnoresOutliers) {
   EXPECT_EQ(binned_median(x.head(39), y.head(39), 24).x.size(), 0);
 }
 
+TEST(BinnedMedian, NoLineAcrossAGapInTheData) {
+  // nothing between -1 and 1: a jump there must not look like a slope
+  Eigen::VectorXd x(400), y(400);
+  for (Eigen::Index i = 0; i < 400; ++i) {
+    x[i] = i < 200 ? -6.0 + 0.025 * static_cast<double>(i)
+                   : 1.0 + 0.025 * static_cast<double>(i - 200);
+    y[i] = x[i] < 0.0 ? -3.0 : 3.0;
+  }
+  const BinnedMedian median = binned_median(x, y, 24);
+  int breaks = 0;
+  for (Eigen::Index i = 0; i < median.x.size(); ++i) {
+    if (std::isnan(median.y[i])) {
+      ++breaks;
+      EXPECT_GT(median.x[i], -1.0);
+      EXPECT_LT(median.x[i], 1.0);
+    } else {
+      EXPECT_EQ(median.y[i], median.x[i] < 0.0 ? -3.0 : 3.0) << "no bin holds both sides";
+    }
+  }
+  EXPECT_EQ(breaks, 1);
+}
+
 }  // namespace
 }  // namespace sparflow

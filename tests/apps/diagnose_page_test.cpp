@@ -178,6 +178,39 @@ TEST(DiagnosePageInBrowser, Unknown) {
   expect_good_in_browser(page, "diagnose page unknown");
 }
 
+TEST(DiagnosePageInBrowser, SwingIsDrawnOverTime) {
+  const CraneModel model = arm_model();
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(model.machine, log_with_friction())});
+  d.verdict = Verdict::kUnknown;
+  d.unexplained = Unexplained{"force", "arm", {"time, 1.13 Hz"}, 0.9,
+                              5e3,     300.0, {"N", 1.0},        "the force of arm swings"};
+  const Page page = diagnose_page(model, d);
+  EXPECT_THAT(page.html(), HasSubstr("What is left of the force of arm, over time"));
+  expect_good_in_browser(page, "diagnose page swing");
+}
+
+TEST(DiagnosePageInBrowser, NothingMissing) {
+  const CraneModel model = arm_model();
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(model.machine, arm_log(0.8))});
+  d.verdict = Verdict::kNone;
+  d.p_value = 0.4;
+  d.ranking = {{"coulomb_friction:arm", -0.5}};
+  d.search.threshold = 6.5;
+  expect_good_in_browser(diagnose_page(model, d), "diagnose page none");
+}
+
+TEST(ImprovePage, StepsAreWholeNumbersAndSharesOfTheErrorBefore) {
+  const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
+  const std::string html =
+      improve_page(extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
+                          {log_with_friction(1)}, {log_with_friction(2)}))
+          .html();
+  EXPECT_THAT(html, HasSubstr("\"x_counts\":true"));
+  EXPECT_THAT(html, HasSubstr("% of before"));
+}
+
 TEST(ImprovePageInBrowser, StepsOfExtend) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},

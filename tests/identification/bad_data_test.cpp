@@ -19,7 +19,7 @@ using testing_support::arm_log;
 using testing_support::arm_machine;
 using testing_support::channel;
 
-const std::filesystem::path kShared = SPARFLOW_SOURCE_DIR "/../shared";
+const std::filesystem::path kLogsBeside = SPARFLOW_SOURCE_DIR "/../shared";
 constexpr double kBar = units::kBar;
 
 std::vector<BadChannel> bad_of(const Machine& machine, const Log& log) {
@@ -200,11 +200,11 @@ std::vector<std::filesystem::path> logs_below(const std::filesystem::path& folde
 }
 
 TEST(BadDataOnCranes, NoRealOrSimulatedLogIsAccused) {
-  if (!std::filesystem::exists(kShared / "data")) GTEST_SKIP() << "no logs of cranes here";
+  if (!std::filesystem::exists(kLogsBeside / "data")) GTEST_SKIP() << "no logs of cranes here";
   for (const char* name : {"hmf_2020_k4", "emps", "loader_crane"}) {
     const Machine machine =
-        load_machine((kShared / "machines" / (std::string(name) + ".yaml")).string());
-    for (const auto& path : logs_below(kShared / "data" / name)) {
+        load_machine((kLogsBeside / "machines" / (std::string(name) + ".yaml")).string());
+    for (const auto& path : logs_below(kLogsBeside / "data" / name)) {
       const Log log = load_log(path.string(), machine);
       for (const BadChannel& b : bad_of(machine, log))
         ADD_FAILURE() << path.filename() << ": " << bad_channel_sentence(b);
@@ -214,12 +214,12 @@ TEST(BadDataOnCranes, NoRealOrSimulatedLogIsAccused) {
 
 /// Faults put into every position and pressure channel of the simulated cranes' logs, where its cylinder moves.
 TEST(BadDataOnCranes, InjectedFaultsAreFound) {
-  if (!std::filesystem::exists(kShared / "data/loader_crane")) GTEST_SKIP() << "no logs here";
-  const Machine machine = load_machine((kShared / "machines/loader_crane.yaml").string());
+  if (!std::filesystem::exists(kLogsBeside / "data/loader_crane")) GTEST_SKIP() << "no logs here";
+  const Machine machine = load_machine((kLogsBeside / "machines/loader_crane.yaml").string());
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   int injected = 0, found = 0, others = 0;
-  for (const auto& path : logs_below(kShared / "data/loader_crane")) {
+  for (const auto& path : logs_below(kLogsBeside / "data/loader_crane")) {
     if (path.filename() != "test.csv") continue;
     const Log log = load_log(path.string(), machine);
     const MachineSignals signals = make_signals(machine, log);

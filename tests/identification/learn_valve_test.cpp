@@ -16,7 +16,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using testing::HasSubstr;
 
-constexpr double kGain = 100.0 / 60000.0;  // 100 l/min
+constexpr double kValveGain = 100.0 / 60000.0;  // 100 l/min
 
 struct ValveData {
   VectorXd command, flow;
@@ -30,8 +30,8 @@ ValveData make_data(Index n, double dead_band, double outliers) {
   for (Index i = 0; i < n; ++i) {
     const double u = uniform(random);
     d.command[i] = -u;  // retracting: only the magnitude counts
-    d.flow[i] = kGain * std::max(0.0, u - dead_band) + 0.01 * kGain * normal(random);
-    if (uniform(random) < outliers) d.flow[i] = kGain * uniform(random);
+    d.flow[i] = kValveGain * std::max(0.0, u - dead_band) + 0.01 * kValveGain * normal(random);
+    if (uniform(random) < outliers) d.flow[i] = kValveGain * uniform(random);
   }
   return d;
 }
@@ -40,10 +40,10 @@ TEST(LearnValve, GainThroughZero) {
   const ValveData d = make_data(1000, 0.0, 0.0);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Standard error 0.01 / sqrt(1000 * mean u^2 = 333) = 0.0005 of the gain; four of them.
-  EXPECT_NEAR(valve.gain / kGain, 1.0, 0.0022);
-  EXPECT_NEAR(valve.gain_standard_error / kGain, 5.5e-4, 1e-4);
+  EXPECT_NEAR(valve.gain / kValveGain, 1.0, 0.0022);
+  EXPECT_NEAR(valve.gain_standard_error / kValveGain, 5.5e-4, 1e-4);
   EXPECT_GT(valve.r2, 0.998);  // noise 0.01 against a spread of 0.29
-  EXPECT_NEAR(valve.rmse / kGain, 0.01, 0.001);
+  EXPECT_NEAR(valve.rmse / kValveGain, 0.01, 0.001);
   EXPECT_NEAR(valve.dead_band, 0.0, 0.004);
   EXPECT_TRUE(valve.warnings.empty());
 }
@@ -52,7 +52,7 @@ TEST(LearnValve, OutliersDoNotMoveIt) {
   const ValveData d = make_data(1000, 0.0, 0.1);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Huber's influence: 10 % outliers move it by at most 1.4 * 0.1 noise deviations = 0.2 % of the gain.
-  EXPECT_NEAR(valve.gain / kGain, 1.0, 0.006);
+  EXPECT_NEAR(valve.gain / kValveGain, 1.0, 0.006);
 }
 
 TEST(LearnValve, DeadBandIsReportedNotModelled) {
@@ -60,14 +60,14 @@ TEST(LearnValve, DeadBandIsReportedNotModelled) {
   ValveData shifted = d;
   for (Index i = 0; i < 1000; ++i) {  // moving samples only, as the learner is given
     shifted.command[i] = -(0.08 + 0.92 * std::abs(d.command[i]));
-    shifted.flow[i] = kGain * (std::abs(shifted.command[i]) - 0.08) +
-                      (d.flow[i] - kGain * std::abs(d.command[i]));
+    shifted.flow[i] = kValveGain * (std::abs(shifted.command[i]) - 0.08) +
+                      (d.flow[i] - kValveGain * std::abs(d.command[i]));
   }
   const LearnedValve valve = learn_valve(shifted.command, shifted.flow);
   EXPECT_TRUE(valve.affine);
   EXPECT_NEAR(valve.dead_band, 0.08, 0.004);
-  EXPECT_NEAR(valve.affine_gain / kGain, 1.0, 0.006);
-  EXPECT_LT(valve.gain, kGain);
+  EXPECT_NEAR(valve.affine_gain / kValveGain, 1.0, 0.006);
+  EXPECT_LT(valve.gain, kValveGain);
   EXPECT_GT(valve.affine_r2, valve.r2);
   ASSERT_EQ(valve.warnings.size(), 1u);
   EXPECT_THAT(valve.warnings[0], HasSubstr("dead band of 0.08"));
@@ -75,12 +75,12 @@ TEST(LearnValve, DeadBandIsReportedNotModelled) {
 
 TEST(LearnValve, ExactDataAndConstantCommand) {
   const VectorXd u = VectorXd::LinSpaced(50, 0.1, 1.0);
-  const LearnedValve exact = learn_valve(u, kGain * u);
-  EXPECT_NEAR(exact.gain / kGain, 1.0, 1e-12);  // rounding
+  const LearnedValve exact = learn_valve(u, kValveGain * u);
+  EXPECT_NEAR(exact.gain / kValveGain, 1.0, 1e-12);  // rounding
   EXPECT_NEAR(exact.r2, 1.0, 1e-12);
   const VectorXd constant = VectorXd::Constant(50, 0.5);
-  const LearnedValve one = learn_valve(constant, kGain * constant);
-  EXPECT_NEAR(one.gain / kGain, 1.0, 1e-12);
+  const LearnedValve one = learn_valve(constant, kValveGain * constant);
+  EXPECT_NEAR(one.gain / kValveGain, 1.0, 1e-12);
   EXPECT_FALSE(one.affine);
 }
 

@@ -22,16 +22,16 @@ struct Free {
 };
 using Variable = std::unique_ptr<matvar_t, Free>;
 
-constexpr std::size_t kRows = 50;
+constexpr std::size_t kMatlabRows = 50;
 const std::vector<std::string> kNames = {"t_s", "q_boom_rad", "q_extension_m", "pA_boom_bar"};
 
 /// 50 instants of the four signals, column by column.
 std::vector<double> signals() {
-  std::vector<double> v(kRows * 4);
-  for (std::size_t i = 0; i < kRows; ++i) {
+  std::vector<double> v(kMatlabRows * 4);
+  for (std::size_t i = 0; i < kMatlabRows; ++i) {
     const auto x = static_cast<double>(i);
-    v[i] = 0.02 * x, v[kRows + i] = 0.5 + 1e-3 * x, v[2 * kRows + i] = 1.5;
-    v[3 * kRows + i] = 80.0 + static_cast<double>(i % 7);
+    v[i] = 0.02 * x, v[kMatlabRows + i] = 0.5 + 1e-3 * x, v[2 * kMatlabRows + i] = 1.5;
+    v[3 * kMatlabRows + i] = 80.0 + static_cast<double>(i % 7);
   }
   return v;
 }
@@ -62,8 +62,8 @@ class MatlabFiles : public test::LogFiles, public testing::WithParamInterface<ma
     const std::vector<double> v = signals();
     std::vector<Variable> all;
     for (std::size_t c = 0; c < 4; ++c) {  // columns and rows both
-      all.push_back(c % 2 == 0 ? matrix(kNames[c].c_str(), kRows, 1, &v[c * kRows])
-                               : matrix(kNames[c].c_str(), 1, kRows, &v[c * kRows]));
+      all.push_back(c % 2 == 0 ? matrix(kNames[c].c_str(), kMatlabRows, 1, &v[c * kMatlabRows])
+                               : matrix(kNames[c].c_str(), 1, kMatlabRows, &v[c * kMatlabRows]));
     }
     return all;
   }
@@ -74,10 +74,10 @@ class MatlabFiles : public test::LogFiles, public testing::WithParamInterface<ma
   }
   void expect_signals(const Log& log) const {
     const std::vector<double> v = signals();
-    ASSERT_EQ(log.samples(), static_cast<Eigen::Index>(kRows));
+    ASSERT_EQ(log.samples(), static_cast<Eigen::Index>(kMatlabRows));
     EXPECT_DOUBLE_EQ(log.time[7], v[7]);
-    EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[9], v[kRows + 9]);
-    EXPECT_DOUBLE_EQ(log.find(Role::kPressureA, 0)->values[5], v[3 * kRows + 5] * 1e5);
+    EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[9], v[kMatlabRows + 9]);
+    EXPECT_DOUBLE_EQ(log.find(Role::kPressureA, 0)->values[5], v[3 * kMatlabRows + 5] * 1e5);
     EXPECT_THAT(log.warnings, IsEmpty());
     EXPECT_EQ(log.sha256.size(), 64u);
   }
@@ -93,7 +93,7 @@ TEST_P(MatlabFiles, VectorsByName) {
   all.push_back(matrix("payload_kg", 1, 1, &payload));
   const Log log = load_log(save(pointers(all)), test::small_crane());
   expect_signals(log);
-  EXPECT_DOUBLE_EQ(log.find(Role::kPayload)->values[kRows - 1], 800.0);
+  EXPECT_DOUBLE_EQ(log.find(Role::kPayload)->values[kMatlabRows - 1], 800.0);
 }
 
 TEST_P(MatlabFiles, OneStruct) {
@@ -110,7 +110,7 @@ TEST_P(MatlabFiles, OneStruct) {
 
 TEST_P(MatlabFiles, MatrixWithNames) {
   const std::vector<double> v = signals();
-  const Variable data = matrix("data", kRows, 4, v.data());
+  const Variable data = matrix("data", kMatlabRows, 4, v.data());
   std::size_t dims[2] = {1, 4};
   const Variable names(Mat_VarCreate("names", MAT_C_CELL, MAT_T_CELL, 2, dims, nullptr, 0));
   for (int c = 0; c < 4; ++c) {
@@ -123,9 +123,9 @@ TEST_P(MatlabFiles, MatrixWithNamesInACharMatrixAndARowASignal) {
   const std::vector<double> v = signals();
   std::vector<double> across(v.size());
   for (std::size_t c = 0; c < 4; ++c) {
-    for (std::size_t i = 0; i < kRows; ++i) across[c + 4 * i] = v[c * kRows + i];
+    for (std::size_t i = 0; i < kMatlabRows; ++i) across[c + 4 * i] = v[c * kMatlabRows + i];
   }
-  const Variable data = matrix("data", 4, kRows, across.data());
+  const Variable data = matrix("data", 4, kMatlabRows, across.data());
   std::string padded(4 * 13, ' ');  // column by column, as MATLAB keeps it
   for (std::size_t c = 0; c < 4; ++c) {
     for (std::size_t j = 0; j < kNames[c].size(); ++j) padded[c + 4 * j] = kNames[c][j];
@@ -138,7 +138,7 @@ TEST_P(MatlabFiles, MatrixWithNamesInACharMatrixAndARowASignal) {
 TEST_P(MatlabFiles, WrongShapesAreSaid) {
   const std::vector<double> v = signals();
   EXPECT_EQ(
-      error({matrix("data", kRows, 4, v.data()).get()}),
+      error({matrix("data", kMatlabRows, 4, v.data()).get()}),
       "log.mat: data: data (50 x 4) is no vector; give a matrix its columns' names in a variable "
       "`names`");
   std::vector<Variable> all = vectors();
@@ -162,7 +162,7 @@ TEST_P(MatlabFiles, TimeThatGoesBackNamesTheRow) {
   std::vector<double> v = signals();
   v[30] = 0.0;
   std::vector<Variable> all = vectors();
-  all[0] = matrix("t_s", kRows, 1, v.data());
+  all[0] = matrix("t_s", kMatlabRows, 1, v.data());
   EXPECT_EQ(
       error(pointers(all)),
       "log.mat: t_s: time goes back from 0.58 to 0 s in row 31; two logs in one file? Cut it here");

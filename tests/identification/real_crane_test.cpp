@@ -15,18 +15,18 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-const std::string kShared = SPARFLOW_SOURCE_DIR "/../shared/";
+const std::string kRealLogs = SPARFLOW_SOURCE_DIR "/../shared/";
 
 class RealCrane : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists(kShared + "data/hmf_2020_k4")) {
+    if (!std::filesystem::exists(kRealLogs + "data/hmf_2020_k4")) {
       GTEST_SKIP() << "no logs of the real crane beside the source tree";
     }
-    machine = load_machine(kShared + "machines/hmf_2020_k4.yaml");
+    machine = load_machine(kRealLogs + "machines/hmf_2020_k4.yaml");
     for (const char* name : {"MainSTDTest1_270325", "MainSineTest_230425", "Dual2SineTest_230425",
                              "Dual1SineRun_230425"}) {
-      logs.push_back(load_log(kShared + "data/hmf_2020_k4/" + name + ".csv", machine));
+      logs.push_back(load_log(kRealLogs + "data/hmf_2020_k4/" + name + ".csv", machine));
     }
   }
   Machine machine;
@@ -90,9 +90,9 @@ TEST_F(RealCrane, FitsAndSaysWhereItFails) {
 }
 
 TEST(RealDrive, OnlyTheForceIsCompared) {
-  const std::string path = kShared + "data/emps/estimation.csv";
+  const std::string path = kRealLogs + "data/emps/estimation.csv";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no log of the drive beside the source tree";
-  const Machine machine = load_machine(kShared + "machines/emps.yaml");
+  const Machine machine = load_machine(kRealLogs + "machines/emps.yaml");
   const FitResult r = fit(machine, {load_log(path, machine)});
   ASSERT_EQ(r.train.scores.size(), 1u);
   EXPECT_EQ(r.train.scores[0].stage, "force");

@@ -233,6 +233,12 @@ TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
   EXPECT_EQ(r.status, OptimizeStatus::kInfeasible);
   EXPECT_THAT(r.message, HasSubstr("keeps all limits in 11.2 s"));
+  // what it names is of the start that came nearest, and what hydraulics cannot give before what follows from it
+  double nearest = INFINITY;
+  for (const StartResult& start : r.starts)
+    if (start.motion.size() > 1) nearest = std::min(nearest, start.excess);
+  EXPECT_EQ(worst_excess(r.checks), nearest);
+  EXPECT_THAT(r.message, HasSubstr("Worst: flow"));
 }
 
 }  // namespace

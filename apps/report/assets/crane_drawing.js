@@ -108,7 +108,7 @@
       content.append(svg("circle", { cx: X(at[0]), cy: Z(at[1]), r: 5, fill: text === "start" ? theme.paper() : theme.color(1),
         stroke: theme.color(1), "stroke-width": 1.8 }));
       const outside = X(at[0]) + 50 > plane.right;
-      content.append(label(text, X(at[0]) + (outside ? -9 : 9), Z(at[1]) + 5, outside ? "end" : "start", theme.ink(),
+      content.append(label(text, X(at[0]) + (outside ? -9 : 9), Z(at[1]) + (text === "start" ? 20 : 5), outside ? "end" : "start", theme.ink(),
         { "font-weight": 600 }));
     }
   }
