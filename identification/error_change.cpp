@@ -22,6 +22,8 @@ constexpr int kFewestBlocks = 4;
 constexpr double kStandardErrors = 2.0;
 /// Everything together, noise included, may move by this much when it is learned again.
 constexpr double kRefitMoves = 1.02;
+/// Of what a change takes away where it acts, the share it may bring in at another place where it acts.
+constexpr double kLargestLoss = 0.25;
 /// A change acts on a quantity when it moves its prediction by this share of the error.
 constexpr double kActs = 0.02;
 /// A relative error of energy that moves by less does not matter to anybody: flows are measured to some percent.
@@ -189,6 +191,8 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
   double all = 0.0, all_n = 0.0;
   struct Pool {
     double before = 0.0, after = 0.0, n = 0.0;
+    double won = 0.0, lost = 0.0;  // squared error taken away and brought in, by quantity
+    std::vector<HarmedError> harmed;
   };
   std::map<std::string, Pool> own;  // by stage, whose quantities have one unit
   for (const StageScore& b : before.scores) {
@@ -202,16 +206,23 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
                         (one_place ? b.at == at : acts_on(before, after, blocks, b));
     if (is_own) {
       Pool& pool = own[b.stage];
-      pool.before += n * b.rmse * b.rmse;
-      pool.after += n * a->rmse * a->rmse;
+      const double was = n * b.rmse * b.rmse, is = n * a->rmse * a->rmse;
+      pool.before += was;
+      pool.after += is;
       pool.n += n;
-      continue;
+      (is < was ? pool.won : pool.lost) += std::abs(is - was);
     }
     const BlockSums sums = squared_errors(before, after, blocks, b);
     const double counted = std::max(1.0, sums.weight.sum());
     const double was = std::sqrt(sums.before.sum() / counted);
     const double is = std::sqrt(sums.after.sum() / counted);
-    if (is > kLargeChange * was && sums.grew()) out.harmed.push_back(harm(b, was, is));
+    if (is > kLargeChange * was && sums.grew())
+      (is_own ? own[b.stage].harmed : out.harmed).push_back(harm(b, was, is));
+  }
+  // where it acts on several quantities, one may give a little for what the others win
+  for (auto& [name, pool] : own) {
+    if (pool.lost <= kLargestLoss * pool.won) continue;
+    out.harmed.insert(out.harmed.end(), pool.harmed.begin(), pool.harmed.end());
   }
   add_harmed_energy(machine, before, after, blocks, out.harmed);
   if (all_n > 0.0) out.overall = std::exp(all / all_n);

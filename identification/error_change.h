@@ -32,6 +32,8 @@ struct ErrorChange {
 /// @param stage where the change acts: force, flow, pressure, pump; else (a sensor) wherever a prediction moved
 /// @param at its cylinder or pump; empty (a joint, the whole machine): wherever a prediction of the stage moved
 ///
+/// Where a change acts on several quantities, one of them counts as harmed when all such take back more than a quarter
+/// of the squared error that the others win.
 /// Noise: both models' squared errors in each block of motion, paired; the mean difference must exceed two standard
 /// errors over the blocks, and the RMS error grow by a tenth (the energy's by 0.2 % of the energy). Pressures count where both models were learned: outside, an error says nothing about a law.
 ErrorChange error_change(const Machine& machine, const CompareResult& before,

@@ -47,8 +47,8 @@ struct ExtendOptions {
   /// Logs of the same machine without the effects: what the model has learned then stays as it is and only effects'
   /// parameters are estimated. `improve` has a parameter of its own for them.
   std::vector<Log> references;
-  int max_steps = 6;  ///< of `improve`
-  std::string date;   ///< "2025-03-14" for the record; empty = not recorded
+  int max_steps = 10;  ///< of `improve`
+  std::string date;    ///< "2025-03-14" for the record; empty = not recorded
 };
 
 /// @param add effects in the order they are added, one step each; none that the model has already

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -82,6 +83,44 @@ TEST(ErrorChange, GrowthOfAnotherErrorIsHarm) {
   EXPECT_EQ(c.harmed[0].stage, "pump");
   EXPECT_THAT(c.harmed[0].sentence, HasSubstr("pump main grew from"));
   EXPECT_TRUE(c.worse());
+}
+
+TEST(ErrorChange, WhatItTakesFromOnePlaceItActsOnAndGivesToAnotherIsHarm) {
+  // a mass that follows the jib at the boom's cost: less error on the whole, and not what anybody wants
+  CompareResult before = compared();
+  {
+    CompareResult* r = &before;
+    ComparedSeries twin = *std::find_if(r->logs[0].series.begin(), r->logs[0].series.end(),
+                                        [](const ComparedSeries& s) { return s.stage == "force"; });
+    twin.at = "other";
+    r->logs[0].series.push_back(twin);
+    StageScore score = *r->find("force", "arm");
+    score.at = "other";
+    r->scores.push_back(score);
+  }
+  const auto with = [](CompareResult r, double arm, double other) {
+    unsigned seed = 1;
+    for (ComparedSeries& s : r.logs[0].series) {
+      if (s.stage != "force") continue;
+      const double size = s.at == "arm" ? arm : other;
+      std::mt19937 random(seed++);
+      std::normal_distribution<double> normal;
+      for (Eigen::Index k = 0; k < s.measured.size(); ++k)
+        s.predicted[k] = s.measured[k] + size * normal(random);
+    }
+    for (StageScore& s : r.scores) {
+      if (s.stage == "force") s.rmse = s.at == "arm" ? arm : other;
+    }
+    return r;
+  };
+  const ErrorChange taken =
+      error_change(arm_machine(), with(before, 4e3, 2e3), with(before, 1e3, 3.2e3), "force");
+  EXPECT_LT(taken.own, 1.0);
+  ASSERT_THAT(taken.harmed, SizeIs(1));
+  EXPECT_EQ(taken.harmed[0].at, "other");
+  const ErrorChange little =
+      error_change(arm_machine(), with(before, 4e3, 1e3), with(before, 1e3, 1.3e3), "force");
+  EXPECT_THAT(little.harmed, IsEmpty());
 }
 
 TEST(ErrorChange, ChanceBetweenMotionsIsNoHarm) {
