@@ -189,6 +189,7 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   const CheckedChannel& c = context.channels[channel];
   if (c.channel->role != Role::kCommand) return {};
   const CylinderSignals& s = context.signals.cylinders[static_cast<std::size_t>(c.cylinder)];
+  if (!s.has_command()) return {};  // zero throughout while it moves: not recorded, and said so
   const VectorXd& u = c.channel->values;
   const VectorXd lengths = finite_values(s.length);
   if (lengths.size() == 0) return {};

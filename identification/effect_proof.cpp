@@ -61,7 +61,7 @@ EffectAction effect_action(const Evidence& evidence,
     action.size = std::max(action.size, size_where_it_acts(own) / noise);
     fourth += own.array().pow(4).sum() / std::pow(noise, 4);
     for (std::size_t k = 0; k < designs.size(); ++k) {
-      if (k == index || !designs[k]->touches(c)) continue;
+      if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
       const VectorXd wrong = designs[k]->effect.effect->info().form_error / noise * acts_in(k, c);
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }

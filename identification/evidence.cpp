@@ -362,14 +362,12 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
             e.filter(log, EvidenceKind::kForce, c.force - known(log, EvidenceKind::kForce, i)) -
             c.static_force;
         if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
-        // Near a start or stop the filter mixes moving and holding forces. Where the side is the speed's own sign,
-        // a friction's column has passed through the same mixture.
-        const Index margin = c.has_command() ? margin_of(log) : 0;
         for (const double f : c.static_force) {
           if (std::isfinite(f))
             b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
         }
-        b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0), margin);
+        b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
+              margin_of(log));
         const double raw = raw_noise(c.force);
         if (log < e.suspects && std::isfinite(raw)) noise += raw * gain_force[log], ++logs;
       }

@@ -265,16 +265,16 @@ TEST(Diagnose, NeedsALog) { EXPECT_THROW(diagnose(reference_model(), {}), InputE
 
 // ------------------------------------------------------------------------------------------- real logs
 
-const std::string kShared = SPARFLOW_SOURCE_DIR "/../shared/";
+const std::string kBeside = SPARFLOW_SOURCE_DIR "/../shared/";
 
 TEST(DiagnoseRealCrane, MassThenCoulombNeverViscous) {
-  if (!std::filesystem::exists(kShared + "data/hmf_2020_k4"))
+  if (!std::filesystem::exists(kBeside + "data/hmf_2020_k4"))
     GTEST_SKIP() << "no logs of the real crane beside the source tree";
-  const Machine machine = load_machine(kShared + "machines/hmf_2020_k4.yaml");
+  const Machine machine = load_machine(kBeside + "machines/hmf_2020_k4.yaml");
   std::vector<Log> logs;
   for (const char* name : {"MainSTDTest1_270325", "MainSineTest_230425", "Dual2SineTest_230425",
                            "Dual1SineRun_230425"}) {
-    logs.push_back(load_log(kShared + "data/hmf_2020_k4/" + name + ".csv", machine));
+    logs.push_back(load_log(kBeside + "data/hmf_2020_k4/" + name + ".csv", machine));
   }
   FitOptions options;
   options.hold_out_every = 0;
@@ -299,9 +299,9 @@ TEST(DiagnoseRealCrane, MassThenCoulombNeverViscous) {
 }
 
 TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
-  const std::string path = kShared + "data/emps/estimation.csv";
+  const std::string path = kBeside + "data/emps/estimation.csv";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no log of the drive beside the source tree";
-  const Machine machine = load_machine(kShared + "machines/emps.yaml");
+  const Machine machine = load_machine(kBeside + "machines/emps.yaml");
   const Diagnosis d = diagnose(CraneModel::untrained(machine), {load_log(path, machine)});
   std::vector<std::string> keys;
   std::map<std::string, double> value;
