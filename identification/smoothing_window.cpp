@@ -8,9 +8,9 @@
 namespace sparflow {
 namespace {
 
-// The grid: ten samples, within 0.1 and 0.2 s, to 0.4 s; faster logs (beyond 100 Hz) thirty samples. Below, real
-// noise (digits, vibration) is not the white noise the risk counts on; above, the starts and stops of a motion and a pump's lag (0.1-0.4 s) round off.
-constexpr double kSamples = 10.0, kSamplesFast = 30.0;
+// The grid: ten samples, within 0.1 and 0.2 s, to 0.4 s. Below, real noise (digits, vibration) is not the white
+// noise the risk counts on; above, the starts and stops of a motion and a pump's lag (0.1-0.4 s) round off.
+constexpr double kSamples = 10.0;
 constexpr double kShortestLow = 0.1, kShortestHigh = 0.2;  // [s]
 constexpr double kLongest = 0.42;                          // [s]
 constexpr double kRatio = 1.2;           // between neighbouring windows of the grid
@@ -81,8 +81,7 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   if (!(step > 0.0) || positions.cols() == 0) return kWhenUnknown;
   const int fewest_half = (order + 2) / 2;  // samples either side that the filter insists on
   const double shortest =
-      std::max({std::min(kSamplesFast * step, kShortestLow),
-                std::min(kSamples * step, kShortestHigh), 2.0 * fewest_half * step});
+      std::max(std::clamp(kSamples * step, kShortestLow, kShortestHigh), 2.0 * fewest_half * step);
   std::vector<double> grid;
   for (double w = shortest; w < std::max(kLongest, 1.01 * shortest); w *= kRatio) grid.push_back(w);
 
