@@ -19,7 +19,7 @@ struct ExtendStep {
   std::string stage;            ///< force, flow, pressure, pump, sensor
   AppliedEffect effect;         ///< as it was estimated in this step
   CompareResult before, after;  ///< what they compare: `judged_on`
-  std::string judged_on;  ///< "test logs", "held-out motions" or "the logs it was learned from"
+  std::string judged_on;        ///< "test logs", "held-out motions" or "training logs"
   ErrorChange change;
   bool others_kept = false;  ///< the effects that were there before kept their values
   /// That asked for it; absent when the user did. Steps of one diagnosis share it.
@@ -47,8 +47,8 @@ struct ExtendOptions {
   /// Logs of the same machine without the effects: what the model has learned then stays as it is and only effects'
   /// parameters are estimated. `improve` has a parameter of its own for them.
   std::vector<Log> references;
-  int max_steps = 10;  ///< of `improve`
-  std::string date;    ///< "2025-03-14" for the record; empty = not recorded
+  int max_steps = 8;  ///< of `improve`
+  std::string date;   ///< "2025-03-14" for the record; empty = not recorded
 };
 
 /// @param add effects in the order they are added, one step each; none that the model has already

@@ -127,9 +127,8 @@ Json stages_json(const ExtendStep& step) {
   return stages;
 }
 
-Json step_json(const ExtendStep& step) {
+Json parameters_json(const AppliedEffect& e) {
   Json parameters = Json::array();
-  const AppliedEffect& e = step.effect;
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = e.effect->info().parameters[p];
     Json ci = nullptr;
@@ -138,11 +137,15 @@ Json step_json(const ExtendStep& step) {
     parameters.push_back(
         {{"name", q.name}, {"value", e.values[p] / q.si}, {"unit", q.unit}, {"ci95", ci}});
   }
+  return parameters;
+}
+
+Json step_json(const ExtendStep& step) {
   Json out = {{"added", step.added}};
   if (!step.removed.empty()) out["removed"] = step.removed;
   out["title"] = step.title;
   out["stage"] = step.stage;
-  out["parameters"] = std::move(parameters);
+  out["parameters"] = parameters_json(step.effect);
   out["judged_on"] = step.judged_on;
   out["error_ratio"] = {{"overall", step.change.overall}, {"own", step.change.own}};
   Json harmed = Json::array();
@@ -175,6 +178,11 @@ std::string ExtendResult::table() const {
           "   the effects before it keep their values: estimated anew together they fitted less\n";
     text += fmt::format("   RMS error on the {}:\n{}", s.judged_on, step_table(s));
   }
+  if (steps.size() > 1) {  // estimated together: each step moved those before it
+    text += "in the model now:\n";
+    for (const AppliedEffect& e : model.effects)
+      text += fmt::format("   {:<28}{}\n", e.key(model.machine), parameters_text(e));
+  }
   for (const ExtendStep& s : rejected) {
     text += fmt::format("not kept: {} ({}); error on the {} {} where it acts, {} overall\n",
                         s.title, parameters_text(s.effect), s.judged_on,
@@ -190,10 +198,15 @@ std::string ExtendResult::json() const {
   Json list = Json::array(), tried = Json::array(), effects = Json::array();
   for (const ExtendStep& s : steps) list.push_back(step_json(s));
   for (const ExtendStep& s : rejected) tried.push_back(step_json(s));
-  for (const AppliedEffect& e : model.effects) effects.push_back(e.key(model.machine));
-  Json root = {{"steps", list},     {"stopped_because", stopped_because},
-               {"not_kept", tried}, {"effects", effects},
-               {"notes", notes},    {"seconds", seconds}};
+  Json now = Json::array();
+  for (const AppliedEffect& e : model.effects) {
+    effects.push_back(e.key(model.machine));
+    now.push_back({{"effect", e.key(model.machine)}, {"parameters", parameters_json(e)}});
+  }
+  Json root = {{"steps", list},       {"stopped_because", stopped_because},
+               {"not_kept", tried},   {"effects", effects},
+               {"in_the_model", now}, {"notes", notes},
+               {"seconds", seconds}};
   if (last) root["last_diagnosis"] = Json::parse(last->json());
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -63,7 +63,7 @@ Workshop::Workshop(const CraneModel& model, const std::vector<Log>& logs,
   }
   held_ = held_out_samples(signals_, options.fit);
   const bool any = std::any_of(held_.begin(), held_.end(), [](const Mask& m) { return m.any(); });
-  judged_on_ = any ? "held-out motions" : "the logs it was learned from";
+  judged_on_ = any ? "held-out motions" : "training logs";
   if (!any) held_.clear();
 }
 

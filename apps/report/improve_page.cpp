@@ -227,6 +227,14 @@ void add_curves(Page& page, const ExtendStep& step) {
   page.plot(std::move(chart));
 }
 
+/// As later steps left it; what was taken back, as it was.
+const AppliedEffect& in_the_model(const CraneModel& model, const AppliedEffect& e) {
+  for (const AppliedEffect& m : model.effects) {
+    if (m.effect == e.effect && m.at == e.at) return m;
+  }
+  return e;
+}
+
 void set_verdict(Page& page, const ExtendResult& r) {
   if (r.steps.empty()) {
     page.verdict(r.rejected.empty() ? Tone::kGood : Tone::kWarning, "Nothing was added",
@@ -238,7 +246,8 @@ void set_verdict(Page& page, const ExtendResult& r) {
   std::string names, text;
   for (const ExtendStep& s : r.steps) {
     names += (names.empty() ? "" : ", then ") + s.title;
-    text += fmt::format("{}: {}. ", capitalised(s.title), parameters_text(estimates_of(s.effect)));
+    text += fmt::format("{}: {}. ", capitalised(s.title),
+                        parameters_text(estimates_of(in_the_model(r.model, s.effect))));
   }
   const std::string change = change_text(all.overall);
   page.verdict(
@@ -272,6 +281,15 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
         "compared.",
         result.steps.front().judged_on);
     page.table(std::move(table));
+    if (result.steps.size() > 1) {
+      Table now;
+      now.title = "In the model now";
+      now.columns = {{"effect"}, {"parameters, 95 % interval"}};
+      for (const AppliedEffect& e : result.model.effects)
+        now.rows.push_back({e.key(result.model.machine), parameters_text(estimates_of(e))});
+      now.note = "All are estimated together: each step moves those before it.";
+      page.table(std::move(now));
+    }
     add_overview(page, result, traces);
     add_error_charts(page, result, traces);
     page.section(heading_prefix + "Measured, before and after");
