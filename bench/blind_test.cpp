@@ -60,6 +60,7 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
   std::size_t next = 0;
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::jthread> pool;
+  pool.reserve(static_cast<std::size_t>(options.jobs));
   for (int j = 0; j < options.jobs; ++j) {
     pool.emplace_back([&] {
       for (;;) {

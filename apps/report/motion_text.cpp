@@ -21,26 +21,26 @@ nlohmann::json start_json(const StartResult& s) {
                       {"energy_exact_J", g.energy_exact},
                       {"excess", g.excess}});
   }
-  nlohmann::json json = {{"seed", s.seed},
-                         {"status", to_string(s.status)},
-                         {"message", s.message},
-                         {"duration_s", s.duration},
-                         {"energy_J", s.energy_smooth},
-                         {"energy_exact_J", s.energy_exact},
-                         {"constraint_violation", s.excess},
-                         {"iterations", s.iterations},
-                         {"solve_s", s.solve_s},
-                         {"callbacks_s", s.callbacks_s},
-                         {"linear_solver_s", s.linear_solver_s},
-                         {"modes_held", s.modes_held},
-                         {"stages", stages}};
+  nlohmann::json out = {{"seed", s.seed},
+                        {"status", to_string(s.status)},
+                        {"message", s.message},
+                        {"duration_s", s.duration},
+                        {"energy_J", s.energy_smooth},
+                        {"energy_exact_J", s.energy_exact},
+                        {"constraint_violation", s.excess},
+                        {"iterations", s.iterations},
+                        {"solve_s", s.solve_s},
+                        {"callbacks_s", s.callbacks_s},
+                        {"linear_solver_s", s.linear_solver_s},
+                        {"modes_held", s.modes_held},
+                        {"stages", stages}};
   if (s.motion.size() < 2) {
     for (const char* key : {"energy_J", "energy_exact_J", "constraint_violation"})
-      json[key] = nullptr;
+      out[key] = nullptr;
   }
-  if (s.seed_feasible) json["seed_energy_exact_J"] = s.seed_energy;
-  if (s.same_as >= 0) json["same_as"] = s.same_as;
-  return json;
+  if (s.seed_feasible) out["seed_energy_exact_J"] = s.seed_energy;
+  if (s.same_as >= 0) out["same_as"] = s.same_as;
+  return out;
 }
 
 }  // namespace
@@ -62,7 +62,7 @@ std::string against_straight_lines(const OptimizeResult& r) {
 
 std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
                           const OptimizeResult& r) {
-  nlohmann::json json = {
+  nlohmann::json out = {
       {"problem", problem.name},
       {"status", r.status == OptimizeStatus::kInterrupted ? "failed" : to_string(r.status)},
       {"message", r.message},
@@ -70,41 +70,41 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       {"solve_s", r.solve_s}};
   int iterations = 0;
   for (const StartResult& s : r.starts) iterations += s.iterations;
-  json["iterations"] = iterations;
-  json["starts"] = nlohmann::json::array();
-  for (const StartResult& s : r.starts) json["starts"].push_back(start_json(s));
+  out["iterations"] = iterations;
+  out["starts"] = nlohmann::json::array();
+  for (const StartResult& s : r.starts) out["starts"].push_back(start_json(s));
   if (r.motion.size() > 1) {
-    json["energy_J"] = r.energy_smooth;
-    json["energy_exact_J"] = r.energy.total;
-    json["seed"] = r.starts[static_cast<std::size_t>(r.best_start)].seed;
-    json["constraint_violation"] = worst_excess(r.checks);
-    json["potential_energy_difference_J"] = r.energy.potential_difference;
-    json["largest_pressure_std_bar"] = r.energy.largest_pressure_std / units::kBar;
-    json["moving_share_outside_data"] = r.energy.moving_share_outside_data;
-    json["share_of_time_moving"] = r.energy.share_moving;
+    out["energy_J"] = r.energy_smooth;
+    out["energy_exact_J"] = r.energy.total;
+    out["seed"] = r.starts[static_cast<std::size_t>(r.best_start)].seed;
+    out["constraint_violation"] = worst_excess(r.checks);
+    out["potential_energy_difference_J"] = r.energy.potential_difference;
+    out["largest_pressure_std_bar"] = r.energy.largest_pressure_std / units::kBar;
+    out["moving_share_outside_data"] = r.energy.moving_share_outside_data;
+    out["share_of_time_moving"] = r.energy.share_moving;
     for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
-      json["throttling_J"][model.machine.cylinders[i].name] = r.energy.throttling[i];
-      json["useful_J"][model.machine.cylinders[i].name] = r.energy.useful[i];
+      out["throttling_J"][model.machine.cylinders[i].name] = r.energy.throttling[i];
+      out["useful_J"][model.machine.cylinders[i].name] = r.energy.useful[i];
     }
     for (std::size_t p = 0; p < model.pumps.size(); ++p)
-      json["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
-    json["best_seed_energy_exact_J"] =
+      out["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
+    out["best_seed_energy_exact_J"] =
         r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
-    json["nearest_line_energy_exact_J"] =
+    out["nearest_line_energy_exact_J"] =
         r.nearest_line_energy > 0.0 ? nlohmann::json(r.nearest_line_energy) : nlohmann::json();
-    json["straight_line_energy_exact_J"] =
+    out["straight_line_energy_exact_J"] =
         r.straight_line_energy > 0.0 ? nlohmann::json(r.straight_line_energy) : nlohmann::json();
-    json["limits"] = nlohmann::json::array();
+    out["limits"] = nlohmann::json::array();
     for (const LimitCheck& c : r.checks) {
-      json["limits"].push_back({{"what", c.what},
-                                {"value", c.value},
-                                {"limit", c.limit},
-                                {"unit", c.unit},
-                                {"t_s", c.time},
-                                {"excess", c.excess}});
+      out["limits"].push_back({{"what", c.what},
+                               {"value", c.value},
+                               {"limit", c.limit},
+                               {"unit", c.unit},
+                               {"t_s", c.time},
+                               {"excess", c.excess}});
     }
   }
-  return json.dump(2) + "\n";
+  return out.dump(2) + "\n";
 }
 
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,

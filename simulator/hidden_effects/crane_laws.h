@@ -9,7 +9,7 @@
 
 namespace sparflow::simulator {
 
-inline constexpr double kBar = 1e5;  ///< [Pa]
+inline constexpr double kBar = 1e5;            ///< [Pa]
 inline constexpr double kLpm = 1.0 / 60000.0;  ///< [m^3/s]
 
 /// One direction of one cylinder; index 0 = extending, 1 = retracting.

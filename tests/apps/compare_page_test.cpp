@@ -123,7 +123,7 @@ TEST(ComparePage, ShareExplainedIsOneForALawAndNoneForNoise) {
 TEST(ComparePageInBrowser, EveryFigureIsDrawn) {
   const CraneModel model = arm_model();
   expect_compare_page_good(compare_page(model, compare(model, {log_with_force(10e3), arm_log()})),
-                         "compare page");
+                           "compare page");
 }
 
 TEST(FitPageInBrowser, EveryFigureIsDrawn) {
