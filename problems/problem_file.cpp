@@ -279,13 +279,18 @@ class ProblemReader {
   }
 
   void read_objective(const YamlValue& value) {
-    const YamlMap map = value.map("weights {energy, smoothness}", {"energy", "smoothness"});
+    const YamlMap map = value.map("weights {energy, time_W, commands_W, smoothness}",
+                                  {"energy", "time_W", "commands_W", "smoothness"});
     ObjectiveWeights& weights = problem_.objective;
     weights.energy = map.number_or("energy", kWeight, 1.0);
+    weights.time = map.number_or("time_W", kWeight, 0.0);
+    weights.commands = map.number_or("commands_W", kWeight, 0.0);
     if (const auto smoothness = map.find("smoothness")) {
       weights.smoothness = smoothness->number(kWeight);
     }
-    if (weights.energy == 0.0 && weights.smoothness.value_or(0.0) == 0.0) {
+    const double sum =
+        weights.energy + weights.time + weights.commands + weights.smoothness.value_or(0.0);
+    if (sum == 0.0) {
       value.fail(
           "both weights are zero, so every motion is as good; give energy or smoothness a "
           "positive weight");
