@@ -355,7 +355,8 @@ class Search {
 
   /// What the trapezoid misses on this mesh, the softness of the maximum (known to lie within it) apart.
   double mesh_error(const StartResult& s) const {
-    if (s.energy_exact <= 0.0) return 0.0;
+    const ObjectiveWeights& w = problem_.objective;
+    if (s.energy_exact <= 0.0 || w.energy <= 0.0 || w.commands > 0.0) return 0.0;
     const double excess = s.energy_smooth - s.energy_exact;
     double volume = 0.0;  // [m^3]
     for (int c = 0; c < model_.machine.cylinder_count(); ++c) {

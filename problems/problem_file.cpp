@@ -54,6 +54,7 @@ class ProblemReader {
     problem_.start = read_posture(root.need("start", start).map(start, {"q"}).need("q", start));
     read_goal(root.need("goal", "where the motion ends, {tip: [x, y, z]} or {q: {...}}"));
     problem_.idle_power = root.number_or("idle_power_W", kPower, 0.0);
+    if (const auto objective = root.find("objective")) read_objective(*objective);
     read_duration(root.need("duration_s", "seconds, {min, max} or free"));
     if (const auto obstacles = root.find("obstacles")) {
       for (const YamlValue& v : obstacles->list("obstacles")) {
@@ -63,7 +64,6 @@ class ProblemReader {
     }
     problem_.clearance = root.number_or("clearance_m", kDistance, 0.0);
     if (const auto path = root.find("path")) read_path(*path);
-    if (const auto objective = root.find("objective")) read_objective(*objective);
     if (const auto knots = root.find("knots")) {
       problem_.knots = knots->integer("the number of knots", 4);
     }
@@ -195,7 +195,7 @@ class ProblemReader {
       return;
     }
     if (value.word() == "free") {
-      if (problem_.idle_power <= 0.0) {
+      if (problem_.idle_power <= 0.0 && problem_.objective.time <= 0.0) {
         value.fail(
             "got free, but idle_power_W is zero: slower is then always cheaper and no best "
             "duration "
