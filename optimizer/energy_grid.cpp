@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 
 constexpr double kNoPath = std::numeric_limits<double>::infinity();
 
-double seconds_since(std::chrono::steady_clock::time_point begin) {
+double elapsed_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
@@ -46,14 +46,14 @@ class EnergyGrid::Search {
     } else {
       build(options.nodes);
     }
-    spent_ = seconds_since(begin);
+    spent_ = elapsed_since(begin);
   }
 
   GridPath cheapest(double price) {
     const auto begin = std::chrono::steady_clock::now();
     GridPath path = trouble_.empty() ? search(price) : GridPath{};
     if (!trouble_.empty()) path.message = trouble_;
-    spent_ += seconds_since(begin);
+    spent_ += elapsed_since(begin);
     return path;
   }
 
@@ -76,7 +76,7 @@ class EnergyGrid::Search {
                        .total
                  : kNoPath;
         found.emplace_back(energy, std::move(path));
-        spent_ += seconds_since(begin);
+        spent_ += elapsed_since(begin);
       }
       return std::pair{fast, std::string()};
     };

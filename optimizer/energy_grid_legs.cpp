@@ -78,17 +78,17 @@ class LegChooser {
 };
 
 /// Which joints move and where to, as one number a joint.
-std::vector<int> signs(const VectorXd& step) {
+std::vector<int> leg_signs(const VectorXd& step) {
   std::vector<int> s;
   for (const double d : step) s.push_back(d > 0.0 ? 1 : d < 0.0 ? -1 : 0);
   return s;
 }
 
 /// Legs of a single joint that follow each other in the same direction are one.
-void join(std::vector<VectorXd>& corners) {
+void join_legs(std::vector<VectorXd>& corners) {
   for (std::size_t k = 1; k + 1 < corners.size();) {
-    const std::vector<int> before = signs(corners[k] - corners[k - 1]);
-    const std::vector<int> after = signs(corners[k + 1] - corners[k]);
+    const std::vector<int> before = leg_signs(corners[k] - corners[k - 1]);
+    const std::vector<int> after = leg_signs(corners[k + 1] - corners[k]);
     const auto moving = std::count_if(before.begin(), before.end(), [](int s) { return s != 0; });
     if (moving == 0 || (moving == 1 && before == after)) {
       corners.erase(corners.begin() + static_cast<std::ptrdiff_t>(k));
@@ -131,7 +131,7 @@ Legs few_legs(MovePricer& pricer, const MatrixXd& path, const LegSearch& search)
       corners.push_back(q);
     }
   }
-  join(corners);
+  join_legs(corners);
   Legs legs;
   legs.corners.resize(static_cast<Eigen::Index>(corners.size()), path.cols());
   for (std::size_t k = 0; k < corners.size(); ++k) {
