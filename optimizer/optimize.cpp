@@ -8,6 +8,7 @@
 
 #include "models/error.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/energy_grid.h"
 
 namespace sparflow {
 namespace {
@@ -245,6 +246,7 @@ class Search {
       }
       one_by_one = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
     }
+    for (ModeCandidate& c : grid_candidates()) one_by_one.push_back(std::move(c));
     const std::size_t given = seeds_.size();
     expected_ = static_cast<int>(given + one_by_one.size());
     solve(
@@ -274,6 +276,30 @@ class Search {
 
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+
+  /// The cheapest ways a search over the whole joint space knows.
+  std::vector<ModeCandidate> grid_candidates() const {
+    std::vector<ModeCandidate> found;
+    const EnergyGridOptions size{options_.grid_nodes};
+    if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
+        model_.machine.joint_count() > size.most_joints)
+      return found;
+    EnergyGrid grid(model_, problem_, size);
+    std::vector<GridPath> paths;
+    if (problem_.objective.energy > 0.0) {
+      paths = grid.paths_for_duration(time_.guess, options_.grid_starts);
+    } else if (problem_.objective.time > 0.0) {
+      constexpr double kTimeIsEverything = 1e7;  // [W]
+      paths.push_back(grid.cheapest_path(kTimeIsEverything));
+    }
+    for (const GridPath& path : paths) {
+      if (!path.found) continue;
+      const double duration =
+          std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+      found.push_back(grid_path_candidate(model_, problem_, path, duration, coarse_.intervals));
+    }
+    return found;
+  }
 
   void solve(int count, const std::function<StartResult(int)>& start,
              const std::function<std::string(int)>& name) {

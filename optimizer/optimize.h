@@ -43,6 +43,8 @@ struct OptimizeOptions {
   int smooth_iterations = 100;
   int phase_iterations = 300;  ///< of a solve with phases; half of it in the search
   int sequential_starts = 6;   ///< one-by-one motions tried besides the seeds, the cheapest guesses
+  int grid_starts = 3;         ///< paths of the global search on a joint grid (energy_grid.h)
+  int grid_nodes = 15000;      ///< of that grid
   bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
   bool free_phases = true;  ///< how long each mode lasts is a variable; false: as the start has it
   double overlap = 0.3;     ///< offered between two phases, share of the shorter one's time
