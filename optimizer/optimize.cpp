@@ -124,6 +124,10 @@ std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
   return kept;
 }
 
+bool time_is_everything(const MotionProblem& problem) {
+  return problem.objective.energy == 0.0 && problem.objective.time > 0.0;
+}
+
 bool same_plan(const PhasePlan& a, const PhasePlan& b) {
   return a.count() == b.count() && a.modes.cols() == b.modes.cols() &&
          (a.modes.array() == b.modes.array()).all();
@@ -187,11 +191,14 @@ void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMoti
     worst = " The solver says: " + result.starts.front().message + ".";
   }
   const double shortest = shortest_seed(seeds);
-  const std::string remedy =
-      shortest > duration
-          ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
-                        duration)
-          : std::string();
+  std::string remedy;
+  if (result.shortest_duration > duration) {
+    remedy = fmt::format(" The shortest motion found takes {:.2f} s; {:g} s was asked for.",
+                         result.shortest_duration, duration);
+  } else if (shortest > duration) {
+    remedy = fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
+                         duration);
+  }
   result.status = OptimizeStatus::kInfeasible;
   result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
 }
@@ -266,6 +273,7 @@ class Search {
           return k < given ? seeds_[k].name : one_by_one[k - given].name;
         });
     if (options_.modes && options_.free_phases) {
+      if (ranking(result_, options_.limit_tolerance).empty()) rescue();
       search_sequences();
       refine();
     }
@@ -288,7 +296,7 @@ class Search {
     std::vector<GridPath> paths;
     if (problem_.objective.energy > 0.0) {
       paths = grid.paths_for_duration(time_.guess, options_.grid_starts);
-    } else if (problem_.objective.time > 0.0) {
+    } else if (time_is_everything(problem_)) {
       constexpr double kTimeIsEverything = 1e7;  // [W]
       paths.push_back(grid.cheapest_path(kTimeIsEverything));
     }
@@ -326,6 +334,33 @@ class Search {
       }
       result_.starts.push_back(std::move(r));
     }
+  }
+
+  /// No start kept all limits: the shortest motion there is tells whether the time is the reason. Where it is not, that
+  /// motion driven slower is a start like any other.
+  void rescue() {
+    if (interrupted() || time_is_everything(problem_)) return;
+    const OptimizeResult shortest = shortest_motion(model_, problem_, seeds_, options_);
+    if (shortest.best_start < 0) return;
+    result_.shortest_duration = shortest.duration;
+    if (shortest.duration > time_.upper) return;
+    const StartResult& fast = shortest.starts[static_cast<std::size_t>(shortest.best_start)];
+    const TimeWindow time{std::max(time_.guess, shortest.duration), time_.lower, time_.upper};
+    const Trajectory slow = with_duration(fast.motion, time.guess);
+    PhasePlan plan = fast.plan;
+    if (plan.count() > 0) plan.durations *= time.guess / plan.total();
+    const std::string name = "the shortest motion, slower";
+    expected_ = static_cast<int>(result_.starts.size()) + 2;
+    solve(
+        2,
+        [&](int i) {
+          return i == 0 || plan.count() == 0
+                     ? optimize_from(model_, problem_, {name, slow, shortest.duration, false}, time,
+                                     coarse_)
+                     : optimize_with_phases(model_, problem_, name + ", its phases", plan, slow,
+                                            time, true, coarse_);
+        },
+        [&](int) { return name; });
   }
 
   /// From the best few motions on: neighbouring mode sequences, as long as one of them is cheaper.
@@ -493,6 +528,22 @@ OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem
                            const std::vector<SeedMotion>& seeds, const TimeWindow& time,
                            const OptimizeOptions& options) {
   return Search(model, problem, seeds, time, options).run();
+}
+
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options) {
+  MotionProblem hurried = problem;
+  hurried.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
+  const double shortest = shortest_seed(seeds);
+  const double guess = shortest > 0.0 ? 1.1 * shortest : std::max(problem.duration.min, 1.0);
+  hurried.duration = {0.0, 20.0 * guess};
+  OptimizeOptions direct = options;
+  direct.schedule.clear();
+  direct.sequential_starts = 0;
+  direct.sequence_rounds = 0;
+  direct.progress = {};
+  return optimize_in(model, hurried, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
 }
 
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
