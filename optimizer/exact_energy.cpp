@@ -139,6 +139,7 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
         goal ? goal->tip : tip_position<double>(machine, std::get<JointGoal>(problem.goal).q);
     line_direction = (end - line_start).normalized();
   }
+  const double trusted = problem.limits.pressure_std;
   const auto width = [](const Range& r) { return std::max(r.hi - r.lo, 1e-12); };
   Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols()), qdd(fine.q.cols());
   for (Eigen::Index k = 0; k < fine.size(); ++k) {
@@ -159,11 +160,15 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
                  width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
     }
     const MachineState& state =
-        chain.evaluate(q.data(), qd.data(), problem.payload, false, kRestSpeed, qdd.data());
+        chain.evaluate(q.data(), qd.data(), problem.payload, trusted > 0.0, kRestSpeed, qdd.data());
     using units::kBar;
     using units::kLitrePerMinute;
     for (int c = 0; c < machine.cylinder_count(); ++c) {
       const auto i = static_cast<std::size_t>(c);
+      const double deviation = state.cylinders[i].pressure_std;
+      if (trusted > 0.0 && machine.cylinders[i].hydraulic())
+        book.see("standard deviation of the pressure of " + machine.cylinders[i].name,
+                 deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t);
       const Valve* valve = machine.valve_of_cylinder(c);
       if (valve == nullptr) continue;
       const double full =

@@ -11,9 +11,9 @@ namespace {
 
 /// How far limits are drawn in so that they also hold between knots.
 struct Tightening {
-  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0;  // shares
-  double clearance = 0.0;                                      // [m]
-  std::vector<double> position;                                // [rad] or [m] by joint
+  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  // shares
+  double clearance = 0.0;                                                   // [m]
+  std::vector<double> position;                                             // [rad] or [m] by joint
   bool limit_pressure = false;
 };
 
@@ -107,6 +107,7 @@ class Start {
     knot.valve_share = tightening_.valve;
     knot.pressure_share = tightening_.pressure;
     knot.tip_line_share = tightening_.line;
+    knot.trust_share = tightening_.trust;
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
@@ -239,6 +240,7 @@ class Start {
         tightening_.limit_pressure = true;
       }
       if (c.what.starts_with("distance of the tip from its line")) tightening_.line *= share;
+      if (c.what.starts_with("standard deviation of the pressure")) tightening_.trust *= share;
       if (c.what.starts_with("clearance")) tightening_.clearance += 1.3 * c.excess;
       if (c.what.starts_with("position of joint ")) {
         const int j = model_.machine.joint_index(c.what.substr(18));

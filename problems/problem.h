@@ -61,6 +61,8 @@ struct MotionLimits {
   std::vector<double> pump_max_flow;      ///< [m^3/s]
   std::vector<double> pump_max_pressure;  ///< [Pa]
   double valve_fraction = 1.0;            ///< share of each valve's full flow that may be used [-]
+  /// Trust region: largest standard deviation of a predicted working pressure [Pa]; 0 = none.
+  double pressure_std = 0.0;
 };
 
 /// The tip shall follow the straight line from its start to its goal.

@@ -211,8 +211,9 @@ class ProblemReader {
   }
 
   void read_limits(const YamlValue& value) {
-    const YamlMap map =
-        value.map("limits {joints, pumps, valve_fraction}", {"joints", "pumps", "valve_fraction"});
+    const YamlMap map = value.map("limits {joints, pumps, valve_fraction, pressure_std_bar}",
+                                  {"joints", "pumps", "valve_fraction", "pressure_std_bar"});
+    problem_.limits.pressure_std = map.number_or("pressure_std_bar", kPressure, 0.0);
     if (const auto joints = map.find("joints")) {
       const YamlMap named = joints->map("limits by joint name", joint_names());
       for (std::size_t i = 0; i < problem_.machine.joints.size(); ++i) {
