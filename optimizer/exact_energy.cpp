@@ -1,7 +1,10 @@
 #include "optimizer/exact_energy.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "models/effects/effective_machine.h"
@@ -115,6 +118,22 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
     const double error = (last_q - std::get<JointGoal>(problem.goal).q).cwiseAbs().maxCoeff();
     book.see("distance from the goal posture", error, 0.0, error - 1e-6, 1.0, "rad or m",
              motion.t[last]);
+  }
+  // the nearest knots, in order: waypoints are passed at knots
+  Eigen::Index from = 0;
+  for (std::size_t w = 0; w < problem.waypoints.size(); ++w) {
+    Eigen::Index best = from;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = from; k <= last; ++k) {
+      const Eigen::VectorXd q = motion.q.row(k).transpose();
+      const double distance = (tip_position<double>(machine, q) - problem.waypoints[w]).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      best = k;
+    }
+    book.see(fmt::format("distance of the tip from waypoint {}", w + 1), nearest, 0.0,
+             nearest - 1e-5, 1.0, "m", motion.t[best]);
+    from = best;
   }
   const double speed =
       std::max(motion.qd.row(0).cwiseAbs().maxCoeff(), motion.qd.row(last).cwiseAbs().maxCoeff());

@@ -41,6 +41,8 @@ std::string pack(const StartResult& r) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     p.number(static_cast<double>(r.plan.modes.data()[i]));
   pack_matrix(p, r.plan.durations);
+  p.number(static_cast<double>(r.plan.waypoint_after.size()));
+  for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
   p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
@@ -68,6 +70,8 @@ StartResult unpack(const std::string& bytes) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
   r.plan.durations = unpack_matrix(u);
+  r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
+  for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
   r.energy_exact = u.number();
   r.energy_smooth = u.number();
   r.excess = u.number();
@@ -243,7 +247,8 @@ class Search {
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<ModeCandidate> one_by_one;
-    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line) {
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
       const Eigen::VectorXd times =
           Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, time_.guess);
       std::vector<Eigen::VectorXd> ends;
@@ -290,7 +295,7 @@ class Search {
     std::vector<ModeCandidate> found;
     const EnergyGridOptions size{options_.grid_nodes};
     if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
-        model_.machine.joint_count() > size.most_joints)
+        !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
       return found;
     EnergyGrid grid(model_, problem_, size);
     std::vector<GridPath> paths;

@@ -90,6 +90,8 @@ struct MotionProblem {
   double payload = 0.0;                       ///< [kg], hangs at the tip
   Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
   Goal goal;
+  /// Points the tip passes on the way, in this order, without having to stop [m]. When is free.
+  std::vector<Eigen::Vector3d> waypoints;
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]
   MotionLimits limits;
