@@ -98,7 +98,8 @@ class Transcription final : public NlpProblem {
 
   /// Start values; before the first call they are the middle of the bounds (0 where a side is open).
   void set_start(const Eigen::VectorXd& x);
-  /// Start from a motion, sampled at this mesh: q and qd from the motion (held at rest beyond its ends), qdd such
+  /// Start from a motion, sampled at this mesh (with free times a motion of as many knots is taken as it is, its
+  /// phases' durations with it): q and qd from the motion (held at rest beyond its ends), qdd such
   /// that the velocity defects vanish. Values outside their bounds are clipped.
   void set_start(const Trajectory& motion);
   /// Multipliers for a warm start; their shapes must be this transcription's.
@@ -151,6 +152,7 @@ class Transcription final : public NlpProblem {
     std::vector<int> hessian;  // [lower triangle of q, column by column]
   };
 
+  Eigen::VectorXd variables_on_mesh(const Trajectory& motion) const;
   void check_phases() const;
   int phase(int interval) const {
     return spec_.phases.of_interval[static_cast<std::size_t>(interval)];

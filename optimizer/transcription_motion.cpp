@@ -55,7 +55,11 @@ const NlpMultipliers* Transcription::start_multipliers() const { return start_mu
 
 VectorXd Transcription::variables(const Trajectory& motion) const {
   SPARFLOW_CHECK(motion.q.cols() == n_, "the motion has another number of joints");
-  const Trajectory mine = resampled(motion, spec_.t);
+  if (phase_count_ > 0 && motion.size() == knots_) return variables_on_mesh(motion);
+  return variables_on_mesh(resampled(motion, spec_.t));
+}
+
+VectorXd Transcription::variables_on_mesh(const Trajectory& mine) const {
   VectorXd x(start_.size());
   Eigen::Map<MatrixXd>(x.data() + q_index(0, 0), n_, knots_) = mine.q.transpose();
   Eigen::Map<MatrixXd>(x.data() + qd_index(0, 0), n_, knots_) = mine.qd.transpose();
@@ -63,7 +67,7 @@ VectorXd Transcription::variables(const Trajectory& motion) const {
       mine.qdd.topRows(intervals_).transpose();
   if (phase_count_ > 0) {
     x.tail(phase_count_).setZero();
-    for (int k = 0; k < intervals_; ++k) x[tau_index(phase(k))] += step_[k];
+    for (int k = 0; k < intervals_; ++k) x[tau_index(phase(k))] += mine.t[k + 1] - mine.t[k];
   }
   return x;
 }
