@@ -61,6 +61,10 @@ VectorXd Transcription::variables(const Trajectory& motion) const {
   Eigen::Map<MatrixXd>(x.data() + qd_index(0, 0), n_, knots_) = mine.qd.transpose();
   Eigen::Map<MatrixXd>(x.data() + qdd_index(0, 0), n_, intervals_) =
       mine.qdd.topRows(intervals_).transpose();
+  if (phase_count_ > 0) {
+    x.tail(phase_count_).setZero();
+    for (int k = 0; k < intervals_; ++k) x[tau_index(phase(k))] += step_[k];
+  }
   return x;
 }
 
@@ -69,6 +73,9 @@ Trajectory Transcription::trajectory(const VectorXd& x) const {
   using ConstMap = Eigen::Map<const MatrixXd>;
   Trajectory motion;
   motion.t = spec_.t;
+  for (int k = 0; k < intervals_ && phase_count_ > 0; ++k) {
+    motion.t[k + 1] = motion.t[k] + step(x.data(), k);
+  }
   motion.q = ConstMap(x.data() + q_index(0, 0), n_, knots_).transpose();
   motion.qd = ConstMap(x.data() + qd_index(0, 0), n_, knots_).transpose();
   motion.qdd.resize(knots_, n_);
@@ -96,6 +103,7 @@ TranscriptionMultipliers Transcription::multipliers(const NlpMultipliers& rows) 
   }
   m.lower = rows.lower;
   m.upper = rows.upper;
+  if (total_time_row_ >= 0) m.total_time = rows.constraint[total_time_row_];
   return m;
 }
 
@@ -119,6 +127,7 @@ void Transcription::set_start_multipliers(const TranscriptionMultipliers& m) {
       rows->constraint[row++] = m.path(static_cast<int>(s), path_row);
     }
   }
+  if (total_time_row_ >= 0) rows->constraint[total_time_row_] = m.total_time;
   rows->lower = m.lower;
   rows->upper = m.upper;
   start_multipliers_ = std::move(rows);
