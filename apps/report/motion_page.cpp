@@ -220,7 +220,9 @@ void add_tables(Page& page, const OptimizeResult& result) {
   limits.columns = {{"limit"}, {"value", "", 5}, {"allowed", "", 5},
                     {"unit"},  {"at", "s", 4},   {"margin", "%", 3}};
   for (const LimitCheck& c : result.checks) {
-    limits.rows.push_back({c.what, c.value, c.limit, c.unit, c.time, margin_cell(c)});
+    constexpr double kRounding = 1e-9;  // of any unit here: the solver's last digits say nothing
+    const double value = std::abs(c.value) < kRounding ? 0.0 : c.value;
+    limits.rows.push_back({c.what, value, c.limit, c.unit, c.time, margin_cell(c)});
   }
   if (!result.checks.empty()) page.table(std::move(limits));
   Table starts;
