@@ -32,6 +32,28 @@ void add_jet(const Jet& jet, double factor, double* gradient, double* hessian) {
 
 }  // namespace
 
+std::vector<FullSpeed> full_speeds(const Machine& machine, const MotionLimits& limits) {
+  std::vector<FullSpeed> speeds;
+  for (int c = 0; c < machine.cylinder_count(); ++c) {
+    const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(c)];
+    const auto j = static_cast<std::size_t>(cylinder.joint);
+    const Range& v = limits.velocity[j];
+    const Range& q = machine.joints[j].position;
+    const double rate = std::abs(linkage_rates(machine, c, 0.5 * (q.lo + q.hi)).d1);
+    const double joint = std::max({std::abs(v.lo), std::abs(v.hi), 1e-6}) * rate;
+    FullSpeed full{joint, joint};
+    const Valve* valve = machine.valve_of_cylinder(c);
+    if (valve != nullptr && cylinder.hydraulic()) {
+      if (valve->max_flow_extend > 0.0)
+        full.extend = valve->max_flow_extend / cylinder.area_piston();
+      if (valve->max_flow_retract > 0.0)
+        full.retract = valve->max_flow_retract / cylinder.area_rod();
+    }
+    speeds.push_back(full);
+  }
+  return speeds;
+}
+
 CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& problem,
                                CraneKnotOptions options)
     : model_(&model),
@@ -92,6 +114,7 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
     choose_clearance_rows();
   }
   mode_.assign(static_cast<std::size_t>(m_), CylinderMode::kFree);
+  full_speed_ = full_speeds(machine, problem.limits);
   speed_.setZero(m_);
   force_.setZero(m_);
   length_.resize(static_cast<std::size_t>(m_));
@@ -194,14 +217,41 @@ void CraneKnotModel::update_effects(const double* z, bool derivatives) {
   effects_derivatives_ = derivatives;
 }
 
+double CraneKnotModel::add_commands(const double* z, double* gradient, double* hessian) {
+  double sum = 0.0;
+  const double w = options_.command_weight / kPowerUnit;
+  for (int c = 0; c < m_; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    const double u = full_speed_[i].command(speed_[c]);
+    sum += w * u * u;
+    if (gradient == nullptr || speed_[c] == 0.0) continue;
+    const double d1 = 2.0 * w * u * u / speed_[c], d2 = d1 / speed_[c];
+    const int j = model_->machine.cylinders[i].joint;
+    const double qd = z[n_ + j];
+    const double vq = length_[i].d2 * qd, vd = length_[i].d1;
+    gradient[j] += d1 * vq;
+    gradient[n_ + j] += d1 * vd;
+    const int size = this->size();
+    hessian[j * size + j] += d2 * vq * vq + d1 * length_[i].d3 * qd;
+    hessian[(n_ + j) * size + n_ + j] += d2 * vd * vd;
+    const double mixed = d2 * vq * vd + d1 * length_[i].d2;
+    hessian[(n_ + j) * size + j] += mixed;
+    hessian[j * size + n_ + j] += mixed;
+  }
+  return sum;
+}
+
 double CraneKnotModel::cost(const double* z) {
+  if (options_.energy_weight == 0.0 || options_.command_weight > 0.0) update(z, 0, false);
+  const double commands = options_.command_weight > 0.0 ? add_commands(z, nullptr, nullptr) : 0.0;
+  if (options_.energy_weight == 0.0) return commands;
   if (effects_) {
     update_effects(z, false);
-    return options_.energy_weight * effects_->power().value / kPowerUnit;
+    return options_.energy_weight * effects_->power().value / kPowerUnit + commands;
   }
   update(z, 0, true);
   const double power = power_.value(speed_.data(), force_.data(), mode_.data());
-  return options_.energy_weight * power / kPowerUnit;
+  return options_.energy_weight * power / kPowerUnit + commands;
 }
 
 double CraneKnotModel::cost_derivatives(const double* z, double* gradient, double* hessian) {
@@ -210,10 +260,20 @@ double CraneKnotModel::cost_derivatives(const double* z, double* gradient, doubl
   g.setZero();
   h.setZero();
   const double scale = options_.energy_weight / kPowerUnit;
+  if (scale == 0.0) {
+    if (options_.command_weight == 0.0) return 0.0;
+    update(z, 2, false);
+    return add_commands(z, gradient, hessian);
+  }
   if (effects_) {
     update_effects(z, true);
     add_jet(effects_->power(), scale, gradient, hessian);
-    return scale * effects_->power().value;
+    double value = scale * effects_->power().value;
+    if (options_.command_weight > 0.0) {
+      update(z, 2, false);
+      value += add_commands(z, gradient, hessian);
+    }
+    return value;
   }
   update(z, 2, true);
   const double power = power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -221,7 +281,8 @@ double CraneKnotModel::cost_derivatives(const double* z, double* gradient, doubl
   chain_hessian(z, power_.gradient().data(), power_.hessian(), hessian);
   g *= scale;
   h *= scale;
-  return scale * power;
+  if (options_.command_weight == 0.0) return scale * power;
+  return scale * power + add_commands(z, gradient, hessian);
 }
 
 void CraneKnotModel::path_bounds(double* lower, double* upper) const {

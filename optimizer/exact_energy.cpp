@@ -6,6 +6,7 @@
 
 #include "models/effects/effective_machine.h"
 #include "models/units.h"
+#include "optimizer/crane_knot_model.h"
 #include "problems/clearance.h"
 
 namespace sparflow {
@@ -201,6 +202,36 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
   }
   check_ends(problem, machine, motion, book);
   return book.sorted();
+}
+
+double command_effort(const CraneModel& model, const MotionProblem& problem,
+                      const Trajectory& motion, int refine) {
+  const std::vector<FullSpeed> full = full_speeds(model.machine, problem.limits);
+  double effort = 0.0;
+  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
+    for (int part = 0; part < refine; ++part) {
+      const double dt = (part + 0.5) * step;
+      for (int c = 0; c < model.machine.cylinder_count(); ++c) {
+        const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
+        const double qdd = motion.qdd(k, j), qd = motion.qd(k, j);
+        const double q = motion.q(k, j) + dt * (qd + 0.5 * dt * qdd);
+        const double speed = linkage_rates(model.machine, c, q).d1 * (qd + dt * qdd);
+        const double u = full[static_cast<std::size_t>(c)].command(speed);
+        effort += step * u * u;
+      }
+    }
+  }
+  return effort;
+}
+
+double exact_cost(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion,
+                  double energy, int refine) {
+  const ObjectiveWeights& w = problem.objective;
+  double cost =
+      w.energy * (energy + problem.idle_power * motion.duration()) + w.time * motion.duration();
+  if (w.commands > 0.0) cost += w.commands * command_effort(model, problem, motion, refine);
+  return cost;
 }
 
 double worst_excess(const std::vector<LimitCheck>& checks) {

@@ -68,9 +68,12 @@ struct TipLine {
   double tolerance = 0.0;  ///< largest distance of the tip from the line [m]
 };
 
-/// Cost = energy * E [J] + smoothness * integral of sum_j qdd_j^2 dt.
+/// Cost = energy * (E [J] + idle power * T) + time * T + commands * integral of sum_i u_i^2 dt
+///        + smoothness * integral of sum_j qdd_j^2 dt, with u_i the command of valve i (1 = full flow).
 struct ObjectiveWeights {
-  double energy = 1.0;  ///< [-]
+  double energy = 1.0;    ///< [-]
+  double time = 0.0;      ///< [W], with energy 0: the shortest time
+  double commands = 0.0;  ///< [W], with energy 0: the gentlest commands
   std::optional<double>
       smoothness;  ///< [J s^3] for joints in rad; absent: the optimiser's own default
 };

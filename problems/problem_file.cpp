@@ -54,6 +54,7 @@ class ProblemReader {
     problem_.start = read_posture(root.need("start", start).map(start, {"q"}).need("q", start));
     read_goal(root.need("goal", "where the motion ends, {tip: [x, y, z]} or {q: {...}}"));
     problem_.idle_power = root.number_or("idle_power_W", kPower, 0.0);
+    if (const auto objective = root.find("objective")) read_objective(*objective);
     read_duration(root.need("duration_s", "seconds, {min, max} or free"));
     if (const auto obstacles = root.find("obstacles")) {
       for (const YamlValue& v : obstacles->list("obstacles")) {
@@ -63,7 +64,6 @@ class ProblemReader {
     }
     problem_.clearance = root.number_or("clearance_m", kDistance, 0.0);
     if (const auto path = root.find("path")) read_path(*path);
-    if (const auto objective = root.find("objective")) read_objective(*objective);
     if (const auto knots = root.find("knots")) {
       problem_.knots = knots->integer("the number of knots", 4);
     }
@@ -195,7 +195,7 @@ class ProblemReader {
       return;
     }
     if (value.word() == "free") {
-      if (problem_.idle_power <= 0.0) {
+      if (problem_.idle_power <= 0.0 && problem_.objective.time <= 0.0) {
         value.fail(
             "got free, but idle_power_W is zero: slower is then always cheaper and no best "
             "duration "
@@ -279,13 +279,18 @@ class ProblemReader {
   }
 
   void read_objective(const YamlValue& value) {
-    const YamlMap map = value.map("weights {energy, smoothness}", {"energy", "smoothness"});
+    const YamlMap map = value.map("weights {energy, time_W, commands_W, smoothness}",
+                                  {"energy", "time_W", "commands_W", "smoothness"});
     ObjectiveWeights& weights = problem_.objective;
     weights.energy = map.number_or("energy", kWeight, 1.0);
+    weights.time = map.number_or("time_W", kWeight, 0.0);
+    weights.commands = map.number_or("commands_W", kWeight, 0.0);
     if (const auto smoothness = map.find("smoothness")) {
       weights.smoothness = smoothness->number(kWeight);
     }
-    if (weights.energy == 0.0 && weights.smoothness.value_or(0.0) == 0.0) {
+    const double sum =
+        weights.energy + weights.time + weights.commands + weights.smoothness.value_or(0.0);
+    if (sum == 0.0) {
       value.fail(
           "both weights are zero, so every motion is as good; give energy or smoothness a "
           "positive weight");

@@ -122,8 +122,10 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
                   r.duration, r.starts[static_cast<std::size_t>(r.best_start)].seed));
   const auto against = [&](const char* what, double energy) {
     if (energy > 0.0)
-      add(fmt::format("  {:<20} {:9.2f} kJ   the optimum saves {:.1f} %", what, energy / 1e3,
-                      100.0 * (1.0 - r.energy.total / energy)));
+      add(fmt::format(
+          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %", what, energy / 1e3,
+          r.energy.total <= energy ? "saves" : "takes more, as energy is not all it counts:",
+          100.0 * std::abs(1.0 - r.energy.total / energy)));
     else
       add(fmt::format("  {:<20}         -      breaks a limit in this time", what));
   };
