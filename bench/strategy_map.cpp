@@ -119,9 +119,13 @@ int run(int argc, char** argv) {
     ParetoOptions options;
     options.points = points;
     options.longest = longest;
+    options.grid_nodes = 0;
     OptimizeOptions& optimize = options.strategies.optimize;
     optimize.intervals = intervals;
     optimize.processes = 1;
+    optimize.search_intervals = std::min(40, intervals);
+    optimize.sequence_rounds = 2;
+    optimize.mesh_error = 1e-3;  // one mesh: differences of interest are larger
     options.strategies.smooth_seeds = 2;
     options.strategies.baselines.intervals = intervals;
     options.strategies.baselines.polished_orders = 2;

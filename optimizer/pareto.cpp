@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "optimizer/energy_grid.h"
+
 namespace sparflow {
 namespace {
 
@@ -44,7 +46,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
                                 const std::vector<SeedMotion>& seeds,
                                 const ParetoOptions& options) {
   ParetoCurve curve;
-  curve.sequential_limit = curve.simultaneous_limit = kNone;
+  curve.sequential_limit = curve.simultaneous_limit = curve.grid_limit = kNone;
   std::vector<Eigen::VectorXd> ends;
   for (const SeedMotion& s : seeds)
     ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
@@ -67,46 +69,50 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     const BaselineMotion slow = baselines.at(kind, kVerySlow * anchor);
     if (slow.found()) *limit = slow.energy.total;
   }
+  EnergyGridOptions grid;
+  grid.nodes = options.grid_nodes;
+  if (options.grid_nodes > 0 && problem.machine.joint_count() <= grid.most_joints &&
+      !problem.tip_line) {
+    const GridPath path = EnergyGrid(model, problem, grid).cheapest_path(0.0);
+    if (path.found) curve.grid_limit = path.slow_energy_J;
+  }
   OptimumSearch search(model, problem, seeds, baselines, options.strategies);
+  StrategyOutcome fastest;
   int done = 0;
   bool go_on = true;
   const auto evaluate = [&](double duration, bool thorough) {
-    const std::vector<StrategyOutcome> known =
-        baseline_outcomes(model, problem, baselines, duration);
+    std::vector<StrategyOutcome> known = baseline_outcomes(model, problem, baselines, duration);
     ParetoPoint p;
     p.duration = duration;
     p.sequential = energy_or_none(known, kSequential);
     p.simultaneous = energy_or_none(known, kJointLine);
+    if (fastest.found()) known.push_back(fastest);
     p.optimal = search.at(duration, known, thorough);
     ++done;
     if (options.progress) {
-      go_on = options.progress(std::min(1.0, static_cast<double>(done) / (options.points + 8)),
+      go_on = options.progress(std::min(1.0, static_cast<double>(done) / options.points),
                                fmt::format("{:.2f} s", duration));
     }
     return p;
   };
-  const auto keep = [&](ParetoPoint p) {
-    const bool found = p.optimal.found();
-    if (found) curve.points.push_back(std::move(p));
-    return found;
-  };
-  // dense where the curve bends: near the shortest time
-  const double low = std::max(anchor, problem.duration.fixed() ? 0.0 : problem.duration.min);
+  // the fastest motion first: it is where the curve begins
+  std::vector<StrategyOutcome> first;
+  for (const std::string& kind : BaselineSet::kinds()) {
+    const double own = baselines.shortest(kind);
+    if (kind == kSequential || own <= 0.0 || own > 1.5 * anchor) continue;
+    const BaselineMotion m = baselines.at(kind, own);
+    if (m.found())
+      first.push_back({kind, m.detail, m.motion, m.duration, own, "", m.energy, {}, {}});
+  }
+  fastest = search.fastest(first);
+  double low = fastest.found() ? std::min(anchor, fastest.duration) : anchor;
+  if (!problem.duration.fixed()) low = std::max(low, problem.duration.min);
+  // dense where the curve bends, near the shortest time; each optimum starts the next
   for (int i = options.points - 1; i >= 0 && go_on; --i) {
     const double share = static_cast<double>(i) / std::max(1, options.points - 1);
-    const double duration = low * std::pow(options.longest, std::pow(share, 1.4));
-    keep(evaluate(duration, i == options.points - 1 || i <= 2));
-  }
-  // down to the shortest time: what overlaps may be faster than any line
-  double found = curve.points.empty() ? anchor : curve.points.back().duration, ratio = 0.93;
-  while (go_on && ratio < 0.985) {
-    const double duration = found * ratio;
-    if (keep(evaluate(duration, true))) {
-      found = duration;
-    } else {
-      curve.too_short = duration;
-      ratio = std::sqrt(ratio);
-    }
+    ParetoPoint p = evaluate(low * std::pow(options.longest, std::pow(share, 1.4)),
+                             i == options.points - 1 || i == options.points / 2 || i <= 1);
+    if (p.optimal.found()) curve.points.push_back(std::move(p));
   }
   std::sort(curve.points.begin(), curve.points.end(),
             [](const ParetoPoint& a, const ParetoPoint& b) { return a.duration < b.duration; });
@@ -122,8 +128,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     if (p.optimal.energy.total <= before.energy.total) continue;
     const std::vector<SeedMotion> from = {{"shorter time", before.motion, 0.0, false}};
     OptimizeOptions with_modes = options.strategies.optimize;
-    with_modes.schedule.clear();
-    with_modes.sequential_starts = 0;
+    with_modes.smooth_starts = with_modes.sequential_starts = with_modes.sequence_rounds = 0;
     const OptimizeResult r = optimize_at(model, problem, from, p.duration, with_modes);
     if (r.best_start < 0 || r.energy.total >= p.optimal.energy.total) continue;
     p.optimal.motion = r.motion;

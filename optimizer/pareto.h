@@ -25,10 +25,10 @@ struct IdleChoice {
 
 struct ParetoCurve {
   std::vector<ParetoPoint> points;  ///< by duration; only those with a motion
-  double shortest = 0.0;            ///< [s] least duration at which a motion was found
-  double too_short = 0.0;           ///< [s] longest duration tried without finding one, 0 = none
+  double shortest = 0.0;            ///< [s] of the fastest motion found
   double sequential_limit = 0.0;  ///< [J] the best one-by-one motion driven very slowly, NaN = none
   double simultaneous_limit = 0.0;  ///< [J] the cheapest straight joint line driven very slowly
+  double grid_limit = 0.0;          ///< [J] cheapest path of the joint-space grid, unlimited time
   std::vector<IdleChoice> idle;
   std::string message;  ///< why there is no point
 };
@@ -37,12 +37,13 @@ struct ParetoOptions {
   int points = 14;
   double longest = 6.0;                                           ///< of the shortest time
   std::vector<double> idle_powers = {1e3, 2e3, 5e3, 10e3, 15e3};  ///< [W]
+  int grid_nodes = 20000;  ///< of the grid for the limit at unlimited time; 0 = not asked
   StrategyOptions strategies;
   std::function<bool(double, const std::string&)> progress;  ///< share done, what; false interrupts
 };
 
-/// Long times first, then shorter until none is found (the last two bracket the shortest time to 2 %), then once
-/// back: what a shorter time found, driven slower, must not be cheaper than what the longer one has.
+/// The fastest motion, then from long times to short ones, each optimum starting the next, then once back: what a
+/// shorter time found, driven slower, must not be cheaper than what the longer one has.
 ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& problem,
                                 const std::vector<SeedMotion>& seeds, const ParetoOptions& options);
 

@@ -93,81 +93,134 @@ OptimumSearch::OptimumSearch(const CraneModel& model, const MotionProblem& probl
       baselines_(baselines),
       options_(std::move(options)) {}
 
-StrategyOutcome OptimumSearch::at(double duration, const std::vector<StrategyOutcome>& known,
-                                  bool thorough) {
-  StrategyOutcome best;
-  best.kind = kOptimal;
-  best.duration = duration;
-  const auto take = [&](const Trajectory& motion, const MotionEnergy& energy,
-                        const std::string& from) {
-    if (best.found() && energy.total >= best.energy.total) return;
-    best.motion = motion;
-    best.energy = energy;
-    best.detail = from;
-  };
-  std::vector<SeedMotion> held;
+std::vector<SeedMotion> OptimumSearch::starts_from(const std::vector<StrategyOutcome>& known,
+                                                   bool thorough) const {
+  std::vector<SeedMotion> from;
+  // first, because the first starts are the ones solved through the smooth law too
+  for (std::size_t i = 0;
+       thorough && i < std::min(seeds_.size(), static_cast<std::size_t>(options_.smooth_seeds));
+       ++i)
+    from.push_back(seeds_[i]);
   for (const StrategyOutcome& o : known) {
-    if (!o.found() || std::abs(o.duration - duration) > 1e-9 * duration) continue;
-    take(o.motion, o.energy, o.kind + (o.detail.empty() ? "" : " (" + o.detail + ")"));
-    held.push_back({o.kind + " (" + o.detail + ")", o.motion, o.shortest, false});
+    // cylinder strokes in proportion differ little from joints in proportion: one of them is enough to start from
+    if (o.found() && o.kind != kActuatorLine)
+      from.push_back({o.detail.empty() ? o.kind : o.kind + " (" + o.detail + ")", o.motion,
+                      o.shortest, false});
   }
   // the last optima driven faster or slower: an overlap may be what a shorter time needs
   for (std::size_t i = 0; i < std::min<std::size_t>(2, earlier_.size()); ++i)
-    held.push_back(earlier_[earlier_.size() - 1 - i]);
-  OptimizeOptions with_modes = options_.optimize;
-  with_modes.schedule.clear();
-  with_modes.sequential_starts = 0;
-  const auto solve = [&](const std::vector<SeedMotion>& from, const OptimizeOptions& options) {
-    if (from.empty()) return;
-    OptimizeResult r = optimize_at(model_, problem_, from, duration, options);
-    if (r.status == OptimizeStatus::kOptimal || r.status == OptimizeStatus::kInterrupted) {
-      if (r.best_start >= 0)
-        take(r.motion, r.energy, r.starts[static_cast<std::size_t>(r.best_start)].seed);
-    } else if (!best.found()) {
-      best.why = r.message;
-    }
-    last_ = std::move(r);
-  };
-  solve(held, with_modes);
-  if (thorough) {
-    std::vector<SeedMotion> smooth = seeds_;
-    if (smooth.size() > static_cast<std::size_t>(options_.smooth_seeds))
-      smooth.resize(static_cast<std::size_t>(options_.smooth_seeds));
-    // the optimum so far through the smooth law too: that is what finds a better overlap
-    if (best.found()) smooth.push_back({"best so far", best.motion, 0.0, false});
-    OptimizeOptions through_smooth = options_.optimize;
-    through_smooth.sequential_starts = 0;
-    solve(smooth, through_smooth);
+    from.push_back(earlier_[earlier_.size() - 1 - i]);
+  return from;
+}
+
+StrategyOutcome OptimumSearch::solved(const std::string& kind, const MotionProblem& problem,
+                                      const std::vector<SeedMotion>& from, const TimeWindow& time,
+                                      bool thorough) {
+  StrategyOutcome o;
+  o.kind = kind;
+  o.duration = time.guess;
+  OptimizeOptions options = options_.optimize;
+  options.smooth_starts = thorough ? options_.smooth_seeds : 0;
+  if (!thorough) {
+    options.sequential_starts = 0;
+    options.sequence_rounds = std::min(options.sequence_rounds, 1);
+    options.searched_starts = 1;
   }
+  if (from.empty()) {
+    o.why = "no motion to start from";
+    return o;
+  }
+  const OptimizeResult r = optimize_in(model_, problem, from, time, options);
+  if (r.best_start < 0) {
+    o.why = r.message;
+    return o;
+  }
+  o.motion = r.motion;
+  o.duration = r.duration;
+  o.energy = r.energy;
+  o.detail = r.starts[static_cast<std::size_t>(r.best_start)].seed;
+  return o;
+}
+
+StrategyOutcome OptimumSearch::at(double duration, const std::vector<StrategyOutcome>& known,
+                                  bool thorough) {
+  StrategyOutcome best = solved(kOptimal, problem_, starts_from(known, thorough),
+                                TimeWindow::fixed(duration), thorough);
+  for (const StrategyOutcome& o : known) {
+    if (!o.found() || std::abs(o.duration - duration) > 1e-9 * duration) continue;
+    if (best.found() && best.energy.total <= o.energy.total) continue;
+    best.motion = o.motion;
+    best.energy = o.energy;
+    best.detail = o.kind + " (" + o.detail + ")";
+  }
+  best.duration = duration;
   if (best.found()) {
     best.why.clear();
     earlier_.push_back({"optimum at another duration", best.motion, 0.0, false});
-  } else if (best.why.empty()) {
-    best.why = "no way tried keeps all limits in this time";
   }
   add_pump_pressures(model_, problem_.payload, best);
   return best;
 }
 
 StrategyOutcome OptimumSearch::at_own_best(double first, double idle_power) {
-  const auto evaluate = [&](double duration, bool thorough) {
-    return at(duration, baseline_outcomes(model_, problem_, baselines_, duration), thorough);
-  };
+  MotionProblem priced = problem_;
+  priced.idle_power = idle_power;
+  const std::vector<StrategyOutcome> known = baseline_outcomes(model_, problem_, baselines_, first);
+  StrategyOutcome best =
+      solved(kOptimal, priced, starts_from(known, true), {first, 0.2 * first, 10.0 * first}, true);
   const auto cost = [&](const StrategyOutcome& o) {
-    return o.found() ? o.energy.total + idle_power * o.duration
-                     : std::numeric_limits<double>::infinity();
+    return o.energy.total + idle_power * o.duration;
   };
-  StrategyOutcome best = evaluate(first, true);
-  // coarse steps while they help, then finer ones around the best
-  for (const double step : {1.2, 1.06}) {
-    for (const double ratio : {1.0 / step, step}) {
-      for (int i = 0; i < 8; ++i) {
-        StrategyOutcome next = evaluate(best.duration * ratio, false);
-        if (!(cost(next) < cost(best))) break;
-        best = std::move(next);
-      }
-    }
+  for (const StrategyOutcome& o : known) {
+    if (!o.found() || (best.found() && cost(best) <= cost(o))) continue;
+    best = o;
+    best.kind = kOptimal;
+    best.detail = o.kind + " (" + o.detail + ")";
   }
+  add_pump_pressures(model_, problem_.payload, best);
+  return best;
+}
+
+StrategyOutcome OptimumSearch::fastest(const std::vector<StrategyOutcome>& first) {
+  MotionProblem timed = problem_;
+  timed.objective.energy = 0.0;
+  timed.objective.time = 1e3;
+  timed.idle_power = 0.0;
+  double guess = std::numeric_limits<double>::infinity();
+  for (const StrategyOutcome& o : first) {
+    if (o.found()) guess = std::min(guess, o.duration);
+  }
+  for (const SeedMotion& s : seeds_) {
+    if (s.shortest_duration > 0.0) guess = std::min(guess, s.shortest_duration);
+  }
+  if (!std::isfinite(guess)) {
+    StrategyOutcome none;
+    none.kind = kMinimumTime;
+    none.why = "no motion to start from";
+    return none;
+  }
+  StrategyOutcome best = solved(kMinimumTime, timed, starts_from(first, true),
+                                {guess, 0.2 * guess, 1.5 * guess}, false);
+  for (const StrategyOutcome& o : first) {
+    if (!o.found() || (best.found() && best.duration <= o.duration)) continue;
+    best = o;
+    best.kind = kMinimumTime;
+    best.detail = o.kind;
+  }
+  best.shortest = best.found() ? best.duration : 0.0;
+  add_pump_pressures(model_, problem_.payload, best);
+  return best;
+}
+
+StrategyOutcome OptimumSearch::gentlest(double duration,
+                                        const std::vector<StrategyOutcome>& known) {
+  MotionProblem gentle = problem_;
+  gentle.objective.energy = 0.0;
+  gentle.objective.commands = 1e3;
+  StrategyOutcome best =
+      solved(kMinimumControl, gentle, starts_from(known, true), TimeWindow::fixed(duration), false);
+  best.duration = duration;
+  add_pump_pressures(model_, problem_.payload, best);
   return best;
 }
 
@@ -209,10 +262,32 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
     out.shortest_of = s.name;
   }
   OptimumSearch search(model, problem, seeds, baselines, options);
+  StrategyOutcome fastest;
+  fastest.kind = kMinimumTime;
+  if (options.shortest_time && out.shortest > 0.0) {
+    std::vector<StrategyOutcome> first;
+    for (std::size_t i = 0; i < shortest.size(); ++i) {
+      const std::string& kind = BaselineSet::kinds()[i];
+      if (shortest[i] > 0.0 && shortest[i] < 1.5 * out.shortest && kind != kSequential)
+        first.push_back(outcome_of(model, problem, baselines.at(kind, shortest[i]), shortest[i]));
+    }
+    fastest = search.fastest(first);
+    if (fastest.found() && fastest.duration < out.shortest) {
+      out.shortest = fastest.duration;
+      out.shortest_of = kMinimumTime;
+    }
+  }
   const auto rows_at = [&](const std::string& name, double factor, double duration, bool thorough) {
     StrategyRow row{name, factor, duration, baseline_outcomes(model, problem, baselines, duration)};
     for (std::size_t i = 0; i < shortest.size(); ++i) row.outcomes[i].shortest = shortest[i];
-    row.outcomes.push_back(search.at(duration, row.outcomes, thorough));
+    std::vector<StrategyOutcome> known = row.outcomes;
+    if (fastest.found()) known.push_back(fastest);
+    if (thorough && options.least_control && factor == 0.0) {
+      row.outcomes.push_back(search.gentlest(duration, known));
+      known.push_back(row.outcomes.back());
+    }
+    if (thorough && fastest.found() && factor == 0.0) row.outcomes.push_back(fastest);
+    row.outcomes.push_back(search.at(duration, known, thorough));
     row.outcomes.back().shortest = out.shortest;
     return row;
   };

@@ -11,6 +11,9 @@
 namespace sparflow {
 
 inline constexpr const char* kOptimal = "optimal";
+inline constexpr const char* kMinimumTime = "minimum_time";  ///< in its own, the shortest time
+inline constexpr const char* kMinimumControl =
+    "minimum_control";  ///< least integral of squared commands
 
 /// One way of moving at one duration.
 struct StrategyOutcome {
@@ -53,7 +56,10 @@ struct StrategyOptions {
   bool own_time = false;        ///< needs idle power
   std::vector<double> factors;  ///< of the shortest time
   double idle_power = 0.0;      ///< [W]
-  int smooth_seeds = 4;         ///< seeds that are also solved through the smooth law, at most
+  bool shortest_time =
+      true;  ///< solve for the shortest time, else take the baselines' and the seeds'
+  bool least_control = true;  ///< solve for the least squared commands in equal time
+  int smooth_seeds = 2;  ///< seeds given to a thorough search, solved through the smooth law too
   BaselineOptions baselines;
   OptimizeOptions optimize;
 };
@@ -71,16 +77,24 @@ class OptimumSearch {
   StrategyOutcome at(double duration, const std::vector<StrategyOutcome>& known, bool thorough);
   /// The duration at which energy + idle power x time is least, near `first`.
   StrategyOutcome at_own_best(double first, double idle_power);
-  const OptimizeResult& last_result() const { return last_; }
+  /// The fastest motion. @param first motions to begin with, the fastest of their kind
+  StrategyOutcome fastest(const std::vector<StrategyOutcome>& first);
+  /// The motion of this duration with the least integral of the squared valve commands (Nurmi and Mattila's
+  /// and everybody's regular cost), whatever it costs in energy.
+  StrategyOutcome gentlest(double duration, const std::vector<StrategyOutcome>& known);
 
  private:
+  std::vector<SeedMotion> starts_from(const std::vector<StrategyOutcome>& known,
+                                      bool thorough) const;
+  StrategyOutcome solved(const std::string& kind, const MotionProblem& problem,
+                         const std::vector<SeedMotion>& from, const TimeWindow& time,
+                         bool thorough);
   const CraneModel& model_;
   const MotionProblem& problem_;
   const std::vector<SeedMotion>& seeds_;
   const BaselineSet& baselines_;
   StrategyOptions options_;
   std::vector<SeedMotion> earlier_;  // optima at other durations, the latest last
-  OptimizeResult last_;
 };
 
 /// Baselines at one duration as outcomes with their pressures.

@@ -61,6 +61,8 @@ std::string strategy_title(const std::string& kind) {
   if (kind == kNearestJointLine) return "simultaneous, nearest end posture";
   if (kind == kActuatorLine) return "cylinder strokes in proportion";
   if (kind == kTipLine) return "tip on a straight line";
+  if (kind == kMinimumTime) return "shortest time";
+  if (kind == kMinimumControl) return "least squared commands";
   if (kind == kOptimal) return "energy-optimal";
   return kind;
 }

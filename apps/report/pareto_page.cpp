@@ -28,9 +28,11 @@ LineChart energy_chart(const ParetoCurve& curve) {
   LineChart chart;
   chart.title = "Pump energy against time";
   chart.note =
-      "Each point is a motion of its own that keeps all limits. Dashed: what the one-by-one motion "
-      "costs when time does not matter. Marked: the best duration when the engine burns so much "
-      "meanwhile.";
+      "Each point is a motion of its own that keeps all limits. Level and dashed: what is left "
+      "when "
+      "time does not matter. Falling and dashed: equal cost when the engine burns so much "
+      "meanwhile; "
+      "where such a line touches the curve is the best time, marked.";
   chart.x_axis = {"duration", "s"};
   chart.y_axis = {"pump energy", "kJ"};
   chart.x.resize(n);
@@ -48,6 +50,22 @@ LineChart energy_chart(const ParetoCurve& curve) {
   if (std::isfinite(curve.sequential_limit)) {
     chart.series.push_back(named_line("one after another, unlimited time",
                                       VectorXd::Constant(n, curve.sequential_limit / 1e3),
+                                      LineStyle::kLimit));
+  }
+  if (std::isfinite(curve.grid_limit)) {
+    chart.series.push_back(named_line("cheapest path of a grid, unlimited time",
+                                      VectorXd::Constant(n, curve.grid_limit / 1e3),
+                                      LineStyle::kLimit));
+  }
+  // energy + idle power x time is the same along such a line; it touches the curve at the best time
+  for (const IdleChoice& c : curve.idle) {
+    if (c.at_end) continue;
+    VectorXd iso(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      iso[i] = (c.energy + c.idle_power * (c.duration - chart.x[i])) / 1e3;
+      if (iso[i] < 0.9 * best.minCoeff() || iso[i] > best.maxCoeff()) iso[i] = std::nan("");
+    }
+    chart.series.push_back(named_line(fmt::format("equal cost at {:g} kW", c.idle_power / 1e3), iso,
                                       LineStyle::kLimit));
   }
   for (const IdleChoice& c : curve.idle) {
@@ -145,12 +163,11 @@ std::string pareto_json(const MotionProblem& problem, const ParetoCurve& curve) 
               {"points", points},
               {"idle", idle},
               {"shortest_s", nullptr},
-              {"too_short_s", nullptr},
               {"unlimited_time",
                {{"sequential_J", number_or_null(curve.sequential_limit)},
-                {"simultaneous_J", number_or_null(curve.simultaneous_limit)}}}};
+                {"simultaneous_J", number_or_null(curve.simultaneous_limit)},
+                {"grid_J", number_or_null(curve.grid_limit)}}}};
   if (curve.shortest > 0.0) out["shortest_s"] = curve.shortest;
-  if (curve.too_short > 0.0) out["too_short_s"] = curve.too_short;
   if (!curve.message.empty()) out["message"] = curve.message;
   return out.dump(1) + "\n";
 }
@@ -186,7 +203,8 @@ std::string pareto_table(const MotionProblem& problem, const ParetoCurve& curve)
       text += fmt::format(" {}: {:.0f} %", k, 100.0 * p.optimal.energy.share_moving[k]);
     text += "\n";
   }
-  text += fmt::format("  unlimited time, one by one: {} kJ\n", cell(curve.sequential_limit));
+  text += fmt::format("  unlimited time: one by one {} kJ, cheapest path of a grid {} kJ\n",
+                      cell(curve.sequential_limit), cell(curve.grid_limit));
   for (const IdleChoice& c : curve.idle) {
     text += fmt::format("  engine at {:4.1f} kW: best in {:.2f} s{}\n", c.idle_power / 1e3,
                         c.duration, c.at_end ? " (the longest looked at)" : "");
