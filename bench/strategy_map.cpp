@@ -88,7 +88,8 @@ MapCurve unpack_curve(const std::string& bytes) {
 int run(int argc, char** argv) {
   CLI::App app{"The map: sequential, simultaneous or optimal, over time, load, pose, idle power"};
   std::string folder = ".", only;
-  int intervals = 80, points = 9, processes = 2;
+  int intervals = 80, points = 9, processes = 2, rounds = 1;
+  bool ends_only = false;
   double longest = 6.0;
   app.add_option("-o,--out", folder, "folder for the tables and the picture")
       ->capture_default_str();
@@ -96,6 +97,8 @@ int run(int argc, char** argv) {
   app.add_option("--intervals", intervals)->check(CLI::Range(20, 1000))->capture_default_str();
   app.add_option("--points", points, "durations a curve")->capture_default_str();
   app.add_option("--longest", longest, "times the shortest")->capture_default_str();
+  app.add_option("--rounds", rounds, "of the search over mode sequences")->capture_default_str();
+  app.add_flag("--two-loads", ends_only, "the lightest and the heaviest load alone");
   app.add_option("--processes", processes)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   struct Task {
@@ -105,7 +108,11 @@ int run(int argc, char** argv) {
   std::vector<Task> tasks;
   for (const Pose& pose : poses()) {
     if (pose.reach.find(only) == std::string::npos) continue;
-    for (const double payload : pose.payloads) tasks.push_back({pose.reach, payload});
+    for (const double payload : pose.payloads) {
+      if (ends_only && payload != pose.payloads.front() && payload != pose.payloads.back())
+        continue;
+      tasks.push_back({pose.reach, payload});
+    }
   }
   const auto work = [&](int index) {
     const Task& task = tasks[static_cast<std::size_t>(index)];
@@ -124,11 +131,11 @@ int run(int argc, char** argv) {
     optimize.intervals = intervals;
     optimize.processes = 1;
     optimize.search_intervals = std::min(40, intervals);
-    optimize.sequence_rounds = 2;
+    optimize.sequence_rounds = rounds;
     optimize.mesh_error = 1e-3;  // one mesh: differences of interest are larger
-    options.strategies.smooth_seeds = 2;
+    options.strategies.smooth_seeds = 1;
     options.strategies.baselines.intervals = intervals;
-    options.strategies.baselines.polished_orders = 2;
+    options.strategies.baselines.polished_orders = 1;
     options.strategies.baselines.optimize = optimize;
     return pack_curve(energy_against_time(model, problem, seeds_of(problem, intervals), options));
   };
