@@ -143,6 +143,8 @@ void add_improve_verb(CLI::App& app, int& code);
 void add_effects_verb(CLI::App& app, int& code);
 void add_plan_verb(CLI::App& app, int& code);
 void add_optimize_verb(CLI::App& app, int& code);
+void add_strategies_verb(CLI::App& app, int& code);
+void add_pareto_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);
 
 }  // namespace sparflow::cli
