@@ -96,7 +96,7 @@ Table row_table(const StrategyRow& row, double idle_power, std::size_t cylinders
 
 /// Pump pressure and flow over time of the three ways everybody asks about.
 void add_powers(Page& page, const CraneModel& model, const MotionProblem& problem,
-                   const StrategyRow& row) {
+                const StrategyRow& row) {
   LineChart chart;
   chart.title = "Pump power over time";
   chart.y_axis = {"power", "kW"};
