@@ -21,7 +21,7 @@ std::string row_title(const StrategyRow& row) {
   return fmt::format("In equal time ({:.2f} s)", row.duration);
 }
 
-std::string signed_percent(double share) { return fmt::format("{:+.1f} %", 100.0 * share); }
+std::string excess_text(double share) { return fmt::format("{:+.1f} %", 100.0 * share); }
 
 /// Energy by where it goes, a bar each way.
 BarChart energy_bars(const StrategyRow& row, double idle_power) {
@@ -95,7 +95,7 @@ Table row_table(const StrategyRow& row, double idle_power, std::size_t cylinders
 }
 
 /// Pump pressure and flow over time of the three ways everybody asks about.
-void add_pressures(Page& page, const CraneModel& model, const MotionProblem& problem,
+void add_powers(Page& page, const CraneModel& model, const MotionProblem& problem,
                    const StrategyRow& row) {
   LineChart chart;
   chart.title = "Pump power over time";
@@ -172,7 +172,7 @@ void add_one(Page& page, const StrategyComparison& c, const CraneModel& model,
     page.table(row_table(row, c.idle_power, model.cylinders.size()));
     if (row.name == "equal") {
       add_paths(page, model.machine, problem, row);
-      add_pressures(page, model, problem, row);
+      add_powers(page, model, problem, row);
       add_orders(page, c);
     }
   }
@@ -300,7 +300,7 @@ void set_verdict(Page& page, const std::vector<StrategyComparison>& all) {
                       line = paired(all, names.front(), kJointLine, kOptimal),
                       tip = paired(all, names.front(), kTipLine, kOptimal);
   const auto text = [](const PairedSummary& s, const std::string& what) {
-    return s.n > 0 ? fmt::format("{} {}", what, signed_percent(s.median)) : what + ": none";
+    return s.n > 0 ? fmt::format("{} {}", what, excess_text(s.median)) : what + ": none";
   };
   const std::string where =
       names.front() == "equal" ? "In equal time" : "Of " + names.front() + " time";
