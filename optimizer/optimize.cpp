@@ -8,6 +8,7 @@
 
 #include "models/error.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/energy_grid.h"
 
 namespace sparflow {
 namespace {
@@ -40,6 +41,8 @@ std::string pack(const StartResult& r) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     p.number(static_cast<double>(r.plan.modes.data()[i]));
   pack_matrix(p, r.plan.durations);
+  p.number(static_cast<double>(r.plan.waypoint_after.size()));
+  for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
   p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
@@ -67,6 +70,8 @@ StartResult unpack(const std::string& bytes) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
   r.plan.durations = unpack_matrix(u);
+  r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
+  for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
   r.energy_exact = u.number();
   r.energy_smooth = u.number();
   r.excess = u.number();
@@ -123,6 +128,10 @@ std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
   return kept;
 }
 
+bool time_is_everything(const MotionProblem& problem) {
+  return problem.objective.energy == 0.0 && problem.objective.time > 0.0;
+}
+
 bool same_plan(const PhasePlan& a, const PhasePlan& b) {
   return a.count() == b.count() && a.modes.cols() == b.modes.cols() &&
          (a.modes.array() == b.modes.array()).all();
@@ -141,8 +150,10 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
     const Trajectory timed = with_duration(s.motion, result.duration);
     if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
     const double energy = exact_energy(model, timed, problem.payload, refine).total;
-    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy)
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
       result.best_seed_energy = energy;
+      result.best_seed_name = s.name;
+    }
     if (nearest) result.nearest_line_energy = energy;
     if (s.straight_line &&
         (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
@@ -186,11 +197,14 @@ void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMoti
     worst = " The solver says: " + result.starts.front().message + ".";
   }
   const double shortest = shortest_seed(seeds);
-  const std::string remedy =
-      shortest > duration
-          ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
-                        duration)
-          : std::string();
+  std::string remedy;
+  if (result.shortest_duration > duration) {
+    remedy = fmt::format(" The shortest motion found takes {:.2f} s; {:g} s was asked for.",
+                         result.shortest_duration, duration);
+  } else if (shortest > duration) {
+    remedy = fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
+                         duration);
+  }
   result.status = OptimizeStatus::kInfeasible;
   result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
 }
@@ -212,6 +226,8 @@ const char* to_string(OptimizeStatus status) {
 }
 
 namespace {
+
+constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
 
 /// Everything that is solved for one problem in one window of time.
 class Search {
@@ -235,7 +251,8 @@ class Search {
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<ModeCandidate> one_by_one;
-    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line) {
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
       const Eigen::VectorXd times =
           Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, time_.guess);
       std::vector<Eigen::VectorXd> ends;
@@ -245,6 +262,7 @@ class Search {
       }
       one_by_one = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
     }
+    for (ModeCandidate& c : grid_candidates()) one_by_one.push_back(std::move(c));
     const std::size_t given = seeds_.size();
     expected_ = static_cast<int>(given + one_by_one.size());
     solve(
@@ -252,9 +270,7 @@ class Search {
         [&](int i) {
           const auto k = static_cast<std::size_t>(i);
           OptimizeOptions options = coarse_;
-          const int ways =
-              problem_.obstacles.empty() ? 1 : 2;  // each way round is a start of its own
-          if (i >= ways * options.smooth_starts && options.modes) options.schedule.clear();
+          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
           return k < given
                      ? optimize_from(model_, problem_, seeds_[k], time_, options)
                      : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
@@ -264,6 +280,7 @@ class Search {
           return k < given ? seeds_[k].name : one_by_one[k - given].name;
         });
     if (options_.modes && options_.free_phases) {
+      if (ranking(result_, options_.limit_tolerance).empty()) rescue();
       search_sequences();
       refine();
     }
@@ -274,6 +291,39 @@ class Search {
 
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+
+  /// The cheapest ways a search over the whole joint space knows.
+  std::vector<ModeCandidate> grid_candidates() const {
+    std::vector<ModeCandidate> found;
+    const EnergyGridOptions size{options_.grid_nodes};
+    if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
+        !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
+      return found;
+    const auto search = [&](const MotionProblem& problem, int most) {
+      EnergyGrid grid(model_, problem, size);
+      std::vector<GridPath> paths;
+      if (problem.objective.energy > 0.0) {
+        paths = grid.paths_for_duration(time_.guess, most);
+      } else if (time_is_everything(problem)) {
+        constexpr double kTimeIsEverything = 1e7;  // [W]
+        paths.push_back(grid.cheapest_path(kTimeIsEverything));
+      }
+      for (const GridPath& path : paths) {
+        if (!path.found) continue;
+        const double duration =
+            std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+        found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
+      }
+    };
+    search(problem_, options_.grid_starts);
+    if (!problem_.obstacles.empty()) {
+      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      MotionProblem wider = problem_;
+      wider.clearance += kRoomForTheRows;
+      search(wider, options_.grid_starts);
+    }
+    return found;
+  }
 
   void solve(int count, const std::function<StartResult(int)>& start,
              const std::function<std::string(int)>& name) {
@@ -302,6 +352,33 @@ class Search {
     }
   }
 
+  /// No start kept all limits: the shortest motion there is tells whether the time is the reason. Where it is not, that
+  /// motion driven slower is a start like any other.
+  void rescue() {
+    if (interrupted() || time_is_everything(problem_)) return;
+    const OptimizeResult shortest = shortest_motion(model_, problem_, seeds_, options_);
+    if (shortest.best_start < 0) return;
+    result_.shortest_duration = shortest.duration;
+    if (shortest.duration > time_.upper) return;
+    const StartResult& fast = shortest.starts[static_cast<std::size_t>(shortest.best_start)];
+    const TimeWindow time{std::max(time_.guess, shortest.duration), time_.lower, time_.upper};
+    const Trajectory slow = with_duration(fast.motion, time.guess);
+    PhasePlan plan = fast.plan;
+    if (plan.count() > 0) plan.durations *= time.guess / plan.total();
+    const std::string name = "the shortest motion, slower";
+    expected_ = static_cast<int>(result_.starts.size()) + 2;
+    solve(
+        2,
+        [&](int i) {
+          return i == 0 || plan.count() == 0
+                     ? optimize_from(model_, problem_, {name, slow, shortest.duration, false}, time,
+                                     coarse_)
+                     : optimize_with_phases(model_, problem_, name + ", its phases", plan, slow,
+                                            time, true, coarse_);
+        },
+        [&](int) { return name; });
+  }
+
   /// From the best few motions on: neighbouring mode sequences, as long as one of them is cheaper.
   void search_sequences() {
     std::vector<PhasePlan> tried;
@@ -319,10 +396,11 @@ class Search {
       };
       std::vector<Job> jobs;
       int searched = 0;
-      double best_before = 0.0;
-      for (const int i : ranking(result_, options_.limit_tolerance)) {
+      const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+      if (ranked.empty()) return;
+      const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+      for (const int i : ranked) {
         const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
-        if (searched == 0) best_before = s.cost;
         if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
         if (searched++ == searched_) break;
         for (PhasePlan& plan : neighbours(s.plan)) {
@@ -467,6 +545,22 @@ OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem
                            const std::vector<SeedMotion>& seeds, const TimeWindow& time,
                            const OptimizeOptions& options) {
   return Search(model, problem, seeds, time, options).run();
+}
+
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options) {
+  MotionProblem hurried = problem;
+  hurried.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
+  const double shortest = shortest_seed(seeds);
+  const double guess = shortest > 0.0 ? 1.1 * shortest : std::max(problem.duration.min, 1.0);
+  hurried.duration = {0.0, 20.0 * guess};
+  OptimizeOptions direct = options;
+  direct.schedule.clear();
+  direct.sequential_starts = 0;
+  direct.sequence_rounds = 0;
+  direct.progress = {};
+  return optimize_in(model, hurried, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
 }
 
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,

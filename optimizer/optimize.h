@@ -43,6 +43,8 @@ struct OptimizeOptions {
   int smooth_iterations = 100;
   int phase_iterations = 300;  ///< of a solve with phases; half of it in the search
   int sequential_starts = 6;   ///< one-by-one motions tried besides the seeds, the cheapest guesses
+  int grid_starts = 3;         ///< paths of the global search on a joint grid (energy_grid.h)
+  int grid_nodes = 15000;      ///< of that grid
   bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
   bool free_phases = true;  ///< how long each mode lasts is a variable; false: as the start has it
   double overlap = 0.3;     ///< offered between two phases, share of the shorter one's time
@@ -113,12 +115,18 @@ struct OptimizeResult {
   std::vector<LimitCheck> checks;  ///< of the motion, or of the start that came nearest to one
   int best_start = -1;
   std::vector<StartResult> starts;
+  double lower_bound =
+      0.0;  ///< [J] no motion of any duration takes less (energy_bound.h); 0 = not asked for or none
+  std::string bound_note;   ///< why there is none, or how the bound was found
   double mesh_error = 0.0;  ///< of the answer's last mesh, relative (OptimizeOptions::mesh_error)
-  double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
+  double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
+  std::string best_seed_name;
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
   /// [J] the straight joint line to the nearest end posture (the first straight seed); 0 = breaks a limit.
   double nearest_line_energy = 0.0;
   std::string straight_line_name;
+  /// [s] the shortest motion found within all limits, sought when no start met the duration; 0 = not sought or none.
+  double shortest_duration = 0.0;
   double solve_s = 0.0;  ///< wall time of everything
   double evaluated_durations = 1;
 };
@@ -152,6 +160,11 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
 OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem,
                            const std::vector<SeedMotion>& seeds, const TimeWindow& time,
                            const OptimizeOptions& options);
+
+/// The shortest motion within all limits that can be found from these seeds; its status is kOptimal when there is one.
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options);
 
 /// The problem as posed: a fixed duration, or the duration that minimises energy + idle power * time.
 /// @throws InputError when the model lacks a pressure process the machine needs
