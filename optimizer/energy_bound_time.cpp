@@ -179,8 +179,9 @@ class TimedSearch {
   Eigen::MatrixX2d active_;
 };
 
-TimedBound timed(const CraneModel& model, const MotionProblem& problem,
-                 const TimedBoundOptions& options, double energy_weight, double duration) {
+TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem,
+                           const TimedBoundOptions& options, double energy_weight,
+                           double duration) {
   const auto begin = std::chrono::steady_clock::now();
   TimedBound bound;
   bound.message = no_bound_reason(model, problem, options.most_joints);
@@ -212,7 +213,7 @@ TimedBound timed(const CraneModel& model, const MotionProblem& problem,
 TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
                            const TimedBoundOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
-  TimedBound bound = timed(model, problem, options, 1.0, duration);
+  TimedBound bound = bound_with_time(model, problem, options, 1.0, duration);
   if (!bound.valid) return bound;
   EnergyBoundOptions unlimited;
   unlimited.nodes = options.nodes;
@@ -231,7 +232,7 @@ TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem
 
 TimedBound least_duration(const CraneModel& model, const MotionProblem& problem,
                           const TimedBoundOptions& options) {
-  return timed(model, problem, options, 0.0, 1.0);
+  return bound_with_time(model, problem, options, 0.0, 1.0);
 }
 
 }  // namespace sparflow
