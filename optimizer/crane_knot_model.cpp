@@ -100,6 +100,11 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
     rows_.push_back(
         {RowKind::kPumpPressure, p, -kInfinity, options_.pressure_share * limit / kPressureUnit});
   }
+  for (int c = 0; c < m_ && problem.limits.pressure_std > 0.0; ++c) {
+    if (!machine.cylinders[static_cast<std::size_t>(c)].hydraulic()) continue;
+    trusts_ = true;
+    rows_.push_back({RowKind::kTrust, c, -kInfinity, options_.trust_share * options_.trust_share});
+  }
   const auto* goal = std::get_if<TipGoal>(&problem.goal);
   if (problem.tip_line) {
     const Eigen::Vector3d end =
@@ -217,6 +222,26 @@ void CraneKnotModel::update_effects(const double* z, bool derivatives) {
   effects_derivatives_ = derivatives;
 }
 
+GpDerivatives CraneKnotModel::trust(int cylinder) const {
+  const auto i = static_cast<std::size_t>(cylinder);
+  const CylinderMode mode = mode_[i];
+  if (mode != CylinderMode::kExtend && mode != CylinderMode::kRetract) return {};
+  const bool out = mode == CylinderMode::kExtend;
+  const Cylinder& c = model_->machine.cylinders[i];
+  const CylinderModel& learned = model_->cylinders[i];
+  const double area = out ? c.area_piston() : -c.area_rod();
+  GpDerivatives d = (out ? learned.extend : learned.retract)
+                        .variance_derivatives(area * speed_[cylinder], force_[cylinder]);
+  const double unit = 1.0 / (problem_->limits.pressure_std * problem_->limits.pressure_std);
+  d.value *= unit;
+  d.d_flow *= unit * area;
+  d.d_force *= unit;
+  d.d_flow_flow *= unit * area * area;
+  d.d_flow_force *= unit * area;
+  d.d_force_force *= unit;
+  return d;
+}
+
 double CraneKnotModel::add_commands(const double* z, double* gradient, double* hessian) {
   double sum = 0.0;
   const double w = options_.command_weight / kPowerUnit;
@@ -321,6 +346,8 @@ std::string CraneKnotModel::path_name(int row) const {
       return fmt::format("pressure of pump {}", machine.pumps[i].name);
     case RowKind::kTipLine:
       return "distance of the tip from its line";
+    case RowKind::kTrust:
+      return fmt::format("standard deviation of the pressure of {}", machine.cylinders[i].name);
   }
   return "path";
 }
@@ -358,7 +385,7 @@ double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessi
 void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
   const bool forces = options_.limit_pressure && !effects_;
   if (options_.limit_pressure && effects_) update_effects(z, jacobian != nullptr);
-  update(z, jacobian != nullptr ? 1 : 0, forces);
+  update(z, jacobian != nullptr ? 1 : 0, forces || trusts_);
   if (forces) {
     if (jacobian != nullptr) {
       power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -412,6 +439,16 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
       case RowKind::kTipLine:
         g[r] = tip_line(z, out, nullptr, 1.0);
         break;
+      case RowKind::kTrust: {
+        const GpDerivatives d = trust(row.index);
+        g[r] = d.value;
+        if (out == nullptr) break;
+        scratch_gradient_.setZero();
+        scratch_gradient_[row.index] = d.d_flow;
+        scratch_gradient_[m_ + row.index] = d.d_force;
+        chain_gradient(scratch_gradient_.data(), out);
+        break;
+      }
     }
   }
   if (clearance_rows_ == 0) return;
@@ -440,7 +477,7 @@ void CraneKnotModel::path_jacobian(const double* z, double* g, double* jacobian)
 void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
   const bool forces = options_.limit_pressure && !effects_;
   if (options_.limit_pressure && effects_) update_effects(z, true);
-  update(z, forces ? 2 : 1, forces);
+  update(z, forces || trusts_ ? 2 : 1, forces || trusts_);
   scratch_gradient_.setZero();
   scratch_hessian_.setZero();
   if (forces) power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -469,6 +506,17 @@ void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier,
         break;
       case RowKind::kTipLine:
         break;
+      case RowKind::kTrust: {
+        const GpDerivatives d = trust(row.index);
+        const int v = row.index, f = m_ + row.index;
+        scratch_gradient_[v] += factor * d.d_flow;
+        scratch_gradient_[f] += factor * d.d_force;
+        scratch_hessian_(v, v) += factor * d.d_flow_flow;
+        scratch_hessian_(f, f) += factor * d.d_force_force;
+        scratch_hessian_(v, f) += factor * d.d_flow_force;
+        scratch_hessian_(f, v) += factor * d.d_flow_force;
+        break;
+      }
     }
   }
   chain_hessian(z, scratch_gradient_.data(), scratch_hessian_, hessian);

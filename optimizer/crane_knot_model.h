@@ -48,7 +48,8 @@ struct CraneKnotOptions {
   /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
   /// when a motion without them came too near.
   bool limit_pressure = false;
-  double oil = 40.0;  ///< [degC] for effects that look at it
+  double trust_share = 1.0;  ///< of the trusted standard deviation (MotionLimits::pressure_std)
+  double oil = 40.0;         ///< [degC] for effects that look at it
 };
 
 /// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m: all
@@ -75,7 +76,7 @@ class CraneKnotModel final : public KnotModel {
   void add_path_hessian(const double* z, const double* multiplier, double* hessian) override;
 
  private:
-  enum class RowKind { kPumpFlow, kValve, kPumpPressure, kTipLine };
+  enum class RowKind { kPumpFlow, kValve, kPumpPressure, kTipLine, kTrust };
   struct Row {
     RowKind kind;
     int index;  // pump or cylinder
@@ -89,6 +90,8 @@ class CraneKnotModel final : public KnotModel {
   void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
   /// The law with effects at z, unless it was evaluated there last.
   void update_effects(const double* z, bool derivatives);
+  /// Variance of a moving cylinder's pressure over the trusted one, with its derivatives in (v, F); 0 at rest.
+  GpDerivatives trust(int cylinder) const;
   /// Adds weight * sum u_i^2 of the speeds last updated, and its derivatives where they are asked for. [kW]
   double add_commands(const double* z, double* gradient, double* hessian);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
@@ -101,6 +104,7 @@ class CraneKnotModel final : public KnotModel {
       machine_;  // that carries the loads; goals and obstacles are the problem's
   CraneKnotOptions options_;
   int n_, m_;
+  bool trusts_ = false;
   SmoothPower power_;
   std::unique_ptr<SmoothEffects> effects_;  // for a model with effects that act in a motion
   Eigen::VectorXd effects_z_;               // where it was evaluated last, with

@@ -41,6 +41,8 @@ std::string pack(const StartResult& r) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     p.number(static_cast<double>(r.plan.modes.data()[i]));
   pack_matrix(p, r.plan.durations);
+  p.number(static_cast<double>(r.plan.waypoint_after.size()));
+  for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
   p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
@@ -68,6 +70,8 @@ StartResult unpack(const std::string& bytes) {
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
   r.plan.durations = unpack_matrix(u);
+  r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
+  for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
   r.energy_exact = u.number();
   r.energy_smooth = u.number();
   r.excess = u.number();
@@ -221,6 +225,8 @@ const char* to_string(OptimizeStatus status) {
 
 namespace {
 
+constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
+
 /// Everything that is solved for one problem in one window of time.
 class Search {
  public:
@@ -243,7 +249,8 @@ class Search {
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<ModeCandidate> one_by_one;
-    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line) {
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
       const Eigen::VectorXd times =
           Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, time_.guess);
       std::vector<Eigen::VectorXd> ends;
@@ -261,9 +268,7 @@ class Search {
         [&](int i) {
           const auto k = static_cast<std::size_t>(i);
           OptimizeOptions options = coarse_;
-          const int ways =
-              problem_.obstacles.empty() ? 1 : 2;  // each way round is a start of its own
-          if (i >= ways * options.smooth_starts && options.modes) options.schedule.clear();
+          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
           return k < given
                      ? optimize_from(model_, problem_, seeds_[k], time_, options)
                      : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
@@ -290,21 +295,30 @@ class Search {
     std::vector<ModeCandidate> found;
     const EnergyGridOptions size{options_.grid_nodes};
     if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
-        model_.machine.joint_count() > size.most_joints)
+        !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
       return found;
-    EnergyGrid grid(model_, problem_, size);
-    std::vector<GridPath> paths;
-    if (problem_.objective.energy > 0.0) {
-      paths = grid.paths_for_duration(time_.guess, options_.grid_starts);
-    } else if (time_is_everything(problem_)) {
-      constexpr double kTimeIsEverything = 1e7;  // [W]
-      paths.push_back(grid.cheapest_path(kTimeIsEverything));
-    }
-    for (const GridPath& path : paths) {
-      if (!path.found) continue;
-      const double duration =
-          std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
-      found.push_back(grid_path_candidate(model_, problem_, path, duration, coarse_.intervals));
+    const auto search = [&](const MotionProblem& problem, int most) {
+      EnergyGrid grid(model_, problem, size);
+      std::vector<GridPath> paths;
+      if (problem.objective.energy > 0.0) {
+        paths = grid.paths_for_duration(time_.guess, most);
+      } else if (time_is_everything(problem)) {
+        constexpr double kTimeIsEverything = 1e7;  // [W]
+        paths.push_back(grid.cheapest_path(kTimeIsEverything));
+      }
+      for (const GridPath& path : paths) {
+        if (!path.found) continue;
+        const double duration =
+            std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+        found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
+      }
+    };
+    search(problem_, options_.grid_starts);
+    if (!problem_.obstacles.empty()) {
+      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      MotionProblem wider = problem_;
+      wider.clearance += kRoomForTheRows;
+      search(wider, options_.grid_starts);
     }
     return found;
   }
@@ -380,10 +394,11 @@ class Search {
       };
       std::vector<Job> jobs;
       int searched = 0;
-      double best_before = 0.0;
-      for (const int i : ranking(result_, options_.limit_tolerance)) {
+      const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+      if (ranked.empty()) return;
+      const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+      for (const int i : ranked) {
         const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
-        if (searched == 0) best_before = s.cost;
         if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
         if (searched++ == searched_) break;
         for (PhasePlan& plan : neighbours(s.plan)) {

@@ -119,6 +119,9 @@ struct OptimizeResult {
   std::vector<LimitCheck> checks;  ///< of the motion, or of the start that came nearest to one
   int best_start = -1;
   std::vector<StartResult> starts;
+  double lower_bound =
+      0.0;  ///< [J] no motion of any duration takes less (energy_bound.h); 0 = not asked for or none
+  std::string bound_note;   ///< why there is none, or how the bound was found
   double mesh_error = 0.0;  ///< of the answer's last mesh, relative (OptimizeOptions::mesh_error)
   double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none

@@ -11,9 +11,9 @@ namespace {
 
 /// How far limits are drawn in so that they also hold between knots.
 struct Tightening {
-  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0;  // shares
-  double clearance = 0.0;                                      // [m]
-  std::vector<double> position;                                // [rad] or [m] by joint
+  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  // shares
+  double clearance = 0.0;                                                   // [m]
+  std::vector<double> position;                                             // [rad] or [m] by joint
   bool limit_pressure = false;
 };
 
@@ -55,7 +55,8 @@ class Start {
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
     if (options_.modes) hold_modes(resampled(timed, mesh_.times));
     Trajectory motion = timed;
-    for (std::size_t stage = 0; stage < options_.schedule.size(); ++stage) {
+    const std::size_t stages = problem_.waypoints.empty() ? options_.schedule.size() : 0;
+    for (std::size_t stage = 0; stage < stages; ++stage) {
       uniform_mesh();
       const bool last = stage + 1 == options_.schedule.size();
       const bool rough = options_.modes || !last;
@@ -88,6 +89,11 @@ class Start {
     const ModeTable& modes = mesh_.modes;
     TranscriptionSpec spec;
     spec.t = mesh_.times;
+    for (std::size_t w = 0; w < mesh_.waypoint_knots.size(); ++w) {
+      spec.waypoints.push_back(
+          {mesh_.waypoint_knots[w],
+           std::make_shared<TipAtGoal>(model_.machine, problem_.waypoints[w])});
+    }
     if (!mesh_.of_interval.empty()) {
       PhaseTimes& phases = spec.phases;
       phases.of_interval = mesh_.of_interval;
@@ -107,6 +113,7 @@ class Start {
     knot.valve_share = tightening_.valve;
     knot.pressure_share = tightening_.pressure;
     knot.tip_line_share = tightening_.line;
+    knot.trust_share = tightening_.trust;
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
@@ -214,6 +221,10 @@ class Start {
     const auto intervals = static_cast<Eigen::Index>(source.size());
     if (intervals + 1 == motion.size()) return false;
     PhaseMesh split;
+    for (const int knot : mesh_.waypoint_knots) {
+      const auto at = std::find(times.begin(), times.end(), motion.t[knot]);
+      split.waypoint_knots.push_back(static_cast<int>(at - times.begin()));
+    }
     split.times = Eigen::Map<const Eigen::VectorXd>(times.data(), intervals + 1);
     split.modes.resize(intervals, mesh_.modes.cols());
     for (Eigen::Index k = 0; k < intervals; ++k) {
@@ -240,6 +251,7 @@ class Start {
         tightening_.limit_pressure = true;
       }
       if (c.what.starts_with("distance of the tip from its line")) tightening_.line *= share;
+      if (c.what.starts_with("standard deviation of the pressure")) tightening_.trust *= share;
       if (c.what.starts_with("clearance")) tightening_.clearance += 1.3 * c.excess;
       if (c.what.starts_with("position of joint ")) {
         const int j = model_.machine.joint_index(c.what.substr(18));
@@ -336,10 +348,13 @@ class Start {
 
   void hold(const ModeTable& modes, const Trajectory& from, bool overlaps) {
     // beside obstacles free times at once would drive a rough start through them
-    const bool hemmed = !problem_.obstacles.empty() && time_.lower == time_.upper;
-    if (options_.free_phases && !hemmed && hold_plan(plan_of(modes, from.t), from, overlaps))
+    const bool hemmed =
+        !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();
+    if (options_.free_phases && !hemmed &&
+        hold_plan(plan_of(modes, from.t, waypoint_times(from)), from, overlaps))
       return;
-    if (time_.lower < time_.upper) return;  // only phases know what to do with free time
+    if (!problem_.waypoints.empty()) return;  // only phases know when one is passed
+    if (time_.lower < time_.upper) return;    // only phases know what to do with free time
     mesh_ = PhaseMesh{};
     mesh_.times = from.t;
     mesh_.modes = modes;
@@ -349,6 +364,30 @@ class Start {
     keep_limits(transcription_->trajectory(solved.x), exact_law());
     if (options_.free_phases && hemmed && result_.excess <= options_.limit_tolerance)
       hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
+  }
+
+  /// When the tip comes nearest to each waypoint, one after the other. [s]
+  std::vector<double> waypoint_times(const Trajectory& motion) const {
+    std::vector<double> times;
+    Eigen::Index from = 1;
+    const auto count = static_cast<Eigen::Index>(problem_.waypoints.size());
+    for (Eigen::Index w = 0; w < count; ++w) {
+      const Eigen::Index until = motion.size() - 1 - (count - w);
+      Eigen::Index best = from;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (Eigen::Index k = from; k <= until; ++k) {
+        const Eigen::VectorXd q = motion.q.row(k).transpose();
+        const double distance = (tip_position<double>(model_.machine, q) -
+                                 problem_.waypoints[static_cast<std::size_t>(w)])
+                                    .norm();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        best = k;
+      }
+      times.push_back(motion.t[best]);
+      from = best + 1;
+    }
+    return times;
   }
 
   /// The law without blends: only the maximum keeps a little softness.

@@ -20,15 +20,23 @@ class PlanBuilder {
  public:
   explicit PlanBuilder(Index cylinders) : cylinders_(cylinders) {}
   void add(const Eigen::Matrix<CylinderMode, 1, Eigen::Dynamic>& row, double duration) {
-    if (!rows_.empty() && (rows_.back().array() == row.array()).all()) {
+    const bool waypoint = !waypoints_.empty() && waypoints_.back() + 1 == count();
+    if (!rows_.empty() && !waypoint && (rows_.back().array() == row.array()).all()) {
       durations_.back() += duration;
       return;
     }
     rows_.push_back(row);
     durations_.push_back(duration);
   }
+  /// At the end of what was added last. @return false when nothing was
+  bool pass_waypoint() {
+    if (rows_.empty()) return false;
+    waypoints_.push_back(count() - 1);
+    return true;
+  }
   PhasePlan plan() const {
     PhasePlan out;
+    out.waypoint_after = waypoints_;
     out.modes.resize(static_cast<Index>(rows_.size()), cylinders_);
     for (std::size_t p = 0; p < rows_.size(); ++p) out.modes.row(static_cast<Index>(p)) = rows_[p];
     out.durations =
@@ -36,11 +44,25 @@ class PlanBuilder {
     return out;
   }
 
+  int count() const { return static_cast<int>(rows_.size()); }
+
  private:
+  std::vector<int> waypoints_;
   Index cylinders_;
   std::vector<Eigen::Matrix<CylinderMode, 1, Eigen::Dynamic>> rows_;
   std::vector<double> durations_;
 };
+
+bool ends_at_waypoint(const PhasePlan& plan, Index phase) {
+  return std::find(plan.waypoint_after.begin(), plan.waypoint_after.end(), phase) !=
+         plan.waypoint_after.end();
+}
+
+void pass_waypoints(const PhasePlan& plan, Index phase, PlanBuilder& out) {
+  for (const int after : plan.waypoint_after) {
+    if (after == phase) out.pass_waypoint();
+  }
+}
 
 /// Moves of both phases; false where a cylinder would move both ways.
 bool join(const ModeTable& modes, Index a, Index b,
@@ -67,10 +89,24 @@ bool covers(const PhasePlan& wanted, const PhasePlan& plan) {
 
 }  // namespace
 
-PhasePlan plan_of(const ModeTable& modes, const VectorXd& times) {
+PhasePlan plan_of(const ModeTable& modes, const VectorXd& times,
+                  const std::vector<double>& waypoint_times) {
   SPARFLOW_CHECK(modes.rows() + 1 == times.size(), "modes and mesh belong together");
   PlanBuilder plan(modes.cols());
-  for (Index k = 0; k < modes.rows(); ++k) plan.add(modes.row(k), times[k + 1] - times[k]);
+  std::size_t next = 0;
+  for (Index k = 0; k < modes.rows(); ++k) {
+    double from = times[k];
+    while (next < waypoint_times.size() && waypoint_times[next] < times[k + 1]) {
+      if (waypoint_times[next] > from) {
+        plan.add(modes.row(k), waypoint_times[next] - from);
+        from = waypoint_times[next];
+      }
+      SPARFLOW_CHECK(plan.pass_waypoint(), "a waypoint lies after the start");
+      ++next;
+    }
+    plan.add(modes.row(k), times[k + 1] - from);
+  }
+  SPARFLOW_CHECK(next == waypoint_times.size(), "waypoints lie before the end");
   return plan.plan();
 }
 
@@ -80,7 +116,7 @@ PhasePlan with_overlaps(const PhasePlan& plan, double share) {
   VectorXd overlap = VectorXd::Zero(std::max<Index>(phases - 1, 0));
   Eigen::Matrix<CylinderMode, 1, Eigen::Dynamic> row;
   for (Index p = 0; p + 1 < phases; ++p) {
-    if (!join(plan.modes, p, p + 1, row)) continue;
+    if (ends_at_waypoint(plan, p) || !join(plan.modes, p, p + 1, row)) continue;
     const bool new_one = (row.array() != plan.modes.row(p).array()).any() &&
                          (row.array() != plan.modes.row(p + 1).array()).any();
     if (!new_one) continue;
@@ -91,6 +127,7 @@ PhasePlan with_overlaps(const PhasePlan& plan, double share) {
   PlanBuilder out(plan.modes.cols());
   for (Index p = 0; p < phases; ++p) {
     out.add(plan.modes.row(p), left[p]);
+    pass_waypoints(plan, p, out);
     if (p + 1 < phases && overlap[p] > 0.0) {
       join(plan.modes, p, p + 1, row);
       out.add(row, overlap[p]);
@@ -104,10 +141,15 @@ PhasePlan without_short(const PhasePlan& plan, double shortest) {
   double owed = 0.0;
   for (Index p = 0; p < plan.modes.rows(); ++p) {
     if (plan.durations[p] < shortest) {
-      owed += plan.durations[p];
-      continue;
+      // what ends at a waypoint cannot go unless something before it stays to end there
+      if (!ends_at_waypoint(plan, p) || out.count() > 0) {
+        owed += plan.durations[p];
+        pass_waypoints(plan, p, out);
+        continue;
+      }
     }
     out.add(plan.modes.row(p), plan.durations[p]);
+    pass_waypoints(plan, p, out);
   }
   PhasePlan kept = out.plan();
   if (kept.count() == 0) return plan;
@@ -117,6 +159,7 @@ PhasePlan without_short(const PhasePlan& plan, double shortest) {
 
 std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
   std::vector<PhasePlan> found;
+  if (!plan.waypoint_after.empty()) return found;
   const Index phases = plan.modes.rows(), cylinders = plan.modes.cols();
   const auto keep = [&](const PhasePlan& candidate) {
     if (candidate.count() == 0 || !covers(plan, candidate)) return;
@@ -203,6 +246,9 @@ PhaseMesh mesh_of(const PhasePlan& plan, int intervals, int least) {
       phase.push_back(p);
     }
     begin += plan.durations[p];
+    for (const int after : plan.waypoint_after) {
+      if (after == p) mesh.waypoint_knots.push_back(static_cast<int>(phase.size()));
+    }
   }
   mesh.times = Eigen::Map<const VectorXd>(times.data(), static_cast<Index>(times.size()));
   mesh.modes.resize(static_cast<Index>(phase.size()), plan.modes.cols());

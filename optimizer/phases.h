@@ -13,12 +13,16 @@ namespace sparflow {
 struct PhasePlan {
   ModeTable modes;            ///< [phases x cylinders]
   Eigen::VectorXd durations;  ///< [s]
+  std::vector<int>
+      waypoint_after;  ///< phase at whose end each of the problem's waypoints is passed
   int count() const { return static_cast<int>(modes.rows()); }
   double total() const { return durations.sum(); }
 };
 
 /// The intervals of a mesh that share their modes, as phases.
-PhasePlan plan_of(const ModeTable& modes, const Eigen::VectorXd& times);
+/// @param waypoint_times [s] a phase ends there too
+PhasePlan plan_of(const ModeTable& modes, const Eigen::VectorXd& times,
+                  const std::vector<double>& waypoint_times = {});
 
 /// Between each two phases one in which the cylinders of both move, where no cylinder would have to move both ways; it
 /// takes `share` of the shorter neighbour's time, half from each side.
@@ -29,7 +33,7 @@ PhasePlan without_short(const PhasePlan& plan, double shortest);
 
 /// Neighbours of a plan, for a search over mode sequences: every phase left out, every two neighbours exchanged or made
 /// one, every cylinder that moves in a phase begun or ended one phase earlier or later. Every cylinder that moves in
-/// `plan` moves in each of them too, the same number of directions.
+/// `plan` moves in each of them too, the same number of directions. None for a plan with waypoints.
 std::vector<PhasePlan> neighbours(const PhasePlan& plan);
 
 /// "boom + | boom +, jib - | jib -": what moves, phase by phase.
@@ -40,6 +44,7 @@ struct PhaseMesh {
   Eigen::VectorXd times;         ///< [s] knots
   std::vector<int> of_interval;  ///< phase of every interval
   ModeTable modes;               ///< [intervals x cylinders]
+  std::vector<int> waypoint_knots;
 };
 
 /// @param intervals wanted in all, shared out by duration

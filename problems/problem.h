@@ -61,6 +61,8 @@ struct MotionLimits {
   std::vector<double> pump_max_flow;      ///< [m^3/s]
   std::vector<double> pump_max_pressure;  ///< [Pa]
   double valve_fraction = 1.0;            ///< share of each valve's full flow that may be used [-]
+  /// Trust region: largest standard deviation of a predicted working pressure [Pa]; 0 = none.
+  double pressure_std = 0.0;
 };
 
 /// The tip shall follow the straight line from its start to its goal.
@@ -88,6 +90,8 @@ struct MotionProblem {
   double payload = 0.0;                       ///< [kg], hangs at the tip
   Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
   Goal goal;
+  /// Points the tip passes on the way, in this order, without having to stop [m]. When is free.
+  std::vector<Eigen::Vector3d> waypoints;
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]
   MotionLimits limits;

@@ -68,6 +68,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       {"message", r.message},
       {"duration_s", r.duration},
       {"solve_s", r.solve_s}};
+  if (r.shortest_duration > 0.0) out["shortest_duration_s"] = r.shortest_duration;
   int iterations = 0;
   for (const StartResult& s : r.starts) iterations += s.iterations;
   out["iterations"] = iterations;
@@ -88,6 +89,11 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
     }
     for (std::size_t p = 0; p < model.pumps.size(); ++p)
       out["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
+    out["mesh_error"] = r.mesh_error;
+    if (r.lower_bound > 0.0) {
+      out["lower_bound_J"] = r.lower_bound;
+      out["gap"] = r.energy.total / r.lower_bound - 1.0;
+    }
     out["best_seed_energy_exact_J"] =
         r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
     out["nearest_line_energy_exact_J"] =
@@ -132,6 +138,14 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   against("straight, nearest", r.nearest_line_energy);
   against("straight, cheapest", r.straight_line_energy);
   against("best seed path", r.best_seed_energy);
+  if (r.lower_bound > 0.0) {
+    add(
+        fmt::format("  lower bound          {:9.2f} kJ   no motion takes less, whatever its time: "
+                    "{:.1f} % below this one",
+                    r.lower_bound / 1e3, 100.0 * (1.0 - r.lower_bound / r.energy.total)));
+  } else if (!r.bound_note.empty()) {
+    add("  lower bound               none   " + r.bound_note);
+  }
   add(fmt::format("  potential energy     {:+9.2f} kJ   end against start",
                   r.energy.potential_difference / 1e3));
   add(fmt::format("  {:<14} {:>12} {:>14}", "cylinder", "useful [kJ]", "throttled [kJ]"));
