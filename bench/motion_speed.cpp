@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -236,6 +237,15 @@ nlohmann::json as_json(const Run& run) {
           {"message", run.message}};
 }
 
+void print_reach(const ReachRuns& r, const std::vector<Way>& ways) {
+  fmt::print("\n{}, from {}\n", r.name, r.seed);
+  for (std::size_t w = 0; w < ways.size(); ++w) {
+    const Run& run = r.by_way[w];
+    fmt::print("  {:38} {:9.1f} ms {:5} iterations  {:8.3f} kJ  {}\n", ways[w].name, 1e3 * run.cpu,
+               run.iterations, 1e-3 * run.energy, run.solved ? "" : "not solved: " + run.message);
+  }
+}
+
 void print_ways(const std::vector<ReachRuns>& runs, const std::vector<Way>& ways) {
   fmt::print(
       "\nOne solve, N = 100, from the same planned path; medians over {} reaches (ratios: of each "
@@ -341,6 +351,7 @@ int run(const std::string& json_path, const std::string& only, int reaches) {
     std::vector<ReachRuns> runs;
     for (const MotionProblem& problem : problems) {
       runs.push_back(run_reach(model, problem));
+      print_reach(runs.back(), all);
       nlohmann::json entry = {{"seed", runs.back().seed}, {"task_wall_s", runs.back().task_wall}};
       for (std::size_t w = 0; w < all.size(); ++w)
         entry["ways"][all[w].name] = as_json(runs.back().by_way[w]);
@@ -370,6 +381,7 @@ int run(const std::string& json_path, const std::string& only, int reaches) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
   std::string json, only;
   int reaches = 6;
   CLI::App app("What the motion optimiser's speed rests on, as ratios in one run on one core.");

@@ -5,8 +5,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "bench/motion_cases.h"
@@ -174,6 +177,7 @@ int run(int cranes, const std::string& json_path) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
   int cranes = 2;
   std::string json;
   CLI::App app(

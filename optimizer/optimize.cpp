@@ -150,8 +150,10 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
     const Trajectory timed = with_duration(s.motion, result.duration);
     if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
     const double energy = exact_energy(model, timed, problem.payload, refine).total;
-    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy)
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
       result.best_seed_energy = energy;
+      result.best_seed_name = s.name;
+    }
     if (nearest) result.nearest_line_energy = energy;
     if (s.straight_line &&
         (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
