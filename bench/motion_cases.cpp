@@ -78,6 +78,7 @@ MotionProblem reach(const std::string& name, const Machine& machine,
 
 std::vector<MotionProblem> loader_crane_reaches() {
   std::vector<MotionProblem> reaches;
+  reaches.reserve(6);
   for (const char* name : {"lift", "lower", "unfold"}) {
     reaches.push_back(
         load_problem(bundled_file(fmt::format("reaches/loader_crane_{}.yaml", name))));
@@ -104,6 +105,7 @@ std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, in
   TimingOptions timing;
   timing.intervals = intervals;
   std::vector<SeedMotion> seeds;
+  seeds.reserve(static_cast<std::size_t>(most));
   for (const SeedPath& path : find_seed_paths(problem, options).paths) {
     const TimedMotion timed = time_parametrise(problem, path.path, 0.0, timing);
     if (timed.motion.size() < 2) continue;

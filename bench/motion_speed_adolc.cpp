@@ -14,6 +14,7 @@ std::shared_ptr<KnotModel> with_adolc(const CraneModel& /*model*/, const MotionP
 
 #include <adolc/adolc.h>
 
+#include <numeric>
 #include <vector>
 
 #include "models/error.h"
@@ -159,11 +160,15 @@ class Adolc final : public WrappedKnotModel {
     SPARFLOW_CHECK(
         model.effects.empty() && options.modes.rows() > 0 && options.command_weight == 0.0,
         "taped are phases of a model without effects");
-    for (int i = 0; i < size(); ++i) rows_.push_back(new double[static_cast<std::size_t>(i) + 1]);
+    lower_.resize(static_cast<std::size_t>(size()));
+    rows_.resize(lower_.size());
+    for (std::size_t i = 0; i < lower_.size(); ++i) {
+      lower_[i].resize(i + 1);
+      rows_[i] = lower_[i].data();
+    }
     tapes_.resize(static_cast<std::size_t>(options.modes.rows()), -1);
   }
   ~Adolc() override {
-    for (double* row : rows_) delete[] row;
     for (const short tag : own_) {
       removeTape(tag, TapeRemovalType::ADOLC_REMOVE_COMPLETELY);
       free_tags().push_back(tag);
@@ -192,8 +197,8 @@ class Adolc final : public WrappedKnotModel {
  private:
   static std::vector<short>& free_tags() {
     static std::vector<short> tags = [] {
-      std::vector<short> all;
-      for (short t = 2000; t > 0; --t) all.push_back(t);
+      std::vector<short> all(2000);
+      std::iota(all.begin(), all.end(), static_cast<short>(1));
       return all;
     }();
     return tags;
@@ -273,6 +278,7 @@ class Adolc final : public WrappedKnotModel {
   const CraneModel& model_;
   const MotionProblem& problem_;
   CraneKnotOptions options_;
+  std::vector<std::vector<double> > lower_;  // triangle of the Hessian, and how ADOL-C wants it
   std::vector<double*> rows_;
   std::vector<short> tapes_, own_;  // by interval; taken by this object
   int interval_ = 0;
