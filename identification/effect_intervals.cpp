@@ -59,6 +59,8 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     FoundEffect& f = found[i];
     const Effect& effect = *f.design.effect.effect;
     const auto linear = static_cast<Index>(f.design.linear);
+    // the search's own fit may lie just inside
+    f.at_bound = f.at_bound || rests_on_bound(f.design, fit.theta.segment(plain, linear));
     f.values = parameter_values(effect, fit.theta.segment(plain, linear), f.design.shape);
     VectorXd sd(designs[i].linear);
     for (Index k = 0; k < sd.size(); ++k)
