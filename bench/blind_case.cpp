@@ -16,16 +16,20 @@
 #include "problems/bundled.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 #include "simulator/hidden_effects/random_machine.h"
+#include "simulator/hidden_effects/visibility.h"
 
 namespace sparflow::bench {
 namespace {
 
 using simulator::CaseRequest;
 using simulator::GeneratedCase;
+using simulator::HiddenEffect;
 using simulator::HiddenParameter;
 using simulator::HiddenTruth;
 /// Learning again moves errors by some tenths of a percent.
 constexpr double kRefitMoves = 1.005;
+/// What a log cannot show is hidden in another crane; after so many other effects are drawn; after so many it stays.
+constexpr std::uint64_t kCranesForIds = 8, kMostCranes = 40;
 constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
 
 Machine draw_machine(std::uint64_t seed) {
@@ -53,7 +57,8 @@ std::vector<std::string> ids_for(const Machine& machine, bool outside, const std
   return ids;
 }
 
-CaseRequest draw_case(const BlindCase& asked) {
+/// @param shown by effect, in words
+CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
   std::mt19937_64 random(asked.seed * 7919 + std::hash<std::string>()(asked.row) % 1000);
   CaseRequest request;
   request.log.seconds = asked.seconds;
@@ -65,8 +70,10 @@ CaseRequest draw_case(const BlindCase& asked) {
   request.log.channels.oil = asked.leave_out != "oil";
   request.log.channels.pumps = asked.leave_out != "pump";
   const double size = asked.row == "small" ? 1.0 / 3.0 : 1.0;
+  std::vector<HiddenEffect> wanted;  // drawn once: what a log cannot show comes on another crane
   for (std::uint64_t attempt = 0;; ++attempt) {
     request.log.machine = draw_machine(asked.seed + 100000 * attempt);
+    request.log.crane_seed = asked.seed + 100000 * attempt;
     if (asked.row == "none") return request;
     if (asked.row == "fault") {
       request.log.effects = {{"sensor_fault", "", 1.0, -1}};
@@ -74,31 +81,50 @@ CaseRequest draw_case(const BlindCase& asked) {
     }
     const std::vector<std::string> ids =
         ids_for(request.log.machine, asked.row == "outside", asked.only);
-    if (ids.empty() && attempt < 20) continue;
+    if (ids.empty() && attempt < kMostCranes) continue;
     if (ids.empty()) throw UsageError("no machine can have " + asked.only);
-    request.log.effects = {{ids[random() % ids.size()], "", size, -1}};
-    while (asked.row == "pairs" && request.log.effects.size() < 2) {
-      const std::string second = ids[random() % ids.size()];
-      if (second != request.log.effects[0].id)
-        request.log.effects.push_back({second, "", size, -1});
+    const bool anew = attempt % kCranesForIds == 0;
+    if (anew || wanted.empty()) {
+      wanted = {{ids[random() % ids.size()], "", size, -1}};
+      while (asked.row == "pairs" && wanted.size() < 2) {
+        const std::string second = ids[random() % ids.size()];
+        if (second != wanted[0].id) wanted.push_back({second, "", size, -1});
+      }
     }
-    return request;
+    const bool possible = std::all_of(wanted.begin(), wanted.end(), [&](const HiddenEffect& e) {
+      return std::find(ids.begin(), ids.end(), e.id) != ids.end();
+    });
+    if (!possible) continue;
+    request.log.effects = wanted;
+    const std::vector<simulator::Visibility> seen =
+        simulator::visibility(request.log, !asked.reference);
+    shown.clear();
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      shown += fmt::format(
+          "   {} shows most in the {}: {:.2g} times the noise, energy {:.3g}, {:.0f} % swallowed\n",
+          wanted[k].id, seen[k].channel, seen[k].size, seen[k].energy, 100.0 * seen[k].swallowed);
+    }
+    if (attempt >= kMostCranes || std::all_of(seen.begin(), seen.end(), simulator::visible))
+      return request;
   }
 }
 
 /// A case as a user has it: logs read from text, a model fitted.
 struct Crane {
   std::vector<HiddenTruth> truth;
+  std::string shown;  // what the generator measured of it
   std::vector<Log> train, references, tests;
   CraneModel model;
   double rows = 0.0;
 };
 
 Crane prepare(const BlindCase& asked) {
-  const CaseRequest request = draw_case(asked);
+  std::string shown;
+  const CaseRequest request = draw_case(asked, shown);
   const GeneratedCase logs = simulator::generate_case(request);
   const Machine& machine = request.log.machine;
   Crane crane;
+  crane.shown = std::move(shown);
   crane.truth = logs.train.truth;
   crane.train = {log_from_text("train.csv", csv_text(logs.train), machine)};
   crane.tests = {log_from_text("test.csv", csv_text(logs.test), machine)};
@@ -286,7 +312,7 @@ BlindRun run_blind(const BlindCase& asked) {
     run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     judge_answer(d, crane.truth, run);
     if (asked.judge == "ours" && asked.extend) judge_extended(d, crane, run);
-    if (asked.judge == "ours") run.details = d.table();
+    if (asked.judge == "ours") run.details = d.table() + crane.shown;
     for (const HiddenTruth& t : crane.truth) {
       for (const HiddenParameter& p : t.parameters) {
         run.details += fmt::format("   truth {} {} = {:.5g} {} (equivalent {:.5g})\n", t.id, p.name,

@@ -132,13 +132,17 @@ void add_held_out(const Runs& runs, Table& table) {
                1.05);
 }
 
-/// Ratio of sums over runs, so that runs without an error to begin with do not count.
+/// Ratio of sums over runs, so that runs without an error to begin with do not count. What is asked is asked of all
+/// runs; the two ways in stand below, because they begin with different errors: a model from a reference lacks the
+/// effect, one that was learned with it contains a part of it already.
 void add_energy(const Runs& runs, Table& table) {
-  for (const bool reference : {true, false}) {
+  enum { kAll, kReference, kAlone };
+  for (const int part : {kAll, kReference, kAlone}) {
     double before = 0.0, after = 0.0, squares = 0.0;
     std::vector<std::pair<double, double>> all;
     for (const BlindRun& r : runs) {
-      if (!hidden(r) || r.asked.reference != reference || !std::isfinite(r.energy_after)) continue;
+      if (!hidden(r) || !std::isfinite(r.energy_after)) continue;
+      if (part != kAll && r.asked.reference != (part == kReference)) continue;
       before += r.energy_before;
       after += r.energy_after;
       all.emplace_back(r.energy_before, r.energy_after);
@@ -147,12 +151,15 @@ void add_energy(const Runs& runs, Table& table) {
     const double ratio = after / before;
     for (const auto& [b, a] : all) squares += (a - ratio * b) * (a - ratio * b);
     const double half = 1.96 * std::sqrt(squares) / before;  // of a ratio of sums
-    table.number({fmt::format("energy error after / before, {}",
-                              reference ? "with a reference" : "from one log alone"),
-                  fmt::format("{:.2f}", ratio),
-                  fmt::format("{:.2f} .. {:.2f}", std::max(0.0, ratio - half), ratio + half),
-                  fmt::format("{}", all.size()), "<= 0.5", "<= 0.3", ratio},
-                 0.5);
+    const bool asked = part == kAll;
+    table.number(
+        {asked                ? "predicted-energy error after / before"
+         : part == kReference ? "  of them with a reference"
+                              : "  of them from one log alone",
+         fmt::format("{:.2f}", ratio),
+         fmt::format("{:.2f} .. {:.2f}", std::max(0.0, ratio - half), ratio + half),
+         fmt::format("{}", all.size()), asked ? "<= 0.5" : "", asked ? "<= 0.3" : "", ratio},
+        asked ? 0.5 : 1e300);
   }
 }
 

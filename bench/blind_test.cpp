@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
 #include <cstdio>
 #include <limits>
 #include <mutex>
@@ -22,7 +23,7 @@ using namespace sparflow;
 using namespace sparflow::bench;
 
 struct Options {
-  int runs = 40, jobs = 2;
+  int runs = 40, none = 0, jobs = 2;
   std::uint64_t seed = 1000;
   BlindCase how;
   std::vector<std::string> rows = {"none", "clear", "small", "outside", "pairs", "fault"};
@@ -34,8 +35,10 @@ struct Options {
 /// Even seeds with the reference, odd ones from the training log alone.
 std::vector<BlindCase> cases_of(const Options& options) {
   std::vector<BlindCase> cases;
-  for (const std::string& row : options.rows) {
-    for (int i = 0; i < options.runs; ++i) {
+  // all rows of a seed together: what is done when it is stopped is a table already
+  for (int i = 0; i < std::max(options.runs, options.none); ++i) {
+    for (const std::string& row : options.rows) {
+      if (i >= options.runs && row != "none") continue;
       for (const std::string& judge : options.ways) {
         BlindCase one = options.how;
         one.row = row;
@@ -51,13 +54,17 @@ std::vector<BlindCase> cases_of(const Options& options) {
   return cases;
 }
 
+/// Set by Ctrl-C: runs under way are finished, the table of what is done is printed.
+volatile std::sig_atomic_t stopped = 0;
+
 /// All cases on `jobs` threads; lines are printed in the order of the cases as they get ready.
+/// @return those that were done
 std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options& options) {
   std::vector<BlindRun> runs(cases.size());
   std::vector<bool> done(cases.size(), false);
   std::mutex mutex;
   std::condition_variable ready;
-  std::size_t next = 0;
+  std::size_t next = 0, finished = cases.size();
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::jthread> pool;
   pool.reserve(static_cast<std::size_t>(options.jobs));
@@ -67,7 +74,11 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
         std::size_t i = 0;
         {
           const std::lock_guard lock(mutex);
-          if (next == cases.size()) return;
+          if (next == cases.size() || stopped != 0) {
+            finished = std::min(finished, next);
+            ready.notify_one();
+            return;
+          }
           i = next++;
         }
         BlindRun run = run_blind(cases[i]);
@@ -80,7 +91,8 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
   }
   for (std::size_t i = 0; i < cases.size(); ++i) {
     std::unique_lock lock(mutex);
-    ready.wait(lock, [&] { return done[i]; });
+    ready.wait(lock, [&] { return done[i] || i >= finished; });
+    if (i >= finished) break;
     if (options.verbose) fmt::print("\n{}", runs[i].details);
     fmt::print("{}", run_line(runs[i]));
     std::fflush(stdout);
@@ -91,6 +103,8 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
                passed * static_cast<double>(cases.size() - i - 1) / static_cast<double>(i + 1));
   }
   fmt::print(stderr, "\n");
+  pool.clear();
+  runs.resize(finished);
   return runs;
 }
 
@@ -98,6 +112,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Blind test of diagnosis on simulated logs with a hidden effect"};
   Options options;
   app.add_option("--runs", options.runs, "of each row, with a reference and without in turn");
+  app.add_option("--none", options.none, "so many of row none, where more are wanted");
   app.add_option("--seed", options.seed, "first seed");
   app.add_option("--seconds", options.how.seconds, "length of a log [s]");
   app.add_option("--noise", options.how.noise, "sensor noise, 1 = 0.8 bar");
@@ -121,6 +136,8 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   options.how.extend = !no_extend;
 
+  std::signal(SIGINT, [](int) { stopped = 1; });
+  std::signal(SIGTERM, [](int) { stopped = 1; });
   const std::vector<BlindRun> all = run_all(cases_of(options), options);
   nlohmann::json json;
   json["runs"] = nlohmann::json::array();
@@ -136,7 +153,8 @@ int run(int argc, char** argv) {
       continue;
     }
     double seconds = std::numeric_limits<double>::quiet_NaN();
-    if (judge == "ours" && !options.no_time) {  // alone on the machine; the middle one of three
+    if (judge == "ours" && !options.no_time &&
+        stopped == 0) {  // alone on the machine; the middle one of three
       std::vector<double> times;
       for (std::uint64_t k = 0; k < 3; ++k)
         times.push_back(time_of_diagnosis(options.seed + 2 * k));

@@ -9,6 +9,7 @@
 #include "problems/bundled.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 #include "simulator/hidden_effects/random_machine.h"
+#include "simulator/hidden_effects/visibility.h"
 
 namespace {
 
@@ -114,6 +115,10 @@ int run(int argc, char** argv) {
     for (const HiddenParameter& p : t.parameters)
       fmt::print("  {} = {:.6g} {}, text-book equivalent {:.6g}\n", p.name, p.value, p.unit,
                  p.equivalent);
+  }
+  for (const Visibility& v : visibility(request.log, false)) {
+    fmt::print("  shows most in the {}: {:.2g} times its noise where it acts{}\n", v.channel,
+               v.size, visible(v) ? "" : "; too little for the blind test");
   }
   fmt::print("{}: {}, {} + {} + {} rows\n", folder, request.log.machine.name, logs.reference.rows(),
              logs.train.rows(), logs.test.rows());

@@ -171,22 +171,13 @@ void settle_values(const CraneModel& model, const std::vector<MachineSignals>& s
   }
 }
 
-/// The motion that tells a set of effects apart; where none of the menu does, the catalogue's general word.
-Experiment next_experiment(const CraneModel& model, const Diagnosis& d, const DiagnosedEffect& e,
-                           const FoundEffect& found, double same_nats) {
-  const auto name = [&](const EffectAt& at) {
-    return effect_key(at.effect->info(), model.machine, at.at);
-  };
+/// Those that explain the same evidence as well.
+std::vector<EffectAt> rivals_of(const FoundEffect& found, double same_nats) {
   std::vector<EffectAt> rivals;
   for (const auto& [rival, worse] : found.alternatives) {
     if (worse < same_nats) rivals.push_back(rival);
   }
-  const BetterMotion motion = better_motion(model, d.evidence, d.search.final, e.applied, rivals);
-  std::vector<std::string> apart;
-  for (const EffectAt& at : motion.words.empty() ? rivals : motion.apart) apart.push_back(name(at));
-  const std::string reason = fmt::format("tells {} from {}", e.key(), fmt::join(apart, ", "));
-  if (motion.words.empty()) return {reason, e.effect.effect->info().separated_by, 0.0, 0.0};
-  return {reason, motion.words, motion.nats_per_minute, motion.nats_here};
+  return rivals;
 }
 
 }  // namespace
@@ -258,8 +249,13 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.effects.push_back(describe(d, i, options.search));
   // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
   for (const DiagnosedEffect& e : d.effects) {
-    const bool doubtful = std::find(dominated.begin(), dominated.end(),
-                                    e.channels.front().channel) != dominated.end();
+    const auto is_dominated = [&](const ChannelGain& g) {
+      return std::find(dominated.begin(), dominated.end(), g.channel) != dominated.end();
+    };
+    // a sensor's error is one and the same wherever its reading goes: a riddle in one place is one in all
+    const bool doubtful = is_dominated(e.channels.front()) ||
+                          (e.effect.effect->info().stage == EffectStage::kSensor &&
+                           std::any_of(e.channels.begin(), e.channels.end(), is_dominated));
     unknown = unknown && doubtful;
   }
   d.verdict = unknown              ? Verdict::kUnknown
@@ -274,7 +270,8 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
     d.indistinguishable.push_back(std::move(set));
     d.experiments.push_back(
-        next_experiment(model, d, e, d.search.found[i], options.search.same_nats));
+        next_experiment(model, d.evidence, d.search.final, e.applied,
+                        rivals_of(d.search.found[i], options.search.same_nats)));
   }
   // Found in the order of what they explain: that order stays; one of a set that is not even half sure goes last.
   std::stable_partition(d.effects.begin(), d.effects.end(),

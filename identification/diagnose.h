@@ -8,6 +8,7 @@
 
 #include "identification/bad_data.h"
 #include "identification/effect_search.h"
+#include "identification/experiment.h"
 
 namespace sparflow {
 
@@ -56,17 +57,6 @@ struct Unexplained {
   std::string sentence;  ///< where it is largest, in words
 };
 
-/// What to record next so that one set of effects is told apart.
-struct Experiment {
-  std::string reason;  ///< which effects it would tell apart
-  std::string motion;  ///< what to record, in words: joint, direction, speeds, load
-  /// Likelihood the wrong ones would lose in a minute of it, and in a minute of the logs at hand [nats]; 0 = no motion
-  /// of the menu was found to tell them apart and `motion` is the catalogue's general word on the effect.
-  double nats_per_minute = 0.0, nats_here = 0.0;
-
-  std::string sentence() const;  ///< with how many minutes of it, without a full stop
-};
-
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   double p_value = 1.0;                  ///< that nothing is missing
@@ -95,7 +85,7 @@ std::string plain_number(double value, int digits);
 
 /// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
 /// cause is not in the catalogue.
-inline constexpr double kLargestLeftoverShare = 0.2;
+inline constexpr double kLargestLeftoverShare = 0.1;
 
 struct DiagnoseOptions {
   SignalOptions signals;

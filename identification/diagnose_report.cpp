@@ -66,15 +66,6 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
 
 }  // namespace
 
-std::string Experiment::sentence() const {
-  if (!(nats_per_minute > 0.0)) return fmt::format("to tell them apart, record: {}", motion);
-  // odds of e^4 = 55 are what the search itself takes for told apart
-  constexpr double kTold = 4.0;
-  const double minutes = std::max(1.0, std::ceil(kTold / nats_per_minute));
-  return fmt::format("record {:.0f} minute{} of: {} ({})", minutes, minutes > 1.0 ? "s" : "",
-                     motion, reason);
-}
-
 std::string Diagnosis::headline() const {
   switch (verdict) {
     case Verdict::kBadData:

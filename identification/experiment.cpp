@@ -1,5 +1,7 @@
 #include "identification/experiment.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -129,6 +131,30 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
   if (best.words.empty() && !here.empty())
     best.nats_here = *std::min_element(here.begin(), here.end());
   return best;
+}
+
+std::string Experiment::sentence() const {
+  if (!(nats_per_minute > 0.0)) return fmt::format("to tell them apart, record: {}", motion);
+  // odds of e^4 = 55 are what the search itself takes for told apart
+  constexpr double kTold = 4.0;
+  const double minutes = std::max(1.0, std::ceil(kTold / nats_per_minute));
+  return fmt::format("record {:.0f} minute{} of: {} ({})", minutes, minutes > 1.0 ? "s" : "",
+                     motion, reason);
+}
+
+Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
+  const auto name = [&](const Effect& effect, int at) {
+    return effect_key(effect.info(), model.machine, at);
+  };
+  const BetterMotion motion = better_motion(model, evidence, fit, found, rivals);
+  std::vector<std::string> apart;
+  for (const EffectAt& e : motion.words.empty() ? rivals : motion.apart)
+    apart.push_back(name(*e.effect, e.at));
+  const std::string reason =
+      fmt::format("tells {} from {}", name(*found.effect, found.at), fmt::join(apart, ", "));
+  if (motion.words.empty()) return {reason, found.effect->info().separated_by, 0.0, 0.0};
+  return {reason, motion.words, motion.nats_per_minute, motion.nats_here};
 }
 
 }  // namespace sparflow

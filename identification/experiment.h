@@ -48,4 +48,20 @@ struct BetterMotion {
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
                            const AppliedEffect& found, const std::vector<EffectAt>& rivals);
 
+/// What to record next so that one set of effects is told apart.
+struct Experiment {
+  std::string reason;  ///< which effects it would tell apart
+  std::string motion;  ///< what to record, in words: joint, direction, speeds, load
+  /// Likelihood the wrong ones would lose in a minute of it, and in a minute of the logs at hand [nats]; 0 = no motion
+  /// of the menu was found to tell them apart and `motion` is the catalogue's general word on the effect.
+  double nats_per_minute = 0.0, nats_here = 0.0;
+
+  std::string sentence() const;  ///< with how many minutes of it, without a full stop
+};
+
+/// What to record next to tell a found effect from its rivals; where no motion of the menu does, the catalogue's
+/// general word on the effect.
+Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals);
+
 }  // namespace sparflow

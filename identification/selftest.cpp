@@ -102,6 +102,35 @@ std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>&
   return out;
 }
 
+/// For a set, the motion that tells the effect it was found for, at its typical size, from the others.
+std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evidence,
+                                    const EffectFit& fit,
+                                    const std::vector<InjectedEffect>& effects,
+                                    const std::vector<std::vector<std::string>>& sets) {
+  const auto named = [&](const std::string& key) {
+    return std::find_if(effects.begin(), effects.end(),
+                        [&](const InjectedEffect& e) { return e.key() == key; });
+  };
+  std::vector<Experiment> out;
+  for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
+    // all others are its rivals; of the other members that need not hold
+    const auto whole = std::find_if(sets[k].begin(), sets[k].end(), [&](const std::string& key) {
+      return named(key)->confused_with.size() + 1 == sets[k].size();
+    });
+    const InjectedEffect& first = *named(whole != sets[k].end() ? *whole : sets[k].front());
+    AppliedEffect typical{first.effect.effect, first.effect.at, {}, {}, {}};
+    for (std::size_t p = 0; p < first.typical.size(); ++p)
+      typical.values.push_back(first.typical[p].value *
+                               first.effect.effect->info().parameters[p].si);
+    std::vector<EffectAt> rivals;
+    for (const std::string& key : sets[k]) {
+      if (key != first.key()) rivals.push_back(named(key)->effect);
+    }
+    out.push_back(next_experiment(model, evidence, fit, typical, rivals));
+  }
+  return out;
+}
+
 }  // namespace
 
 Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
@@ -173,7 +202,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   const std::vector<std::size_t> drawn = draw_checks(seen, options.check, options.search.seed);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const std::size_t i = drawn[k];
-    report(0.6 + 0.4 * static_cast<double>(k) / static_cast<double>(drawn.size()),
+    report(0.6 + 0.35 * static_cast<double>(k) / static_cast<double>(drawn.size()),
            "injecting " + seen[i].key());
     const SearchCandidate& c = study.candidate(i);
     InjectionCheck check =
@@ -184,6 +213,8 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     out.checks.push_back(std::move(check));
   }
   out.sets = sets_of(seen);
+  report(0.97, "motions that would tell effects apart");
+  out.experiments = motions_for(model, evidence, fit, seen, out.sets);
   out.effects.insert(out.effects.end(), seen.begin(), seen.end());
   const auto place = [&](const InjectedEffect& e) {
     return std::find_if(wanted.begin(), wanted.end(),

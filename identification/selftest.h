@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "identification/effect_search.h"
+#include "identification/experiment.h"
 
 namespace sparflow {
 
@@ -61,11 +62,15 @@ struct InjectionCheck {
   bool as_predicted() const { return predicted == named; }
 };
 
+/// Sets for which the separating motion is looked for, and that a screen shows.
+inline constexpr std::size_t kSetsWithMotion = 6;
+
 struct Selftest {
   std::vector<InjectedEffect> effects;  ///< in the catalogue's order, by stage
   std::vector<InjectionCheck> checks;
   std::vector<std::vector<std::string>> sets;  ///< keys that these logs cannot tell apart
-  double threshold = 0.0;                      ///< [nats] a gain beyond its price must reach
+  std::vector<Experiment> experiments;  ///< what to record for the first kSetsWithMotion sets
+  double threshold = 0.0;               ///< [nats] a gain beyond its price must reach
   double false_alarm = 0.05;
   double samples = 0.0, duration = 0.0;  ///< of the logs, [s]
   std::size_t logs = 0, references = 0;

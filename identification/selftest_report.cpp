@@ -13,8 +13,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostSets = 6;  ///< on a screen; the rest is in the JSON
-
 /// JSON has no NaN and no infinity.
 json values_json(const std::vector<ShownValue>& values) {
   json out = json::array();
@@ -85,15 +83,12 @@ std::string Selftest::table() const {
   for (const auto& [reason, keys] : never)
     out += fmt::format("    {}\n      {}\n", reason, fmt::join(keys, ", "));
   if (!sets.empty()) out += "\n  Cannot be told apart on these motions:\n";
-  for (std::size_t k = 0; k < std::min(kMostSets, sets.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
     out += fmt::format("    {}\n", fmt::join(sets[k], "  or  "));
-    const auto one = std::find_if(effects.begin(), effects.end(), [&](const InjectedEffect& e) {
-      return e.key() == sets[k].front();
-    });
-    if (one != effects.end()) out += fmt::format("      record: {}\n", one->separated_by);
+    if (k < experiments.size()) out += fmt::format("      {}\n", experiments[k].sentence());
   }
-  if (sets.size() > kMostSets)
-    out += fmt::format("    and {} more sets\n", sets.size() - kMostSets);
+  if (sets.size() > kSetsWithMotion)
+    out += fmt::format("    and {} more sets\n", sets.size() - kSetsWithMotion);
   if (!checks.empty()) {
     const auto right = std::count_if(checks.begin(), checks.end(),
                                      [](const InjectionCheck& c) { return c.as_predicted(); });
@@ -143,6 +138,13 @@ std::string Selftest::json() const {
     j["effects"].push_back(std::move(one));
   }
   j["indistinguishable"] = sets;
+  j["experiments"] = nlohmann::json::array();
+  for (const Experiment& e : experiments) {
+    j["experiments"].push_back({{"reason", e.reason},
+                                {"motion", e.motion},
+                                {"nats_per_minute", json_number(e.nats_per_minute)},
+                                {"nats_per_minute_here", json_number(e.nats_here)}});
+  }
   j["checks"] = nlohmann::json::array();
   for (const InjectionCheck& c : checks) {
     j["checks"].push_back({{"effect", c.key},

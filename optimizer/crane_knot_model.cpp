@@ -32,6 +32,28 @@ void add_jet(const Jet& jet, double factor, double* gradient, double* hessian) {
 
 }  // namespace
 
+std::vector<FullSpeed> full_speeds(const Machine& machine, const MotionLimits& limits) {
+  std::vector<FullSpeed> speeds;
+  for (int c = 0; c < machine.cylinder_count(); ++c) {
+    const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(c)];
+    const auto j = static_cast<std::size_t>(cylinder.joint);
+    const Range& v = limits.velocity[j];
+    const Range& q = machine.joints[j].position;
+    const double rate = std::abs(linkage_rates(machine, c, 0.5 * (q.lo + q.hi)).d1);
+    const double joint = std::max({std::abs(v.lo), std::abs(v.hi), 1e-6}) * rate;
+    FullSpeed full{joint, joint};
+    const Valve* valve = machine.valve_of_cylinder(c);
+    if (valve != nullptr && cylinder.hydraulic()) {
+      if (valve->max_flow_extend > 0.0)
+        full.extend = valve->max_flow_extend / cylinder.area_piston();
+      if (valve->max_flow_retract > 0.0)
+        full.retract = valve->max_flow_retract / cylinder.area_rod();
+    }
+    speeds.push_back(full);
+  }
+  return speeds;
+}
+
 CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& problem,
                                CraneKnotOptions options)
     : model_(&model),
@@ -78,6 +100,11 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
     rows_.push_back(
         {RowKind::kPumpPressure, p, -kInfinity, options_.pressure_share * limit / kPressureUnit});
   }
+  for (int c = 0; c < m_ && problem.limits.pressure_std > 0.0; ++c) {
+    if (!machine.cylinders[static_cast<std::size_t>(c)].hydraulic()) continue;
+    trusts_ = true;
+    rows_.push_back({RowKind::kTrust, c, -kInfinity, options_.trust_share * options_.trust_share});
+  }
   const auto* goal = std::get_if<TipGoal>(&problem.goal);
   if (problem.tip_line) {
     const Eigen::Vector3d end =
@@ -92,6 +119,7 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
     choose_clearance_rows();
   }
   mode_.assign(static_cast<std::size_t>(m_), CylinderMode::kFree);
+  full_speed_ = full_speeds(machine, problem.limits);
   speed_.setZero(m_);
   force_.setZero(m_);
   length_.resize(static_cast<std::size_t>(m_));
@@ -194,14 +222,61 @@ void CraneKnotModel::update_effects(const double* z, bool derivatives) {
   effects_derivatives_ = derivatives;
 }
 
+GpDerivatives CraneKnotModel::trust(int cylinder) const {
+  const auto i = static_cast<std::size_t>(cylinder);
+  const CylinderMode mode = mode_[i];
+  if (mode != CylinderMode::kExtend && mode != CylinderMode::kRetract) return {};
+  const bool out = mode == CylinderMode::kExtend;
+  const Cylinder& c = model_->machine.cylinders[i];
+  const CylinderModel& learned = model_->cylinders[i];
+  const double area = out ? c.area_piston() : -c.area_rod();
+  GpDerivatives d = (out ? learned.extend : learned.retract)
+                        .variance_derivatives(area * speed_[cylinder], force_[cylinder]);
+  const double unit = 1.0 / (problem_->limits.pressure_std * problem_->limits.pressure_std);
+  d.value *= unit;
+  d.d_flow *= unit * area;
+  d.d_force *= unit;
+  d.d_flow_flow *= unit * area * area;
+  d.d_flow_force *= unit * area;
+  d.d_force_force *= unit;
+  return d;
+}
+
+double CraneKnotModel::add_commands(const double* z, double* gradient, double* hessian) {
+  double sum = 0.0;
+  const double w = options_.command_weight / kPowerUnit;
+  for (int c = 0; c < m_; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    const double u = full_speed_[i].command(speed_[c]);
+    sum += w * u * u;
+    if (gradient == nullptr || speed_[c] == 0.0) continue;
+    const double d1 = 2.0 * w * u * u / speed_[c], d2 = d1 / speed_[c];
+    const int j = model_->machine.cylinders[i].joint;
+    const double qd = z[n_ + j];
+    const double vq = length_[i].d2 * qd, vd = length_[i].d1;
+    gradient[j] += d1 * vq;
+    gradient[n_ + j] += d1 * vd;
+    const int size = this->size();
+    hessian[j * size + j] += d2 * vq * vq + d1 * length_[i].d3 * qd;
+    hessian[(n_ + j) * size + n_ + j] += d2 * vd * vd;
+    const double mixed = d2 * vq * vd + d1 * length_[i].d2;
+    hessian[(n_ + j) * size + j] += mixed;
+    hessian[j * size + n_ + j] += mixed;
+  }
+  return sum;
+}
+
 double CraneKnotModel::cost(const double* z) {
+  if (options_.energy_weight == 0.0 || options_.command_weight > 0.0) update(z, 0, false);
+  const double commands = options_.command_weight > 0.0 ? add_commands(z, nullptr, nullptr) : 0.0;
+  if (options_.energy_weight == 0.0) return commands;
   if (effects_) {
     update_effects(z, false);
-    return options_.energy_weight * effects_->power().value / kPowerUnit;
+    return options_.energy_weight * effects_->power().value / kPowerUnit + commands;
   }
   update(z, 0, true);
   const double power = power_.value(speed_.data(), force_.data(), mode_.data());
-  return options_.energy_weight * power / kPowerUnit;
+  return options_.energy_weight * power / kPowerUnit + commands;
 }
 
 double CraneKnotModel::cost_derivatives(const double* z, double* gradient, double* hessian) {
@@ -210,10 +285,20 @@ double CraneKnotModel::cost_derivatives(const double* z, double* gradient, doubl
   g.setZero();
   h.setZero();
   const double scale = options_.energy_weight / kPowerUnit;
+  if (scale == 0.0) {
+    if (options_.command_weight == 0.0) return 0.0;
+    update(z, 2, false);
+    return add_commands(z, gradient, hessian);
+  }
   if (effects_) {
     update_effects(z, true);
     add_jet(effects_->power(), scale, gradient, hessian);
-    return scale * effects_->power().value;
+    double value = scale * effects_->power().value;
+    if (options_.command_weight > 0.0) {
+      update(z, 2, false);
+      value += add_commands(z, gradient, hessian);
+    }
+    return value;
   }
   update(z, 2, true);
   const double power = power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -221,7 +306,8 @@ double CraneKnotModel::cost_derivatives(const double* z, double* gradient, doubl
   chain_hessian(z, power_.gradient().data(), power_.hessian(), hessian);
   g *= scale;
   h *= scale;
-  return scale * power;
+  if (options_.command_weight == 0.0) return scale * power;
+  return scale * power + add_commands(z, gradient, hessian);
 }
 
 void CraneKnotModel::path_bounds(double* lower, double* upper) const {
@@ -260,6 +346,8 @@ std::string CraneKnotModel::path_name(int row) const {
       return fmt::format("pressure of pump {}", machine.pumps[i].name);
     case RowKind::kTipLine:
       return "distance of the tip from its line";
+    case RowKind::kTrust:
+      return fmt::format("standard deviation of the pressure of {}", machine.cylinders[i].name);
   }
   return "path";
 }
@@ -297,7 +385,7 @@ double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessi
 void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
   const bool forces = options_.limit_pressure && !effects_;
   if (options_.limit_pressure && effects_) update_effects(z, jacobian != nullptr);
-  update(z, jacobian != nullptr ? 1 : 0, forces);
+  update(z, jacobian != nullptr ? 1 : 0, forces || trusts_);
   if (forces) {
     if (jacobian != nullptr) {
       power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -351,6 +439,16 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
       case RowKind::kTipLine:
         g[r] = tip_line(z, out, nullptr, 1.0);
         break;
+      case RowKind::kTrust: {
+        const GpDerivatives d = trust(row.index);
+        g[r] = d.value;
+        if (out == nullptr) break;
+        scratch_gradient_.setZero();
+        scratch_gradient_[row.index] = d.d_flow;
+        scratch_gradient_[m_ + row.index] = d.d_force;
+        chain_gradient(scratch_gradient_.data(), out);
+        break;
+      }
     }
   }
   if (clearance_rows_ == 0) return;
@@ -379,7 +477,7 @@ void CraneKnotModel::path_jacobian(const double* z, double* g, double* jacobian)
 void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier, double* hessian) {
   const bool forces = options_.limit_pressure && !effects_;
   if (options_.limit_pressure && effects_) update_effects(z, true);
-  update(z, forces ? 2 : 1, forces);
+  update(z, forces || trusts_ ? 2 : 1, forces || trusts_);
   scratch_gradient_.setZero();
   scratch_hessian_.setZero();
   if (forces) power_.derivatives(speed_.data(), force_.data(), mode_.data());
@@ -408,6 +506,17 @@ void CraneKnotModel::add_path_hessian(const double* z, const double* multiplier,
         break;
       case RowKind::kTipLine:
         break;
+      case RowKind::kTrust: {
+        const GpDerivatives d = trust(row.index);
+        const int v = row.index, f = m_ + row.index;
+        scratch_gradient_[v] += factor * d.d_flow;
+        scratch_gradient_[f] += factor * d.d_force;
+        scratch_hessian_(v, v) += factor * d.d_flow_flow;
+        scratch_hessian_(f, f) += factor * d.d_force_force;
+        scratch_hessian_(v, f) += factor * d.d_flow_force;
+        scratch_hessian_(f, v) += factor * d.d_flow_force;
+        break;
+      }
     }
   }
   chain_hessian(z, scratch_gradient_.data(), scratch_hessian_, hessian);

@@ -15,13 +15,24 @@
 
 namespace sparflow {
 
+/// Rod speed at full command. [m/s]
+struct FullSpeed {
+  double extend = 0.0, retract = 0.0;
+  /// Command that drives the rod at `speed`; its square has a kink in the second derivative at rest only.
+  double command(double speed) const { return speed / (speed > 0.0 ? extend : retract); }
+};
+
+/// By cylinder: through its valve where one is known, else at its joint's velocity limit in the middle of its range.
+std::vector<FullSpeed> full_speeds(const Machine& machine, const MotionLimits& limits);
+
 /// Mode of every cylinder in every interval, [intervals x cylinders].
 using ModeTable = Eigen::Matrix<CylinderMode, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct CraneKnotOptions {
   Smoothing smoothing;
-  double energy_weight = 1.0;  ///< [-] factor on the power
-  ModeTable modes;             ///< empty = every cylinder free everywhere
+  double energy_weight = 1.0;   ///< [-] factor on the power
+  double command_weight = 0.0;  ///< [W] factor on the sum of the squared commands
+  ModeTable modes;              ///< empty = every cylinder free everywhere
   /// Shares of the limits that may be used, slightly below one so that they also hold between knots.
   double flow_share = 1.0;
   double valve_share = 1.0;
@@ -37,7 +48,8 @@ struct CraneKnotOptions {
   /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
   /// when a motion without them came too near.
   bool limit_pressure = false;
-  double oil = 40.0;  ///< [degC] for effects that look at it
+  double trust_share = 1.0;  ///< of the trusted standard deviation (MotionLimits::pressure_std)
+  double oil = 40.0;         ///< [degC] for effects that look at it
 };
 
 /// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m: all
@@ -64,7 +76,7 @@ class CraneKnotModel final : public KnotModel {
   void add_path_hessian(const double* z, const double* multiplier, double* hessian) override;
 
  private:
-  enum class RowKind { kPumpFlow, kValve, kPumpPressure, kTipLine };
+  enum class RowKind { kPumpFlow, kValve, kPumpPressure, kTipLine, kTrust };
   struct Row {
     RowKind kind;
     int index;  // pump or cylinder
@@ -78,6 +90,10 @@ class CraneKnotModel final : public KnotModel {
   void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
   /// The law with effects at z, unless it was evaluated there last.
   void update_effects(const double* z, bool derivatives);
+  /// Variance of a moving cylinder's pressure over the trusted one, with its derivatives in (v, F); 0 at rest.
+  GpDerivatives trust(int cylinder) const;
+  /// Adds weight * sum u_i^2 of the speeds last updated, and its derivatives where they are asked for. [kW]
+  double add_commands(const double* z, double* gradient, double* hessian);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
   void choose_clearance_rows();
   void path_all(const double* z, double* g, double* jacobian);
@@ -88,6 +104,7 @@ class CraneKnotModel final : public KnotModel {
       machine_;  // that carries the loads; goals and obstacles are the problem's
   CraneKnotOptions options_;
   int n_, m_;
+  bool trusts_ = false;
   SmoothPower power_;
   std::unique_ptr<SmoothEffects> effects_;  // for a model with effects that act in a motion
   Eigen::VectorXd effects_z_;               // where it was evaluated last, with
@@ -104,6 +121,7 @@ class CraneKnotModel final : public KnotModel {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all_clearance_jacobian_;
   Eigen::Vector3d line_start_, line_direction_;
   std::vector<CylinderMode> mode_;
+  std::vector<FullSpeed> full_speed_;
   Eigen::VectorXd speed_, force_, scratch_gradient_;
   std::vector<Taylor3> length_;
   Eigen::MatrixXd jacobian_;  // d(v, F)/dz, [2 m x 2 n]

@@ -1,11 +1,15 @@
 #include "optimizer/exact_energy.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "models/effects/effective_machine.h"
 #include "models/units.h"
+#include "optimizer/crane_knot_model.h"
 #include "problems/clearance.h"
 
 namespace sparflow {
@@ -115,6 +119,22 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
     book.see("distance from the goal posture", error, 0.0, error - 1e-6, 1.0, "rad or m",
              motion.t[last]);
   }
+  // the nearest knots, in order: waypoints are passed at knots
+  Eigen::Index from = 0;
+  for (std::size_t w = 0; w < problem.waypoints.size(); ++w) {
+    Eigen::Index best = from;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = from; k <= last; ++k) {
+      const Eigen::VectorXd q = motion.q.row(k).transpose();
+      const double distance = (tip_position<double>(machine, q) - problem.waypoints[w]).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      best = k;
+    }
+    book.see(fmt::format("distance of the tip from waypoint {}", w + 1), nearest, 0.0,
+             nearest - 1e-5, 1.0, "m", motion.t[best]);
+    from = best;
+  }
   const double speed =
       std::max(motion.qd.row(0).cwiseAbs().maxCoeff(), motion.qd.row(last).cwiseAbs().maxCoeff());
   book.see("speed at start and end", speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s", motion.t[last]);
@@ -138,6 +158,7 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
         goal ? goal->tip : tip_position<double>(machine, std::get<JointGoal>(problem.goal).q);
     line_direction = (end - line_start).normalized();
   }
+  const double trusted = problem.limits.pressure_std;
   const auto width = [](const Range& r) { return std::max(r.hi - r.lo, 1e-12); };
   Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols()), qdd(fine.q.cols());
   for (Eigen::Index k = 0; k < fine.size(); ++k) {
@@ -158,11 +179,15 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
                  width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
     }
     const MachineState& state =
-        chain.evaluate(q.data(), qd.data(), problem.payload, false, kRestSpeed, qdd.data());
+        chain.evaluate(q.data(), qd.data(), problem.payload, trusted > 0.0, kRestSpeed, qdd.data());
     using units::kBar;
     using units::kLitrePerMinute;
     for (int c = 0; c < machine.cylinder_count(); ++c) {
       const auto i = static_cast<std::size_t>(c);
+      const double deviation = state.cylinders[i].pressure_std;
+      if (trusted > 0.0 && machine.cylinders[i].hydraulic())
+        book.see("standard deviation of the pressure of " + machine.cylinders[i].name,
+                 deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t);
       const Valve* valve = machine.valve_of_cylinder(c);
       if (valve == nullptr) continue;
       const double full =
@@ -201,6 +226,36 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
   }
   check_ends(problem, machine, motion, book);
   return book.sorted();
+}
+
+double command_effort(const CraneModel& model, const MotionProblem& problem,
+                      const Trajectory& motion, int refine) {
+  const std::vector<FullSpeed> full = full_speeds(model.machine, problem.limits);
+  double effort = 0.0;
+  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
+    for (int part = 0; part < refine; ++part) {
+      const double dt = (part + 0.5) * step;
+      for (int c = 0; c < model.machine.cylinder_count(); ++c) {
+        const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
+        const double qdd = motion.qdd(k, j), qd = motion.qd(k, j);
+        const double q = motion.q(k, j) + dt * (qd + 0.5 * dt * qdd);
+        const double speed = linkage_rates(model.machine, c, q).d1 * (qd + dt * qdd);
+        const double u = full[static_cast<std::size_t>(c)].command(speed);
+        effort += step * u * u;
+      }
+    }
+  }
+  return effort;
+}
+
+double exact_cost(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion,
+                  double energy, int refine) {
+  const ObjectiveWeights& w = problem.objective;
+  double cost =
+      w.energy * (energy + problem.idle_power * motion.duration()) + w.time * motion.duration();
+  if (w.commands > 0.0) cost += w.commands * command_effort(model, problem, motion, refine);
+  return cost;
 }
 
 double worst_excess(const std::vector<LimitCheck>& checks) {

@@ -29,6 +29,14 @@ struct MotionEnergy {
 MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
                           int refine = 16);
 
+/// Integral of the squared commands of all valves (1 = full flow) over a motion. [s]
+double command_effort(const CraneModel& model, const MotionProblem& problem,
+                      const Trajectory& motion, int refine = 16);
+
+/// The problem's objective under the exact law: energy * (E + idle power * T) + time * T + commands * effort. [J]
+double exact_cost(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion,
+                  double energy, int refine = 16);
+
 /// One limit at its worst instant.
 struct LimitCheck {
   std::string what;    ///< "flow of pump main"

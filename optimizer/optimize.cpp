@@ -8,6 +8,7 @@
 
 #include "models/error.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/energy_grid.h"
 
 namespace sparflow {
 namespace {
@@ -35,6 +36,13 @@ std::string pack(const StartResult& r) {
   pack_matrix(p, r.motion.q);
   pack_matrix(p, r.motion.qd);
   pack_matrix(p, r.motion.qdd);
+  p.number(r.duration).number(r.cost).number(r.plan.count());
+  p.number(static_cast<double>(r.plan.modes.cols()));
+  for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
+    p.number(static_cast<double>(r.plan.modes.data()[i]));
+  pack_matrix(p, r.plan.durations);
+  p.number(static_cast<double>(r.plan.waypoint_after.size()));
+  for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
   p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
@@ -55,6 +63,15 @@ StartResult unpack(const std::string& bytes) {
   r.motion.q = unpack_matrix(u);
   r.motion.qd = unpack_matrix(u);
   r.motion.qdd = unpack_matrix(u);
+  r.duration = u.number();
+  r.cost = u.number();
+  const auto phases = static_cast<Eigen::Index>(u.number());
+  r.plan.modes.resize(phases, static_cast<Eigen::Index>(u.number()));
+  for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
+    r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
+  r.plan.durations = unpack_matrix(u);
+  r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
+  for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
   r.energy_exact = u.number();
   r.energy_smooth = u.number();
   r.excess = u.number();
@@ -77,12 +94,14 @@ StartResult unpack(const std::string& bytes) {
   return r;
 }
 
-/// Two starts that ended in the same motion: all joints within a thousandth of their range at all knots.
+/// Two starts that ended in the same motion: all joints within a thousandth of their range at all of a's knots.
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
-  if (a.size() != b.size() || a.size() < 2) return false;
+  if (a.size() < 2 || b.size() < 2) return false;
+  if (std::abs(a.duration() - b.duration()) > 1e-3 * a.duration()) return false;
+  const Eigen::MatrixXd other = resampled(b, a.t).q;
   for (Eigen::Index j = 0; j < a.q.cols(); ++j) {
     const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
-    if ((a.q.col(j) - b.q.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
+    if ((a.q.col(j) - other.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
   }
   return true;
 }
@@ -96,23 +115,26 @@ double shortest_seed(const std::vector<SeedMotion>& seeds) {
   return shortest;
 }
 
-/// The cheapest different motions that came from seeds, the winner apart.
-std::vector<SeedMotion> best_other_motions(const OptimizeResult& result, std::size_t seed_count,
-                                           double limit_tolerance, std::size_t most) {
-  std::vector<const StartResult*> kept;
-  for (std::size_t i = 0; i < std::min(seed_count, result.starts.size()); ++i) {
-    const StartResult& s = result.starts[i];
-    if (static_cast<int>(i) != result.best_start && s.same_as < 0 && s.usable(limit_tolerance))
-      kept.push_back(&s);
+/// Starts from the cheapest on: those that keep all limits, each motion once.
+std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
+  std::vector<int> kept;
+  for (std::size_t i = 0; i < result.starts.size(); ++i) {
+    if (result.starts[i].usable(limit_tolerance)) kept.push_back(static_cast<int>(i));
   }
-  std::sort(kept.begin(), kept.end(), [](const StartResult* a, const StartResult* b) {
-    return a->energy_exact < b->energy_exact;
+  std::stable_sort(kept.begin(), kept.end(), [&](int x, int y) {
+    return result.starts[static_cast<std::size_t>(x)].cost <
+           result.starts[static_cast<std::size_t>(y)].cost;
   });
-  std::vector<SeedMotion> motions;
-  for (std::size_t i = 0; i < std::min(most, kept.size()); ++i) {
-    motions.push_back({kept[i]->seed, kept[i]->motion, 0.0, false});
-  }
-  return motions;
+  return kept;
+}
+
+bool time_is_everything(const MotionProblem& problem) {
+  return problem.objective.energy == 0.0 && problem.objective.time > 0.0;
+}
+
+bool same_plan(const PhasePlan& a, const PhasePlan& b) {
+  return a.count() == b.count() && a.modes.cols() == b.modes.cols() &&
+         (a.modes.array() == b.modes.array()).all();
 }
 
 /// What the seeds themselves cost, driven in the result's time, where they keep the limits in it.
@@ -128,8 +150,10 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
     const Trajectory timed = with_duration(s.motion, result.duration);
     if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
     const double energy = exact_energy(model, timed, problem.payload, refine).total;
-    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy)
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
       result.best_seed_energy = energy;
+      result.best_seed_name = s.name;
+    }
     if (nearest) result.nearest_line_energy = energy;
     if (s.straight_line &&
         (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
@@ -173,11 +197,14 @@ void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMoti
     worst = " The solver says: " + result.starts.front().message + ".";
   }
   const double shortest = shortest_seed(seeds);
-  const std::string remedy =
-      shortest > duration
-          ? fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
-                        duration)
-          : std::string();
+  std::string remedy;
+  if (result.shortest_duration > duration) {
+    remedy = fmt::format(" The shortest motion found takes {:.2f} s; {:g} s was asked for.",
+                         result.shortest_duration, duration);
+  } else if (shortest > duration) {
+    remedy = fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
+                         duration);
+  }
   result.status = OptimizeStatus::kInfeasible;
   result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
 }
@@ -198,90 +225,348 @@ const char* to_string(OptimizeStatus status) {
   return "failed";
 }
 
+namespace {
+
+constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
+
+/// Everything that is solved for one problem in one window of time.
+class Search {
+ public:
+  Search(const CraneModel& model, const MotionProblem& problem,
+         const std::vector<SeedMotion>& seeds, const TimeWindow& time,
+         const OptimizeOptions& options)
+      : model_(model),
+        problem_(problem),
+        seeds_(seeds),
+        time_(time),
+        options_(options),
+        coarse_(options) {
+    if (options.modes && options.free_phases && options.search_intervals > 0)
+      coarse_.intervals = std::min(options.intervals, options.search_intervals);
+    coarse_.phase_iterations = options.phase_iterations / 2;
+    // beside obstacles a solve takes ten times longer, and the seeds differ more than their neighbours do
+    searched_ = problem.obstacles.empty() ? options.searched_starts : 1;
+  }
+
+  OptimizeResult run() {
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<ModeCandidate> one_by_one;
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
+      const Eigen::VectorXd times =
+          Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, time_.guess);
+      std::vector<Eigen::VectorXd> ends;
+      ends.reserve(seeds_.size());
+      for (const SeedMotion& s : seeds_) {
+        ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+      }
+      one_by_one = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
+    }
+    for (ModeCandidate& c : grid_candidates()) one_by_one.push_back(std::move(c));
+    const std::size_t given = seeds_.size();
+    expected_ = static_cast<int>(given + one_by_one.size());
+    solve(
+        static_cast<int>(given + one_by_one.size()),
+        [&](int i) {
+          const auto k = static_cast<std::size_t>(i);
+          OptimizeOptions options = coarse_;
+          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
+          return k < given
+                     ? optimize_from(model_, problem_, seeds_[k], time_, options)
+                     : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
+        },
+        [&](int i) {
+          const auto k = static_cast<std::size_t>(i);
+          return k < given ? seeds_[k].name : one_by_one[k - given].name;
+        });
+    if (options_.modes && options_.free_phases) {
+      if (ranking(result_, options_.limit_tolerance).empty()) rescue();
+      search_sequences();
+      refine();
+    }
+    conclude();
+    result_.solve_s = seconds_since(begin);
+    return std::move(result_);
+  }
+
+ private:
+  bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+
+  /// The cheapest ways a search over the whole joint space knows.
+  std::vector<ModeCandidate> grid_candidates() const {
+    std::vector<ModeCandidate> found;
+    const EnergyGridOptions size{options_.grid_nodes};
+    if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
+        !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
+      return found;
+    const auto search = [&](const MotionProblem& problem, int most) {
+      EnergyGrid grid(model_, problem, size);
+      std::vector<GridPath> paths;
+      if (problem.objective.energy > 0.0) {
+        paths = grid.paths_for_duration(time_.guess, most);
+      } else if (time_is_everything(problem)) {
+        constexpr double kTimeIsEverything = 1e7;  // [W]
+        paths.push_back(grid.cheapest_path(kTimeIsEverything));
+      }
+      for (const GridPath& path : paths) {
+        if (!path.found) continue;
+        const double duration =
+            std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+        found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
+      }
+    };
+    search(problem_, options_.grid_starts);
+    if (!problem_.obstacles.empty()) {
+      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      MotionProblem wider = problem_;
+      wider.clearance += kRoomForTheRows;
+      search(wider, options_.grid_starts);
+    }
+    return found;
+  }
+
+  void solve(int count, const std::function<StartResult(int)>& start,
+             const std::function<std::string(int)>& name) {
+    const auto done = [&](int index, int finished) {
+      if (options_.progress)
+        options_.progress(static_cast<int>(result_.starts.size()) + finished, expected_,
+                          name(index));
+    };
+    const std::vector<ChildResult> children = run_in_children(
+        count, options_.processes, [&](int i) { return pack(start(i)); }, done);
+    for (int i = 0; i < count; ++i) {
+      const ChildResult& child = children[static_cast<std::size_t>(i)];
+      StartResult r;
+      if (child.ok) {
+        r = unpack(child.bytes);
+      } else {
+        r.seed = name(i);
+        r.message = child.error;
+        r.duration = time_.guess;
+      }
+      for (std::size_t k = 0; k < result_.starts.size() && r.same_as < 0; ++k) {
+        if (same_motion(problem_, r.motion, result_.starts[k].motion))
+          r.same_as = static_cast<int>(k);
+      }
+      result_.starts.push_back(std::move(r));
+    }
+  }
+
+  /// No start kept all limits: the shortest motion there is tells whether the time is the reason. Where it is not, that
+  /// motion driven slower is a start like any other.
+  void rescue() {
+    if (interrupted() || time_is_everything(problem_)) return;
+    const OptimizeResult shortest = shortest_motion(model_, problem_, seeds_, options_);
+    if (shortest.best_start < 0) return;
+    result_.shortest_duration = shortest.duration;
+    if (shortest.duration > time_.upper) return;
+    const StartResult& fast = shortest.starts[static_cast<std::size_t>(shortest.best_start)];
+    const TimeWindow time{std::max(time_.guess, shortest.duration), time_.lower, time_.upper};
+    const Trajectory slow = with_duration(fast.motion, time.guess);
+    PhasePlan plan = fast.plan;
+    if (plan.count() > 0) plan.durations *= time.guess / plan.total();
+    const std::string name = "the shortest motion, slower";
+    expected_ = static_cast<int>(result_.starts.size()) + 2;
+    solve(
+        2,
+        [&](int i) {
+          return i == 0 || plan.count() == 0
+                     ? optimize_from(model_, problem_, {name, slow, shortest.duration, false}, time,
+                                     coarse_)
+                     : optimize_with_phases(model_, problem_, name + ", its phases", plan, slow,
+                                            time, true, coarse_);
+        },
+        [&](int) { return name; });
+  }
+
+  /// From the best few motions on: neighbouring mode sequences, as long as one of them is cheaper.
+  void search_sequences() {
+    std::vector<PhasePlan> tried;
+    const auto known = [&](const PhasePlan& plan) {
+      return std::any_of(tried.begin(), tried.end(),
+                         [&](const PhasePlan& t) { return same_plan(t, plan); });
+    };
+    for (const StartResult& s : result_.starts) {
+      if (s.plan.count() > 0 && !known(s.plan)) tried.push_back(s.plan);
+    }
+    for (int round = 0; round < options_.sequence_rounds && !interrupted(); ++round) {
+      struct Job {
+        int from;
+        PhasePlan plan;
+      };
+      std::vector<Job> jobs;
+      int searched = 0;
+      const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+      if (ranked.empty()) return;
+      const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+      for (const int i : ranked) {
+        const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
+        if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
+        if (searched++ == searched_) break;
+        for (PhasePlan& plan : neighbours(s.plan)) {
+          if (known(plan)) continue;
+          tried.push_back(plan);
+          jobs.push_back({i, std::move(plan)});
+        }
+      }
+      if (jobs.empty()) return;
+      expected_ = static_cast<int>(result_.starts.size() + jobs.size());
+      const std::vector<StartResult> from = result_.starts;
+      solve(
+          static_cast<int>(jobs.size()),
+          [&](int i) {
+            const Job& job = jobs[static_cast<std::size_t>(i)];
+            const StartResult& s = from[static_cast<std::size_t>(job.from)];
+            const TimeWindow time{s.duration, time_.lower, time_.upper};
+            return optimize_with_phases(model_, problem_,
+                                        "sequence " + plan_text(model_.machine, job.plan), job.plan,
+                                        s.motion, time, true, coarse_);
+          },
+          [&](int i) { return "sequence " + std::to_string(i + 1); });
+      const std::vector<int> now = ranking(result_, options_.limit_tolerance);
+      constexpr double kWorthAnotherRound = 1e-3;  // relative
+      if (now.empty() || result_.starts[static_cast<std::size_t>(now.front())].cost >
+                             (1.0 - kWorthAnotherRound) * best_before)
+        return;
+    }
+  }
+
+  /// What the trapezoid misses on this mesh, the softness of the maximum (known to lie within it) apart.
+  double mesh_error(const StartResult& s) const {
+    const ObjectiveWeights& w = problem_.objective;
+    if (s.energy_exact <= 0.0 || w.energy <= 0.0 || w.commands > 0.0) return 0.0;
+    const double excess = s.energy_smooth - s.energy_exact;
+    double volume = 0.0;  // [m^3]
+    for (int c = 0; c < model_.machine.cylinder_count(); ++c) {
+      const Cylinder& cylinder = model_.machine.cylinders[static_cast<std::size_t>(c)];
+      for (Eigen::Index k = 0; k + 1 < s.motion.size() && cylinder.hydraulic(); ++k) {
+        const double way =
+            linkage_rates(model_.machine, c, s.motion.q(k + 1, cylinder.joint)).value -
+            linkage_rates(model_.machine, c, s.motion.q(k, cylinder.joint)).value;
+        volume += way > 0.0 ? way * cylinder.area_piston() : -way * cylinder.area_rod();
+      }
+    }
+    const double softness =
+        options_.pressure_in_modes * std::log(1.0 + model_.machine.cylinder_count()) * volume;
+    return std::max(0.0, std::max(excess - softness, -excess)) / s.energy_exact;
+  }
+
+  /// The best motions again on the answer's mesh, finer until the trapezoid's error does not matter.
+  void refine() {
+    std::vector<int> best = ranking(result_, options_.limit_tolerance);
+    std::vector<int> chosen;
+    for (const int i : best) {
+      const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
+      const double least = result_.starts[static_cast<std::size_t>(best.front())].cost;
+      if (s.plan.count() > 0 && s.same_as < 0 && s.cost < 1.005 * least) chosen.push_back(i);
+      if (static_cast<int>(chosen.size()) == searched_) break;
+    }
+    for (int intervals = options_.intervals, round = 0;
+         !chosen.empty() && round < 4 && !interrupted(); intervals *= 2, ++round) {
+      OptimizeOptions fine = options_;
+      fine.intervals = intervals;
+      expected_ = static_cast<int>(result_.starts.size() + chosen.size());
+      const std::vector<StartResult> from = result_.starts;
+      const std::size_t first = result_.starts.size();
+      const auto source = [&](int i) -> const StartResult& {
+        return from[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])];
+      };
+      const auto name = [&](int i) {
+        const std::string& seed = source(i).seed;
+        return seed.starts_with("finer: ") ? seed : "finer: " + seed;
+      };
+      solve(
+          static_cast<int>(chosen.size()),
+          [&](int i) {
+            const StartResult& s = source(i);
+            const TimeWindow time{s.duration, time_.lower, time_.upper};
+            return optimize_with_phases(model_, problem_, name(i), s.plan, s.motion, time, false,
+                                        fine);
+          },
+          name);
+      // the coarse motion is kept as what the finer one is compared with, not as an answer of its own
+      std::size_t winner = first;
+      for (std::size_t i = first; i < result_.starts.size(); ++i) {
+        if (result_.starts[i].usable(options_.limit_tolerance) &&
+            result_.starts[i].cost < result_.starts[winner].cost)
+          winner = i;
+      }
+      if (!result_.starts[winner].usable(options_.limit_tolerance)) return;
+      result_.mesh_error = mesh_error(result_.starts[winner]);
+      if (result_.mesh_error <= options_.mesh_error) return;
+      chosen = {static_cast<int>(winner)};
+    }
+  }
+
+  void conclude() {
+    const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+    const bool stopped =
+        std::any_of(result_.starts.begin(), result_.starts.end(),
+                    [](const StartResult& r) { return r.status == NlpStatus::kInterrupted; });
+    if (!ranked.empty()) {
+      result_.best_start = ranked.front();
+      const StartResult& best = result_.starts[static_cast<std::size_t>(result_.best_start)];
+      result_.status = stopped ? OptimizeStatus::kInterrupted : OptimizeStatus::kOptimal;
+      result_.motion = best.motion;
+      result_.duration = best.motion.duration();
+      result_.energy_smooth = best.energy_smooth;
+      result_.energy = exact_energy(model_, best.motion, problem_.payload, options_.refine);
+      result_.checks = check_limits(model_, problem_, best.motion, options_.refine);
+      result_.message = fmt::format("{}: {:.1f} kJ in {:.2f} s", problem_.name,
+                                    result_.energy.total / 1e3, result_.duration);
+      set_baselines(model_, problem_, seeds_, options_.refine, result_);
+      return;
+    }
+    result_.duration = time_.guess;
+    set_baselines(model_, problem_, seeds_, options_.refine, result_);
+    if (const StartResult* nearest = nearest_start(result_))
+      result_.checks = check_limits(model_, problem_, nearest->motion, options_.refine);
+    if (stopped) {
+      result_.status = OptimizeStatus::kInterrupted;
+      result_.message = problem_.name + ": interrupted before any motion was found";
+    } else {
+      say_why_infeasible(problem_, seeds_, time_.guess, result_);
+    }
+  }
+
+  const CraneModel& model_;
+  const MotionProblem& problem_;
+  const std::vector<SeedMotion>& seeds_;
+  TimeWindow time_;
+  const OptimizeOptions& options_;
+  OptimizeOptions coarse_;
+  OptimizeResult result_;
+  int expected_ = 0, searched_ = 1;
+};
+
+}  // namespace
+
+OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, const TimeWindow& time,
+                           const OptimizeOptions& options) {
+  return Search(model, problem, seeds, time, options).run();
+}
+
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options) {
+  MotionProblem hurried = problem;
+  hurried.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
+  const double shortest = shortest_seed(seeds);
+  const double guess = shortest > 0.0 ? 1.1 * shortest : std::max(problem.duration.min, 1.0);
+  hurried.duration = {0.0, 20.0 * guess};
+  OptimizeOptions direct = options;
+  direct.schedule.clear();
+  direct.sequential_starts = 0;
+  direct.sequence_rounds = 0;
+  direct.progress = {};
+  return optimize_in(model, hurried, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
+}
+
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
                            const std::vector<SeedMotion>& seeds, double duration,
                            const OptimizeOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
-  OptimizeResult result;
-  result.duration = duration;
-  std::vector<ModeCandidate> one_by_one;
-  if (options.sequential_starts > 0 && options.modes && !problem.tip_line) {
-    const Eigen::VectorXd times = Eigen::VectorXd::LinSpaced(options.intervals + 1, 0.0, duration);
-    std::vector<Eigen::VectorXd> ends;
-    ends.reserve(seeds.size());
-    for (const SeedMotion& s : seeds) {
-      ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
-    }
-    one_by_one = sequential_candidates(model, problem, times, ends, options.sequential_starts);
-  }
-  const std::size_t given = seeds.size();
-  const int count = static_cast<int>(given + one_by_one.size());
-  const auto name = [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    return k < given ? seeds[k].name : one_by_one[k - given].name;
-  };
-  const auto work = [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    return pack(k < given ? optimize_from(model, problem, seeds[k], duration, options)
-                          : optimize_with_modes(model, problem, one_by_one[k - given], options));
-  };
-  const auto done = [&](int index, int finished) {
-    if (options.progress) options.progress(finished, count, name(index));
-  };
-  const std::vector<ChildResult> children = run_in_children(count, options.processes, work, done);
-  for (int i = 0; i < count; ++i) {
-    const ChildResult& child = children[static_cast<std::size_t>(i)];
-    StartResult start;
-    if (child.ok) {
-      start = unpack(child.bytes);
-    } else {
-      start.seed = name(i);
-      start.message = child.error;
-    }
-    start.duration = duration;
-    for (std::size_t k = 0; k < result.starts.size() && start.same_as < 0; ++k) {
-      if (same_motion(problem, start.motion, result.starts[k].motion))
-        start.same_as = static_cast<int>(k);
-    }
-    result.starts.push_back(std::move(start));
-  }
-  for (int i = 0; i < count; ++i) {
-    const StartResult& s = result.starts[static_cast<std::size_t>(i)];
-    if (!s.usable(options.limit_tolerance)) continue;
-    if (result.best_start < 0 ||
-        s.energy_exact < result.starts[static_cast<std::size_t>(result.best_start)].energy_exact) {
-      result.best_start = i;
-    }
-  }
-  set_baselines(model, problem, seeds, options.refine, result);
-  result.solve_s = seconds_since(begin);
-  if (result.best_start >= 0) {
-    const StartResult& best = result.starts[static_cast<std::size_t>(result.best_start)];
-    const bool stopped =
-        std::any_of(result.starts.begin(), result.starts.end(),
-                    [](const StartResult& r) { return r.status == NlpStatus::kInterrupted; });
-    result.status = stopped ? OptimizeStatus::kInterrupted : OptimizeStatus::kOptimal;
-    result.motion = best.motion;
-    result.energy_smooth = best.energy_smooth;
-    result.energy = exact_energy(model, best.motion, problem.payload, options.refine);
-    result.checks = check_limits(model, problem, best.motion, options.refine);
-    result.message =
-        fmt::format("{}: {:.1f} kJ in {:.2f} s", problem.name, result.energy.total / 1e3, duration);
-    return result;
-  }
-  bool interrupted = false;
-  for (const StartResult& s : result.starts) {
-    interrupted = interrupted || s.status == NlpStatus::kInterrupted;
-  }
-  if (const StartResult* nearest = nearest_start(result))
-    result.checks = check_limits(model, problem, nearest->motion, options.refine);
-  if (interrupted) {
-    result.status = OptimizeStatus::kInterrupted;
-    result.message = problem.name + ": interrupted before any motion was found";
-  } else {
-    say_why_infeasible(problem, seeds, duration, result);
-  }
-  return result;
+  return optimize_in(model, problem, seeds, TimeWindow::fixed(duration), options);
 }
 
 OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
@@ -297,73 +582,24 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
   if (problem.duration.fixed())
     return optimize_at(model, problem, seeds, problem.duration.min, options);
 
-  // Free or bounded time: J(T) = E(T) + idle power * T. All starts at a comfortable duration, then a golden
-  // section over T from the best motion, which changes little from one duration to the next.
+  // Free or bounded time is a variable of every start; where the search begins still matters, so two beginnings.
   const auto begin = std::chrono::steady_clock::now();
   const double shortest = shortest_seed(seeds);
-  const double lo = std::max(problem.duration.min, 0.4 * shortest);
+  const double lo = std::max(problem.duration.min, 0.05 * shortest);
   const double hi = std::min(problem.duration.max, std::max(6.0 * shortest, 2.0 * lo));
-  OptimizeResult best =
-      optimize_at(model, problem, seeds, std::clamp(1.5 * shortest, lo, hi), options);
-  if (best.status == OptimizeStatus::kInfeasible && hi > best.duration)
-    best = optimize_at(model, problem, seeds, hi, options);
-  if (best.status != OptimizeStatus::kOptimal) return best;
-  const auto cost = [&](const OptimizeResult& r) {
-    return r.status == OptimizeStatus::kOptimal ? r.energy.total + problem.idle_power * r.duration
-                                                : std::numeric_limits<double>::infinity();
-  };
-  // At every duration: the best so far, the best other motions of the first (driven faster or slower, modes as they
-  // are: an overlap may be what a shorter time needs) and the cheapest one-by-one motions.
-  OptimizeOptions nearby = options;
-  nearby.schedule.clear();
-  nearby.sequential_starts = std::min(options.sequential_starts, 2);
-  const std::vector<SeedMotion> others =
-      best_other_motions(best, seeds.size(), options.limit_tolerance, 2);
-  nearby.progress = {};
-  int durations = 1;
-  const auto evaluate = [&](double duration) {
-    std::vector<SeedMotion> tried = others;
-    tried.push_back({"best so far", best.motion, shortest, false});
-    OptimizeResult r = optimize_at(model, problem, tried, duration, nearby);
+  OptimizeResult best;
+  int durations = 0;
+  for (const double times_shortest : {1.3, 3.0}) {
+    if (durations > 0 && options.interrupted && options.interrupted()) break;
+    const TimeWindow window{std::clamp(times_shortest * shortest, lo, hi), lo, hi};
+    OptimizeResult r = optimize_in(model, problem, seeds, window, options);
     ++durations;
-    const double value = cost(r);
-    if (value < cost(best)) {
-      best = std::move(r);
-    }
-    if (options.progress)
-      options.progress(durations, 14, fmt::format("duration {:.2f} s", duration));
-    return value;
-  };
-  constexpr double kGolden = 0.6180339887498949;
-  double a = lo, b = hi;
-  double x1 = b - kGolden * (b - a), x2 = a + kGolden * (b - a);
-  double f1 = evaluate(x1), f2 = evaluate(x2);
-  while (b - a > 0.02 * best.duration && durations < 14 &&
-         !(options.interrupted && options.interrupted())) {
-    if (f1 < f2) {
-      b = x2;
-      x2 = x1;
-      f2 = f1;
-      x1 = b - kGolden * (b - a);
-      f1 = evaluate(x1);
-    } else {
-      a = x1;
-      x1 = x2;
-      f1 = f2;
-      x2 = a + kGolden * (b - a);
-      f2 = evaluate(x2);
-    }
+    const auto cost = [](const OptimizeResult& o) {
+      return o.best_start < 0 ? std::numeric_limits<double>::infinity()
+                              : o.starts[static_cast<std::size_t>(o.best_start)].cost;
+    };
+    if (durations == 1 || cost(r) < cost(best)) best = std::move(r);
   }
-  // Everything again in the time that was chosen: every start is then of one duration, and none is missed
-  // because it was only tried in another.
-  if (!(options.interrupted && options.interrupted())) {
-    std::vector<SeedMotion> all = seeds;
-    all.push_back({"best of the duration search", best.motion, shortest, false});
-    OptimizeResult last = optimize_at(model, problem, all, best.duration, options);
-    if (last.best_start >= 0 && last.energy.total <= best.energy.total) best = std::move(last);
-  }
-  // compared with lines and seeds in the time that was chosen
-  set_baselines(model, problem, seeds, options.refine, best);
   best.evaluated_durations = durations;
   best.solve_s = seconds_since(begin);
   return best;

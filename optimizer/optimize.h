@@ -9,6 +9,7 @@
 #include "optimizer/exact_energy.h"
 #include "optimizer/motion_modes.h"
 #include "optimizer/nlp/ipopt_solver.h"
+#include "optimizer/phases.h"
 #include "optimizer/sequential_modes.h"
 
 namespace sparflow {
@@ -23,14 +24,34 @@ struct SeedMotion {
   bool straight_line = false;  ///< a straight joint-space line, the baseline users compare with
 };
 
+/// How long a motion may take, and where the search for its duration begins. [s]
+struct TimeWindow {
+  double guess = 0.0;
+  double lower = 0.0, upper = 0.0;
+  static TimeWindow fixed(double duration) { return {duration, duration, duration}; }
+};
+
 struct OptimizeOptions {
-  int intervals = 100;
+  int intervals = 100;  ///< of the answer's mesh, and at most eight times that: see `mesh_error`
+  int search_intervals = 50;  ///< of the mesh on which starts and sequences are compared
+  double mesh_error =
+      1e-4;  ///< |energy of the solve - exact energy| / exact energy, beyond the softness of its maximum
+  int smooth_starts = 2;  ///< seeds that are solved through the smooth law too
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the one before.
   std::vector<Smoothing> schedule = {{20e-3, 10e5}};
   /// Iterations a smooth stage may take: its motion is a start for the modes, not the answer.
   int smooth_iterations = 100;
-  int sequential_starts = 6;  ///< one-by-one motions tried besides the seeds, the cheapest guesses
+  int phase_iterations = 300;  ///< of a solve with phases; half of it in the search
+  int sequential_starts = 6;   ///< one-by-one motions tried besides the seeds, the cheapest guesses
+  int grid_starts = 3;         ///< paths of the global search on a joint grid (energy_grid.h)
+  int grid_nodes = 15000;      ///< of that grid
   bool modes = true;  ///< finish with the modes held fixed; false: the single smooth NLP alone
+  bool free_phases = true;  ///< how long each mode lasts is a variable; false: as the start has it
+  double overlap = 0.3;     ///< offered between two phases, share of the shorter one's time
+  int phase_intervals = 5;  ///< least intervals of a phase
+  /// Neighbours of the best mode sequences tried (phases left out, exchanged, made one, moved): rounds at most.
+  int sequence_rounds = 3;
+  int searched_starts = 2;  ///< different motions the search over mode sequences begins from
   ModeOptions mode_options;
   double pressure_in_modes = 0.3e5;  ///< beta of the finish [Pa]
   double tolerance = 1e-6;           ///< of the last solve
@@ -64,6 +85,8 @@ struct StartResult {
   Trajectory motion;           ///< empty when there is none
   double duration = 0.0;       ///< [s] it was solved for
   double energy_exact = 0.0;   ///< [J]
+  double cost = 0.0;           ///< [J] exact_cost() of the motion, what starts are compared by
+  PhasePlan plan;              ///< phases of the motion; none if they were not held
   double energy_smooth = 0.0;  ///< [J] of the last solve's own law
   double excess = 0.0;         ///< worst relative overshoot of a limit between knots
   int iterations = 0;
@@ -92,11 +115,18 @@ struct OptimizeResult {
   std::vector<LimitCheck> checks;  ///< of the motion, or of the start that came nearest to one
   int best_start = -1;
   std::vector<StartResult> starts;
-  double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
+  double lower_bound =
+      0.0;  ///< [J] no motion of any duration takes less (energy_bound.h); 0 = not asked for or none
+  std::string bound_note;   ///< why there is none, or how the bound was found
+  double mesh_error = 0.0;  ///< of the answer's last mesh, relative (OptimizeOptions::mesh_error)
+  double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
+  std::string best_seed_name;
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
   /// [J] the straight joint line to the nearest end posture (the first straight seed); 0 = breaks a limit.
   double nearest_line_energy = 0.0;
   std::string straight_line_name;
+  /// [s] the shortest motion found within all limits, sought when no start met the duration; 0 = not sought or none.
+  double shortest_duration = 0.0;
   double solve_s = 0.0;  ///< wall time of everything
   double evaluated_durations = 1;
 };
@@ -104,15 +134,37 @@ struct OptimizeResult {
 /// One start at one duration.
 StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
                           const SeedMotion& seed, double duration, const OptimizeOptions& options);
+/// One start in a window of durations.
+StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
+                          const SeedMotion& seed, const TimeWindow& time,
+                          const OptimizeOptions& options);
 
 /// One start with its modes given.
 StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
                                 const ModeCandidate& candidate, const OptimizeOptions& options);
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const TimeWindow& time,
+                                const OptimizeOptions& options);
+
+/// One start with its phases given, from a motion near them (its stretches are driven in the plan's durations).
+/// @param overlaps offered between the phases
+StartResult optimize_with_phases(const CraneModel& model, const MotionProblem& problem,
+                                 const std::string& name, const PhasePlan& plan,
+                                 const Trajectory& guess, const TimeWindow& time, bool overlaps,
+                                 const OptimizeOptions& options);
 
 /// All starts (seeds and one-by-one motions) at one duration, in child processes, best one chosen by its exact energy.
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
                            const std::vector<SeedMotion>& seeds, double duration,
                            const OptimizeOptions& options);
+OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, const TimeWindow& time,
+                           const OptimizeOptions& options);
+
+/// The shortest motion within all limits that can be found from these seeds; its status is kOptimal when there is one.
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options);
 
 /// The problem as posed: a fixed duration, or the duration that minimises energy + idle power * time.
 /// @throws InputError when the model lacks a pressure process the machine needs

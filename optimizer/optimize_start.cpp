@@ -11,19 +11,18 @@ namespace {
 
 /// How far limits are drawn in so that they also hold between knots.
 struct Tightening {
-  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0;  // shares
-  double clearance = 0.0;                                      // [m]
-  std::vector<double> position;                                // [rad] or [m] by joint
+  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  // shares
+  double clearance = 0.0;                                                   // [m]
+  std::vector<double> position;                                             // [rad] or [m] by joint
   bool limit_pressure = false;
 };
 
 class Start {
  public:
-  Start(const CraneModel& model, const MotionProblem& problem, double duration,
+  Start(const CraneModel& model, const MotionProblem& problem, const TimeWindow& time,
         const OptimizeOptions& options)
-      : model_(model), problem_(problem), options_(options) {
-    const int intervals = options.intervals;
-    times_.setLinSpaced(intervals + 1, 0.0, duration);
+      : model_(model), problem_(problem), time_(time), options_(options) {
+    uniform_mesh();
     tightening_.position.assign(model.machine.joints.size(), 0.0);
   }
 
@@ -31,13 +30,22 @@ class Start {
     result_.seed = candidate.name;
     keep_clear_ends(candidate.guess);
     offer(candidate.guess, false);
-    hold(candidate.modes, candidate.guess);
+    hold(candidate.modes, candidate.guess, true);
     return result_;
   }
 
-  StartResult run(const SeedMotion& seed, double duration) {
+  StartResult run(const std::string& name, const PhasePlan& plan, const Trajectory& guess,
+                  bool overlaps) {
+    result_.seed = name;
+    keep_clear_ends(guess);
+    offer(guess, false);
+    hold_plan(plan, guess, overlaps);
+    return result_;
+  }
+
+  StartResult run(const SeedMotion& seed) {
     result_.seed = seed.name;
-    const Trajectory timed = with_duration(seed.motion, duration);
+    const Trajectory timed = with_duration(seed.motion, time_.guess);
     result_.seed_feasible =
         worst_excess(check_limits(model_, problem_, timed, options_.refine)) <= 1e-3;
     if (result_.seed_feasible)
@@ -45,19 +53,21 @@ class Start {
     keep_clear_ends(timed);
     if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
-    if (options_.modes) hold_modes(resampled(timed, times_));
+    if (options_.modes) hold_modes(resampled(timed, mesh_.times));
     Trajectory motion = timed;
-    for (std::size_t stage = 0; stage < options_.schedule.size(); ++stage) {
+    const std::size_t stages = problem_.waypoints.empty() ? options_.schedule.size() : 0;
+    for (std::size_t stage = 0; stage < stages; ++stage) {
+      uniform_mesh();
       const bool last = stage + 1 == options_.schedule.size();
       const bool rough = options_.modes || !last;
       const NlpResult solved =
-          solve(motion, options_.schedule[stage], ModeTable(), rough ? 1e-2 : options_.tolerance);
+          solve(motion, options_.schedule[stage], rough ? 1e-2 : options_.tolerance);
       note_status(solved);
       if (solved.status == NlpStatus::kInterrupted) return result_;
       if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
       motion = transcription_->trajectory(solved.x);
       if (options_.modes || last) {
-        keep_limits(motion, options_.schedule[stage], ModeTable(), !options_.modes);
+        keep_limits(motion, options_.schedule[stage], !options_.modes);
       }
       if (options_.modes) hold_modes(motion);
     }
@@ -69,18 +79,41 @@ class Start {
     return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
   }
 
-  NlpResult solve(const Trajectory& from, const Smoothing& smoothing, const ModeTable& modes,
-                  double tolerance) {
+  /// One phase of one mode over the whole time.
+  void uniform_mesh() {
+    mesh_ = PhaseMesh{};
+    mesh_.times.setLinSpaced(options_.intervals + 1, 0.0, time_.guess);
+  }
+
+  NlpResult solve(const Trajectory& from, const Smoothing& smoothing, double tolerance) {
+    const ModeTable& modes = mesh_.modes;
     TranscriptionSpec spec;
-    spec.t = times_;
+    spec.t = mesh_.times;
+    for (std::size_t w = 0; w < mesh_.waypoint_knots.size(); ++w) {
+      spec.waypoints.push_back(
+          {mesh_.waypoint_knots[w],
+           std::make_shared<TipAtGoal>(model_.machine, problem_.waypoints[w])});
+    }
+    if (!mesh_.of_interval.empty()) {
+      PhaseTimes& phases = spec.phases;
+      phases.of_interval = mesh_.of_interval;
+      phases.lower.setConstant(phases.count(), shortest_phase());
+      phases.upper.setConstant(phases.count(), time_.upper);
+      phases.total_lower = time_.lower;
+      phases.total_upper = time_.upper;
+      phases.price =
+          1e-3 * (problem_.objective.energy * problem_.idle_power + problem_.objective.time);
+    }
     CraneKnotOptions knot;
     knot.smoothing = smoothing;
     knot.energy_weight = problem_.objective.energy;
+    knot.command_weight = problem_.objective.commands;
     knot.modes = modes;
     knot.flow_share = tightening_.flow;
     knot.valve_share = tightening_.valve;
     knot.pressure_share = tightening_.pressure;
     knot.tip_line_share = tightening_.line;
+    knot.trust_share = tightening_.trust;
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
@@ -103,7 +136,7 @@ class Start {
     transcription_->set_start(from);
     NlpOptions nlp;
     nlp.tolerance = tolerance;
-    nlp.max_iterations = modes.rows() > 0 ? 300 : options_.smooth_iterations;
+    nlp.max_iterations = modes.rows() > 0 ? options_.phase_iterations : options_.smooth_iterations;
     nlp.max_seconds = options_.max_seconds;
     nlp.more = options_.ipopt;
     if (modes.rows() > 0 || result_.iterations > 0) nlp.mu_init = 1e-3;
@@ -148,14 +181,59 @@ class Start {
         hi[d][j] = r.hi - inset;
       }
     }
-    spec.bounds = TranscriptionBounds::uniform(static_cast<int>(times_.size()) - 1, lo[0], hi[0],
-                                               lo[1], hi[1], lo[2], hi[2]);
+    spec.bounds = TranscriptionBounds::uniform(static_cast<int>(mesh_.times.size()) - 1, lo[0],
+                                               hi[0], lo[1], hi[1], lo[2], hi[2]);
     spec.bounds.rest_to_rest(problem_.start);
     if (const auto* goal = std::get_if<TipGoal>(&problem_.goal)) {
       spec.terminal = std::make_shared<TipAtGoal>(model_.machine, goal->tip);
     } else {
-      spec.bounds.fix_q(static_cast<int>(times_.size()) - 1, std::get<JointGoal>(problem_.goal).q);
+      spec.bounds.fix_q(static_cast<int>(mesh_.times.size()) - 1,
+                        std::get<JointGoal>(problem_.goal).q);
     }
+  }
+
+  /// Between far knots a link can cut a corner of an obstacle; drawing in the clearance by as much would close narrow
+  /// ways. Such intervals are cut in four instead. @return false when none is deep enough, or the mesh is full
+  bool split_where_it_touches(const Trajectory& motion) {
+    if (problem_.obstacles.empty() || mesh_.modes.rows() == 0) return false;
+    constexpr double kDeep = 5e-3;  // [m]
+    constexpr int kParts = 4;
+    if (motion.size() > 4 * options_.intervals) return false;
+    ClearanceModel clearance(problem_);
+    std::vector<double> times = {motion.t[0]};
+    std::vector<Eigen::Index> source;
+    for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+      const double h = motion.t[k + 1] - motion.t[k];
+      bool touches = false;
+      Eigen::VectorXd q;
+      for (int part = 1; part < options_.refine && !touches; ++part) {
+        const double dt = h * part / options_.refine;
+        q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
+        touches = clearance.nearest(q.data()).distance < -kDeep;
+      }
+      const int parts = touches ? kParts : 1;
+      for (int part = 1; part <= parts; ++part) {
+        times.push_back(part == parts ? motion.t[k + 1] : motion.t[k] + h * part / parts);
+        source.push_back(k);
+      }
+    }
+    const auto intervals = static_cast<Eigen::Index>(source.size());
+    if (intervals + 1 == motion.size()) return false;
+    PhaseMesh split;
+    for (const int knot : mesh_.waypoint_knots) {
+      const auto at = std::find(times.begin(), times.end(), motion.t[knot]);
+      split.waypoint_knots.push_back(static_cast<int>(at - times.begin()));
+    }
+    split.times = Eigen::Map<const Eigen::VectorXd>(times.data(), intervals + 1);
+    split.modes.resize(intervals, mesh_.modes.cols());
+    for (Eigen::Index k = 0; k < intervals; ++k) {
+      const Eigen::Index old = source[static_cast<std::size_t>(k)];
+      split.modes.row(k) = mesh_.modes.row(old);
+      if (!mesh_.of_interval.empty())
+        split.of_interval.push_back(mesh_.of_interval[static_cast<std::size_t>(old)]);
+    }
+    mesh_ = std::move(split);
+    return true;
   }
 
   /// Draws in what is broken between the knots. @return false when all limits are kept
@@ -172,6 +250,7 @@ class Start {
         tightening_.limit_pressure = true;
       }
       if (c.what.starts_with("distance of the tip from its line")) tightening_.line *= share;
+      if (c.what.starts_with("standard deviation of the pressure")) tightening_.trust *= share;
       if (c.what.starts_with("clearance")) tightening_.clearance += 1.3 * c.excess;
       if (c.what.starts_with("position of joint ")) {
         const int j = model_.machine.joint_index(c.what.substr(18));
@@ -187,17 +266,25 @@ class Start {
     std::vector<LimitCheck> checks = check_limits(model_, problem_, motion, options_.refine);
     const double excess = worst_excess(checks);
     const double energy = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+    const double cost = exact_cost(model_, problem_, motion, energy, options_.refine);
     const bool kept = excess <= options_.limit_tolerance;
     const bool first = result_.motion.size() < 2;
     const bool had_kept = !first && result_.excess <= options_.limit_tolerance;
-    if (!first && !(kept && (!had_kept || energy < result_.energy_exact)) &&
+    if (!first && !(kept && (!had_kept || cost < result_.cost)) &&
         !(!kept && !had_kept && excess < result_.excess)) {
       return checks;
     }
     result_.motion = motion;
     result_.excess = excess;
     result_.energy_exact = energy;
+    result_.cost = cost;
+    result_.duration = motion.duration();
     result_.modes_held = modes_held;
+    result_.plan = PhasePlan{};
+    if (modes_held && !mesh_.of_interval.empty()) {
+      result_.plan = plan_;
+      result_.plan.durations = durations_of(mesh_, motion.t);
+    }
     // of the law last solved for; before the first solve there is none
     result_.energy_smooth =
         transcription_ ? 1e3 * transcription_->model_cost(transcription_->variables(motion)) /
@@ -208,13 +295,17 @@ class Start {
 
   /// Keeps a motion if it is better than what there is; while it breaks limits between knots, solves again with
   /// those drawn in.
-  void keep_limits(Trajectory motion, const Smoothing& smoothing, const ModeTable& modes,
-                   bool solve_again = true) {
+  void keep_limits(Trajectory motion, const Smoothing& smoothing, bool solve_again = true) {
     for (int attempt = 0;; ++attempt) {
-      const std::vector<LimitCheck> checks = offer(motion, modes.rows() > 0);
-      if (!solve_again || attempt == options_.tightenings || !tighten(checks)) return;
+      const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0);
+      if (!solve_again || attempt == options_.tightenings) return;
+      if (split_where_it_touches(motion)) {
+        motion = resampled(motion, mesh_.times);
+      } else if (!tighten(checks)) {
+        return;
+      }
       ++tightenings_used_;
-      const NlpResult solved = solve(motion, smoothing, modes, options_.tolerance);
+      const NlpResult solved = solve(motion, smoothing, options_.tolerance);
       if (!usable(solved)) return;
       motion = transcription_->trajectory(solved.x);
     }
@@ -251,21 +342,96 @@ class Start {
 
   /// Holds the modes a motion shows and makes the best of them; the start's motion is the best of all.
   void hold_modes(const Trajectory& shown) {
-    hold(modes_of(model_, problem_, shown, options_.mode_options), shown);
+    hold(modes_of(model_, problem_, shown, options_.mode_options), shown, true);
   }
 
-  void hold(const ModeTable& modes, const Trajectory& from) {
+  void hold(const ModeTable& modes, const Trajectory& from, bool overlaps) {
+    // beside obstacles free times at once would drive a rough start through them
+    const bool hemmed =
+        !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();
+    if (options_.free_phases && !hemmed &&
+        hold_plan(plan_of(modes, from.t, waypoint_times(from)), from, overlaps))
+      return;
+    if (!problem_.waypoints.empty()) return;  // only phases know when one is passed
+    if (time_.lower < time_.upper) return;    // only phases know what to do with free time
+    mesh_ = PhaseMesh{};
+    mesh_.times = from.t;
+    mesh_.modes = modes;
+    const NlpResult solved = solve(from, exact_law(), options_.tolerance);
+    note_status(solved);
+    if (!usable(solved)) return;
+    keep_limits(transcription_->trajectory(solved.x), exact_law());
+    if (options_.free_phases && hemmed && result_.excess <= options_.limit_tolerance)
+      hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
+  }
+
+  /// When the tip comes nearest to each waypoint, one after the other. [s]
+  std::vector<double> waypoint_times(const Trajectory& motion) const {
+    std::vector<double> times;
+    Eigen::Index from = 1;
+    const auto count = static_cast<Eigen::Index>(problem_.waypoints.size());
+    for (Eigen::Index w = 0; w < count; ++w) {
+      const Eigen::Index until = motion.size() - 1 - (count - w);
+      Eigen::Index best = from;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (Eigen::Index k = from; k <= until; ++k) {
+        const Eigen::VectorXd q = motion.q.row(k).transpose();
+        const double distance = (tip_position<double>(model_.machine, q) -
+                                 problem_.waypoints[static_cast<std::size_t>(w)])
+                                    .norm();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        best = k;
+      }
+      times.push_back(motion.t[best]);
+      from = best + 1;
+    }
+    return times;
+  }
+
+  /// The law without blends: only the maximum keeps a little softness.
+  Smoothing exact_law() const {
     Smoothing exact = options_.schedule.empty() ? Smoothing{} : options_.schedule.back();
     exact.pressure = options_.pressure_in_modes;
-    const NlpResult solved = solve(from, exact, modes, options_.tolerance);
-    note_status(solved);
-    if (usable(solved)) keep_limits(transcription_->trajectory(solved.x), exact, modes);
+    return exact;
+  }
+
+  /// [s] no valve opens and closes in less, and the problem needs some lower bound
+  double shortest_phase() const { return std::min(0.02, 2e-3 * time_.guess); }
+
+  /// Phases of free durations; phases that shrink to nothing are dropped and the rest is solved again.
+  bool hold_plan(const PhasePlan& wanted, const Trajectory& from, bool overlaps) {
+    PhasePlan plan = wanted;
+    if (overlaps) plan = with_overlaps(plan, options_.overlap);
+    Trajectory guess = from;
+    bool any = false;
+    for (int round = 0; round < 3; ++round) {
+      plan_ = plan;
+      mesh_ = mesh_of(plan, options_.intervals, options_.phase_intervals);
+      const NlpResult solved =
+          solve(resampled(guess, mesh_.times), exact_law(), options_.tolerance);
+      note_status(solved);
+      if (!usable(solved)) return any;
+      const Trajectory motion = transcription_->trajectory(solved.x);
+      PhasePlan found = plan;
+      found.durations = durations_of(mesh_, motion.t);
+      const PhasePlan kept = without_short(found, 1.5 * shortest_phase());
+      const bool last = kept.count() == found.count() || round == 2;
+      keep_limits(motion, exact_law(), last);
+      any = true;
+      if (last) return true;
+      plan = kept;
+      guess = motion;
+    }
+    return any;
   }
 
   const CraneModel& model_;
   const MotionProblem& problem_;
+  TimeWindow time_;
   const OptimizeOptions& options_;
-  Eigen::VectorXd times_;
+  PhaseMesh mesh_;  // of the next solve; no phases: all times fixed
+  PhasePlan plan_;  // behind the mesh
   Tightening tightening_;
   int tightenings_used_ = 0;
   Eigen::MatrixXd clear_postures_;
@@ -277,12 +443,32 @@ class Start {
 
 StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
                                 const ModeCandidate& candidate, const OptimizeOptions& options) {
-  return Start(model, problem, candidate.guess.duration(), options).run(candidate);
+  return optimize_with_modes(model, problem, candidate,
+                             TimeWindow::fixed(candidate.guess.duration()), options);
+}
+
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const TimeWindow& time,
+                                const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(candidate);
+}
+
+StartResult optimize_with_phases(const CraneModel& model, const MotionProblem& problem,
+                                 const std::string& name, const PhasePlan& plan,
+                                 const Trajectory& guess, const TimeWindow& time, bool overlaps,
+                                 const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(name, plan, guess, overlaps);
 }
 
 StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
                           const SeedMotion& seed, double duration, const OptimizeOptions& options) {
-  return Start(model, problem, duration, options).run(seed, duration);
+  return optimize_from(model, problem, seed, TimeWindow::fixed(duration), options);
+}
+
+StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
+                          const SeedMotion& seed, const TimeWindow& time,
+                          const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(seed);
 }
 
 }  // namespace sparflow

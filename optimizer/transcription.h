@@ -7,6 +7,8 @@
 ///               terminal(q_N), path(z_k), bounds on every single variable
 /// The cost integral alone is approximate (trapezoid). A model that uses the acceleration sees each interval at
 /// both its ends with the interval's own qdd, because qdd jumps at the knots.
+/// With free times, x ends in tau_0 .. tau_{P-1}: the intervals of phase p keep their shares of tau_p, and
+///   h_k = share_k tau_p,   total_lower <= sum tau <= total_upper,   price sum tau is added to the objective.
 /// Source: Betts (2010), Practical Methods for Optimal Control, ch. 4; equations and layout: docs/transcription.md.
 #include <memory>
 #include <vector>
@@ -37,10 +39,31 @@ struct TranscriptionBounds {
   void rest_to_rest(const Eigen::VectorXd& q_start);
 };
 
+/// Free durations of groups of intervals ("phases"), so that when a mode ends is itself optimised, and with it, if
+/// the total is free, how long the motion takes.
+struct PhaseTimes {
+  /// [N] phase of every interval, 0, .., 0, 1, .., P-1; empty: all times are fixed as `t` has them.
+  std::vector<int> of_interval;
+  Eigen::VectorXd lower, upper;   ///< [P] s, lower > 0
+  double total_lower = 0.0;       ///< [s]
+  double total_upper = kNoBound;  ///< [s]
+  double price = 0.0;             ///< cost of a second (idle power), in the cost's own unit
+  int count() const { return of_interval.empty() ? 0 : of_interval.back() + 1; }
+};
+
+/// A configuration constraint at one knot on the way.
+struct Waypoint {
+  int knot = 0;
+  std::shared_ptr<TerminalModel> model;
+};
+
 struct TranscriptionSpec {
-  Eigen::VectorXd t;  ///< [s] the N+1 knots, increasing, any spacing
+  Eigen::VectorXd
+      t;  ///< [s] the N+1 knots, increasing, any spacing; with free times where they start from
   std::shared_ptr<KnotModel> knot;
   std::shared_ptr<TerminalModel> terminal;  ///< null = the end posture is ruled by the bounds alone
+  std::vector<Waypoint> waypoints;
+  PhaseTimes phases;
   TranscriptionBounds bounds;
   Eigen::VectorXd acceleration_weight;  ///< [n] w_i >= 0, empty = none
   /// true: w_i qdd^2 h, an integral over time, independent of the mesh; false: a plain sum.
@@ -52,9 +75,10 @@ struct TranscriptionSpec {
 struct TranscriptionMultipliers {
   Eigen::MatrixXd q_defect;      ///< [N x n] of q_{k+1} - q_k - h/2 (qd_k + qd_{k+1}) = 0
   Eigen::MatrixXd qd_defect;     ///< [N x n] of qd_{k+1} - qd_k - h qdd_k = 0
-  Eigen::VectorXd terminal;      ///< [terminal rows]
+  Eigen::VectorXd terminal;      ///< [rows of the terminal model, then of the waypoints]
   Eigen::MatrixXd path;          ///< [nodes x path rows], zero where a row is not imposed
   Eigen::VectorXd lower, upper;  ///< of the bounds, laid out as x
+  double total_time = 0.0;       ///< of total_lower <= sum tau <= total_upper
 };
 
 class Transcription final : public NlpProblem {
@@ -70,10 +94,12 @@ class Transcription final : public NlpProblem {
   int q_index(int knot, int joint) const { return knot * n_ + joint; }
   int qd_index(int knot, int joint) const { return (knots_ + knot) * n_ + joint; }
   int qdd_index(int interval, int joint) const { return (2 * knots_ + interval) * n_ + joint; }
+  int tau_index(int phase) const { return (2 * knots_ + intervals_) * n_ + phase; }
 
   /// Start values; before the first call they are the middle of the bounds (0 where a side is open).
   void set_start(const Eigen::VectorXd& x);
-  /// Start from a motion, sampled at this mesh: q and qd from the motion (held at rest beyond its ends), qdd such
+  /// Start from a motion, sampled at this mesh (with free times a motion of as many knots is taken as it is, its
+  /// phases' durations with it): q and qd from the motion (held at rest beyond its ends), qdd such
   /// that the velocity defects vanish. Values outside their bounds are clipped.
   void set_start(const Trajectory& motion);
   /// Multipliers for a warm start; their shapes must be this transcription's.
@@ -83,7 +109,7 @@ class Transcription final : public NlpProblem {
   Eigen::VectorXd variables(const Trajectory& motion) const;
   Trajectory trajectory(const Eigen::VectorXd& x) const;
   TranscriptionMultipliers multipliers(const NlpMultipliers& rows) const;
-  /// Integral of the model's cost alone, without the acceleration term.
+  /// Integral of the model's cost alone, without the acceleration term and the price of time.
   double model_cost(const Eigen::VectorXd& x);
 
   NlpSize size() const override;
@@ -105,10 +131,11 @@ class Transcription final : public NlpProblem {
   /// acceleration) one end of an interval.
   struct Node {
     int knot = 0;
-    int interval = -1;    ///< whose qdd; -1 = the model does not use it
-    double weight = 0.0;  ///< [s] in the trapezoid
-    int first_row = 0;    ///< in g, of this node's path rows
-    int law = 0;          ///< interval in whose name the model is evaluated
+    int interval = -1;  ///< whose qdd; -1 = the model does not use it
+    int before = -1;    ///< interval on the left whose half step is in the weight; -1 = none
+    int after = -1;     ///< the same on the right
+    int first_row = 0;  ///< in g, of this node's path rows
+    int law = 0;        ///< interval in whose name the model is evaluated
     /// false: only rows that use the acceleration (the others are another node's)
     bool all_rows = true;
   };
@@ -117,37 +144,63 @@ class Transcription final : public NlpProblem {
     bool velocity;  ///< of qd, else of q
   };
 
+  /// A terminal model at its knot, with its rows in g and its places in the derivatives.
+  struct Point {
+    int knot = 0;
+    TerminalModel* model = nullptr;
+    int count = 0, row = 0, jacobian = 0;
+    std::vector<int> hessian;  // [lower triangle of q, column by column]
+  };
+
+  Eigen::VectorXd variables_on_mesh(const Trajectory& motion) const;
+  void check_phases() const;
+  int phase(int interval) const {
+    return spec_.phases.of_interval[static_cast<std::size_t>(interval)];
+  }
+  /// h_k at x. [s]
+  double step(const double* x, int interval) const {
+    return phase_count_ == 0 ? step_[interval] : x[tau_index(phase(interval))] * share_[interval];
+  }
+  /// Weight of a node in the trapezoid at x. [s]
+  double weight(const Node& node, const double* x) const;
+  void time_gradient(const double* x, Out gradient) const;
+  void time_hessian(const double* x, double objective_factor, const double* multiplier,
+                    Out value) const;
   void make_nodes();
+  void make_points();
   void make_defects();
   void make_jacobian();
   void make_hessian();
   int global_index(const Node& node, int local) const;
   const std::vector<int>& rows_of(const Node& node) const;
   void gather(const Node& node, const double* x, double* z) const;
+  double acceleration_factor(const double* x, int interval, int joint) const;
   double acceleration_cost(const double* x) const;
   void update_values(const double* x);
   void update_derivatives(const double* x);
   std::string joint_name(int joint) const;
 
   TranscriptionSpec spec_;
-  int n_, knots_, intervals_, z_size_, terminal_count_, path_count_;
+  int n_, knots_, intervals_, phase_count_, z_size_, terminal_count_ = 0, path_count_;
   bool with_acceleration_;
-  Eigen::VectorXd step_;                 ///< [s] h_k
-  Eigen::MatrixXd acceleration_factor_;  ///< [n x N] w_i or w_i h_k
+  Eigen::VectorXd step_;   ///< [s] h_k of spec_.t
+  Eigen::VectorXd share_;  ///< [N] h_k / tau of its phase, with free times
+  std::vector<Point> points_;
   std::vector<Node> nodes_;
   std::vector<Defect> defects_;  ///< in row order; rows between fixed variables are left out
-  int terminal_row_ = 0, row_count_ = 0;
+  int terminal_row_ = 0, total_time_row_ = -1, row_count_ = 0;
   std::vector<int> all_rows_, acceleration_rows_;
 
   // Structure, and the values that never change.
   std::vector<int> jacobian_row_, jacobian_column_, hessian_row_, hessian_column_;
   Eigen::VectorXd jacobian_constant_;
-  std::vector<std::vector<int>> row_columns_;  ///< per path row: the local indices it depends on
-  int terminal_jacobian_ = 0;                  ///< first value of the terminal block
-  int first_path_jacobian_ = 0;                ///< first value of the path blocks, node by node
-  std::vector<int> node_hessian_;              ///< [node x lower triangle of z, column by column]
-  std::vector<int> terminal_hessian_;          ///< [lower triangle of q_N, column by column]
-  std::vector<int> acceleration_hessian_;      ///< [N x n] diagonal of qdd
+  std::vector<std::vector<int>> row_columns_;   ///< per path row: the local indices it depends on
+  int first_path_jacobian_ = 0;                 ///< first value of the path blocks, node by node
+  std::vector<int> node_hessian_;               ///< [node x lower triangle of z, column by column]
+  std::vector<int> acceleration_hessian_;       ///< [N x n] diagonal of qdd
+  std::vector<int> time_node_hessian_;          ///< [node x sides x z] tau against z
+  std::vector<int> time_defect_hessian_;        ///< [defect x 2 or 1] tau against qd, qdd
+  std::vector<int> time_acceleration_hessian_;  ///< [N x n] tau against qdd
 
   Eigen::VectorXd start_;
   std::unique_ptr<NlpMultipliers> start_multipliers_;
@@ -156,10 +209,11 @@ class Transcription final : public NlpProblem {
   Eigen::VectorXd value_x_, derivative_x_;
   double cost_ = 0.0;
   Eigen::VectorXd cost_gradient_;
-  std::vector<double> node_cost_hessian_;  ///< [node x z x z]
-  std::vector<double> path_value_;         ///< [node x path rows]
-  std::vector<double> path_jacobian_;      ///< [node x path rows x z]
-  Eigen::VectorXd z_, z_gradient_, path_multiplier_, terminal_jacobian_value_;
+  std::vector<double> node_cost_, node_cost_gradient_;  ///< [node], [node x z], with free times
+  std::vector<double> node_cost_hessian_;               ///< [node x z x z]
+  std::vector<double> path_value_;                      ///< [node x path rows]
+  std::vector<double> path_jacobian_;                   ///< [node x path rows x z]
+  Eigen::VectorXd z_, path_multiplier_, terminal_jacobian_value_;
   std::vector<double> block_, terminal_block_;
 };
 

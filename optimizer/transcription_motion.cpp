@@ -55,12 +55,20 @@ const NlpMultipliers* Transcription::start_multipliers() const { return start_mu
 
 VectorXd Transcription::variables(const Trajectory& motion) const {
   SPARFLOW_CHECK(motion.q.cols() == n_, "the motion has another number of joints");
-  const Trajectory mine = resampled(motion, spec_.t);
+  if (phase_count_ > 0 && motion.size() == knots_) return variables_on_mesh(motion);
+  return variables_on_mesh(resampled(motion, spec_.t));
+}
+
+VectorXd Transcription::variables_on_mesh(const Trajectory& mine) const {
   VectorXd x(start_.size());
   Eigen::Map<MatrixXd>(x.data() + q_index(0, 0), n_, knots_) = mine.q.transpose();
   Eigen::Map<MatrixXd>(x.data() + qd_index(0, 0), n_, knots_) = mine.qd.transpose();
   Eigen::Map<MatrixXd>(x.data() + qdd_index(0, 0), n_, intervals_) =
       mine.qdd.topRows(intervals_).transpose();
+  if (phase_count_ > 0) {
+    x.tail(phase_count_).setZero();
+    for (int k = 0; k < intervals_; ++k) x[tau_index(phase(k))] += mine.t[k + 1] - mine.t[k];
+  }
   return x;
 }
 
@@ -69,6 +77,9 @@ Trajectory Transcription::trajectory(const VectorXd& x) const {
   using ConstMap = Eigen::Map<const MatrixXd>;
   Trajectory motion;
   motion.t = spec_.t;
+  for (int k = 0; k < intervals_ && phase_count_ > 0; ++k) {
+    motion.t[k + 1] = motion.t[k] + step(x.data(), k);
+  }
   motion.q = ConstMap(x.data() + q_index(0, 0), n_, knots_).transpose();
   motion.qd = ConstMap(x.data() + qd_index(0, 0), n_, knots_).transpose();
   motion.qdd.resize(knots_, n_);
@@ -96,6 +107,7 @@ TranscriptionMultipliers Transcription::multipliers(const NlpMultipliers& rows) 
   }
   m.lower = rows.lower;
   m.upper = rows.upper;
+  if (total_time_row_ >= 0) m.total_time = rows.constraint[total_time_row_];
   return m;
 }
 
@@ -119,6 +131,7 @@ void Transcription::set_start_multipliers(const TranscriptionMultipliers& m) {
       rows->constraint[row++] = m.path(static_cast<int>(s), path_row);
     }
   }
+  if (total_time_row_ >= 0) rows->constraint[total_time_row_] = m.total_time;
   rows->lower = m.lower;
   rows->upper = m.upper;
   start_multipliers_ = std::move(rows);

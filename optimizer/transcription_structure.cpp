@@ -14,6 +14,18 @@ namespace sparflow {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+void Transcription::make_points() {
+  const auto add = [&](int knot, TerminalModel* model) {
+    points_.push_back({knot, model, model->count(), 0, 0, {}});
+    terminal_count_ += model->count();
+  };
+  if (spec_.terminal) add(intervals_, spec_.terminal.get());
+  for (const Waypoint& w : spec_.waypoints) {
+    SPARFLOW_CHECK(w.model && w.knot >= 0 && w.knot <= intervals_, "a waypoint is at a knot");
+    add(w.knot, w.model.get());
+  }
+}
+
 void Transcription::make_nodes() {
   all_rows_.resize(static_cast<std::size_t>(path_count_));
   std::iota(all_rows_.begin(), all_rows_.end(), 0);
@@ -30,21 +42,20 @@ void Transcription::make_nodes() {
   }
   if (!with_acceleration_) {
     for (int k = 0; k < knots_; ++k) {
-      const double before = k > 0 ? step_[k - 1] : 0.0;
-      const double after = k < intervals_ ? step_[k] : 0.0;
+      const int after = k < intervals_ ? k : -1;
       if (k > 0 && k < intervals_ && spec_.knot->split_at(k)) {
-        nodes_.push_back({k, -1, 0.5 * before, 0, k - 1, true});
-        nodes_.push_back({k, -1, 0.5 * after, 0, k, false});
+        nodes_.push_back({k, -1, k - 1, -1, 0, k - 1, true});
+        nodes_.push_back({k, -1, -1, k, 0, k, false});
         continue;
       }
-      nodes_.push_back({k, -1, 0.5 * (before + after), 0, std::min(k, intervals_ - 1), true});
+      nodes_.push_back({k, -1, k - 1, after, 0, std::min(k, intervals_ - 1), true});
     }
     return;
   }
   // Rows without acceleration belong to the interval that begins at the knot; at the last knot, to the last one.
   for (int k = 0; k < intervals_; ++k) {
-    nodes_.push_back({k, k, 0.5 * step_[k], 0, k, true});
-    nodes_.push_back({k + 1, k, 0.5 * step_[k], 0, k, k + 1 == intervals_});
+    nodes_.push_back({k, k, -1, k, 0, k, true});
+    nodes_.push_back({k + 1, k, k, -1, 0, k, k + 1 == intervals_});
   }
 }
 
@@ -78,6 +89,9 @@ void Transcription::make_defects() {
           residual = q1 - q0 - 0.5 * step_[k] * (qd0 + qd1);
           scale = std::abs(q0) + std::abs(q1);
         }
+        // with free times only what holds for every step may go
+        const double moving = velocity ? b.qdd_lower(k, i) : std::max(std::abs(qd0), std::abs(qd1));
+        if (phase_count_ > 0 && moving != 0.0) all_fixed = false;
         constexpr double kRounding = 1e-14;  // some 50 units in the last place of the terms
         if (all_fixed && std::abs(residual) <= kRounding * scale) continue;
         defects_.push_back({k, i, velocity});
@@ -85,11 +99,18 @@ void Transcription::make_defects() {
     }
   }
   terminal_row_ = static_cast<int>(defects_.size());
-  row_count_ = terminal_row_ + terminal_count_;
+  row_count_ = terminal_row_;
+  for (Point& p : points_) {
+    p.row = row_count_;
+    row_count_ += p.count;
+  }
   for (Node& node : nodes_) {
     node.first_row = row_count_;
     row_count_ += static_cast<int>(rows_of(node).size());
   }
+  const PhaseTimes& times = spec_.phases;
+  if (phase_count_ > 0 && (times.total_lower > 0.0 || std::isfinite(times.total_upper)))
+    total_time_row_ = row_count_++;
 }
 
 int Transcription::global_index(const Node& node, int local) const {
@@ -112,16 +133,20 @@ void Transcription::make_jacobian() {
       add(row, qd_index(k, i), -1.0);
       add(row, qd_index(k + 1, i), 1.0);
       add(row, qdd_index(k, i), -h);
+      if (phase_count_ > 0) add(row, tau_index(phase(k)), 0.0);
     } else {
       add(row, q_index(k, i), -1.0);
       add(row, q_index(k + 1, i), 1.0);
       add(row, qd_index(k, i), -0.5 * h);
       add(row, qd_index(k + 1, i), -0.5 * h);
+      if (phase_count_ > 0) add(row, tau_index(phase(k)), 0.0);
     }
   }
-  terminal_jacobian_ = static_cast<int>(constant.size());
-  for (int r = 0; r < terminal_count_; ++r) {
-    for (int i = 0; i < n_; ++i) add(terminal_row_ + r, q_index(intervals_, i), 0.0);
+  for (Point& p : points_) {
+    p.jacobian = static_cast<int>(constant.size());
+    for (int r = 0; r < p.count; ++r) {
+      for (int i = 0; i < n_; ++i) add(p.row + r, q_index(p.knot, i), 0.0);
+    }
   }
   first_path_jacobian_ = static_cast<int>(constant.size());
   for (const Node& node : nodes_) {
@@ -133,13 +158,16 @@ void Transcription::make_jacobian() {
       ++row;
     }
   }
+  for (int p = 0; p < phase_count_ && total_time_row_ >= 0; ++p) {
+    add(total_time_row_, tau_index(p), 1.0);
+  }
   jacobian_constant_ = Eigen::Map<VectorXd>(constant.data(), static_cast<int>(constant.size()));
 }
 
 void Transcription::make_hessian() {
   // Two nodes share a knot's block, or a qdd's: each place of the lower triangle has one value.
   std::unordered_map<long, int> known;
-  const long width = static_cast<long>(n_) * (2 * knots_ + intervals_);
+  const long width = tau_index(phase_count_);
   const auto place = [&](int row, int column) {
     const auto [at, fresh] =
         known.try_emplace(row * width + column, static_cast<int>(hessian_row_.size()));
@@ -157,9 +185,10 @@ void Transcription::make_hessian() {
       }
     }
   }
-  for (int c = 0; c < n_ && terminal_count_ > 0; ++c) {
-    for (int r = c; r < n_; ++r) {
-      terminal_hessian_.push_back(place(q_index(intervals_, r), q_index(intervals_, c)));
+  for (Point& p : points_) {
+    for (int c = 0; c < n_; ++c) {
+      for (int r = c; r < n_; ++r)
+        p.hessian.push_back(place(q_index(p.knot, r), q_index(p.knot, c)));
     }
   }
   for (int k = 0; k < intervals_; ++k) {
@@ -167,10 +196,30 @@ void Transcription::make_hessian() {
       acceleration_hessian_.push_back(place(qdd_index(k, i), qdd_index(k, i)));
     }
   }
+  if (phase_count_ == 0) return;
+  for (const Node& node : nodes_) {
+    for (const int side : {node.before, node.after}) {
+      for (int i = 0; i < z_size_ && side >= 0; ++i)
+        time_node_hessian_.push_back(place(tau_index(phase(side)), global_index(node, i)));
+    }
+  }
+  for (const auto [k, i, velocity] : defects_) {
+    const int tau = tau_index(phase(k));
+    if (velocity) {
+      time_defect_hessian_.push_back(place(tau, qdd_index(k, i)));
+    } else {
+      time_defect_hessian_.push_back(place(tau, qd_index(k, i)));
+      time_defect_hessian_.push_back(place(tau, qd_index(k + 1, i)));
+    }
+  }
+  for (int k = 0; k < intervals_ && spec_.acceleration_weight_times_step; ++k) {
+    for (int i = 0; i < n_; ++i)
+      time_acceleration_hessian_.push_back(place(tau_index(phase(k)), qdd_index(k, i)));
+  }
 }
 
 NlpSize Transcription::size() const {
-  return {n_ * (2 * knots_ + intervals_), row_count_, static_cast<int>(jacobian_row_.size()),
+  return {tau_index(phase_count_), row_count_, static_cast<int>(jacobian_row_.size()),
           static_cast<int>(hessian_row_.size())};
 }
 
@@ -196,10 +245,16 @@ void Transcription::bounds(Out x_lower, Out x_upper, Out g_lower, Out g_upper) c
   lay(x_upper, qd, b.qd_upper);
   lay(x_lower, qdd, b.qdd_lower);
   lay(x_upper, qdd, b.qdd_upper);
+  if (phase_count_ > 0) {
+    x_lower.tail(phase_count_) = spec_.phases.lower;
+    x_upper.tail(phase_count_) = spec_.phases.upper;
+  }
   g_lower.head(terminal_row_).setZero();
   g_upper.head(terminal_row_).setZero();
-  if (terminal_count_ > 0) {
-    spec_.terminal->bounds(g_lower.data() + terminal_row_, g_upper.data() + terminal_row_);
+  for (const Point& p : points_) p.model->bounds(g_lower.data() + p.row, g_upper.data() + p.row);
+  if (total_time_row_ >= 0) {
+    g_lower[total_time_row_] = spec_.phases.total_lower;
+    g_upper[total_time_row_] = spec_.phases.total_upper;
   }
   if (path_count_ == 0) return;
   VectorXd lower(path_count_), upper(path_count_);
@@ -221,6 +276,7 @@ std::string Transcription::joint_name(int joint) const {
 }
 
 std::string Transcription::variable_name(int index) const {
+  if (index >= tau_index(0)) return fmt::format("duration of phase {}", index - tau_index(0));
   const int instant = index / n_;
   const std::string joint = joint_name(index % n_);
   if (instant < knots_) return fmt::format("q[{}] at t = {:.4g} s", joint, spec_.t[instant]);
@@ -236,8 +292,9 @@ std::string Transcription::constraint_name(int index) const {
     return fmt::format("{} defect of {} after t = {:.4g} s", d.velocity ? "velocity" : "position",
                        joint_name(d.joint), spec_.t[d.interval]);
   }
-  if (index < terminal_row_ + terminal_count_) {
-    return spec_.terminal->name(index - terminal_row_);
+  if (index == total_time_row_) return "total duration";
+  for (const Point& p : points_) {
+    if (index >= p.row && index < p.row + p.count) return p.model->name(index - p.row);
   }
   for (const Node& node : nodes_) {
     const std::vector<int>& rows = rows_of(node);

@@ -322,6 +322,7 @@ class Search {
 }  // namespace
 
 SeedResult find_seed_paths(const MotionProblem& problem, const SeedOptions& options) {
+  if (!problem.waypoints.empty()) return find_paths_through_waypoints(problem, options);
   return Search(problem, options).run();
 }
 

@@ -50,6 +50,10 @@ struct SeedResult {
   double solve_s = 0.0;    ///< [s]
 };
 
+/// The same leg by leg through the problem's waypoints: the postures at them are those the legs happen to end in, which
+/// whoever optimises may move. Status and message are those of the first leg that cannot be planned.
+SeedResult find_paths_through_waypoints(const MotionProblem& problem, const SeedOptions& options);
+
 /// @throws nothing for what the user asked for; sizes that do not match the machine are a CHECK
 SeedResult find_seed_paths(const MotionProblem& problem, const SeedOptions& options = {});
 

@@ -61,6 +61,8 @@ struct MotionLimits {
   std::vector<double> pump_max_flow;      ///< [m^3/s]
   std::vector<double> pump_max_pressure;  ///< [Pa]
   double valve_fraction = 1.0;            ///< share of each valve's full flow that may be used [-]
+  /// Trust region: largest standard deviation of a predicted working pressure [Pa]; 0 = none.
+  double pressure_std = 0.0;
 };
 
 /// The tip shall follow the straight line from its start to its goal.
@@ -68,9 +70,12 @@ struct TipLine {
   double tolerance = 0.0;  ///< largest distance of the tip from the line [m]
 };
 
-/// Cost = energy * E [J] + smoothness * integral of sum_j qdd_j^2 dt.
+/// Cost = energy * (E [J] + idle power * T) + time * T + commands * integral of sum_i u_i^2 dt
+///        + smoothness * integral of sum_j qdd_j^2 dt, with u_i the command of valve i (1 = full flow).
 struct ObjectiveWeights {
-  double energy = 1.0;  ///< [-]
+  double energy = 1.0;    ///< [-]
+  double time = 0.0;      ///< [W], with energy 0: the shortest time
+  double commands = 0.0;  ///< [W], with energy 0: the gentlest commands
   std::optional<double>
       smoothness;  ///< [J s^3] for joints in rad; absent: the optimiser's own default
 };
@@ -85,6 +90,8 @@ struct MotionProblem {
   double payload = 0.0;                       ///< [kg], hangs at the tip
   Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
   Goal goal;
+  /// Points the tip passes on the way, in this order, without having to stop [m]. When is free.
+  std::vector<Eigen::Vector3d> waypoints;
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]
   MotionLimits limits;

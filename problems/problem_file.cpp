@@ -40,7 +40,7 @@ class ProblemReader {
     const YamlMap root = parse_yaml(text, file_)
                              .map("a motion problem: machine, start, goal, duration_s, ...",
                                   {"name", "machine", "model", "payload_kg", "start", "goal",
-                                   "duration_s", "idle_power_W", "limits", "obstacles",
+                                   "waypoints", "duration_s", "idle_power_W", "limits", "obstacles",
                                    "clearance_m", "path", "objective", "knots"});
     problem_.file = file_;
     problem_.name = fs::path(file_).stem().string();
@@ -53,7 +53,13 @@ class ProblemReader {
     const std::string start = "the posture at the start, {q: {JOINT: position}}";
     problem_.start = read_posture(root.need("start", start).map(start, {"q"}).need("q", start));
     read_goal(root.need("goal", "where the motion ends, {tip: [x, y, z]} or {q: {...}}"));
+    if (const auto waypoints = root.find("waypoints")) {
+      const std::string form = "a point the tip passes, {tip: [x, y, z]}";
+      for (const YamlValue& v : waypoints->list("points the tip passes on the way"))
+        problem_.waypoints.push_back(read_tip(v.map(form, {"tip"}).need("tip", form)));
+    }
     problem_.idle_power = root.number_or("idle_power_W", kPower, 0.0);
+    if (const auto objective = root.find("objective")) read_objective(*objective);
     read_duration(root.need("duration_s", "seconds, {min, max} or free"));
     if (const auto obstacles = root.find("obstacles")) {
       for (const YamlValue& v : obstacles->list("obstacles")) {
@@ -62,8 +68,12 @@ class ProblemReader {
       }
     }
     problem_.clearance = root.number_or("clearance_m", kDistance, 0.0);
-    if (const auto path = root.find("path")) read_path(*path);
-    if (const auto objective = root.find("objective")) read_objective(*objective);
+    if (const auto path = root.find("path")) {
+      read_path(*path);
+      if (problem_.tip_line && !problem_.waypoints.empty())
+        path->fail(
+            "a tip on one straight line cannot pass waypoints as well; drop the one or the other");
+    }
     if (const auto knots = root.find("knots")) {
       problem_.knots = knots->integer("the number of knots", 4);
     }
@@ -159,7 +169,11 @@ class ProblemReader {
       problem_.goal = JointGoal{read_posture(*q)};
       return;
     }
-    const YamlValue tip = *map.find("tip");
+    problem_.goal = TipGoal{read_tip(*map.find("tip"))};
+  }
+
+  /// A point the tip can be asked to reach: in the machine's plane, if it has one.
+  Eigen::Vector3d read_tip(const YamlValue& tip) const {
     const Eigen::Vector3d goal = tip.vector3(kTipPoint);
     const Eigen::Vector3d now = tip_position<double>(problem_.machine, problem_.start);
     const auto rounded = [](double x) { return std::abs(x) < 1e-9 ? 0.0 : x; };
@@ -180,7 +194,7 @@ class ProblemReader {
                       "point of the plane is [{:.4f}, {:.4f}, {:.4f}]",
                       std::abs(off), nearest.x(), nearest.y(), nearest.z()));
     }
-    problem_.goal = TipGoal{goal};
+    return goal;
   }
 
   void read_duration(const YamlValue& value) {
@@ -195,7 +209,7 @@ class ProblemReader {
       return;
     }
     if (value.word() == "free") {
-      if (problem_.idle_power <= 0.0) {
+      if (problem_.idle_power <= 0.0 && problem_.objective.time <= 0.0) {
         value.fail(
             "got free, but idle_power_W is zero: slower is then always cheaper and no best "
             "duration "
@@ -211,8 +225,9 @@ class ProblemReader {
   }
 
   void read_limits(const YamlValue& value) {
-    const YamlMap map =
-        value.map("limits {joints, pumps, valve_fraction}", {"joints", "pumps", "valve_fraction"});
+    const YamlMap map = value.map("limits {joints, pumps, valve_fraction, pressure_std_bar}",
+                                  {"joints", "pumps", "valve_fraction", "pressure_std_bar"});
+    problem_.limits.pressure_std = map.number_or("pressure_std_bar", kPressure, 0.0);
     if (const auto joints = map.find("joints")) {
       const YamlMap named = joints->map("limits by joint name", joint_names());
       for (std::size_t i = 0; i < problem_.machine.joints.size(); ++i) {
@@ -279,13 +294,18 @@ class ProblemReader {
   }
 
   void read_objective(const YamlValue& value) {
-    const YamlMap map = value.map("weights {energy, smoothness}", {"energy", "smoothness"});
+    const YamlMap map = value.map("weights {energy, time_W, commands_W, smoothness}",
+                                  {"energy", "time_W", "commands_W", "smoothness"});
     ObjectiveWeights& weights = problem_.objective;
     weights.energy = map.number_or("energy", kWeight, 1.0);
+    weights.time = map.number_or("time_W", kWeight, 0.0);
+    weights.commands = map.number_or("commands_W", kWeight, 0.0);
     if (const auto smoothness = map.find("smoothness")) {
       weights.smoothness = smoothness->number(kWeight);
     }
-    if (weights.energy == 0.0 && weights.smoothness.value_or(0.0) == 0.0) {
+    const double sum =
+        weights.energy + weights.time + weights.commands + weights.smoothness.value_or(0.0);
+    if (sum == 0.0) {
       value.fail(
           "both weights are zero, so every motion is as good; give energy or smoothness a "
           "positive weight");

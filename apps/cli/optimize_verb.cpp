@@ -3,6 +3,7 @@
 #include "apps/cli/context.h"
 #include "apps/report/motion_page.h"
 #include "models/error.h"
+#include "optimizer/energy_bound.h"
 #include "optimizer/motion_table.h"
 
 namespace sparflow::cli {
@@ -14,6 +15,8 @@ struct OptimizeArguments {
   int intervals = 0;
   int processes = 0;
   bool smooth_only = false;
+  bool bound = false;
+  std::string from;
   Outputs outputs;
 };
 
@@ -38,10 +41,17 @@ OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
   return result;
 }
 
+void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
+  const EnergyBound bound = energy_bound(model, problem);
+  result.bound_note = bound.message;
+  if (bound.valid) result.lower_bound = bound.lower_bound_J;
+}
+
 int run(const OptimizeArguments& a) {
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
-  check_outputs_apart("optimize", outputs, {{"--problem", a.problem}, {"--model", a.model}});
+  check_outputs_apart("optimize", outputs,
+                      {{"--problem", a.problem}, {"--model", a.model}, {"--from", a.from}});
   check_writable(a.output);
   a.outputs.check();
   const auto [problem, model] = load_problem_and_model(a.problem, a.model);
@@ -62,7 +72,14 @@ int run(const OptimizeArguments& a) {
     seed_options.progress = [&](double share, const std::string& what) {
       progress(0.2 * share, what);
     };
-    seeds = make_seeds(problem, seed_options, options.intervals);
+    if (a.from.empty()) {
+      seeds = make_seeds(problem, seed_options, options.intervals);
+    } else {  // warm: nothing but the motion that is known
+      seeds.motions.push_back({"previous motion", load_motion(a.from, model.machine), 0.0, false});
+      seeds.motions.back().shortest_duration = seeds.motions.back().motion.duration();
+      options.sequential_starts = options.grid_starts = options.smooth_starts = 0;
+      options.sequence_rounds = 1;
+    }
     progress(0.2, fmt::format("solving from {} paths", seeds.motions.size()));
     finish_on_interrupt();
     options.progress = [&](int done, int all, const std::string& what) {
@@ -72,13 +89,14 @@ int run(const OptimizeArguments& a) {
     result = seeds.motions.empty() ? no_seed(problem, seeds)
                                    : optimize(model, problem, seeds.motions, options);
   }
+  if (a.bound && result.motion.size() > 1) set_bound(model, problem, result);
   if (result.motion.size() > 1 && !a.output.empty()) {
     write_file_atomically(a.output, motion_csv(model, result.motion, problem.payload));
   }
   if (!a.outputs.json.empty())
     write_file_atomically(a.outputs.json, optimize_json(model, problem, result));
   if (!a.outputs.report.empty()) {
-    const SeedMotion* line = cheapest_straight_line(seeds, result);
+    const SeedMotion* line = baseline_seed(seeds, result);
     const Trajectory timed = line ? with_duration(line->motion, result.duration) : Trajectory{};
     motion_page(model, problem, result, line ? &timed : nullptr, line ? line->name : "")
         .write(a.outputs.report);
@@ -114,6 +132,13 @@ void add_optimize_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(1, 256));
   verb->add_flag("--smooth-only", a->smooth_only,
                  "the single smooth NLP without modes (for comparison)");
+  verb->add_flag("--bound", a->bound,
+                 "also a certified lower bound: no motion of any duration takes less energy");
+  verb->add_option("--from", a->from,
+                   "start from this motion (CSV of an earlier run, for another goal or payload) "
+                   "and from nothing else")
+      ->type_name("MOTION.csv")
+      ->check(CLI::ExistingFile);
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }

@@ -93,10 +93,11 @@ void add_sets(Page& page, const Selftest& t) {
   Table table;
   table.title = "Sets, and the motion that separates them";
   table.columns = {{"one of"}, {"motion"}};
-  for (const auto& set : t.sets) {
-    std::string keys, motions;
-    for (const std::string& key : set) {
+  for (std::size_t k = 0; k < t.sets.size(); ++k) {
+    std::string keys, motions = k < t.experiments.size() ? t.experiments[k].sentence() : "";
+    for (const std::string& key : t.sets[k]) {
       keys += (keys.empty() ? "" : ", ") + key;
+      if (k < t.experiments.size()) continue;
       const auto e = std::find_if(t.effects.begin(), t.effects.end(),
                                   [&](const InjectedEffect& x) { return x.key() == key; });
       if (e != t.effects.end() && motions.find(e->separated_by) == std::string::npos)

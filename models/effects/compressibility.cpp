@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "models/effects/builtin.h"
 #include "models/effects/hydraulics.h"
@@ -11,6 +12,10 @@ namespace {
 
 /// Oil in hose and ports, as a share of the full chamber.
 constexpr double kDeadVolume = 0.05;
+
+/// A chamber that begins to be fed, or to hold the load, takes on its pressure through valves within a filter's
+/// width: what is compressed then does not come out of the rod's way. [s]
+constexpr double kTakesOver = 0.3;
 
 /// Shortest and longest length the joint's range (or the stated stroke) allows. [m]
 Range lengths_in_use(const Machine& machine, int cylinder) {
@@ -35,6 +40,26 @@ Eigen::VectorXd rate_of(const MachineSeries& log, const Eigen::VectorXd& x) {
     }
   }
   return rate;
+}
+
+/// Rates that a sensor's noise alone may make count as none: they would stand in the regressor all the time, where
+/// the oil is squeezed only now and then, and the modulus would come out many times too high. The noise is what
+/// differs between instants half a second apart, beyond the filter's width; a steady rise is none.
+void drop_noise(const MachineSeries& log, Eigen::VectorXd& rate) {
+  constexpr double kLevel = 3.0, kApart_s = 0.5;  // [-] standard deviations
+  const auto apart = std::max<Eigen::Index>(1, std::lround(kApart_s / std::max(log.step, 1e-3)));
+  std::vector<double> changes;
+  for (Eigen::Index k = apart; k < rate.size(); ++k) {
+    const double change = std::abs(rate[k] - rate[k - apart]);
+    if (std::isfinite(change)) changes.push_back(change);
+  }
+  if (changes.empty()) return;
+  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  const double least = kLevel * *middle / (0.6745 * std::sqrt(2.0));
+  for (double& r : rate) {
+    if (std::abs(r) < least) r = 0.0;
+  }
 }
 
 class Compressibility final : public Effect {
@@ -77,15 +102,29 @@ class Compressibility final : public Effect {
     if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) return false;
     const Range range = lengths_in_use(*log.machine, at);
     const double dead = kDeadVolume * (range.hi - range.lo);
-    const Eigen::VectorXd rate_a = rate_of(log, c.pressure_a), rate_b = rate_of(log, c.pressure_b);
+    Eigen::VectorXd rate_a = rate_of(log, c.pressure_a), rate_b = rate_of(log, c.pressure_b);
+    drop_noise(log, rate_a);
+    drop_noise(log, rate_b);
     const Eigen::VectorXd& force = carried_force(c);
     columns.resize(log.samples(), 1);
+    Eigen::Array<bool, Eigen::Dynamic, 1> on_piston(log.samples());
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       // the chamber that is supplied; at rest the one that holds the load
-      const bool piston_side = c.direction[k] != 0 ? c.direction[k] > 0 : force[k] > 0.0;
+      on_piston[k] = c.direction[k] != 0 ? c.direction[k] > 0 : force[k] > 0.0;
+    }
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const bool piston_side = on_piston[k];
       const double height = piston_side ? c.length[k] - range.lo : range.hi - c.length[k];
       const double squeezed = std::max(0.0, height) + dead;  // volume per area
       columns(k, 0) = piston_side ? -squeezed * rate_a[k] : squeezed * rate_b[k];
+    }
+    for (Eigen::Index k = 1; k < log.samples(); ++k) {
+      if (on_piston[k] == on_piston[k - 1]) continue;
+      const double at_change = log.time[k];
+      for (Eigen::Index j = k; j < log.samples() && log.time[j] - at_change < kTakesOver; ++j)
+        columns(j, 0) = 0.0;
+      for (Eigen::Index j = k; j-- > 0 && at_change - log.time[j] < kTakesOver;)
+        columns(j, 0) = 0.0;
     }
     return true;
   }

@@ -17,22 +17,25 @@ class OilTemperature final : public Effect {
         .title = "laminar losses follow the oil's viscosity",
         .stage = EffectStage::kPressure,
         .place = EffectPlace::kMachine,
-        .parameters = {{"return_loss",
-                        "bar",
+        // By slope at 40 degC rather than by loss: what warming takes away is what a log shows; how the loss and beta
+        // share it shows only in the curvature.
+        .parameters = {{"return_slope",
+                        "bar/K",
                         units::kBar,
                         0.0,
-                        40 * units::kBar,
-                        4 * units::kBar,
-                        "laminar loss from cylinder to tank at the section's full flow and 40 degC",
+                        3 * units::kBar,
+                        0.3 * units::kBar,
+                        "fall of the loss from cylinder to tank by kelvin, at the section's full "
+                        "flow and 40 degC",
                         true,
                         {}},
-                       {"supply_loss",
-                        "bar",
+                       {"supply_slope",
+                        "bar/K",
                         units::kBar,
                         0.0,
-                        40 * units::kBar,
-                        4 * units::kBar,
-                        "laminar loss from pump to cylinder at the section's full flow and 40 degC",
+                        3 * units::kBar,
+                        0.3 * units::kBar,
+                        "the same from pump to cylinder",
                         true,
                         {}},
                        {"beta",
@@ -41,10 +44,10 @@ class OilTemperature final : public Effect {
                         0.005,
                         0.1,
                         0.03,
-                        "viscosity falls by this share a kelvin",
+                        "viscosity falls by this share a kelvin: loss = slope / beta",
                         false,
-                        {0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075}}},
-        .equation = "dp = loss(40 degC) Q/Q_full (exp(-beta (T - 40)) - 1)",
+                        {0.005, 0.01, 0.02, 0.03, 0.04, 0.055, 0.075}}},
+        .equation = "dp = slope Q/Q_full (exp(-beta (T - 40)) - 1) / beta",
         .signals = {"oil temperature", "chamber pressures", "pump pressure"},
         .confused_with = {"return_back_pressure", "flow_dependent_margin", "drift of a sensor"},
         .separated_by = "the same motions cold and warm",
@@ -104,7 +107,10 @@ class OilTemperature final : public Effect {
   }
 
  private:
-  static double factor(double oil, double beta) { return std::expm1(-beta * (oil - kReference)); }
+  /// [K] degrees below the reference, bent by beta.
+  static double factor(double oil, double beta) {
+    return std::expm1(-beta * (oil - kReference)) / beta;
+  }
 };
 
 }  // namespace

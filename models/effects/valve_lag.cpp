@@ -47,7 +47,8 @@ class ValveLag final : public Effect {
         .confused_with = {"valve_deadband", "sensor_delay", "compressibility"},
         .separated_by = "steps of the command, several times",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 and 7 (valve dynamics)",
-        .form_error = 0.1,
+        // two stages in series, fitted by one, come out a fifth to a quarter shorter than their sum
+        .form_error = 0.13,
         .in_motion = "nothing: a motion prescribes flow; a controller must lead the command"};
     return info;
   }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "models/error.h"
+#include "simulator/hidden_effects/drive.h"
 #include "simulator/hidden_effects/log_columns.h"
-#include "simulator/hidden_effects/plant.h"
 
 namespace sparflow::simulator {
 namespace {
@@ -125,35 +125,42 @@ std::vector<std::string> places_of(const std::string& id, const Machine& machine
   return places;
 }
 
-GeneratedLog generate(const LogRequest& request) {
+std::unique_ptr<HiddenCase> draw_hidden(const LogRequest& request) {
   const Machine& machine = request.machine;
   if (request.rate < 5.0 || request.rate > 200.0 || request.seconds <= 0.0)
     throw InputError({}, "rate",
                      fmt::format("got {} Hz for {} s, expected 5..200 Hz and a "
                                  "positive duration",
                                  request.rate, request.seconds));
-  const double usual = usual_payload(machine, request.crane_seed);
-  CraneLaws laws = draw_crane_laws(machine, request.crane_seed);
-  std::vector<HiddenEffect> drawn = request.effects, absent = request.absent;
-  std::vector<std::unique_ptr<HiddenLaw>> hidden =
-      make_laws(drawn, machine, laws, request.crane_seed, usual);
-  for (const auto& law : make_laws(absent, machine, laws, request.crane_seed, usual))
-    law->prepare_crane(laws);
-  for (const auto& law : hidden) law->prepare_crane(laws);
+  auto drawn = std::make_unique<HiddenCase>();  // laws keep its address
+  HiddenCase& one = *drawn;
+  one.usual_payload = usual_payload(machine, request.crane_seed);
+  one.laws = draw_crane_laws(machine, request.crane_seed);
+  one.drawn = request.effects;
+  std::vector<HiddenEffect> absent = request.absent;
+  one.hidden = make_laws(one.drawn, machine, one.laws, request.crane_seed, one.usual_payload);
+  for (const auto& law :
+       make_laws(absent, machine, one.laws, request.crane_seed, one.usual_payload))
+    law->prepare_crane(one.laws);
+  for (const auto& law : one.hidden) law->prepare_crane(one.laws);
+  return drawn;
+}
 
+void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& before_step,
+               const RowWatch& after_row) {
+  const Machine& machine = request.machine;
+  const CraneLaws& laws = one.laws;
   Random load_random(request.motion_seed, "loads");
-  Payloads payloads = draw_payloads(load_random, usual, request.seconds, request.warm);
+  Payloads payloads = draw_payloads(load_random, one.usual_payload, request.seconds, request.warm);
   OperatorMotion motion(machine, laws, request.motion_seed);
   const int substeps =
       std::max(1, static_cast<int>(std::ceil(1.0 / request.rate / kLongestStep - 1e-9)));
   const double h = 1.0 / request.rate / substeps;
-  Plant plant(machine, laws, hidden, motion.start_posture(), h);
+  Plant plant(machine, laws, one.hidden, motion.start_posture(), h);
   const auto rows = static_cast<std::size_t>(std::llround(request.seconds * request.rate));
-  LogRecorder recorder(machine, request, rows);
 
   std::vector<double> command(machine.cylinders.size(), 0.0), rate(machine.cylinders.size());
   const double oil_before = request.warm ? 0.6 * request.seconds + 0.5 * laws.oil_time : 0.0;
-  SensorState sensors;
   for (std::size_t row = 0; row < rows; ++row) {
     for (int sub = 0; sub < substeps; ++sub) {
       const PlantState& s = plant.state();
@@ -162,7 +169,7 @@ GeneratedLog generate(const LogRequest& request) {
       motion.levers(s.t, h, s.q, rate, command);
       for (std::size_t i = 0; i < command.size(); ++i) {
         // over a dead band the lever is thrown: the operator has learned most of it
-        for (const auto& law : hidden) {
+        for (const auto& law : one.hidden) {
           const double gap = laws.operator_deadband_share *
                              law->lever_deadband(static_cast<int>(i), sign_of(command[i]));
           const double small = std::min(1.0, std::abs(command[i]) / 0.03);
@@ -173,15 +180,28 @@ GeneratedLog generate(const LogRequest& request) {
       }
       const double oil = laws.oil_end - (laws.oil_end - laws.oil_start) *
                                             std::exp(-(s.t + oil_before) / laws.oil_time);
-      plant.step(payloads.mass[payloads.now], oil, command);
+      const double payload = payloads.mass[payloads.now];
+      if (before_step) before_step(plant, {payload, oil, command});
+      plant.step(payload, oil, command);
     }
-    plant.sense(sensors);
-    recorder.add(plant.state(), sensors, payloads.mass[payloads.now]);
+    after_row(plant, payloads.mass[payloads.now]);
   }
+}
+
+GeneratedLog generate(const LogRequest& request) {
+  const std::unique_ptr<HiddenCase> drawn = draw_hidden(request);
+  HiddenCase& one = *drawn;
+  const auto rows = static_cast<std::size_t>(std::llround(request.seconds * request.rate));
+  LogRecorder recorder(request.machine, request, rows);
+  SensorState sensors;
+  drive_log(request, one, {}, [&](Plant& plant, double payload) {
+    plant.sense(sensors);
+    recorder.add(plant.state(), sensors, payload);
+  });
   Random noise(request.motion_seed, "noise");
-  recorder.finish(hidden, noise);
+  recorder.finish(one.hidden, noise);
   GeneratedLog log = recorder.log();
-  log.truth = truths(drawn, hidden);
+  log.truth = truths(one.drawn, one.hidden);
   return log;
 }
 

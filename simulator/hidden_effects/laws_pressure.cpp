@@ -176,7 +176,11 @@ class OilTemperature final : public HiddenLaw {
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    return {{"beta", beta_, "1/K", beta_}, {"return_loss", kLaminarLoss, "Pa", kLaminarLoss}};
+    // by kelvin at 40 degC; a table of straight pieces has no curvature there
+    const double middle = std::sinh(10.0 * beta_) / 10.0;
+    const double slope = kLaminarLoss * (law_ == 2 ? middle : beta_);
+    return {{"beta", beta_, "1/K", law_ == 2 ? 0.0 : beta_},
+            {"return_slope", slope, "Pa/K", slope}};
   }
 
  private:
@@ -249,7 +253,8 @@ std::vector<LawEntry> pressure_laws() {
            HiddenPlace::kMachine,
            true,
            {"exponential", "Walther (ASTM D341)", "table of straight pieces"},
-           "beta [1/K], return_loss [Pa] laminar loss of every section at full flow and 40 degC",
+           "beta [1/K], return_slope [Pa/K] fall of every section's laminar loss at full flow and "
+           "40 degC",
            make_law<OilTemperature>,
            any_hydraulic}};
 }

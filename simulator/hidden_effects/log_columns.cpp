@@ -11,12 +11,8 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kPressureNoise =
-    0.8 * kBar;                          // [Pa] standard deviation, white, as in the shared logs
-constexpr double kAngleNoise = 3.0e-4;   // [rad]
-constexpr double kTravelNoise = 1.0e-3;  // [m]
-constexpr double kOilNoise = 0.12;       // [K]
-constexpr double kForceNoise = 0.01;     // share of a drive's RMS force
+constexpr double kOilNoise = 0.12;    // [K]
+constexpr double kForceNoise = 0.01;  // share of a drive's RMS force
 
 using Columns = std::vector<std::vector<double>>;
 

@@ -4,6 +4,11 @@
 
 namespace sparflow::simulator {
 
+// Standard deviations at noise factor 1, white, as in the shared logs.
+inline constexpr double kPressureNoise = 0.8 * kBar;  ///< [Pa]
+inline constexpr double kAngleNoise = 3.0e-4;         ///< [rad]
+inline constexpr double kTravelNoise = 1.0e-3;        ///< [m]
+
 class LogRecorder {
  public:
   LogRecorder(const Machine& machine, const LogRequest& request, std::size_t rows);

@@ -61,6 +61,14 @@ void Plant::step(double payload, double oil, const std::vector<double>& command)
   s.t += s.h;
 }
 
+void Plant::follow(const PlantState& other) {
+  state_.q = other.q;
+  for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {
+    state_.cylinders[i].length = other.cylinders[i].length;
+    state_.cylinders[i].rate = other.cylinders[i].rate;
+  }
+}
+
 void Plant::move() {
   PlantState& s = state_;
   each([&s](HiddenLaw& law) { law.opening(s); });

@@ -15,6 +15,8 @@ class Plant {
   /// One step of state().h: levers in, everything else follows.
   void step(double payload, double oil, const std::vector<double>& command);
   void sense(SensorState& sensors);
+  /// Stands where another one stands, before a step: what follows differs by the laws alone.
+  void follow(const PlantState& other);
   const PlantState& state() const { return state_; }
 
  private:

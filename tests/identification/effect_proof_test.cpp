@@ -84,6 +84,20 @@ TEST(EffectAction, LooksAtTheEffectThatIsAskedFor) {
   EXPECT_GT(effect_action(e, {&small, &large}, 1, fit).size, 3.0);
 }
 
+TEST(EffectAction, AShareOfAnotherLawsFormIsNoEffectOfItsOwn) {
+  const VectorXd ones = VectorXd::Ones(kRows);
+  const Evidence e = evidence_with(110.0 * ones, 1.0, 6);
+  const EffectDesign small = plain_design({ones});
+  EffectDesign large = plain_design({ones});
+  EffectFit fit = fit_effects(e, {&small, &large});
+  fit.theta << 10.0, 100.0;
+  // a tenth of a friction of 100 may be its law's form; the weight of a mass is known better (2 %)
+  large.effect.effect = find_effect("viscous_friction");
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 1.0, 1e-9);
+  large.effect.effect = find_effect("unmodelled_mass");
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
+}
+
 /// The same by leaving rows out and solving again.
 HeldOutGain by_refitting(const Evidence& e, const std::vector<const EffectDesign*>& designs,
                          std::size_t index, const EffectFit& fit, int folds) {

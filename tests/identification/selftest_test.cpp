@@ -161,6 +161,27 @@ TEST(Selftest, OneJointCannotTellAMassFromItsPayload) {
   EXPECT_THAT(t.sets, Contains(Contains("payload_error")));
 }
 
+TEST(Selftest, SaysWhatToRecordForEachSet) {
+  const Selftest t = test_arm(arm_log(0.8));
+  ASSERT_FALSE(t.sets.empty());
+  ASSERT_EQ(t.experiments.size(), std::min(kSetsWithMotion, t.sets.size()));
+  for (std::size_t k = 0; k < t.experiments.size(); ++k) {
+    const Experiment& e = t.experiments[k];
+    EXPECT_FALSE(e.motion.empty());
+    EXPECT_THAT(t.table(), HasSubstr(e.sentence()));
+    // a motion of the menu is worth more than those at hand, which cannot tell the set apart
+    if (e.nats_per_minute > 0.0) {
+      EXPECT_GT(e.nats_per_minute, e.nats_here);
+    }
+    const auto named = std::count_if(
+        t.sets[k].begin(), t.sets[k].end(),
+        [&](const std::string& key) { return e.reason.find(key) != std::string::npos; });
+    EXPECT_GE(named, 2) << e.reason;
+  }
+  const auto json = nlohmann::json::parse(t.json());
+  EXPECT_EQ(json.at("experiments").size(), t.experiments.size());
+}
+
 TEST(Selftest, InjectionAgrees) {
   const Selftest t = test_arm(arm_log(0.8), 3);
   EXPECT_EQ(t.checks.size(), 3u);

@@ -1,6 +1,8 @@
 // Effects of the flow stage: what their columns recover from a log made by another formula.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "models/effects/hydraulics.h"
 #include "tests/models/effect_series.h"
 
@@ -144,6 +146,21 @@ TEST_F(FlowEffects, CompressedOilIsMissing) {
   c.direction.setConstant(-1);
   c.pressure_b = -10e5 * log.time;
   EXPECT_NEAR(columns("compressibility", 0, 0)(500, 0) * 1e-9, -1.1e-3, 1e-9);
+  // noise of a sensor at rest is no squeezed oil: steps of 10 bar stand out, the noise between them does not count
+  c.direction.setConstant(1);
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 0.05e5);
+  for (Index k = 0; k < log.samples(); ++k)
+    c.pressure_a[k] = (k % 400 < 200 ? 50e5 : 60e5) + noise(random);
+  const MatrixXd stepped = columns("compressibility", 0, 0);
+  EXPECT_LT((stepped.array() != 0.0).count(), log.samples() / 20);
+  EXPECT_NE(stepped(200, 0), 0.0);
+  // a chamber that takes over jumps to its pressure through the valves: not counted for 0.3 s before and after
+  c.pressure_a = 10e5 * log.time;
+  c.direction.tail(log.samples() - 500).setConstant(-1);
+  const MatrixXd switched = columns("compressibility", 0, 0);
+  for (const int k : {500 - 14, 499, 500, 500 + 14}) EXPECT_EQ(switched(k, 0), 0.0) << k;
+  for (const int k : {500 - 40, 500 + 40}) EXPECT_NE(switched(k, 0), 0.0) << k;
 }
 
 TEST_F(FlowEffects, SitWhereThereIsOilAndSayNothingWithoutACommand) {

@@ -195,8 +195,10 @@ TEST(Optimize, BaselinesAreTheCheapestOfTheirKind) {
 }
 
 TEST(Optimize, HeldModesAreKeptBySolver) {
-  // The solver may shift and reshape the legs of a one-by-one motion, never drive two cylinders at once.
-  const Lift c;
+  // Without overlaps offered, the solver may shift, stretch and reshape the legs of a one-by-one motion, never drive
+  // two cylinders at once.
+  Lift c;
+  c.options.overlap = 0.0;
   const VectorXd times = VectorXd::LinSpaced(41, 0.0, 16.0);
   std::vector<VectorXd> ends;
   for (const SeedMotion& s : c.seeds)
@@ -228,6 +230,7 @@ TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
   Lift c;
   c.problem.duration = {2.0, 2.0};
   c.options.sequential_starts = 0;
+  c.options.free_phases = false;  // else the shortest motion is sought and named
   c.seeds[0].shortest_duration = 11.25;
   c.seeds[1].shortest_duration = 14.75;
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);

@@ -183,7 +183,13 @@ TEST(Optimize, TooShortATimeIsNamedWithTheLimitAndAFeasibleDuration) {
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
   EXPECT_EQ(r.status, OptimizeStatus::kInfeasible);
   EXPECT_THAT(r.message, HasSubstr("infeasible"));
-  EXPECT_THAT(r.message, HasSubstr("keeps all limits in"));
+  EXPECT_THAT(r.message, HasSubstr("The shortest motion found takes"));
+  EXPECT_GT(r.shortest_duration, 2.0);
+  // in 2 % more than that it works, in 2 % less it does not
+  c.problem.duration = {1.02 * r.shortest_duration, 1.02 * r.shortest_duration};
+  EXPECT_EQ(optimize(c.model, c.problem, c.seeds, quick()).status, OptimizeStatus::kOptimal);
+  c.problem.duration = {0.98 * r.shortest_duration, 0.98 * r.shortest_duration};
+  EXPECT_EQ(optimize(c.model, c.problem, c.seeds, quick()).status, OptimizeStatus::kInfeasible);
 }
 
 TEST(Optimize, IdlePowerShortensAFreeMotion) {

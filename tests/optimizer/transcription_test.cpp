@@ -151,7 +151,7 @@ VectorXd uneven_times() {
   return t;
 }
 
-Transcription coupled(bool acceleration, bool laws) {
+Transcription coupled(bool acceleration, bool laws, bool free_times = false) {
   TranscriptionSpec spec;
   spec.t = uneven_times();
   spec.knot = std::make_shared<Coupled>(acceleration, laws);
@@ -159,6 +159,14 @@ Transcription coupled(bool acceleration, bool laws) {
   spec.bounds = wide(6, 2);
   spec.acceleration_weight = Vector2d(0.3, 0.05);
   spec.joint_names = {"boom", "jib"};
+  if (free_times) {
+    spec.phases.of_interval = {0, 0, 1, 1, 1, 2};
+    spec.phases.lower = VectorXd::Constant(3, 0.1);
+    spec.phases.upper = VectorXd::Constant(3, 2.0);
+    spec.phases.total_upper = 3.0;
+    spec.phases.price = 0.7;
+    spec.waypoints = {{2, std::make_shared<Product>()}};
+  }
   return Transcription(std::move(spec));
 }
 
@@ -171,12 +179,12 @@ VectorXd random_point(const NlpProblem& problem, unsigned seed) {
 }
 
 struct Variant {
-  bool acceleration, laws;
+  bool acceleration, laws, free_times = false;
 };
 class EveryVariant : public testing::TestWithParam<Variant> {};
 
 TEST_P(EveryVariant, DerivativesMatchDifferencesOnAnUnevenMesh) {
-  Transcription problem = coupled(GetParam().acceleration, GetParam().laws);
+  Transcription problem = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   for (unsigned seed : {1u, 2u}) {
     const DerivativeCheck check = check_derivatives(problem, random_point(problem, seed));
     // All functions are polynomials of degree <= 4, for which the extrapolated difference is exact: what is
@@ -188,7 +196,7 @@ TEST_P(EveryVariant, DerivativesMatchDifferencesOnAnUnevenMesh) {
 }
 
 TEST_P(EveryVariant, ObjectiveIsTheTrapezoidWrittenOut) {
-  Transcription problem = coupled(GetParam().acceleration, GetParam().laws);
+  Transcription problem = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   Coupled model(GetParam().acceleration, GetParam().laws);
   const VectorXd x = random_point(problem, 3);
   const Trajectory motion = problem.trajectory(x);
@@ -204,12 +212,13 @@ TEST_P(EveryVariant, ObjectiveIsTheTrapezoidWrittenOut) {
     }
     expected += h * (0.3 * std::pow(motion.qdd(k, 0), 2) + 0.05 * std::pow(motion.qdd(k, 1), 2));
   }
+  if (GetParam().free_times) expected += 0.7 * motion.duration();
   // The same sum in another order: a few units in the last place of terms of order 1.
   EXPECT_NEAR(problem.objective(x), expected, 1e-13);
 }
 
 TEST_P(EveryVariant, NoPlaceOfTheHessianIsNamedTwiceAndAllAreLower) {
-  Transcription problem = coupled(GetParam().acceleration, GetParam().laws);
+  Transcription problem = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   Eigen::VectorXi row(problem.size().hessian_nonzeros), column(row.size());
   problem.hessian_structure(row, column);
   std::set<std::pair<int, int>> places;
@@ -220,9 +229,10 @@ TEST_P(EveryVariant, NoPlaceOfTheHessianIsNamedTwiceAndAllAreLower) {
 }
 
 TEST_P(EveryVariant, AnswersDoNotDependOnTheOrderOfTheQuestions) {
-  const VectorXd a = random_point(coupled(false, false), 4),
-                 b = random_point(coupled(false, false), 5);
-  Transcription used = coupled(GetParam().acceleration, GetParam().laws);
+  const bool times = GetParam().free_times;
+  const VectorXd a = random_point(coupled(false, false, times), 4),
+                 b = random_point(coupled(false, false, times), 5);
+  Transcription used = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   VectorXd g(used.size().constraints), jacobian(used.size().jacobian_nonzeros);
   VectorXd hessian(used.size().hessian_nonzeros);
   const VectorXd multiplier = VectorXd::LinSpaced(g.size(), -1.0, 1.0);
@@ -231,7 +241,7 @@ TEST_P(EveryVariant, AnswersDoNotDependOnTheOrderOfTheQuestions) {
   used.constraints(a, g);
   used.hessian(a, 0.5, multiplier, hessian);
   used.objective(b);
-  Transcription fresh = coupled(GetParam().acceleration, GetParam().laws);
+  Transcription fresh = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   VectorXd g2 = g, jacobian2 = jacobian, hessian2 = hessian;
   fresh.hessian(a, 0.5, multiplier, hessian2);
   EXPECT_EQ(hessian, hessian2);
@@ -244,7 +254,25 @@ TEST_P(EveryVariant, AnswersDoNotDependOnTheOrderOfTheQuestions) {
 
 INSTANTIATE_TEST_SUITE_P(Transcription, EveryVariant,
                          testing::Values(Variant{false, false}, Variant{false, true},
-                                         Variant{true, false}, Variant{true, true}));
+                                         Variant{true, false}, Variant{true, true},
+                                         Variant{false, false, true}, Variant{false, true, true},
+                                         Variant{true, true, true}));
+
+TEST(Transcription, FreeTimesKeepSharesAndSayWhatTheyAre) {
+  Transcription problem = coupled(false, true, true);
+  VectorXd x = random_point(problem, 3);
+  x.tail(3) << 0.8, 2.4, 0.6;
+  const Trajectory motion = problem.trajectory(x);
+  // the mesh is 0.5 0.6 | 0.9 | 1.4 1.5 | 2.3 | 2.6: phase 0 had 0.1 and 0.3 s, phase 1 0.5, 0.1 and 0.8
+  EXPECT_NEAR(motion.t[1], 0.5 + 0.8 * 0.25, 1e-14);
+  EXPECT_NEAR(motion.t[3], 0.5 + 0.8 + 2.4 * 0.5 / 1.4, 1e-14);
+  EXPECT_NEAR(motion.duration(), 3.8, 1e-14);
+  EXPECT_EQ(problem.variable_name(problem.tau_index(1)), "duration of phase 1");
+  EXPECT_EQ(problem.constraint_name(problem.size().constraints - 1), "total duration");
+  VectorXd g(problem.size().constraints);
+  problem.constraints(x, g);
+  EXPECT_NEAR(g[g.size() - 1], 3.8, 1e-14);
+}
 
 TEST(Transcription, RowsAndLayoutAreAsDocumented) {
   Transcription plain = coupled(false, false);

@@ -1,0 +1,384 @@
+#include "optimizer/energy_bound_potential.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/error.h"
+#include "models/linkage.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+
+std::size_t z(long i) { return static_cast<std::size_t>(i); }
+
+/// Share of the largest rate below which a cylinder's length is no coordinate (dead centre).
+constexpr double kLeastRate = 0.15;
+
+/// The largest of each node's own and its neighbours' values along one axis.
+void widen(const Lattice& lattice, int joint, std::vector<float>& field) {
+  const long stride = lattice.stride[z(joint)];
+  const long lines = lattice.lines[z(joint)].size();
+  const std::vector<float> before = field;
+  for (long node = 0; node < lattice.nodes; ++node) {
+    const long line = node / stride % lines;
+    if (line > 0) field[z(node)] = std::max(field[z(node)], before[z(node - stride)]);
+    if (line + 1 < lines) field[z(node)] = std::max(field[z(node)], before[z(node + stride)]);
+  }
+}
+
+/// The prices are divided by m, which is straight between lines where the prices' mean is curved: what is divided can be
+/// lower inside an edge than at both its ends. Factor <= 1 by edge that covers it, from the second differences of m with
+/// the same fourfold safety.
+VectorXd chord_factors(const AxisCoordinate& axis) {
+  const Eigen::Index lines = axis.x.size();
+  VectorXd bend = VectorXd::Zero(lines);
+  for (Eigen::Index k = 1; k + 1 < lines; ++k) {
+    const double a = axis.x[k] - axis.x[k - 1], b = axis.x[k + 1] - axis.x[k];
+    const double second =
+        2.0 * ((axis.m[k + 1] - axis.m[k]) / b - (axis.m[k] - axis.m[k - 1]) / a) / (a + b);
+    bend[k] = 0.5 * std::max(a, b) * std::max(a, b) * std::max(0.0, second) / axis.m[k];
+  }
+  if (lines >= 4) {  // towards the ends of the axis it may still grow
+    const auto grown = [](double next, double after) {
+      return next * (after > 0.0 ? std::clamp(next / after, 1.0, 3.0) : 1.0);
+    };
+    bend[0] = grown(bend[1], bend[2]);
+    bend[lines - 1] = grown(bend[lines - 2], bend[lines - 3]);
+  }
+  VectorXd keep(lines - 1);
+  for (Eigen::Index k = 0; k + 1 < lines; ++k) {
+    double worst = std::max(bend[k], bend[k + 1]);
+    if (k > 0) worst = std::max(worst, bend[k - 1]);
+    if (k + 2 < lines) worst = std::max(worst, bend[k + 2]);
+    keep[k] = std::max(0.0, 1.0 - worst);
+  }
+  return keep;
+}
+
+}  // namespace
+
+MoveWeights::MoveWeights(const CraneModel& model, const MotionProblem& problem,
+                         const Machine& loaded, const std::vector<Range>& force_range)
+    : payload_(problem.payload),
+      demands_(cylinder_demands(model, problem, force_range)),
+      statics_(loaded),
+      force_(model.cylinders.size()),
+      rate_(model.cylinders.size()) {
+  for (const PumpModel& pump : model.pumps) standby_.push_back(pump.standby);
+}
+
+double MoveWeights::price(int joint, bool forward, const double* force, const double* rate) const {
+  double sum = 0.0;
+  for (const CylinderDemand& d : demands_) {
+    if (d.joint != joint) continue;
+    const int side = forward == (rate[d.cylinder] > 0.0) ? 0 : 1;
+    double pressure = standby_[z(d.pump)];
+    if (d.load_sensing) pressure = std::max(pressure, d.table[side].least(force[d.cylinder]));
+    sum += std::max(0.0, pressure) * d.area[side] * std::abs(rate[d.cylinder]);
+  }
+  return sum;
+}
+
+void MoveWeights::at(const VectorXd& q, Eigen::MatrixX2d& weight) {
+  statics_.update(q.data(), payload_, 0);
+  for (std::size_t c = 0; c < force_.size(); ++c) {
+    force_[c] = statics_.force()[static_cast<Eigen::Index>(c)];
+    rate_[c] = statics_.length(static_cast<int>(c)).d1;
+  }
+  weight.resize(q.size(), 2);
+  for (int j = 0; j < q.size(); ++j) {
+    weight(j, 0) = price(j, true, force_.data(), rate_.data());
+    weight(j, 1) = price(j, false, force_.data(), rate_.data());
+  }
+}
+
+EnergyPotential::EnergyPotential(const Machine& loaded, const MotionProblem& problem,
+                                 MoveWeights& weights, Lattice lattice)
+    : machine_(&loaded), lattice_(std::move(lattice)) {
+  const LatticeForces forces = lattice_forces(loaded, lattice_, problem.payload);
+  losses_.assign(z(lattice_.joints()), Eigen::Vector2d::Zero());
+  make_costs(forces, weights);
+  solve(lattice_.nearest_node(problem.start));
+}
+
+void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights& weights) {
+  const int n = lattice_.joints();
+  const std::size_t cylinders = forces.length.size();
+  cost_.resize(z(n));
+  axes_.resize(z(n));
+  std::vector<double> force(cylinders), rate(cylinders);
+  for (int j = 0; j < n; ++j) {
+    const VectorXd& lines = lattice_.lines[z(j)];
+    AxisCoordinate& axis = axes_[z(j)];
+    // the coordinate's x
+    int own = 0;
+    for (const CylinderDemand& d : weights.demands()) {
+      if (d.joint != j) continue;
+      ++own;
+      axis.cylinder = d.cylinder;
+    }
+    const bool monotone = own == 1 && [&] {
+      const auto rates = forces.rate[z(axis.cylinder)].array();
+      return rates.minCoeff() * rates.maxCoeff() > 0.0 &&
+             rates.abs().minCoeff() > kLeastRate * rates.abs().maxCoeff();
+    }();
+    if (!monotone) axis.cylinder = -1;
+    axis.x = axis.cylinder < 0 ? lines
+                               : VectorXd((forces.length[z(axis.cylinder)].array() -
+                                           forces.length[z(axis.cylinder)][0])
+                                              .abs());
+    // prices of moving j alone, per unit of x, and their mean along the axis
+    std::array<std::vector<float>, 2> field;
+    for (auto& f : field) f.resize(z(lattice_.nodes));
+    VectorXd sum = VectorXd::Zero(lines.size());
+    for (long node = 0; node < lattice_.nodes; ++node) {
+      const int line = lattice_.line(node, j);
+      for (std::size_t c = 0; c < cylinders; ++c) {
+        force[c] = static_cast<double>(forces.force(static_cast<Eigen::Index>(c), node));
+        const int joint = machine_->cylinders[c].joint;
+        rate[c] = joint == j ? forces.rate[c][line] : 0.0;
+      }
+      const double per = axis.cylinder < 0 ? 1.0 : std::abs(rate[z(axis.cylinder)]);
+      for (const int direction : {0, 1}) {
+        const double price = weights.price(j, direction == 0, force.data(), rate.data()) / per;
+        field[z(direction)][z(node)] = static_cast<float>(price);
+        sum[line] += price;
+      }
+    }
+    const double top = sum.maxCoeff();
+    axis.m = top > 0.0 ? VectorXd((sum / top).cwiseMax(1e-3)) : VectorXd::Ones(lines.size());
+    axis.u.setZero(lines.size());
+    for (Eigen::Index k = 1; k < lines.size(); ++k) {
+      axis.u[k] = axis.u[k - 1] + (axis.x[k] - axis.x[k - 1]) * 0.5 * (axis.m[k] + axis.m[k - 1]);
+    }
+    for (auto& f : field) {
+      for (long node = 0; node < lattice_.nodes; ++node) {
+        f[z(node)] /= static_cast<float>(axis.m[lattice_.line(node, j)]);
+      }
+    }
+    cost_[z(j)] = std::move(field);
+  }
+  for (int j = 0; j < n; ++j) {
+    for (const int direction : {0, 1}) edge_costs(j, cost_[z(j)][z(direction)]);
+    // a cylinder at its dead centre within an edge costs nothing there
+    for (std::size_t c = 0; c < cylinders; ++c) {
+      if (machine_->cylinders[c].joint != j) continue;
+      const VectorXd& r = forces.rate[c];
+      for (long node = 0; node < lattice_.nodes; ++node) {
+        const int line = lattice_.line(node, j);
+        if (line + 1 < r.size() && r[line] * r[line + 1] <= 0.0) {
+          cost_[z(j)][0][z(node)] = cost_[z(j)][1][z(node)] = 0.0F;
+        }
+      }
+    }
+  }
+}
+
+void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
+  const int n = lattice_.joints();
+  // What linear interpolation along each axis can be above the price: h^2/8 times a smooth second derivative; at a kink
+  // (standby, tabulated least demand) half the larger of the second differences of the cell's nodes times h^2. The
+  // latter is four times the former, so it serves both.
+  constexpr double kShare = 0.5;
+  std::vector<float> allowance(z(lattice_.nodes), 0.0F);
+  for (int k = 0; k < n; ++k) {
+    const VectorXd& u = axes_[z(k)].u;
+    const long stride = lattice_.stride[z(k)], lines = u.size();
+    double total = 0.0;
+    std::vector<float> along(z(lattice_.nodes), 0.0F);
+    for (long node = 0; node < lattice_.nodes; ++node) {
+      const long line = node / stride % lines;
+      if (line == 0 || line + 1 == lines) continue;
+      const double a = u[line] - u[line - 1], b = u[line + 1] - u[line], h = std::max(a, b);
+      const double f = static_cast<double>(field[z(node)]);
+      const double left = static_cast<double>(field[z(node - stride)]);
+      const double right = static_cast<double>(field[z(node + stride)]);
+      const double second = 2.0 * ((right - f) / b - (f - left) / a) / (a + b);
+      const double off = kShare * h * h * std::max(0.0, second);
+      along[z(node)] = static_cast<float>(off);
+      if (f > 0.0) total += off / f;
+    }
+    if (lines >= 4) {  // towards the ends of the axis it may still grow
+      for (long node = 0; node < lattice_.nodes; ++node) {
+        const long line = node / stride % lines;
+        if (line > 0 && line + 1 < lines) continue;
+        const long in = line == 0 ? stride : -stride;
+        const float next = along[z(node + in)], after = along[z(node + 2 * in)];
+        const float growth = after > 0.0F ? std::clamp(next / after, 1.0F, 3.0F) : 1.0F;
+        along[z(node)] = growth * next;
+      }
+    }
+    for (std::size_t node = 0; node < along.size(); ++node) allowance[node] += along[node];
+    losses_[z(k)][1] += 0.5 * total / static_cast<double>(lattice_.nodes);
+  }
+  for (int k = 0; k < n; ++k) widen(lattice_, k, allowance);
+  const VectorXd& u = axes_[z(joint)].u;
+  const VectorXd keep = chord_factors(axes_[z(joint)]);
+  const long stride = lattice_.stride[z(joint)], lines = u.size();
+  double change = 0.0;
+  for (long node = 0; node < lattice_.nodes; ++node) {
+    const long line = node / stride % lines;
+    if (line + 1 == lines) continue;
+    const float a = field[z(node)], b = field[z(node + stride)];
+    if (a + b > 0.0F) change += static_cast<double>(std::abs(a - b) / (a + b));
+    const double least =
+        static_cast<double>(std::min(a, b)) -
+        static_cast<double>(std::max(allowance[z(node)], allowance[z(node + stride)]));
+    const auto cost =
+        static_cast<float>(std::max(0.0, least) * keep[line] * (u[line + 1] - u[line]));
+    field[z(node)] = std::nextafter(cost, 0.0F);
+  }
+  losses_[z(joint)][0] += 0.5 * change / static_cast<double>(lattice_.nodes);
+}
+
+void EnergyPotential::solve(long start) {
+  phi_.assign(z(lattice_.nodes), std::numeric_limits<double>::infinity());
+  phi_[z(start)] = 0.0;
+  const unsigned orders = 1u << lattice_.joints();
+  // sweeps in all orders until none finds a shorter way: then every edge's inequality holds
+  for (unsigned quiet = 0, order = 0; quiet < orders; order = (order + 1) % orders) {
+    quiet = sweep(order) ? 0 : quiet + 1;
+  }
+}
+
+bool EnergyPotential::sweep(unsigned order) {
+  const int n = lattice_.joints();
+  bool any = false;
+  std::vector<long> line(z(n)), first(z(n)), last(z(n)), by(z(n));
+  for (int j = 0; j < n; ++j) {
+    const bool down = order >> j & 1u;
+    const long end = lattice_.lines[z(j)].size() - 1;
+    first[z(j)] = down ? end : 0;
+    last[z(j)] = down ? 0 : end;
+    by[z(j)] = down ? -1 : 1;
+    line[z(j)] = first[z(j)];
+  }
+  const int inner = n - 1;
+  while (true) {
+    long node = 0;
+    for (int j = 0; j < n; ++j) node += line[z(j)] * lattice_.stride[z(j)];
+    for (long k = first[z(inner)];; k += by[z(inner)], node += by[z(inner)]) {
+      double best = phi_[z(node)];
+      for (int j = 0; j < n; ++j) {
+        const long at = j == inner ? k : line[z(j)];
+        if (at == first[z(j)]) continue;  // nothing upwind
+        const long from = node - by[z(j)] * lattice_.stride[z(j)];
+        const double step = by[z(j)] > 0 ? static_cast<double>(cost_[z(j)][0][z(from)])
+                                         : static_cast<double>(cost_[z(j)][1][z(node)]);
+        best = std::min(best, phi_[z(from)] + step);
+      }
+      if (best < phi_[z(node)] * (1.0 - 1e-12)) {
+        phi_[z(node)] = best;
+        any = true;
+      }
+      if (k == last[z(inner)]) break;
+    }
+    int j = inner - 1;
+    for (; j >= 0; --j) {
+      if (line[z(j)] == last[z(j)]) {
+        line[z(j)] = first[z(j)];
+        continue;
+      }
+      line[z(j)] += by[z(j)];
+      break;
+    }
+    if (j < 0) return any;
+  }
+}
+
+int EnergyPotential::cell_of(int joint, double q) const {
+  const VectorXd& lines = lattice_.lines[z(joint)];
+  const auto* end = lines.data() + lines.size();
+  const auto above = std::upper_bound(lines.data(), end, q) - lines.data();
+  return static_cast<int>(std::clamp<std::ptrdiff_t>(above - 1, 0, lines.size() - 2));
+}
+
+double EnergyPotential::coordinate(int joint, int cell, double q) const {
+  const AxisCoordinate& axis = axes_[z(joint)];
+  double x = q;
+  if (axis.cylinder >= 0) {
+    const double first = lattice_.lines[z(joint)][0];
+    x = std::abs(cylinder_length(*machine_, axis.cylinder, q) -
+                 cylinder_length(*machine_, axis.cylinder, first));
+  }
+  const double width = axis.x[cell + 1] - axis.x[cell];
+  const double way = std::clamp(x - axis.x[cell], 0.0, width);
+  const double slope = (axis.m[cell + 1] - axis.m[cell]) / width;
+  return axis.u[cell] + way * (axis.m[cell] + 0.5 * slope * way);
+}
+
+double EnergyPotential::coordinate_rate(int joint, int cell, double q) const {
+  const AxisCoordinate& axis = axes_[z(joint)];
+  double x = q, rate = 1.0;
+  if (axis.cylinder >= 0) {
+    const double first = lattice_.lines[z(joint)][0];
+    const Taylor3 length = linkage_rates(*machine_, axis.cylinder, q);
+    x = std::abs(length.value - cylinder_length(*machine_, axis.cylinder, first));
+    rate = std::abs(length.d1);
+  }
+  const double share = (x - axis.x[cell]) / (axis.x[cell + 1] - axis.x[cell]);
+  return rate * (axis.m[cell] + std::clamp(share, 0.0, 1.0) * (axis.m[cell + 1] - axis.m[cell]));
+}
+
+double EnergyPotential::value(const VectorXd& q) const {
+  const int n = lattice_.joints();
+  long base = 0;
+  std::array<double, 8> share{};
+  SPARFLOW_CHECK(n <= 8, "a grid has few joints");
+  for (int j = 0; j < n; ++j) {
+    const int cell = cell_of(j, q[j]);
+    const VectorXd& u = axes_[z(j)].u;
+    share[z(j)] = (coordinate(j, cell, q[j]) - u[cell]) / (u[cell + 1] - u[cell]);
+    base += cell * lattice_.stride[z(j)];
+  }
+  double sum = 0.0;
+  for (unsigned corner = 0; corner < 1u << n; ++corner) {
+    double weight = 1.0;
+    long node = base;
+    for (int j = 0; j < n; ++j) {
+      const bool up = corner >> j & 1u;
+      weight *= up ? share[z(j)] : 1.0 - share[z(j)];
+      if (up) node += lattice_.stride[z(j)];
+    }
+    if (weight > 0.0) sum += weight * phi_[z(node)];
+  }
+  return sum;
+}
+
+VectorXd EnergyPotential::gradient(const VectorXd& q) const {
+  const int n = lattice_.joints();
+  VectorXd slope = VectorXd::Zero(n);
+  long base = 0;
+  VectorXd share(n), per(n);
+  for (int j = 0; j < n; ++j) {
+    const int cell = cell_of(j, q[j]);
+    const VectorXd& u = axes_[z(j)].u;
+    const double width = u[cell + 1] - u[cell];
+    share[j] = (coordinate(j, cell, q[j]) - u[cell]) / width;
+    per[j] = coordinate_rate(j, cell, q[j]) / width;
+    base += cell * lattice_.stride[z(j)];
+  }
+  for (unsigned corner = 0; corner < 1u << n; ++corner) {
+    long node = base;
+    for (int j = 0; j < n; ++j) {
+      if (corner >> j & 1u) node += lattice_.stride[z(j)];
+    }
+    for (int d = 0; d < n; ++d) {
+      double weight = (corner >> d & 1u) != 0 ? 1.0 : -1.0;
+      for (int j = 0; j < n; ++j) {
+        if (j != d) weight *= (corner >> j & 1u) != 0 ? share[j] : 1.0 - share[j];
+      }
+      slope[d] += weight * phi_[z(node)] * per[d];
+    }
+  }
+  return slope;
+}
+
+void EnergyPotential::scale(double factor) {
+  for (double& value : phi_) value *= factor;
+}
+
+}  // namespace sparflow

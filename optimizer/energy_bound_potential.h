@@ -1,0 +1,79 @@
+#pragma once
+/// The potential of optimizer/energy_bound.h on its grid.
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "models/static_force.h"
+#include "optimizer/energy_grid_lattice.h"
+#include "optimizer/energy_grid_table.h"
+
+namespace sparflow {
+
+/// Least price of moving one joint alone, W_j+ and W_j-, at any posture. A workspace.
+class MoveWeights {
+ public:
+  MoveWeights(const CraneModel& model, const MotionProblem& problem, const Machine& loaded,
+              const std::vector<Range>& force_range);
+
+  /// @param weight [n x 2] in + and - direction [J/rad] or [J/m]
+  void at(const Eigen::VectorXd& q, Eigen::MatrixX2d& weight);
+  /// The same from tabulated lengths' rates and forces. @param force [N] by cylinder @param rate by cylinder
+  double price(int joint, bool forward, const double* force, const double* rate) const;
+  const std::vector<CylinderDemand>& demands() const { return demands_; }
+
+ private:
+  double payload_;
+  std::vector<CylinderDemand> demands_;
+  std::vector<double> standby_;
+  StaticForce statics_;
+  std::vector<double> force_, rate_;
+};
+
+/// Coordinate of one axis in which the potential is interpolated: du = m(x) dx between two lines with m linear in x, x the
+/// length of the joint's only cylinder where that is monotone, else the joint coordinate. Along it the weights vary
+/// least, and not at all at constant pressure.
+struct AxisCoordinate {
+  int cylinder = -1;  ///< -1 = the joint coordinate itself
+  Eigen::VectorXd x;  ///< at the lines, increasing in absolute travel from the first
+  Eigen::VectorXd m;  ///< at the lines
+  Eigen::VectorXd u;  ///< at the lines, increasing
+};
+
+class EnergyPotential {
+ public:
+  /// Builds and solves. @param lattice the start must be a node
+  EnergyPotential(const Machine& loaded, const MotionProblem& problem, MoveWeights& weights,
+                  Lattice lattice);
+
+  const Lattice& lattice() const { return lattice_; }
+  double node_value(long node) const { return phi_[static_cast<std::size_t>(node)]; }
+  /// Interpolated. [J]
+  double value(const Eigen::VectorXd& q) const;
+  /// Its gradient inside a cell [J/rad] or [J/m].
+  Eigen::VectorXd gradient(const Eigen::VectorXd& q) const;
+  /// Multiplies the potential.
+  void scale(double factor);
+  /// Mean over the edges of each axis: relative change of the price along the axis itself (x) and the sum of relative
+  /// curvature allowances across the axis (y), for choosing the number of lines.
+  const std::vector<Eigen::Vector2d>& losses() const { return losses_; }
+
+ private:
+  void make_costs(const LatticeForces& forces, const MoveWeights& weights);
+  void edge_costs(int joint, std::vector<float>& field);
+  void solve(long start);
+  bool sweep(unsigned order);
+  double coordinate(int joint, int cell, double q) const;
+  double coordinate_rate(int joint, int cell, double q) const;
+  int cell_of(int joint, double q) const;
+
+  const Machine* machine_;
+  Lattice lattice_;
+  std::vector<AxisCoordinate> axes_;
+  std::vector<std::array<std::vector<float>, 2>>
+      cost_;  // [joint][direction] of the edge from a node to the next line
+  std::vector<double> phi_;
+  std::vector<Eigen::Vector2d> losses_;
+};
+
+}  // namespace sparflow

@@ -1,0 +1,280 @@
+#include "simulator/hidden_effects/visibility.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "simulator/hidden_effects/drive.h"
+#include "simulator/hidden_effects/log_columns.h"
+
+namespace sparflow::simulator {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kMean_s = 0.3;         // changes and noise are means over this long
+constexpr double kLeastSize = 1.0;      // standard deviations where it acts
+constexpr double kLeastSeconds = 10.0;  // an effect of that size acting so long is enough
+constexpr double kMostSwallowed = 0.9;  // what is asked of a diagnosis: nothing above is named
+constexpr double kForceShareNoise = 0.01;
+
+/// One measured quantity: the change by the effect, and what may follow it when learned from this very log.
+struct Channel {
+  std::string name;
+  double deviation = 0.0;  // of the noise of a mean over kMean_s
+  bool learned = false;    // pressures and pumps: a law of flow and force
+  std::vector<double> change;
+  std::vector<VectorXd> basis;
+  // the mean under way
+  double sum = 0.0;
+  VectorXd basis_sum;
+  int count = 0;
+
+  void add(double value, const VectorXd& own) {
+    sum += value;
+    if (basis_sum.size() == 0) basis_sum = VectorXd::Zero(own.size());
+    basis_sum += own;
+    ++count;
+  }
+  /// Ends a mean; one over less than half of its rows does not count.
+  void close(int rows) {
+    if (2 * count >= rows) {
+      change.push_back(sum / count);
+      basis.emplace_back(basis_sum / count);
+    }
+    sum = 0.0;
+    basis_sum = VectorXd();
+    count = 0;
+  }
+};
+
+/// Pressure that the return line or the counterbalance valve sets, and which of the two does.
+struct Ruled {
+  double pressure = 0.0;
+  bool counterbalance = false;
+  bool fed_a = false;  // the chamber it shows in is A
+};
+
+Ruled ruled_pressure(const Cylinder& drive, const CylinderLaws& laws, const CylinderState& c) {
+  const double fed = c.side > 0 ? drive.area_piston() : drive.area_rod();
+  const double other = c.side > 0 ? drive.area_rod() : drive.area_piston();
+  const double least = std::max(c.pilot_pressure, laws.rest_tank);
+  Ruled r;
+  r.counterbalance = least > (c.side * c.force + other * c.return_pressure) / fed;
+  r.pressure = r.counterbalance ? least : c.return_pressure;
+  r.fed_a = (c.side > 0) == r.counterbalance;
+  return r;
+}
+
+/// The crane without one of the effects.
+struct Shadow {
+  std::unique_ptr<HiddenCase> crane;
+  std::unique_ptr<Plant> plant;
+  SensorState sensors;
+  std::vector<Channel> force, speed, pump;
+  std::vector<std::vector<Channel>> pressure;  // by cylinder: direction (2) times branch (2)
+};
+
+std::vector<Channel> channels_like(const Machine& machine, double rate, double factor,
+                                   const char* what) {
+  std::vector<Channel> all(machine.cylinders.size());
+  const double n = std::max(1.0, kMean_s * rate);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Cylinder& c = machine.cylinders[i];
+    all[i].name = std::string(what) + " of " + c.name;
+    all[i].deviation =
+        kPressureNoise * factor / std::sqrt(n) *
+        std::hypot(c.hydraulic() ? c.area_piston() : 0.0, c.hydraulic() ? c.area_rod() : 0.0);
+  }
+  return all;
+}
+
+std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t without,
+                                    const Plant& plant, double factor) {
+  auto s = std::make_unique<Shadow>();
+  const Machine& machine = request.machine;
+  s->crane = draw_hidden(request);
+  s->crane->hidden.erase(s->crane->hidden.begin() + static_cast<std::ptrdiff_t>(without));
+  s->plant = std::make_unique<Plant>(machine, s->crane->laws, s->crane->hidden, plant.state().q,
+                                     plant.state().h);
+  const double n = std::max(2.0, kMean_s * request.rate);
+  s->force = channels_like(machine, request.rate, factor, "force");
+  s->speed = channels_like(machine, request.rate, factor, "speed");
+  for (std::size_t i = 0; i < s->speed.size(); ++i) {
+    const Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[i].joint)];
+    const double sensor =
+        (joint.type == JointType::kRevolute ? kAngleNoise : kTravelNoise) * factor;
+    // slope of a line through n readings; a usual lever
+    s->speed[i].deviation = sensor * std::abs(plant.state().cylinders[i].rate) * request.rate *
+                            std::sqrt(12.0 / (n * n * n));
+    s->pressure.emplace_back();
+    for (int k = 0; k < 4; ++k) {
+      Channel one;
+      one.name = "pressure of " + machine.cylinders[i].name;
+      one.deviation = kPressureNoise * factor / std::sqrt(n);
+      one.learned = true;
+      s->pressure.back().push_back(std::move(one));
+    }
+  }
+  for (const Pump& p : machine.pumps) {
+    Channel one;
+    one.name = "pump " + p.name;
+    one.deviation = kPressureNoise * factor / std::sqrt(n);
+    one.learned = true;
+    s->pump.push_back(std::move(one));
+  }
+  return s;
+}
+
+/// Largest chamber pressure, as read, of what the levers ask of a pump. @param leader -1: none
+double asked_pressure(const Pump& pump, const PlantState& s, const SensorState& read, int& leader) {
+  double most = 0.0;
+  leader = -1;
+  for (const int i : pump.feeds) {
+    const auto k = static_cast<std::size_t>(i);
+    const double u = s.cylinders[k].command;
+    if (u == 0.0) continue;
+    const double p = u > 0.0 ? read.pressure_a[k] : read.pressure_b[k];
+    if (leader >= 0 && p <= most) continue;
+    most = p;
+    leader = i;
+  }
+  return most;
+}
+
+void compare_row(const Machine& machine, const PlantState& a, const SensorState& read, Shadow& s) {
+  const PlantState& b = s.plant->state();
+  for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+    const Cylinder& drive = machine.cylinders[i];
+    const CylinderState &ca = a.cylinders[i], &cb = b.cylinders[i];
+    VectorXd lever(2);
+    lever << std::max(0.0, ca.command), std::min(0.0, ca.command);
+    s.speed[i].add(ca.speed - cb.speed, lever);
+    const double read_a = read.pressure_a[i] - s.sensors.pressure_a[i];
+    const double read_b = read.pressure_b[i] - s.sensors.pressure_b[i];
+    if (std::abs(ca.speed) > kMoving) {
+      const double change = drive.hydraulic()
+                                ? drive.area_piston() * read_a - drive.area_rod() * read_b
+                                : ca.force - cb.force;
+      s.force[i].add(change, VectorXd());
+    }
+    if (!drive.hydraulic() || ca.side == 0 || ca.side != cb.side) continue;
+    const Ruled ra = ruled_pressure(drive, s.crane->laws.cylinders[i], ca);
+    const Ruled rb = ruled_pressure(drive, s.crane->laws.cylinders[i], cb);
+    double change = ra.pressure - rb.pressure;
+    if (ra.counterbalance != rb.counterbalance)  // the one that rules now against what was there
+      change = ra.fed_a ? ca.pressure_a - cb.pressure_a : ca.pressure_b - cb.pressure_b;
+    change += ra.fed_a ? read_a - (ca.pressure_a - cb.pressure_a)
+                       : read_b - (ca.pressure_b - cb.pressure_b);
+    const double q = (ra.counterbalance ? ca.flow : ca.return_flow) / 1e-3, f = ca.force / 1e5;
+    VectorXd own(5);
+    own << 1.0, q, q * q, f, q * f;
+    s.pressure[i][(ca.side > 0 ? 0U : 2U) + (ra.counterbalance ? 1U : 0U)].add(change, own);
+  }
+  for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
+    int leader = -1, other = -1;
+    const double asked = asked_pressure(machine.pumps[p], a, read, leader);
+    const double asked_without = asked_pressure(machine.pumps[p], b, s.sensors, other);
+    VectorXd margins = VectorXd::Zero(static_cast<Index>(machine.cylinders.size()) + 1);
+    margins[leader + 1] = 1.0;
+    s.pump[p].add(read.pump[p] - asked - (s.sensors.pump[p] - asked_without), margins);
+  }
+}
+
+void judge_channel(const Channel& c, bool learned_from_it, Visibility& best, double& whole,
+                   double& left) {
+  const auto n = static_cast<Index>(c.change.size());
+  if (n < 10 || !(c.deviation > 0.0)) return;
+  VectorXd x = Eigen::Map<const VectorXd>(c.change.data(), n) / c.deviation;
+  const double before = x.squaredNorm();
+  if (learned_from_it && c.basis.front().size() > 0) {
+    MatrixXd basis(n, c.basis.front().size());
+    for (Index i = 0; i < n; ++i) basis.row(i) = c.basis[static_cast<std::size_t>(i)].transpose();
+    x -= basis * basis.colPivHouseholderQr().solve(x);
+  }
+  const double energy = x.squaredNorm();
+  if (c.learned) {
+    whole += before;
+    left += energy;
+  }
+  if (!(energy > best.energy)) return;
+  best.energy = energy;
+  best.size = std::sqrt(x.array().pow(4).sum() / energy);
+  best.channel = c.name;
+  best.swallowed = c.learned ? 1.0 : 0.0;  // filled in once all are known
+}
+
+Visibility judge(Shadow& s, bool learned_from_it) {
+  Visibility best;
+  double whole = 0.0, left = 0.0;
+  for (const auto* group : {&s.force, &s.speed, &s.pump}) {
+    for (const Channel& c : *group) judge_channel(c, learned_from_it, best, whole, left);
+  }
+  for (const auto& group : s.pressure) {
+    for (const Channel& c : group) judge_channel(c, learned_from_it, best, whole, left);
+  }
+  if (best.swallowed > 0.0) best.swallowed = whole > 0.0 ? 1.0 - left / whole : 0.0;
+  return best;
+}
+
+}  // namespace
+
+std::vector<Visibility> visibility(const LogRequest& request, bool learned_from_it) {
+  const Machine& machine = request.machine;
+  const double factor = request.noise_factor > 0.0 ? request.noise_factor : 1.0;
+  const std::unique_ptr<HiddenCase> one = draw_hidden(request);
+  std::vector<std::unique_ptr<Shadow>> shadows(request.effects.size());
+  std::vector<double> force_squares(machine.cylinders.size(), 0.0);
+  const int mean_rows = std::max(1, static_cast<int>(std::lround(kMean_s * request.rate)));
+  SensorState read;
+  int row = 0;
+  const auto follow = [&](const Plant& plant, const StepInput& in) {
+    for (std::size_t k = 0; k < shadows.size(); ++k) {
+      if (!shadows[k]) shadows[k] = make_shadow(request, k, plant, factor);
+      shadows[k]->plant->follow(plant.state());
+      shadows[k]->plant->step(in.payload, in.oil, in.command);
+    }
+  };
+  const auto compare = [&](Plant& plant, double) {
+    plant.sense(read);
+    ++row;
+    for (std::size_t i = 0; i < force_squares.size(); ++i)
+      force_squares[i] += std::pow(plant.state().cylinders[i].force, 2);
+    for (const auto& s : shadows) {
+      s->plant->sense(s->sensors);
+      compare_row(machine, plant.state(), read, *s);
+      if (row % mean_rows != 0) continue;
+      for (auto* group : {&s->force, &s->speed, &s->pump})
+        for (Channel& c : *group) c.close(mean_rows);
+      for (auto& group : s->pressure)
+        for (Channel& c : group) c.close(mean_rows);
+    }
+  };
+  drive_log(request, *one, follow, compare);
+  std::vector<Visibility> all;
+  for (std::size_t k = 0; k < shadows.size(); ++k) {
+    const std::string& id = request.effects[k].id;
+    if (id == "sensor_delay" || id == "sensor_fault") {
+      constexpr double kAlways = std::numeric_limits<double>::infinity();
+      all.push_back({kAlways, kAlways, "the recording", 0.0});
+      continue;
+    }
+    for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+      if (machine.cylinders[i].hydraulic()) continue;
+      shadows[k]->force[i].deviation =
+          kForceShareNoise * factor * std::sqrt(force_squares[i] / std::max(1, row) / mean_rows);
+    }
+    all.push_back(judge(*shadows[k], learned_from_it));
+  }
+  return all;
+}
+
+bool visible(const Visibility& v) {
+  return v.size >= kLeastSize && v.energy >= kLeastSize * kLeastSize * kLeastSeconds / kMean_s &&
+         v.swallowed <= kMostSwallowed;
+}
+
+}  // namespace sparflow::simulator

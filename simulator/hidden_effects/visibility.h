@@ -1,0 +1,37 @@
+#pragma once
+/// How much of a hidden effect a log can show at all, told without any diagnosis: the crane is driven once more
+/// beside itself without that effect, in the same postures with the same levers, and what the sensors would read
+/// differs.
+#include <string>
+#include <vector>
+
+#include "simulator/hidden_effects/hidden_effect.h"
+
+namespace sparflow::simulator {
+
+struct Visibility {
+  /// Largest over the channels: change where the effect acts (root of the sum of fourth over that of second powers)
+  /// in standard deviations of the channel's own noise, both as means over 0.3 s.
+  double size = 0.0;
+  double energy =
+      0.0;  ///< sum over the log of (change / deviation)^2 in that channel, means over 0.3 s
+  std::string channel;  ///< "force of boom"
+  /// Share of the energy of pressures and pumps, in the channel where most is left, that a smooth law of the
+  /// cylinder's own flow and force (a margin for each leading cylinder, a gain for each direction) can follow:
+  /// learned from the same log, it contains that much. 0 when a reference pins it.
+  double swallowed = 0.0;
+};
+
+/// One entry for each of the request's effects, all others being there.
+/// Channels: force of each cylinder while it moves, its speed at the command, the pressure of the chamber that the
+/// return line or the counterbalance valve rules, pump pressure beyond what the commanded chambers ask. Sensors'
+/// errors count in what they feed. Delays of channels and noise (sensor_delay, sensor_fault) act on the recording and
+/// are not judged: size infinity.
+/// @param learned_from_it no reference: what a law learned from this log can follow is taken off first
+std::vector<Visibility> visibility(const LogRequest& request, bool learned_from_it);
+
+/// The rule of the blind test: at least as large as the noise where it acts, with the energy of ten seconds of that,
+/// and no more than nine tenths swallowed.
+bool visible(const Visibility& v);
+
+}  // namespace sparflow::simulator

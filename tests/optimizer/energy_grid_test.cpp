@@ -1,0 +1,189 @@
+// Grid paths against closed forms, the exact law's verdict and the limits.
+#include "optimizer/energy_grid.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "models/kinematics.h"
+#include "models/linkage.h"
+#include "optimizer/exact_energy.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "tests/optimizer/synthetic_model.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct GridCase {
+  MotionProblem problem;
+  CraneModel model;
+  explicit GridCase(const std::string& reach)
+      : problem(load_problem(bundled_file("reaches/" + reach + ".yaml"))),
+        model(test_support::synthetic_model(problem.machine)) {}
+};
+
+Trajectory straight_line(const MotionProblem& problem, const CraneModel& model,
+                         const VectorXd& end) {
+  GridPath line;
+  line.found = true;
+  line.corners.resize(2, end.size());
+  line.corners << problem.start.transpose(), end.transpose();
+  line.leg_durations = VectorXd::Constant(1, 1.0);
+  return timed_grid_path(model, problem, line, 60.0);
+}
+
+TEST(EnergyGrid, EndsAtTheGoalWithinAllLimitsAtItsShortestDurationAndAnyLonger) {
+  for (const char* reach : {"loader_crane_lift", "loader_crane_unfold", "swing_crane_load"}) {
+    GridCase c(reach);
+    c.problem.tip_line.reset();
+    EnergyGrid grid(c.model, c.problem, {12000, 4});
+    for (const double price : {0.0, 3e3, 1e5}) {
+      const GridPath path = grid.cheapest_path(price);
+      ASSERT_TRUE(path.found) << reach << ": " << path.message;
+      EXPECT_NEAR(path.leg_durations.sum(), path.duration_s, 1e-9);
+      ASSERT_EQ(path.modes.rows(), path.corners.rows() - 1);
+      for (const double slower : {1.0, 1.7}) {
+        const Trajectory motion =
+            timed_grid_path(c.model, c.problem, path, slower * path.duration_s);
+        for (const LimitCheck& check : check_limits(c.model, c.problem, motion, 23)) {
+          // pump pressure is only looked at along whole moves; clearance of ramps not at all
+          if (check.what.starts_with("pressure")) continue;
+          const double slack = check.what.starts_with("clearance") ? 0.02 : 1e-4;
+          EXPECT_LE(check.excess, slack) << reach << ", price " << price << ": " << check.what;
+        }
+      }
+    }
+  }
+}
+
+TEST(EnergyGrid, ConstantPressureCostsPressureTimesVolumeWhateverTheWay) {
+  GridCase c("hmf_reach");
+  ASSERT_EQ(c.problem.machine.pumps[0].type, PumpType::kConstantPressure);
+  const VectorXd start = c.problem.start;
+  VectorXd end = start;
+  end[0] += 0.3;
+  end[1] += 0.5;
+  c.problem.goal = JointGoal{end};
+  c.problem.obstacles.clear();
+  double volume = 0.0;
+  for (int i = 0; i < 2; ++i) {
+    const double dx = cylinder_length(c.problem.machine, i, end[i]) -
+                      cylinder_length(c.problem.machine, i, start[i]);
+    const Cylinder& cylinder = c.problem.machine.cylinders[static_cast<std::size_t>(i)];
+    volume += std::abs(dx) * (dx > 0.0 ? cylinder.area_piston() : cylinder.area_rod());
+  }
+  const double expected = c.model.pumps[0].standby * volume;
+  EnergyGrid grid(c.model, c.problem, {2500, 4});
+  for (const double price : {0.0, 1e4}) {
+    const GridPath path = grid.cheapest_path(price);
+    ASSERT_TRUE(path.found) << path.message;
+    EXPECT_NEAR(path.slow_energy_J, expected, 1e-5 * expected);  // single precision of the moves
+    // the exact law by midpoints over ramps, 4 parts an interval
+    EXPECT_NEAR(path.energy_J, expected, 2e-3 * expected);
+  }
+}
+
+TEST(EnergyGrid, IsCheaperThanTheStraightLineAndCheaperTheMoreTimeThereIs) {
+  const GridCase c("loader_crane_lift");
+  EnergyGrid grid(c.model, c.problem);
+  const GridPath slow = grid.cheapest_path(0.0);
+  ASSERT_TRUE(slow.found);
+  const Trajectory line = straight_line(c.problem, c.model, slow.corners.bottomRows(1).transpose());
+  const double straight = exact_energy(c.model, line, c.problem.payload).total;
+  const double timed =
+      exact_energy(c.model, timed_grid_path(c.model, c.problem, slow, 60.0), c.problem.payload)
+          .total;
+  EXPECT_LT(timed, straight);
+  // at unlimited time each leg has its own best speed, at 60 s all have one: a bar or two of fifty
+  EXPECT_NEAR(timed, slow.slow_energy_J, 0.03 * timed);
+  const GridPath fast = grid.cheapest_path(1e6);
+  ASSERT_TRUE(fast.found);
+  EXPECT_LT(fast.duration_s, slow.duration_s);
+  double last = 1e12;
+  for (const double share : {1.05, 1.4, 2.0}) {
+    const double duration = share * fast.duration_s;
+    const GridPath path = grid.path_for_duration(duration);
+    ASSERT_TRUE(path.found);
+    ASSERT_LE(path.duration_s, duration * (1.0 + 1e-9));
+    const double energy = exact_energy(c.model, timed_grid_path(c.model, c.problem, path, duration),
+                                       c.problem.payload)
+                              .total;
+    EXPECT_LT(
+        energy,
+        last *
+            1.002);  // the same path, slower, may cost a little more: P falls, then rises, with Q
+    last = energy;
+  }
+}
+
+TEST(EnergyGrid, CandidateHoldsItsModesAndItsCornersOnTheMesh) {
+  const GridCase c("loader_crane_unfold");
+  EnergyGrid grid(c.model, c.problem, {12000, 4});
+  const GridPath path = grid.cheapest_path(1e3);
+  ASSERT_TRUE(path.found);
+  const double duration = 1.2 * path.duration_s;
+  const ModeCandidate candidate = grid_path_candidate(c.model, c.problem, path, duration, 80);
+  ASSERT_EQ(candidate.modes.rows(), candidate.guess.size() - 1);
+  EXPECT_NEAR(candidate.guess.t[candidate.guess.size() - 1], duration, 1e-9);
+  for (Eigen::Index k = 0; k < candidate.modes.rows(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      const double middle = 0.5 * (candidate.guess.qd(k, i) + candidate.guess.qd(k + 1, i));
+      if (candidate.modes(k, i) == CylinderMode::kRest) {
+        EXPECT_EQ(middle, 0.0);
+        continue;
+      }
+      const double rate = linkage_rates(c.problem.machine, i, candidate.guess.q(k, i)).d1;
+      EXPECT_EQ(rate * middle > 0.0, candidate.modes(k, i) == CylinderMode::kExtend);
+    }
+  }
+  for (Eigen::Index corner = 0; corner < path.corners.rows(); ++corner) {
+    const MatrixXd off = candidate.guess.q.rowwise() - path.corners.row(corner);
+    EXPECT_LT(off.cwiseAbs().rowwise().maxCoeff().minCoeff(), 1e-9);
+  }
+}
+
+TEST(EnergyGrid, GoesRoundAnObstacle) {
+  GridCase c("loader_crane_over_wall");
+  EnergyGrid grid(c.model, c.problem, {12000, 4});
+  const GridPath path = grid.cheapest_path(0.0);
+  ASSERT_TRUE(path.found) << path.message;
+  ClearanceModel clearance(c.problem);
+  EXPECT_TRUE(clearance.path_clear(path.corners));
+  c.problem.obstacles.clear();
+  EnergyGrid open(c.model, c.problem, {12000, 4});
+  EXPECT_LE(open.cheapest_path(0.0).slow_energy_J, path.slow_energy_J * 1.001);
+}
+
+TEST(EnergyGrid, SaysWhyThereIsNoPath) {
+  GridCase c("loader_crane_lift");
+  EXPECT_THAT(EnergyGrid(c.model, c.problem, {1000, 2}).cheapest_path(0.0).message,
+              ::testing::HasSubstr("too many nodes"));
+  c.problem.goal = TipGoal{{30.0, 0.0, 3.0}};
+  const GridPath none = EnergyGrid(c.model, c.problem, {1000, 4}).path_for_duration(20.0);
+  EXPECT_FALSE(none.found);
+  EXPECT_THAT(none.message, ::testing::HasSubstr("no posture"));
+}
+
+TEST(DemandTable, MatchesTheProcessAndItsLeastIsBelowItEverywhere) {
+  const GaussianProcess process = test_support::synthetic_process(0.02, true, 2e-3, 3e5, 5);
+  const DemandTable table(process, 7e5, 2e-3, {-2e5, 2.5e5});
+  EXPECT_LT(table.allowance(), 0.5e5);  // half a bar of some hundred
+  for (double force = -2e5; force <= 2.5e5; force += 1.37e3) {
+    double least = 1e12;
+    for (double flow = 1e-6; flow <= 2e-3; flow += 1.3e-5) {
+      const double exact = process.mean(flow, force) + 7e5;
+      EXPECT_NEAR(table.demand(flow, force), exact, 0.2e5);  // interpolation; data scatter by 1 bar
+      least = std::min(least, exact);
+    }
+    EXPECT_LE(table.least(force), least);
+    EXPECT_GE(table.least(force), least - 0.1e5);  // the price of safety, of some hundred bar
+  }
+}
+
+}  // namespace
+}  // namespace sparflow

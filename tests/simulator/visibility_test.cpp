@@ -1,0 +1,69 @@
+// What a log can show of an effect, measured without any diagnosis.
+#include "simulator/hidden_effects/visibility.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/simulator/hidden_log_support.h"
+
+namespace sparflow::simulator {
+namespace {
+
+Visibility seen(const HiddenEffect& effect, bool learned_from_it = false) {
+  LogRequest request = quiet_request(machine_named("loader_crane"), 120.0);
+  request.effects = {effect};
+  return visibility(request, learned_from_it).front();
+}
+
+TEST(HiddenVisibility, AForceGrowsInProportion) {
+  const Visibility whole = seen({"coulomb_friction", "boom", 1.0, 0});
+  const Visibility third = seen({"coulomb_friction", "boom", 1.0 / 3.0, 0});
+  EXPECT_EQ(whole.channel, "force of boom");
+  // the other crane stands in the same postures: nothing but the friction differs
+  EXPECT_NEAR(whole.size / third.size, 3.0, 0.05);
+  EXPECT_NEAR(whole.energy / third.energy, 9.0, 0.3);
+  EXPECT_EQ(whole.swallowed, 0.0);
+}
+
+TEST(HiddenVisibility, AConstantForceIsItsShareOfTheNoise) {
+  const Machine machine = machine_named("loader_crane");
+  LogRequest request = quiet_request(machine, 120.0);
+  request.effects = {{"force_offset", "boom", 1.0, 0}};
+  const GeneratedLog log = generate(request);
+  const double offset = log.truth.front().parameters.front().value;
+  const Cylinder& boom =
+      machine.cylinders[static_cast<std::size_t>(machine.cylinder_index("boom"))];
+  // 0.8 bar white on both chambers, means over 0.3 s of 50 Hz
+  const double noise = 0.8e5 * std::hypot(boom.area_piston(), boom.area_rod()) / std::sqrt(15.0);
+  EXPECT_NEAR(visibility(request, false).front().size, std::abs(offset) / noise,
+              0.03 * std::abs(offset) / noise);
+}
+
+TEST(HiddenVisibility, WhatIsSmallIsNotAsked) {
+  EXPECT_TRUE(visible(seen({"coulomb_friction", "boom", 1.0, 0})));
+  EXPECT_FALSE(visible(seen({"coulomb_friction", "boom", 1e-3, 0})));
+}
+
+TEST(HiddenVisibility, ALawLearnedFromTheSameLogFollowsALossOfItsOwnFlow) {
+  const HiddenEffect loss{"flow_dependent_margin", "", 1.0, 0};
+  const Visibility with = seen(loss, false), alone = seen(loss, true);
+  EXPECT_LT(alone.energy, with.energy);
+  EXPECT_GT(alone.swallowed, 0.0);
+  EXPECT_LT(alone.swallowed, 1.0);
+}
+
+TEST(HiddenVisibility, FlowShowsInTheSpeedAndEachOfAPairOnItsOwn) {
+  LogRequest request = quiet_request(machine_named("loader_crane"), 120.0);
+  request.effects = {{"valve_deadband", "boom", 1.0, 0}, {"coulomb_friction", "jib", 1.0, 0}};
+  const std::vector<Visibility> both = visibility(request, false);
+  ASSERT_EQ(both.size(), 2U);
+  EXPECT_EQ(both[0].channel, "speed of boom");
+  EXPECT_EQ(both[1].channel, "force of jib");
+  EXPECT_TRUE(visible(both[0]) && visible(both[1]));
+}
+
+TEST(HiddenVisibility, DelaysOfTheRecordingAreAlwaysAsked) {
+  EXPECT_TRUE(visible(seen({"sensor_delay", "", 1.0, 0})));
+}
+
+}  // namespace
+}  // namespace sparflow::simulator
