@@ -1,5 +1,6 @@
 /// Where one cylinder after another is cheaper than all at once, and what the optimum does instead: over time, load,
-/// pose and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv and strategy_map.svg.
+/// pose and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
+/// summary.txt and strategy_map.svg.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -163,7 +164,9 @@ int run(int argc, char** argv) {
   const std::vector<double> idle = {0.0, 1e3, 2e3, 5e3, 10e3, 15e3};
   write_file_atomically(folder + "/strategy_idle.csv", idle_csv(curves, idle));
   write_file_atomically(folder + "/strategy_map.svg", map_svg(curves, idle));
-  fmt::print("{}", map_summary(curves, idle));
+  const std::string summary = map_summary(curves, idle);
+  write_file_atomically(folder + "/summary.txt", summary);
+  fmt::print("{}", summary);
   return 0;
 }
 

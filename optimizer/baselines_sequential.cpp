@@ -8,6 +8,7 @@
 
 #include "models/linkage.h"
 #include "optimizer/baselines.h"
+#include "optimizer/phases.h"
 #include "problems/clearance.h"
 #include "problems/motion_limits.h"
 #include "problems/time_parametrise.h"
@@ -336,28 +337,29 @@ BaselineMotion BaselineSet::polished(const BaselineMotion& from, const DrivenPat
   ModeCandidate candidate;
   candidate.name = "one by one: " + path.detail;
   candidate.guess = from.motion;
-  const int intervals = options_.optimize.intervals;
-  candidate.modes =
-      ModeTable::Constant(intervals, model_.machine.cylinder_count(), CylinderMode::kRest);
-  const std::vector<double> times = shared_time(model_, problem_.payload, path.legs, from.duration);
-  double begin = 0.0;
+  candidate.energy = from.energy.total;
+  candidate.modes = ModeTable::Constant(from.motion.size() - 1, model_.machine.cylinder_count(),
+                                        CylinderMode::kRest);
+  Eigen::Index at = 0;  // the legs' meshes follow each other
   for (std::size_t i = 0; i < path.legs.size(); ++i) {
-    const double end = begin + times[i];
-    const int c = model_.machine.cylinder_of_joint(path.joints[i]);
+    const Trajectory& leg = path.legs[i];
+    const int joint = path.joints[i], c = model_.machine.cylinder_of_joint(joint);
     if (c >= 0) {
-      const Trajectory& leg = path.legs[i];
-      const double first = leg.q(0, path.joints[i]), last = leg.q(leg.size() - 1, path.joints[i]);
+      const double first = leg.q(0, joint), last = leg.q(leg.size() - 1, joint);
       const double rate = linkage_rates(model_.machine, c, 0.5 * (first + last)).d1;
       const bool extends = (last > first) == (rate > 0.0);
-      for (int k = 0; k < intervals; ++k) {
-        const double middle = (k + 0.5) * from.duration / intervals;
-        if (middle >= begin && middle < end)
-          candidate.modes(k, c) = extends ? CylinderMode::kExtend : CylinderMode::kRetract;
-      }
+      candidate.modes.col(c)
+          .segment(at, leg.size() - 1)
+          .setConstant(extends ? CylinderMode::kExtend : CylinderMode::kRetract);
     }
-    begin = end;
+    at += leg.size() - 1;
   }
-  const StartResult solved = optimize_with_modes(model_, problem_, candidate, options_.optimize);
+  // no overlaps: it shall remain one cylinder after another; how long each leg takes is free
+  OptimizeOptions options = options_.optimize;
+  options.overlap = 0.0;
+  const StartResult solved = optimize_with_phases(
+      model_, problem_, candidate.name, plan_of(candidate.modes, from.motion.t), from.motion,
+      TimeWindow::fixed(from.duration), false, options);
   if (!solved.usable(options_.limit_tolerance) || solved.energy_exact >= from.energy.total)
     return from;
   BaselineMotion better = from;

@@ -128,7 +128,8 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     if (p.optimal.energy.total <= before.energy.total) continue;
     const std::vector<SeedMotion> from = {{"shorter time", before.motion, 0.0, false}};
     OptimizeOptions with_modes = options.strategies.optimize;
-    with_modes.smooth_starts = with_modes.sequential_starts = with_modes.sequence_rounds = 0;
+    with_modes.smooth_starts = with_modes.sequential_starts = 0;
+    with_modes.grid_starts = with_modes.sequence_rounds = 0;
     const OptimizeResult r = optimize_at(model, problem, from, p.duration, with_modes);
     if (r.best_start < 0 || r.energy.total >= p.optimal.energy.total) continue;
     p.optimal.motion = r.motion;

@@ -122,7 +122,7 @@ StrategyOutcome OptimumSearch::solved(const std::string& kind, const MotionProbl
   OptimizeOptions options = options_.optimize;
   options.smooth_starts = thorough ? options_.smooth_seeds : 0;
   if (!thorough) {
-    options.sequential_starts = 0;
+    options.sequential_starts = options.grid_starts = 0;
     options.sequence_rounds = std::min(options.sequence_rounds, 1);
     options.searched_starts = 1;
   }

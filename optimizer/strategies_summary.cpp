@@ -57,8 +57,8 @@ std::vector<std::string> row_names(const std::vector<StrategyComparison>& all) {
 
 std::string strategy_title(const std::string& kind) {
   if (kind == kSequential) return "one cylinder after another";
-  if (kind == kJointLine) return "simultaneous, best end posture";
-  if (kind == kNearestJointLine) return "simultaneous, nearest end posture";
+  if (kind == kJointLine) return "simultaneous, best end";
+  if (kind == kNearestJointLine) return "simultaneous, nearest end";
   if (kind == kActuatorLine) return "cylinder strokes in proportion";
   if (kind == kTipLine) return "tip on a straight line";
   if (kind == kMinimumTime) return "shortest time";

@@ -24,35 +24,43 @@ std::string row_title(const StrategyRow& row) {
 std::string excess_text(double share) { return fmt::format("{:+.1f} %", 100.0 * share); }
 
 /// Energy by where it goes, a bar each way.
-BarChart energy_bars(const StrategyRow& row, double idle_power) {
+BarChart energy_bars(const StrategyRow& row, double idle_power, const Machine& machine) {
   BarChart bars;
   bars.title = row_title(row);
   bars.value_axis = {"energy", "kJ"};
   bars.note =
       "Useful: working pressure times flow. Throttled: lost in the valves because another "
       "cylinder, the margin or standby sets the pump's pressure.";
-  std::vector<double> useful, lost, idle;
+  std::vector<double> useful, idle;
+  std::vector<std::vector<double>> lost(machine.cylinders.size());
   for (const StrategyOutcome& o : row.outcomes) {
     if (!o.found()) continue;
     bars.categories.push_back(strategy_title(o.kind));
-    double u = 0.0, t = 0.0;
-    for (const double x : o.energy.useful) u += x;
-    for (const double x : o.energy.throttling) t += x;
-    useful.push_back(u / 1e3);
-    lost.push_back(t / 1e3);
+    double sum = 0.0;
+    for (const double x : o.energy.useful) sum += x;
+    useful.push_back(sum / 1e3);
+    for (std::size_t c = 0; c < lost.size(); ++c)
+      lost[c].push_back(c < o.energy.throttling.size() ? o.energy.throttling[c] / 1e3 : 0.0);
     idle.push_back(idle_power * o.duration / 1e3);
   }
   const auto column = [](const std::vector<double>& v) {
     return VectorXd(Eigen::Map<const VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
   };
-  bars.series = {{"useful", column(useful)}, {"throttled", column(lost)}};
+  bars.series = {{"useful", column(useful)}};
+  for (std::size_t c = 0; c < lost.size(); ++c) {
+    if (machine.cylinders[c].hydraulic())
+      bars.series.push_back({"throttled at " + machine.cylinders[c].name, column(lost[c])});
+  }
   if (idle_power > 0.0) bars.series.push_back({"engine idling", column(idle)});
   return bars;
 }
 
-Table row_table(const StrategyRow& row, double idle_power, std::size_t cylinders) {
+/// Energies, times and pressures of each way.
+Table row_table(const StrategyRow& row, double idle_power) {
   Table table;
   table.title = row_title(row);
+  table.note =
+      "Potential: gained by machine and load, part of the useful energy. Pressures: the pump's.";
   table.columns = {{"way"},
                    {"pump energy", "kJ"},
                    {"duration", "s"},
@@ -61,16 +69,10 @@ Table row_table(const StrategyRow& row, double idle_power, std::size_t cylinders
                    {"potential", "kJ", 3},
                    {"peak", "bar", 3},
                    {"mean", "bar", 3}};
-  for (std::size_t k = 1; k <= std::min<std::size_t>(cylinders, 3); ++k)
-    table.columns.push_back({fmt::format("{} moving", k), "% of time", 3});
-  table.columns.push_back({"shortest", "s", 4});
-  table.columns.push_back({"note"});
   for (const StrategyOutcome& o : row.outcomes) {
     std::vector<TableCell> cells{strategy_title(o.kind)};
     if (!o.found()) {
-      while (cells.size() + 2 < table.columns.size()) cells.emplace_back(std::nan(""));
-      cells.emplace_back(o.shortest > 0.0 ? o.shortest : std::nan(""));
-      cells.emplace_back(o.why);
+      while (cells.size() < table.columns.size()) cells.emplace_back(std::nan(""));
       table.rows.push_back(std::move(cells));
       continue;
     }
@@ -82,19 +84,37 @@ Table row_table(const StrategyRow& row, double idle_power, std::size_t cylinders
          {o.energy.total / 1e3, o.duration, lost / 1e3, idle_power * o.duration / 1e3,
           o.energy.potential_difference / 1e3, peak / units::kBar, mean / units::kBar})
       cells.emplace_back(value);
-    for (std::size_t k = 1; k <= std::min<std::size_t>(cylinders, 3); ++k) {
-      cells.emplace_back(k < o.energy.share_moving.size() ? 100.0 * o.energy.share_moving[k]
-                                                          : std::nan(""));
-    }
-    cells.emplace_back(o.shortest > 0.0 ? o.shortest : std::nan(""));
-    cells.emplace_back(o.detail);
     if (o.kind == kOptimal) table.highlighted_row = static_cast<int>(table.rows.size());
     table.rows.push_back(std::move(cells));
   }
   return table;
 }
 
-/// Pump pressure and flow over time of the three ways everybody asks about.
+/// How many cylinders move, how fast each way could be, and where its motion comes from.
+Table moving_table(const StrategyRow& row) {
+  Table table;
+  table.title = "What moves";
+  table.columns = {{"way"}};
+  for (int k = 1; k <= 3; ++k)
+    table.columns.push_back({fmt::format("{} move{}", k, k == 1 ? "s" : ""), "% of time", 3});
+  table.columns.push_back({"shortest", "s", 4});
+  table.columns.push_back({"note"});
+  for (const StrategyOutcome& o : row.outcomes) {
+    std::vector<TableCell> cells{strategy_title(o.kind)};
+    for (std::size_t k = 1; k <= 3; ++k) {
+      cells.emplace_back(o.found() && k < o.energy.share_moving.size()
+                             ? 100.0 * o.energy.share_moving[k]
+                             : std::nan(""));
+    }
+    cells.emplace_back(o.shortest > 0.0 ? o.shortest : std::nan(""));
+    cells.emplace_back(o.found() ? o.detail : o.why);
+    if (o.kind == kOptimal) table.highlighted_row = static_cast<int>(table.rows.size());
+    table.rows.push_back(std::move(cells));
+  }
+  return table;
+}
+
+/// Pump power over time of the three ways everybody asks about.
 void add_powers(Page& page, const CraneModel& model, const MotionProblem& problem,
                 const StrategyRow& row) {
   LineChart chart;
@@ -168,8 +188,9 @@ void add_one(Page& page, const StrategyComparison& c, const CraneModel& model,
   for (const StrategyRow& row : c.rows) {
     const double idle = row.duration > 0.0 ? 0.0 : c.idle_power;
     page.section(row_title(row));
-    page.plot(energy_bars(row, idle));
-    page.table(row_table(row, c.idle_power, model.cylinders.size()));
+    page.plot(energy_bars(row, idle, model.machine));
+    page.table(row_table(row, c.idle_power));
+    page.table(moving_table(row));
     if (row.name == "equal") {
       add_paths(page, model.machine, problem, row);
       add_powers(page, model, problem, row);
@@ -278,11 +299,7 @@ void add_set(Page& page, const std::vector<StrategyComparison>& all) {
   for (const StrategyComparison& c : all) {
     if (!c.message.empty()) page.paragraph(c.problem + ": " + c.message);
     for (const StrategyRow& row : c.rows) {
-      std::size_t cylinders = 0;
-      for (const StrategyOutcome& o : row.outcomes)
-        cylinders = std::max(cylinders, o.energy.throttling.size());
-      if (cylinders == 0) continue;
-      Table table = row_table(row, c.idle_power, cylinders);
+      Table table = row_table(row, c.idle_power);
       table.title = c.problem + ": " + table.title;
       page.table(std::move(table));
     }

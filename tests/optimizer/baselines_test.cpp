@@ -18,7 +18,7 @@ namespace {
 using Eigen::VectorXd;
 using ::testing::HasSubstr;
 
-struct Lift {
+struct BaselineCase {
   MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   CraneModel model = test_support::synthetic_model(problem.machine);
 };
@@ -38,7 +38,7 @@ VectorXd posture3(double boom, double jib, double extension) {
 }
 
 TEST(Baselines, ActuatorLineStrokesAreInProportion) {
-  const Lift c;
+  const BaselineCase c;
   const VectorXd from = c.problem.start, to = posture3(0.6, -0.5, 2.0);
   const Eigen::MatrixXd path = actuator_line(c.problem.machine, from, to, 10);
   ASSERT_EQ(path.rows(), 11);
@@ -57,7 +57,7 @@ TEST(Baselines, ActuatorLineStrokesAreInProportion) {
 }
 
 TEST(Baselines, PseudoInverseKeepsTheTipOnItsLine) {
-  const Lift c;
+  const BaselineCase c;
   const Eigen::Vector3d goal = std::get<TipGoal>(c.problem.goal).tip,
                         first = tip_position<double>(c.problem.machine, c.problem.start);
   double share = 0.0;
@@ -83,7 +83,7 @@ TEST(Baselines, PseudoInverseKeepsTheTipOnItsLine) {
 }
 
 TEST(Baselines, PseudoInverseSaysHowFarItCame) {
-  const Lift c;
+  const BaselineCase c;
   double share = 1.0;
   pseudo_inverse_line(c.problem.machine, c.problem, {14.0, 0.0, 3.0}, &share);
   EXPECT_LT(share, 1.0);
@@ -91,7 +91,7 @@ TEST(Baselines, PseudoInverseSaysHowFarItCame) {
 }
 
 TEST(Baselines, SharedTimeAddsUpAndIsBestAmongSplits) {
-  const Lift c;
+  const BaselineCase c;
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   const BaselineMotion m = set.at(kSequential, 25.0);
   ASSERT_TRUE(m.found()) << m.why;
@@ -103,7 +103,7 @@ TEST(Baselines, SharedTimeAddsUpAndIsBestAmongSplits) {
 }
 
 TEST(Baselines, EveryKindKeepsAllLimitsBetweenTheKnotsOrSaysWhyNot) {
-  const Lift c;
+  const BaselineCase c;
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   for (const std::string& kind : BaselineSet::kinds()) {
     const BaselineMotion m = set.at(kind, 16.0);
@@ -123,7 +123,7 @@ TEST(Baselines, EveryKindKeepsAllLimitsBetweenTheKnotsOrSaysWhyNot) {
 }
 
 TEST(Baselines, OwnBestTimeIsShorterTheMoreIdlingCosts) {
-  const Lift c;
+  const BaselineCase c;
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   const BaselineMotion fast = set.at_own_best(kJointLine, 0.0);
   EXPECT_NEAR(fast.duration, set.shortest(kJointLine), 1e-9);
@@ -139,7 +139,7 @@ TEST(Baselines, OwnBestTimeIsShorterTheMoreIdlingCosts) {
 }
 
 TEST(Baselines, NothingReachesBeyondTheTelescope) {
-  Lift c;
+  BaselineCase c;
   c.problem.goal = TipGoal{{14.0, 0.0, 3.0}};
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   EXPECT_TRUE(set.end_postures().empty());
@@ -150,7 +150,7 @@ TEST(Baselines, NothingReachesBeyondTheTelescope) {
 }
 
 TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
-  const Lift c;
+  const BaselineCase c;
   StrategyOptions options;
   options.baselines = few_intervals();
   options.optimize = options.baselines.optimize;
