@@ -95,6 +95,22 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
   return c;
 }
 
+/// Affected stretches [s]; short gaps between them are closed, so that a picture can show them.
+std::vector<std::pair<double, double>> stretches_of(const Log& log, const Mask& affected) {
+  const double gap = 0.01 * log.duration();
+  std::vector<std::pair<double, double>> out;
+  for (Index k = 0; k < affected.size(); ++k) {
+    if (!affected[k]) continue;
+    const double t = log.time[k];
+    if (!out.empty() && t - out.back().second <= std::max(gap, 1.5 * log.step)) {
+      out.back().second = t;
+    } else {
+      out.emplace_back(t, t);
+    }
+  }
+  return out;
+}
+
 BadChannel report(const CheckContext& context, std::size_t i, Finding found) {
   BadChannel bad;
   const Index n = context.log.samples();
@@ -108,6 +124,11 @@ BadChannel report(const CheckContext& context, std::size_t i, Finding found) {
   bad.share = static_cast<double>(found.affected.cast<Index>().sum()) / static_cast<double>(n);
   bad.evidence = std::move(found.evidence);
   bad.remedy = std::move(found.remedy);
+  bad.file = context.log.file;
+  bad.unit = context.channels[i].field_unit;
+  bad.time = context.log.time;
+  bad.values = context.channels[i].channel->values / context.channels[i].field;
+  bad.stretches = stretches_of(context.log, found.affected);
   return bad;
 }
 

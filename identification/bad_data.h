@@ -5,6 +5,7 @@
 /// (channels of the same kind), and that nothing else in the machine did at that moment. A pressure that steps with
 /// a command, or an oscillation that all sensors see, is the machine's own. docs/fit_and_compare.md, "Bad data".
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "identification/signals.h"
@@ -27,6 +28,13 @@ struct BadChannel {
   double share = 0.0;    ///< of the log's samples, 0..1
   std::string evidence;  ///< one sentence with figures
   std::string remedy;    ///< one sentence: what to do
+
+  // For its picture.
+  std::string file = {};        ///< the log's name
+  std::string unit = {};        ///< of `values`: bar, mm, degC ...
+  Eigen::VectorXd time = {};    ///< [s] [samples]
+  Eigen::VectorXd values = {};  ///< [unit] [samples] as logged, NaN = missing
+  std::vector<std::pair<double, double>> stretches = {};  ///< [s] affected, in order
 };
 
 /// "stuck", "jumping", "noisy", "drop_out", "saturated", as in JSON.

@@ -18,8 +18,9 @@ using Eigen::Index;
 using Eigen::VectorXd;
 /// The chord converges by the share of the non-linearity each time: a tenth for angles of a few degrees.
 constexpr int kChords = 3;
-constexpr int kSections = 10;  // of the golden section: a bracket shrinks to 1 %
-constexpr int kSweeps = 2;     // over all nonlinear parameters
+constexpr int kSections = 10;         // of the golden section: a bracket shrinks to 1 %
+constexpr double kMuchSharper = 0.5;  // a window that is hardly shorter changes nothing
+constexpr int kSweeps = 2;            // over all nonlinear parameters
 
 std::vector<double> shape_of(const AppliedEffect& e) {
   std::vector<double> shape;
@@ -77,7 +78,12 @@ class Estimator {
             const std::vector<MachineSignals>& suspects,
             const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
             const std::vector<AppliedEffect>* in_references)
-      : base_(model), suspects_(suspects), references_(references), leave_out_(leave_out) {
+      : base_(model),
+        suspects_(suspects),
+        references_(references),
+        sharp_(can_sharpen(suspects) && (references.empty() || can_sharpen(references))),
+        leave_out_(leave_out) {
+    if (sharp_) sharpen_all();
     std::erase_if(base_.effects, [&](const AppliedEffect& a) {
       return std::any_of(wanted.begin(), wanted.end(),
                          [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
@@ -119,8 +125,23 @@ class Estimator {
   }
 
  private:
+  /// Positions so finely measured that a shorter window than the search's will do, in every log.
+  bool can_sharpen(const std::vector<MachineSignals>& logs) const {
+    return std::all_of(logs.begin(), logs.end(), [&](const MachineSignals& s) {
+      return sharp_window(s) < kMuchSharper * s.window;
+    });
+  }
+  static double sharp_window(const MachineSignals& s) {
+    return sharpest_window(s.time, s.runs, s.q_measured, s.window);
+  }
+  void sharpen_all() {
+    for (auto* logs : {&suspects_, &references_}) {
+      for (MachineSignals& s : *logs) s = smoothed_anew(base_.machine, s, sharp_window(s));
+    }
+  }
+
   Evidence collect(const CraneModel& model) const {
-    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_);
+    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, sharp_);
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
     return evidence;
@@ -282,8 +303,8 @@ class Estimator {
   }
 
   CraneModel base_;
-  const std::vector<MachineSignals>& suspects_;
-  const std::vector<MachineSignals>& references_;
+  std::vector<MachineSignals> suspects_, references_;
+  bool sharp_ = false;  // all logs through a shorter window than the search's, rows up to the ends
   const std::vector<Mask>& leave_out_;
   std::vector<AppliedEffect> in_references_;
   Evidence evidence_;

@@ -26,6 +26,16 @@ std::vector<const EffectDesign*> pointers(const std::vector<EffectDesign>& desig
   return out;
 }
 
+/// Where every row counts the same, less of it than a law of this kind must have: part of another effect.
+bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
+  for (Index k = 0; k < design.linear; ++k) {
+    const double lo = design.lower[static_cast<std::size_t>(k)];
+    const double hi = design.upper[static_cast<std::size_t>(k)];
+    if (lo > 0.0 && theta[k] < lo + 1e-6 * (hi - lo)) return true;
+  }
+  return false;
+}
+
 /// Whether the effect is told from nothing, and from the plainer effect it contains.
 bool could_be_nothing(const Effect& effect, const std::vector<double>& values,
                       const std::vector<double>& half) {
@@ -59,6 +69,7 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     FoundEffect& f = found[i];
     const Effect& effect = *f.design.effect.effect;
     const auto linear = static_cast<Index>(f.design.linear);
+    f.at_bound = f.at_bound || less_than_plausible(f.design, fit.theta.segment(plain, linear));
     f.values = parameter_values(effect, fit.theta.segment(plain, linear), f.design.shape);
     VectorXd sd(designs[i].linear);
     for (Index k = 0; k < sd.size(); ++k)

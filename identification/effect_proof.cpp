@@ -80,6 +80,16 @@ EffectAction effect_action(const Evidence& evidence,
   return action;
 }
 
+bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>& theta) {
+  for (Index k = 0; k < design.linear; ++k) {
+    const double lo = design.lower[static_cast<std::size_t>(k)];
+    const double hi = design.upper[static_cast<std::size_t>(k)];
+    const double edge = 1e-6 * (hi - lo);
+    if (theta[k] > hi - edge || (lo > 0.0 && theta[k] < lo + edge)) return true;
+  }
+  return false;
+}
+
 HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                           std::size_t index, const EffectFit& fit, int folds) {
   const Layout layout(designs);

@@ -22,6 +22,9 @@ EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
                            const EffectFit& fit);
 
+/// Whether one of the design's linear parameters lies on the edge of what is plausible; zero is no edge: no effect.
+bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::VectorXd>& theta);
+
 struct HeldOutGain {
   double gain = 0.0, error = 0.0;  ///< [nats], sum over folds and its standard error
   double improved = 0.0;           ///< share of the folds it improved

@@ -8,6 +8,7 @@
 
 #include "identification/effect_intervals.h"
 #include "identification/null_gate.h"
+#include "identification/parallel.h"
 #include "identification/search_proofs.h"
 #include "identification/search_scores.h"
 
@@ -70,7 +71,7 @@ class Search {
       const NullGate gate =
           make_null_gate(evidence_, gated, base, current, options_.simulations, random_);
       const double level = found.empty() ? options_.false_alarm : 0.5 * options_.false_alarm;
-      const Score& best = plainer(scores, gate, level);
+      const Score best = chosen(scores, gate, level, base);
       const double p = gate.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(step, scores, gate);
       ++step;
@@ -102,26 +103,77 @@ class Search {
     }
   }
 
-  /// The best candidate that passes the gate (the best of all if none does), or the plainer effect it contains when
-  /// that explains most of the same: what is left then decides whether the refinement is needed, and `prune` drops
-  /// whichever becomes superfluous.
-  const Score& plainer(const std::vector<Score>& scores, const NullGate& gate, double level) const {
-    const Score* first = &scores.front();
+  /// Whether `one` leaves significantly less than `other` where every row counts the same.
+  bool ordinarily_better(const std::vector<const EffectDesign*>& base, const EffectDesign& one,
+                         const EffectDesign& other) const {
+    return ordinary_advantage(evidence_, scores_.ordinary(base, one),
+                              scores_.ordinary(base, other)) > 0.0;
+  }
+
+  /// That of `rivals` which is most of all better than `best` where every row counts the same, or `best`.
+  const Score* ordinarily_best(const std::vector<const EffectDesign*>& base,
+                               const std::vector<const Score*>& rivals,
+                               const EffectDesign& best) const {
+    const OrdinaryResidual one = scores_.ordinary(base, best);
+    std::vector<double> advantage(rivals.size());
+    parallel(rivals.size(), [&](std::size_t i) {
+      const EffectDesign& d = design_of(*rivals[i]);
+      bool meets = false;
+      for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
+        meets = meets || (d.touches(c) && best.touches(c));
+      if (meets) advantage[i] = ordinary_advantage(evidence_, scores_.ordinary(base, d), one);
+    });
+    const auto most = std::max_element(advantage.begin(), advantage.end());
+    return most == advantage.end() || *most <= 0.0
+               ? nullptr
+               : rivals[static_cast<std::size_t>(most - advantage.begin())];
+  }
+  const EffectDesign& design_of(const Score& s) const {
+    return candidates_[s.candidate].designs[s.design];
+  }
+
+  /// The most likely candidate that passes the gate (the best of all if none does), another one that passes and leaves
+  /// significantly less where every row counts the same, or the plainer effect that the choice contains when that
+  /// explains most of the same: what is left then decides whether the refinement is needed, and `prune` drops whichever
+  /// becomes superfluous.
+  Score chosen(const std::vector<Score>& scores, const NullGate& gate, double level,
+               const std::vector<const EffectDesign*>& base) const {
+    std::vector<const Score*> passing;
     for (const Score& s : scores) {
-      if (gate.p_value(s.gain, s.candidate) < level) {
-        first = &s;
-        break;
-      }
+      if (gate.p_value(s.gain, s.candidate) < level) passing.push_back(&s);
+    }
+    if (passing.empty()) return scores.front();
+    const Score* first = passing.front();
+    const Score* larger = ordinarily_best(base, passing, design_of(*first));
+    if (larger != nullptr) {
+      if (tracing())
+        fmt::print(stderr, "  {} leaves less than {}\n", key(candidates_[larger->candidate].effect),
+                   key(candidates_[first->candidate].effect));
+      first = larger;
     }
     const EffectAt& best = candidates_[first->candidate].effect;
-    for (const Score& s : scores) {
-      const EffectAt& e = candidates_[s.candidate].effect;
-      if (e.at == best.at && e.effect->info().id == best.effect->info().refines &&
-          s.gain > 0.5 * first->gain) {
-        return s;
+    for (const Score* s : passing) {
+      const EffectAt& e = candidates_[s->candidate].effect;
+      if (e.at != best.at || e.effect->info().id != best.effect->info().refines) continue;
+      if (s->gain > 0.5 * first->gain ||
+          !ordinarily_better(base, design_of(*first), design_of(*s))) {
+        return shaped(base, *s);
       }
     }
-    return *first;
+    return shaped(base, *first);
+  }
+
+  /// The same candidate with those nonlinear parameters of its grid that leave significantly less where every row
+  /// counts the same, if any do.
+  Score shaped(const std::vector<const EffectDesign*>& base, const Score& score) const {
+    std::vector<Score> others;
+    for (std::size_t d = 0; d < candidates_[score.candidate].designs.size(); ++d) {
+      if (d != score.design) others.push_back({score.candidate, d, score.gain});
+    }
+    std::vector<const Score*> pointers;
+    for (const Score& o : others) pointers.push_back(&o);
+    const Score* better = ordinarily_best(base, pointers, design_of(score));
+    return better == nullptr ? score : *better;
   }
 
   /// What the later ones turned into a remnant. @return whether any was dropped
@@ -237,9 +289,14 @@ class Search {
     const double own =
         scores_.gain_instead(f.design, f.design, others, without) - penalty_of(f.design.effect);
     f.gain = own;
-    if (!scores.empty() && scores.front().gain > own + 1.0) {
+    const Score* challenger = nullptr;
+    if (!scores.empty() && scores.front().gain > own + 1.0 &&
+        !ordinarily_better(others, f.design, design_of(scores.front()))) {
+      challenger = &scores.front();
+    }
+    if (challenger != nullptr) {
       FoundEffect rival;
-      rival.design = scores_.refined(others, scores.front(), without);
+      rival.design = scores_.refined(others, *challenger, without);
       rival.p_value = f.p_value;
       std::vector<FoundEffect> trial = found;
       trial[i] = rival;

@@ -310,7 +310,7 @@ std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
 
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                           const std::vector<MachineSignals>& references,
-                          const std::vector<AppliedEffect>* in_references) {
+                          const std::vector<AppliedEffect>* in_references, bool whole_motions) {
   Evidence e;
   const Machine& machine = model.machine;
   std::vector<const MachineSignals*> signals;
@@ -326,6 +326,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     k.force = summed(impulse_response(s->step, s->window, order, 2), 2);
     k.speed = summed(impulse_response(s->step, s->window, order, 1), 1);
     k.pressure = summed(impulse_response(s->step, s->window, order, 0), 0);
+    if (whole_motions) k.force = k.speed = k.pressure = VectorXd::Ones(1);
     gain_force.push_back(k.force.norm());
     gain_pressure.push_back(k.pressure.norm());
     e.kernels_.push_back(std::move(k));
@@ -333,7 +334,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     e.stride =
         std::max(e.stride, static_cast<int>(std::lround(s->window / s->step / kRowsAWindow)));
   }
-  const auto margin_of = [&](std::size_t log) {
+  const auto margin_of = [&](std::size_t log) -> Index {
+    if (whole_motions) return 0;
     return static_cast<Index>(std::lround(0.5 * signals[log]->window / signals[log]->step));
   };
 

@@ -59,7 +59,7 @@ struct Evidence {
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
                                    const std::vector<MachineSignals>&,
-                                   const std::vector<AppliedEffect>*);
+                                   const std::vector<AppliedEffect>*, bool);
   struct Kernels {  // of one log: low-passes for forces, speeds and pressures, centred, odd length
     Eigen::VectorXd force, speed, pressure;
   };
@@ -69,9 +69,12 @@ struct Evidence {
 
 /// @param model its effects are in every channel's model part; its margins start the pump's demand
 /// @param in_references effects that the references have; null: the model's
+/// @param whole_motions rows up to the ends of each motion, of quantities as measured: for signals whose own window is
+/// so sharp (sharpest_window) that it rounds nothing off
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                           const std::vector<MachineSignals>& references = {},
-                          const std::vector<AppliedEffect>* in_references = nullptr);
+                          const std::vector<AppliedEffect>* in_references = nullptr,
+                          bool whole_motions = false);
 
 /// Effects of the model that the machine had already when the references were recorded: all but those that a step of
 /// the model's record added from other logs.

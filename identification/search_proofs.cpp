@@ -15,15 +15,9 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
   found.size = action.size;
   found.absorbed = action.absorbed;
   found.over_form = action.over_form;
-  found.at_bound = false;
   Index first = 0;
   for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
-  for (Index k = 0; k < found.design.linear; ++k) {
-    const double v = fit.theta[first + k], lo = found.design.lower[static_cast<std::size_t>(k)];
-    const double hi = found.design.upper[static_cast<std::size_t>(k)];
-    const double edge = 1e-6 * (hi - lo);
-    found.at_bound = found.at_bound || v > hi - edge || (lo > 0.0 && v < lo + edge);
-  }
+  found.at_bound = rests_on_bound(found.design, fit.theta.segment(first, found.design.linear));
   const HeldOutGain held = held_out_gain(evidence, designs, index, fit, options.folds);
   found.held_out = held.gain;
   found.held_out_error = held.error;

@@ -111,6 +111,11 @@ double SearchScores::gain_instead(const EffectDesign& design, const EffectDesign
   return gain(others, design, without, touched_by(place), true);
 }
 
+OrdinaryResidual SearchScores::ordinary(const std::vector<const EffectDesign*>& base,
+                                        const EffectDesign& design) const {
+  return ordinary_residual(evidence_, base, design, connected(base, design));
+}
+
 /// Nonlinear parameters between grid points, by golden section in each in turn.
 EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
                                    const CandidateScore& score, const EffectFit& current) const {

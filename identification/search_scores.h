@@ -2,6 +2,7 @@
 /// Likelihood gains of candidates beside or in the place of effects already found. Used by effect_search.cpp only.
 #include <vector>
 
+#include "identification/ordinary_check.h"
 #include "identification/search_candidates.h"
 
 namespace sparflow {
@@ -35,6 +36,10 @@ class SearchScores {
   double gain_instead(const EffectDesign& design, const EffectDesign& place,
                       const std::vector<const EffectDesign*>& others,
                       const EffectFit& without) const;
+
+  /// What ordinary least squares leaves with `design` beside `base`.
+  OrdinaryResidual ordinary(const std::vector<const EffectDesign*>& base,
+                            const EffectDesign& design) const;
 
   /// Nonlinear parameters between grid points, by golden section in each in turn.
   EffectDesign refined(const std::vector<const EffectDesign*>& base, const CandidateScore& score,

@@ -81,8 +81,7 @@ VectorXd smoothed_or_empty(const SavitzkyGolay& filter, const VectorXd& values) 
   return values.size() == 0 ? VectorXd() : filter.apply(values, 0);
 }
 
-void measured(const Machine& machine, const Log& log, int index, const SavitzkyGolay& filter,
-              MachineSignals& out) {
+void measured(const Machine& machine, const Log& log, int index, MachineSignals& out) {
   const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(index)];
   CylinderSignals& c = out.cylinders[static_cast<std::size_t>(index)];
   c.command = values_or_empty(log, Role::kCommand, index);
@@ -98,9 +97,6 @@ void measured(const Machine& machine, const Log& log, int index, const SavitzkyG
   if (c.force.size() == 0 && c.pressure_a.size() > 0 && c.pressure_b.size() > 0) {
     c.force = c.pressure_a * cylinder.area_piston() - c.pressure_b * cylinder.area_rod();
   }
-  c.pressure_a_smooth = smoothed_or_empty(filter, c.pressure_a);
-  c.pressure_b_smooth = smoothed_or_empty(filter, c.pressure_b);
-  c.force_smooth = smoothed_or_empty(filter, c.force);
 }
 
 /// Pose, speeds, tip and static forces at every usable sample.
@@ -218,6 +214,40 @@ Mask edges(const MachineSignals& s) {
   return edge;
 }
 
+/// All that follows from what is measured and the filter.
+void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOptions& options,
+            MachineSignals& out) {
+  const Index n = out.samples(), joints = machine.joint_count();
+  out.window = filter.window();
+  out.edge = edges(out);
+  out.q.resize(n, joints);
+  out.qd.resize(n, joints);
+  out.qdd.resize(n, joints);
+  out.usable = out.payload.array().isFinite();
+  for (int j = 0; j < joints; ++j) {
+    const Smoothed joint = filter.smooth(out.q_measured.col(j));
+    out.q.col(j) = joint.value;
+    out.qd.col(j) = joint.first;
+    out.qdd.col(j) = joint.second;
+    out.usable = out.usable && joint.value.array().isFinite() && joint.first.array().isFinite();
+  }
+  out.tip = Eigen::MatrixXd::Constant(n, 3, kNaN);
+  for (CylinderSignals& c : out.cylinders) {
+    for (VectorXd* v : {&c.length, &c.rate, &c.speed, &c.acceleration, &c.static_force}) {
+      *v = VectorXd::Constant(n, kNaN);
+    }
+    c.pressure_a_smooth = smoothed_or_empty(filter, c.pressure_a);
+    c.pressure_b_smooth = smoothed_or_empty(filter, c.pressure_b);
+    c.force_smooth = smoothed_or_empty(filter, c.force);
+  }
+  evaluate_machine(machine, out);
+  for (CylinderSignals& c : out.cylinders) c.model_force = c.predicted_force = c.static_force;
+  drop_dead_commands(machine, options.motion, out);
+  find_motion(machine, options.motion, out);
+  for (PumpSignals& pump : out.pumps)
+    pump.pressure_smooth = smoothed_or_empty(filter, pump.pressure);
+}
+
 }  // namespace
 
 VectorXd joints_at_strokes(const Machine& machine, int cylinder, const VectorXd& strokes,
@@ -256,6 +286,21 @@ VectorXd sample_durations(const VectorXd& time, const std::vector<SampleRange>& 
   return duration;
 }
 
+MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signals, double window_s,
+                             const SignalOptions& options) {
+  MachineSignals out = signals;
+  for (CylinderSignals& c : out.cylinders) {
+    for (VectorXd* v :
+         {&c.pressure_effect, &c.pressure_sensor_effect, &c.demand_effect, &c.flow_effect}) {
+      v->resize(0);
+    }
+  }
+  for (PumpSignals& p : out.pumps) p.pressure_effect.resize(0);
+  out.of_effective_machine = false;
+  derive(machine, {out.time, out.runs, window_s, options.smoothing.order}, options, out);
+  return out;
+}
+
 MachineSignals make_signals(const Machine& machine, const Log& log, const SignalOptions& options) {
   MachineSignals out;
   out.file = log.file;
@@ -263,51 +308,23 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
   out.step = log.step;
   out.time = log.time;
   out.runs = log.runs;
-  const Index n = out.samples(), joints = machine.joint_count();
   const SavitzkyGolay filter = make_filter(log, options.smoothing);
-  out.window = filter.window();
-  out.edge = edges(out);
-
-  out.q.resize(n, joints);
-  out.qd.resize(n, joints);
-  out.qdd.resize(n, joints);
-  for (int j = 0; j < joints; ++j) {
-    const Smoothed joint = filter.smooth(raw_joint(machine, log, j, out));
-    out.q.col(j) = joint.value;
-    out.qd.col(j) = joint.first;
-    out.qdd.col(j) = joint.second;
-  }
+  const Index n = out.samples(), joints = machine.joint_count();
+  out.q_measured.resize(n, joints);
+  for (int j = 0; j < joints; ++j) out.q_measured.col(j) = raw_joint(machine, log, j, out);
   const Channel* payload = log.find(Role::kPayload);
   out.payload_measured = payload != nullptr;
   out.payload = payload != nullptr ? payload->values : VectorXd(VectorXd::Zero(n));
   if (payload == nullptr) out.notes.push_back("no payload_kg in the log: 0 kg is assumed");
   out.oil = values_or_empty(log, Role::kOilTemperature, -1);
   out.return_pressure = values_or_empty(log, Role::kReturnPressure, -1);
-  out.usable = out.payload.array().isFinite();
-  for (int j = 0; j < joints; ++j) {
-    out.usable = out.usable && out.q.col(j).array().isFinite() && out.qd.col(j).array().isFinite();
-  }
-
-  out.tip = Eigen::MatrixXd::Constant(n, 3, kNaN);
   out.cylinders.resize(machine.cylinders.size());
-  for (int i = 0; i < machine.cylinder_count(); ++i) {
-    CylinderSignals& c = out.cylinders[static_cast<std::size_t>(i)];
-    for (VectorXd* v : {&c.length, &c.rate, &c.speed, &c.acceleration, &c.static_force}) {
-      *v = VectorXd::Constant(n, kNaN);
-    }
-    measured(machine, log, i, filter, out);
-  }
-  evaluate_machine(machine, out);
-  for (CylinderSignals& c : out.cylinders) c.model_force = c.predicted_force = c.static_force;
-  drop_dead_commands(machine, options.motion, out);
-  find_motion(machine, options.motion, out);
-
+  for (int i = 0; i < machine.cylinder_count(); ++i) measured(machine, log, i, out);
   out.pumps.resize(machine.pumps.size());
   for (int p = 0; p < machine.pump_count(); ++p) {
-    PumpSignals& pump = out.pumps[static_cast<std::size_t>(p)];
-    pump.pressure = values_or_empty(log, Role::kPumpPressure, p);
-    pump.pressure_smooth = smoothed_or_empty(filter, pump.pressure);
+    out.pumps[static_cast<std::size_t>(p)].pressure = values_or_empty(log, Role::kPumpPressure, p);
   }
+  derive(machine, filter, options, out);
   for (const Channel& channel : log.channels) {
     if (channel.role == Role::kCandidate) {
       out.candidates.push_back({channel.signal, channel.unit, channel.values});

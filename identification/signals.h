@@ -79,6 +79,7 @@ struct MachineSignals {
   std::string sha256;          ///< of the log's bytes
   double step = 0.0;           ///< [s] median sampling interval
   Eigen::VectorXd time;        ///< [s]
+  Eigen::MatrixXd q_measured;  ///< [samples x joints] as logged or from the strokes, SI
   Eigen::MatrixXd q, qd, qdd;  ///< [samples x joints] smoothed, SI
   Eigen::MatrixXd tip;         ///< [samples x 3] [m] in the base frame
   Eigen::VectorXd payload;     ///< [kg]; 0 everywhere when not logged
@@ -103,6 +104,11 @@ struct MachineSignals {
 /// @throws InputError when a stroke lies outside what the linkage can reach at every sample
 MachineSignals make_signals(const Machine& machine, const Log& log,
                             const SignalOptions& options = {});
+
+/// The same log through another filter; what effects have added (apply_effects) is gone.
+/// @param window_s full width [s], > 0
+MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signals, double window_s,
+                             const SignalOptions& options = {});
 
 /// Joint coordinates of a series of strokes [m], NaN where no joint coordinate has that stroke: Newton's
 /// method from the sample before, the bracketed `joint_at_stroke` where that fails. Error below 1e-10 rad.

@@ -77,6 +77,14 @@ class SavitzkyGolay {
 double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
                      const Eigen::MatrixXd& positions, int order = 3);
 
+/// Shortest window at which noise is no part of what a force is regressed on: its variance in the accelerations is
+/// below a thousandth of theirs (noise in a regressor makes its parameter too small by that share: Fuller (1987),
+/// Measurement Error Models, ch. 1). Smoothing rounds off starts and stops, and a law fitted to the smoothed force
+/// discounts what happens there; at this window every sample of a motion counts.
+/// @return full width [s], `longest` when no shorter one will do
+double sharpest_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
+                       const Eigen::MatrixXd& positions, double longest, int order = 3);
+
 /// The filter for a log: the window of the options, or the one `choose_window` finds for the log's joint
 /// positions and strokes.
 SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options = {});

@@ -13,9 +13,10 @@ namespace {
 constexpr double kSamples = 10.0;
 constexpr double kShortestLow = 0.1, kShortestHigh = 0.2;  // [s]
 constexpr double kLongest = 0.42;                          // [s]
-constexpr double kRatio = 1.2;           // between neighbouring windows of the grid
-constexpr Eigen::Index kEnough = 40000;  // samples looked at, in blocks spread over the log
-constexpr double kWhenUnknown = 0.25;    // [s]
+constexpr double kRatio = 1.2;             // between neighbouring windows of the grid
+constexpr Eigen::Index kEnough = 40000;    // samples looked at, in blocks spread over the log
+constexpr double kLargestDilution = 1e-3;  // share of noise in the variance of an acceleration
+constexpr double kWhenUnknown = 0.25;      // [s]
 
 /// Standard deviation of white noise on a channel: third differences have 20 times its variance and hardly
 /// any motion; the median of their size (0.6745 sigma) is blind to the starts and stops.
@@ -118,6 +119,26 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   Eigen::Index best = 0;
   risk.minCoeff(&best);
   return grid[static_cast<std::size_t>(best)];
+}
+
+double sharpest_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& all_runs,
+                       const Eigen::MatrixXd& positions, double longest, int order) {
+  const std::vector<SampleRange> runs = spread_blocks(all_runs);
+  const double step = median_step(time);
+  if (!(step > 0.0)) return longest;
+  for (double w = kSamples * step; w < longest; w *= kRatio) {
+    const SavitzkyGolay filter(time, runs, w, order);
+    bool sharp = positions.cols() > 0;
+    for (Eigen::Index c = 0; c < positions.cols() && sharp; ++c) {
+      const Eigen::ArrayXd a = filter.apply(positions.col(c), 2).array();
+      const double count = static_cast<double>(a.isFinite().count());
+      const double whole = a.isFinite().select(a.square(), 0.0).sum() / std::max(1.0, count);
+      const double noise = std::pow(noise_of(positions.col(c), runs) * filter.noise_gain(2), 2);
+      sharp = noise <= kLargestDilution * (whole - noise);
+    }
+    if (sharp) return w;
+  }
+  return longest;
 }
 
 SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options) {

@@ -259,6 +259,25 @@ void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, con
   }
 }
 
+LineChart bad_channel_chart(const BadChannel& bad) {
+  LineChart chart;
+  chart.title = fmt::format("{} in {}", bad.channel, bad.file);
+  chart.y_axis = {bad.channel, bad.unit};
+  chart.x = bad.time;
+  chart.series.push_back({"as logged", bad.values, LineStyle::kPlain, 0, {}, {}});
+  std::string word = bad_data_word(bad.kind);
+  std::replace(word.begin(), word.end(), '_', ' ');
+  const double thinnest = bad.time.size() > 1  // one sample would not be seen
+                              ? 0.002 * (bad.time[bad.time.size() - 1] - bad.time[0])
+                              : 0.0;
+  for (const auto& [from, to] : bad.stretches) {
+    const double more = std::max(0.0, 0.5 * (thinnest - (to - from)));
+    chart.spans.push_back({from - more, to + more, chart.spans.empty() ? word : ""});
+  }
+  chart.note = fmt::format("Shaded: where it is {}.", word);
+  return chart;
+}
+
 void add_ranking(Page& page, const Diagnosis& d) {
   if (d.ranking.empty()) return;
   BarChart chart;

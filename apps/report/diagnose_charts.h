@@ -38,6 +38,9 @@ void add_effect_pictures(Page& page, const Diagnosis& diagnosis, std::size_t eff
 void add_left_over(Page& page, const Diagnosis& diagnosis, const std::string& stage,
                    const std::string& at, bool swings);
 
+/// A bad channel over time as logged, where it is bad shaded.
+LineChart bad_channel_chart(const BadChannel& bad);
+
 /// Gains of the candidates, and what chance would reach.
 void add_ranking(Page& page, const Diagnosis& diagnosis);
 

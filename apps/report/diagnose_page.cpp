@@ -15,6 +15,8 @@
 namespace sparflow {
 namespace {
 
+constexpr std::size_t kMostBadPictures = 4;  // the worst; the table has all
+
 Tone tone_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::kNone:
@@ -197,6 +199,9 @@ void add_bad_data(Page& page, const Diagnosis& d) {
                           100.0 * b.share, b.evidence, b.remedy});
   }
   page.table(std::move(table));
+  for (std::size_t i = 0; i < std::min(kMostBadPictures, d.bad.size()); ++i) {
+    if (d.bad[i].time.size() > 1) page.plot(bad_channel_chart(d.bad[i]));
+  }
 }
 
 }  // namespace

@@ -235,6 +235,17 @@ const AppliedEffect& in_the_model(const CraneModel& model, const AppliedEffect& 
   return e;
 }
 
+/// Without what was tried and not kept: that has a section of its own.
+std::string stopped_briefly(const ExtendResult& r) {
+  if (r.rejected.empty()) return r.stopped_because;
+  const std::size_t at =
+      r.stopped_because.find(fmt::format("; {} was tried", r.rejected.front().title));
+  if (at == std::string::npos) return r.stopped_because;
+  return r.stopped_because.substr(0, at) + fmt::format("; {} more {} tried and not kept",
+                                                       r.rejected.size(),
+                                                       r.rejected.size() == 1 ? "was" : "were");
+}
+
 void set_verdict(Page& page, const ExtendResult& r) {
   if (r.steps.empty()) {
     page.verdict(r.rejected.empty() ? Tone::kGood : Tone::kWarning, "Nothing was added",
@@ -255,7 +266,7 @@ void set_verdict(Page& page, const ExtendResult& r) {
       fmt::format("The error on the {} is {} overall{}. {}{}{}.", r.steps.front().judged_on, change,
                   r.steps.size() > 1 ? " after all steps" : "", text,
                   r.last ? "Stopped because " : "",
-                  r.last ? r.stopped_because : capitalised(r.stopped_because)));
+                  r.last ? stopped_briefly(r) : capitalised(stopped_briefly(r))));
 }
 
 void add_last(Page& page, const Diagnosis& d) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "models/effects/builtin.h"
+#include "models/effects/user_effect_scope.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -64,6 +65,10 @@ const Effect* add_user_effect(std::unique_ptr<Effect> effect) {
   mutable_catalogue().push_back(std::move(effect));
   return mutable_catalogue().back().get();
 }
+
+UserEffectScope::UserEffectScope() : before_(mutable_catalogue().size()) {}
+
+UserEffectScope::~UserEffectScope() { mutable_catalogue().resize(before_); }
 
 EffectAt parse_effect(const std::string& key, const Machine& machine) {
   const std::size_t colon = key.find(':');

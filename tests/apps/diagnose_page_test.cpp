@@ -190,6 +190,32 @@ TEST(DiagnosePageInBrowser, SwingIsDrawnOverTime) {
   expect_good_in_browser(page, "diagnose page swing");
 }
 
+TEST(DiagnosePageInBrowser, BadChannelIsDrawnOverTimeWithTheFaultMarked) {
+  const CraneModel model = arm_model();
+  Log log = log_with_friction();
+  Channel& pressure = testing_support::channel(log, "pA_arm");
+  const Eigen::Index from = log.samples() / 3, length = log.samples() / 5;
+  pressure.values.segment(from, length).setConstant(pressure.values[from]);
+  Diagnosis d;
+  const MachineSignals signals = make_signals(model.machine, log);
+  d.evidence = collect_evidence(model, {signals});
+  d.verdict = Verdict::kBadData;
+  d.bad = find_bad_channels(model.machine, log, signals);
+  ASSERT_EQ(d.bad.size(), 1u);
+  ASSERT_EQ(d.bad[0].stretches.size(), 1u);
+  const LineChart chart = bad_channel_chart(d.bad[0]);
+  EXPECT_EQ(chart.y_axis.unit, "bar");
+  EXPECT_NEAR(chart.series[0].y[from], pressure.values[from] / 1e5, 1e-9);
+  ASSERT_EQ(chart.spans.size(), 1u);
+  EXPECT_EQ(chart.spans[0].label, "stuck");
+  // the machine rests for a moment around it: stuck is what has one value
+  EXPECT_NEAR(chart.spans[0].from, log.time[from], 2.0);
+  EXPECT_NEAR(chart.spans[0].to, log.time[from + length - 1], 2.0);
+  const Page page = diagnose_page(model, d);
+  EXPECT_EQ(page.plot_count(), 1);
+  expect_good_in_browser(page, "diagnose page bad data");
+}
+
 TEST(DiagnosePageInBrowser, NothingMissing) {
   const CraneModel model = arm_model();
   Diagnosis d;

@@ -201,5 +201,24 @@ TEST(MakeFilter, RealAndSimulatedLogsGetAUsualWindow) {
   EXPECT_DOUBLE_EQ(make_filter(log, {.window_s = 0.3, .order = 2}).window(), 0.3);
 }
 
+TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
+  const Eigen::VectorXd time = even_time(8000, 1e-3);
+  const double w = 2.0 * M_PI * 0.7, amplitude = 0.1;
+  const Eigen::VectorXd clean = amplitude * (w * time).array().sin();
+  const double acceleration = amplitude * w * w / std::sqrt(2.0);  // RMS
+  for (const double sigma : {1e-7, 3e-6, 2e-5}) {
+    const Eigen::VectorXd x = clean + sigma * white_noise(8000, 4);
+    const double window = sharpest_window(time, {{0, 8000}}, x, 0.4);
+    const auto share = [&](double width) {
+      return std::pow(sigma * filter(time, width).noise_gain(2) / acceleration, 2);
+    };
+    // the noise's size is itself estimated, to some 2 %
+    EXPECT_LT(share(window), 1.1e-3) << sigma;
+    if (window > 0.0101) EXPECT_GT(share(window / 1.2), 0.9e-3) << sigma;
+  }
+  const Eigen::VectorXd rough = clean + 5e-3 * white_noise(8000, 4);
+  EXPECT_DOUBLE_EQ(sharpest_window(time, {{0, 8000}}, rough, 0.2), 0.2);
+}
+
 }  // namespace
 }  // namespace sparflow

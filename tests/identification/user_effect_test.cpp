@@ -12,6 +12,7 @@
 #include "identification/extend.h"
 #include "identification/series.h"
 #include "models/effects/registry.h"
+#include "models/effects/user_effect_scope.h"
 #include "models/error.h"
 #include "models/linkage.h"
 #include "models/model_file.h"
@@ -63,11 +64,16 @@ Log log_with_tight_spot(unsigned seed) {
   return log;
 }
 
+/// Its effects are gone after each test: other tests search the bare catalogue.
+class UserEffect : public testing::Test {
+  UserEffectScope scope_;
+};
+
 const Effect& tight_spot() {
   return *register_user_effects(kTightSpot, "mine.yaml", arm_machine()).front();
 }
 
-TEST(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
+TEST_F(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
   const Effect& effect = tight_spot();
   // Fb stands last in the file and first here: the law is proportional to it
   ASSERT_EQ(effect.info().parameters[0].name, "Fb");
@@ -86,7 +92,7 @@ TEST(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
   EXPECT_NEAR(d.effects[0].parameters[0].value, 1e-3 * p[0], 1e-9);
 }
 
-TEST(UserEffect, IsAddedAndCarriedByTheModelFile) {
+TEST_F(UserEffect, IsAddedAndCarriedByTheModelFile) {
   const EffectAt effect{&tight_spot(), 0};
   CraneModel model = arm_model();
   model.user_effects = {effect.effect};
@@ -107,7 +113,7 @@ TEST(UserEffect, IsAddedAndCarriedByTheModelFile) {
   EXPECT_THAT(offered.user_effects, Contains(effect.effect));
 }
 
-TEST(UserEffect, OneDefinitionTwiceIsFineTwoOfOneIdAreNot) {
+TEST_F(UserEffect, OneDefinitionTwiceIsFineTwoOfOneIdAreNot) {
   const Effect& effect = tight_spot();
   // another layout, a comment, more effects in the file: the same definition
   std::string text = std::string("# my effects\n") + kTightSpot;
@@ -141,8 +147,19 @@ TEST(UserEffect, OneDefinitionTwiceIsFineTwoOfOneIdAreNot) {
       InputError);
 }
 
+TEST(UserEffectScope, LeavesTheCatalogueAsItWas) {
+  const std::size_t before = effect_catalogue().size();
+  {
+    const UserEffectScope scope;
+    register_user_effects(kTightSpot, "mine.yaml", arm_machine());
+    EXPECT_EQ(effect_catalogue().size(), before + 1);
+  }
+  EXPECT_EQ(effect_catalogue().size(), before);
+  EXPECT_EQ(find_effect("tight_spot"), nullptr);
+}
+
 /// A law of each stage as that stage's evidence sees it (docs/user_effects.md).
-TEST(UserEffect, ShowsInTheEvidenceOfItsStage) {
+TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
   const Machine machine = arm_machine();
   const MachineSignals signals = make_signals(machine, arm_log());
   MachineSeries series = make_series(arm_model(), signals);

@@ -11,6 +11,7 @@
 #include "broken_model_support.h"
 #include "models/effects/registry.h"
 #include "models/effects/user_effect.h"
+#include "models/effects/user_effect_scope.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -150,6 +151,7 @@ constexpr const char* kSealFriction = R"yaml(effects:
 )yaml";
 
 TEST(ModelFile, CarriesEffectsOfTheUsersOwn) {
+  const UserEffectScope scope;
   CraneModel model = small_model();
   const Effect* seal = register_user_effects(kSealFriction, "mine.yaml", model.machine).front();
   EXPECT_EQ(register_user_effects(kSealFriction, "again.yaml", model.machine).front(), seal);

@@ -2,7 +2,9 @@
 // law of each stage that a motion sees.
 #include <gtest/gtest.h>
 
+#include "models/effects/registry.h"
 #include "models/effects/user_effect.h"
+#include "models/effects/user_effect_scope.h"
 #include "optimizer/crane_knot_model.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/transcription.h"
@@ -78,6 +80,7 @@ void check_whole_energy(const CraneModel& model, const std::string& what) {
 class UserEffectsOnMachine : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(UserEffectsOnMachine, WholeEnergyMatchesFiniteDifferences) {
+  const UserEffectScope scope;
   CraneModel bare =
       test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
   CraneModel all = bare;
@@ -94,6 +97,7 @@ TEST_P(UserEffectsOnMachine, WholeEnergyMatchesFiniteDifferences) {
 }
 
 TEST_P(UserEffectsOnMachine, EnergyChangesWithThem) {
+  const UserEffectScope scope;
   const CraneModel bare =
       test_support::synthetic_model(load_machine(bundled_file("machines/" + GetParam())));
   const MotionProblem problem = test_support::problem_for(bare.machine, 13);
