@@ -170,7 +170,9 @@ TEST(Selftest, SaysWhatToRecordForEachSet) {
     EXPECT_FALSE(e.motion.empty());
     EXPECT_THAT(t.table(), HasSubstr(e.sentence()));
     // a motion of the menu is worth more than those at hand, which cannot tell the set apart
-    if (e.nats_per_minute > 0.0) EXPECT_GT(e.nats_per_minute, e.nats_here);
+    if (e.nats_per_minute > 0.0) {
+      EXPECT_GT(e.nats_per_minute, e.nats_here);
+    }
     const auto named = std::count_if(
         t.sets[k].begin(), t.sets[k].end(),
         [&](const std::string& key) { return e.reason.find(key) != std::string::npos; });
