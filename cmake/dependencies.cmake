@@ -7,7 +7,6 @@ find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(yaml-cpp REQUIRED)
-find_package(Ceres REQUIRED)
 pkg_check_modules(IPOPT REQUIRED IMPORTED_TARGET GLOBAL ipopt)  # carries -DHAVE_CSTDDEF
 
 # OMPL's package file names no target and boost libraries that are not installed: link libompl itself.

@@ -36,7 +36,7 @@ endforeach()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/apps/report
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow/apps FILES_MATCHING PATTERN "*.h"
         PATTERN assets EXCLUDE)
-foreach(DATA machines reaches logs effects)
+foreach(DATA machines models reaches logs effects)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/problems/${DATA} DESTINATION ${CMAKE_INSTALL_DATADIR}/sparflow)
 endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sparflow)

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "identification/bad_data_checks.h"
+#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 
 namespace sparflow {
@@ -117,7 +118,7 @@ UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
   VectorXd weight = VectorXd::Ones(n);
   for (int pass = 0; pass < 5; ++pass) {  // Huber's weights: what is sought must not bend the line
     const Eigen::MatrixXd wx = weight.asDiagonal() * x;
-    const Eigen::Vector2d p = (x.transpose() * wx).ldlt().solve(wx.transpose() * y);
+    const Eigen::Vector2d p = solve_symmetric(transposed_product(x, wx), wx.transpose() * y);
     out.a = p[0];
     out.b = p[1];
     const VectorXd r = y - x * p;

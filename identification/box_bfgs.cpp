@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/linear_algebra.h"
+
 namespace sparflow {
 namespace {
 
@@ -83,7 +85,8 @@ BoxBfgsResult minimise_in_box(const std::function<double(const VectorXd&, Vector
       if (!scaled) inverse_hessian = MatrixXd::Identity(n, n) * (sy / y.squaredNorm());
       scaled = true;
       const MatrixXd left = MatrixXd::Identity(n, n) - s * y.transpose() / sy;
-      inverse_hessian = left * inverse_hessian * left.transpose() + s * s.transpose() / sy;
+      inverse_hessian =
+          product(product(left, inverse_hessian), left.transpose()) + s * s.transpose() / sy;
     }
     // Twice in a row, since one short step may only be a poor line search.
     flat = decrease < options.value_tolerance * (1.0 + std::abs(r.value)) ? flat + 1 : 0;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 
 namespace sparflow {
@@ -85,7 +86,7 @@ Rows gather(const std::vector<BranchData>& logs) {
   // force = A_supply p_supply - A_return p_return, times the side: areas and sign from the data
   MatrixXd pressures(n, 2);
   pressures << r.p_supply, r.p_return;
-  const VectorXd areas = pressures.colPivHouseholderQr().solve(force);
+  const VectorXd areas = least_squares(pressures, force);
   r.load = std::abs(areas[0]) > 0.0 ? VectorXd(force / areas[0]) : VectorXd::Zero(n);
   const double largest = std::max(1.0, r.load.cwiseAbs().maxCoeff());
   r.valve.col(3) = r.load / largest;
@@ -100,10 +101,10 @@ struct Law {
 
   void fit(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
     const double total = weight.sum();
-    MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
+    MatrixXd normal = weighted_gram(x, weight);
     // regressors are near one: this holds what the samples do not show at zero and changes nothing else
     normal.diagonal().array() += 1e-6 * total + 1e-12;
-    coefficients = normal.ldlt().solve(x.transpose() * weight.cwiseProduct(y));
+    coefficients = solve_symmetric(normal, x.transpose() * weight.cwiseProduct(y));
     const VectorXd r = y - x * coefficients;
     deviation = std::max(kSharpest, std::sqrt(weight.dot(r.cwiseAbs2()) / std::max(total, 1e-9)));
     share = total / static_cast<double>(y.size());

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "identification/linear_algebra.h"
+
 namespace sparflow {
 namespace {
 
@@ -37,7 +39,7 @@ VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* 
   MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
   h.diagonal().array() += 1e-10;
   const VectorXd gs = scale.cwiseProduct(g);
-  VectorXd x = h.ldlt().solve(gs);
+  VectorXd x = solve_symmetric(h, gs);
   const auto lower = [&](Index i) { return scale[i] > 0.0 ? b.lower[i] / scale[i] : 0.0; };
   const auto upper = [&](Index i) { return scale[i] > 0.0 ? b.upper[i] / scale[i] : 0.0; };
   *at_bound = false;
@@ -103,10 +105,7 @@ MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
     if (baseline_coefficients != nullptr) baseline_coefficients->resize(0, m + 1);
     return all;
   }
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(all.leftCols(b));
-  const MatrixXd coefficients = qr.solve(all.rightCols(m + 1));
-  if (baseline_coefficients != nullptr) *baseline_coefficients = coefficients;
-  return all.rightCols(m + 1) - all.leftCols(b) * coefficients;
+  return without_projection(all.rightCols(m + 1), all.leftCols(b), baseline_coefficients);
 }
 
 EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
@@ -161,7 +160,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
       Whitened& w = white[c];
       w.rows = whitened_rows(channel, fit.noise[c], columns[c], &w.log_determinant, &w.baseline);
       const Index m = columns[c].cols();
-      const MatrixXd cross = w.rows.leftCols(m).transpose() * w.rows / fit.noise[c].variance;
+      const MatrixXd cross = transposed_product(w.rows.leftCols(m), w.rows) / fit.noise[c].variance;
       for (Index i = 0; i < m; ++i) {
         const Index oi = owner[c][static_cast<std::size_t>(i)];
         g[oi] += cross(i, m);
@@ -209,7 +208,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
     }
     if (last && control.covariance && count > 0) {
       // sandwich: bread N^-1, filling by blocks (White 1980; Liang & Zeger 1986)
-      const MatrixXd bread = n.ldlt().solve(MatrixXd::Identity(count, count));
+      const MatrixXd bread = solve_symmetric_columns(n, MatrixXd::Identity(count, count));
       MatrixXd filling = MatrixXd::Zero(count, count);
       for (std::size_t c = 0; c < channels; ++c) {
         if (!active(c)) continue;
@@ -229,7 +228,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
           filling += full * full.transpose();
         }
       }
-      const MatrixXd robust = bread * filling * bread;
+      const MatrixXd robust = product(product(bread, filling), bread);
       fit.covariance = bread;
       for (Index i = 0; i < count;
            ++i) {  // the wider of the two, correlations of the model-based one

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "identification/linear_algebra.h"
+
 namespace sparflow {
 namespace {
 
@@ -36,7 +38,7 @@ VectorXd inside_bounds(const MatrixXd& n, const VectorXd& g, const EffectDesign&
   MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
   h.diagonal().array() += 1e-9;  // decides only what no data decide
   const VectorXd gs = scale.cwiseProduct(g);
-  VectorXd b = h.ldlt().solve(gs), lower(g.size()), upper(g.size());
+  VectorXd b = solve_symmetric(h, gs), lower(g.size()), upper(g.size());
   for (Index i = 0; i < g.size(); ++i) {
     lower[i] = design.lower[static_cast<std::size_t>(i)] / scale[i];
     upper[i] = design.upper[static_cast<std::size_t>(i)] / scale[i];
@@ -163,9 +165,9 @@ ProjectedDesign PowerStudy::project(const EffectDesign& design) const {
     p.white[c] =
         whitened_rows(channel, noise_[c], design.columns[c], nullptr, &coefficients).leftCols(m) /
         std::sqrt(noise_[c].variance);
-    p.gram += p.white[c].transpose() * p.white[c];
+    p.gram += transposed_product(p.white[c], p.white[c]);
     p.plain[c] = design.columns[c];
-    if (coefficients.rows() > 0) p.plain[c] -= channel.baseline * coefficients.leftCols(m);
+    if (coefficients.rows() > 0) p.plain[c] -= product(channel.baseline, coefficients.leftCols(m));
   }
   return p;
 }

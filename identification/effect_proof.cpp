@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/linear_algebra.h"
+
 namespace sparflow {
 namespace {
 
@@ -32,7 +34,7 @@ VectorXd solve(MatrixXd n, const VectorXd& g) {
   const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   n = scale.asDiagonal() * n * scale.asDiagonal();
   n.diagonal().array() += 1e-9;
-  return scale.cwiseProduct(n.ldlt().solve(scale.cwiseProduct(g)));
+  return scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
 }
 
 double size_where_it_acts(const VectorXd& action) {
@@ -57,8 +59,7 @@ EffectAction effect_action(const Evidence& evidence,
     const double noise = fit.noise[c].deviation();
     VectorXd own = acts_in(index, c);
     whole += own.squaredNorm() / (noise * noise);
-    if (channel.baseline.cols() > 0)
-      own -= channel.baseline * channel.baseline.colPivHouseholderQr().solve(own);
+    if (channel.baseline.cols() > 0) own -= channel.baseline * least_squares(channel.baseline, own);
     const double squares = own.squaredNorm();
     left += squares / (noise * noise);
     if (!(squares > 0.0)) continue;
@@ -106,7 +107,7 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     for (std::size_t b = 0; b < evidence.channels[c].blocks.size(); ++b) {
       const NoiseBlock& block = evidence.channels[c].blocks[b];
       const MatrixXd part = rows[c].middleRows(block.first, block.last - block.first);
-      const MatrixXd cross = part.leftCols(width).transpose() * part;
+      const MatrixXd cross = transposed_product(part.leftCols(width), part);
       for (Index i = 0; i < width; ++i) {
         const Index oi = owner[c][static_cast<std::size_t>(i)];
         g[b % count][oi] += cross(i, width);

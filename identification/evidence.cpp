@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "identification/branches.h"
+#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 #include "identification/series.h"
 #include "models/nan.h"
@@ -163,7 +164,7 @@ double raw_noise(const VectorXd& x) {
 void slope_of(EvidenceChannel& channel) {
   channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
-  const VectorXd b = channel.baseline.colPivHouseholderQr().solve(channel.y);
+  const VectorXd b = least_squares(channel.baseline, channel.y);
   channel.force_slope = (b[3] + b[4] * channel.baseline.col(1).array()) / kForceScale;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 
 namespace sparflow {
@@ -17,9 +18,8 @@ using Eigen::VectorXd;
 VectorXd quadratic_residuals(const GpPoints& p) {
   MatrixXd features(p.size(), 6);
   features << VectorXd::Ones(p.size()), p.x1, p.x2, p.x1.square(), p.x1 * p.x2, p.x2.square();
-  const MatrixXd normal = features.transpose() * features;
-  const VectorXd coefficients =
-      normal.completeOrthogonalDecomposition().solve(features.transpose() * p.y);
+  const MatrixXd normal = transposed_product(features, features);
+  const VectorXd coefficients = least_squares_of_least_norm(normal, features.transpose() * p.y);
   return p.y - features * coefficients;
 }
 

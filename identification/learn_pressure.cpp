@@ -13,6 +13,7 @@
 #include "identification/box_bfgs.h"
 #include "identification/gp_likelihood.h"
 #include "identification/gp_screening.h"
+#include "identification/linear_algebra.h"
 #include "identification/sparse_gp.h"
 #include "models/error.h"
 
@@ -203,7 +204,7 @@ GpParameters to_si(const Problem& problem, const GpPosterior& posterior, const G
     t(m + 1, m) = -f.offset / f.scale;
     t(m + 1, m + 1) = 1.0 / f.scale;
   }
-  const MatrixXd core = p.scale * p.scale * (t.transpose() * posterior.core * t);
+  const MatrixXd core = p.scale * p.scale * product(transposed_product(t, posterior.core), t);
   out.variance_core = 0.5 * (core + core.transpose());
   return out;
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 #include "models/error.h"
 
@@ -29,9 +30,9 @@ RobustFit robust_fit(const MatrixXd& features, const VectorXd& y) {
   double std = 0.0;
   MatrixXd normal;
   for (int i = 0; i < 50; ++i) {
-    normal = features.transpose() * weight.asDiagonal() * features;
+    normal = weighted_gram(features, weight);
     const VectorXd before = fit.coefficients;
-    fit.coefficients = normal.ldlt().solve(features.transpose() * weight.cwiseProduct(y));
+    fit.coefficients = solve_symmetric(normal, features.transpose() * weight.cwiseProduct(y));
     fit.residuals = y - features * fit.coefficients;
     // Below a billionth of the signal residuals are rounding, and so would be the weights.
     std = std::max(robust_std(fit.residuals), 1e-9 * y.cwiseAbs().maxCoeff());
@@ -39,7 +40,7 @@ RobustFit robust_fit(const MatrixXd& features, const VectorXd& y) {
     weight = fit.residuals.unaryExpr([&](double r) { return huber_weight(r, kHuberStds * std); });
     if (i > 0 && (fit.coefficients - before).norm() < 1e-10 * fit.coefficients.norm()) break;
   }
-  fit.covariance = std * std * normal.inverse();
+  fit.covariance = std * std * inverse(normal);
   return fit;
 }
 

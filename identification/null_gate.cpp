@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/linear_algebra.h"
+
 namespace sparflow {
 namespace {
 
@@ -35,7 +37,7 @@ MatrixXd flipped_scores(const MatrixXd& x, const VectorXd& residual, const Vecto
         x.middleRows(first, length).transpose() * left.segment(first, length);
   }
   const double variance = left.squaredNorm() / static_cast<double>(left.size());
-  return by_block * signs / std::sqrt(std::max(variance, 1e-300));
+  return product(by_block, signs) / std::sqrt(std::max(variance, 1e-300));
 }
 
 }  // namespace
@@ -76,8 +78,7 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
     fixed[c] = rows.leftCols(width);
     VectorXd r = rows.col(width);
     if (width > 0) {  // orthonormal, so that projecting later is one product
-      fixed[c] = MatrixXd(fixed[c].householderQr().householderQ() *
-                          MatrixXd::Identity(channel.rows(), width));
+      fixed[c] = thin_qr(fixed[c]).q;
       r -= fixed[c] * (fixed[c].transpose() * r);
     }
     residual[c] = std::move(r);
@@ -102,22 +103,21 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
             whitened_rows(evidence.channels[c], fit.noise[c], d.columns[c]).leftCols(d.linear);
         if (fixed[c].cols() > 0) {
           const VectorXd whole = x.colwise().squaredNorm();
-          x -= fixed[c] * (fixed[c].transpose() * x);
+          x -= product(fixed[c], transposed_product(fixed[c], x));
           for (Index i = 0; i < x.cols(); ++i) {  // accepted already: rounding is no candidate
             if (x.col(i).squaredNorm() < 1e-16 * whole[i]) x.col(i).setZero();
           }
         }
         x /= std::sqrt(fit.noise[c].variance);
-        n += x.transpose() * x;
-        z.leftCols(simulations) += x.transpose() * noise[c];
+        n += transposed_product(x, x);
+        z.leftCols(simulations) += transposed_product(x, noise[c]);
         g += x.transpose() * residual[c] / std::sqrt(fit.noise[c].variance);
         columns[c] = std::move(x);
       }
       const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
       n = scale.asDiagonal() * n * scale.asDiagonal();
       n.diagonal().array() += 1e-9;
-      const Eigen::LDLT<MatrixXd> solver(n);
-      const VectorXd own = scale.cwiseProduct(solver.solve(scale.cwiseProduct(g)));
+      const VectorXd own = scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
       for (std::size_t c = 0; c < channels; ++c) {
         if (columns[c].cols() == 0) continue;
         z.rightCols(simulations) +=
@@ -125,7 +125,8 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
                            evidence.channels[c].blocks, signs[c]);
       }
       z = scale.asDiagonal() * z;
-      best = best.cwiseMax((0.5 * z.cwiseProduct(solver.solve(z)).colwise().sum()).transpose());
+      best = best.cwiseMax(
+          (0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum()).transpose());
     }
     const double usual = upper_decile(best.head(simulations));
     const double scale =

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/linear_algebra.h"
 #include "identification/parallel.h"
 
 namespace sparflow {
@@ -42,15 +43,14 @@ int independent_columns(const SearchCandidate& candidate) {
   for (const EffectDesign& d : candidate.designs) {
     MatrixXd gram = MatrixXd::Zero(d.linear, d.linear);
     for (const MatrixXd& c : d.columns) {
-      if (c.cols() > 0) gram += c.transpose() * c / std::max(c.squaredNorm(), 1e-300);
+      if (c.cols() > 0) gram += transposed_product(c, c) / std::max(c.squaredNorm(), 1e-300);
     }
     const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     Index here = 0;
     for (Index i = 0; i < d.linear; ++i)
       here += gram(i, i) > 1e-12 * gram.diagonal().maxCoeff() ? 1 : 0;
     const MatrixXd correlation = scale.asDiagonal() * gram * scale.asDiagonal();
-    here =
-        std::min(here, Eigen::ColPivHouseholderQR<MatrixXd>(correlation).setThreshold(1e-6).rank());
+    here = std::min(here, rank(correlation, 1e-6));
     linear = std::max(linear, here);
   }
   return static_cast<int>(linear);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/linear_algebra.h"
 #include "identification/log_time.h"
 #include "models/error.h"
 
@@ -26,11 +27,8 @@ Eigen::MatrixXd fit_weights(const Eigen::VectorXd& nodes, double at, int order) 
     if (k >= 1) evaluate(1, k) = k * std::pow(at, k - 1);
     if (k >= 2) evaluate(2, k) = k * (k - 1) * std::pow(at, k - 2);
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
-  const Eigen::MatrixXd thin =
-      qr.householderQ() * Eigen::MatrixXd::Identity(nodes.size(), order + 1);
-  const auto upper = qr.matrixQR().topRows(order + 1).triangularView<Eigen::Upper>();
-  return upper.transpose().solve(evaluate.transpose()).transpose() * thin.transpose();
+  const ThinQr qr = thin_qr(basis);
+  return product(qr.q, solve_transposed_upper(qr.r, evaluate.transpose())).transpose();
 }
 
 /// Samples either side of the middle in a window of `window_s`.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <random>
 
+#include "identification/linear_algebra.h"
 #include "identification/parallel.h"
 #include "identification/robust.h"
 #include "identification/unexplained_time.h"
@@ -62,7 +63,7 @@ Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<in
   VectorXd g_all = VectorXd::Zero(m);
   for (std::size_t f = 0; f < rows.size(); ++f) {
     const MatrixXd xf = x(rows[f], Eigen::all);
-    gram[f].noalias() = xf.transpose() * xf;
+    gram[f] = transposed_product(xf, xf);
     cross[f].noalias() = xf.transpose() * y(rows[f]);
     all += gram[f];
     g_all += cross[f];
@@ -74,7 +75,7 @@ Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<in
     for (std::size_t f = 0; f < rows.size(); ++f) {
       MatrixXd n = all - gram[f];
       n.diagonal().array() += strength * scale;
-      const VectorXd w = n.llt().solve(g_all - cross[f]);
+      const VectorXd w = solve_definite(n, g_all - cross[f]);
       for (const Index i : rows[f]) prediction[i] = x.row(i).dot(w);
     }
     const double explained = 1.0 - (y - prediction).squaredNorm() / y.squaredNorm();
@@ -232,9 +233,9 @@ VectorXd to_explain(const Evidence& evidence, const EvidenceChannel& channel, co
       channel.kind != EvidenceKind::kPump) {
     // a learned process follows any smooth law of the cylinder's own flow and force: that is no riddle
     const MatrixXd own = own_process_basis(evidence, channel, rows);
-    MatrixXd gram = own.transpose() * own;
+    MatrixXd gram = transposed_product(own, own);
     gram.diagonal().array() += 1e-3 * gram.diagonal().mean();
-    y -= own * gram.llt().solve(own.transpose() * y);
+    y -= own * solve_definite(gram, own.transpose() * y);
     y.array() -= y.mean();
   }
   return y;

@@ -191,8 +191,6 @@ Json parse(const std::string& text, const std::string& file) {
 
 }  // namespace
 
-const char* program_version() { return SPARFLOW_VERSION; }
-
 std::string model_to_json(const CraneModel& model) {
   Json root;
   root["sparflow_model"] = kModelFileVersion;

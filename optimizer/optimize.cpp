@@ -150,8 +150,10 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
     const Trajectory timed = with_duration(s.motion, result.duration);
     if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
     const double energy = exact_energy(model, timed, problem.payload, refine).total;
-    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy)
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
       result.best_seed_energy = energy;
+      result.best_seed_name = s.name;
+    }
     if (nearest) result.nearest_line_energy = energy;
     if (s.straight_line &&
         (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
@@ -225,6 +227,8 @@ const char* to_string(OptimizeStatus status) {
 
 namespace {
 
+constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
+
 /// Everything that is solved for one problem in one window of time.
 class Search {
  public:
@@ -266,9 +270,7 @@ class Search {
         [&](int i) {
           const auto k = static_cast<std::size_t>(i);
           OptimizeOptions options = coarse_;
-          const int ways =
-              problem_.obstacles.empty() ? 1 : 2;  // each way round is a start of its own
-          if (i >= ways * options.smooth_starts && options.modes) options.schedule.clear();
+          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
           return k < given
                      ? optimize_from(model_, problem_, seeds_[k], time_, options)
                      : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
@@ -297,19 +299,28 @@ class Search {
     if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
         !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
       return found;
-    EnergyGrid grid(model_, problem_, size);
-    std::vector<GridPath> paths;
-    if (problem_.objective.energy > 0.0) {
-      paths = grid.paths_for_duration(time_.guess, options_.grid_starts);
-    } else if (time_is_everything(problem_)) {
-      constexpr double kTimeIsEverything = 1e7;  // [W]
-      paths.push_back(grid.cheapest_path(kTimeIsEverything));
-    }
-    for (const GridPath& path : paths) {
-      if (!path.found) continue;
-      const double duration =
-          std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
-      found.push_back(grid_path_candidate(model_, problem_, path, duration, coarse_.intervals));
+    const auto search = [&](const MotionProblem& problem, int most) {
+      EnergyGrid grid(model_, problem, size);
+      std::vector<GridPath> paths;
+      if (problem.objective.energy > 0.0) {
+        paths = grid.paths_for_duration(time_.guess, most);
+      } else if (time_is_everything(problem)) {
+        constexpr double kTimeIsEverything = 1e7;  // [W]
+        paths.push_back(grid.cheapest_path(kTimeIsEverything));
+      }
+      for (const GridPath& path : paths) {
+        if (!path.found) continue;
+        const double duration =
+            std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+        found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
+      }
+    };
+    search(problem_, options_.grid_starts);
+    if (!problem_.obstacles.empty()) {
+      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      MotionProblem wider = problem_;
+      wider.clearance += kRoomForTheRows;
+      search(wider, options_.grid_starts);
     }
     return found;
   }
@@ -385,10 +396,11 @@ class Search {
       };
       std::vector<Job> jobs;
       int searched = 0;
-      double best_before = 0.0;
-      for (const int i : ranking(result_, options_.limit_tolerance)) {
+      const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+      if (ranked.empty()) return;
+      const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+      for (const int i : ranked) {
         const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
-        if (searched == 0) best_before = s.cost;
         if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
         if (searched++ == searched_) break;
         for (PhasePlan& plan : neighbours(s.plan)) {

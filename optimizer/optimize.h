@@ -119,7 +119,8 @@ struct OptimizeResult {
       0.0;  ///< [J] no motion of any duration takes less (energy_bound.h); 0 = not asked for or none
   std::string bound_note;   ///< why there is none, or how the bound was found
   double mesh_error = 0.0;  ///< of the answer's last mesh, relative (OptimizeOptions::mesh_error)
-  double best_seed_energy = 0.0;      ///< [J] cheapest feasible seed at this duration; 0 = none
+  double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
+  std::string best_seed_name;
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
   /// [J] the straight joint line to the nearest end posture (the first straight seed); 0 = breaks a limit.
   double nearest_line_energy = 0.0;

@@ -345,7 +345,13 @@ class Start {
     hold(modes_of(model_, problem_, shown, options_.mode_options), shown, true);
   }
 
-  void hold(const ModeTable& modes, const Trajectory& from, bool overlaps) {
+  void hold(const ModeTable& modes, const Trajectory& shown, bool overlaps) {
+    // a guess may be on a mesh of its own; modes without one are on equal intervals
+    const Trajectory from =
+        shown.size() == modes.rows() + 1
+            ? shown
+            : resampled(shown, Eigen::VectorXd::LinSpaced(modes.rows() + 1, shown.t[0],
+                                                          shown.t[shown.size() - 1]));
     // beside obstacles free times at once would drive a rough start through them
     const bool hemmed =
         !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();

@@ -258,9 +258,11 @@ Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int i
   return seeds;
 }
 
-const SeedMotion* cheapest_straight_line(const Seeds& seeds, const OptimizeResult& result) {
+const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result) {
+  const std::string& name =
+      result.straight_line_name.empty() ? result.best_seed_name : result.straight_line_name;
   for (const SeedMotion& s : seeds.motions) {
-    if (s.name == result.straight_line_name) return &s;
+    if (s.name == name) return &s;
   }
   return nullptr;
 }

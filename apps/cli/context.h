@@ -129,8 +129,9 @@ struct Seeds {
 };
 Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int intervals);
 
-/// The straight joint line of the seeds that costs least at this duration, timed; null when none holds it.
-const SeedMotion* cheapest_straight_line(const Seeds& seeds, const OptimizeResult& result);
+/// What a motion is drawn beside: the straight joint line that costs least at this duration, or the best seed where
+/// no straight line keeps the limits; null when no seed does.
+const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result);
 
 // One function a verb; each adds its subcommand and sets its callback's exit code through `code`.
 void add_fit_verb(CLI::App& app, int& code);
@@ -142,6 +143,8 @@ void add_improve_verb(CLI::App& app, int& code);
 void add_effects_verb(CLI::App& app, int& code);
 void add_plan_verb(CLI::App& app, int& code);
 void add_optimize_verb(CLI::App& app, int& code);
+void add_strategies_verb(CLI::App& app, int& code);
+void add_pareto_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);
 
 }  // namespace sparflow::cli

@@ -75,7 +75,7 @@ int run(const std::string& folder) {
   page.subtitle(
       "One loader crane: its pressures learned from a log, compared with another log, and one "
       "reach made energy-optimal.");
-  const std::string against = against_straight_lines(result);
+  const std::string against = against_seeds(result);
   page.verdict(Tone::kGood,
                fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
                            against.empty() ? "" : ": ", against),
@@ -83,7 +83,7 @@ int run(const std::string& folder) {
                            "%. Energies are those of the exact law.",
                            train[0].samples(),
                            100.0 * std::abs(fitted.test->energy.front().relative_error)));
-  const SeedMotion* straight = cheapest_straight_line(seeds, result);
+  const SeedMotion* straight = baseline_seed(seeds, result);
   const Trajectory timed =
       straight ? with_duration(straight->motion, result.duration) : Trajectory{};
   add_motion(page, fitted.model, problem, result, straight ? &timed : nullptr,

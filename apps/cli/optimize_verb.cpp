@@ -96,7 +96,7 @@ int run(const OptimizeArguments& a) {
   if (!a.outputs.json.empty())
     write_file_atomically(a.outputs.json, optimize_json(model, problem, result));
   if (!a.outputs.report.empty()) {
-    const SeedMotion* line = cheapest_straight_line(seeds, result);
+    const SeedMotion* line = baseline_seed(seeds, result);
     const Trajectory timed = line ? with_duration(line->motion, result.duration) : Trajectory{};
     motion_page(model, problem, result, line ? &timed : nullptr, line ? line->name : "")
         .write(a.outputs.report);

@@ -220,7 +220,9 @@ void add_tables(Page& page, const OptimizeResult& result) {
   limits.columns = {{"limit"}, {"value", "", 5}, {"allowed", "", 5},
                     {"unit"},  {"at", "s", 4},   {"margin", "%", 3}};
   for (const LimitCheck& c : result.checks) {
-    limits.rows.push_back({c.what, c.value, c.limit, c.unit, c.time, margin_cell(c)});
+    constexpr double kRounding = 1e-9;  // of any unit here: the solver's last digits say nothing
+    const double value = std::abs(c.value) < kRounding ? 0.0 : c.value;
+    limits.rows.push_back({c.what, value, c.limit, c.unit, c.time, margin_cell(c)});
   }
   if (!result.checks.empty()) page.table(std::move(limits));
   Table starts;
@@ -271,13 +273,17 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
     if (!result.starts.empty()) add_tables(page, result);
     return;
   }
-  const double line = result.nearest_line_energy;
+  const std::string beside =
+      result.nearest_line_energy > 0.0
+          ? fmt::format("straight line, nearest end: {:.1f} kJ", result.nearest_line_energy / 1e3)
+      : result.best_seed_energy > 0.0
+          ? fmt::format("best seed, {}: {:.1f} kJ", result.best_seed_name,
+                        result.best_seed_energy / 1e3)
+          : std::string();
   double lost = 0.0;
   for (const double t : result.energy.throttling) lost += t;
   page.tiles(
-      {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law",
-        line > 0.0 ? fmt::format("straight line, nearest end: {:.1f} kJ", line / 1e3)
-                   : std::string(),
+      {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law", beside,
         Tone::kGood},
        {seconds_text(result.duration), "s", "duration"},
        {fmt::format("{:.1f}", lost / 1e3), "kJ", "lost in valves",
@@ -303,7 +309,7 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                  const std::string& baseline_name) {
   Page page("Energy-optimal motion: " + problem.name);
   if (result.status == OptimizeStatus::kOptimal) {
-    const std::string against = against_straight_lines(result);
+    const std::string against = against_seeds(result);
     page.verdict(
         Tone::kGood,
         fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,

@@ -45,7 +45,7 @@ nlohmann::json start_json(const StartResult& s) {
 
 }  // namespace
 
-std::string against_straight_lines(const OptimizeResult& r) {
+std::string against_seeds(const OptimizeResult& r) {
   std::vector<std::string> parts;
   const auto add = [&](const std::string& what, double energy) {
     if (energy <= 0.0) return;
@@ -57,6 +57,8 @@ std::string against_straight_lines(const OptimizeResult& r) {
   add("the straight joint line to the nearest end posture", r.nearest_line_energy);
   if (r.straight_line_energy != r.nearest_line_energy)
     add("the cheapest straight line", r.straight_line_energy);
+  if (r.best_seed_energy != r.straight_line_energy)
+    add("the best seed, " + r.best_seed_name, r.best_seed_energy);
   return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
 }
 
@@ -96,6 +98,8 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
     }
     out["best_seed_energy_exact_J"] =
         r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
+    out["best_seed"] =
+        r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_name) : nlohmann::json();
     out["nearest_line_energy_exact_J"] =
         r.nearest_line_energy > 0.0 ? nlohmann::json(r.nearest_line_energy) : nlohmann::json();
     out["straight_line_energy_exact_J"] =
@@ -126,18 +130,18 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   add(fmt::format("{}: {}", to_string(r.status), problem.name));
   add(fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}", r.energy.total / 1e3,
                   r.duration, r.starts[static_cast<std::size_t>(r.best_start)].seed));
-  const auto against = [&](const char* what, double energy) {
+  const auto against = [&](const char* what, double energy, const std::string& name) {
     if (energy > 0.0)
       add(fmt::format(
-          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %", what, energy / 1e3,
+          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %{}{}", what, energy / 1e3,
           r.energy.total <= energy ? "saves" : "takes more, as energy is not all it counts:",
-          100.0 * std::abs(1.0 - r.energy.total / energy)));
+          100.0 * std::abs(1.0 - r.energy.total / energy), name.empty() ? "" : "; ", name));
     else
       add(fmt::format("  {:<20}         -      breaks a limit in this time", what));
   };
-  against("straight, nearest", r.nearest_line_energy);
-  against("straight, cheapest", r.straight_line_energy);
-  against("best seed path", r.best_seed_energy);
+  against("straight, nearest", r.nearest_line_energy, "");
+  against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
+  against("best seed path", r.best_seed_energy, r.best_seed_name);
   if (r.lower_bound > 0.0) {
     add(
         fmt::format("  lower bound          {:9.2f} kJ   no motion takes less, whatever its time: "

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/kinematics.h"
 #include "models/machine_file.h"
 #include "models/units.h"
 #include "optimizer/optimize.h"
@@ -92,6 +93,61 @@ TEST(KnownOptimum, TheCheapCylinderGoesToItsEndAndNotBeyond) {
   const double near = found.motion.q(found.motion.size() - 1, 1);
   EXPECT_NEAR(near, 0.5, 1e-3);
   EXPECT_LE(near, 0.5 + 1e-6);
+}
+
+TEST(KnownOptimum, TheFinishSmoothsByItsOwnWidthOnly) {
+  // Log-sum-exp of n demands lies between their maximum and the maximum + beta log(n + 1), so the law the finish was
+  // solved under lies above the exact energy by at most beta log(n + 1) times the volume pumped, and not below it.
+  Rails r;
+  r.model.cylinders[1].extend = r.model.cylinders[1].retract = constant_pressure(99.5e5);
+  r.problem.limits.pump_max_flow.assign(1, 0.0);
+  r.problem.goal = JointGoal{VectorXd::Constant(2, 0.5)};
+  OptimizeOptions options = Rails::options();
+  // near alone, both together, far alone; each way smooth and within its limits
+  ModeCandidate candidate;
+  candidate.name = "overlapping";
+  candidate.modes.setConstant(options.intervals, 2, CylinderMode::kRest);
+  Trajectory& guess = candidate.guess;
+  const Eigen::Index knots = options.intervals + 1;
+  guess.t = VectorXd::LinSpaced(knots, 0.0, 2.4);
+  guess.q.setZero(knots, 2);
+  guess.qd.setZero(knots, 2);
+  guess.qdd.setZero(knots, 2);
+  constexpr int kFirst[2] = {10, 0}, kLong = 30;  // [intervals]
+  const double way = 0.5, time = guess.t[kLong];
+  for (int j = 0; j < 2; ++j) {
+    for (int k = 0; k < options.intervals; ++k) {
+      if (k >= kFirst[j] && k < kFirst[j] + kLong) candidate.modes(k, j) = CylinderMode::kExtend;
+    }
+    for (Eigen::Index k = 0; k < knots; ++k) {
+      const double s = std::clamp((guess.t[k] - guess.t[kFirst[j]]) / time, 0.0, 1.0);
+      guess.q(k, j) = way * s * s * s * (10.0 + s * (-15.0 + s * 6.0));
+      guess.qd(k, j) = way / time * 30.0 * s * s * (1.0 - s) * (1.0 - s);
+      guess.qdd(k, j) = way / (time * time) * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s);
+    }
+  }
+  const double volume = r.area * 2.0 * way;
+  const auto above_exact = [&](double beta) {
+    options.pressure_in_modes = beta;
+    const StartResult found = optimize_with_modes(r.model, r.problem, candidate, options);
+    EXPECT_TRUE(found.usable(options.limit_tolerance)) << found.message;
+    EXPECT_TRUE(found.modes_held) << "the guess was kept";
+    return found.energy_smooth - found.energy_exact;
+  };
+  // 2e-4 of 78 kJ: speeds too small to count as moving, near the starts and stops
+  const double rounding = 2e-4 * 100e5 * volume;
+  const double finish = OptimizeOptions().pressure_in_modes;
+  const auto bound = [&](double beta) { return beta * std::log(3.0) * volume; };
+  for (const double beta : {finish, 10.0 * finish}) {
+    SCOPED_TRACE(beta);
+    const double above = above_exact(beta);
+    EXPECT_GE(above, -rounding);
+    EXPECT_LE(above, bound(beta) + rounding);
+    // the wider one shows that the bound of the finish can be broken
+    if (beta > finish) {
+      EXPECT_GT(above, 2.0 * bound(finish));
+    }
+  }
 }
 
 TEST(KnownOptimum, OneByOneGuessesKnowEveryLimitOfSpeed) {
@@ -233,6 +289,71 @@ TEST(KnownOptimum, PumpPressureIsDrawnIn) {
 TEST(KnownOptimum, TheTipsDistanceFromItsLineIsDrawnIn) {
   Reach r("loader_crane_line.yaml");
   expect_drawn_in(r, r.line(false), 16.0, "distance of the tip from its line");
+}
+
+TEST(KnownOptimum, ClearanceRowsThatAreLeftOutAreFarOnes) {
+  // Two balls beside the way of the tip, early and late: the rows chosen for the seed must tell the least clearance
+  // of every posture on it where that is small, as all rows together do.
+  Reach r("loader_crane_lift.yaml");
+  const SeedMotion seed = r.line(false);
+  const Eigen::Index knots = seed.motion.size();
+  for (const Eigen::Index k : {knots / 5, knots - knots / 5}) {
+    const VectorXd q = seed.motion.q.row(k);
+    const Eigen::Vector3d tip = tip_position<double>(r.problem.machine, q);
+    r.problem.obstacles.push_back({"ball", Sphere{tip - Eigen::Vector3d{0.0, 0.0, 0.7}, 0.3}});
+  }
+  CraneKnotOptions some;
+  some.near_postures = seed.motion.q;
+  CraneKnotModel chosen(r.model, r.problem, some), all(r.model, r.problem, {});
+  ASSERT_LT(chosen.path_count(), all.path_count()) << "nothing is left out";
+  const auto least = [](CraneKnotModel& model, const VectorXd& q) {
+    VectorXd z = VectorXd::Zero(model.size()), g(model.path_count());
+    z.head(q.size()) = q;
+    model.path(z.data(), g.data());
+    double low = INFINITY;
+    for (int row = 0; row < model.path_count(); ++row) {
+      if (model.path_name(row).starts_with("clearance")) low = std::min(low, g[row]);
+    }
+    return low;
+  };
+  constexpr double kSmall = 0.4;  // [m] below the half metre from which on rows are left out
+  int small = 0;
+  for (Eigen::Index k = 0; k < knots; ++k) {
+    const double low = least(all, seed.motion.q.row(k));
+    if (low > kSmall) continue;
+    ++small;
+    EXPECT_EQ(least(chosen, seed.motion.q.row(k)), low) << k;
+  }
+  EXPECT_GT(small, 2);
+}
+
+TEST(KnownOptimum, ThePumpsLimitIsTheProblems) {
+  // The row itself, not only the motion: drawing limits in would in the end also keep one that is set too wide.
+  Reach r("loader_crane_lift.yaml");
+  const double limit = 0.4 * r.problem.machine.pumps[0].max_flow;
+  r.problem.limits.pump_max_flow[0] = limit;
+  CraneKnotModel knot(r.model, r.problem, {});
+  VectorXd lower(knot.path_count()), upper(knot.path_count());
+  knot.path_bounds(lower.data(), upper.data());
+  int found = 0;
+  for (int row = 0; row < knot.path_count(); ++row) {
+    if (knot.path_name(row) != "flow of pump main") continue;
+    ++found;
+    EXPECT_NEAR(upper[row], 1e3 * limit, 1e-9 * 1e3 * limit) << "[l/s]";
+  }
+  EXPECT_EQ(found, 1);
+}
+
+TEST(KnownOptimum, ThrottlingIsThatOfTheCheaperCylinder) {
+  // Both sleds move at once, the pump at the dearer one's 100 bar: the other's valve takes 50 of them, its own none.
+  const Rails r;
+  const MotionEnergy e = exact_energy(r.model, r.line_to(0.5, 0.5).motion, 0.0);
+  const double volume = 0.5 * r.area;
+  // 1e-3: at the first and last instants a cylinder is slower than what counts as moving
+  EXPECT_NEAR(e.throttling[0], 0.0, 1e-3 * e.total);
+  EXPECT_NEAR(e.throttling[1], 50e5 * volume, 1e-3 * e.total);
+  EXPECT_NEAR(e.useful[0], 100e5 * volume, 1e-3 * e.total);
+  EXPECT_NEAR(e.useful[1], 50e5 * volume, 1e-3 * e.total);
 }
 
 TEST(KnownOptimum, ClearanceIsDrawnIn) {

@@ -230,6 +230,7 @@ TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
   Lift c;
   c.problem.duration = {2.0, 2.0};
   c.options.sequential_starts = 0;
+  c.options.free_phases = false;  // else the shortest motion is sought and named
   c.seeds[0].shortest_duration = 11.25;
   c.seeds[1].shortest_duration = 14.75;
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);

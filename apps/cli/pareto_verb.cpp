@@ -1,0 +1,111 @@
+#include <fmt/format.h>
+
+#include "apps/cli/context.h"
+#include "apps/report/pareto_page.h"
+#include "models/error.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct ParetoArguments {
+  std::string problem, model, output;
+  SeedOptions seeds;
+  int points = 14;
+  double longest = 6.0;
+  std::vector<double> idle_kw = {1, 2, 5, 10, 15};
+  int intervals = 0;
+  int processes = 0;
+  Outputs outputs;
+};
+
+int run(const ParetoArguments& a) {
+  std::vector<NamedFile> outputs = a.outputs.files();
+  outputs.push_back({"--output", a.output});
+  check_outputs_apart("pareto", outputs, {{"--problem", a.problem}, {"--model", a.model}});
+  check_writable(a.output);
+  a.outputs.check();
+  const auto [problem, model] = load_problem_and_model(a.problem, a.model);
+  const std::vector<std::string> missing = model.missing();
+  if (!missing.empty()) {
+    throw InputError({problem.file, 0, 0}, "model",
+                     fmt::format("the model has no working pressure for {}; fit it on a log in "
+                                 "which that movement occurs",
+                                 fmt::join(missing, ", ")));
+  }
+  ParetoOptions options;
+  options.points = a.points;
+  options.longest = a.longest;
+  options.idle_powers.clear();
+  for (const double kw : a.idle_kw) options.idle_powers.push_back(1e3 * kw);
+  OptimizeOptions& optimize = options.strategies.optimize;
+  optimize.intervals = a.intervals > 0 ? a.intervals : problem.knots.value_or(101) - 1;
+  optimize.processes = a.processes > 0 ? a.processes : 2;
+  optimize.interrupted = interrupted;
+  options.strategies.smooth_seeds = 2;
+  options.strategies.baselines.intervals = optimize.intervals;
+  options.strategies.baselines.polished_orders = 2;
+  options.strategies.baselines.optimize = optimize;
+  ParetoCurve curve;
+  {
+    Progress progress("pareto");
+    SeedOptions seed_options = a.seeds;
+    seed_options.progress = [&](double share, const std::string& what) {
+      progress(0.1 * share, what);
+    };
+    const Seeds seeds = make_seeds(problem, seed_options, optimize.intervals);
+    finish_on_interrupt();
+    options.progress = [&](double share, const std::string& what) {
+      progress(0.1 + 0.9 * share, what);
+      return !interrupted();
+    };
+    if (seeds.motions.empty()) {
+      curve.message = "infeasible. " + seeds.paths.message;
+    } else {
+      curve = energy_against_time(model, problem, seeds.motions, options);
+    }
+  }
+  if (!a.output.empty() && !curve.points.empty())
+    write_file_atomically(a.output, pareto_csv(curve));
+  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, pareto_json(problem, curve));
+  if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
+  fmt::print("{}", pareto_table(problem, curve));
+  if (interrupted()) return kInterrupted;
+  return curve.points.empty() ? kNotSolved : kDone;
+}
+
+}  // namespace
+
+void add_pareto_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<ParetoArguments>();
+  CLI::App* verb = app.add_subcommand("pareto", "least energy against time");
+  verb->add_option("--problem,-p", a->problem, "motion problem (YAML); its duration is not used")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--model", a->model, "fitted model; absent: the one the problem names")
+      ->type_name("MODEL.json");
+  verb->add_option("--output,-o", a->output, "curve to write (CSV)")->type_name("CURVE.csv");
+  verb->add_option("--points", a->points, "durations, besides those that look for the shortest")
+      ->check(CLI::Range(3, 200))
+      ->capture_default_str();
+  verb->add_option("--longest", a->longest, "longest duration, times the shortest")
+      ->check(CLI::Range(1.2, 100.0))
+      ->capture_default_str();
+  verb->add_option("--idle", a->idle_kw, "engine powers for which the best time is named")
+      ->type_name("KW")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
+      ->capture_default_str();
+  verb->add_option("--intervals", a->intervals,
+                   "intervals of the mesh; absent: the problem's knots, or 100")
+      ->check(CLI::Range(10, 5000));
+  verb->add_option("--processes", a->processes, "starts solved at once; absent: 2")
+      ->check(CLI::Range(1, 256));
+  a->outputs.add_to(*verb);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli

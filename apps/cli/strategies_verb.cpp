@@ -1,0 +1,210 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/cli/context.h"
+#include "apps/report/strategies_page.h"
+#include "models/error.h"
+#include "optimizer/child_processes.h"
+#include "problems/problem_file.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct StrategiesArguments {
+  std::vector<std::string> problems;
+  std::string model;
+  std::string time = "equal";
+  double idle_kw = -1.0;
+  SeedOptions seeds;
+  int intervals = 0;
+  int processes = 0;
+  int orders = 4;
+  Outputs outputs;
+};
+
+/// Files as they are, folders' .yaml files by name; in a folder, without --model, those that name a model.
+std::vector<std::string> problem_files(const std::vector<std::string>& given, bool with_model) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> files;
+  for (const std::string& path : given) {
+    std::error_code error;
+    if (!fs::is_directory(path, error)) {
+      files.push_back(path);
+      continue;
+    }
+    std::vector<std::string> inside;
+    for (const auto& entry : fs::directory_iterator(path)) {
+      if (entry.path().extension() == ".yaml") inside.push_back(entry.path().string());
+    }
+    if (inside.empty())
+      throw InputError({path, 0, 0}, "", "no motion problem (*.yaml) in this folder");
+    std::sort(inside.begin(), inside.end());
+    for (const std::string& file : inside) {
+      if (with_model || !load_problem(file).model_path.empty()) {
+        files.push_back(file);
+      } else {
+        note(fmt::format("{}: names no model, left out", file));
+      }
+    }
+  }
+  return files;
+}
+
+/// "equal", "own", "equal,own", "1.1,1.5,3" or any mixture.
+void read_times(const std::string& text, StrategyOptions& options) {
+  options.equal_time = options.own_time = false;
+  std::size_t at = 0;
+  while (at <= text.size()) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    const std::string word = text.substr(at, comma - at);
+    at = comma + 1;
+    if (word == "equal") {
+      options.equal_time = true;
+    } else if (word == "own") {
+      options.own_time = true;
+    } else {
+      char* end = nullptr;
+      const double factor = std::strtod(word.c_str(), &end);
+      if (word.empty() || *end != '\0' || !(factor >= 1.0) || factor > 1000.0) {
+        throw UsageError(fmt::format(
+            "strategies: --time has \"{}\"; give equal, own, or factors of the shortest time "
+            "from 1 on, apart by commas (1.1,1.5,3)",
+            word));
+      }
+      options.factors.push_back(factor);
+    }
+  }
+}
+
+int run(const StrategiesArguments& a) {
+  const std::vector<std::string> files = problem_files(a.problems, !a.model.empty());
+  std::vector<NamedFile> inputs = named("--problem", files);
+  inputs.push_back({"--model", a.model});
+  check_outputs_apart("strategies", a.outputs.files(), inputs);
+  a.outputs.check();
+  StrategyOptions options;
+  read_times(a.time, options);
+  options.baselines.polished_orders = a.orders;
+  options.optimize.processes = 1;
+  options.optimize.interrupted = interrupted;
+  std::vector<ProblemAndModel> tasks;
+  tasks.reserve(files.size());
+  for (const std::string& file : files) {
+    tasks.push_back(load_problem_and_model(file, a.model));
+    const double idle = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : tasks.back().problem.idle_power;
+    if (options.own_time && idle <= 0.0) {
+      warn(
+          fmt::format("{}: without idle power slower is always cheaper, so each way's own best "
+                      "time is its shortest; give --idle KW for another answer",
+                      tasks.back().problem.name));
+    }
+    const std::vector<std::string> missing = tasks.back().model.missing();
+    if (!missing.empty()) {
+      throw InputError({file, 0, 0}, "model",
+                       fmt::format("the model has no working pressure for {}; fit it on a log in "
+                                   "which that movement occurs",
+                                   fmt::join(missing, ", ")));
+    }
+  }
+  finish_on_interrupt();
+  const auto work = [&](int index) {
+    const ProblemAndModel& task = tasks[static_cast<std::size_t>(index)];
+    StrategyOptions own = options;
+    own.idle_power = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : task.problem.idle_power;
+    own.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
+    own.baselines.intervals = own.optimize.intervals;
+    own.baselines.optimize = own.optimize;
+    const Seeds seeds = make_seeds(task.problem, a.seeds, own.optimize.intervals);
+    StrategyComparison c;
+    if (seeds.motions.empty()) {
+      c.problem = task.problem.name;
+      c.file = task.problem.file;
+      c.payload = task.problem.payload;
+      c.idle_power = own.idle_power;
+      c.message = "infeasible. " + seeds.paths.message;
+    } else {
+      c = compare_strategies(task.model, task.problem, seeds.motions, own);
+    }
+    return packed(c);
+  };
+  const int count = static_cast<int>(files.size());
+  const int processes = a.processes > 0 ? a.processes : usable_processors();
+  std::vector<ChildResult> children;
+  {
+    Progress progress("strategies");
+    progress(0.0, fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
+    children = run_in_children(count, processes, work, [&](int index, int finished) {
+      progress(static_cast<double>(finished) / count,
+               tasks[static_cast<std::size_t>(index)].problem.name);
+    });
+  }
+  std::vector<StrategyComparison> all;
+  std::vector<Machine> machines;
+  int solved = 0;
+  for (std::size_t i = 0; i < children.size(); ++i) {
+    StrategyComparison c;
+    if (children[i].ok) {
+      c = unpacked_comparison(children[i].bytes);
+    } else {
+      c.problem = tasks[i].problem.name;
+      c.file = tasks[i].problem.file;
+      c.message = children[i].error;
+    }
+    const bool any = std::any_of(c.rows.begin(), c.rows.end(), [](const StrategyRow& row) {
+      return row.find(kOptimal) != nullptr && row.find(kOptimal)->found();
+    });
+    solved += any ? 1 : 0;
+    all.push_back(std::move(c));
+    machines.push_back(tasks[i].model.machine);
+  }
+  if (!a.outputs.json.empty())
+    write_file_atomically(a.outputs.json, strategies_json(all, machines));
+  if (!a.outputs.report.empty()) {
+    const bool one = all.size() == 1;
+    strategies_page(all, one ? &tasks.front().model : nullptr,
+                    one ? &tasks.front().problem : nullptr)
+        .write(a.outputs.report);
+  }
+  fmt::print("{}", strategies_table(all));
+  if (interrupted()) return kInterrupted;
+  return solved > 0 ? kDone : kNotSolved;
+}
+
+}  // namespace
+
+void add_strategies_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<StrategiesArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "strategies", "one cylinder after another, all at once, or the energy-optimal motion");
+  verb->add_option("--problem,-p", a->problems, "motion problems (YAML), or folders of them")
+      ->required()
+      ->type_name("FILE|DIR");
+  verb->add_option("--model", a->model, "fitted model; absent: the one each problem names")
+      ->type_name("MODEL.json");
+  verb->add_option("--time", a->time,
+                   "equal (the problem's duration), own (each way's best, with idling), or factors "
+                   "of the shortest time: 1.1,1.5,3; apart by commas")
+      ->type_name("WHEN")
+      ->capture_default_str();
+  verb->add_option("--idle", a->idle_kw, "engine power while time passes; absent: the problem's")
+      ->type_name("KW")
+      ->check(CLI::Range(0.0, 1000.0));
+  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  verb->add_option("--orders", a->orders, "orders of cylinders whose segments are optimised")
+      ->check(CLI::Range(0, 120))
+      ->capture_default_str();
+  verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
+      ->capture_default_str();
+  verb->add_option("--intervals", a->intervals,
+                   "intervals of the mesh; absent: the problem's knots, or 100")
+      ->check(CLI::Range(10, 5000));
+  verb->add_option("--processes", a->processes, "problems solved at once; absent: all processors")
+      ->check(CLI::Range(1, 256));
+  a->outputs.add_to(*verb);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli

@@ -1,0 +1,349 @@
+/// The bundled reaches and random ones, solved: what is feasible, what is named, what it costs against baselines and
+/// against what is known. build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "models/error.h"
+#include "models/kinematics.h"
+#include "models/model_file.h"
+#include "optimizer/child_processes.h"
+#include "optimizer/energy_grid.h"
+#include "optimizer/strategies_summary.h"
+#include "planners/seed_paths.h"
+#include "problems/bundled.h"
+#include "problems/clearance.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+
+namespace sparflow {
+namespace {
+
+using nlohmann::json;
+
+struct Task {
+  MotionProblem problem;
+  const CraneModel* model = nullptr;
+  bool meant_feasible = true;
+  std::string why_not;  // of one made infeasible on purpose
+};
+
+struct Figures {
+  StrategyComparison comparison;
+  double unlimited = 0.0;  // [J] cheapest path of the grid at unlimited time, 0 = not asked
+  std::string named;       // what is said of an infeasible one
+};
+
+struct Settings {
+  int intervals = 100, paths = 4;
+  bool grid = false;
+};
+
+std::vector<SeedMotion> seeds_of(const MotionProblem& problem, const Settings& settings,
+                                 std::string* message) {
+  SeedOptions options;
+  options.count = settings.paths;
+  std::vector<SeedMotion> seeds;
+  TimingOptions timing;
+  timing.intervals = settings.intervals;
+  const SeedResult found = find_seed_paths(problem, options);
+  *message = found.message;
+  for (const SeedPath& path : found.paths) {
+    const TimedMotion timed = time_parametrise(problem, path.path, 0.0, timing);
+    if (timed.motion.size() < 2) continue;
+    seeds.push_back({fmt::format("{} {}", path.planner, seeds.size() + 1), timed.motion,
+                     timed.shortest, path.planner == "straight line"});
+  }
+  return seeds;
+}
+
+Figures solve(const Task& task, const Settings& settings) {
+  Figures f;
+  const std::vector<SeedMotion> seeds = seeds_of(task.problem, settings, &f.named);
+  f.comparison.problem = task.problem.name;
+  f.comparison.file = task.problem.file;
+  if (seeds.empty()) return f;
+  StrategyOptions options;
+  options.idle_power = task.problem.idle_power;
+  options.least_control = false;
+  options.baselines.intervals = options.optimize.intervals = settings.intervals;
+  options.baselines.polished_orders = 2;
+  options.optimize.processes = 1;
+  options.baselines.optimize = options.optimize;
+  f.comparison = compare_strategies(*task.model, task.problem, seeds, options);
+  f.named = f.comparison.message;
+  if (settings.grid && task.problem.machine.joint_count() <= 4) {
+    EnergyGridOptions grid;
+    grid.nodes = 20000;
+    const GridPath path = EnergyGrid(*task.model, task.problem, grid).cheapest_path(0.0);
+    if (path.found) f.unlimited = path.slow_energy_J;
+  }
+  return f;
+}
+
+std::string pack_figures(const Figures& f) {
+  return Packer().text(packed(f.comparison)).number(f.unlimited).text(f.named).bytes();
+}
+
+Figures unpack_figures(const std::string& bytes) {
+  Unpacker u(bytes);
+  Figures f;
+  f.comparison = unpacked_comparison(u.text());
+  f.unlimited = u.number();
+  f.named = u.text();
+  return f;
+}
+
+const StrategyOutcome* optimum_of(const Figures& f) {
+  const StrategyRow* row = f.comparison.row("equal");
+  const StrategyOutcome* best = row != nullptr ? row->find(kOptimal) : nullptr;
+  return best != nullptr && best->found() ? best : nullptr;
+}
+
+/// A reach between two random postures, or one made infeasible on purpose (every tenth).
+Task random_task(const MotionProblem& base, const CraneModel& model, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  Task task;
+  task.model = &model;
+  MotionProblem& p = task.problem;
+  p = base;
+  p.file.clear();
+  p.obstacles.clear();
+  p.tip_line.reset();
+  p.idle_power = 0.0;
+  p.name = fmt::format("{} random {}", base.machine.name, seed);
+  const Eigen::Index n = p.start.size();
+  const auto posture = [&] {
+    Eigen::VectorXd q(n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Range& r = p.limits.position[static_cast<std::size_t>(j)];
+      q[j] = r.lo + (0.05 + 0.9 * unit(random)) * (r.hi - r.lo);  // off the ends of the range
+    }
+    return q;
+  };
+  p.start = posture();
+  const Eigen::VectorXd end = posture();
+  p.payload = std::floor(300.0 * unit(random));
+  const Eigen::Vector3d tip = tip_position<double>(p.machine, end);
+  p.goal = TipGoal{tip};
+  Eigen::MatrixXd line(2, n);
+  line << p.start.transpose(), end.transpose();
+  const double reach = time_parametrise(p, line, 0.0).shortest;
+  // time enough: what the straight line to the posture behind the goal needs, up to four times that
+  const double duration = std::max(1.0, reach * (1.02 + 3.0 * unit(random) * unit(random)));
+  p.duration = {duration, duration};
+  if (seed % 10 == 0) {
+    task.meant_feasible = false;
+    const Eigen::Vector3d base_point = tip_position<double>(p.machine, p.start);
+    if (seed % 20 == 0) {
+      task.why_not = "out of reach";
+      Eigen::Vector3d out = tip;
+      out.x() = (out.x() < 0.0 ? -1.0 : 1.0) * (20.0 + base_point.norm());
+      p.goal = TipGoal{out};
+    } else {
+      task.why_not = "too short a time";
+      p.duration = {0.15 * reach, 0.15 * reach};
+    }
+  }
+  return task;
+}
+
+struct Count {
+  int feasible = 0, solved = 0, infeasible = 0, named = 0, above_baseline = 0, wrongly_solved = 0;
+  std::vector<double> gap, sequential, line, seconds;
+};
+
+void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures) {
+  Count c;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const Figures& f = figures[i];
+    const StrategyOutcome* best = optimum_of(f);
+    c.seconds.push_back(f.comparison.solve_s);
+    if (!tasks[i].meant_feasible) {
+      ++c.infeasible;
+      if (best != nullptr) {
+        ++c.wrongly_solved;
+      } else if (!f.named.empty()) {
+        ++c.named;
+      }
+      fmt::print("{:44} infeasible ({}): {}\n", tasks[i].problem.name, tasks[i].why_not,
+                 best != nullptr   ? "SOLVED"
+                 : f.named.empty() ? "NOT NAMED"
+                                   : f.named);
+      continue;
+    }
+    ++c.feasible;
+    if (best == nullptr) {
+      fmt::print("{:44} not solved: {}\n", tasks[i].problem.name, f.named);
+      continue;
+    }
+    ++c.solved;
+    std::string others;
+    for (const StrategyOutcome& o : f.comparison.row("equal")->outcomes) {
+      if (!o.found() || o.kind == kOptimal || o.kind == kMinimumTime) continue;
+      const double excess = o.energy.total / best->energy.total - 1.0;
+      if (excess < 0.0) ++c.above_baseline;
+      if (o.kind == kSequential) c.sequential.push_back(excess);
+      if (o.kind == kJointLine) c.line.push_back(excess);
+      if (o.kind == kSequential || o.kind == kJointLine || o.kind == kTipLine)
+        others += fmt::format("  {} {:+.1f} %", o.kind, 100.0 * excess);
+    }
+    if (f.unlimited > 0.0) {
+      c.gap.push_back(best->energy.total / f.unlimited - 1.0);
+      others += fmt::format("  unlimited time {:.2f} kJ", f.unlimited / 1e3);
+    }
+    fmt::print("{:44} {:8.2f} kJ {:6.2f} s ({:.2f} x shortest){}\n", tasks[i].problem.name,
+               best->energy.total / 1e3, best->duration, best->duration / f.comparison.shortest,
+               others);
+  }
+  const auto spread = [](const char* what, const std::vector<double>& v) {
+    if (v.empty()) return;
+    fmt::print(
+        "{}: median {:+.2f} %, quartiles {:+.2f} .. {:+.2f}, 95th {:+.2f}, worst {:+.2f} ({} "
+        "reaches)\n",
+        what, 100 * quantile(v, 0.5), 100 * quantile(v, 0.25), 100 * quantile(v, 0.75),
+        100 * quantile(v, 0.95), 100 * quantile(v, 1.0), v.size());
+  };
+  fmt::print(
+      "\nfeasible {}: solved {} ({:.1f} %)\ninfeasible {}: named {}, solved all the same {}\n",
+      c.feasible, c.solved, 100.0 * c.solved / std::max(1, c.feasible), c.infeasible, c.named,
+      c.wrongly_solved);
+  fmt::print("optimum above a baseline: {} times\n", c.above_baseline);
+  spread("sequential over the optimum", c.sequential);
+  spread("simultaneous (best end) over the optimum", c.line);
+  spread("optimum over the grid's cheapest path at unlimited time", c.gap);
+  fmt::print("seconds a comparison: median {:.1f}, worst {:.1f}\n", quantile(c.seconds, 0.5),
+             quantile(c.seconds, 1.0));
+}
+
+/// Best known energies: what the file has, or what was found now where that is less.
+void write_best_known(const std::string& path, const std::vector<Task>& tasks,
+                      const std::vector<Figures>& figures) {
+  json known = json::object();
+  if (std::ifstream in(path); in) known = json::parse(in, nullptr, false);
+  if (known.is_discarded() || !known.is_object()) known = json::object();
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const std::string& file = tasks[i].problem.file;
+    const std::string name = file.substr(file.find_last_of('/') + 1);
+    if (name.empty()) continue;
+    const StrategyOutcome* best = optimum_of(figures[i]);
+    json& entry = known[name];
+    if (best == nullptr) {
+      if (entry.is_null()) entry = {{"status", "infeasible"}, {"why", figures[i].named}};
+      continue;
+    }
+    const bool better = entry.is_null() || !entry.contains("energy_J") ||
+                        entry["energy_J"].is_null() ||
+                        best->energy.total < entry["energy_J"].get<double>();
+    if (!better) continue;
+    entry = {{"status", "optimal"},
+             {"energy_J", best->energy.total},
+             {"duration_s", best->duration},
+             {"shortest_s", figures[i].comparison.shortest},
+             {"share_moving", best->energy.share_moving},
+             {"from", best->detail}};
+    for (const StrategyOutcome& o : figures[i].comparison.row("equal")->outcomes) {
+      if (o.found() && o.kind != kOptimal && o.kind != kMinimumTime)
+        entry["baselines_J"][o.kind] = o.energy.total;
+    }
+    if (figures[i].unlimited > 0.0) entry["unlimited_time_J"] = figures[i].unlimited;
+  }
+  write_file_atomically(path, known.dump(1) + "\n");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"The problem set and random reaches"};
+  int random_count = 0, processes = 2;
+  std::uint64_t seed = 1;
+  std::string only, write;
+  Settings settings;
+  app.add_option("--random", random_count, "random reaches instead of the bundled ones");
+  app.add_option("--seed", seed, "of the first random reach")->capture_default_str();
+  app.add_option("--only", only, "bundled reaches whose name contains this");
+  app.add_option("--write", write, "best known energies (JSON): kept where they are better");
+  app.add_option("--intervals", settings.intervals)->capture_default_str();
+  app.add_option("--paths", settings.paths, "seed paths at most")->capture_default_str();
+  app.add_flag("--grid", settings.grid, "also the grid's cheapest path at unlimited time");
+  app.add_option("--processes", processes)->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  std::vector<std::unique_ptr<CraneModel>> models;
+  std::vector<std::string> model_files;
+  const auto model_at = [&](const std::string& file) {
+    for (std::size_t i = 0; i < model_files.size(); ++i) {
+      if (model_files[i] == file) return models[i].get();
+    }
+    model_files.push_back(file);
+    models.push_back(std::make_unique<CraneModel>(load_model(file)));
+    return models.back().get();
+  };
+  std::vector<Task> tasks;
+  if (random_count == 0) {
+    for (const std::string& file : bundled_files("reaches", ".yaml")) {
+      if (file.find(only) == std::string::npos) continue;
+      MotionProblem problem = load_problem(file);
+      std::string model_file = problem.model_path;
+      if (model_file.empty() && problem.machine.name == "loader-crane")
+        model_file = bundled_file("models/loader_crane.json");
+      if (model_file.empty()) continue;
+      Task task;
+      task.model = model_at(model_file);
+      task.problem = load_problem(file, &task.model->machine);
+      // the bundled ones say so in their first line
+      std::ifstream in(file);
+      std::string first;
+      std::getline(in, first);
+      task.meant_feasible = first.find("Infeasible") == std::string::npos;
+      task.why_not = first;
+      tasks.push_back(std::move(task));
+    }
+  }
+  for (int i = 0; i < random_count; ++i) {
+    // two of three on the loader crane, whose redundancy makes it the hardest
+    const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
+    const char* reach = own % 3 != 0   ? "loader_crane_fold"
+                        : own % 2 != 0 ? "hmf_lift"
+                                       : "swing_crane_far";
+    const std::string file = bundled_file(std::string("reaches/") + reach + ".yaml");
+    const CraneModel* model = model_at(load_problem(file).model_path);
+    tasks.push_back(random_task(load_problem(file, &model->machine), *model, own));
+  }
+  const int count = static_cast<int>(tasks.size());
+  const std::vector<ChildResult> results = run_in_children(
+      count, processes,
+      [&](int i) { return pack_figures(solve(tasks[static_cast<std::size_t>(i)], settings)); },
+      [&](int i, int done) {
+        fmt::print(stderr, "{}/{} {}\n", done, count,
+                   tasks[static_cast<std::size_t>(i)].problem.name);
+      });
+  std::vector<Figures> figures;
+  for (const ChildResult& r : results) {
+    figures.emplace_back();
+    if (r.ok) {
+      figures.back() = unpack_figures(r.bytes);
+    } else {
+      figures.back().named.clear();
+      fmt::print(stderr, "a solve ended: {}\n", r.error);
+    }
+  }
+  report(tasks, figures);
+  if (!write.empty()) write_best_known(write, tasks, figures);
+  return 0;
+}
+
+}  // namespace
+}  // namespace sparflow
+
+int main(int argc, char** argv) {
+  try {
+    return sparflow::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "problem_set: {}\n", error.what());
+    return 3;
+  }
+}

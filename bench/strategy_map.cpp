@@ -1,0 +1,183 @@
+/// Where one cylinder after another is cheaper than all at once, and what the optimum does instead: over time, load,
+/// pose and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
+/// summary.txt and strategy_map.svg.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "bench/strategy_map_picture.h"
+#include "models/error.h"
+#include "models/model_file.h"
+#include "optimizer/child_processes.h"
+#include "optimizer/pareto.h"
+#include "planners/seed_paths.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+
+namespace sparflow {
+namespace {
+
+struct Pose {
+  std::string reach;             // bundled problem
+  std::vector<double> payloads;  // [kg]
+};
+
+/// Light, medium and near what the pump's pressure allows there.
+const std::vector<Pose>& poses() {
+  static const std::vector<Pose> all = {
+      {"loader_crane_lift", {0, 500, 1000}},       {"loader_crane_lower", {0, 600, 1000}},
+      {"loader_crane_stretch", {0, 250, 500}},     {"loader_crane_fold", {0, 250, 500}},
+      {"loader_crane_sideways", {0, 350, 700}},    {"loader_crane_far_low", {0, 150, 300}},
+      {"swing_crane_side_to_side", {0, 250, 400}}, {"hmf_lift", {0, 150, 300}},
+  };
+  return all;
+}
+
+std::vector<SeedMotion> seeds_of(const MotionProblem& problem, int intervals) {
+  SeedOptions options;
+  options.count = 4;
+  std::vector<SeedMotion> seeds;
+  TimingOptions timing;
+  timing.intervals = intervals;
+  for (const SeedPath& path : find_seed_paths(problem, options).paths) {
+    const TimedMotion timed = time_parametrise(problem, path.path, 0.0, timing);
+    if (timed.motion.size() < 2) continue;
+    seeds.push_back({fmt::format("{} {}", path.planner, seeds.size() + 1), timed.motion,
+                     timed.shortest, path.planner == "straight line"});
+  }
+  return seeds;
+}
+
+/// Everything of a curve but its motions, through the pipe.
+std::string pack_curve(const ParetoCurve& curve) {
+  Packer p;
+  p.number(curve.shortest).number(curve.sequential_limit).number(curve.simultaneous_limit);
+  p.text(curve.message).number(static_cast<double>(curve.points.size()));
+  for (const ParetoPoint& point : curve.points) {
+    p.number(point.duration).number(point.sequential).number(point.simultaneous);
+    p.number(point.optimal.energy.total).text(point.optimal.detail);
+    const std::vector<double>& share = point.optimal.energy.share_moving;
+    p.numbers(share.data(), share.size());
+  }
+  return p.bytes();
+}
+
+MapCurve unpack_curve(const std::string& bytes) {
+  Unpacker u(bytes);
+  MapCurve curve;
+  curve.shortest = u.number();
+  curve.sequential_limit = u.number();
+  curve.simultaneous_limit = u.number();
+  curve.message = u.text();
+  curve.points.resize(static_cast<std::size_t>(u.number()));
+  for (MapPoint& point : curve.points) {
+    point.duration = u.number();
+    point.sequential = u.number();
+    point.simultaneous = u.number();
+    point.optimal = u.number();
+    point.from = u.text();
+    point.share_moving = u.numbers();
+  }
+  return curve;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"The map: sequential, simultaneous or optimal, over time, load, pose, idle power"};
+  std::string folder = ".", only;
+  int intervals = 80, points = 9, processes = 2, rounds = 1;
+  bool ends_only = false;
+  double longest = 6.0;
+  app.add_option("-o,--out", folder, "folder for the tables and the picture")
+      ->capture_default_str();
+  app.add_option("--only", only, "reaches whose name contains this");
+  app.add_option("--intervals", intervals)->check(CLI::Range(20, 1000))->capture_default_str();
+  app.add_option("--points", points, "durations a curve")->capture_default_str();
+  app.add_option("--longest", longest, "times the shortest")->capture_default_str();
+  app.add_option("--rounds", rounds, "of the search over mode sequences")->capture_default_str();
+  app.add_flag("--two-loads", ends_only, "the lightest and the heaviest load alone");
+  app.add_option("--processes", processes)->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  struct Task {
+    std::string reach;
+    double payload;
+  };
+  std::vector<Task> tasks;
+  for (const Pose& pose : poses()) {
+    if (pose.reach.find(only) == std::string::npos) continue;
+    for (const double payload : pose.payloads) {
+      if (ends_only && payload != pose.payloads.front() && payload != pose.payloads.back())
+        continue;
+      tasks.push_back({pose.reach, payload});
+    }
+  }
+  const auto work = [&](int index) {
+    const Task& task = tasks[static_cast<std::size_t>(index)];
+    const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
+    MotionProblem problem = load_problem(file);
+    // problems from before there were bundled models name none
+    const CraneModel model = load_model(
+        problem.model_path.empty() ? bundled_file("models/loader_crane.json") : problem.model_path);
+    problem = load_problem(file, &model.machine);
+    problem.payload = task.payload;
+    ParetoOptions options;
+    options.points = points;
+    options.longest = longest;
+    options.grid_nodes = 0;
+    OptimizeOptions& optimize = options.strategies.optimize;
+    optimize.intervals = intervals;
+    optimize.processes = 1;
+    optimize.search_intervals = std::min(40, intervals);
+    optimize.sequence_rounds = rounds;
+    optimize.mesh_error = 1e-3;  // one mesh: differences of interest are larger
+    options.strategies.smooth_seeds = 1;
+    options.strategies.baselines.intervals = intervals;
+    options.strategies.baselines.polished_orders = 1;
+    options.strategies.baselines.optimize = optimize;
+    return pack_curve(energy_against_time(model, problem, seeds_of(problem, intervals), options));
+  };
+  const std::vector<ChildResult> results =
+      run_in_children(static_cast<int>(tasks.size()), processes, work, [&](int index, int done) {
+        const Task& task = tasks[static_cast<std::size_t>(index)];
+        fmt::print(stderr, "{}/{} {} {} kg\n", done, tasks.size(), task.reach, task.payload);
+      });
+  std::vector<MapCurve> curves;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    MapCurve curve;
+    if (results[i].ok) {
+      curve = unpack_curve(results[i].bytes);
+    } else {
+      curve.message = results[i].error;
+    }
+    curve.reach = tasks[i].reach;
+    curve.payload = tasks[i].payload;
+    if (!curve.message.empty())
+      fmt::print(stderr, "{} {} kg: {}\n", curve.reach, curve.payload, curve.message);
+    curves.push_back(std::move(curve));
+  }
+  std::filesystem::create_directories(folder);
+  write_file_atomically(folder + "/strategy_map.csv", map_csv(curves));
+  const std::vector<double> idle = {0.0, 1e3, 2e3, 5e3, 10e3, 15e3};
+  write_file_atomically(folder + "/strategy_idle.csv", idle_csv(curves, idle));
+  write_file_atomically(folder + "/strategy_map.svg", map_svg(curves, idle));
+  const std::string summary = map_summary(curves, idle);
+  write_file_atomically(folder + "/summary.txt", summary);
+  fmt::print("{}", summary);
+  return 0;
+}
+
+}  // namespace
+}  // namespace sparflow
+
+int main(int argc, char** argv) {
+  try {
+    return sparflow::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "strategy_map: {}\n", error.what());
+    return 3;
+  }
+}
