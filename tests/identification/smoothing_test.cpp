@@ -214,7 +214,9 @@ TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
     };
     // the noise's size is itself estimated, to some 2 %
     EXPECT_LT(share(window), 1.1e-3) << sigma;
-    if (window > 0.0101) EXPECT_GT(share(window / 1.2), 0.9e-3) << sigma;
+    if (window > 0.0101) {
+      EXPECT_GT(share(window / 1.2), 0.9e-3) << sigma;
+    }
   }
   const Eigen::VectorXd rough = clean + 5e-3 * white_noise(8000, 4);
   EXPECT_DOUBLE_EQ(sharpest_window(time, {{0, 8000}}, rough, 0.2), 0.2);
