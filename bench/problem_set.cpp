@@ -13,6 +13,7 @@
 #include "models/kinematics.h"
 #include "models/model_file.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/energy_bound.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/strategies_summary.h"
 #include "planners/seed_paths.h"
@@ -35,13 +36,14 @@ struct Task {
 
 struct Figures {
   StrategyComparison comparison;
+  double bound = 0.0;      // [J] certified, of any motion of any duration; 0 = none
   double unlimited = 0.0;  // [J] cheapest path of the grid at unlimited time, 0 = not asked
   std::string named;       // what is said of an infeasible one
 };
 
 struct Settings {
   int intervals = 100, paths = 4;
-  bool grid = false;
+  bool grid = false, bound = true;
 };
 
 std::vector<SeedMotion> seeds_of(const MotionProblem& problem, const Settings& settings,
@@ -77,6 +79,10 @@ Figures solve(const Task& task, const Settings& settings) {
   options.baselines.optimize = options.optimize;
   f.comparison = compare_strategies(*task.model, task.problem, seeds, options);
   f.named = f.comparison.message;
+  if (settings.bound) {
+    const EnergyBound bound = energy_bound(*task.model, task.problem);
+    if (bound.valid) f.bound = bound.lower_bound_J;
+  }
   if (settings.grid && task.problem.machine.joint_count() <= 4) {
     EnergyGridOptions grid;
     grid.nodes = 20000;
@@ -87,7 +93,12 @@ Figures solve(const Task& task, const Settings& settings) {
 }
 
 std::string pack_figures(const Figures& f) {
-  return Packer().text(packed(f.comparison)).number(f.unlimited).text(f.named).bytes();
+  return Packer()
+      .text(packed(f.comparison))
+      .number(f.unlimited)
+      .number(f.bound)
+      .text(f.named)
+      .bytes();
 }
 
 Figures unpack_figures(const std::string& bytes) {
@@ -95,6 +106,7 @@ Figures unpack_figures(const std::string& bytes) {
   Figures f;
   f.comparison = unpacked_comparison(u.text());
   f.unlimited = u.number();
+  f.bound = u.number();
   f.named = u.text();
   return f;
 }
@@ -156,6 +168,9 @@ Task random_task(const MotionProblem& base, const CraneModel& model, std::uint64
 
 struct Count {
   int feasible = 0, solved = 0, infeasible = 0, named = 0, above_baseline = 0, wrongly_solved = 0;
+  int below_bound = 0;
+  std::vector<double> bound_slow,
+      bound_fast;  // excess over the certified bound, from 3 times the shortest time on, below
   std::vector<double> gap, sequential, line, seconds;
 };
 
@@ -194,6 +209,15 @@ void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures)
       if (o.kind == kSequential || o.kind == kJointLine || o.kind == kTipLine)
         others += fmt::format("  {} {:+.1f} %", o.kind, 100.0 * excess);
     }
+    if (f.bound > 0.0) {
+      const double excess = best->energy.total / f.bound - 1.0;
+      if (excess < 0.0) ++c.below_bound;
+      const bool hemmed = !tasks[i].problem.obstacles.empty() || tasks[i].problem.tip_line;
+      if (!hemmed)
+        (best->duration >= 3.0 * f.comparison.shortest ? c.bound_slow : c.bound_fast)
+            .push_back(excess);
+      others += fmt::format("  bound {:+.1f} %", 100.0 * excess);
+    }
     if (f.unlimited > 0.0) {
       c.gap.push_back(best->energy.total / f.unlimited - 1.0);
       others += fmt::format("  unlimited time {:.2f} kJ", f.unlimited / 1e3);
@@ -217,6 +241,16 @@ void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures)
   fmt::print("optimum above a baseline: {} times\n", c.above_baseline);
   spread("sequential over the optimum", c.sequential);
   spread("simultaneous (best end) over the optimum", c.line);
+  fmt::print("optimum below its certified bound: {} times\n", c.below_bound);
+  spread("optimum over the certified bound (any time), from 3 times the shortest time on",
+         c.bound_slow);
+  spread("optimum over the certified bound (any time), in less time", c.bound_fast);
+  if (!c.bound_slow.empty()) {
+    const auto near =
+        std::count_if(c.bound_slow.begin(), c.bound_slow.end(), [](double x) { return x <= 0.02; });
+    fmt::print("within 2 % of it from 3 times the shortest time on: {} of {}\n", near,
+               c.bound_slow.size());
+  }
   spread("optimum over the grid's cheapest path at unlimited time", c.gap);
   fmt::print("seconds a comparison: median {:.1f}, worst {:.1f}\n", quantile(c.seconds, 0.5),
              quantile(c.seconds, 1.0));
@@ -252,6 +286,7 @@ void write_best_known(const std::string& path, const std::vector<Task>& tasks,
       if (o.found() && o.kind != kOptimal && o.kind != kMinimumTime)
         entry["baselines_J"][o.kind] = o.energy.total;
     }
+    if (figures[i].bound > 0.0) entry["lower_bound_J"] = figures[i].bound;
     if (figures[i].unlimited > 0.0) entry["unlimited_time_J"] = figures[i].unlimited;
   }
   write_file_atomically(path, known.dump(1) + "\n");
@@ -269,6 +304,7 @@ int run(int argc, char** argv) {
   app.add_option("--write", write, "best known energies (JSON): kept where they are better");
   app.add_option("--intervals", settings.intervals)->capture_default_str();
   app.add_option("--paths", settings.paths, "seed paths at most")->capture_default_str();
+  app.add_flag("!--no-bound", settings.bound, "leave out the certified lower bound");
   app.add_flag("--grid", settings.grid, "also the grid's cheapest path at unlimited time");
   app.add_option("--processes", processes)->capture_default_str();
   CLI11_PARSE(app, argc, argv);

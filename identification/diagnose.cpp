@@ -103,7 +103,8 @@ double leftover_share(const Diagnosis& d, const Leftover& left) {
   const double before = suspect_rms(d.evidence, left.channel, d.search.null.residual[left.channel]);
   const double after = suspect_rms(d.evidence, left.channel, d.search.final.residual[left.channel]);
   const double catalogue = std::max(0.0, before * before - after * after);
-  const double flexible = left.rms * left.rms;
+  // a swing that comes and goes is measured where it is: over the whole log it cannot be more than all that is left
+  const double flexible = std::min(left.rms * left.rms, after * after);
   return flexible / std::max(catalogue + flexible, 1e-300);
 }
 

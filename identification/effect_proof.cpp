@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Fitted, the law of a friction, a loss or a sensor still differs from the machine's by at least this share, sample
-/// by sample: what grows with the power 0.85 of the speed leaves a seventh beside a line. Weights are exact.
+/// Fitted, the law of a loss, a valve or a sensor still differs from the machine's by at least this share, sample by
+/// sample. Weights are exact; frictions say themselves how far their form may be wrong.
 constexpr double kLeastForm = 0.1;
 
 struct Layout {  // of the designs' parameters
@@ -68,8 +68,9 @@ EffectAction effect_action(const Evidence& evidence,
     for (std::size_t k = 0; k < designs.size(); ++k) {
       if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
       const Effect& other = *designs[k]->effect.effect;
-      const double share = other.changes_machine() ? other.info().form_error
-                                                   : std::max(other.info().form_error, kLeastForm);
+      const bool exact = other.changes_machine() || other.info().stage == EffectStage::kForce;
+      const double share =
+          exact ? other.info().form_error : std::max(other.info().form_error, kLeastForm);
       const VectorXd wrong = share / noise * acts_in(k, c);
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
