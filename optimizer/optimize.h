@@ -3,6 +3,7 @@
 /// fixed (no activation left to exploit), then the exact law's verdict between the knots.
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,9 @@ struct OptimizeOptions {
   int processes = 2;                 ///< starts solved at once
   double max_seconds = 60.0;         ///< of one start
   std::map<std::string, std::string> ipopt;  ///< further solver options by name
+  /// Puts another model in the place of the crane's at every solve, for comparisons of derivatives; empty = none.
+  std::function<std::shared_ptr<KnotModel>(const CraneKnotOptions&, std::shared_ptr<KnotModel>)>
+      knot_wrapper;
   /// (starts done, starts in all, sentence); false interrupts.
   std::function<bool(int, int, const std::string&)> progress;
   /// Asked once an iteration; true stops with the best so far.

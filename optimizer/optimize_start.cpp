@@ -119,6 +119,7 @@ class Start {
     knot.clear_postures = clear_postures_;
     if (!problem_.obstacles.empty()) knot.near_postures = from.q;
     spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
+    if (options_.knot_wrapper) spec.knot = options_.knot_wrapper(knot, spec.knot);
     set_bounds(spec);
     if (modes.rows() > 0) apply_modes(model_, modes, spec.bounds);
     spec.acceleration_weight.resize(model_.machine.joint_count());
