@@ -16,46 +16,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Number of cells of each axis that loses least in all for about `nodes` nodes, from what a coarse grid lost.
-std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, const Lattice& coarse,
-                                double nodes) {
-  const std::size_t n = losses.size();
-  std::vector<double> lines(n);
-  for (std::size_t j = 0; j < n; ++j) {
-    const bool varies = losses[j][0] > 1e-9 || losses[j][1] > 1e-9;
-    // two cells suffice along an axis that changes no price; else curvature must be seen
-    lines[j] = varies ? 7.0 : 3.0;
-  }
-  const auto gain = [&](std::size_t j) {  // what 1 % more lines saves
-    const double ratio = static_cast<double>(coarse.lines[j].size() - 1) / (lines[j] - 1.0);
-    return losses[j][0] * ratio + 2.0 * losses[j][1] * ratio * ratio;
-  };
-  double count = 1.0;
-  for (const double l : lines) count *= l;
-  constexpr double kGrowth = 1.02;
-  while (count < nodes) {
-    std::size_t best = 0;
-    for (std::size_t j = 1; j < n; ++j) {
-      if (gain(j) > gain(best)) best = j;
-    }
-    if (!(gain(best) > 1e-7)) break;
-    lines[best] *= kGrowth;
-    count *= kGrowth;
-  }
-  std::vector<int> cells;
-  for (const double l : lines) cells.push_back(static_cast<int>(std::lround(l)) - 1);
-  return cells;
-}
-
-Lattice lattice_of(const MotionProblem& problem, const std::vector<int>& cells) {
-  std::vector<VectorXd> lines;
-  for (std::size_t j = 0; j < cells.size(); ++j) {
-    const double start = problem.start[static_cast<Eigen::Index>(j)];
-    lines.push_back(axis_lines(problem.limits.position[j], {start}, cells[j]));
-  }
-  return Lattice(std::move(lines));
-}
-
 /// Largest ratio of the potential's slope to the price it must not exceed, at random postures.
 double largest_slope_ratio(const MotionProblem& problem, const EnergyPotential& potential,
                            MoveWeights& weights, int samples) {
@@ -91,35 +51,43 @@ std::string acting_effects(const CraneModel& model) {
 
 }  // namespace
 
-EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
-                         const EnergyBoundOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
-  EnergyBound bound;
+std::string no_bound_reason(const CraneModel& model, const MotionProblem& problem,
+                            int most_joints) {
   const int n = model.machine.joint_count();
-  if (n > options.most_joints) {
-    bound.message = fmt::format("no bound: a grid over {} joints has too many nodes (at most {})",
-                                n, options.most_joints);
-    return bound;
+  if (n > most_joints) {
+    return fmt::format("no bound: a grid over {} joints has too many nodes (at most {})", n,
+                       most_joints);
   }
   if (const std::string names = acting_effects(model); !names.empty()) {
-    bound.message = "no bound: not proven with effects along the chain (" + names + ")";
-    return bound;
+    return "no bound: not proven with effects along the chain (" + names + ")";
   }
   for (int j = 0; j < n; ++j) {
     const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
     if (problem.start[j] >= r.lo - 1e-9 && problem.start[j] <= r.hi + 1e-9) continue;
-    bound.message = "no bound: the start is outside the position limits";
-    return bound;
+    return "no bound: the start is outside the position limits";
   }
+  return {};
+}
+
+EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
+                         const EnergyBoundOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  EnergyBound bound;
+  bound.message = no_bound_reason(model, problem, options.most_joints);
+  if (!bound.message.empty()) return bound;
+  const int n = model.machine.joint_count();
   const auto loaded = effective_machine(model.machine, model.effects);
   const int probe = n <= 3 ? 12 : 8;
-  Lattice coarse = lattice_of(problem, std::vector<int>(static_cast<std::size_t>(n), probe));
+  Lattice coarse = bound_lattice(problem, std::vector<int>(static_cast<std::size_t>(n), probe));
   MoveWeights weights(model, problem, *loaded,
                       lattice_forces(*loaded, coarse, problem.payload).range);
-  const EnergyPotential rough(*loaded, problem, weights, coarse);
+  const EnergyPotential rough(*loaded, problem, weights, coarse,
+                              lattice_forces(*loaded, coarse, problem.payload));
   const std::vector<int> cells =
       balanced_cells(rough.losses(), coarse, static_cast<double>(options.nodes));
-  EnergyPotential potential(*loaded, problem, weights, lattice_of(problem, cells));
+  const Lattice fine = bound_lattice(problem, cells);
+  EnergyPotential potential(*loaded, problem, weights, fine,
+                            lattice_forces(*loaded, fine, problem.payload));
   for (const VectorXd& lines : potential.lattice().lines) {
     bound.lines.push_back(static_cast<int>(lines.size()));
   }

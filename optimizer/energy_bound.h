@@ -36,4 +36,7 @@ struct EnergyBound {
 EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
                          const EnergyBoundOptions& options = {});
 
+/// Why there can be no bound, empty when there can.
+std::string no_bound_reason(const CraneModel& model, const MotionProblem& problem, int most_joints);
+
 }  // namespace sparflow

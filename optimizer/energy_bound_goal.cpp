@@ -98,7 +98,7 @@ struct PostureBox {
 }  // namespace
 
 LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
-                          const EnergyPotential& potential, double accuracy) {
+                          const EnergyPotential& potential, double accuracy, double tip_accuracy) {
   LeastOnGoal result;
   if (const auto* goal = std::get_if<JointGoal>(&problem.goal)) {
     result.reachable = true;
@@ -172,7 +172,6 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
   if (open.empty()) return result;
   result.reachable = true;
   constexpr long kMostBoxes = 400000;
-  constexpr double kFine = 2e-3;  // [m] sides along which the potential does not vary are cut to
   while (true) {
     PostureBox box = open.top();
     result.lower = box.least;
@@ -183,7 +182,7 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
     const double scale = std::max(box.least, 1e-9);
     for (int j = 0; j < n; ++j) {
       const double want = std::max(variation[j] / (accuracy * scale),
-                                   tips.side(j, 0.5 * (box.hi[j] - box.lo[j])) / kFine);
+                                   tips.side(j, 0.5 * (box.hi[j] - box.lo[j])) / tip_accuracy);
       if (want > most) {
         most = want;
         cut = j;

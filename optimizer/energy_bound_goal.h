@@ -14,8 +14,10 @@ struct LeastOnGoal {
 /// Best-first branch and bound over boxes of postures: within a cell the interpolated potential is least at a corner; a
 /// box is dropped when the tip, linear from its middle plus a bound of the rest, cannot be at the goal. Works for goal
 /// sets of any dimension.
-/// @param accuracy relative; the answer is a bound whatever it is
+/// @param accuracy relative, and  @param tip_accuracy how finely the goal set is followed [m]; the answer is a bound
+/// whatever they are
 LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
-                          const EnergyPotential& potential, double accuracy);
+                          const EnergyPotential& potential, double accuracy,
+                          double tip_accuracy = 2e-3);
 
 }  // namespace sparflow

@@ -13,14 +13,21 @@ namespace sparflow {
 /// Least price of moving one joint alone, W_j+ and W_j-, at any posture. A workspace.
 class MoveWeights {
  public:
+  virtual ~MoveWeights() = default;
   MoveWeights(const CraneModel& model, const MotionProblem& problem, const Machine& loaded,
               const std::vector<Range>& force_range);
 
   /// @param weight [n x 2] in + and - direction [J/rad] or [J/m]
   void at(const Eigen::VectorXd& q, Eigen::MatrixX2d& weight);
-  /// The same from tabulated lengths' rates and forces. @param force [N] by cylinder @param rate by cylinder
-  double price(int joint, bool forward, const double* force, const double* rate) const;
+  /// The same from tabulated forces and rates dx/dq. @param force [N] and rate by cylinder
+  virtual void prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const;
   const std::vector<CylinderDemand>& demands() const { return demands_; }
+
+ protected:
+  /// Forces and rates at q, read by the next two.
+  void update(const Eigen::VectorXd& q);
+  const double* force_data() const { return force_.data(); }
+  const double* rate_data() const { return rate_.data(); }
 
  private:
   double payload_;
@@ -40,11 +47,19 @@ struct AxisCoordinate {
   Eigen::VectorXd u;  ///< at the lines, increasing
 };
 
+/// Lattice over the position limits with the start on a line of each axis. @param cells by joint
+Lattice bound_lattice(const MotionProblem& problem, const std::vector<int>& cells);
+
+/// Number of cells of each axis that loses least in all for about `nodes` nodes.
+/// @param losses what EnergyPotential::losses() said of the `coarse` lattice
+std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, const Lattice& coarse,
+                                double nodes);
+
 class EnergyPotential {
  public:
-  /// Builds and solves. @param lattice the start must be a node
-  EnergyPotential(const Machine& loaded, const MotionProblem& problem, MoveWeights& weights,
-                  Lattice lattice);
+  /// Builds and solves. @param lattice the start must be a node  @param forces of that lattice
+  EnergyPotential(const Machine& loaded, const MotionProblem& problem, const MoveWeights& weights,
+                  Lattice lattice, const LatticeForces& forces);
 
   const Lattice& lattice() const { return lattice_; }
   double node_value(long node) const { return phi_[static_cast<std::size_t>(node)]; }

@@ -37,7 +37,9 @@ struct BoundCase {
   }
 
   EnergyPotential potential(MoveWeights& weights, int cells) const {
-    return EnergyPotential(model.machine, problem, weights, lattice(cells));
+    const Lattice grid = lattice(cells);
+    return EnergyPotential(model.machine, problem, weights, grid,
+                           lattice_forces(model.machine, grid, problem.payload));
   }
   Lattice lattice(int cells) const {
     std::vector<VectorXd> lines;

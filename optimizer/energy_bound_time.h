@@ -1,0 +1,91 @@
+#pragma once
+/// Lower bounds when time is short: of the energy at a given duration, and of the duration itself. By Lagrangian duality
+///   E(T) >= V(lambda) - lambda T,   V = least of E + lambda T over all motions >= potential(end) - potential(start)
+/// for every potential whose slopes p satisfy max over admissible speeds v of p.v - power(q, v) <= lambda at every
+/// posture. Admissible: joint speeds, valve flows, pump flow; accelerations are left out, as are obstacles. Only slopes in
+/// a box |p_j| <= B_j(q) are used, so that the grid of optimizer/energy_bound.h serves; which box, is searched for.
+/// docs/energy_bound.md has the proof.
+#include "optimizer/energy_bound.h"
+#include "optimizer/energy_bound_potential.h"
+
+namespace sparflow {
+
+/// One way to share the price of time among the joints.
+struct TimeShares {
+  double price = 0.0;          ///< lambda [W]; [-] 1 for the least duration
+  double energy_weight = 1.0;  ///< 1, or 0: energy is free, for the least duration
+  Eigen::MatrixX2d
+      share;  ///< [n x 2] >= 0, of each joint moving in + and - direction [-]; only ratios count
+};
+
+/// Largest slopes B_j+-: the least price of moving j alone, plus alpha(q) * share_j / top speed_j with the largest alpha
+/// that keeps the inequality above. A workspace.
+class TimedWeights final : public MoveWeights {
+ public:
+  TimedWeights(const CraneModel& model, const MotionProblem& problem, const Machine& loaded,
+               const std::vector<Range>& force_range);
+
+  void set_shares(const TimeShares& shares) {
+    shares_ = shares;
+    ramp_gain_ = 0.0;
+  }
+  /// Largest sum over joints of (B_j - W_j) a_j met by prices() since set_shares(), a_j the acceleration limit: near its
+  /// ends, where |v_j| <= a_j t, a motion gains at most this times t. [W/s]; [1/s] for the least duration
+  double ramp_gain() const { return ramp_gain_; }
+  /// False when a joint's cylinders are fed by different pumps: the inequality then is not covered.
+  bool possible() const { return possible_; }
+
+  void prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const override;
+  /// max over v of p.v - power(q, v) [W] of slopes within the signs of p. @param slope by joint
+  double largest_gain(const Eigen::VectorXd& q, const Eigen::VectorXd& slope);
+
+ private:
+  /// A joint that moves one way: what it costs and how fast it may be.
+  struct Move {
+    int joint = 0, direction = 0, pump = -1;
+    double pressure = 0.0;  ///< least its pump must give [Pa]
+    double area = 0.0;      ///< volume per travel [m^3/rad] or [m^2]
+    double speed = 0.0;     ///< top [rad/s] or [m/s]
+    double slope = 0.0;     ///< p_j, in the direction of the move
+    double growth = 0.0;    ///< d slope / d alpha
+  };
+  void make_moves(const double* force, const double* rate) const;
+  /// Gain of the best speeds at the moves' slopes; `derivative` by alpha along it.
+  double gain(double* derivative) const;
+
+  std::vector<Range> speed_, acceleration_;
+  std::vector<double> pump_flow_, pump_standby_;
+  TimeShares shares_;
+  bool possible_ = true;
+  mutable double ramp_gain_ = 0.0;
+  mutable std::vector<Move> moves_;
+  mutable std::vector<int> order_;
+};
+
+struct TimedBoundOptions {
+  long nodes = 120000;       ///< of the last grid
+  long search_nodes = 4000;  ///< of the grids on which the shares are searched
+  int evaluations = 70;      ///< of that search
+  int most_joints = 4;
+};
+
+struct TimedBound {
+  bool valid = false;
+  std::string message;     ///< why not
+  double value = 0.0;      ///< [J] or [s]
+  double price_W = 0.0;    ///< lambda it was found at
+  Eigen::VectorXd shares;  ///< by joint, the largest 1
+  std::vector<int> lines;  ///< of the last grid
+  double checked_scale = 1.0;
+  double seconds = 0.0;
+};
+
+/// No motion that takes at most `duration` [s] needs less energy [J], idle power not included.
+TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
+                           const TimedBoundOptions& options = {});
+
+/// No motion is shorter [s].
+TimedBound least_duration(const CraneModel& model, const MotionProblem& problem,
+                          const TimedBoundOptions& options = {});
+
+}  // namespace sparflow
