@@ -46,7 +46,6 @@ GaussianProcess synthetic_process(double area, bool extend, int centres, unsigne
     // some ten bar in all, however many share them
     p.weight[i] = (unit(random) - 0.3) * 4e5 * (24.0 / centres) / (p.signal_std * p.signal_std);
   }
-  p.variance_core = Eigen::MatrixXd::Zero(centres + 2, centres + 2);
   p.flow_max = full_flow;
   p.force_min = -force_span;
   p.force_max = force_span;

@@ -149,8 +149,12 @@ std::string interval(const RegionBound& bound) {
   const double width = bound.hi - bound.lo;
   const int digits =
       width >= 20.0 ? 0 : std::clamp(1 - static_cast<int>(std::floor(std::log10(width))), 0, 6);
-  return fmt::format("{} {:.{}f}..{:.{}f}{}{}", bound.words, bound.lo, digits, bound.hi, digits,
-                     bound.unit.empty() ? "" : " ", bound.unit);
+  const auto without_minus_zero = [&](double v) {
+    return std::abs(v) < 0.5 * std::pow(10.0, -digits) ? 0.0 : v;
+  };
+  return fmt::format("{} {:.{}f}..{:.{}f}{}{}", bound.words, without_minus_zero(bound.lo), digits,
+                     without_minus_zero(bound.hi), digits, bound.unit.empty() ? "" : " ",
+                     bound.unit);
 }
 
 std::string describe(const WorstRegion& region, const ErrorGroup& group) {

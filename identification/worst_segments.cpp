@@ -211,10 +211,12 @@ std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareRe
     w.share_of_error = squares[worst] / total;
     w.share_of_samples = count[worst] / samples;
     w.sentence = fmt::format(
-        "{:.1f} to {:.1f} s of {} ({}): {:.0f} % of the error of the {} in {:.0f} % of its samples "
+        "{:.1f} to {:.1f} s of {} ({}): {:.0f} % of the error of the {} in {} of its samples "
         "(RMSE {})",
         w.from_s, w.to_s, w.file, w.moved, 100.0 * w.share_of_error, part.words,
-        100.0 * w.share_of_samples, size_text(w.rmse, w.unit));
+        w.share_of_samples < 0.005 ? std::string("less than 1 %")
+                                   : fmt::format("{:.0f} %", 100.0 * w.share_of_samples),
+        size_text(w.rmse, w.unit));
     out.push_back(std::move(w));
   }
   std::stable_sort(out.begin(), out.end(), [](const WorstSegment& a, const WorstSegment& b) {

@@ -198,7 +198,7 @@ BaselineMotion BaselineSet::timed(const std::string& kind, const DrivenPath& pat
 }
 
 std::vector<BaselineMotion> BaselineSet::orders_at(double duration) const {
-  return sequences_at(duration, options_.polished_orders);
+  return sequences_at(duration, options_.polished_orders, false);
 }
 
 BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, bool polish) const {
@@ -208,7 +208,7 @@ BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, b
   none.why = refusal(kind);
   if (kind == kSequential) {
     std::vector<BaselineMotion> orders =
-        sequences_at(duration, polish ? options_.polished_orders : 0);
+        sequences_at(duration, polish ? options_.polished_orders : 0, true);
     if (!orders.empty()) {
       double shortest = std::numeric_limits<double>::infinity();
       for (const BaselineMotion& m : orders) {

@@ -91,7 +91,8 @@ class BaselineSet {
   BaselineMotion cheapest(const std::string& kind, double duration, bool polish) const;
   const std::vector<DrivenPath>& paths(const std::string& kind) const;
   const std::string& refusal(const std::string& kind) const;
-  std::vector<BaselineMotion> sequences_at(double duration, int polished) const;
+  /// @param only_best limits of those dearer than the first that keeps them are not looked at
+  std::vector<BaselineMotion> sequences_at(double duration, int polished, bool only_best) const;
   void find_end_postures(const std::vector<Eigen::VectorXd>& given);
   void make_sequences();
   void make_lines();

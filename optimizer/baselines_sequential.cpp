@@ -283,7 +283,8 @@ void BaselineSet::make_sequences() {
   }
 }
 
-std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polished_count) const {
+std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polished_count,
+                                                      bool only_best) const {
   // the cheapest end posture of each order
   std::map<std::string, std::pair<BaselineMotion, const DrivenPath*>> best;
   for (const DrivenPath& path : sequences_) {
@@ -312,8 +313,12 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
   bool kept_one = false;
   for (auto& [m, path] : all) {
     if (!m.found()) continue;
-    // unpolished, only the first that keeps its limits counts; the rest are only looked at when asked for
-    if (polished_count == 0 && kept_one) break;
+    if (only_best && kept_one && left <= 0) {
+      // dearer than the one that was kept, and its limits were not looked at
+      m.motion = Trajectory{};
+      m.why = "dearer";
+      continue;
+    }
     const std::vector<LimitCheck> checks =
         check_limits(model_, problem_, m.motion, options_.optimize.refine);
     if (worst_excess(checks) > options_.limit_tolerance) {

@@ -319,8 +319,9 @@ void set_verdict(Page& page, const std::vector<StrategyComparison>& all) {
   const auto text = [](const PairedSummary& s, const std::string& what) {
     return s.n > 0 ? fmt::format("{} {}", what, excess_text(s.median)) : what + ": none";
   };
-  const std::string where =
-      names.front() == "equal" ? "In equal time" : "Of " + names.front() + " time";
+  const std::string where = names.front() == "equal" ? "In equal time"
+                            : names.front() == "own" ? "Each in its own best time"
+                                                     : "In " + names.front() + " time";
   page.verdict(
       Tone::kNeutral,
       fmt::format("{} against the energy-optimal motion{}: {}, {}, {}", where,

@@ -91,9 +91,11 @@ TEST(EffectAction, AShareOfAnotherLawsFormIsNoEffectOfItsOwn) {
   EffectDesign large = plain_design({ones});
   EffectFit fit = fit_effects(e, {&small, &large});
   fit.theta << 10.0, 100.0;
-  // a tenth of a friction of 100 may be its law's form; the weight of a mass is known better (2 %)
-  large.effect.effect = find_effect("viscous_friction");
+  // a tenth of what a pump's limit takes may be its law's form; a friction's law is known to 5 %, a mass' weight to 2 %
+  large.effect.effect = find_effect("flow_saturation");
   EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 1.0, 1e-9);
+  large.effect.effect = find_effect("viscous_friction");
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 2.0, 1e-9);
   large.effect.effect = find_effect("unmodelled_mass");
   EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
 }

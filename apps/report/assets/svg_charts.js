@@ -77,7 +77,7 @@
 
   page.kinds.bars = function (host, spec) {
     const width = host.clientWidth, many = spec.series.length, colors = spec.series.map((_, k) => theme.color(k));
-    const left = Math.min(width * 0.4, 16 + Math.max(30, ...spec.categories.map(textWidth))), right = 70;
+    const left = Math.min(width * 0.5, 16 + Math.max(30, ...spec.categories.map(textWidth))), right = 70;
     const barHeight = spec.stacked ? 22 : 15, rowHeight = (spec.stacked ? barHeight : barHeight * Math.max(1, many)) + 12;
     const rows = spec.categories.length;
     const drawing = root(host, width, 0);

@@ -1,0 +1,34 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "apps/report/motion_page.h"
+
+namespace sparflow {
+namespace {
+
+TEST(MotionText, BesideTheSeedsByName) {
+  OptimizeResult r;
+  r.energy.total = 80e3;
+  EXPECT_EQ(against_seeds(r), "") << "no seed keeps the limits";
+  r.best_seed_energy = 100e3;
+  r.best_seed_name = "RRT-Connect 2";
+  EXPECT_EQ(against_seeds(r),
+            "20 % less than the best seed, RRT-Connect 2 (100.0 kJ) in the same time");
+  // a straight line that is the best seed is not told twice
+  r.straight_line_energy = r.nearest_line_energy = 100e3;
+  r.straight_line_name = r.best_seed_name = "straight line 1";
+  EXPECT_EQ(against_seeds(r),
+            "20 % less than the straight joint line to the nearest end posture (100.0 kJ) in the "
+            "same time");
+  r.straight_line_energy = r.best_seed_energy = 81e3;
+  EXPECT_THAT(against_seeds(r),
+              testing::EndsWith("and 1.2 % less than the cheapest straight line (81.0 kJ) in the "
+                                "same time"));
+  r.best_seed_energy = 79e3;
+  r.best_seed_name = "BIT* 3";
+  EXPECT_THAT(against_seeds(r),
+              testing::HasSubstr("1.3 % more than the best seed, BIT* 3 (79.0 kJ)"));
+}
+
+}  // namespace
+}  // namespace sparflow
