@@ -79,7 +79,7 @@ class Search {
         result.threshold = gate.threshold(level);
         result.p_value = p;
       }
-      if (p >= level) break;
+      if (p >= level || best.gain < options_.least_gain) break;
       FoundEffect f;
       f.design = scores_.refined(base, best, current);
       f.p_value = p;
@@ -256,7 +256,7 @@ class Search {
         const EffectFit without =
             fit_effects(evidence_, designs_of(found, i), nullptr, final_control());
         found[i].gain = current.total() - without.total() - penalty_of(found[i].design.effect);
-        if (found[i].gain > 3.0) continue;
+        if (found[i].gain > options_.least_gain) continue;
         if (tracing())
           fmt::print(stderr, "  dropped {} ({:.1f})\n", key(found[i].design.effect), found[i].gain);
         found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));

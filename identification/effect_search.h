@@ -12,9 +12,7 @@
 namespace sparflow {
 
 struct SearchOptions {
-  /// Nominal, of the whole search on logs with nothing missing. Residuals of real laws are not quite exchangeable in
-  /// sign, so about ten times as many pass: this is what keeps the true rate below 5 % (docs/blind_test.md).
-  double false_alarm = 0.005;
+  double false_alarm = 0.05;  ///< of the whole search on logs with nothing missing
   int max_effects = 8;
   int simulations = 300;  ///< of the null, for the gate
   /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
@@ -24,6 +22,9 @@ struct SearchOptions {
   double smallest_over_form = 1.5;
   double largest_absorbed =
       0.9;  ///< an effect that learned laws imitate to more than this share is not named
+  /// [nats] beyond its price that an effect must gain, whatever the gate allows: the gate simulates the noise's law,
+  /// and what that law misses is worth some nats in long logs. Effects that are there gain tens.
+  double least_gain = 10.0;
   double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart
   int folds = 5;
   unsigned seed = 1;

@@ -71,7 +71,8 @@ struct Selftest {
   std::vector<std::vector<std::string>> sets;  ///< keys that these logs cannot tell apart
   std::vector<Experiment> experiments;  ///< what to record for the first kSetsWithMotion sets
   double threshold = 0.0;               ///< [nats] a gain beyond its price must reach
-  double false_alarm = 0.005;
+  double false_alarm = 0.05;
+  double least_gain = 10.0;  ///< [nats], as SearchOptions has it
   double samples = 0.0, duration = 0.0;  ///< of the logs, [s]
   std::size_t logs = 0, references = 0;
   std::vector<std::string> notes;
