@@ -72,7 +72,7 @@ struct Selftest {
   std::vector<Experiment> experiments;  ///< what to record for the first kSetsWithMotion sets
   double threshold = 0.0;               ///< [nats] a gain beyond its price must reach
   double false_alarm = 0.05;
-  double least_gain = 10.0;  ///< [nats], as SearchOptions has it
+  double least_gain = 10.0;              ///< [nats], as SearchOptions has it
   double samples = 0.0, duration = 0.0;  ///< of the logs, [s]
   std::size_t logs = 0, references = 0;
   std::vector<std::string> notes;
