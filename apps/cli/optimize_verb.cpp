@@ -132,8 +132,9 @@ void add_optimize_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(1, 256));
   verb->add_flag("--smooth-only", a->smooth_only,
                  "the single smooth NLP without modes (for comparison)");
-  verb->add_flag("--bound", a->bound,
-                 "also a lower bound: no motion of any duration takes less energy (docs/energy_bound.md)");
+  verb->add_flag(
+      "--bound", a->bound,
+      "also a lower bound: no motion of any duration takes less energy (docs/energy_bound.md)");
   verb->add_option("--from", a->from,
                    "start from this motion (CSV of an earlier run, for another goal or payload) "
                    "and from nothing else")
