@@ -171,6 +171,7 @@ class Search {
       if (d != score.design) others.push_back({score.candidate, d, score.gain});
     }
     std::vector<const Score*> pointers;
+    pointers.reserve(others.size());
     for (const Score& o : others) pointers.push_back(&o);
     const Score* better = ordinarily_best(base, pointers, design_of(score));
     return better == nullptr ? score : *better;

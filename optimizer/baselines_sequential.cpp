@@ -108,6 +108,7 @@ std::vector<double> shared_time(const CraneModel& model, double payload,
   for (const Trajectory& leg : legs) shortest += leg.duration();
   const double spare = std::max(0.0, duration - shortest), unit = spare / kUnits;
   std::vector<double> times;
+  times.reserve(legs.size());
   for (const Trajectory& leg : legs) times.push_back(leg.duration());
   if (spare <= 1e-9 * shortest || legs.size() == 1) {
     times.back() += duration - shortest;
@@ -302,6 +303,7 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
     at->second.first.shortest = shortest;
   }
   std::vector<std::pair<BaselineMotion, const DrivenPath*>> all;
+  all.reserve(best.size());
   for (auto& [order, entry] : best) all.push_back(std::move(entry));
   const auto cheaper = [](const auto& a, const auto& b) {
     if (a.first.found() != b.first.found()) return a.first.found();
@@ -334,6 +336,7 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
   }
   std::stable_sort(all.begin(), all.end(), cheaper);
   std::vector<BaselineMotion> motions;
+  motions.reserve(all.size());
   for (auto& entry : all) motions.push_back(std::move(entry.first));
   return motions;
 }

@@ -132,6 +132,7 @@ std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, cons
     count *= kGrowth;
   }
   std::vector<int> cells;
+  cells.reserve(lines.size());
   for (const double l : lines) cells.push_back(static_cast<int>(std::lround(l)) - 1);
   return cells;
 }

@@ -151,6 +151,7 @@ class EnergyGrid::Search {
     const int each =
         many > 0 ? std::max(4, static_cast<int>(std::pow(left, 1.0 / many)) - 3) : kFew;
     std::vector<int> cells;
+    cells.reserve(varies.size());
     for (int j = 0; j < n_; ++j) {
       cells.push_back(varies[static_cast<std::size_t>(j)] ? each : kFew);
     }

@@ -48,6 +48,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   ParetoCurve curve;
   curve.sequential_limit = curve.simultaneous_limit = curve.grid_limit = kNone;
   std::vector<Eigen::VectorXd> ends;
+  ends.reserve(seeds.size());
   for (const SeedMotion& s : seeds)
     ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
   const BaselineSet baselines(model, problem, ends, options.strategies.baselines);

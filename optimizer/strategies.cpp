@@ -241,6 +241,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
   out.payload = problem.payload;
   out.idle_power = options.idle_power;
   std::vector<Eigen::VectorXd> ends;
+  ends.reserve(seeds.size());
   for (const SeedMotion& s : seeds)
     ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
   const BaselineSet baselines(model, problem, ends, options.baselines);
