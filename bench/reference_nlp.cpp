@@ -75,6 +75,7 @@ nlohmann::json as_json(const Outcome& outcome, const Arguments& arguments) {
           {"solve_s", r.solve_s},
           {"callbacks_s", r.callbacks_s},
           {"linear_solver_s", r.linear_solver_s},
+          {"kkt_solver", to_string(r.kkt_solver)},
           {"solve_cpu_s", r.solve_cpu_s},
           {"callbacks_cpu_s", r.callbacks_cpu_s},
           {"setup_s", outcome.setup_s},
@@ -105,14 +106,14 @@ void print(const Outcome& outcome, const Arguments& arguments) {
       "                      wall ms    cpu ms   (median of {} runs, one core)\n"
       "  solve            {:10.2f}{:10.2f}\n"
       "    callbacks      {:10.2f}{:10.2f}   model and derivatives, {} kernels\n"
-      "    linear solver  {:10.2f}             MUMPS, and assembling its matrix\n"
+      "    linear solver  {:10.2f}             {}, and assembling its matrix\n"
       "    rest of Ipopt  {:10.2f}\n"
       "  before           {:10.2f}             reading the file, laying out the NLP\n",
       arguments.problem, to_string(r.status), r.iterations, r.objective, outcome.energy_kJ,
       r.objective - outcome.energy_kJ, r.max_violation, e.objective, e.gradient, e.constraints,
       e.jacobian, e.hessian, arguments.repeat, 1e3 * r.solve_s, 1e3 * r.solve_cpu_s,
       1e3 * r.callbacks_s, 1e3 * r.callbacks_cpu_s, kernel_isa_name(kernel_isa()),
-      1e3 * r.linear_solver_s, 1e3 * rest, 1e3 * outcome.setup_s);
+      1e3 * r.linear_solver_s, to_string(r.kkt_solver), 1e3 * rest, 1e3 * outcome.setup_s);
   if (!r.solved()) fmt::print("  {}\n", r.message);
 }
 
@@ -136,6 +137,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 10000));
   app.add_option("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)")
       ->check(CLI::PositiveNumber);
+  app.add_option("--kkt", arguments.options.kkt_solver, "solver of the KKT systems: chain or mumps")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, KktSolver>{
+          {"chain", KktSolver::kChain}, {"mumps", KktSolver::kMumps}}));
   app.add_option("--print-level", arguments.options.print_level, "Ipopt's table, 0 to 12")
       ->check(CLI::Range(0, 12));
   try {
