@@ -76,9 +76,10 @@ Graph quotient(const Graph& graph, const std::vector<int>& group, int groups) {
 std::vector<int> elimination_order(const Graph& graph) {
   const int size = graph.size();
   std::vector<int> position(at(size), -1);
-  // The border: minimum degree would find it late as well, but counts its couplings in every degree before.
-  const double mean = size > 0 ? double(graph.neighbour.size()) / size : 0.0;
-  const double many = std::max(48.0, 6.0 * mean);
+  // The border: minimum degree would find it late as well, but counts its couplings in every degree before. A posture
+  // with very many rows of its own (clearances) is none: its share of all unknowns is that of one knot.
+  constexpr double kLeast = 48.0, kShare = 0.05;
+  const double many = std::max(kLeast, kShare * size);
   std::vector<int> border, inner(at(size), -1), node;
   for (int i = 0; i < size; ++i) {
     if (graph.degree(i) > many) {
