@@ -131,30 +131,46 @@ SPARFLOW_INLINE void solve_backward(int stride, int count, const double* panel, 
   }
 }
 
-#define SPARFLOW_LDL_KERNEL(NAME, TARGET)                                                 \
-  TARGET void update_##NAME(double* f, int stride, int first, int last, int size,         \
-                            const double* l1, const double* w1, const double* l2,         \
-                            const double* w2) {                                           \
-    update_columns(f, stride, first, last, size, l1, w1, l2, w2);                         \
-  }                                                                                       \
-  TARGET void product_##NAME(double* f, int stride, int first, int size, const double* l, \
-                             const double* w, int count) {                                \
-    subtract_product(f, stride, first, size, l, w, count);                                \
-  }                                                                                       \
-  TARGET void forward_##NAME(int stride, int count, const double* panel, double* x) {     \
-    solve_forward(stride, count, panel, x);                                               \
-  }                                                                                       \
-  TARGET void backward_##NAME(int stride, int count, const double* panel, double* x) {    \
-    solve_backward(stride, count, panel, x);                                              \
-  }                                                                                       \
-  constexpr LdlKernel kLdl_##NAME = {update_##NAME, product_##NAME, forward_##NAME,       \
-                                     backward_##NAME};
+void update_baseline(double* f, int stride, int first, int last, int size, const double* l1,
+                     const double* w1, const double* l2, const double* w2) {
+  update_columns(f, stride, first, last, size, l1, w1, l2, w2);
+}
+void product_baseline(double* f, int stride, int first, int size, const double* l, const double* w,
+                      int count) {
+  subtract_product(f, stride, first, size, l, w, count);
+}
+void forward_baseline(int stride, int count, const double* panel, double* x) {
+  solve_forward(stride, count, panel, x);
+}
+void backward_baseline(int stride, int count, const double* panel, double* x) {
+  solve_backward(stride, count, panel, x);
+}
+constexpr LdlKernel kLdlBaseline = {update_baseline, product_baseline, forward_baseline,
+                                    backward_baseline};
 
-SPARFLOW_LDL_KERNEL(baseline, )
 #if defined(__x86_64__)
-SPARFLOW_LDL_KERNEL(avx2, __attribute__((target("avx2,fma"))))
+#define SPARFLOW_AVX2 __attribute__((target("avx2,fma")))
+SPARFLOW_AVX2
+void update_avx2(double* f, int stride, int first, int last, int size, const double* l1,
+                 const double* w1, const double* l2, const double* w2) {
+  update_columns(f, stride, first, last, size, l1, w1, l2, w2);
+}
+SPARFLOW_AVX2
+void product_avx2(double* f, int stride, int first, int size, const double* l, const double* w,
+                  int count) {
+  subtract_product(f, stride, first, size, l, w, count);
+}
+SPARFLOW_AVX2
+void forward_avx2(int stride, int count, const double* panel, double* x) {
+  solve_forward(stride, count, panel, x);
+}
+SPARFLOW_AVX2
+void backward_avx2(int stride, int count, const double* panel, double* x) {
+  solve_backward(stride, count, panel, x);
+}
+constexpr LdlKernel kLdlAvx2 = {update_avx2, product_avx2, forward_avx2, backward_avx2};
+#undef SPARFLOW_AVX2
 #endif
-#undef SPARFLOW_LDL_KERNEL
 #undef SPARFLOW_INLINE
 
 }  // namespace
@@ -163,9 +179,9 @@ const LdlKernel& ldl_kernel() {
 #if defined(__x86_64__)
   static const bool avx2 =
       __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  if (avx2) return kLdl_avx2;
+  if (avx2) return kLdlAvx2;
 #endif
-  return kLdl_baseline;
+  return kLdlBaseline;
 }
 
 }  // namespace sparflow::detail
