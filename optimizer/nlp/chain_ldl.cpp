@@ -206,6 +206,13 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
     for (int i = candidates; i < size; ++i) below = std::max(below, std::abs(column[i]));
     return std::max(most, below);
   };
+  // most often the first candidate will do
+  const double first = std::abs(f[k * stride + k]);
+  if (first > kVanished &&
+      first >= kGoodPivot * detail::ldl_kernel().largest(size - k - 1, f + k * stride + k + 1)) {
+    width = 1;
+    return true;
+  }
   double best = 0.0;
   int best_first = -1, best_second = -1;
   for (int c = k; c < candidates && best < kGoodPivot; ++c) {
