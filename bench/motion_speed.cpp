@@ -77,6 +77,9 @@ OptimizeOptions one_solve(int intervals) {
 std::vector<Way> ways(const CraneModel& model, const MotionProblem& problem) {
   std::vector<Way> all;
   all.push_back({"phases, exact Hessian", one_solve(100)});
+  Way mumps{"phases, exact Hessian, MUMPS", one_solve(100)};
+  mumps.options.ipopt = {{"linear_solver", "mumps"}};
+  all.push_back(mumps);
   Way smooth{"single smooth NLP, exact Hessian", one_solve(100), false};
   smooth.options.modes = false;
   smooth.options.schedule = {{20e-3, 10e5}, {2e-3, 1e5}};

@@ -49,7 +49,7 @@ class Start {
     result_.seed_feasible =
         worst_excess(check_limits(model_, problem_, timed, options_.refine)) <= 1e-3;
     if (result_.seed_feasible)
-      result_.seed_energy = exact_energy(model_, timed, problem_.payload, options_.refine).total;
+      result_.seed_energy = exact_total_energy(model_, timed, problem_.payload, options_.refine);
     keep_clear_ends(timed);
     if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
@@ -160,7 +160,7 @@ class Start {
     record.solve_s = solved.solve_s;
     if (usable(solved)) {
       const Trajectory motion = transcription_->trajectory(solved.x);
-      record.energy_exact = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+      record.energy_exact = exact_total_energy(model_, motion, problem_.payload, options_.refine);
       record.excess = worst_excess(check_limits(model_, problem_, motion, options_.refine));
     }
     result_.stages.push_back(std::move(record));
@@ -266,7 +266,7 @@ class Start {
   std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
     std::vector<LimitCheck> checks = check_limits(model_, problem_, motion, options_.refine);
     const double excess = worst_excess(checks);
-    const double energy = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+    const double energy = exact_total_energy(model_, motion, problem_.payload, options_.refine);
     const double cost = exact_cost(model_, problem_, motion, energy, options_.refine);
     const bool kept = excess <= options_.limit_tolerance;
     const bool first = result_.motion.size() < 2;

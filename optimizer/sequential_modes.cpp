@@ -138,7 +138,7 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
   integrate(problem.start, m);
   // a start that passes through an obstacle rarely finds its way out with its modes held
   if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess) return false;
-  out.energy = exact_energy(model, m, problem.payload, 2).total;
+  out.energy = exact_total_energy(model, m, problem.payload, 2);
   return true;
 }
 
