@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "bench/program_options.h"
 #include "bench/reference_model.h"
 #include "models/error.h"
 #include "optimizer/nlp/ipopt_solver.h"
@@ -130,23 +130,18 @@ int solve(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   Arguments arguments;
-  CLI::App app("Solves the reference NLP (bench/data/reference_problem.json) with Ipopt.");
-  app.add_option("problem", arguments.problem, "the problem file (JSON)")->required();
-  app.add_option("--json", arguments.json, "write the machine-readable result here");
-  app.add_option("--repeat", arguments.repeat, "solve so many times, report the median run")
-      ->check(CLI::Range(1, 10000));
-  app.add_option("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--kkt", arguments.options.kkt_solver, "solver of the KKT systems: chain or mumps")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, KktSolver>{
-          {"chain", KktSolver::kChain}, {"mumps", KktSolver::kMumps}}));
-  app.add_option("--print-level", arguments.options.print_level, "Ipopt's table, 0 to 12")
-      ->check(CLI::Range(0, 12));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  bench::ProgramOptions app(
+      "Solves the reference NLP (bench/data/reference_problem.json) with Ipopt.");
+  app.add("problem", arguments.problem, "the problem file (JSON)").required();
+  app.add("--json", arguments.json, "write the machine-readable result here");
+  app.add("--repeat", arguments.repeat, "solve so many times, report the median run")
+      .range(1, 10000);
+  app.add("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)").positive();
+  std::string kkt = arguments.options.kkt_solver == KktSolver::kChain ? "chain" : "mumps";
+  app.add("--kkt", kkt, "solver of the KKT systems").one_of({"chain", "mumps"});
+  app.add("--print-level", arguments.options.print_level, "Ipopt's table, 0 to 12").range(0, 12);
+  if (const auto code = app.parse(argc, argv)) return *code;
+  arguments.options.kkt_solver = kkt == "chain" ? KktSolver::kChain : KktSolver::kMumps;
   try {
     return solve(arguments);
   } catch (const InputError& error) {

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "models/effects/effective_machine.h"
+#include "models/linear_algebra.h"
 #include "optimizer/exact_energy.h"
 #include "problems/clearance.h"
 
@@ -163,7 +164,7 @@ bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
     }
     const Eigen::Matrix3d normal =
         jacobian * jacobian.transpose() + 1e-9 * Eigen::Matrix3d::Identity();
-    VectorXd step = jacobian.transpose() * normal.ldlt().solve(error);
+    VectorXd step = jacobian.transpose() * solve_symmetric(normal, error);
     const double length = step.cwiseAbs().maxCoeff();
     if (length > 0.3) step *= 0.3 / length;
     q += step;
