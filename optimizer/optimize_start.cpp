@@ -45,7 +45,6 @@ class Start {
 
   StartResult run(const SeedMotion& seed) {
     result_.seed = seed.name;
-    far_ = true;
     const Trajectory timed = with_duration(seed.motion, time_.guess);
     result_.seed_feasible = worst_excess(verdict(timed).checks) <= 1e-3;
     if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
@@ -140,10 +139,6 @@ class Start {
     nlp.max_seconds = options_.max_seconds;
     nlp.more = options_.ipopt;
     if (modes.rows() > 0 || result_.iterations > 0) nlp.mu_init = 1e-3;
-    // A path of the planners is far from any optimum: where the barrier follows the progress made, instead of falling
-    // from a small start, the solver leaves the path's neighbourhood and ends in the cheaper optimum more often than not.
-    if (far_ && modes.rows() > 0 && tightenings_used_ == 0)
-      nlp.more.try_emplace("mu_strategy", "adaptive");
     nlp.on_iteration = [this](const NlpIteration&) {
       return !(options_.interrupted && options_.interrupted());
     };
@@ -464,7 +459,6 @@ class Start {
   PhasePlan plan_;  // behind the mesh
   Tightening tightening_;
   int tightenings_used_ = 0;
-  bool far_ = false;  // the start is a planner's path
   Eigen::MatrixXd clear_postures_;
   std::unique_ptr<Transcription> transcription_;
   StartResult result_;
