@@ -26,6 +26,16 @@ double half_power(double largest) {
   return std::bit_cast<double>(static_cast<std::uint64_t>(1023 - half) << 52);
 }
 
+/// How good a pivot of two rows (a, b; b, d) is, with the largest entries beside its rows: the inverse of what they can
+/// grow by, as own / beside is of a pivot of one row. 0 = none.
+double pair_quality(double a, double b, double d, double beside_a, double beside_d) {
+  const double det = std::abs(a * d - b * b);
+  if (std::abs(b) <= kVanished || det <= kVanished * std::max(std::abs(a * d), b * b)) return 0.0;
+  const double growth = std::max(std::abs(d) * beside_a + std::abs(b) * beside_d,
+                                 std::abs(b) * beside_a + std::abs(a) * beside_d);
+  return growth > kGoodPivot * det ? det / growth : 1.0 / kGoodPivot;
+}
+
 }  // namespace
 
 /// Two sweeps of symmetric equilibration in the largest entry (Ruiz 2001), rounded to powers of two.
@@ -206,6 +216,26 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
     for (int i = candidates; i < size; ++i) below = std::max(below, std::abs(column[i]));
     return std::max(most, below);
   };
+  // most often the first candidate will do
+  const double first = std::abs(f[k * stride + k]);
+  if (first > kVanished &&
+      first >= kGoodPivot * detail::ldl_kernel().largest(size - k - 1, f + k * stride + k + 1)) {
+    width = 1;
+    return true;
+  }
+  // or the pair the order was made for, if it stands together still
+  if (k + 1 < candidates) {
+    const double* l1 = f + k * stride;
+    const double* l2 = l1 + stride;
+    const int below = size - k - 2;
+    const double quality =
+        pair_quality(l1[k], l1[k + 1], l2[k + 1], detail::ldl_kernel().largest(below, l1 + k + 2),
+                     detail::ldl_kernel().largest(below, l2 + k + 2));
+    if (quality >= kGoodPivot) {
+      width = 2;
+      return true;
+    }
+  }
   double best = 0.0;
   int best_first = -1, best_second = -1;
   for (int c = k; c < candidates && best < kGoodPivot; ++c) {
@@ -221,16 +251,10 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
       best_second = -1;
     }
     if (best >= kGoodPivot || partner < 0) continue;
-    const double a = entry(c, c), b = entry(c, partner), d = entry(partner, partner);
-    const double det = std::abs(a * d - b * b);
-    if (det <= kVanished * std::max(std::abs(a * d), b * b) || std::abs(b) <= kVanished) continue;
     const double beside_c = largest(c, partner, ignored);
     const double beside_p = largest(partner, c, ignored);
-    // |inverse of the pair's block| times what stands beside it bounds what the elimination adds
-    const double growth = std::max(std::abs(d) * beside_c + std::abs(b) * beside_p,
-                                   std::abs(b) * beside_c + std::abs(a) * beside_p) /
-                          det;
-    const double quality = growth > kGoodPivot ? 1.0 / growth : 1.0 / kGoodPivot;
+    const double quality =
+        pair_quality(entry(c, c), entry(c, partner), entry(partner, partner), beside_c, beside_p);
     if (quality > best) {
       best = quality;
       best_first = c;

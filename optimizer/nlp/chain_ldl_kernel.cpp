@@ -13,6 +13,18 @@ constexpr int kLanes = 4;
 SPARFLOW_INLINE void load(const double* from, LdlLanes& v) { std::memcpy(&v, from, sizeof v); }
 SPARFLOW_INLINE void store(double* to, const LdlLanes& v) { std::memcpy(to, &v, sizeof v); }
 
+SPARFLOW_INLINE double largest_entry(int size, const double* column) {
+  LdlLanes most = {0.0, 0.0, 0.0, 0.0}, a;
+  for (int i = 0; i < size; i += kLanes) {
+    load(column + i, a);
+    a = a < 0.0 ? -a : a;
+    most = a > most ? a : most;
+  }
+  const double first = most[0] > most[1] ? most[0] : most[1];
+  const double second = most[2] > most[3] ? most[2] : most[3];
+  return first > second ? first : second;
+}
+
 SPARFLOW_INLINE void update_columns(double* f, int stride, int first, int last, int size,
                                     const double* l1, const double* w1, const double* l2,
                                     const double* w2) {
@@ -131,6 +143,7 @@ SPARFLOW_INLINE void solve_backward(int stride, int count, const double* panel, 
   }
 }
 
+double largest_baseline(int size, const double* column) { return largest_entry(size, column); }
 void update_baseline(double* f, int stride, int first, int last, int size, const double* l1,
                      const double* w1, const double* l2, const double* w2) {
   update_columns(f, stride, first, last, size, l1, w1, l2, w2);
@@ -145,11 +158,13 @@ void forward_baseline(int stride, int count, const double* panel, double* x) {
 void backward_baseline(int stride, int count, const double* panel, double* x) {
   solve_backward(stride, count, panel, x);
 }
-constexpr LdlKernel kLdlBaseline = {update_baseline, product_baseline, forward_baseline,
-                                    backward_baseline};
+constexpr LdlKernel kLdlBaseline = {largest_baseline, update_baseline, product_baseline,
+                                    forward_baseline, backward_baseline};
 
 #if defined(__x86_64__)
 #define SPARFLOW_AVX2 __attribute__((target("avx2,fma")))
+SPARFLOW_AVX2
+double largest_avx2(int size, const double* column) { return largest_entry(size, column); }
 SPARFLOW_AVX2
 void update_avx2(double* f, int stride, int first, int last, int size, const double* l1,
                  const double* w1, const double* l2, const double* w2) {
@@ -168,7 +183,8 @@ SPARFLOW_AVX2
 void backward_avx2(int stride, int count, const double* panel, double* x) {
   solve_backward(stride, count, panel, x);
 }
-constexpr LdlKernel kLdlAvx2 = {update_avx2, product_avx2, forward_avx2, backward_avx2};
+constexpr LdlKernel kLdlAvx2 = {largest_avx2, update_avx2, product_avx2, forward_avx2,
+                                backward_avx2};
 #undef SPARFLOW_AVX2
 #endif
 #undef SPARFLOW_INLINE

@@ -9,6 +9,8 @@ inline int ldl_padded(int rows) { return (rows + 3) / 4 * 4; }
 inline int ldl_stride(int rows) { return ldl_padded(rows + kLdlPadding); }
 
 struct LdlKernel {
+  /// Largest |column[i]|, 0 <= i < size; what follows up to whole vectors must be zero.
+  double (*largest)(int size, const double* column);
   /// f(i, c) -= l1[i] w1[c] (+ l2[i] w2[c] when l2 is given) for first <= c < last, c <= i < size.
   void (*update)(double* f, int stride, int first, int last, int size, const double* l1,
                  const double* w1, const double* l2, const double* w2);
