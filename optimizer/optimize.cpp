@@ -28,6 +28,9 @@ bool same_plan(const PhasePlan& a, const PhasePlan& b) {
          (a.modes.array() == b.modes.array()).all();
 }
 
+/// Where time is short, the sequences tried are also those of motions so many times slower.
+constexpr double kSlower[] = {1.25, 1.6};
+
 constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
 
 /// Everything that is solved for one problem in one window of time.
@@ -51,19 +54,16 @@ class Search {
 
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
-    std::vector<ModeCandidate> one_by_one;
-    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
-        problem_.waypoints.empty()) {
-      const Eigen::VectorXd times =
-          Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, time_.guess);
-      std::vector<Eigen::VectorXd> ends;
-      ends.reserve(seeds_.size());
-      for (const SeedMotion& s : seeds_) {
-        ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+    std::vector<ModeCandidate> one_by_one = sequences(time_.guess);
+    if (hurried()) {
+      for (const double slower : kSlower) {
+        for (ModeCandidate& c : sequences(slower * time_.guess)) {
+          c.name += fmt::format(", squeezed from {:g} times as long", slower);
+          c.guess = with_duration(c.guess, time_.guess);
+          one_by_one.push_back(std::move(c));
+        }
       }
-      one_by_one = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
     }
-    for (ModeCandidate& c : grid_candidates()) one_by_one.push_back(std::move(c));
     const std::size_t given = seeds_.size();
     expected_ = static_cast<int>(given + one_by_one.size());
     solve(
@@ -93,8 +93,35 @@ class Search {
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
 
-  /// The cheapest ways a search over the whole joint space knows.
-  std::vector<ModeCandidate> grid_candidates() const {
+  /// Too little time for taking turns: what is cheap then is a slower motion's sequence with its phases overlapping,
+  /// which neither the seeds (all joints at once) nor the grid at this time shows. Beside obstacles the ways round are
+  /// what differs, and a solve takes ten times longer.
+  bool hurried() const {
+    const double shortest = shortest_seed(seeds_);
+    return problem_.objective.energy > 0.0 && problem_.obstacles.empty() &&
+           time_.lower == time_.upper && time_.guess < 1.6 * shortest;
+  }
+
+  /// One by one in so long a time, and the cheapest ways a search over the whole joint space knows.
+  std::vector<ModeCandidate> sequences(double duration) const {
+    std::vector<ModeCandidate> found;
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
+      const Eigen::VectorXd times =
+          Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, duration);
+      std::vector<Eigen::VectorXd> ends;
+      ends.reserve(seeds_.size());
+      for (const SeedMotion& s : seeds_) {
+        ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+      }
+      found = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
+    }
+    for (ModeCandidate& c : grid_candidates(duration)) found.push_back(std::move(c));
+    return found;
+  }
+
+  /// @param wanted [s] longer than the window allows: the path is to be driven faster by whoever asked
+  std::vector<ModeCandidate> grid_candidates(double wanted) const {
     std::vector<ModeCandidate> found;
     const EnergyGridOptions size{options_.grid_nodes};
     if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
@@ -104,15 +131,15 @@ class Search {
       EnergyGrid grid(model_, problem, size);
       std::vector<GridPath> paths;
       if (problem.objective.energy > 0.0) {
-        paths = grid.paths_for_duration(time_.guess, most);
+        paths = grid.paths_for_duration(wanted, most);
       } else if (time_is_everything(problem)) {
         constexpr double kTimeIsEverything = 1e7;  // [W]
         paths.push_back(grid.cheapest_path(kTimeIsEverything));
       }
       for (const GridPath& path : paths) {
         if (!path.found) continue;
-        const double duration =
-            std::clamp(std::max(time_.guess, path.duration_s), time_.lower, time_.upper);
+        double duration = std::max(wanted, path.duration_s);
+        if (wanted <= time_.upper) duration = std::clamp(duration, time_.lower, time_.upper);
         found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
       }
     };
