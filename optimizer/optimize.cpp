@@ -58,7 +58,7 @@ class Search {
     if (hurried()) {
       for (const double slower : kSlower) {
         for (ModeCandidate& c : sequences(slower * time_.guess)) {
-          c.name += fmt::format(", squeezed from {:g} times as long", slower);
+          c.name = fmt::format("squeezed {:g} times: {}", slower, c.name);
           c.guess = with_duration(c.guess, time_.guess);
           one_by_one.push_back(std::move(c));
         }

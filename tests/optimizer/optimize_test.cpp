@@ -177,6 +177,21 @@ TEST(Optimize, OneByOneIsTriedDownToTheShortestTimeItNeeds) {
   }
 }
 
+TEST(Optimize, WhereTimeIsShortSlowerSequencesAreSqueezed) {
+  Case c = lift_case();
+  c.seeds.resize(1);
+  for (const double times_shortest : {1.3, 2.5}) {
+    const double duration = times_shortest * c.seeds[0].shortest_duration;
+    c.problem.duration = {duration, duration};
+    const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+    ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
+    const bool squeezed = std::any_of(r.starts.begin(), r.starts.end(), [](const StartResult& s) {
+      return s.seed.find("squeezed") != std::string::npos;
+    });
+    EXPECT_EQ(squeezed, times_shortest < 1.6) << duration << " s";
+  }
+}
+
 TEST(Optimize, TooShortATimeIsNamedWithTheLimitAndAFeasibleDuration) {
   Case c = lift_case();
   c.problem.duration = {2.0, 2.0};
