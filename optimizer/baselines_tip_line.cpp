@@ -56,6 +56,7 @@ void BaselineSet::make_best_tip_lines() {
   double duration = kFirstLineDuration;
   if (!tip_lines_.empty()) {
     duration = 1.05 * tip_lines_.front().shortest;
+    best_tip_lines_ = tip_lines_;  // one of the choices, and the fastest where little time is left
   } else if (problem_.duration.min > 0.0) {
     duration = problem_.duration.min;
   }

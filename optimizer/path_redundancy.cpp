@@ -295,7 +295,11 @@ class LineProgram {
     q_ = postures_.joints(from + 0.5 * d);
     qd_ = postures_.joints(d) / h;
     if (ratios_.speed(q_, qd_, nullptr) > 1.0 - kFlowMargin) return kNoCost;
-    const MachineState& s = chain_.evaluate(q_.data(), qd_.data(), problem_.payload);
+    const double trusted = problem_.limits.pressure_std;
+    const MachineState& s = chain_.evaluate(q_.data(), qd_.data(), problem_.payload, trusted > 0.0);
+    for (const CylinderState& c : s.cylinders) {
+      if (trusted > 0.0 && c.pressure_std > trusted) return kNoCost;
+    }
     for (std::size_t p = 0; p < s.pumps.size(); ++p) {
       const double most = problem_.limits.pump_max_pressure[p];
       if (most > 0.0 && problem_.machine.pumps[p].type == PumpType::kLoadSensing &&

@@ -137,6 +137,17 @@ TEST(PathRedundancy, RefusesWhatHasNoSingleRedundantJoint) {
   EXPECT_EQ(path_redundancy_refusal(LineCase().problem), "");
 }
 
+TEST(PathRedundancy, IsAsFastAsThePseudoInverse) {
+  const LineCase c;
+  BaselineOptions options;
+  options.polished_orders = 0;
+  const BaselineSet set(c.model, c.problem, {}, options);
+  EXPECT_LE(set.shortest(kBestTipLine), set.shortest(kTipLine));
+  const double duration = set.shortest(kTipLine);
+  EXPECT_LE(set.at(kBestTipLine, duration).energy.total,
+            set.at(kTipLine, duration).energy.total * (1 + 1e-12));
+}
+
 TEST(PathRedundancy, SaysHowFarItComesInTooShortATime) {
   const LineCase c;
   const PathRedundancy r = best_redundancy_line(c.model, c.problem, 3.0, {});
