@@ -28,20 +28,10 @@ class PumpLag final : public Effect {
                         0.02,
                         2.0,
                         0.2,
-                        "time constant, of two stages their sum",
+                        "time constant",
                         false,
-                        {0.03, 0.05, 0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7, 1.0}},
-                       {"second",
-                        "-",
-                        1.0,
-                        0.0,
-                        0.5,
-                        0.0,
-                        "share of tau in a second stage, as of a control piston behind its pilot "
-                        "valve; 0: one stage",
-                        false,
-                        {0.0, 0.2, 0.4}}},
-        .equation = "((1 - second) tau d/dt + 1) (second tau d/dt + 1) p = demand",
+                        {0.03, 0.05, 0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7, 1.0}}},
+        .equation = "tau dp/dt + p = demand",
         .signals = {"pump pressure", "working pressures", "commands"},
         .confused_with = {"sensor_delay"},
         .separated_by = "steps of one function, several times",
@@ -58,10 +48,7 @@ class PumpLag final : public Effect {
     if (kind != EvidenceKind::kPump || index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    const double second = shape.size() > 1 ? shape[1] * shape[0] : 0.0;
-    Eigen::VectorXd late = first_order_lag(log, demand, shape[0] - second);
-    if (second > 0.0) late = first_order_lag(log, late, second);
-    columns = late - demand;
+    columns = first_order_lag(log, demand, shape[0]) - demand;
     return true;
   }
 };
