@@ -5,7 +5,6 @@
 /// Thresholds were chosen on seeds below 1000 only.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -15,6 +14,7 @@
 #include <thread>
 
 #include "bench/blind_table.h"
+#include "bench/program_options.h"
 #include "models/error.h"
 
 namespace {
@@ -109,31 +109,28 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Blind test of diagnosis on simulated logs with a hidden effect"};
+  bench::ProgramOptions app("Blind test of diagnosis on simulated logs with a hidden effect");
   Options options;
-  app.add_option("--runs", options.runs, "of each row, with a reference and without in turn");
-  app.add_option("--none", options.none, "so many of row none, where more are wanted");
-  app.add_option("--seed", options.seed, "first seed");
-  app.add_option("--seconds", options.how.seconds, "length of a log [s]");
-  app.add_option("--noise", options.how.noise, "sensor noise, 1 = 0.8 bar");
-  app.add_option("--rows", options.rows, "none, clear, small, outside, pairs, fault")
-      ->delimiter(',');
-  app.add_option("--way", options.way, "reference, alone or both")
-      ->check(CLI::IsMember({"reference", "alone", "both"}));
-  app.add_option("--ways", options.ways,
-                 "who judges: ours, and for comparison bic, gp, correlation (docs/blind_test.md)")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"ours", "bic", "gp", "correlation"}));
-  app.add_option("--only", options.how.only, "this effect alone");
-  app.add_option("--missing", options.how.leave_out, "columns that no log has")
-      ->check(CLI::IsMember({"rod", "payload", "commands", "oil", "pump"}));
-  app.add_option("--jobs", options.jobs, "runs at the same time")->check(CLI::Range(1, 64));
-  app.add_option("--json", options.json, "all runs and the table as JSON");
+  app.add("--runs", options.runs, "of each row, with a reference and without in turn");
+  app.add("--none", options.none, "so many of row none, where more are wanted");
+  app.add("--seed", options.seed, "first seed");
+  app.add("--seconds", options.how.seconds, "length of a log [s]");
+  app.add("--noise", options.how.noise, "sensor noise, 1 = 0.8 bar");
+  app.add("--rows", options.rows, "none, clear, small, outside, pairs, fault");
+  app.add("--way", options.way, "reference, alone or both").one_of({"reference", "alone", "both"});
+  app.add("--ways", options.ways,
+          "who judges: ours, and for comparison bic, gp, correlation (docs/blind_test.md)")
+      .one_of({"ours", "bic", "gp", "correlation"});
+  app.add("--only", options.how.only, "this effect alone");
+  app.add("--missing", options.how.leave_out, "columns that no log has")
+      .one_of({"rod", "payload", "commands", "oil", "pump"});
+  app.add("--jobs", options.jobs, "runs at the same time").range(1, 64);
+  app.add("--json", options.json, "all runs and the table as JSON");
   bool no_extend = false;
-  app.add_flag("--no-extend", no_extend, "diagnose only: quicker, without the test log's rows");
-  app.add_flag("--no-time", options.no_time, "without timing a diagnosis alone");
-  app.add_flag("-v,--verbose", options.verbose, "the whole diagnosis of each run");
-  CLI11_PARSE(app, argc, argv);
+  app.flag("--no-extend", no_extend, "diagnose only: quicker, without the test log's rows");
+  app.flag("--no-time", options.no_time, "without timing a diagnosis alone");
+  app.flag("-v,--verbose", options.verbose, "the whole diagnosis of each run");
+  if (const auto code = app.parse(argc, argv)) return *code;
   options.how.extend = !no_extend;
 
   std::signal(SIGINT, [](int) { stopped = 1; });

@@ -2,8 +2,7 @@
 /// machine.yaml, truth.json.  build/bench/hidden_log --effects coulomb_friction:boom=1,pump_lag --seed 7 -o DIR
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-
+#include "bench/program_options.h"
 #include "models/error.h"
 #include "models/machine_file.h"
 #include "problems/bundled.h"
@@ -59,34 +58,26 @@ void print_catalogue() {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Simulated measurements of a crane with a hidden effect"};
+  bench::ProgramOptions app("Simulated measurements of a crane with a hidden effect");
   std::string machine = "random", folder;
   std::vector<std::string> effects, without;
   std::uint64_t seed = 1;
   double size = 1.0;
   bool list = false;
   CaseRequest request;
-  app.add_option("--machine", machine, "machine file, or random");
-  app.add_option("--effects", effects, "id[:at][=size][/law],...; none: nothing hidden")
-      ->delimiter(',');
-  app.add_option("--size", size, "1 = clear, 0.333 = small");
-  app.add_option("--seed", seed, "crane, machine and motions");
-  app.add_option("--seconds", request.log.seconds, "of reference and training log [s]");
-  app.add_option("--test-seconds", request.test_seconds, "of the test log [s]");
-  app.add_option("--noise", request.log.noise_factor, "1 = 0.8 bar");
-  app.add_option("--rate", request.log.rate, "[Hz] 5..200");
-  app.add_option("--without", without, "commands, pB, pump, payload, oil")->delimiter(',');
-  app.add_flag("--strokes", request.log.channels.strokes, "x_<cylinder>_m in place of q");
-  app.add_flag("--list", list, "the table of effects and their laws");
-  app.add_option("-o,--out", folder, "case folder");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    app.exit(error);
-    return 2;
-  }
+  app.add("--machine", machine, "machine file, or random");
+  app.add("--effects", effects, "id[:at][=size][/law],...; none: nothing hidden");
+  app.add("--size", size, "1 = clear, 0.333 = small");
+  app.add("--seed", seed, "crane, machine and motions");
+  app.add("--seconds", request.log.seconds, "of reference and training log [s]");
+  app.add("--test-seconds", request.test_seconds, "of the test log [s]");
+  app.add("--noise", request.log.noise_factor, "1 = 0.8 bar");
+  app.add("--rate", request.log.rate, "[Hz] 5..200");
+  app.add("--without", without, "commands, pB, pump, payload, oil");
+  app.flag("--strokes", request.log.channels.strokes, "x_<cylinder>_m in place of q");
+  app.flag("--list", list, "the table of effects and their laws");
+  app.add("-o,--out", folder, "case folder");
+  if (const auto code = app.parse(argc, argv)) return *code;
   if (list) {
     print_catalogue();
     return 0;

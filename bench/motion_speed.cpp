@@ -4,7 +4,6 @@
 /// Times are processor times, which other programs on the machine change least. docs/speed.md has the table.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,6 +13,7 @@
 
 #include "bench/motion_cases.h"
 #include "bench/motion_speed_derivatives.h"
+#include "bench/program_options.h"
 #include "models/error.h"
 #include "optimizer/energy_grid.h"
 #include "problems/time_parametrise.h"
@@ -77,6 +77,9 @@ OptimizeOptions one_solve(int intervals) {
 std::vector<Way> ways(const CraneModel& model, const MotionProblem& problem) {
   std::vector<Way> all;
   all.push_back({"phases, exact Hessian", one_solve(100)});
+  Way mumps{"phases, exact Hessian, MUMPS", one_solve(100)};
+  mumps.options.ipopt = {{"linear_solver", "mumps"}};
+  all.push_back(mumps);
   Way smooth{"single smooth NLP, exact Hessian", one_solve(100), false};
   smooth.options.modes = false;
   smooth.options.schedule = {{20e-3, 10e5}, {2e-3, 1e5}};
@@ -396,15 +399,12 @@ int main(int argc, char** argv) {
   setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
   std::string json, only;
   int reaches = 6;
-  CLI::App app("What the motion optimiser's speed rests on, as ratios in one run on one core.");
-  app.add_option("--json", json, "write the figures here");
-  app.add_option("--only", only, "ways or growth")->check(CLI::IsMember({"ways", "growth"}));
-  app.add_option("--reaches", reaches, "so many of the reaches")->check(CLI::Range(1, 6));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  bench::ProgramOptions app(
+      "What the motion optimiser's speed rests on, as ratios in one run on one core.");
+  app.add("--json", json, "write the figures here");
+  app.add("--only", only, "ways or growth").one_of({"ways", "growth"});
+  app.add("--reaches", reaches, "so many of the reaches").range(1, 6);
+  if (const auto code = app.parse(argc, argv)) return *code;
   try {
     return run(json, only, reaches);
   } catch (const InputError& error) {

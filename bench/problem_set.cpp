@@ -2,13 +2,13 @@
 /// against what is known. build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "bench/program_options.h"
 #include "models/error.h"
 #include "models/kinematics.h"
 #include "models/model_file.h"
@@ -293,21 +293,21 @@ void write_best_known(const std::string& path, const std::vector<Task>& tasks,
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"The problem set and random reaches"};
+  bench::ProgramOptions app("The problem set and random reaches");
   int random_count = 0, processes = 2;
   std::uint64_t seed = 1;
   std::string only, write;
   Settings settings;
-  app.add_option("--random", random_count, "random reaches instead of the bundled ones");
-  app.add_option("--seed", seed, "of the first random reach")->capture_default_str();
-  app.add_option("--only", only, "bundled reaches whose name contains this");
-  app.add_option("--write", write, "best known energies (JSON): kept where they are better");
-  app.add_option("--intervals", settings.intervals)->capture_default_str();
-  app.add_option("--paths", settings.paths, "seed paths at most")->capture_default_str();
-  app.add_flag("!--no-bound", settings.bound, "leave out the certified lower bound");
-  app.add_flag("--grid", settings.grid, "also the grid's cheapest path at unlimited time");
-  app.add_option("--processes", processes)->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  app.add("--random", random_count, "random reaches instead of the bundled ones");
+  app.add("--seed", seed, "of the first random reach");
+  app.add("--only", only, "bundled reaches whose name contains this");
+  app.add("--write", write, "best known energies (JSON): kept where they are better");
+  app.add("--intervals", settings.intervals, "of the mesh");
+  app.add("--paths", settings.paths, "seed paths at most");
+  app.flag("!--no-bound", settings.bound, "leave out the certified lower bound");
+  app.flag("--grid", settings.grid, "also the grid's cheapest path at unlimited time");
+  app.add("--processes", processes, "at the same time");
+  if (const auto code = app.parse(argc, argv)) return *code;
   std::vector<std::unique_ptr<CraneModel>> models;
   std::vector<std::string> model_files;
   const auto model_at = [&](const std::string& file) {

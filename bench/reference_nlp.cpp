@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "bench/program_options.h"
 #include "bench/reference_model.h"
 #include "models/error.h"
 #include "optimizer/nlp/ipopt_solver.h"
@@ -75,6 +75,7 @@ nlohmann::json as_json(const Outcome& outcome, const Arguments& arguments) {
           {"solve_s", r.solve_s},
           {"callbacks_s", r.callbacks_s},
           {"linear_solver_s", r.linear_solver_s},
+          {"kkt_solver", to_string(r.kkt_solver)},
           {"solve_cpu_s", r.solve_cpu_s},
           {"callbacks_cpu_s", r.callbacks_cpu_s},
           {"setup_s", outcome.setup_s},
@@ -105,14 +106,14 @@ void print(const Outcome& outcome, const Arguments& arguments) {
       "                      wall ms    cpu ms   (median of {} runs, one core)\n"
       "  solve            {:10.2f}{:10.2f}\n"
       "    callbacks      {:10.2f}{:10.2f}   model and derivatives, {} kernels\n"
-      "    linear solver  {:10.2f}             MUMPS, and assembling its matrix\n"
+      "    linear solver  {:10.2f}             {}, and assembling its matrix\n"
       "    rest of Ipopt  {:10.2f}\n"
       "  before           {:10.2f}             reading the file, laying out the NLP\n",
       arguments.problem, to_string(r.status), r.iterations, r.objective, outcome.energy_kJ,
       r.objective - outcome.energy_kJ, r.max_violation, e.objective, e.gradient, e.constraints,
       e.jacobian, e.hessian, arguments.repeat, 1e3 * r.solve_s, 1e3 * r.solve_cpu_s,
       1e3 * r.callbacks_s, 1e3 * r.callbacks_cpu_s, kernel_isa_name(kernel_isa()),
-      1e3 * r.linear_solver_s, 1e3 * rest, 1e3 * outcome.setup_s);
+      1e3 * r.linear_solver_s, to_string(r.kkt_solver), 1e3 * rest, 1e3 * outcome.setup_s);
   if (!r.solved()) fmt::print("  {}\n", r.message);
 }
 
@@ -129,20 +130,18 @@ int solve(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   Arguments arguments;
-  CLI::App app("Solves the reference NLP (bench/data/reference_problem.json) with Ipopt.");
-  app.add_option("problem", arguments.problem, "the problem file (JSON)")->required();
-  app.add_option("--json", arguments.json, "write the machine-readable result here");
-  app.add_option("--repeat", arguments.repeat, "solve so many times, report the median run")
-      ->check(CLI::Range(1, 10000));
-  app.add_option("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--print-level", arguments.options.print_level, "Ipopt's table, 0 to 12")
-      ->check(CLI::Range(0, 12));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  bench::ProgramOptions app(
+      "Solves the reference NLP (bench/data/reference_problem.json) with Ipopt.");
+  app.add("problem", arguments.problem, "the problem file (JSON)").required();
+  app.add("--json", arguments.json, "write the machine-readable result here");
+  app.add("--repeat", arguments.repeat, "solve so many times, report the median run")
+      .range(1, 10000);
+  app.add("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)").positive();
+  std::string kkt = arguments.options.kkt_solver == KktSolver::kChain ? "chain" : "mumps";
+  app.add("--kkt", kkt, "solver of the KKT systems").one_of({"chain", "mumps"});
+  app.add("--print-level", arguments.options.print_level, "Ipopt's table, 0 to 12").range(0, 12);
+  if (const auto code = app.parse(argc, argv)) return *code;
+  arguments.options.kkt_solver = kkt == "chain" ? KktSolver::kChain : KktSolver::kMumps;
   try {
     return solve(arguments);
   } catch (const InputError& error) {

@@ -4,7 +4,6 @@
 ///   build/bench/replay [--cranes 2] [--json OUT.json]
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/motion_cases.h"
+#include "bench/program_options.h"
 #include "identification/fit.h"
 #include "models/error.h"
 #include "models/linkage.h"
@@ -180,16 +180,12 @@ int main(int argc, char** argv) {
   setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
   int cranes = 2;
   std::string json;
-  CLI::App app(
+  bench::ProgramOptions app(
       "Optimised motions replayed on a simulated crane that shares no law with the model.");
-  app.add_option("--cranes", cranes, "cranes of the same drawing, each with laws of its own")
-      ->check(CLI::Range(1, 100));
-  app.add_option("--json", json, "write the figures here");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  app.add("--cranes", cranes, "cranes of the same drawing, each with laws of its own")
+      .range(1, 100);
+  app.add("--json", json, "write the figures here");
+  if (const auto code = app.parse(argc, argv)) return *code;
   try {
     return run(cranes, json);
   } catch (const InputError& error) {

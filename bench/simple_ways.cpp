@@ -9,6 +9,7 @@
 #include "identification/effect_search.h"
 #include "identification/fit.h"
 #include "models/error.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow::bench {
 namespace {
@@ -20,14 +21,6 @@ using Eigen::VectorXd;
 /// What columns orthogonal to the baseline are left with.
 MatrixXd without(const MatrixXd& basis, const MatrixXd& x) {
   return x - basis * (basis.transpose() * x);
-}
-
-/// Orthonormal columns that span `x`.
-MatrixXd span_of(const MatrixXd& x) {
-  if (x.cols() == 0 || x.rows() == 0) return MatrixXd(x.rows(), 0);
-  const VectorXd scale = x.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  Eigen::ColPivHouseholderQR<MatrixXd> qr(x * scale.asDiagonal());
-  return qr.householderQ() * MatrixXd::Identity(x.rows(), qr.rank());
 }
 
 /// Mean squared error by stage over all places of it; a stage has one unit.
@@ -229,8 +222,8 @@ SimpleAnswer RawEvidence::iid_bic(int most) const {
     }
     const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
-    theta = scale.asDiagonal() * Eigen::CompleteOrthogonalDecomposition<MatrixXd>(scaled).solve(
-                                     scale.asDiagonal() * cross);
+    theta = scale.asDiagonal() *
+            least_squares_of_least_norm(scaled, VectorXd(scale.asDiagonal() * cross));
     Index at = 0;
     for (const Design* d : designs) {
       for (const EffectParameter& p : d->effect.effect->info().parameters) {
@@ -310,9 +303,8 @@ SimpleAnswer RawEvidence::strongest_correlation() const {
     if (c.baseline.cols() > 0) {
       const VectorXd scale = c.baseline.colwise().norm().cwiseMax(1e-300).cwiseInverse();
       const MatrixXd base = c.baseline * scale.asDiagonal();
-      const VectorXd beta =
-          Eigen::CompleteOrthogonalDecomposition<MatrixXd>(MatrixXd(base(learned_from, Eigen::all)))
-              .solve(VectorXd(c.y(learned_from)));
+      const VectorXd beta = least_squares_of_least_norm(MatrixXd(base(learned_from, Eigen::all)),
+                                                        VectorXd(c.y(learned_from)));
       r -= base(suspect, Eigen::all) * beta;
     }
     r.array() -= r.mean();

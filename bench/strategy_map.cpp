@@ -3,12 +3,12 @@
 /// summary.txt and strategy_map.svg.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
+#include "bench/program_options.h"
 #include "bench/strategy_map_picture.h"
 #include "models/error.h"
 #include "models/model_file.h"
@@ -87,21 +87,21 @@ MapCurve unpack_curve(const std::string& bytes) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"The map: sequential, simultaneous or optimal, over time, load, pose, idle power"};
+  bench::ProgramOptions app(
+      "The map: sequential, simultaneous or optimal, over time, load, pose, idle power");
   std::string folder = ".", only;
   int intervals = 80, points = 9, processes = 2, rounds = 1;
   bool ends_only = false;
   double longest = 6.0;
-  app.add_option("-o,--out", folder, "folder for the tables and the picture")
-      ->capture_default_str();
-  app.add_option("--only", only, "reaches whose name contains this");
-  app.add_option("--intervals", intervals)->check(CLI::Range(20, 1000))->capture_default_str();
-  app.add_option("--points", points, "durations a curve")->capture_default_str();
-  app.add_option("--longest", longest, "times the shortest")->capture_default_str();
-  app.add_option("--rounds", rounds, "of the search over mode sequences")->capture_default_str();
-  app.add_flag("--two-loads", ends_only, "the lightest and the heaviest load alone");
-  app.add_option("--processes", processes)->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  app.add("-o,--out", folder, "folder for the tables and the picture");
+  app.add("--only", only, "reaches whose name contains this");
+  app.add("--intervals", intervals, "of the mesh").range(20, 1000);
+  app.add("--points", points, "durations a curve");
+  app.add("--longest", longest, "times the shortest");
+  app.add("--rounds", rounds, "of the search over mode sequences");
+  app.flag("--two-loads", ends_only, "the lightest and the heaviest load alone");
+  app.add("--processes", processes, "at the same time");
+  if (const auto code = app.parse(argc, argv)) return *code;
   struct Task {
     std::string reach;
     double payload;

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "identification/bad_data_checks.h"
-#include "identification/linear_algebra.h"
 #include "identification/robust.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

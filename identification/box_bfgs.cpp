@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/linear_algebra.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

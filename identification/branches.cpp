@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "identification/linear_algebra.h"
 #include "identification/robust.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "identification/linear_algebra.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -7,10 +7,10 @@
 #include <numeric>
 
 #include "identification/branches.h"
-#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 #include "identification/series.h"
 #include "models/effects/hydraulics.h"
+#include "models/linear_algebra.h"
 #include "models/nan.h"
 
 namespace sparflow {

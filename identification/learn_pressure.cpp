@@ -13,9 +13,9 @@
 #include "identification/box_bfgs.h"
 #include "identification/gp_likelihood.h"
 #include "identification/gp_screening.h"
-#include "identification/linear_algebra.h"
 #include "identification/sparse_gp.h"
 #include "models/error.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

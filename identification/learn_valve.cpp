@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "identification/linear_algebra.h"
 #include "identification/robust.h"
 #include "models/error.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

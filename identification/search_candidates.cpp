@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/linear_algebra.h"
 #include "identification/parallel.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

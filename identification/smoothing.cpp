@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "identification/linear_algebra.h"
 #include "identification/log_time.h"
 #include "models/error.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

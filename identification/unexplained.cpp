@@ -9,10 +9,10 @@
 #include <optional>
 #include <random>
 
-#include "identification/linear_algebra.h"
 #include "identification/parallel.h"
 #include "identification/robust.h"
 #include "identification/unexplained_time.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -43,8 +43,10 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
   const auto own = static_cast<std::size_t>(channel.index);
   if (channel.kind == EvidenceKind::kFlow) {
     sections.reserve(evidence.series.size());
-    for (const MachineSeries& s : evidence.series)
-      sections.push_back(fit_gains(s, channel.index, s.cylinders[own].command));
+    for (const MachineSeries& s : evidence.series) {
+      const VectorXd& command = s.cylinders[own].command;
+      sections.push_back(command.size() > 0 ? fit_gains(s, channel.index, command) : SectionFit{});
+    }
   }
   const auto flow_of = [&](const MachineSeries& s, std::size_t i, Index k) {
     const CylinderSeries& c = s.cylinders[i];

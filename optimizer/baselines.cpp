@@ -8,6 +8,7 @@
 
 #include "models/error.h"
 #include "models/kinematics.h"
+#include "models/linear_algebra.h"
 #include "models/linkage.h"
 #include "problems/motion_limits.h"
 #include "problems/time_parametrise.h"
@@ -88,7 +89,7 @@ MatrixXd pseudo_inverse_line(const Machine& machine, const MotionProblem& proble
       // a planar machine's jacobian has no row along its normal, hence the small term
       const Eigen::Matrix3d normal =
           weighted * weighted.transpose() + 1e-12 * Eigen::Matrix3d::Identity();
-      q += speed.asDiagonal() * (weighted.transpose() * normal.ldlt().solve(error));
+      q += speed.asDiagonal() * (weighted.transpose() * solve_symmetric(normal, error));
       for (Eigen::Index j = 0; j < q.size(); ++j) {
         const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
         if (q[j] >= r.lo && q[j] <= r.hi) continue;

@@ -126,7 +126,7 @@ std::vector<double> shared_time(const CraneModel& model, double payload,
       const double extra = spare * std::pow(static_cast<double>(s) / (kTableSize - 1), 2);
       table.duration.push_back(times[i] + extra);
       table.energy.push_back(
-          exact_energy(model, with_duration(legs[i], times[i] + extra), payload, 2).total);
+          exact_total_energy(model, with_duration(legs[i], times[i] + extra), payload, 2));
     }
     std::vector<double> next(kUnits + 1, kNever);
     for (int k = 0; k <= kUnits; ++k) {

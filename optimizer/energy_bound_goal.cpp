@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "models/kinematics.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {
@@ -38,8 +39,7 @@ class TipBoxes {
       Eigen::MatrixXd still(3, static_cast<Eigen::Index>(fixed.size()));
       for (std::size_t k = 0; k < fixed.size(); ++k)
         still.col(static_cast<Eigen::Index>(k)) = fixed[k];
-      directions_ =
-          Eigen::MatrixXd(still.householderQr().householderQ()).rightCols(3 - still.cols());
+      directions_ = complement_of(still);
     }
   }
 
@@ -67,11 +67,11 @@ class TipBoxes {
     // the same seen along each joint's own direction, which the box is aligned with
     const Eigen::MatrixXd gram = scaled * scaled.transpose();
     const double small = 1e-12 * gram.trace() + 1e-300;
-    const Eigen::MatrixXd inverse =
+    const Eigen::MatrixXd back =
         scaled.transpose() *
-        (gram + small * Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).inverse();
+        inverse(gram + small * Eigen::MatrixXd::Identity(gram.rows(), gram.cols()));
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Eigen::RowVectorXd row = inverse.row(i);
+      const Eigen::RowVectorXd row = back.row(i);
       const double most = (row * scaled).cwiseAbs().sum() + row.norm() * slack;
       if (std::abs(row.dot(error)) > most) return false;
     }

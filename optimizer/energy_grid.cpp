@@ -71,9 +71,8 @@ class EnergyGrid::Search {
       if (!known) {
         const auto begin = std::chrono::steady_clock::now();
         const double energy =
-            fast ? exact_energy(model_, timed_grid_path(model_, problem_, path, duration),
-                                problem_.payload, 4)
-                       .total
+            fast ? exact_total_energy(model_, timed_grid_path(model_, problem_, path, duration),
+                                      problem_.payload, 4)
                  : kNoPath;
         found.emplace_back(energy, std::move(path));
         spent_ += elapsed_since(begin);
@@ -410,9 +409,8 @@ class EnergyGrid::Search {
     path.leg_durations = shortest_leg_durations(model_, problem_, path.corners);
     path.duration_s = path.leg_durations.sum();
     if (path.leg_durations.size() > 0) {
-      path.energy_J = exact_energy(model_, timed_grid_path(model_, problem_, path, path.duration_s),
-                                   problem_.payload, 4)
-                          .total;
+      path.energy_J = exact_total_energy(
+          model_, timed_grid_path(model_, problem_, path, path.duration_s), problem_.payload, 4);
     }
   }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/kinematics.h"
+#include "models/linear_algebra.h"
 #include "optimizer/sequential_modes.h"
 
 namespace sparflow {
@@ -42,7 +43,7 @@ class GoalNewton {
       const Eigen::Matrix3d normal = scaled * scaled.transpose();
       const double small = 1e-10 * std::max(normal.trace(), 1e-12);
       VectorXd step =
-          scaled.transpose() * (normal + small * Eigen::Matrix3d::Identity()).ldlt().solve(error);
+          scaled.transpose() * solve_symmetric(normal + small * Eigen::Matrix3d::Identity(), error);
       const double length = step.cwiseAbs().maxCoeff();
       if (length > 3.0) step *= 3.0 / length;  // three cells at most
       q += scale.cwiseProduct(step);

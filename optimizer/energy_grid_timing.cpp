@@ -208,7 +208,7 @@ ModeCandidate grid_path_candidate(const CraneModel& model, const MotionProblem& 
       first = false;
     }
   }
-  candidate.energy = exact_energy(model, candidate.guess, problem.payload, 2).total;
+  candidate.energy = exact_total_energy(model, candidate.guess, problem.payload, 2);
   return candidate;
 }
 

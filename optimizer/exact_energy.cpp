@@ -1,7 +1,5 @@
 #include "optimizer/exact_energy.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -72,35 +70,78 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
   return energy;
 }
 
+double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,
+                          int refine) {
+  if (motion.size() < 2) return 0.0;
+  Chain chain(model);
+  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
+  double total = 0.0;
+  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
+    qdd = motion.qdd.row(k);
+    for (int part = 0; part < refine; ++part) {
+      const double dt = (part + 0.5) * step;
+      q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
+      qd = motion.qd.row(k) + dt * motion.qdd.row(k);
+      total +=
+          step * chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data()).power;
+    }
+  }
+  return total;
+}
+
 namespace {
 
-/// Collects the worst instant of each limit.
+/// Collects the worst instant of each limit, named by what is limited and of which part. Words are put together once
+/// only: it is asked at every instant of every check.
 class LimitBook {
  public:
   /// @param over value - limit in the limit's own direction  @param scale what an overshoot is relative to
-  void see(const std::string& what, double value, double limit, double over, double scale,
-           const char* unit, double time) {
+  void see(const char* what, const std::string& part, double value, double limit, double over,
+           double scale, const char* unit, double time) {
     const double excess = over / scale;
-    for (LimitCheck& c : checks_) {
-      if (c.what != what) continue;
-      if (excess > c.excess) c = {what, value, limit, unit, time, excess};
+    if (++next_ >= entries_.size()) next_ = 0;  // limits come in the same order every time
+    if (next_ < entries_.size() && !entries_[next_].is(what, part)) {
+      next_ = 0;
+      while (next_ < entries_.size() && !entries_[next_].is(what, part)) ++next_;
+    }
+    if (next_ == entries_.size()) {
+      entries_.push_back({what, part, {what + part, value, limit, unit, time, excess}});
       return;
     }
-    checks_.push_back({what, value, limit, unit, time, excess});
+    LimitCheck& check = entries_[next_].check;
+    if (excess <= check.excess) return;
+    check.value = value;
+    check.limit = limit;
+    check.unit = unit;
+    check.time = time;
+    check.excess = excess;
   }
-  void range(const std::string& what, double value, const Range& r, double scale, const char* unit,
-             double time) {
+  void range(const char* what, const std::string& part, double value, const Range& r, double scale,
+             const char* unit, double time) {
     const bool high = value - r.hi > r.lo - value;
-    see(what, value, high ? r.hi : r.lo, std::max(value - r.hi, r.lo - value), scale, unit, time);
+    see(what, part, value, high ? r.hi : r.lo, std::max(value - r.hi, r.lo - value), scale, unit,
+        time);
   }
-  std::vector<LimitCheck> sorted() {
-    std::sort(checks_.begin(), checks_.end(),
+  std::vector<LimitCheck> sorted() const {
+    std::vector<LimitCheck> checks;
+    checks.reserve(entries_.size());
+    for (const Entry& e : entries_) checks.push_back(e.check);
+    std::sort(checks.begin(), checks.end(),
               [](const LimitCheck& a, const LimitCheck& b) { return a.excess > b.excess; });
-    return checks_;
+    return checks;
   }
 
  private:
-  std::vector<LimitCheck> checks_;
+  struct Entry {
+    std::string what, part;
+    LimitCheck check;
+    bool is(const char* other_what, const std::string& other_part) const {
+      return part == other_part && what == other_what;
+    }
+  };
+  std::vector<Entry> entries_;
+  std::size_t next_ = 0;
 };
 
 void check_ends(const MotionProblem& problem, const Machine& machine, const Trajectory& motion,
@@ -108,15 +149,15 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
   const Eigen::Index last = motion.size() - 1;
   const Eigen::VectorXd first_q = motion.q.row(0), last_q = motion.q.row(last);
   const double start_error = (first_q - problem.start).cwiseAbs().maxCoeff();
-  book.see("distance from the start posture", start_error, 0.0, start_error - 1e-9, 1.0, "rad or m",
-           motion.t[0]);
+  book.see("distance from the start posture", "", start_error, 0.0, start_error - 1e-9, 1.0,
+           "rad or m", motion.t[0]);
   if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
     const double error = (tip_position<double>(machine, last_q) - goal->tip).norm();
-    book.see("distance of the tip from its goal", error, 0.0, error - 1e-5, 1.0, "m",
+    book.see("distance of the tip from its goal", "", error, 0.0, error - 1e-5, 1.0, "m",
              motion.t[last]);
   } else {
     const double error = (last_q - std::get<JointGoal>(problem.goal).q).cwiseAbs().maxCoeff();
-    book.see("distance from the goal posture", error, 0.0, error - 1e-6, 1.0, "rad or m",
+    book.see("distance from the goal posture", "", error, 0.0, error - 1e-6, 1.0, "rad or m",
              motion.t[last]);
   }
   // the nearest knots, in order: waypoints are passed at knots
@@ -131,13 +172,14 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
       nearest = distance;
       best = k;
     }
-    book.see(fmt::format("distance of the tip from waypoint {}", w + 1), nearest, 0.0,
+    book.see("distance of the tip from waypoint ", std::to_string(w + 1), nearest, 0.0,
              nearest - 1e-5, 1.0, "m", motion.t[best]);
     from = best;
   }
   const double speed =
       std::max(motion.qd.row(0).cwiseAbs().maxCoeff(), motion.qd.row(last).cwiseAbs().maxCoeff());
-  book.see("speed at start and end", speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s", motion.t[last]);
+  book.see("speed at start and end", "", speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s",
+           motion.t[last]);
 }
 
 }  // namespace
@@ -169,13 +211,13 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
     for (int j = 0; j < machine.joint_count(); ++j) {
       const auto i = static_cast<std::size_t>(j);
       const bool turns = machine.joints[i].type == JointType::kRevolute;
-      const std::string name = machine.joints[i].name;
+      const std::string& name = machine.joints[i].name;
       const MotionLimits& l = problem.limits;
-      book.range("position of joint " + name, q[j], l.position[i], width(l.position[i]),
+      book.range("position of joint ", name, q[j], l.position[i], width(l.position[i]),
                  turns ? "rad" : "m", t);
-      book.range("velocity of joint " + name, qd[j], l.velocity[i], width(l.velocity[i]),
+      book.range("velocity of joint ", name, qd[j], l.velocity[i], width(l.velocity[i]),
                  turns ? "rad/s" : "m/s", t);
-      book.range("acceleration of joint " + name, fine.qdd(k, j), l.acceleration[i],
+      book.range("acceleration of joint ", name, fine.qdd(k, j), l.acceleration[i],
                  width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
     }
     const MachineState& state =
@@ -186,7 +228,7 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const auto i = static_cast<std::size_t>(c);
       const double deviation = state.cylinders[i].pressure_std;
       if (trusted > 0.0 && machine.cylinders[i].hydraulic())
-        book.see("standard deviation of the pressure of " + machine.cylinders[i].name,
+        book.see("standard deviation of the pressure of ", machine.cylinders[i].name,
                  deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t);
       const Valve* valve = machine.valve_of_cylinder(c);
       if (valve == nullptr) continue;
@@ -195,7 +237,7 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const double limit = problem.limits.valve_fraction * full;
       if (limit <= 0.0) continue;
       const double flow = state.cylinders[i].flow;
-      book.see("flow through valve " + machine.cylinders[i].name, flow / kLitrePerMinute,
+      book.see("flow through valve ", machine.cylinders[i].name, flow / kLitrePerMinute,
                limit / kLitrePerMinute, flow - limit, limit, "l/min", t);
     }
     for (int p = 0; p < machine.pump_count(); ++p) {
@@ -205,22 +247,22 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const double pressure_limit = problem.limits.pump_max_pressure[i];
       const PumpState& s = state.pumps[i];
       if (flow_limit > 0.0) {
-        book.see("flow of pump " + machine.pumps[i].name, s.flow / kLitrePerMinute,
+        book.see("flow of pump ", machine.pumps[i].name, s.flow / kLitrePerMinute,
                  flow_limit / kLitrePerMinute, s.flow - flow_limit, flow_limit, "l/min", t);
       }
       if (pressure_limit > 0.0 && machine.pumps[i].type == PumpType::kLoadSensing) {
-        book.see("pressure of pump " + machine.pumps[i].name, s.pressure / kBar,
+        book.see("pressure of pump ", machine.pumps[i].name, s.pressure / kBar,
                  pressure_limit / kBar, s.pressure - pressure_limit, pressure_limit, "bar", t);
       }
     }
     if (clearance) {
       const double distance = clearance->nearest(q.data()).distance;
-      book.see("clearance beyond the required distance", distance, 0.0, -distance, 1.0, "m", t);
+      book.see("clearance beyond the required distance", "", distance, 0.0, -distance, 1.0, "m", t);
     }
     if (problem.tip_line) {
       Eigen::Vector3d off = tip_position<double>(machine, q) - line_start;
       off -= line_direction * line_direction.dot(off);
-      book.see("distance of the tip from its line", off.norm(), problem.tip_line->tolerance,
+      book.see("distance of the tip from its line", "", off.norm(), problem.tip_line->tolerance,
                off.norm() - problem.tip_line->tolerance, problem.tip_line->tolerance, "m", t);
     }
   }

@@ -9,123 +9,14 @@
 #include "models/error.h"
 #include "optimizer/child_processes.h"
 #include "optimizer/energy_grid.h"
+#include "optimizer/optimize_outcome.h"
+#include "optimizer/start_pack.h"
 
 namespace sparflow {
 namespace {
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-void pack_matrix(Packer& p, const Eigen::MatrixXd& m) {
-  p.number(static_cast<double>(m.rows())).number(static_cast<double>(m.cols()));
-  p.numbers(m.data(), static_cast<std::size_t>(m.size()));
-}
-
-Eigen::MatrixXd unpack_matrix(Unpacker& u) {
-  const auto rows = static_cast<Eigen::Index>(u.number());
-  const auto cols = static_cast<Eigen::Index>(u.number());
-  const std::vector<double> values = u.numbers();
-  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
-}
-
-std::string pack(const StartResult& r) {
-  Packer p;
-  p.text(r.seed).number(static_cast<double>(r.status)).text(r.message);
-  pack_matrix(p, r.motion.t);
-  pack_matrix(p, r.motion.q);
-  pack_matrix(p, r.motion.qd);
-  pack_matrix(p, r.motion.qdd);
-  p.number(r.duration).number(r.cost).number(r.plan.count());
-  p.number(static_cast<double>(r.plan.modes.cols()));
-  for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
-    p.number(static_cast<double>(r.plan.modes.data()[i]));
-  pack_matrix(p, r.plan.durations);
-  p.number(static_cast<double>(r.plan.waypoint_after.size()));
-  for (const int phase : r.plan.waypoint_after) p.number(phase);
-  p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
-  p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
-  p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
-  for (const StageRecord& s : r.stages) {
-    p.text(s.what).number(static_cast<double>(s.status)).number(s.iterations);
-    p.number(s.solve_s).number(s.energy_exact).number(s.excess);
-  }
-  return p.bytes();
-}
-
-StartResult unpack(const std::string& bytes) {
-  Unpacker u(bytes);
-  StartResult r;
-  r.seed = u.text();
-  r.status = static_cast<NlpStatus>(static_cast<int>(u.number()));
-  r.message = u.text();
-  r.motion.t = unpack_matrix(u);
-  r.motion.q = unpack_matrix(u);
-  r.motion.qd = unpack_matrix(u);
-  r.motion.qdd = unpack_matrix(u);
-  r.duration = u.number();
-  r.cost = u.number();
-  const auto phases = static_cast<Eigen::Index>(u.number());
-  r.plan.modes.resize(phases, static_cast<Eigen::Index>(u.number()));
-  for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
-    r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
-  r.plan.durations = unpack_matrix(u);
-  r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
-  for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
-  r.energy_exact = u.number();
-  r.energy_smooth = u.number();
-  r.excess = u.number();
-  r.iterations = static_cast<int>(u.number());
-  r.solve_s = u.number();
-  r.callbacks_s = u.number();
-  r.linear_solver_s = u.number();
-  r.modes_held = u.number() != 0.0;
-  r.seed_energy = u.number();
-  r.seed_feasible = u.number() != 0.0;
-  r.stages.resize(static_cast<std::size_t>(u.number()));
-  for (StageRecord& s : r.stages) {
-    s.what = u.text();
-    s.status = static_cast<NlpStatus>(static_cast<int>(u.number()));
-    s.iterations = static_cast<int>(u.number());
-    s.solve_s = u.number();
-    s.energy_exact = u.number();
-    s.excess = u.number();
-  }
-  return r;
-}
-
-/// Two starts that ended in the same motion: all joints within a thousandth of their range at all of a's knots.
-bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
-  if (a.size() < 2 || b.size() < 2) return false;
-  if (std::abs(a.duration() - b.duration()) > 1e-3 * a.duration()) return false;
-  const Eigen::MatrixXd other = resampled(b, a.t).q;
-  for (Eigen::Index j = 0; j < a.q.cols(); ++j) {
-    const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
-    if ((a.q.col(j) - other.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
-  }
-  return true;
-}
-
-double shortest_seed(const std::vector<SeedMotion>& seeds) {
-  double shortest = 0.0;
-  for (const SeedMotion& s : seeds) {
-    if (s.shortest_duration > 0.0 && (shortest == 0.0 || s.shortest_duration < shortest))
-      shortest = s.shortest_duration;
-  }
-  return shortest;
-}
-
-/// Starts from the cheapest on: those that keep all limits, each motion once.
-std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
-  std::vector<int> kept;
-  for (std::size_t i = 0; i < result.starts.size(); ++i) {
-    if (result.starts[i].usable(limit_tolerance)) kept.push_back(static_cast<int>(i));
-  }
-  std::stable_sort(kept.begin(), kept.end(), [&](int x, int y) {
-    return result.starts[static_cast<std::size_t>(x)].cost <
-           result.starts[static_cast<std::size_t>(y)].cost;
-  });
-  return kept;
 }
 
 bool time_is_everything(const MotionProblem& problem) {
@@ -136,96 +27,6 @@ bool same_plan(const PhasePlan& a, const PhasePlan& b) {
   return a.count() == b.count() && a.modes.cols() == b.modes.cols() &&
          (a.modes.array() == b.modes.array()).all();
 }
-
-/// What the seeds themselves cost, driven in the result's time, where they keep the limits in it.
-void set_baselines(const CraneModel& model, const MotionProblem& problem,
-                   const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
-  result.best_seed_energy = result.straight_line_energy = result.nearest_line_energy = 0.0;
-  constexpr double kSeedTolerance =
-      1e-3;  // time scaling of a seed on its own mesh: see time_parametrise
-  bool first_line = true;
-  for (const SeedMotion& s : seeds) {
-    const bool nearest = s.straight_line && first_line;
-    if (s.straight_line) first_line = false;
-    const Trajectory timed = with_duration(s.motion, result.duration);
-    if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
-    const double energy = exact_energy(model, timed, problem.payload, refine).total;
-    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
-      result.best_seed_energy = energy;
-      result.best_seed_name = s.name;
-    }
-    if (nearest) result.nearest_line_energy = energy;
-    if (s.straight_line &&
-        (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
-      result.straight_line_energy = energy;
-      result.straight_line_name = s.name;
-    }
-  }
-}
-
-/// The start nearest to keeping every limit; null when none came to a motion.
-const StartResult* nearest_start(const OptimizeResult& result) {
-  const StartResult* nearest = nullptr;
-  for (const StartResult& s : result.starts) {
-    if (s.motion.size() > 1 && (nearest == nullptr || s.excess < nearest->excess)) nearest = &s;
-  }
-  return nearest;
-}
-
-/// How many times longer the motion would have to take for this limit to hold: what makes a velocity, an
-/// acceleration and a flow comparable. Lengths do not mend with time.
-double stretch_asked(const LimitCheck& c) {
-  if (c.excess <= 0.0 || c.limit == 0.0) return 1.0 + std::max(c.excess, 0.0);
-  const double ratio = std::abs(c.value / c.limit);
-  if (c.what.starts_with("acceleration of")) return std::sqrt(ratio);
-  // between equals the flow, which is why the accelerations of a shortened path are too high
-  return c.what.starts_with("flow") ? 1.01 * ratio : ratio;
-}
-
-/// @param result with the checks of its nearest motion, if there is one
-void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
-                        double duration, OptimizeResult& result) {
-  std::string worst;
-  if (!result.checks.empty()) {
-    const LimitCheck& c = *std::max_element(result.checks.begin(), result.checks.end(),
-                                            [](const LimitCheck& x, const LimitCheck& y) {
-                                              return stretch_asked(x) < stretch_asked(y);
-                                            });
-    worst = fmt::format(" Worst: {} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}.", c.what,
-                        c.time, c.value, c.limit, c.unit);
-  } else if (!result.starts.empty()) {
-    worst = " The solver says: " + result.starts.front().message + ".";
-  }
-  const double shortest = shortest_seed(seeds);
-  std::string remedy;
-  if (result.shortest_duration > duration) {
-    remedy = fmt::format(" The shortest motion found takes {:.2f} s; {:g} s was asked for.",
-                         result.shortest_duration, duration);
-  } else if (shortest > duration) {
-    remedy = fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
-                         duration);
-  }
-  result.status = OptimizeStatus::kInfeasible;
-  result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
-}
-
-}  // namespace
-
-const char* to_string(OptimizeStatus status) {
-  switch (status) {
-    case OptimizeStatus::kOptimal:
-      return "optimal";
-    case OptimizeStatus::kInfeasible:
-      return "infeasible";
-    case OptimizeStatus::kFailed:
-      return "failed";
-    case OptimizeStatus::kInterrupted:
-      return "interrupted";
-  }
-  return "failed";
-}
-
-namespace {
 
 constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
 
@@ -333,12 +134,12 @@ class Search {
                           name(index));
     };
     const std::vector<ChildResult> children = run_in_children(
-        count, options_.processes, [&](int i) { return pack(start(i)); }, done);
+        count, options_.processes, [&](int i) { return pack_start(start(i)); }, done);
     for (int i = 0; i < count; ++i) {
       const ChildResult& child = children[static_cast<std::size_t>(i)];
       StartResult r;
       if (child.ok) {
-        r = unpack(child.bytes);
+        r = unpack_start(child.bytes);
       } else {
         r.seed = name(i);
         r.message = child.error;

@@ -46,10 +46,8 @@ class Start {
   StartResult run(const SeedMotion& seed) {
     result_.seed = seed.name;
     const Trajectory timed = with_duration(seed.motion, time_.guess);
-    result_.seed_feasible =
-        worst_excess(check_limits(model_, problem_, timed, options_.refine)) <= 1e-3;
-    if (result_.seed_feasible)
-      result_.seed_energy = exact_energy(model_, timed, problem_.payload, options_.refine).total;
+    result_.seed_feasible = worst_excess(verdict(timed).checks) <= 1e-3;
+    if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
     keep_clear_ends(timed);
     if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
     // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
@@ -160,8 +158,8 @@ class Start {
     record.solve_s = solved.solve_s;
     if (usable(solved)) {
       const Trajectory motion = transcription_->trajectory(solved.x);
-      record.energy_exact = exact_energy(model_, motion, problem_.payload, options_.refine).total;
-      record.excess = worst_excess(check_limits(model_, problem_, motion, options_.refine));
+      record.energy_exact = verdict(motion).energy;
+      record.excess = worst_excess(verdict(motion).checks);
     }
     result_.stages.push_back(std::move(record));
     return solved;
@@ -262,11 +260,31 @@ class Start {
     return any;
   }
 
+  /// What the exact law says of a motion, between its knots too.
+  struct Verdict {
+    Trajectory motion;
+    std::vector<LimitCheck> checks;
+    double energy = 0.0;  // [J]
+  };
+  /// Asked twice of the same motion more often than not; the last answer is kept.
+  const Verdict& verdict(const Trajectory& motion) {
+    const Trajectory& known = verdict_.motion;
+    const bool same = known.t.size() == motion.t.size() && known.t == motion.t &&
+                      known.q == motion.q && known.qd == motion.qd &&
+                      known.qdd.rows() == motion.qdd.rows() && known.qdd == motion.qdd;
+    if (!same) {
+      verdict_.checks = check_limits(model_, problem_, motion, options_.refine);
+      verdict_.energy = exact_total_energy(model_, motion, problem_.payload, options_.refine);
+      verdict_.motion = motion;
+    }
+    return verdict_;
+  }
+
   /// Keeps a motion if it is better than what there is: limits first, then exact energy. @return its limits
   std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
-    std::vector<LimitCheck> checks = check_limits(model_, problem_, motion, options_.refine);
+    const std::vector<LimitCheck> checks = verdict(motion).checks;
     const double excess = worst_excess(checks);
-    const double energy = exact_energy(model_, motion, problem_.payload, options_.refine).total;
+    const double energy = verdict(motion).energy;
     const double cost = exact_cost(model_, problem_, motion, energy, options_.refine);
     const bool kept = excess <= options_.limit_tolerance;
     const bool first = result_.motion.size() < 2;
@@ -444,6 +462,7 @@ class Start {
   Eigen::MatrixXd clear_postures_;
   std::unique_ptr<Transcription> transcription_;
   StartResult result_;
+  Verdict verdict_;
 };
 
 }  // namespace

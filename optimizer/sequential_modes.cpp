@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "models/effects/effective_machine.h"
+#include "models/linear_algebra.h"
 #include "optimizer/exact_energy.h"
 #include "problems/clearance.h"
 
@@ -137,7 +138,7 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
   integrate(problem.start, m);
   // a start that passes through an obstacle rarely finds its way out with its modes held
   if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess) return false;
-  out.energy = exact_energy(model, m, problem.payload, 2).total;
+  out.energy = exact_total_energy(model, m, problem.payload, 2);
   return true;
 }
 
@@ -163,7 +164,7 @@ bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
     }
     const Eigen::Matrix3d normal =
         jacobian * jacobian.transpose() + 1e-9 * Eigen::Matrix3d::Identity();
-    VectorXd step = jacobian.transpose() * normal.ldlt().solve(error);
+    VectorXd step = jacobian.transpose() * solve_symmetric(normal, error);
     const double length = step.cwiseAbs().maxCoeff();
     if (length > 0.3) step *= 0.3 / length;
     q += step;

@@ -7,6 +7,7 @@
 
 #include "models/error.h"
 #include "models/kinematics.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {
@@ -38,9 +39,8 @@ TipSolver::TipSolver(const MotionProblem& problem)
     : machine_(problem.machine), limits_(problem.limits.position), scale_(speed_scale(problem)) {
   Eigen::Matrix3d projector = Eigen::Matrix3d::Identity();
   for (const Vector3d& d : fixed_tip_directions(machine_)) projector -= d * d.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(projector);
   const int count = static_cast<int>(std::lround(projector.trace()));
-  moving_ = eigen.eigenvectors().rightCols(count);  // eigenvalues ascend: 0s first
+  moving_ = symmetric_eigen(projector).vectors.rightCols(count);  // eigenvalues ascend: 0s first
 }
 
 int TipSolver::redundancy() const {
@@ -61,7 +61,7 @@ VectorXd TipSolver::step(const MatrixXd& jacobian, const VectorXd& residual, dou
     const MatrixXd scaled = jacobian * weight.asDiagonal();
     MatrixXd normal = scaled * scaled.transpose();
     normal.diagonal().array() += damping * (normal.trace() + 1e-12);
-    move = -(weight.asDiagonal() * (scaled.transpose() * normal.ldlt().solve(residual)));
+    move = -(weight.asDiagonal() * (scaled.transpose() * solve_symmetric(normal, residual)));
     bool outward = false;
     for (Eigen::Index i = 0; i < q.size(); ++i) {
       const bool stuck = (q[i] <= limits_[at(i)].lo && move[i] < 0.0) ||

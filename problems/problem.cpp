@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "models/linear_algebra.h"
+
 namespace sparflow {
 
 bool Duration::free() const { return min == 0.0 && std::isinf(max); }
@@ -34,12 +36,12 @@ std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
     const Eigen::Matrix3d along = axis * axis.transpose();
     moved += joint.type == JointType::kRevolute ? Eigen::Matrix3d::Identity() - along : along;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(moved);
+  const SymmetricEigen eigen = symmetric_eigen(moved);
   std::vector<Eigen::Vector3d> fixed;
   for (int k = 0; k < 3; ++k) {
     // squared sine of the angle by which the axes miss parallel: 1e-12 is a millionth of a radian
-    if (eigen.eigenvalues()[k] > 1e-12) continue;
-    Eigen::Vector3d d = eigen.eigenvectors().col(k);
+    if (eigen.values[k] > 1e-12) continue;
+    Eigen::Vector3d d = eigen.vectors.col(k);
     Eigen::Index largest = 0;
     d.cwiseAbs().maxCoeff(&largest);
     if (d[largest] < 0.0) d = -d;

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "apps/report/diagnose_charts.h"
+#include "models/linear_algebra.h"
 #include "models/nan.h"
 #include "models/units.h"
 
@@ -26,7 +27,7 @@ VectorXd contribution(const Evidence& evidence, const AppliedEffect& effect,
 /// What the learned laws leave.
 VectorXd beside_baseline(const EvidenceChannel& channel, const VectorXd& y) {
   if (channel.baseline.cols() == 0) return y;
-  return y - channel.baseline * channel.baseline.colPivHouseholderQr().solve(y);
+  return y - channel.baseline * least_squares(channel.baseline, y);
 }
 
 /// The measured quantity of a channel over one log.

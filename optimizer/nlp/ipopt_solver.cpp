@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "models/error.h"
+#include "optimizer/nlp/chain_ldl_ipopt.h"
 #include "optimizer/nlp/ipopt_adapter.h"
 
 namespace sparflow {
@@ -54,12 +55,17 @@ class OptionSetter {
   std::map<std::string, std::string>& used_;
 };
 
-void set_options(Ipopt::IpoptApplication& app, const NlpOptions& options, bool warm,
+void set_options(Ipopt::IpoptApplication& app, const NlpOptions& options, KktSolver kkt, bool warm,
                  std::map<std::string, std::string>& used) {
   OptionSetter setter(app, used);
   setter.set("sb", std::string("yes"));  // no banner
   setter.set("print_level", options.print_level);
-  setter.set("linear_solver", std::string("mumps"));
+  if (kkt == KktSolver::kChain) {
+    for (const auto& [name, value] : detail::ChainLdlSession::ipopt_options())
+      setter.set(name, value);
+  } else {
+    setter.set("linear_solver", std::string("mumps"));
+  }
   setter.set("tol", options.tolerance);
   setter.set("max_iter", options.max_iterations);
   if (options.acceptable_tolerance) setter.set("acceptable_tol", *options.acceptable_tolerance);
@@ -182,7 +188,7 @@ void judge_fixed_point(NlpProblem& problem, const Bounds& bounds, const NlpOptio
       feasible ? "every variable is fixed" : "every variable is fixed, and they violate";
 }
 
-/// Ipopt 3.11 has a timer for MUMPS' factorisation but never starts it; the one around the whole solution of the
+/// Ipopt 3.11 has a timer for the factorisation but never starts it; the one around the whole solution of the
 /// augmented system is the narrowest that holds the factorisation.
 double linear_solver_seconds(Ipopt::IpoptApplication& app) {
   const Ipopt::SmartPtr<Ipopt::IpoptData> data = app.IpoptDataObject();
@@ -190,14 +196,16 @@ double linear_solver_seconds(Ipopt::IpoptApplication& app) {
   return data->TimingStats().StdAugSystemSolverMultiSolve().TotalWallclockTime();
 }
 
-/// @return what a callback threw, or nullptr
-std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, NlpResult& result) {
-  // Held to the end of this scope, the destruction of MUMPS' instance included.
-  const std::lock_guard<std::mutex> lock(ipopt_mutex());
+/// One solve. @return what a callback threw, or nullptr
+std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, KktSolver kkt,
+                             NlpResult& result) {
+  result.kkt_solver = kkt;
+  std::optional<detail::ChainLdlSession> session;
+  if (kkt == KktSolver::kChain) session.emplace();
   const Ipopt::SmartPtr<Ipopt::IpoptApplication> app =
       new Ipopt::IpoptApplication(options.print_level > 0);
   app->RethrowNonIpoptException(false);
-  set_options(*app, options, problem.start_multipliers() != nullptr, result.options_used);
+  set_options(*app, options, kkt, problem.start_multipliers() != nullptr, result.options_used);
   // "" = do not look for an options file in the current folder.
   if (app->Initialize("") != Ipopt::Solve_Succeeded) {
     throw UsageError("Ipopt refused its options");
@@ -207,13 +215,38 @@ std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, Nlp
   const auto begin = std::chrono::steady_clock::now();
   const double cpu_begin = detail::thread_cpu_seconds();
   const Ipopt::ApplicationReturnStatus code = app->OptimizeTNLP(owner);
-  result.solve_cpu_s = detail::thread_cpu_seconds() - cpu_begin;
-  result.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  result.linear_solver_s = linear_solver_seconds(*app);
+  result.solve_cpu_s += detail::thread_cpu_seconds() - cpu_begin;
+  result.solve_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.linear_solver_s += linear_solver_seconds(*app);
   const Outcome outcome = outcome_of(code, adapter->out_of_time());
   result.status = outcome.status;
   result.message = outcome.message;
+  if (session && adapter->error() == nullptr) {
+    if (!session->refusal().empty()) result.kkt_note = session->refusal();
+    if (code == Ipopt::Error_In_Step_Computation)
+      result.kkt_note = "no step could be computed with the chain's factors";
+  }
   return adapter->error();
+}
+
+/// With the solver asked for, and once more with MUMPS if that one gave up.
+std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, NlpResult& result) {
+  // Held to the end of this scope, the destruction of the linear solver's instance included.
+  const std::lock_guard<std::mutex> lock(ipopt_mutex());
+  const bool named = options.more.count("linear_solver") > 0;
+  const KktSolver asked = named ? KktSolver::kMumps : options.kkt_solver;
+  const std::exception_ptr thrown = run_ipopt(problem, options, asked, result);
+  if (thrown != nullptr || result.kkt_note.empty()) return thrown;
+  NlpResult again;
+  again.kkt_note = result.kkt_note;
+  again.evaluations = result.evaluations;
+  again.solve_s = result.solve_s;
+  again.callbacks_s = result.callbacks_s;
+  again.solve_cpu_s = result.solve_cpu_s;
+  again.callbacks_cpu_s = result.callbacks_cpu_s;
+  again.linear_solver_s = result.linear_solver_s;
+  result = std::move(again);
+  return run_ipopt(problem, options, KktSolver::kMumps, result);
 }
 
 }  // namespace
@@ -237,6 +270,8 @@ const char* to_string(NlpStatus status) {
   }
   return "unknown";
 }
+
+const char* to_string(KktSolver solver) { return solver == KktSolver::kChain ? "chain" : "mumps"; }
 
 std::string NlpResult::brief() const {
   std::string line = fmt::format(

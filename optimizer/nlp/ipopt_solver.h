@@ -23,6 +23,13 @@ enum class NlpStatus {
 };
 const char* to_string(NlpStatus status);
 
+/// What solves the KKT systems.
+enum class KktSolver {
+  kChain,  ///< ChainLdl: faster where the problem is a chain in time; MUMPS takes over where it is none
+  kMumps,
+};
+const char* to_string(KktSolver solver);
+
 /// One line of progress.
 struct NlpIteration {
   int iteration = 0;
@@ -50,6 +57,7 @@ struct NlpOptions {
   double warm_start_mu = 1e-5;
   double warm_start_push = 1e-8;
   int print_level = 0;  ///< Ipopt's table on stdout; 0 = silent
+  KktSolver kkt_solver = KktSolver::kChain;
   /// Any other Ipopt option by its name, e.g. {"bound_relax_factor", "0"}.
   std::map<std::string, std::string> more;
   /// Called once an iteration; false stops with the current iterate. May throw: rethrown after the solve.
@@ -78,7 +86,9 @@ struct NlpResult {
   /// The same two as processor time of the solving thread: what they are on a machine that does other things too.
   double solve_cpu_s = 0.0;
   double callbacks_cpu_s = 0.0;
-  /// Wall time of it in solving KKT systems: assembling the augmented matrix, MUMPS' ordering, factorisation and back
+  KktSolver kkt_solver = KktSolver::kMumps;  ///< that ended the solve
+  std::string kkt_note;                      ///< why it was not the one asked for; empty = it was
+  /// Wall time of it in solving KKT systems: assembling the augmented matrix, ordering, factorisation and back
   /// substitution, refinement. From Ipopt's timing statistics (its narrower timers leave the factorisation out),
   /// which do not cover the restoration phase: a lower bound when restoration_iterations > 0.
   double linear_solver_s = 0.0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "models/linear_algebra.h"
 #include "simulator/hidden_effects/drive.h"
 #include "simulator/hidden_effects/log_columns.h"
 
@@ -201,7 +202,7 @@ void judge_channel(const Channel& c, bool learned_from_it, Visibility& best, dou
   if (learned_from_it && c.basis.front().size() > 0) {
     MatrixXd basis(n, c.basis.front().size());
     for (Index i = 0; i < n; ++i) basis.row(i) = c.basis[static_cast<std::size_t>(i)].transpose();
-    x -= basis * basis.colPivHouseholderQr().solve(x);
+    x -= basis * least_squares(basis, x);
   }
   const double energy = x.squaredNorm();
   if (c.learned) {

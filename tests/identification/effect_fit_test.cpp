@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "models/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {
@@ -78,9 +79,9 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
   covariance.topLeftCorner(n0, n0) = dense_covariance(fit.noise[0], c.evidence.channels[0].blocks);
   covariance.bottomRightCorner(n1, n1) =
       dense_covariance(fit.noise[1], c.evidence.channels[1].blocks);
-  const Eigen::LLT<MatrixXd> cholesky(covariance);
-  const MatrixXd normal = x.transpose() * cholesky.solve(x);
-  const VectorXd dense = normal.ldlt().solve(x.transpose() * cholesky.solve(y));
+  const MatrixXd precision = inverse(covariance);
+  const MatrixXd normal = x.transpose() * precision * x;
+  const VectorXd dense = solve_symmetric(normal, x.transpose() * (precision * y));
   // the fit's own ridge is 1e-10 of a parameter's information
   EXPECT_NEAR(fit.theta[0], dense[0], 1e-7);
   EXPECT_NEAR(fit.theta[1], dense[1], 1e-7);
@@ -91,16 +92,15 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
   for (std::size_t k = 0; k < 2; ++k) {
     const std::vector<NoiseBlock>& blocks = c.evidence.channels[k].blocks;
     const MatrixXd shape = dense_covariance(fit.noise[k], blocks) / fit.noise[k].variance;
-    const Eigen::LLT<MatrixXd> l(shape);
     const VectorXd r = k == 0 ? residual.head(n0) : residual.tail(n1);
     const double rows = static_cast<double>(r.size());
-    const double v = r.dot(l.solve(r)) / rows;
-    const double expected = -MatrixXd(l.matrixL()).diagonal().array().log().sum() -
+    const double v = r.dot(solve_definite(shape, r)) / rows;
+    const double expected = -cholesky_factor(shape).diagonal().array().log().sum() -
                             0.5 * rows * (std::log(2.0 * std::numbers::pi * v) + 1.0);
     EXPECT_NEAR(fit.log_likelihood[k], expected, 1e-6);
   }
   // never narrower than the model's own covariance
-  const MatrixXd model_based = normal.inverse();
+  const MatrixXd model_based = inverse(normal);
   for (Index i = 0; i < 2; ++i) EXPECT_GE(fit.covariance(i, i), (1.0 - 1e-6) * model_based(i, i));
   EXPECT_FALSE(fit.at_bound);
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "models/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {
@@ -122,7 +123,7 @@ HeldOutGain by_refitting(const Evidence& e, const std::vector<const EffectDesign
     }
     const auto error = [&](const MatrixXd& all) {
       const VectorXd theta =
-          MatrixXd(all(in, Eigen::all)).householderQr().solve(VectorXd(rows.rightCols(1)(in, 0)));
+          least_squares(MatrixXd(all(in, Eigen::all)), VectorXd(rows.rightCols(1)(in, 0)));
       return (VectorXd(rows.rightCols(1)(out, 0)) - MatrixXd(all(out, Eigen::all)) * theta)
           .squaredNorm();
     };

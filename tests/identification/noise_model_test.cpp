@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "models/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {
@@ -74,8 +75,7 @@ TEST(NoiseModel, WhiteningIsTheInverseRootOfTheCovariance) {
     const MatrixXd unit = w * covariance * w.transpose() / m.variance;
     // rounding of sums of 40 products of size 10
     EXPECT_LT((unit - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-11);
-    const Eigen::LLT<MatrixXd> cholesky(covariance / m.variance);
-    const double dense = -MatrixXd(cholesky.matrixL()).diagonal().array().log().sum();
+    const double dense = -cholesky_factor(covariance / m.variance).diagonal().array().log().sum();
     EXPECT_NEAR(log_determinant, dense, 1e-10 * static_cast<double>(n));
   }
 }
@@ -88,9 +88,9 @@ TEST(NoiseModel, LikelihoodIsTheDenseOne) {
     MatrixXd whitened = y;
     const double fast = m.whiten(blocks, whitened) - 0.5 * whitened.squaredNorm() / m.variance -
                         0.5 * static_cast<double>(y.size()) * std::log(m.variance);
-    const Eigen::LLT<MatrixXd> cholesky(dense_covariance(m, blocks));
-    const double dense = -MatrixXd(cholesky.matrixL()).diagonal().array().log().sum() -
-                         0.5 * y.dot(cholesky.solve(y));
+    const MatrixXd covariance = dense_covariance(m, blocks);
+    const double dense = -cholesky_factor(covariance).diagonal().array().log().sum() -
+                         0.5 * y.dot(solve_definite(covariance, y));
     EXPECT_NEAR(fast, dense, 1e-9 * std::abs(dense));
   }
 }

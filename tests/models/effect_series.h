@@ -7,6 +7,7 @@
 
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
+#include "models/linear_algebra.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow::test_support {
@@ -96,10 +97,10 @@ inline MachineSeries two_cylinder_series(const Machine& m) {
 }
 
 /// Plain least squares, columns scaled to one.
-inline Eigen::VectorXd least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+inline Eigen::VectorXd scaled_least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   const Eigen::VectorXd size = x.colwise().norm();
   const Eigen::MatrixXd scaled = x * size.cwiseInverse().asDiagonal();
-  return scaled.colPivHouseholderQr().solve(y).cwiseQuotient(size);
+  return sparflow::least_squares(scaled, y).cwiseQuotient(size);
 }
 
 inline const Effect& effect_named(const std::string& id) {

@@ -31,7 +31,7 @@ class FlowEffects : public ::testing::Test {
     return c;
   }
   double residual(const MatrixXd& x, const VectorXd& y) const {
-    return (y - x * least_squares(x, y)).norm() / y.norm();
+    return (y - x * scaled_least_squares(x, y)).norm() / y.norm();
   }
 };
 
@@ -49,21 +49,21 @@ TEST_F(FlowEffects, DeadBandIsRecoveredByDirectionAndForBothGains) {
     }
     const MatrixXd lack = columns("valve_deadband", 0, 0, {full_flow ? 1.0 : 0.0});
     // free gains: both agree. 1 %: the knee is found to 1e-4, the samples inside it are few
-    const VectorXd free = least_squares(gains_and(lack, 0), c.speed);
+    const VectorXd free = scaled_least_squares(gains_and(lack, 0), c.speed);
     if (!full_flow) {
       EXPECT_NEAR(free[2], extend, 0.01 * extend);
       EXPECT_NEAR(free[3], retract, 0.01 * retract);
     }
     // gains pinned by a reference without dead band: the form decides
-    const VectorXd pinned = least_squares(lack, c.speed - straight);
+    const VectorXd pinned = scaled_least_squares(lack, c.speed - straight);
     EXPECT_NEAR(pinned[0], extend, 0.01 * extend) << full_flow;
     EXPECT_NEAR(pinned[1], retract, 0.01 * retract) << full_flow;
   }
 }
 
 TEST_F(FlowEffects, WithoutDeadBandNoneIsFound) {
-  const VectorXd b =
-      least_squares(gains_and(columns("valve_deadband", 0, 0, {0.0}), 0), log.cylinders[0].speed);
+  const VectorXd b = scaled_least_squares(gains_and(columns("valve_deadband", 0, 0, {0.0}), 0),
+                                          log.cylinders[0].speed);
   EXPECT_NEAR(b[2], 0.0, 1e-4);  // the search for the knee ends at 1e-4
   EXPECT_NEAR(b[3], 0.0, 1e-4);
 }
@@ -81,7 +81,7 @@ TEST_F(FlowEffects, LagAndDelayAreToldApartAndMeasured) {
     }
   }
   const VectorXd right =
-      least_squares(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
+      scaled_least_squares(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
   EXPECT_NEAR(right[2], 1.0, 0.01);  // Euler at a thousandth of tau
   const double exact = residual(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
   for (const std::vector<double>& wrong :
@@ -102,7 +102,7 @@ TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
   }
   ASSERT_GT((served.array() < 1.0).count(), 100);
   for (int i = 0; i < 2; ++i) {
-    const VectorXd b = least_squares(
+    const VectorXd b = scaled_least_squares(
         gains_and(columns("flow_saturation", i, 0, {limit}), static_cast<std::size_t>(i)),
         log.cylinders[static_cast<std::size_t>(i)].speed);
     EXPECT_NEAR(b[2], 1.0, 0.02);  // gains and share settle in turns to about 1 %

@@ -59,7 +59,7 @@ TEST_F(PumpEffects, TankLineIsRecoveredFromTheOthersFlow) {
       (3e5 + 1e9 * own.array() + 2e11 * own.array().square() + k * all.array().square()).matrix();
   MatrixXd x(y.size(), 4);
   x << VectorXd::Ones(y.size()), own, own.cwiseAbs2(), c;
-  EXPECT_NEAR(least_squares(x, y)[3] / k, 1.0, 1e-9);  // the same law, no noise: rounding
+  EXPECT_NEAR(scaled_least_squares(x, y)[3] / k, 1.0, 1e-9);  // the same law, no noise: rounding
 }
 
 TEST_F(PumpEffects, LineLossIsAskedOfThePumpOrReadAsForce) {
@@ -138,7 +138,7 @@ TEST_F(PumpEffects, OilTemperatureIsRecoveredFromTheReturnChamber) {
       (5e5 + 8 * kBar / full * own.array() * (-0.03 * (log.oil.array() - 40.0)).exp()).matrix();
   MatrixXd x(y.size(), 3);
   x << VectorXd::Ones(y.size()), own, c.col(0);
-  EXPECT_NEAR(least_squares(x, y)[2] / kBar, 8.0 * 0.03, 1e-6);
+  EXPECT_NEAR(scaled_least_squares(x, y)[2] / kBar, 8.0 * 0.03, 1e-6);
 }
 
 TEST_F(PumpEffects, MarginGrowsWithTheWholeFlowButNotBelowStandby) {
@@ -177,7 +177,7 @@ TEST_F(PumpEffects, PowerLimitIsRecoveredAndItsGridCoversTheLog) {
   MatrixXd c;
   const double shape[] = {power};
   ASSERT_TRUE(effect_named("torque_limit").columns(log, EvidenceKind::kPump, 0, 0, shape, c));
-  EXPECT_NEAR(least_squares(c, cut)[0], 1.0, 0.02);  // the demand is averaged over 0.3 s
+  EXPECT_NEAR(scaled_least_squares(c, cut)[0], 1.0, 0.02);  // the demand is averaged over 0.3 s
   const std::vector<double> grid = effect_named("torque_limit").grid(log, 0, 0);
   ASSERT_FALSE(grid.empty());
   EXPECT_LT(grid.front(), power);

@@ -45,6 +45,49 @@ TEST(Linkage, PinsFollowTheLawOfCosines) {
   }
 }
 
+TEST(Linkage, ClosedFormIsTheTemplateWithThreeDerivatives) {
+  // any axis, any frame, pins off the plane, both branches
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.translate(Eigen::Vector3d(0.3, -0.2, 0.5));
+  frame.rotate(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -0.5).normalized()));
+  FourBarLinkage bar;
+  bar.barrel = {-1.1, -0.4, 0.45};
+  bar.rocker = {0.05, -0.1, 0.55};
+  bar.coupler = {0.40, 0.15, 0.1};
+  bar.rocker_length = 0.55;
+  bar.coupler_length = 0.50;
+  FourBarLinkage other = bar;
+  bar.branch = 1;
+  other.branch = -1;
+  const Linkage linkages[] = {PinsLinkage{{1.4, 0.1, -0.1}, {0.1, 0.6, 0.2}, true}, bar, other};
+  int compared = 0;
+  for (const Linkage& linkage : linkages) {
+    Machine m =
+        one_joint(JointType::kRevolute, Eigen::Vector3d(0.1, -0.3, 1.0).normalized(), linkage);
+    m.joints[0].origin = frame;
+    for (double q = -1.4; q < 1.45; q += 0.2) {
+      Taylor3 expected;
+      try {
+        expected = cylinder_length(m, 0, Taylor3::variable(q));
+      } catch (const std::domain_error&) {
+        EXPECT_THROW(linkage_rates(m, 0, q), std::domain_error);
+        continue;
+      }
+      // near where the four-bar opens, derivatives grow and carry their rounding with them
+      const double size =
+          1.0 + std::abs(expected.d1) + std::abs(expected.d2) + std::abs(expected.d3);
+      if (size > 1e3) continue;
+      ++compared;
+      const Taylor3 x = linkage_rates(m, 0, q);
+      EXPECT_NEAR(x.value, expected.value, kTightRounding * size);
+      EXPECT_NEAR(x.d1, expected.d1, kTightRounding * size * size);
+      EXPECT_NEAR(x.d2, expected.d2, kTightRounding * size * size);
+      EXPECT_NEAR(x.d3, expected.d3, kTightRounding * size * size);
+    }
+  }
+  EXPECT_GT(compared, 30);
+}
+
 TEST(Linkage, PinsWithAnAxialOffsetAddItInQuadrature) {
   const Machine flat = one_joint(JointType::kRevolute, Eigen::Vector3d::UnitZ(),
                                  PinsLinkage{{1.4, 0, 0}, {0, 0.6, 0}, true});

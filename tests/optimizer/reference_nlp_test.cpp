@@ -159,6 +159,22 @@ TEST(ReferenceNlp, DerivativesMatchDifferences) {
   EXPECT_LT(check.hessian_error, 1e-5) << check.worst_hessian;
 }
 
+TEST(ReferenceNlp, BothKktSolversTakeTheSameWay) {
+  NlpOptions options;
+  options.kkt_solver = KktSolver::kChain;
+  Transcription first = reference_transcription(problem());
+  const NlpResult chain = solve_with_ipopt(first, options);
+  options.kkt_solver = KktSolver::kMumps;
+  Transcription second = reference_transcription(problem());
+  const NlpResult mumps = solve_with_ipopt(second, options);
+  ASSERT_EQ(chain.kkt_solver, KktSolver::kChain) << chain.kkt_note;
+  ASSERT_EQ(mumps.kkt_solver, KktSolver::kMumps);
+  ASSERT_TRUE(chain.solved() && mumps.solved());
+  // as between tolerances: 3e-8 relative
+  EXPECT_NEAR(chain.objective, mumps.objective, 1e-7 * mumps.objective);
+  EXPECT_NEAR(chain.iterations, mumps.iterations, 10) << "rounding shifts it by a few";
+}
+
 TEST(ReferenceNlp, ReachesTheKnownOptimum) {
   Transcription nlp = reference_transcription(problem());
   const NlpResult result = solve_with_ipopt(nlp);

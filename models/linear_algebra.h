@@ -1,6 +1,6 @@
 #pragma once
 /// Dense linear algebra behind plain functions. Eigen's decompositions and matrix products are templates, compiled
-/// again in every file that names them (they were a third of this room's build time); here they are compiled once.
+/// again in every file that names them (some five seconds each); here they are compiled once.
 #include <Eigen/Dense>
 
 namespace sparflow {
@@ -38,6 +38,19 @@ struct ThinQr {
 ThinQr thin_qr(const MatrixIn& a);
 /// R^-T B of an upper triangular R.
 Eigen::MatrixXd solve_transposed_upper(const MatrixIn& r, const MatrixIn& b);
+/// Orthonormal columns that span A's columns (scaled to one first) to within rounding.
+Eigen::MatrixXd span_of(const MatrixIn& a);
+/// Orthonormal columns normal to all columns of A, which are independent [n x (n - columns of A)].
+Eigen::MatrixXd complement_of(const MatrixIn& a);
+/// L of A = L L^T, A symmetric positive definite.
+Eigen::MatrixXd cholesky_factor(const MatrixIn& a);
+
+/// Eigenvalues of a symmetric A, ascending, and their unit vectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+SymmetricEigen symmetric_eigen(const MatrixIn& a);
 /// Number of columns of a square A independent to within `threshold` (relative to the largest pivot).
 Eigen::Index rank(const MatrixIn& a, double threshold);
 

@@ -1,4 +1,4 @@
-#include "identification/linear_algebra.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 
@@ -50,6 +50,25 @@ ThinQr thin_qr(const MatrixIn& a) {
 
 MatrixXd solve_transposed_upper(const MatrixIn& r, const MatrixIn& b) {
   return r.triangularView<Eigen::Upper>().transpose().solve(b);
+}
+
+MatrixXd span_of(const MatrixIn& a) {
+  if (a.cols() == 0 || a.rows() == 0) return MatrixXd(a.rows(), 0);
+  const VectorXd scale = a.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(a * scale.asDiagonal());
+  return qr.householderQ() * MatrixXd::Identity(a.rows(), qr.rank());
+}
+
+MatrixXd complement_of(const MatrixIn& a) {
+  const MatrixXd q = Eigen::HouseholderQR<MatrixXd>(a).householderQ();
+  return q.rightCols(a.rows() - a.cols());
+}
+
+MatrixXd cholesky_factor(const MatrixIn& a) { return Eigen::LLT<MatrixXd>(a).matrixL(); }
+
+SymmetricEigen symmetric_eigen(const MatrixIn& a) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(a);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 
 Eigen::Index rank(const MatrixIn& a, double threshold) {

@@ -1,0 +1,212 @@
+// Order, fronts and storage: what is found once for a pattern.
+#include <algorithm>
+#include <cmath>
+
+#include "models/error.h"
+#include "optimizer/nlp/chain_ldl.h"
+#include "optimizer/nlp/chain_ldl_kernel.h"
+#include "optimizer/nlp/chain_ldl_order.h"
+
+namespace sparflow {
+namespace {
+
+std::size_t place_at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+struct ChainLdl::Tree {
+  std::vector<detail::FrontNodes> fronts;
+  std::vector<std::vector<int>> member;  ///< unknowns of every position
+};
+
+ChainLdl::ChainLdl(int order, const std::vector<int>& row, const std::vector<int>& column,
+                   const double* value)
+    : order_(order), row_(row), column_(column) {
+  SPARFLOW_CHECK(order > 0 && row.size() == column.size(), "a place has a row and a column");
+  const detail::Graph graph = detail::graph_of(order, row, column);
+  std::vector<int> group = pair_up(value);
+  const int groups = 1 + *std::max_element(group.begin(), group.end());
+  const detail::Graph coarse = detail::quotient(graph, group, groups);
+  const std::vector<int> position = detail::elimination_order(coarse);
+  std::vector<int> weight(place_at(groups), 0);
+  Tree tree;
+  tree.member.resize(place_at(groups));
+  for (int i = 0; i < order; ++i) {
+    ++weight[place_at(group[place_at(i)])];
+    tree.member[place_at(position[place_at(group[place_at(i)])])].push_back(i);
+  }
+  tree.fronts = detail::fronts_of(coarse, position, weight);
+  make_fronts(tree);
+}
+
+bool ChainLdl::same_pattern(int order, int entries, const int* row, const int* column,
+                            int base) const {
+  if (order != order_ || place_at(entries) != row_.size()) return false;
+  for (std::size_t e = 0; e < row_.size(); ++e) {
+    if (row[e] - base != row_[e] || column[e] - base != column_[e]) return false;
+  }
+  return true;
+}
+
+/// Rows whose diagonal vanishes (constraints) cannot be pivots on their own: each is put beside the free neighbour
+/// that has the fewest couplings (a slack beside its row, an acceleration beside its defect).
+/// @return group of every unknown
+std::vector<int> ChainLdl::pair_up(const double* value) const {
+  struct Coupling {
+    int other;
+    double value;
+  };
+  std::vector<double> diagonal(place_at(order_), 0.0), largest(place_at(order_), 0.0);
+  std::vector<int> degree(place_at(order_), 0);
+  for (std::size_t e = 0; e < row_.size(); ++e) {
+    const int i = row_[e], j = column_[e];
+    const double size = std::abs(value[e]);
+    largest[place_at(i)] = std::max(largest[place_at(i)], size);
+    largest[place_at(j)] = std::max(largest[place_at(j)], size);
+    if (i == j) {
+      diagonal[place_at(i)] += value[e];
+    } else {
+      ++degree[place_at(i)];
+      ++degree[place_at(j)];
+    }
+  }
+  constexpr double kNoDiagonal = 1e-6, kWeak = 1e-3;
+  std::vector<std::vector<Coupling>> couplings(place_at(order_));
+  std::vector<int> constraints;
+  for (int i = 0; i < order_; ++i) {
+    if (std::abs(diagonal[place_at(i)]) > kNoDiagonal * largest[place_at(i)]) continue;
+    constraints.push_back(i);
+    couplings[place_at(i)].reserve(place_at(degree[place_at(i)]));
+  }
+  for (std::size_t e = 0; e < row_.size(); ++e) {
+    const int i = row_[e], j = column_[e];
+    if (i == j) continue;
+    if (couplings[place_at(i)].capacity() > 0)
+      couplings[place_at(i)].push_back({j, std::abs(value[e])});
+    if (couplings[place_at(j)].capacity() > 0)
+      couplings[place_at(j)].push_back({i, std::abs(value[e])});
+  }
+  std::stable_sort(constraints.begin(), constraints.end(),
+                   [&](int a, int b) { return degree[place_at(a)] < degree[place_at(b)]; });
+  std::vector<int> partner(place_at(order_), -1);
+  for (const int i : constraints) {
+    if (partner[place_at(i)] >= 0) continue;
+    const Coupling* best = nullptr;
+    for (const Coupling& c : couplings[place_at(i)]) {
+      if (partner[place_at(c.other)] >= 0 || c.value < kWeak * largest[place_at(i)] ||
+          c.value == 0.0)
+        continue;
+      if (best == nullptr || degree[place_at(c.other)] < degree[place_at(best->other)] ||
+          (degree[place_at(c.other)] == degree[place_at(best->other)] && c.value > best->value)) {
+        best = &c;
+      }
+    }
+    if (best == nullptr) continue;
+    partner[place_at(i)] = best->other;
+    partner[place_at(best->other)] = i;
+  }
+  std::vector<int> group(place_at(order_), -1);
+  int groups = 0;
+  for (int i = 0; i < order_; ++i) {
+    if (group[place_at(i)] >= 0) continue;
+    group[place_at(i)] = groups;
+    if (partner[place_at(i)] >= 0) group[place_at(partner[place_at(i)])] = groups;
+    ++groups;
+  }
+  return group;
+}
+
+/// Unknowns of every front, where each contribution and each value goes, and the room all that needs.
+void ChainLdl::make_fronts(const Tree& tree) {
+  const auto count = tree.fronts.size();
+  fronts_.resize(count);
+  first_place_.resize(count);
+  rows_.reserve(4 * place_at(order_));
+  std::vector<int> front_of(place_at(order_)), own_place(place_at(order_)),
+      place(place_at(order_), -1);
+  std::vector<int> begin(count);
+  for (std::size_t f = 0; f < count; ++f) {
+    Front& front = fronts_[f];
+    front.first_row = static_cast<int>(rows_.size());
+    front.parent = tree.fronts[f].parent;
+    if (front.parent >= 0) ++fronts_[place_at(front.parent)].children;
+    for (const int position : tree.fronts[f].own) {
+      for (const int i : tree.member[place_at(position)]) {
+        front_of[place_at(i)] = static_cast<int>(f);
+        own_place[place_at(i)] = front.own++;
+        rows_.push_back(i);
+      }
+    }
+    for (const int position : tree.fronts[f].updated) {
+      const std::vector<int>& member = tree.member[place_at(position)];
+      rows_.insert(rows_.end(), member.begin(), member.end());
+    }
+    front.rows = static_cast<int>(rows_.size()) - front.first_row;
+  }
+  // each value is assembled where the first of its two unknowns is eliminated
+  std::vector<std::vector<int>> entries(count);
+  for (std::size_t e = 0; e < row_.size(); ++e) {
+    const int f = std::min(front_of[place_at(row_[e])], front_of[place_at(column_[e])]);
+    entries[place_at(f)].push_back(static_cast<int>(e));
+  }
+  entry_.reserve(row_.size());
+  entry_row_.reserve(row_.size());
+  entry_column_.reserve(row_.size());
+  place_.reserve(rows_.size());
+  long room = 0, waiting = 0, most_waiting = 0;
+  int most_rows = 0;
+  std::vector<long> from_below(count, 0);  // room of the contributions a front takes from the stack
+  for (std::size_t f = 0; f < count; ++f) {
+    Front& front = fronts_[f];
+    for (int k = 0; k < front.rows; ++k) place[place_at(rows_[place_at(front.first_row + k)])] = k;
+    front.first_entry = static_cast<int>(entry_.size());
+    for (const int e : entries[f]) {
+      const int r = place[place_at(row_[place_at(e)])], c = place[place_at(column_[place_at(e)])];
+      entry_.push_back(e);
+      entry_row_.push_back(std::max(r, c));
+      entry_column_.push_back(std::min(r, c));
+    }
+    const long below = front.rows - front.own;
+    waiting += below * below - from_below[f];
+    most_waiting = std::max(most_waiting, waiting);
+    if (front.parent >= 0) from_below[place_at(front.parent)] += below * below;
+    room += static_cast<long>(detail::ldl_padded(front.rows)) * front.own;
+    most_rows = std::max(most_rows, front.rows);
+    for (int k = 0; k < front.own; ++k) {
+      const double rest = front.rows - k;
+      statistics_.multiply_adds += 0.5 * rest * (rest + 1.0);
+      statistics_.factor_entries += front.rows - k - 1;
+    }
+  }
+  // where a front's updated rows stand in the front above
+  for (std::size_t f = 0; f < count; ++f) {
+    first_place_[f] = static_cast<int>(place_.size());
+    const Front& front = fronts_[f];
+    if (front.parent < 0) continue;
+    const Front& above = fronts_[place_at(front.parent)];
+    for (int k = 0; k < above.rows; ++k) place[place_at(rows_[place_at(above.first_row + k)])] = k;
+    for (int k = front.own; k < front.rows; ++k)
+      place_.push_back(place[place_at(rows_[place_at(front.first_row + k)])]);
+  }
+  // half as much again as foreseen, for delayed pivots
+  constexpr std::size_t kSpare = 4096;
+  factor_.resize(place_at(static_cast<int>(room)) * 3 / 2 + kSpare);
+  index_.resize(rows_.size() * 3 / 2 + kSpare);
+  waiting_value_.resize(static_cast<std::size_t>(most_waiting) * 3 / 2 + kSpare);
+  waiting_index_.resize(kSpare);
+  waiting_.reserve(count);
+  const int stride = detail::ldl_stride(most_rows + most_rows / 2);
+  work_.resize(place_at(stride) * place_at(stride));
+  product_.resize(place_at(stride) * place_at(stride));
+  unknown_.resize(place_at(stride));
+  local_.resize(place_at(stride));
+  scale_.resize(place_at(order_));
+  largest_.resize(place_at(order_));
+  pivot_.resize(2 * place_at(order_));
+  width_.resize(place_at(order_));
+  statistics_.order = order_;
+  statistics_.fronts = static_cast<int>(count);
+  statistics_.largest_front = most_rows;
+}
+
+}  // namespace sparflow

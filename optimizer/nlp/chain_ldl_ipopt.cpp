@@ -1,0 +1,109 @@
+#include "optimizer/nlp/chain_ldl_ipopt.h"
+
+#include <HSLLoader.h>
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "models/error.h"
+
+namespace sparflow::detail {
+namespace {
+
+ChainLdlSession* current_session = nullptr;
+
+/// A front larger than this is no chain's: there MUMPS with its blocked kernels is the better choice.
+constexpr int kLargestFront = 320;
+
+// What Ipopt 3.11 (IpMa27TSolverInterface.cpp) reads of INFO, 0-based.
+constexpr int kFlag = 0, kRealsNeeded = 4, kIntegersNeeded = 5, kCompressedReals = 11,
+              kCompressedIntegers = 12, kNegative = 14, kInfoSize = 20;
+constexpr int kSingularFlag = -5;  // Ipopt adds to the diagonal and tries again
+constexpr int kFatalFlag = -1;     // Ipopt gives up
+
+}  // namespace
+
+/// Arguments as MA27's: entries (irn, icn) from 1, `a` their values at the time of factorisation. `ikeep` is handed from
+/// analysis to factorisation, `iw` from there to the solution: their first entries carry which solver it is.
+struct ChainLdlRoutines {
+  static void defaults(ipfint* icntl, double* cntl) {
+    for (int i = 0; i < 30; ++i) icntl[i] = 0;
+    for (int i = 0; i < 5; ++i) cntl[i] = 0.0;
+  }
+
+  static void analyse(ipfint* n, ipfint* entries, const ipfint*, const ipfint*, ipfint*, ipfint*,
+                      ipfint* ikeep, ipfint*, ipfint* steps, ipfint*, ipfint*, double*,
+                      ipfint* info, double* operations) {
+    for (int i = 0; i < kInfoSize; ++i) info[i] = 0;
+    *steps = 1;
+    *operations = 0.0;
+    info[kRealsNeeded] = *entries;
+    info[kIntegersNeeded] = *n;
+    if (current_session == nullptr) {
+      info[kFlag] = kFatalFlag;
+      return;
+    }
+    // the order is found with the first values: which diagonals vanish is not in the pattern
+    ikeep[0] = static_cast<ipfint>(current_session->solvers_.size());
+    current_session->solvers_.emplace_back();
+  }
+
+  static void factorise(ipfint* n, ipfint* entries, const ipfint* irn, const ipfint* icn, double* a,
+                        ipfint*, ipfint* iw, ipfint*, ipfint* ikeep, ipfint*, ipfint* front,
+                        ipfint*, ipfint*, double* cntl, ipfint* info) {
+    for (int i = 0; i < kInfoSize; ++i) info[i] = 0;
+    *front = 1;
+    iw[0] = ikeep[0];
+    info[kCompressedReals] = info[kCompressedIntegers] = 0;
+    try {
+      auto& solver = current_session->solvers_[static_cast<std::size_t>(ikeep[0])];
+      if (solver == nullptr) {
+        std::vector<int> row(irn, irn + *entries), column(icn, icn + *entries);
+        for (int& i : row) --i;
+        for (int& i : column) --i;
+        solver = std::make_unique<ChainLdl>(*n, row, column, a);
+        if (solver->statistics().largest_front > kLargestFront) {
+          current_session->refusal_ = fmt::format("the KKT matrix is no chain: a front of {} rows",
+                                                  solver->statistics().largest_front);
+          info[kFlag] = kFatalFlag;
+          return;
+        }
+      }
+      if (solver->factorise(a, cntl[0]) == LdlOutcome::kSingular) {
+        info[kFlag] = kSingularFlag;
+        return;
+      }
+      info[kNegative] = solver->statistics().negative;
+    } catch (const std::exception& error) {
+      current_session->refusal_ = error.what();
+      info[kFlag] = kFatalFlag;
+    }
+  }
+
+  static void solve(ipfint*, double*, ipfint*, ipfint* iw, ipfint*, double*, ipfint*, double* rhs,
+                    ipfint*, ipfint*, ipfint*, double*) {
+    current_session->solvers_[static_cast<std::size_t>(iw[0])]->solve(rhs);
+  }
+};
+
+ChainLdlSession::ChainLdlSession() {
+  SPARFLOW_CHECK(current_session == nullptr, "Ipopt's solves take turns");
+  current_session = this;
+  LSL_setMA27(ChainLdlRoutines::analyse, ChainLdlRoutines::factorise, ChainLdlRoutines::solve,
+              ChainLdlRoutines::defaults);
+}
+
+ChainLdlSession::~ChainLdlSession() { current_session = nullptr; }
+
+std::vector<std::pair<std::string, std::string>> ChainLdlSession::ipopt_options() {
+  // Scaling is ChainLdl's own (Ipopt's default beside "ma27" would be another routine of that library). The pivot
+  // threshold begins higher than Ipopt's 1e-8: in a chain a delayed pivot costs next to nothing.
+  // Ipopt looks at every solution's residual anyway and refines where it exceeds 1e-10: no step of that in advance.
+  return {{"linear_solver", "ma27"},
+          {"min_refinement_steps", "0"},
+          {"linear_system_scaling", "none"},
+          {"ma27_pivtol", "1e-4"},
+          {"ma27_pivtolmax", "0.1"}};
+}
+
+}  // namespace sparflow::detail
