@@ -184,8 +184,8 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   constexpr double kStretch = 1.5;        // [s] of one value
   constexpr double kContradiction = 0.8;  // [s] on end in which the cylinder does something else
   constexpr double kFirm = 0.15;          // [-] outside any dead band
-  // Pumps that run short slow a cylinder to half its speed, little lets it run faster than usual.
-  constexpr double kSlow = 0.4, kFast = 1.25;
+  // Pumps that run short slow a cylinder to half its speed, a compensator that fails lets it run at up to twice.
+  constexpr double kSlow = 0.4, kFast = 2.2;
   constexpr double kHabit = 0.02;  // of the other samples may be as far off
   const CheckedChannel& c = context.channels[channel];
   if (c.channel->role != Role::kCommand) return {};

@@ -60,6 +60,26 @@ VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* 
   return scale.cwiseProduct(x);
 }
 
+/// A parameter that nothing feels even at its bound (the mass of a point on the joint's own axis, beside its moment)
+/// would follow rounding to that bound.
+void drop_unfelt(const Evidence& evidence, EffectDesign& design) {
+  constexpr double kUnfelt = 0.05;  // of the sensors' noise
+  for (Index k = 0; k < design.linear; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double most = std::max(std::abs(design.lower[at]), std::abs(design.upper[at]));
+    bool felt = false;
+    for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+      if (!design.touches(c)) continue;
+      const double floor = evidence.channels[c].noise_floor;
+      felt = felt || !(design.columns[c].col(k).cwiseAbs().maxCoeff() * most < kUnfelt * floor);
+    }
+    if (felt) continue;
+    for (MatrixXd& c : design.columns) {
+      if (c.cols() > 0) c.col(k).setZero();
+    }
+  }
+}
+
 struct Whitened {
   MatrixXd rows;      // [rows x (parameters + 1)], baseline projected out, unit innovation variance
   MatrixXd baseline;  // coefficients of [columns, y] on the baseline
@@ -90,6 +110,7 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   }
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c));
+  drop_unfelt(evidence, d);
   return d;
 }
 

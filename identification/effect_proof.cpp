@@ -43,6 +43,11 @@ double size_where_it_acts(const VectorXd& action) {
 
 }  // namespace
 
+double form_share(const Effect& effect) {
+  const bool exact = effect.changes_machine() || effect.info().stage == EffectStage::kForce;
+  return exact ? effect.info().form_error : std::max(effect.info().form_error, kLeastForm);
+}
+
 EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
                            const EffectFit& fit) {
@@ -67,11 +72,7 @@ EffectAction effect_action(const Evidence& evidence,
     fourth += own.array().pow(4).sum() / std::pow(noise, 4);
     for (std::size_t k = 0; k < designs.size(); ++k) {
       if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
-      const Effect& other = *designs[k]->effect.effect;
-      const bool exact = other.changes_machine() || other.info().stage == EffectStage::kForce;
-      const double share =
-          exact ? other.info().form_error : std::max(other.info().form_error, kLeastForm);
-      const VectorXd wrong = share / noise * acts_in(k, c);
+      const VectorXd wrong = form_share(*designs[k]->effect.effect) / noise * acts_in(k, c);
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
   }

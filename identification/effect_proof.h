@@ -22,6 +22,9 @@ EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
                            const EffectFit& fit);
 
+/// Share of an effect by which its law may differ from the machine's, sample by sample, even when fitted.
+double form_share(const Effect& effect);
+
 /// Whether one of the design's linear parameters lies on the edge of what is plausible; zero is no edge: no effect.
 bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::VectorXd>& theta);
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 #include "identification/effect_intervals.h"
+#include "identification/effect_proof.h"
 #include "identification/null_gate.h"
 #include "identification/parallel.h"
 #include "identification/search_proofs.h"
@@ -14,6 +16,10 @@
 
 namespace sparflow {
 namespace {
+
+/// Times the least gain of a name: an effect that fits only with implausible parameters must be beyond doubt itself
+/// before its absence of a name means something.
+constexpr double kSurelySomething = 3.0;
 
 /// Diagnosis of the diagnosis: SPARFLOW_TRACE=1 prints every step to stderr.
 bool tracing() {
@@ -40,7 +46,13 @@ class Search {
     refused_.assign(candidates_.size(), false);
     for (int round = 0; round < 3; ++round) {
       select(found, current, result);
+      bool reshaped = false;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        reshaped = reshape(found, i, current) || reshaped;
       prune(found, current);
+      if (reshaped) {
+        for (std::size_t i = 0; i < found.size(); ++i) judge(found, i, current);
+      }
       finish(found, current);
       estimate_intervals(evidence_, found);
       if (!drop_unproven(found, current, result)) break;
@@ -84,15 +96,19 @@ class Search {
       f.design = scores_.refined(base, best, current);
       f.p_value = p;
       found.push_back(std::move(f));
-      const EffectFit next = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+      EffectFit next = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+      whole_share(found, next, best.gain);
       judge(found, found.size() - 1, next);
       if (tracing()) trace_found(found, next);
-      const std::string why = why_not_named(found.back(), options_);
+      found.back().gain = best.gain;
+      std::string why = why_not_named(found.back(), options_);
+      if (why.empty()) why = only_mends(found);
       if (!why.empty()) {
         result.notes.push_back(
             fmt::format("{} fits best but is not named: {}", key(found.back().design.effect), why));
         if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
-        if (found.back().at_bound && found.back().size >= options_.smallest_effect) {
+        if (found.back().at_bound && found.back().size >= options_.smallest_effect &&
+            best.gain > kSurelySomething * options_.least_gain) {
           result.unnamed.push_back(found.back());
         }
         found.pop_back();
@@ -101,6 +117,74 @@ class Search {
       }
       current = next;
     }
+  }
+
+  /// A short lag shows by the product of its share and its time alone, a limit that is hardly reached by share and
+  /// excess: where the share rests on its bound, the whole share with another time or limit says nearly the same and is
+  /// plausible.
+  void whole_share(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
+    constexpr double kSame = 3.0, kSameShare = 0.05;  // [nats]; of the gain
+    constexpr double kFarthest = 2.0;                 // times
+    constexpr int kHalvings = 9;
+    EffectDesign& design = found.back().design;
+    const EffectParameter& share = design.effect.effect->info().parameters.front();
+    if (!share.linear || share.name != "share" || design.shape.empty() || design.linear != 1 ||
+        !rests_on_bound(design, fit.theta.tail(1)))
+      return;
+    const EffectDesign before = design;
+    const auto share_at = [&](double factor) {
+      std::vector<double> shape = before.shape;
+      shape[0] *= factor;
+      design = make_design(evidence_, before.effect, std::move(shape));
+      if (!design.acts()) return std::numeric_limits<double>::quiet_NaN();
+      design.lower = {-std::numeric_limits<double>::max()};
+      design.upper = {std::numeric_limits<double>::max()};
+      FitControl control;
+      control.noise_passes = 1;
+      const EffectFit f = fit_effects(evidence_, designs_of(found), &fit, control);
+      return f.theta[f.theta.size() - 1];
+    };
+    const double at_one = share_at(1.0);
+    double a = 1.0, b = 1.0;  // the share crosses one between these factors
+    for (const double factor : {1.0 / kFarthest, kFarthest}) {
+      if (b == 1.0 && (share_at(factor) - 1.0) * (at_one - 1.0) < 0.0) b = factor;
+    }
+    for (int k = 0; k < kHalvings && b != 1.0; ++k) {
+      const double middle = std::sqrt(a * b);
+      ((share_at(middle) - 1.0) * (at_one - 1.0) > 0.0 ? a : b) = middle;
+    }
+    std::vector<double> shape = before.shape;
+    shape[0] *= std::sqrt(a * b);
+    design = make_design(evidence_, before.effect, std::move(shape));
+    EffectFit whole = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+    const double least = fit.total() - std::max(kSame, kSameShare * gain);
+    if (tracing()) {
+      fmt::print(stderr, "  whole share at [{:.4g}]: {:.1f} nats\n", fmt::join(design.shape, " "),
+                 whole.total() - fit.total());
+    }
+    if (whole.total() > least && !rests_on_bound(design, whole.theta.tail(1))) {
+      fit = std::move(whole);
+    } else {
+      design = before;
+    }
+  }
+
+  /// What the form of a law is wrong by leaves that share, squared, of the effect's own gain to whatever else acts in
+  /// the same place. @return why the last of `found` is no more than that; empty: it is more
+  std::string only_mends(const std::vector<FoundEffect>& found) const {
+    const FoundEffect& last = found.back();
+    for (std::size_t i = 0; i + 1 < found.size(); ++i) {
+      const FoundEffect& other = found[i];
+      bool meets = false;
+      for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
+        meets = meets || (other.design.touches(c) && last.design.touches(c));
+      const double form = form_share(*other.design.effect.effect);
+      if (!meets || last.gain > form * form * other.gain) continue;
+      return fmt::format(
+          "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over", last.gain,
+          key(other.design.effect), other.gain);
+    }
+    return {};
   }
 
   /// Whether `one` leaves significantly less than `other` where every row counts the same.
@@ -279,6 +363,44 @@ class Search {
       if (!swapped) break;
     }
     for (std::size_t i = 0; i < found.size(); ++i) judge(found, i, current);
+  }
+
+  /// Another variant of the same effect (the other sensor, the other law) may serve better since others were found,
+  /// and make one of them superfluous. @return whether one took the place
+  bool reshape(std::vector<FoundEffect>& found, std::size_t i, EffectFit& current) {
+    const std::vector<bool> choices = shape_choices(*found[i].design.effect.effect);
+    if (std::find(choices.begin(), choices.end(), true) == choices.end()) return false;
+    const std::vector<const EffectDesign*> others = designs_of(found, i);
+    const EffectFit without = fit_effects(evidence_, others, &current, {});
+    double most = scores_.gain(others, found[i].design, without) + 1.0;
+    const Score* best = nullptr;
+    std::vector<Score> variants;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (!same(candidates_[c].effect, found[i].design.effect)) continue;
+      variants.reserve(candidates_[c].designs.size());
+      for (std::size_t d = 0; d < candidates_[c].designs.size(); ++d) {
+        const std::vector<double>& shape = candidates_[c].designs[d].shape;
+        bool other = false;
+        for (std::size_t k = 0; k < shape.size(); ++k)
+          other = other || (choices[k] && shape[k] != found[i].design.shape[k]);
+        if (other) variants.push_back({c, d, 0.0});
+      }
+    }
+    for (Score& s : variants) {
+      s.gain = scores_.gain(others, design_of(s), without);
+      if (s.gain > most) most = s.gain, best = &s;
+    }
+    if (best == nullptr) return false;
+    FoundEffect variant;
+    variant.design = scores_.refined(others, *best, without);
+    variant.p_value = found[i].p_value;
+    if (tracing()) {
+      fmt::print(stderr, "  {} changes shape [{:.4g}] -> [{:.4g}]\n", key(variant.design.effect),
+                 fmt::join(found[i].design.shape, " "), fmt::join(variant.design.shape, " "));
+    }
+    found[i] = std::move(variant);
+    current = fit_effects(evidence_, designs_of(found), nullptr, final_control());
+    return true;
   }
 
   /// @return whether a rival took the place of found[i]

@@ -9,6 +9,7 @@
 #include "identification/branches.h"
 #include "identification/robust.h"
 #include "identification/series.h"
+#include "models/effects/hydraulics.h"
 #include "models/linear_algebra.h"
 #include "models/nan.h"
 
@@ -160,12 +161,80 @@ double raw_noise(const VectorXd& x) {
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
 }
 
-/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the builder's units.
-void slope_of(EvidenceChannel& channel) {
+/// A chamber falls no further than its anti-cavitation valve lets it: below a level the law of flow and force ends.
+struct CavitationFloor {
+  VectorXd law;        ///< of the baseline's columns; empty: no such level is reached
+  double level = 0.0;  ///< [Pa]
+
+  /// By how much the valve holds the pressure above the law. [rows, Pa]
+  VectorXd held(const Eigen::MatrixXd& baseline) const {
+    return (level - (baseline * law).array()).cwiseMax(0.0);
+  }
+};
+
+/// max(law, level) by alternating assignment, where that leaves much less than the law alone.
+CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y) {
+  constexpr Index kFewestOfOne = 20;  // rows of either piece
+  constexpr double kMuchLess = 0.8;   // of the sum of squares
+  constexpr int kTurns = 25;
+  CavitationFloor best;
+  if (y.size() < 3 * kFewestOfOne) return best;
+  const VectorXd plain = least_squares(baseline, y);
+  double least = kMuchLess * (y - baseline * plain).squaredNorm();
+  for (const double start : {0.15, 0.4, 0.7}) {
+    CavitationFloor f{plain, quantile(VectorXd(baseline * plain), start)};
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const VectorXd by_law = baseline * f.law;
+      std::vector<Index> on_law, held;
+      on_law.reserve(static_cast<std::size_t>(y.size()));
+      held.reserve(static_cast<std::size_t>(y.size()));
+      for (Index i = 0; i < y.size(); ++i) (by_law[i] < f.level ? held : on_law).push_back(i);
+      if (static_cast<Index>(std::min(on_law.size(), held.size())) < kFewestOfOne) break;
+      f.law = least_squares(baseline(on_law, Eigen::all), y(on_law));
+      f.level = y(held).mean();
+      const double squares = (y - baseline * f.law - f.held(baseline)).squaredNorm();
+      if (squares < least) {
+        least = squares;
+        best = f;
+      }
+    }
+  }
+  return best;
+}
+
+/// The law's end joins a supply channel's baseline; learned from the references, where there are any.
+CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects) {
+  std::vector<Index> rows;
+  for (const bool references : {true, false}) {
+    rows.clear();
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (references && static_cast<std::size_t>(channel.log[b]) < suspects) continue;
+      for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) rows.push_back(i);
+    }
+    if (static_cast<Index>(rows.size()) >= 2 * kFewestRows) break;
+  }
+  const CavitationFloor floor =
+      cavitation_floor(channel.baseline(rows, Eigen::all), channel.y(rows));
+  if (floor.law.size() == 0) return floor;
+  Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + 1);
+  wider << channel.baseline, floor.held(channel.baseline) * 1e-5;
+  channel.baseline = std::move(wider);
+  return floor;
+}
+
+/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the builder's units,
+/// and what the anti-cavitation valve adds.
+void slope_of(EvidenceChannel& channel, std::size_t suspects) {
   channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
+  const CavitationFloor floor = add_cavitation_floor(channel, suspects);
+  const auto flow = channel.baseline.col(1).array();
   const VectorXd b = least_squares(channel.baseline, channel.y);
-  channel.force_slope = (b[3] + b[4] * channel.baseline.col(1).array()) / kForceScale;
+  channel.force_slope = (b[3] + b[4] * flow) / kForceScale;
+  if (floor.law.size() == 0) return;
+  const auto held = (channel.baseline.col(5).array() > 0.0).cast<double>();
+  channel.force_slope.array() -=
+      b[5] * 1e-5 * held * (floor.law[3] + floor.law[4] * flow) / kForceScale;
 }
 
 std::vector<BranchSplit> branches_of(const Evidence& e,
@@ -440,8 +509,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           base.col(1) = q / q0;
           base.col(2) = (q / q0).cwiseAbs2();
           if (!returning) {
-            base.col(3) = s.force / f0;
-            base.col(4) = (s.force / f0).cwiseProduct(q / q0);
+            base.col(3) = steady_force(s) / f0;
+            base.col(4) = (steady_force(s) / f0).cwiseProduct(q / q0);
           }
           b.add(log, returning ? split.return_line : split.counterbalance, y, base, margin_of(log));
           if (log < e.suspects) noise = raw_noise(raw) * gain_pressure[log];
@@ -451,7 +520,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         b.channel.unit = {"bar", 1e5};
         b.channel.noise_floor = noise;
         b.channel.text = evidence_text(kind, name);
-        if (b.finish(e.channels) && !returning) slope_of(e.channels.back());
+        if (b.finish(e.channels) && !returning) slope_of(e.channels.back(), e.suspects);
       }
     }
   }

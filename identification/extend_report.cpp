@@ -44,6 +44,12 @@ std::string parameters_text(const AppliedEffect& e) {
   return text;
 }
 
+/// A pressure error that says more of what the training logs lacked than of the physics.
+bool mostly_extrapolated(const StageScore& s) {
+  return s.extrapolated_percent >= 5.0 && s.extrapolated_error_percent > 50.0 &&
+         s.extrapolated_error_percent > 1.25 * s.extrapolated_percent;
+}
+
 /// Rows of one step: the scores that moved by more than a refit moves them, the largest change first.
 std::string step_table(const ExtendStep& step) {
   constexpr double kMoved = 0.01;
@@ -68,14 +74,23 @@ std::string step_table(const ExtendStep& step) {
     return std::abs(x.change) > std::abs(y.change);
   });
   std::string text;
+  int beyond = 0;
   constexpr std::size_t kMost = 8;
   for (std::size_t i = 0; i < std::min(kMost, rows.size()); ++i) {
     const auto [before, unit] = readable(rows[i].before->rmse, rows[i].before->unit);
     const double si = unit == "kN" ? 1e3 : rows[i].before->unit.si;
-    text += fmt::format("   {:<12}{:<22}{:>9} -> {:>9} {:<6}{:>9}\n", rows[i].before->stage,
+    const bool asked_too_much = mostly_extrapolated(*rows[i].after);
+    beyond += asked_too_much ? 1 : 0;
+    text += fmt::format("   {:<12}{:<22}{:>9} -> {:>9} {:<6}{:>9}{}\n", rows[i].before->stage,
                         place(*rows[i].before), short_number(before),
                         short_number(rows[i].after->rmse / si), unit,
-                        signed_percent(std::exp(rows[i].change)));
+                        signed_percent(std::exp(rows[i].change)), asked_too_much ? " *" : "");
+  }
+  if (beyond > 0) {
+    text +=
+        "   * most of this error lies at flows or loads the pressures were never learned at: it "
+        "says "
+        "little of the effect\n";
   }
   const auto rest = still + static_cast<long>(rows.size() - std::min(kMost, rows.size()));
   if (rest > 0) text += fmt::format("   {} other errors moved less\n", rest);

@@ -39,6 +39,21 @@ std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>
   return active;
 }
 
+/// Noise that was fitted without an effect may hold the effect for noise: what is slow (oil that warms, a wrong mass)
+/// then stays offsets of motions. The likelihood has both maxima; from white noise the effect comes first.
+bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) const {
+  constexpr double kOffsets = 0.2,
+                   kSlow = 0.85;  // share of the variance; correlation of neighbours
+  for (std::size_t c = 0; c < current.noise.size(); ++c) {
+    if (!d.touches(c)) continue;
+    const NoiseModel& noise = current.noise[c];
+    const double whole = noise.deviation() * noise.deviation();
+    if (noise.offset_variance > kOffsets * whole || noise.phi1 > kSlow * (1.0 - noise.phi2))
+      return true;
+  }
+  return false;
+}
+
 /// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
 double SearchScores::gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
                           const EffectFit& current, const std::vector<bool>& also,
@@ -55,13 +70,18 @@ double SearchScores::gain(const std::vector<const EffectDesign*>& base, const Ef
     if (needed) with.push_back(b);
   }
   with.push_back(&d);
-  const EffectFit fit = fit_effects(evidence_, with, &current, c);
-  if (!only_there) return fit.total() - current.total();
-  double sum = 0.0;  // a rival must explain the same evidence, not other evidence as much
-  for (std::size_t k = 0; k < also.size(); ++k) {
-    if (also[k]) sum += fit.log_likelihood[k] - current.log_likelihood[k];
-  }
-  return sum;
+  const auto gained = [&](const EffectFit& fit) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < c.active.size(); ++k) {
+      // a rival must explain the same evidence, not other evidence as much
+      if (only_there ? also[k] : c.active[k])
+        sum += fit.log_likelihood[k] - current.log_likelihood[k];
+    }
+    return sum;
+  };
+  const double from_current = gained(fit_effects(evidence_, with, &current, c));
+  if (!may_hide(current, d)) return from_current;
+  return std::max(from_current, gained(fit_effects(evidence_, with, nullptr, c)));
 }
 
 std::vector<bool> SearchScores::touched_by(const EffectDesign& design) const {

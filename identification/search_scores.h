@@ -45,12 +45,16 @@ class SearchScores {
   EffectDesign refined(const std::vector<const EffectDesign*>& base, const CandidateScore& score,
                        const EffectFit& current) const;
 
- private:
-  std::vector<bool> connected(const std::vector<const EffectDesign*>& designs,
-                              const EffectDesign& d) const;
+  /// Log likelihood with `d` beside `base` - that of `current`, which has `base`. [nats]
+  /// @param also channels to fit besides those that d and base meet in @param only_there count these alone
   double gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
               const EffectFit& current, const std::vector<bool>& also = {},
               bool only_there = false) const;
+
+ private:
+  std::vector<bool> connected(const std::vector<const EffectDesign*>& designs,
+                              const EffectDesign& d) const;
+  bool may_hide(const EffectFit& current, const EffectDesign& design) const;
   std::vector<bool> touched_by(const EffectDesign& design) const;
 
   const Evidence& evidence_;

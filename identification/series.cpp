@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/effects/memory.h"
 #include "models/error.h"
 #include "models/nan.h"
 
@@ -11,6 +12,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
+constexpr double kSteadyForce_s = 1.0;  ///< width of the mean that takes the pressures' noise off
 
 CylinderSeries cylinder_series(const Cylinder& cylinder, const CylinderSignals& c) {
   CylinderSeries out;
@@ -23,6 +25,8 @@ CylinderSeries cylinder_series(const Cylinder& cylinder, const CylinderSignals& 
   out.command = c.command;
   out.pressure_a = c.pressure_a_smooth;
   out.pressure_b = c.pressure_b_smooth;
+  out.measured_a = c.pressure_a;
+  out.measured_b = c.pressure_b;
   out.direction = c.direction;
   out.flow = c.flow;
   out.return_flow = VectorXd::Zero(c.flow.size());
@@ -104,6 +108,11 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
   out.oil = signals.oil;
   for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
     out.cylinders.push_back(cylinder_series(machine.cylinders[i], signals.cylinders[i]));
+    CylinderSeries& c = out.cylinders.back();
+    if (c.force.size() > 0) {
+      c.steady_force = c.static_force +
+                       moving_average(out, c.force - c.static_force, c.direction, kSteadyForce_s);
+    }
   }
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     PumpSeries pump;

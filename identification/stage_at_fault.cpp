@@ -148,7 +148,9 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
     const Eigen::Map<const VectorXd> r(rough.data(), static_cast<Index>(rough.size()));
     out.noise = kAllowance * robust_std(r) / unit.si;
   }
-  const double beyond = std::sqrt(std::max(0.0, out.own * out.own - out.noise * out.noise));
+  // A law learned with wrong inputs makes up for them: what right inputs then do to it is not its fault.
+  const double at_fault = std::min(out.own, out.error);
+  const double beyond = std::sqrt(std::max(0.0, at_fault * at_fault - out.noise * out.noise));
   out.severity = out.spread > 0.0 ? beyond / out.spread : 0.0;
   out.words = words_of(out);
   return out;
@@ -168,12 +170,26 @@ std::string describe(const StageAtFault& found) {
   for (const StageSplit& s : found.stages) {
     const bool next = (f.stage == "force" && s.stage == "pressure" && s.at == f.at) ||
                       (f.stage == "pressure" && s.stage == "pump");
-    if (next && s.inherited > 0.25 * s.error && (heir == nullptr || s.inherited > heir->inherited))
+    if (next && !s.makes_up() && s.inherited > 0.25 * s.error &&
+        (heir == nullptr || s.inherited > heir->inherited))
       heir = &s;
   }
   if (heir != nullptr) {
     text += fmt::format("; the {} inherits {} of it, its own error is {}", heir->words,
                         amount(heir->inherited, heir->unit), amount(heir->own, heir->unit));
+  }
+  // a law that was learned with the wrong input and hides it
+  const StageSplit* hides = nullptr;
+  for (const StageSplit& s : found.stages) {
+    const bool next = f.stage == "force" && s.stage == "pressure" && s.at == f.at;
+    if (next && s.makes_up() && (hides == nullptr || s.own > hides->own)) hides = &s;
+  }
+  if (hides != nullptr) {
+    text += fmt::format(
+        "; the {} was learned with it and makes up for it: {} along the chain, {} once the force "
+        "is "
+        "right",
+        hides->words, amount(hides->error, hides->unit), amount(hides->own, hides->unit));
   }
   return text + ".";
 }

@@ -27,8 +27,10 @@ struct StageSplit {
       0.0;  ///< [unit] of its sensor (and of the speed, where it is one), at rest of fast change
   double spread = 0.0;  ///< standard deviation of the measured
   long n = 0;
-  /// Own error beyond noise over the measured spread, 0 = as good as can be.
+  /// Own error (or that along the chain, where it is less) beyond noise over the measured spread, 0 = as good as can be.
   double severity = 0.0;
+  /// Learned together with the errors of the stage before, which it cancels.
+  bool makes_up() const { return own > 2.0 * error && inherited > 2.0 * error; }
 };
 
 struct StageAtFault {

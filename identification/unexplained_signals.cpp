@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "identification/unexplained.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/valve_flow.h"
 
 namespace sparflow {
 
@@ -36,6 +38,23 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
     if (v.maxCoeff() > v.minCoeff()) out.push_back({name, std::move(v)});
   };
   const auto at = [](const VectorXd& v, Index k) { return k < v.size() ? v[k] : 0.0; };
+  // of the cylinder whose speed is judged the flow it is asked for: its measured flow is that speed, noise and all
+  std::vector<SectionFit> sections;
+  const auto own = static_cast<std::size_t>(channel.index);
+  if (channel.kind == EvidenceKind::kFlow) {
+    sections.reserve(evidence.series.size());
+    for (const MachineSeries& s : evidence.series) {
+      const VectorXd& command = s.cylinders[own].command;
+      sections.push_back(command.size() > 0 ? fit_gains(s, channel.index, command) : SectionFit{});
+    }
+  }
+  const auto flow_of = [&](const MachineSeries& s, std::size_t i, Index k) {
+    const CylinderSeries& c = s.cylinders[i];
+    if (sections.empty() || i != own) return c.flow[k];
+    const double u = at(c.command, k);
+    return sections[static_cast<std::size_t>(&s - evidence.series.data())].gain(u) * std::abs(u) *
+           supply_area(machine.cylinders[i], u > 0.0 ? 1 : -1);
+  };
   for (int j = 0; j < machine.joint_count(); ++j) {
     add("q_" + machine.joints[static_cast<std::size_t>(j)].name,
         [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return s.q(k, j); });
@@ -76,12 +95,11 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
         [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
           double flow = 0.0;
           for (const int i : machine.pumps[p].feeds)
-            flow += s.cylinders[static_cast<std::size_t>(i)].flow[k];
+            flow += flow_of(s, static_cast<std::size_t>(i), k);
           return at(s.pumps[p].pressure, k) * flow;
         });
   }
   if (channel.kind == EvidenceKind::kFlow && machine.pump_of_cylinder(channel.index) >= 0) {
-    const auto own = static_cast<std::size_t>(channel.index);
     const auto pump = static_cast<std::size_t>(machine.pump_of_cylinder(channel.index));
     add("pressure over the spool", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
       const CylinderSeries& c = s.cylinders[own];
@@ -92,7 +110,7 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
   }
   add("total flow", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
     double sum = 0.0;
-    for (const CylinderSeries& c : s.cylinders) sum += c.flow[k];
+    for (std::size_t i = 0; i < s.cylinders.size(); ++i) sum += flow_of(s, i, k);
     return sum;
   });
   add("payload",

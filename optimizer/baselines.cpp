@@ -107,8 +107,8 @@ MatrixXd pseudo_inverse_line(const Machine& machine, const MotionProblem& proble
 }
 
 const std::vector<std::string>& BaselineSet::kinds() {
-  static const std::vector<std::string> all = {kSequential, kJointLine, kNearestJointLine,
-                                               kActuatorLine, kTipLine};
+  static const std::vector<std::string> all = {kSequential,   kJointLine, kNearestJointLine,
+                                               kActuatorLine, kTipLine,   kBestTipLine};
   return all;
 }
 
@@ -119,6 +119,7 @@ BaselineSet::BaselineSet(const CraneModel& model, const MotionProblem& problem,
   find_end_postures(end_postures);
   make_sequences();
   make_lines();
+  make_best_tip_lines();
 }
 
 void BaselineSet::make_lines() {
@@ -164,14 +165,16 @@ const std::vector<DrivenPath>& BaselineSet::paths(const std::string& kind) const
   if (kind == kJointLine) return joint_lines_;
   if (kind == kNearestJointLine) return nearest_line_;
   if (kind == kActuatorLine) return actuator_lines_;
-  SPARFLOW_CHECK(kind == kTipLine, "a kind of baseline");
-  return tip_lines_;
+  if (kind == kTipLine) return tip_lines_;
+  SPARFLOW_CHECK(kind == kBestTipLine, "a kind of baseline");
+  return best_tip_lines_;
 }
 
 const std::string& BaselineSet::refusal(const std::string& kind) const {
   if (kind == kSequential) return no_sequence_;
   if (kind == kJointLine) return no_line_;
   if (kind == kNearestJointLine) return no_nearest_;
+  if (kind == kBestTipLine) return no_best_tip_;
   return kind == kActuatorLine ? no_actuator_ : no_tip_;
 }
 
@@ -230,6 +233,11 @@ BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, b
     all.push_back(timed(kind, path, duration));
     if (all.back().found())
       all.back().energy = exact_energy(model_, all.back().motion, problem_.payload, 2);
+  }
+  // other times, other redundancy: solved anew where it is the answer, not where a search looks around
+  if (kind == kBestTipLine && polish && !all.empty()) {
+    BaselineMotion anew = best_tip_line(duration);
+    if (anew.found()) all.push_back(std::move(anew));
   }
   std::stable_sort(all.begin(), all.end(), [](const BaselineMotion& a, const BaselineMotion& b) {
     if (a.found() != b.found()) return a.found();

@@ -19,6 +19,8 @@ inline constexpr const char* kNearestJointLine =
 inline constexpr const char* kActuatorLine =
     "actuator_line";  ///< strokes in proportion; Jensen, Ebbesen and Hansen
 inline constexpr const char* kTipLine = "tip_line";  ///< pseudo-inverse, least weighted joint speed
+inline constexpr const char* kBestTipLine =
+    "tip_line_best";  ///< redundancy of least energy; Nurmi and Mattila (optimizer/path_redundancy.h)
 
 /// A baseline at one duration.
 struct BaselineMotion {
@@ -36,7 +38,8 @@ struct BaselineOptions {
   int intervals = 100;
   int polished_orders =
       4;  ///< orders whose segments are optimised (optimize_with_modes), cheapest first
-  int most_orders = 24;  ///< orders considered at all, cheapest first
+  int most_orders = 24;      ///< orders considered at all, cheapest first
+  int tip_speed_levels = 2;  ///< time laws tried for the tip line of best redundancy
   double limit_tolerance = 1e-5;
   OptimizeOptions optimize;  ///< of the segments
 };
@@ -96,14 +99,17 @@ class BaselineSet {
   void find_end_postures(const std::vector<Eigen::VectorXd>& given);
   void make_sequences();
   void make_lines();
+  void make_best_tip_lines();
+  BaselineMotion best_tip_line(double duration) const;
   BaselineMotion polished(const BaselineMotion& from, const DrivenPath& path) const;
 
   const CraneModel& model_;
   const MotionProblem& problem_;
   BaselineOptions options_;
   std::vector<Eigen::VectorXd> ends_;
-  std::vector<DrivenPath> sequences_, joint_lines_, nearest_line_, actuator_lines_, tip_lines_;
-  std::string no_sequence_, no_line_, no_nearest_, no_actuator_, no_tip_;
+  std::vector<DrivenPath> sequences_, joint_lines_, nearest_line_, actuator_lines_, tip_lines_,
+      best_tip_lines_;
+  std::string no_sequence_, no_line_, no_nearest_, no_actuator_, no_tip_, no_best_tip_;
 };
 
 /// Legs of a motion driven one after the other, each stretched to its share of `duration` such that the sum of

@@ -50,7 +50,7 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
     if (s.straight_line) first_line = false;
     const Trajectory timed = with_duration(s.motion, result.duration);
     if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
-    const double energy = exact_energy(model, timed, problem.payload, refine).total;
+    const double energy = exact_total_energy(model, timed, problem.payload, refine);
     if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
       result.best_seed_energy = energy;
       result.best_seed_name = s.name;

@@ -61,6 +61,7 @@ std::string strategy_title(const std::string& kind) {
   if (kind == kNearestJointLine) return "simultaneous, nearest end";
   if (kind == kActuatorLine) return "cylinder strokes in proportion";
   if (kind == kTipLine) return "tip on a straight line";
+  if (kind == kBestTipLine) return "tip line, best redundancy";
   if (kind == kMinimumTime) return "shortest time";
   if (kind == kMinimumControl) return "least squared commands";
   if (kind == kOptimal) return "energy-optimal";

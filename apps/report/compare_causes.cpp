@@ -48,9 +48,11 @@ void add_stages(Page& page, const CompareResult& result) {
     const auto share = [&s](double rms) {
       return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
     };
-    noise.values[i] = share(std::min(s.noise, s.own));
-    own.values[i] = share(s.own) - noise.values[i];
-    inherited.values[i] = share(s.inherited);
+    // where a law makes up for what it inherits, what is left of both is what there is to see
+    const double own_error = s.makes_up() ? s.error : s.own;
+    noise.values[i] = share(std::min(s.noise, own_error));
+    own.values[i] = share(own_error) - noise.values[i];
+    inherited.values[i] = s.makes_up() ? 0.0 : share(s.inherited);
   }
   chart.series = {std::move(own), std::move(inherited), std::move(noise)};
   page.plot(std::move(chart));
@@ -60,7 +62,9 @@ void add_stages(Page& page, const CompareResult& result) {
                    {"noise", "", 2}, {"unit"}};
   for (const StageSplit& s : stages)
     table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
-  table.note = "RMS. Where own and inherited errors are related, their squares do not add up.";
+  table.note =
+      "RMS. Where own and inherited errors are related, their squares do not add up; where they "
+      "cancel, the law was learned with the wrong force and makes up for it (drawn: what is left).";
   table.highlighted_row = result.fault.fault;
   page.table(std::move(table));
 }

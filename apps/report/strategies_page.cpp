@@ -206,7 +206,7 @@ BarChart excess_bars(const std::vector<StrategyComparison>& all, const std::stri
   bars.note = "No bar: this way keeps the limits in no motion of that duration.";
   bars.value_axis = {"more than the energy-optimal motion", "%"};
   bars.stacked = false;
-  const std::vector<std::string> kinds = {kSequential, kJointLine, kTipLine};
+  const std::vector<std::string> kinds = {kSequential, kJointLine, kTipLine, kBestTipLine};
   std::vector<std::vector<double>> values(kinds.size());
   for (const StrategyComparison& c : all) {
     const StrategyRow* row = c.row(name);

@@ -42,6 +42,8 @@ class BaseTilt final : public Effect {
         .citation =
             "Craig (2005), Introduction to Robotics, sec. 6.5: gravity as an acceleration "
             "of the base",
+        // ground that slopes across the arm as well
+        .form_error = 0.04,
         .in_motion = "force"};
     return info;
   }

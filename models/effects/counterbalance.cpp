@@ -90,7 +90,7 @@ class Counterbalance final : public Effect {
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
     const double area = return_area(log.machine->cylinders[i], side);
-    const Eigen::VectorXd& force = carried_force(c);
+    const Eigen::VectorXd& force = steady_force(c);
     columns.setZero(log.samples(), 2);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       if (c.direction[k] != side) continue;

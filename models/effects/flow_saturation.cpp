@@ -17,26 +17,38 @@ class FlowSaturation final : public Effect {
         .title = "pump cannot deliver what the valves ask for",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kPump,
-        .parameters = {{"share",
-                        "-",
-                        1.0,
-                        0.7,
-                        1.35,
-                        1.0,
-                        "share of the excess that is missing, about 1",
-                        true,
-                        {}},
-                       {"limit",
-                        "l/min",
-                        units::kLitrePerMinute,
-                        2 * units::kLitrePerMinute,
-                        2000 * units::kLitrePerMinute,
-                        100 * units::kLitrePerMinute,
-                        "largest flow of the pump",
-                        false,
-                        {10 * units::kLitrePerMinute, 30 * units::kLitrePerMinute,
-                         100 * units::kLitrePerMinute, 300 * units::kLitrePerMinute}}},
-        .equation = "Q_i = Q_i(u) min(1, limit / sum of Q(u))",
+        .parameters =
+            {{"share",
+              "-",
+              1.0,
+              0.7,
+              1.35,
+              1.0,
+              "share of the excess that is missing, about 1",
+              true,
+              {}},
+             {"limit",
+              "l/min",
+              units::kLitrePerMinute,
+              2 * units::kLitrePerMinute,
+              2000 * units::kLitrePerMinute,
+              100 * units::kLitrePerMinute,
+              "largest flow of the pump",
+              false,
+              {10 * units::kLitrePerMinute, 30 * units::kLitrePerMinute,
+               100 * units::kLitrePerMinute, 300 * units::kLitrePerMinute}},
+             {"soft",
+              "-",
+              1.0,
+              0.0,
+              1.0,
+              0.0,
+              "1: the flow nears its limit gradually (power law of exponent 12), 0: at once",
+              false,
+              {0.0, 1.0},
+              true}},
+        .equation =
+            "Q_i = Q_i(u) min(1, limit / sum of Q(u)), soft: (1 + (sum / limit)^12)^(-1/12)",
         .signals = {"commands", "position"},
         .confused_with = {"torque_limit", "valve_deadband"},
         .separated_by = "each function at full command alone, then all together",
@@ -59,8 +71,9 @@ class FlowSaturation final : public Effect {
     return pump == at ? p[1] : std::numeric_limits<double>::infinity();
   }
 
-  std::vector<double> grid(const MachineSeries& log, int at, int) const override {
-    const Demand demand(log, at, std::numeric_limits<double>::infinity());
+  std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const override {
+    if (shape_index == 1) return {0.0, 1.0};
+    const Demand demand(log, at, std::numeric_limits<double>::infinity(), false);
     if (!demand.known || !(demand.largest > 0.0)) return {};
     std::vector<double> limits;
     for (const double part : {0.45, 0.53, 0.6, 0.66, 0.72, 0.78, 0.84, 0.9, 0.95}) {
@@ -72,7 +85,7 @@ class FlowSaturation final : public Effect {
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || log.machine->pump_of_cylinder(index) != at) return false;
-    const Demand demand(log, at, shape[0]);
+    const Demand demand(log, at, shape[0], shape.size() > 1 && shape[1] > 0.5);
     if (!demand.known) return false;
     const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(index)].command;
     const SectionFit& fit = demand.fits[static_cast<std::size_t>(index)];
@@ -91,7 +104,7 @@ class FlowSaturation final : public Effect {
     Eigen::VectorXd served;        ///< [samples] 0..1
     double largest = 0.0;          ///< [m^3/s] sum of what is asked for
 
-    Demand(const MachineSeries& log, int pump, double limit) {
+    Demand(const MachineSeries& log, int pump, double limit, bool soft) {
       const Machine& machine = *log.machine;
       const std::vector<int>& feeds = machine.pumps[static_cast<std::size_t>(pump)].feeds;
       fits.resize(log.cylinders.size());
@@ -115,6 +128,11 @@ class FlowSaturation final : public Effect {
           }
         }
         largest = asked.maxCoeff();
+        if (soft && std::isfinite(limit)) {
+          constexpr double kExponent = 12.0;
+          served = (1.0 + (asked.array() / limit).pow(kExponent)).pow(-1.0 / kExponent).matrix();
+          continue;
+        }
         if (!(largest > limit)) return;
         served =
             (limit / asked.array()).min(1.0).matrix();  // nothing asked: limit / 0, fully served

@@ -52,6 +52,10 @@ const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder) {
   return cylinder.force.size() > 0 ? cylinder.force : cylinder.static_force;
 }
 
+const Eigen::VectorXd& steady_force(const CylinderSeries& cylinder) {
+  return cylinder.steady_force.size() > 0 ? cylinder.steady_force : carried_force(cylinder);
+}
+
 int return_side(EvidenceKind kind) {
   if (kind == EvidenceKind::kReturnExtend) return 1;
   return kind == EvidenceKind::kReturnRetract ? -1 : 0;

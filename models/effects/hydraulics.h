@@ -38,6 +38,8 @@ Eigen::VectorXd total_return_flow(const MachineSeries& log);
 Eigen::VectorXd pump_flow(const MachineSeries& log, int pump);
 /// The force a cylinder carries: measured, or by virtual work where none is measured. [N]
 const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder);
+/// The same without the pressures' own noise, where it is known. [N]
+const Eigen::VectorXd& steady_force(const CylinderSeries& cylinder);
 
 /// What a rise of the return pressure does to the supply. p_supply = max(static branch, counterbalance branch): all
 /// of it appears while the load asks for more than that, nothing while the load helps; between the two the

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
 
@@ -56,13 +58,15 @@ class SensorDelay final : public Effect {
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override {
-    return {EvidenceKind::kForce, EvidenceKind::kFlow};
+    return {EvidenceKind::kForce, EvidenceKind::kFlow, EvidenceKind::kPump};
   }
 
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(index)];
     const bool positions = shape[1] > 0.0;
+    if (kind == EvidenceKind::kPump)
+      return !positions && switching_late(log, static_cast<std::size_t>(index), shape[0], columns);
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(index)];
     const double shift = positions ? -shape[0] : shape[0];
     if (kind == EvidenceKind::kForce) {
       columns = delayed(log, c.static_force, shift) - c.static_force;
@@ -70,6 +74,30 @@ class SensorDelay final : public Effect {
     }
     if (kind != EvidenceKind::kFlow || !positions) return false;
     columns = c.speed - delayed(log, c.speed, shift);
+    return true;
+  }
+
+ private:
+  /// Pump and chambers are late together, but not the commands that choose what a pump follows: it seems to follow
+  /// the choice of `delay` ago.
+  static bool switching_late(const MachineSeries& log, std::size_t pump, double delay,
+                             Eigen::MatrixXd& columns) {
+    const Eigen::VectorXd& demand = log.pumps[pump].demand;
+    if (demand.size() == 0) return false;
+    columns = delayed(log, demand, delay) - demand;
+    for (const auto& [first, last] : log.runs) {
+      Eigen::Index before = first;
+      for (Eigen::Index k = first; k < last; ++k) {
+        while (before < k && log.time[before] < log.time[k] - delay) ++before;
+        bool switched = false;
+        for (const int i : log.machine->pumps[pump].feeds) {
+          const Eigen::VectorXi& d = log.cylinders[static_cast<std::size_t>(i)].direction;
+          for (Eigen::Index j = std::max(first, before - 1); j < k; ++j)
+            switched = switched || d[j] != d[k];
+        }
+        if (!switched) columns(k, 0) = 0.0;
+      }
+    }
     return true;
   }
 };

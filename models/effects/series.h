@@ -16,10 +16,14 @@ struct CylinderSeries {
   Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
   Eigen::VectorXd acceleration;  ///< [m/s^2]
   Eigen::VectorXd
-      static_force;         ///< [N] by virtual work of the machine file, positive pushes the rod in
-  Eigen::VectorXd force;    ///< [N] measured, through the position's filter
-  Eigen::VectorXd command;  ///< [-] -1..1, as logged
+      static_force;       ///< [N] by virtual work of the machine file, positive pushes the rod in
+  Eigen::VectorXd force;  ///< [N] measured, through the position's filter
+  /// [N] static force and the mean, within a motion and half a second either way, of what is measured beyond it: for
+  /// laws of one pressure in which the force made from both pressures must not carry that pressure's own noise.
+  Eigen::VectorXd steady_force;
+  Eigen::VectorXd command;                 ///< [-] -1..1, as logged
   Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] chambers, through the position's filter
+  Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
   /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals.h).
   Eigen::VectorXi direction;
   Eigen::VectorXd flow;  ///< [m^3/s] into the chamber of that side, never negative; 0 at rest

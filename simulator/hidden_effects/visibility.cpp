@@ -130,16 +130,18 @@ std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t witho
   return s;
 }
 
-/// Largest chamber pressure, as read, of what the levers ask of a pump. @param leader -1: none
-double asked_pressure(const Pump& pump, const PlantState& s, const SensorState& read, int& leader) {
-  double most = 0.0;
+/// Largest chamber pressure, as read, with its margin, of what the levers ask of a pump: who leads may change with an
+/// effect elsewhere, and with it the margin, without any riddle in the pump. @param leader -1: none
+double asked_pressure(const Pump& pump, double standby, const CraneLaws& laws, const PlantState& s,
+                      const SensorState& read, int& leader) {
+  double most = standby;
   leader = -1;
   for (const int i : pump.feeds) {
     const auto k = static_cast<std::size_t>(i);
     const double u = s.cylinders[k].command;
     if (u == 0.0) continue;
-    const double p = u > 0.0 ? read.pressure_a[k] : read.pressure_b[k];
-    if (leader >= 0 && p <= most) continue;
+    const double p = (u > 0.0 ? read.pressure_a[k] : read.pressure_b[k]) + laws.cylinders[k].margin;
+    if (p <= most) continue;
     most = p;
     leader = i;
   }
@@ -171,14 +173,20 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
     change += ra.fed_a ? read_a - (ca.pressure_a - cb.pressure_a)
                        : read_b - (ca.pressure_b - cb.pressure_b);
     const double q = (ra.counterbalance ? ca.flow : ca.return_flow) / 1e-3, f = ca.force / 1e5;
-    VectorXd own(5);
-    own << 1.0, q, q * q, f, q * f;
+    // a learned law of flow and force is smooth, not linear: polynomials up to the fourth degree
+    VectorXd own(15);
+    Index term = 0;
+    for (int degree = 0; degree <= 4; ++degree) {
+      for (int n = 0; n <= degree; ++n) own[term++] = std::pow(q, n) * std::pow(f, degree - n);
+    }
     s.pressure[i][(ca.side > 0 ? 0U : 2U) + (ra.counterbalance ? 1U : 0U)].add(change, own);
   }
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     int leader = -1, other = -1;
-    const double asked = asked_pressure(machine.pumps[p], a, read, leader);
-    const double asked_without = asked_pressure(machine.pumps[p], b, s.sensors, other);
+    const double asked =
+        asked_pressure(machine.pumps[p], s.crane->laws.standby[p], s.crane->laws, a, read, leader);
+    const double asked_without = asked_pressure(machine.pumps[p], s.crane->laws.standby[p],
+                                                s.crane->laws, b, s.sensors, other);
     VectorXd margins = VectorXd::Zero(static_cast<Index>(machine.cylinders.size()) + 1);
     margins[leader + 1] = 1.0;
     s.pump[p].add(read.pump[p] - asked - (s.sensors.pump[p] - asked_without), margins);

@@ -27,6 +27,10 @@ TEST_F(Cli, StrategiesWritesTheKeysThatScriptsRead) {
               p["strategies"]["optimal"]["energy_J"].get<double>() * (1 - 1e-12))
         << kind;
   }
+  // two joints, two directions of the tip: nothing is redundant
+  EXPECT_FALSE(p["strategies"].at("tip_line_best").at("feasible").get<bool>());
+  EXPECT_THAT(p["strategies"]["tip_line_best"].at("why").get<std::string>(),
+              HasSubstr("needs exactly one"));
   EXPECT_TRUE(p["strategies"]["sequential"].contains("order"));
   EXPECT_LT(p["strategies"]["minimum_time"]["duration_s"].get<double>(), 25.0);
   EXPECT_LT(p.at("own_time").at("optimal").at("duration_s").get<double>(), 25.0);

@@ -66,6 +66,23 @@ TEST(StageAtFault, AWrongForceIsItsOwnAndThePressuresInheritIt) {
   EXPECT_GT(pump.inherited, 8.0 * pump.own);
 }
 
+// A first fit learns the pressures with the wrong force: they agree, and only the right force would show that they should not.
+TEST(StageAtFault, ALawLearnedWithAWrongForceIsNotBlamedForIt) {
+  CraneModel model = arm_model();
+  const double area = model.machine.cylinders[0].area_piston();
+  model.cylinders[0].extend =
+      testing_support::linear_process(4.0 * units::kBar + 20e3 / area, 1.0 / area);
+  const CompareResult r = compare(model, {heavier(20e3)});
+  const StageSplit& up = stage(r, "pressure", "extend");
+  EXPECT_LT(up.error, 0.8);  // sensor noise, 0.5 bar
+  EXPECT_NEAR(up.own, 17.7, 0.3);
+  EXPECT_NEAR(up.inherited, 17.7, 0.3);
+  EXPECT_TRUE(up.makes_up());
+  ASSERT_GE(r.fault.fault, 0);
+  EXPECT_EQ(r.fault.stages[static_cast<std::size_t>(r.fault.fault)].stage, "force");
+  EXPECT_THAT(r.fault.sentence, HasSubstr("working pressure of arm extending was learned with it"));
+}
+
 TEST(StageAtFault, AWrongPressureProcessIsNotTheForces) {
   CraneModel model = arm_model();
   model.cylinders[0].extend = testing_support::linear_process(

@@ -140,27 +140,35 @@ TEST_F(FlowEffects, CompressedOilIsMissing) {
   c.direction.setConstant(1);
   c.length.setConstant(1.0);
   c.pressure_a = 10e5 * log.time;
-  const MatrixXd col = columns("compressibility", 0, 0);
+  const MatrixXd col = columns("compressibility", 0, 0, {0.0});
   EXPECT_NEAR(col(500, 0) * 1e-9, -1.1e-3, 1e-9);
-  EXPECT_NEAR(col(1200, 0) * 1e-9, -1.1e-3, 1e-9) << "first sample after a gap: one-sided";
+  EXPECT_EQ(col(log.runs.back().first, 0), 0.0) << "nothing is known across a gap";
   c.direction.setConstant(-1);
   c.pressure_b = -10e5 * log.time;
-  EXPECT_NEAR(columns("compressibility", 0, 0)(500, 0) * 1e-9, -1.1e-3, 1e-9);
-  // noise of a sensor at rest is no squeezed oil: steps of 10 bar stand out, the noise between them does not count
-  c.direction.setConstant(1);
-  std::mt19937 random(3);
-  std::normal_distribution<double> noise(0.0, 0.05e5);
-  for (Index k = 0; k < log.samples(); ++k)
-    c.pressure_a[k] = (k % 400 < 200 ? 50e5 : 60e5) + noise(random);
-  const MatrixXd stepped = columns("compressibility", 0, 0);
-  EXPECT_LT((stepped.array() != 0.0).count(), log.samples() / 20);
-  EXPECT_NE(stepped(200, 0), 0.0);
-  // a chamber that takes over jumps to its pressure through the valves: not counted for 0.3 s before and after
-  c.pressure_a = 10e5 * log.time;
-  c.direction.tail(log.samples() - 500).setConstant(-1);
-  const MatrixXd switched = columns("compressibility", 0, 0);
-  for (const int k : {500 - 14, 499, 500, 500 + 14}) EXPECT_EQ(switched(k, 0), 0.0) << k;
-  for (const int k : {500 - 40, 500 + 40}) EXPECT_NE(switched(k, 0), 0.0) << k;
+  EXPECT_NEAR(columns("compressibility", 0, 0, {0.0})(500, 0) * 1e-9, -1.1e-3, 1e-9);
+}
+
+// 50 bar more in a chamber of 1.1 m at 1 GPa are 5.5 mm, at once or late; also as the chamber takes over.
+TEST_F(FlowEffects, AJumpOfPressureMovesTheRodAsFarHoweverLate) {
+  CylinderSeries& c = log.cylinders[0];
+  c.length.setConstant(1.0);
+  c.pressure_a = VectorXd::Constant(log.samples(), 20e5);
+  c.pressure_b = VectorXd::Constant(log.samples(), 90e5);
+  c.pressure_a.segment(300, log.samples() - 300).setConstant(70e5);
+  // what is measured counts, not what a filter made of it
+  c.measured_a = c.pressure_a;
+  c.measured_b = c.pressure_b;
+  c.pressure_a.setZero();
+  c.direction.setConstant(-1);
+  c.direction.tail(log.samples() - 300).setConstant(1);
+  for (const double tau : {0.0, 0.2}) {
+    const MatrixXd col = columns("compressibility", 0, 0, {tau});
+    EXPECT_EQ(col(299, 0), 0.0);
+    // a lag sampled every 20 ms moves the sum by less than 1e-3
+    EXPECT_NEAR(col.topRows(900).sum() * log.step * 1e-9, -5.5e-3, 6e-6) << tau;
+  }
+  EXPECT_LT(columns("compressibility", 0, 0, {0.2}).col(0).cwiseAbs().maxCoeff(),
+            0.2 * columns("compressibility", 0, 0, {0.0}).col(0).cwiseAbs().maxCoeff());
 }
 
 TEST_F(FlowEffects, SitWhereThereIsOilAndSayNothingWithoutACommand) {

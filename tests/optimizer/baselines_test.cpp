@@ -120,6 +120,9 @@ TEST(Baselines, EveryKindKeepsAllLimitsBetweenTheKnotsOrSaysWhyNot) {
     EXPECT_FALSE(none.found()) << kind;
     EXPECT_THAT(none.why, HasSubstr("needs")) << kind;
   }
+  // the pseudo-inverse's postures are among the choices
+  EXPECT_LE(set.at(kBestTipLine, 16.0).energy.total,
+            set.at(kTipLine, 16.0).energy.total * (1 + 1e-12));
   // the best end posture is at least as cheap as the nearest
   EXPECT_LE(set.at(kJointLine, 16.0).energy.total,
             set.at(kNearestJointLine, 16.0).energy.total * (1 + 1e-12));
