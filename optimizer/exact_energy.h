@@ -20,6 +20,9 @@ struct MotionEnergy {
   double moving_share_outside_data =
       0.0;  ///< share of moving cylinder-time outside its process' data box
   std::vector<double> share_moving;  ///< share of time with 0, 1, 2, ... cylinders moving
+
+  /// The pumps give less than machine and load gain: pressures extrapolated far from what they were learned at.
+  bool impossible() const { return total < potential_difference; }
 };
 
 /// Integrates the exact law over a motion: midpoint rule on every interval cut into `refine` parts. Whether

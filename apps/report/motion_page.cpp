@@ -290,6 +290,12 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
         fmt::format("{:.0f} % of the energy", 100.0 * lost / std::max(1.0, result.energy.total))},
        {fmt::format("{:+.1f}", result.energy.potential_difference / 1e3), "kJ",
         "potential energy gained", "end posture against start"}});
+  if (result.energy.impossible()) {
+    page.paragraph(
+        "Warning: the pump gives less energy than machine and load gain. The pressures here are "
+        "extrapolated to "
+        "loads they were never learned at; fit the model with such loads.");
+  }
   if (result.energy.moving_share_outside_data > 0.02) {
     page.paragraph(
         fmt::format("{:.0f} % of the cylinders' moving time lies outside the flows and forces the "

@@ -173,6 +173,12 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
         "pressure +-{:.1f} bar",
         100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
   }
+  if (r.energy.impossible()) {
+    add("  WARNING              the pump gives less energy than machine and load gain: pressures "
+        "here are\n"
+        "                       extrapolated to loads they were never learned at; fit with such "
+        "loads");
+  }
   int usable = 0, distinct = 0;
   for (const StartResult& s : r.starts) {
     usable += s.motion.size() > 1 && s.excess <= 1e-4;
