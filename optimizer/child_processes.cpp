@@ -177,4 +177,16 @@ std::vector<double> Unpacker::numbers() {
   return values;
 }
 
+Packer& Packer::matrix(const Eigen::MatrixXd& value) {
+  number(static_cast<double>(value.rows())).number(static_cast<double>(value.cols()));
+  return numbers(value.data(), static_cast<std::size_t>(value.size()));
+}
+
+Eigen::MatrixXd Unpacker::matrix() {
+  const auto rows = static_cast<Eigen::Index>(number());
+  const auto cols = static_cast<Eigen::Index>(number());
+  const std::vector<double> values = numbers();
+  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
+}
+
 }  // namespace sparflow

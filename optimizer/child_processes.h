@@ -1,6 +1,7 @@
 #pragma once
 /// Independent solves in child processes: the solver underneath is not thread-safe (MUMPS keeps module
 /// variables), processes are.
+#include <Eigen/Core>
 #include <functional>
 #include <string>
 #include <vector>
@@ -30,6 +31,7 @@ class Packer {
   Packer& number(double value);
   Packer& text(const std::string& value);
   Packer& numbers(const double* values, std::size_t count);
+  Packer& matrix(const Eigen::MatrixXd& value);
   std::string bytes() const { return bytes_; }
 
  private:
@@ -42,6 +44,7 @@ class Unpacker {
   double number();
   std::string text();
   std::vector<double> numbers();
+  Eigen::MatrixXd matrix();
 
  private:
   void take(void* out, std::size_t size);

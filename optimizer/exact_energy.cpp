@@ -8,6 +8,7 @@
 #include "models/effects/effective_machine.h"
 #include "models/units.h"
 #include "optimizer/crane_knot_model.h"
+#include "optimizer/instants.h"
 #include "problems/clearance.h"
 
 namespace sparflow {
@@ -29,38 +30,33 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
   energy.share_moving.assign(cylinders + 1, 0.0);
   if (motion.size() < 2) return energy;
   Chain chain(model);
-  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
   double moving_time = 0.0, outside_time = 0.0;
-  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
-    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
-    qdd = motion.qdd.row(k);
-    for (int part = 0; part < refine; ++part) {
-      const double dt = (part + 0.5) * step;
-      q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
-      qd = motion.qd.row(k) + dt * motion.qdd.row(k);
-      const MachineState& state =
-          chain.evaluate(q.data(), qd.data(), payload, true, kRestSpeed, qdd.data());
-      energy.total += step * state.power;
-      for (std::size_t p = 0; p < state.pumps.size(); ++p) {
-        energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
-      }
-      std::size_t moving = 0;
-      for (std::size_t i = 0; i < cylinders; ++i) {
-        const CylinderState& c = state.cylinders[i];
-        if (!c.moving) continue;
-        ++moving;
-        energy.throttling[i] += step * state.throttling(model.machine, static_cast<int>(i));
-        energy.useful[i] += step * c.pressure * c.flow;
-        energy.largest_pressure_std = std::max(energy.largest_pressure_std, c.pressure_std);
-        const GaussianProcess& process =
-            c.speed > 0.0 ? model.cylinders[i].extend : model.cylinders[i].retract;
-        moving_time += step;
-        if (!process.empty() && outside_data(process.parameters(), c.flow, c.total_force))
-          outside_time += step;
-      }
-      energy.share_moving[moving] += step;
-    }
-  }
+  for_each_instant(
+      motion, refine,
+      [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
+          double step) {
+        const MachineState& state =
+            chain.evaluate(q.data(), qd.data(), payload, true, kRestSpeed, qdd.data());
+        energy.total += step * state.power;
+        for (std::size_t p = 0; p < state.pumps.size(); ++p) {
+          energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
+        }
+        std::size_t moving = 0;
+        for (std::size_t i = 0; i < cylinders; ++i) {
+          const CylinderState& c = state.cylinders[i];
+          if (!c.moving) continue;
+          ++moving;
+          energy.throttling[i] += step * state.throttling(model.machine, static_cast<int>(i));
+          energy.useful[i] += step * c.pressure * c.flow;
+          energy.largest_pressure_std = std::max(energy.largest_pressure_std, c.pressure_std);
+          const GaussianProcess& process =
+              c.speed > 0.0 ? model.cylinders[i].extend : model.cylinders[i].retract;
+          moving_time += step;
+          if (!process.empty() && outside_data(process.parameters(), c.flow, c.total_force))
+            outside_time += step;
+        }
+        energy.share_moving[moving] += step;
+      });
   for (double& share : energy.share_moving) share /= motion.duration();
   energy.moving_share_outside_data = moving_time > 0.0 ? outside_time / moving_time : 0.0;
   const Eigen::Index last = motion.size() - 1;
@@ -74,19 +70,14 @@ double exact_total_energy(const CraneModel& model, const Trajectory& motion, dou
                           int refine) {
   if (motion.size() < 2) return 0.0;
   Chain chain(model);
-  Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
   double total = 0.0;
-  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
-    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
-    qdd = motion.qdd.row(k);
-    for (int part = 0; part < refine; ++part) {
-      const double dt = (part + 0.5) * step;
-      q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
-      qd = motion.qd.row(k) + dt * motion.qdd.row(k);
-      total +=
-          step * chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data()).power;
-    }
-  }
+  for_each_instant(
+      motion, refine,
+      [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
+          double step) {
+        total += step *
+                 chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data()).power;
+      });
   return total;
 }
 

@@ -12,6 +12,7 @@
 #include "optimizer/self_motion.h"
 #include "problems/clearance.h"
 #include "problems/motion_limits.h"
+#include "problems/time_parametrise.h"
 
 namespace sparflow {
 namespace {
@@ -52,26 +53,6 @@ MatrixXd spline_controls(const Trajectory& motion) {
     c.row(k) = motion.q.row(k) + 0.5 * (motion.t[k + 1] - motion.t[k]) * motion.qd.row(k);
   }
   return c;
-}
-
-/// The uniform quadratic B-spline of control points; the first and last count twice: rest at both ends.
-Trajectory spline_motion(const MatrixXd& c, double duration) {
-  const Eigen::Index n = c.rows();
-  const double h = duration / static_cast<double>(n);
-  const auto control = [&](Eigen::Index k) { return c.row(std::clamp<Eigen::Index>(k, 0, n - 1)); };
-  Trajectory m;
-  m.t.resize(n + 1);
-  m.q.resize(n + 1, c.cols());
-  m.qd.resize(n + 1, c.cols());
-  m.qdd.resize(n + 1, c.cols());
-  for (Eigen::Index k = 0; k <= n; ++k) {
-    const Eigen::Index i = std::min(k, n - 1);
-    m.t[k] = k == n ? duration : h * static_cast<double>(k);
-    m.q.row(k) = 0.5 * (control(k - 1) + control(k));
-    m.qd.row(k) = (control(k) - control(k - 1)) / h;
-    m.qdd.row(k) = (control(i + 1) - 2.0 * control(i) + control(i - 1)) / (h * h);
-  }
-  return m;
 }
 
 /// Row of `c` at a share of its rows, linear between them.
@@ -344,7 +325,8 @@ PathRedundancy refined_line(const CraneModel& model, const MotionProblem& proble
     }
     coarse = std::move(next);
     if (stages < options.intervals) continue;
-    const Trajectory motion = spline_motion(coarse.control, duration);
+    const Trajectory motion =
+        spline_motion(coarse.control, duration / static_cast<double>(coarse.control.rows()));
     const double energy = exact_total_energy(model, motion, problem.payload, 4);
     const bool settled = std::abs(energy - last) < options.energy_change * last;
     last = std::min(last, energy);

@@ -3,34 +3,18 @@
 #include "optimizer/child_processes.h"
 
 namespace sparflow {
-namespace {
-
-void pack_matrix(Packer& p, const Eigen::MatrixXd& m) {
-  p.number(static_cast<double>(m.rows())).number(static_cast<double>(m.cols()));
-  p.numbers(m.data(), static_cast<std::size_t>(m.size()));
-}
-
-Eigen::MatrixXd unpack_matrix(Unpacker& u) {
-  const auto rows = static_cast<Eigen::Index>(u.number());
-  const auto cols = static_cast<Eigen::Index>(u.number());
-  const std::vector<double> values = u.numbers();
-  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
-}
-
-}  // namespace
-
 std::string pack_start(const StartResult& r) {
   Packer p;
   p.text(r.seed).number(static_cast<double>(r.status)).text(r.message);
-  pack_matrix(p, r.motion.t);
-  pack_matrix(p, r.motion.q);
-  pack_matrix(p, r.motion.qd);
-  pack_matrix(p, r.motion.qdd);
+  p.matrix(r.motion.t);
+  p.matrix(r.motion.q);
+  p.matrix(r.motion.qd);
+  p.matrix(r.motion.qdd);
   p.number(r.duration).number(r.cost).number(r.plan.count());
   p.number(static_cast<double>(r.plan.modes.cols()));
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     p.number(static_cast<double>(r.plan.modes.data()[i]));
-  pack_matrix(p, r.plan.durations);
+  p.matrix(r.plan.durations);
   p.number(static_cast<double>(r.plan.waypoint_after.size()));
   for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
@@ -49,17 +33,17 @@ StartResult unpack_start(const std::string& bytes) {
   r.seed = u.text();
   r.status = static_cast<NlpStatus>(static_cast<int>(u.number()));
   r.message = u.text();
-  r.motion.t = unpack_matrix(u);
-  r.motion.q = unpack_matrix(u);
-  r.motion.qd = unpack_matrix(u);
-  r.motion.qdd = unpack_matrix(u);
+  r.motion.t = u.matrix();
+  r.motion.q = u.matrix();
+  r.motion.qd = u.matrix();
+  r.motion.qdd = u.matrix();
   r.duration = u.number();
   r.cost = u.number();
   const auto phases = static_cast<Eigen::Index>(u.number());
   r.plan.modes.resize(phases, static_cast<Eigen::Index>(u.number()));
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
     r.plan.modes.data()[i] = static_cast<CylinderMode>(static_cast<int>(u.number()));
-  r.plan.durations = unpack_matrix(u);
+  r.plan.durations = u.matrix();
   r.plan.waypoint_after.resize(static_cast<std::size_t>(u.number()));
   for (int& phase : r.plan.waypoint_after) phase = static_cast<int>(u.number());
   r.energy_exact = u.number();

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "models/error.h"
+#include "optimizer/instants.h"
 
 namespace sparflow {
 namespace {
@@ -21,25 +22,19 @@ void add_pump_pressures(const CraneModel& model, double payload, StrategyOutcome
   constexpr int kParts = 4;
   std::vector<double> delivering(pumps, 0.0);
   Chain chain(model);
-  Eigen::VectorXd q, qd, qdd;
-  const Trajectory& m = outcome.motion;
-  for (Eigen::Index k = 0; k + 1 < m.size(); ++k) {
-    const double step = (m.t[k + 1] - m.t[k]) / kParts;
-    qdd = m.qdd.row(k);
-    for (int part = 0; part < kParts; ++part) {
-      const double dt = (part + 0.5) * step;
-      q = m.q.row(k) + dt * m.qd.row(k) + 0.5 * dt * dt * m.qdd.row(k);
-      qd = m.qd.row(k) + dt * m.qdd.row(k);
-      const MachineState& s =
-          chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
-      for (std::size_t p = 0; p < pumps; ++p) {
-        outcome.peak_pressure[p] = std::max(outcome.peak_pressure[p], s.pumps[p].pressure);
-        if (s.pumps[p].flow <= 0.0) continue;
-        delivering[p] += step;
-        outcome.mean_pressure[p] += step * s.pumps[p].pressure;
-      }
-    }
-  }
+  for_each_instant(outcome.motion, kParts,
+                   [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
+                       const Eigen::VectorXd& qdd, double step) {
+                     const MachineState& s = chain.evaluate(q.data(), qd.data(), payload, false,
+                                                            kRestSpeed, qdd.data());
+                     for (std::size_t p = 0; p < pumps; ++p) {
+                       outcome.peak_pressure[p] =
+                           std::max(outcome.peak_pressure[p], s.pumps[p].pressure);
+                       if (s.pumps[p].flow <= 0.0) continue;
+                       delivering[p] += step;
+                       outcome.mean_pressure[p] += step * s.pumps[p].pressure;
+                     }
+                   });
   for (std::size_t p = 0; p < pumps; ++p) {
     if (delivering[p] > 0.0) outcome.mean_pressure[p] /= delivering[p];
   }

@@ -5,18 +5,6 @@
 namespace sparflow {
 namespace {
 
-void put_matrix(Packer& p, const Eigen::MatrixXd& m) {
-  p.number(static_cast<double>(m.rows())).number(static_cast<double>(m.cols()));
-  p.numbers(m.data(), static_cast<std::size_t>(m.size()));
-}
-
-Eigen::MatrixXd take_matrix(Unpacker& u) {
-  const auto rows = static_cast<Eigen::Index>(u.number());
-  const auto cols = static_cast<Eigen::Index>(u.number());
-  const std::vector<double> values = u.numbers();
-  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
-}
-
 void put_list(Packer& p, const std::vector<double>& v) { p.numbers(v.data(), v.size()); }
 
 void put_energy(Packer& p, const MotionEnergy& e) {
@@ -42,18 +30,18 @@ MotionEnergy take_energy(Unpacker& u) {
 }
 
 void put_motion(Packer& p, const Trajectory& m) {
-  put_matrix(p, m.t);
-  put_matrix(p, m.q);
-  put_matrix(p, m.qd);
-  put_matrix(p, m.qdd);
+  p.matrix(m.t);
+  p.matrix(m.q);
+  p.matrix(m.qd);
+  p.matrix(m.qdd);
 }
 
 Trajectory take_motion(Unpacker& u) {
   Trajectory m;
-  m.t = take_matrix(u);
-  m.q = take_matrix(u);
-  m.qd = take_matrix(u);
-  m.qdd = take_matrix(u);
+  m.t = u.matrix();
+  m.q = u.matrix();
+  m.qd = u.matrix();
+  m.qdd = u.matrix();
   return m;
 }
 

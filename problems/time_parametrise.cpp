@@ -175,8 +175,9 @@ VectorXd point_at(const Grid& grid, const Run& run, double when, std::size_t& pi
   return grid.q[piece] + share * (grid.q[piece + 1] - grid.q[piece]);
 }
 
-/// The quadratic B-spline motion of control points `c` (rows), interval h.
-Trajectory spline(const MatrixXd& c, double h) {
+}  // namespace
+
+Trajectory spline_motion(const MatrixXd& c, double h) {
   const Eigen::Index n = c.rows();  // intervals; the first and last control point count twice
   const auto control = [&](Eigen::Index k) { return c.row(std::clamp<Eigen::Index>(k, 0, n - 1)); };
   Trajectory motion;
@@ -193,8 +194,6 @@ Trajectory spline(const MatrixXd& c, double h) {
   }
   return motion;
 }
-
-}  // namespace
 
 TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path, double duration,
                              const TimingOptions& options) {
@@ -225,7 +224,7 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
       control.row(intervals - 1) = path.bottomRows(1);
     }
     // Ratios at interval 1 s tell by how much time must be stretched.
-    const Trajectory unit = spline(control, 1.0);
+    const Trajectory unit = spline_motion(control, 1.0);
     LimitRatios limits(problem);
     double interval = kLeastInterval;
     std::string name;
@@ -245,7 +244,7 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
     result.shortest = interval * intervals;
     const bool too_short = duration > 0.0 && duration < result.shortest;
     const double taken = duration > 0.0 && !too_short ? duration : result.shortest;
-    result.motion = spline(control, taken / intervals);
+    result.motion = spline_motion(control, taken / intervals);
     result.motion.t[intervals] = taken;
     result.stops = !round && waypoints.size() > 2;
     const Nearest nearest = clearance.nearest_on(result.motion, kFine);

@@ -49,4 +49,8 @@ struct TimedMotion {
 TimedMotion time_parametrise(const MotionProblem& problem, const Eigen::MatrixXd& path,
                              double duration, const TimingOptions& options = {});
 
+/// The uniform quadratic B-spline of control points [intervals x joints], the first and last counted twice: rest at both
+/// ends where the first two and the last two are equal; piecewise constant acceleration. @param h interval [s]
+Trajectory spline_motion(const Eigen::MatrixXd& control, double h);
+
 }  // namespace sparflow
