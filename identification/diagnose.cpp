@@ -10,6 +10,7 @@
 #include "identification/effect_estimate.h"
 #include "identification/experiment.h"
 #include "identification/unexplained.h"
+#include "models/effects/hydraulics.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -123,14 +124,19 @@ bool shows_too(const Machine& machine, const EvidenceChannel& from, const Eviden
   return of_chambers(to) && from.index == to.index;
 }
 
-/// What an effect takes away where it does most, in units of what stays there.
-double strength(const DiagnosedEffect& e) {
-  double most = 0.0;
-  for (const ChannelGain& g : e.channels) {
-    const double squares = g.rmse_before * g.rmse_before - g.rmse_after * g.rmse_after;
-    most = std::max(most, std::sqrt(std::max(0.0, squares)) / std::max(g.rmse_after, 1e-300));
-  }
-  return most;
+/// A channel's value in what its neighbours by `shows_too` can be compared in: [Pa], of speeds [m^3/s].
+double common_size(const Machine& machine, const EvidenceChannel& channel, double value) {
+  if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow) return value;
+  const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(channel.index)];
+  if (!cylinder.hydraulic()) return value;
+  const double area = supply_area(cylinder, 1);
+  return channel.kind == EvidenceKind::kForce ? value / area : value * area;
+}
+
+/// RMS of what an effect takes away where it does most.
+double size_of(const DiagnosedEffect& e) {
+  const ChannelGain& g = e.channels.front();
+  return std::sqrt(std::max(0.0, g.rmse_before * g.rmse_before - g.rmse_after * g.rmse_after));
 }
 
 /// Whether riddles leave open that the effect is what it is called: one in its own channel, or a larger one in a
@@ -138,14 +144,16 @@ double strength(const DiagnosedEffect& e) {
 /// wherever its reading goes: for it a riddle in one place is one in all.
 bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
                  const std::vector<Leftover>& riddles) {
+  const Machine& machine = *evidence.series[0].machine;
   const bool sensor = e.effect.effect->info().stage == EffectStage::kSensor;
   return std::any_of(riddles.begin(), riddles.end(), [&](const Leftover& r) {
     const auto own = [&](const ChannelGain& g) { return g.channel == r.channel; };
     if (own(e.channels.front())) return true;
     if (sensor && std::any_of(e.channels.begin(), e.channels.end(), own)) return true;
-    return shows_too(*evidence.series[0].machine, evidence.channels[r.channel],
-                     evidence.channels[e.channels.front().channel]) &&
-           r.rms > strength(e) * r.noise;
+    const EvidenceChannel &there = evidence.channels[r.channel],
+                          &here = evidence.channels[e.channels.front().channel];
+    return shows_too(machine, there, here) &&
+           common_size(machine, there, r.rms) > common_size(machine, here, size_of(e));
   });
 }
 
