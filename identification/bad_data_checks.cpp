@@ -112,12 +112,31 @@ double log_chance(const Repeats& all, const Repeats& inside) {
   return sum;
 }
 
-/// Largest step into and out of a stretch.
-double entry_step(const VectorXd& values, SampleRange s) {
-  double step = 0.0;
-  if (s.begin > 0) step = std::abs(values[s.begin] - values[s.begin - 1]);
-  if (s.end < values.size()) step = std::max(step, std::abs(values[s.end] - values[s.end - 1]));
-  return step;
+/// Whether the channel's cylinder (any, for a pump) is set going, stopped or turned round near a sample: a chamber
+/// is filled or emptied then, at once.
+bool turns_near(const CheckContext& context, const CheckedChannel& c, Index k) {
+  constexpr double kAnswers = 0.3;  // [s] of a valve
+  const auto around = static_cast<Index>(std::ceil(kAnswers / std::max(context.log.step, 1e-9)));
+  for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
+    if (c.cylinder >= 0 && c.cylinder != static_cast<int>(i)) continue;
+    const Eigen::VectorXi& direction = context.signals.cylinders[i].direction;
+    const Index last = std::min(k + around, direction.size() - 1);
+    for (Index j = std::max<Index>(1, k - around); j <= last; ++j) {
+      if (direction[j] != direction[j - 1]) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether a stretch at the end of the range was reached and left as pressures are: gently, or by what the machine
+/// did itself just then. A broken sensor knows nothing of that.
+bool reached_by_machine(const CheckContext& context, const CheckedChannel& c,
+                        const VectorXd& values, SampleRange s, double gentle) {
+  const auto by_machine = [&](Index k) {  // from k - 1 to k
+    return k <= 0 || k >= values.size() || std::abs(values[k] - values[k - 1]) < gentle ||
+           turns_near(context, c, k);
+  };
+  return by_machine(s.begin) && by_machine(s.end);
 }
 
 /// Never changes although its cylinder is driven both ways: the habits of the channel say nothing then.
@@ -306,10 +325,9 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
     Repeats inside;
     inside.add(values, state, s);
     if (log_chance(all, inside) > limit) continue;
-    // a sensor that ends at zero, reached gently, is clipped there but not broken
-    const bool gentle =
-        entry_step(values, s) < 10.0 * context.noise[channel].typical + c.least_jump;
-    if (values[s.begin] == 0.0 && gentle) continue;
+    // a sensor that ends at zero is clipped there but not broken
+    const double gentle = 10.0 * context.noise[channel].typical + c.least_jump;
+    if (values[s.begin] == 0.0 && reached_by_machine(context, c, values, s, gentle)) continue;
     zero = zero && values[s.begin] == 0.0;
     found.affected.segment(s.begin, s.size()).setConstant(true);
     if (s.size() > longest.size()) longest = s;

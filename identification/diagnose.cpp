@@ -10,6 +10,7 @@
 #include "identification/effect_estimate.h"
 #include "identification/experiment.h"
 #include "identification/unexplained.h"
+#include "models/effects/hydraulics.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -106,6 +107,54 @@ double leftover_share(const Diagnosis& d, const Leftover& left) {
   // a swing that comes and goes is measured where it is: over the whole log it cannot be more than all that is left
   const double flexible = std::min(left.rms * left.rms, after * after);
   return flexible / std::max(catalogue + flexible, 1e-300);
+}
+
+/// Whether a cause in channel `from` shows in `to` too: all that one cylinder's chamber sensors make, the demand they
+/// are for its pump, and the flows that one pump shares out.
+bool shows_too(const Machine& machine, const EvidenceChannel& from, const EvidenceChannel& to) {
+  const auto of_chambers = [](const EvidenceChannel& c) {
+    return c.kind != EvidenceKind::kFlow && c.kind != EvidenceKind::kPump;
+  };
+  if (from.kind == EvidenceKind::kFlow && to.kind == EvidenceKind::kFlow) {
+    const int pump = machine.pump_of_cylinder(from.index);
+    return pump >= 0 && machine.pump_of_cylinder(to.index) == pump;
+  }
+  if (!of_chambers(from)) return false;
+  if (to.kind == EvidenceKind::kPump) return machine.pump_of_cylinder(from.index) == to.index;
+  return of_chambers(to) && from.index == to.index;
+}
+
+/// A channel's value in what its neighbours by `shows_too` can be compared in: [Pa], of speeds [m^3/s].
+double common_size(const Machine& machine, const EvidenceChannel& channel, double value) {
+  if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow) return value;
+  const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(channel.index)];
+  if (!cylinder.hydraulic()) return value;
+  const double area = supply_area(cylinder, 1);
+  return channel.kind == EvidenceKind::kForce ? value / area : value * area;
+}
+
+/// RMS of what an effect takes away where it does most.
+double size_of(const DiagnosedEffect& e) {
+  const ChannelGain& g = e.channels.front();
+  return std::sqrt(std::max(0.0, g.rmse_before * g.rmse_before - g.rmse_after * g.rmse_after));
+}
+
+/// Whether riddles leave open that the effect is what it is called: one in its own channel, or a larger one in a
+/// channel that shows it too, of which the effect may be the smaller half. A sensor's error is one and the same
+/// wherever its reading goes: for it a riddle in one place is one in all.
+bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
+                 const std::vector<Leftover>& riddles) {
+  const Machine& machine = *evidence.series[0].machine;
+  const bool sensor = e.effect.effect->info().stage == EffectStage::kSensor;
+  return std::any_of(riddles.begin(), riddles.end(), [&](const Leftover& r) {
+    const auto own = [&](const ChannelGain& g) { return g.channel == r.channel; };
+    if (own(e.channels.front())) return true;
+    if (sensor && std::any_of(e.channels.begin(), e.channels.end(), own)) return true;
+    const EvidenceChannel &there = evidence.channels[r.channel],
+                          &here = evidence.channels[e.channels.front().channel];
+    return shows_too(machine, there, here) &&
+           common_size(machine, there, r.rms) > common_size(machine, here, size_of(e));
+  });
 }
 
 Unexplained describe(const Evidence& evidence, const Leftover& left) {
@@ -230,17 +279,17 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   }
   if (progress) progress(0.92, "looking at what is left");
   const std::vector<Leftover> left = find_leftovers(d.evidence, d.search.final);
-  bool unknown = false;
-  std::vector<std::size_t> dominated;
+  std::vector<Leftover> riddles;
+  bool in_touched = false;
   for (const Leftover& l : left) {
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
     const double share = leftover_share(d, l);
     if (touched) d.leftover_share = std::max(d.leftover_share, share);
     if (share < kLargestLeftoverShare) continue;
-    if (!d.unexplained || (touched && !unknown)) d.unexplained = describe(d.evidence, l);
-    unknown = unknown || touched;
-    dominated.push_back(l.channel);
+    if (!d.unexplained || (touched && !in_touched)) d.unexplained = describe(d.evidence, l);
+    in_touched = in_touched || touched;
+    riddles.push_back(l);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
@@ -249,16 +298,10 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe(d, i, options.search));
   // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
-  for (const DiagnosedEffect& e : d.effects) {
-    const auto is_dominated = [&](const ChannelGain& g) {
-      return std::find(dominated.begin(), dominated.end(), g.channel) != dominated.end();
-    };
-    // a sensor's error is one and the same wherever its reading goes: a riddle in one place is one in all
-    const bool doubtful = is_dominated(e.channels.front()) ||
-                          (e.effect.effect->info().stage == EffectStage::kSensor &&
-                           std::any_of(e.channels.begin(), e.channels.end(), is_dominated));
-    unknown = unknown && doubtful;
-  }
+  const bool unknown = !riddles.empty() && std::all_of(d.effects.begin(), d.effects.end(),
+                                                       [&](const DiagnosedEffect& e) {
+                                                         return is_doubtful(d.evidence, e, riddles);
+                                                       });
   d.verdict = unknown              ? Verdict::kUnknown
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown

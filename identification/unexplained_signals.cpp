@@ -1,14 +1,22 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "identification/unexplained.h"
 #include "models/effects/hydraulics.h"
+#include "models/effects/memory.h"
 #include "models/effects/valve_flow.h"
 
 namespace sparflow {
 
 using Eigen::Index;
 using Eigen::VectorXd;
+
+namespace {
+/// [s] Time constants of what answers the pump's power late. A first-order answer between them is nearly a sum of both.
+constexpr double kLate[] = {0.3, 1.5};
+}  // namespace
 
 std::vector<SignalColumn> channel_signals(const Evidence& evidence,
                                           const EvidenceChannel& channel) {
@@ -89,15 +97,34 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
                                           Index) { return at(s.pumps[p].pressure, k); });
   }
   // of a pump: power, and what its pressure leaves over the spool of this channel's cylinder
+  // and what that power was a while ago: engines, thermal valves and power controllers answer it late
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     if (channel.kind == EvidenceKind::kPump) continue;
-    add("power of " + machine.pumps[p].name,
-        [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
-          double flow = 0.0;
-          for (const int i : machine.pumps[p].feeds)
-            flow += flow_of(s, static_cast<std::size_t>(i), k);
-          return at(s.pumps[p].pressure, k) * flow;
-        });
+    std::vector<VectorXd> power;
+    power.reserve(evidence.series.size());
+    for (const MachineSeries& s : evidence.series) {
+      power.emplace_back(VectorXd::Zero(s.samples()));
+      for (Index k = 0; k < s.samples(); ++k) {
+        double flow = 0.0;
+        for (const int i : machine.pumps[p].feeds)
+          flow += flow_of(s, static_cast<std::size_t>(i), k);
+        power.back()[k] = at(s.pumps[p].pressure, k) * flow;
+      }
+    }
+    const auto add_power = [&](const std::string& name, const std::vector<VectorXd>& of) {
+      add(name, [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+        return of[static_cast<std::size_t>(&s - evidence.series.data())][k];
+      });
+    };
+    const std::string name = "power of " + machine.pumps[p].name;
+    add_power(name, power);
+    for (const double late : kLate) {
+      std::vector<VectorXd> lagged;
+      lagged.reserve(power.size());
+      for (std::size_t l = 0; l < power.size(); ++l)
+        lagged.push_back(first_order_lag(evidence.series[l], power[l], late));
+      add_power(fmt::format("{} {:.1f} s late", name, late), lagged);
+    }
   }
   if (channel.kind == EvidenceKind::kFlow && machine.pump_of_cylinder(channel.index) >= 0) {
     const auto pump = static_cast<std::size_t>(machine.pump_of_cylinder(channel.index));

@@ -172,6 +172,23 @@ TEST(BadData, APressureClippedAtZeroWhereItIsLowAnywayPasses) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
+TEST(BadData, AChamberEmptiedByTheMachineBelowASensorsZeroIsNoDropOut) {
+  // the sensor reads 12 bar too little: whenever the arm stops, what is left in the chamber is below its zero
+  Log log = noisy_arm();
+  const MachineSignals signals = make_signals(arm_machine(), log);
+  const Eigen::VectorXi& direction = signals.cylinders[0].direction;
+  Eigen::VectorXd& x = channel(log, "pA_arm").values;
+  const double most = x.maxCoeff();
+  Eigen::Index rests = 0;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    if (direction[k] == 0) x[k] = 0.0;
+    rests += k > 0 && direction[k] == 0 && direction[k - 1] != 0 ? 1 : 0;
+  }
+  ASSERT_GT(rests, 1);
+  ASSERT_GT(most, 30.0 * kBar) << "steps that are not gentle";
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
 TEST(BadData, ASensorAtTheEndOfItsRange) {
   Log log = noisy_arm();
   Eigen::VectorXd& x = channel(log, "p_main").values;

@@ -186,6 +186,16 @@ TEST(Diagnose, RippleOfThePumpIsNotInTheCatalogue) {
   EXPECT_THAT(a.diagnosis.headline(), Not(IsEmpty()));
 }
 
+TEST(Diagnose, ADriftingSensorIsNotInTheCatalogue) {
+  // what looks like an effect in pressures and pump is the smaller half of a riddle in the force, from the same sensor
+  for (const int law : {0, 1}) {
+    const Answer a = with_reference({{"pressure_drift", "boom", 1.0, law}});
+    EXPECT_EQ(a.diagnosis.verdict, Verdict::kUnknown) << a.diagnosis.table();
+    ASSERT_TRUE(a.diagnosis.unexplained.has_value());
+    EXPECT_EQ(a.diagnosis.unexplained->at, "boom");
+  }
+}
+
 TEST(Diagnose, ABrokenSensorIsBadData) {
   for (const int law : {0, 1, 2}) {
     const HiddenCase logs =

@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "models/effects/memory.h"
 #include "tests/identification/evidence_support.h"
 #include "tests/identification/hidden_case.h"
 
@@ -132,6 +133,25 @@ TEST(Leftovers, AFunctionOfASignalIsFoundAndTheSignalNamed) {
   EXPECT_EQ(found[0].depends_on.front(), "q_jib");
   EXPECT_GT(found[0].explained, 0.25);
   EXPECT_EQ(found[0].frequency, 0.0);
+}
+
+TEST(Leftovers, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
+  // an engine that slows under load: between the two time constants that are offered
+  Left left(25);
+  const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
+  const MachineSeries& s = left.evidence.series[0];
+  VectorXd power = VectorXd::Zero(s.samples());
+  for (const CylinderSeries& cylinder : s.cylinders) power += cylinder.flow;
+  power = power.cwiseProduct(s.pumps[0].pressure);
+  for (double& p : power) p = std::isfinite(p) ? p : 0.0;
+  const VectorXd late = first_order_lag(s, power, 0.8);
+  const VectorXd& u = s.cylinders[0].command;
+  const double scale = 1.0 / (u.cwiseAbs().maxCoeff() * late.maxCoeff());
+  left.add(c, 8.0, [&](Index k) { return -scale * u[k] * late[k]; });
+  const std::vector<Leftover> found = find_leftovers(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("late")));
 }
 
 TEST(Leftovers, ALearnedProcessOwnInputsAreNoRiddle) {
