@@ -109,6 +109,10 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
   for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
     out.cylinders.push_back(cylinder_series(machine.cylinders[i], signals.cylinders[i]));
     CylinderSeries& c = out.cylinders.back();
+    c.opening = c.command;
+    for (const AppliedEffect& e : model.effects) {
+      e.effect->shape_opening(static_cast<int>(i), e.at, e.values, c.opening);
+    }
     if (c.force.size() > 0) {
       c.steady_force = c.static_force +
                        moving_average(out, c.force - c.static_force, c.direction, kSteadyForce_s);
