@@ -9,6 +9,7 @@
 
 #include "identification/effect_estimate.h"
 #include "identification/experiment.h"
+#include "identification/robust.h"
 #include "identification/unexplained.h"
 #include "models/effects/hydraulics.h"
 #include "models/error.h"
@@ -32,6 +33,7 @@ double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd
   return n > 0.0 ? std::sqrt(squares / n) : 0.0;
 }
 
+/// @param index of a found effect; their number: all of them
 EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   std::vector<const EffectDesign*> others;
   for (std::size_t i = 0; i < d.search.found.size(); ++i) {
@@ -40,6 +42,50 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   FitControl control;
   control.keep_residuals = true;
   return fit_effects(d.evidence, others, nullptr, control);
+}
+
+/// Whether the model and what was found follow a pump's steps down to what they leave elsewhere: then it is the pump
+/// that is late or at its limit, no sensor that jumps.
+bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& bad,
+                   std::size_t log) {
+  constexpr double kAlike = 3.0;  // standard deviations of the rest
+  // a jump that is shorter than the filter is hardly seen behind it
+  const bool brief = std::any_of(bad.stretches.begin(), bad.stretches.end(), [&](const auto& jump) {
+    return jump.second - jump.first < d.evidence.window;
+  });
+  if (brief) return false;
+  for (std::size_t i = 0; i < d.evidence.channels.size(); ++i) {
+    const EvidenceChannel& c = d.evidence.channels[i];
+    if (c.kind != EvidenceKind::kPump || "p_" + c.at != bad.channel) continue;
+    const VectorXd& time = d.evidence.series[log].time;
+    double squares = 0.0, n = 0.0;
+    for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+      if (static_cast<std::size_t>(c.log[b]) != log) continue;
+      for (Index row = c.blocks[b].first; row < c.blocks[b].last; ++row) {
+        const double t = time[c.sample[static_cast<std::size_t>(row)]];
+        const bool inside =
+            std::any_of(bad.stretches.begin(), bad.stretches.end(),
+                        [&](const auto& jump) { return t > jump.first && t < jump.second; });
+        if (!inside) continue;
+        squares += std::pow(fit.residual[i][row], 2);
+        n += 1.0;
+      }
+    }
+    return n > 0.0 && std::sqrt(squares / n) < kAlike * robust_std(fit.residual[i]);
+  }
+  return false;
+}
+
+/// Takes out the jumps that are physics.
+void keep_what_is_no_physics(const Diagnosis& d, const std::vector<std::size_t>& log_of,
+                             std::vector<BadChannel>& bad) {
+  const EffectFit fit = fit_without(d, d.search.found.size());
+  std::vector<BadChannel> kept;
+  kept.reserve(bad.size());
+  for (std::size_t i = 0; i < bad.size(); ++i) {
+    if (!follows_steps(d, fit, bad[i], log_of[i])) kept.push_back(std::move(bad[i]));
+  }
+  bad = std::move(kept);
 }
 
 DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOptions& options) {
@@ -332,11 +378,13 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
     throw InputError({}, "logs", "no log to diagnose: give at least one with --log");
   std::vector<MachineSignals> suspects, pinned;
   std::vector<BadChannel> bad;
+  std::vector<std::size_t> log_of;  // each bad channel's
   for (const Log& log : logs) {
     suspects.push_back(make_signals(model.machine, log, options.signals));
     if (!options.check_data) continue;
     for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back()))
       bad.push_back(std::move(b));
+    log_of.resize(bad.size(), suspects.size() - 1);
   }
   for (const Log& log : references)
     pinned.push_back(make_signals(model.machine, log, options.signals));
@@ -346,6 +394,7 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
       bad.begin(), bad.end(), [](const BadChannel& b) { return b.kind != BadDataKind::kJumping; });
   if (!surely_bad) {
     Diagnosis d = diagnose_signals(model, suspects, pinned, options, progress);
+    if (!bad.empty()) keep_what_is_no_physics(d, log_of, bad);
     if (!bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
     d.bad = std::move(bad);
     return d;

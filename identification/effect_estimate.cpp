@@ -9,6 +9,7 @@
 #include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
 #include "identification/search_candidates.h"
+#include "identification/series.h"
 #include "models/error.h"
 
 namespace sparflow {
@@ -79,6 +80,7 @@ class Estimator {
             const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
             const std::vector<AppliedEffect>* in_references)
       : base_(model),
+        known_(model.effects),
         suspects_(suspects),
         references_(references),
         sharp_(can_sharpen(suspects) && (references.empty() || can_sharpen(references))),
@@ -142,6 +144,8 @@ class Estimator {
 
   Evidence collect(const CraneModel& model) const {
     Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, sharp_);
+    // a lag stays behind the dead band that was known before, also while both are estimated
+    for (MachineSeries& s : evidence.series) set_openings(known_, s);
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
     return evidence;
@@ -303,6 +307,7 @@ class Estimator {
   }
 
   CraneModel base_;
+  std::vector<AppliedEffect> known_;  ///< the model's, wanted or not
   std::vector<MachineSignals> suspects_, references_;
   bool sharp_ = false;  // all logs through a shorter window than the search's, rows up to the ends
   const std::vector<Mask>& leave_out_;

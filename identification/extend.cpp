@@ -194,6 +194,15 @@ void add_look_alikes(const Diagnosis& d, const EffectAt& effect, std::vector<Eff
   }
 }
 
+/// Whether other effects of the valve act behind this one (a lag behind a dead band): they look different once it is in
+/// the model, and what came beside it in the same diagnosis may only have stood for them.
+bool shapes_opening(const AppliedEffect& e) {
+  const Eigen::VectorXd small = Eigen::Vector2d(1e-3, -1e-3);
+  Eigen::VectorXd opening = small;
+  e.effect->shape_opening(e.at, e.at, e.values, opening);
+  return opening != small;
+}
+
 /// Those that were not kept in the end, and why, once each, as part of why it stopped.
 void name_rejected(ExtendResult& result) {
   std::erase_if(result.rejected, [&](const ExtendStep& r) {
@@ -385,6 +394,7 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       if (!e->rivals.empty()) notes.push_back(stands_for(*e));
       add_notes(std::move(notes), result);
       keep(std::move(step), std::move(next), workshop, options.date, current, result);
+      if (shapes_opening(current.model.effects.back())) break;
     }
     if (tried > kMostRejected && result.stopped_because.empty())
       result.stopped_because = "what is found does not hold on data that took no part";

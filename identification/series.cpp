@@ -114,6 +114,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
                        moving_average(out, c.force - c.static_force, c.direction, kSteadyForce_s);
     }
   }
+  set_openings(model.effects, out);
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     PumpSeries pump;
     pump.pressure = signals.pumps[p].pressure_smooth;
@@ -121,6 +122,15 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     out.pumps.push_back(std::move(pump));
   }
   return out;
+}
+
+void set_openings(const std::vector<AppliedEffect>& effects, MachineSeries& series) {
+  for (std::size_t i = 0; i < series.cylinders.size(); ++i) {
+    CylinderSeries& c = series.cylinders[i];
+    c.opening = c.command;
+    for (const AppliedEffect& e : effects)
+      e.effect->shape_opening(static_cast<int>(i), e.at, e.values, c.opening);
+  }
 }
 
 VectorXd effect_series(const AppliedEffect& effect, const MachineSeries& log, EvidenceKind kind,

@@ -13,6 +13,9 @@ namespace sparflow {
 ///        chamber that is asked for is not measured.
 MachineSeries make_series(const CraneModel& model, const MachineSignals& signals);
 
+/// What these effects leave of each command (CylinderSeries::opening); make_series does it with the model's.
+void set_openings(const std::vector<AppliedEffect>& effects, MachineSeries& series);
+
 /// What one effect adds to the measured quantity `kind` of cylinder or pump `index`, by its parameters' values, not
 /// filtered: exact for effects that are another machine, else the effect's columns times its linear parameters.
 /// Force [N], rod speed [m/s] or pressure [Pa].

@@ -60,8 +60,10 @@ void DiagnosisInputs::add_tests(CLI::App& app, const std::string& what) {
 }
 
 void DiagnosisInputs::add_candidates(CLI::App& app, const std::string& what) {
-  app.add_option("--candidates", candidates_,
-                 what + ", as in `sparflow effects`; else the whole catalogue")
+  app.add_option(
+         "--candidates", candidates_,
+         what +
+             ", as in `sparflow effects`, without :AT at all its places; else the whole catalogue")
       ->type_name("EFFECT[:AT]...");
 }
 
@@ -102,7 +104,14 @@ DiagnosisFiles DiagnosisInputs::read() const {
   files.model = load_model_aloud(model_);
   own_.load_into(files.model);
   const Machine& machine = files.model.machine;
-  for (const std::string& c : candidates_) files.candidates.push_back(parse_effect(c, machine));
+  for (const std::string& c : candidates_) {
+    const Effect* everywhere = c.find(':') == std::string::npos ? find_effect(c) : nullptr;
+    if (everywhere == nullptr || everywhere->places(machine).empty()) {
+      files.candidates.push_back(parse_effect(c, machine));  // which names what is wrong with it
+      continue;
+    }
+    for (const int at : everywhere->places(machine)) files.candidates.push_back({everywhere, at});
+  }
   files.logs = load_logs(logs_, machine, mapping_);
   files.references = load_logs(references_, machine, mapping_);
   files.tests = load_logs(tests_, machine, mapping_);

@@ -288,7 +288,7 @@ void add_ranking(Page& page, const Diagnosis& d) {
     if (values.size() == kMostRanked) break;
     if (gain <= 0.0 && !values.empty()) break;
     chart.categories.push_back(key);
-    values.push_back(std::max(0.0, gain));
+    values.push_back(gain);
   }
   if (d.search.threshold > 0.0) {
     chart.categories.push_back("chance, at 5 %");

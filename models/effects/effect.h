@@ -117,6 +117,10 @@ class Effect {
     return std::numeric_limits<double>::infinity();
   }
 
+  /// What is left of a cylinder's command behind this effect of its valve (a dead band); [samples], [-], in place.
+  virtual void shape_opening(int /*cylinder*/, int /*at*/, std::span<const double> /*p*/,
+                             Eigen::VectorXd& /*opening*/) const {}
+
   /// Text (YAML) that defines a user's effect, so that a model file can carry it; empty: built in.
   virtual std::string definition() const { return {}; }
 

@@ -97,8 +97,9 @@ double shown(const EffectParameter& p, double si) { return si / p.si; }
 
 std::string parameter_words(const EffectParameter& p) {
   const std::string unit = p.unit == "-" || p.unit.empty() ? "" : " " + p.unit;
-  std::string text = fmt::format("{}: {}. {:.3g} to {:.3g}{}", p.name, p.meaning, shown(p, p.lower),
-                                 shown(p, p.upper), unit);
+  std::string text =
+      fmt::format("{}: {}{}{:.3g} to {:.3g}{}", p.name, p.meaning, p.meaning.empty() ? "" : ". ",
+                  shown(p, p.lower), shown(p, p.upper), unit);
   text += fmt::format(", clear at {:.3g}{}", shown(p, p.typical), unit);
   if (p.linear) return text;
   std::vector<std::string> values;

@@ -21,7 +21,10 @@ struct CylinderSeries {
   /// [N] static force and the mean, within a motion and half a second either way, of what is measured beyond it: for
   /// laws of one pressure in which the force made from both pressures must not carry that pressure's own noise.
   Eigen::VectorXd steady_force;
-  Eigen::VectorXd command;                 ///< [-] -1..1, as logged
+  Eigen::VectorXd command;  ///< [-] -1..1, as logged
+  /// [-] what the model's valve effects without memory (a dead band) leave of the command: what a valve that is late
+  /// as well is late with. Empty: the command itself.
+  Eigen::VectorXd opening;
   Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] chambers, through the position's filter
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
   /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals.h).

@@ -46,6 +46,15 @@ class ValveDeadband final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
+  void shape_opening(int cylinder, int at, std::span<const double> p,
+                     Eigen::VectorXd& opening) const override {
+    if (cylinder != at) return;
+    for (double& u : opening) {
+      if (u > 0.0) u = std::max(0.0, u - p[0]);
+      if (u < 0.0) u = std::min(0.0, u + p[1]);
+    }
+  }
+
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;

@@ -63,7 +63,9 @@ class ValveLag final : public Effect {
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;
-    const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    // inside a dead band that the model knows there is nothing to be late with
+    const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
     if (command.size() == 0) return false;
     const auto late = [&](const Eigen::VectorXd& x) {
       if (shape[1] > 0.75) return delayed(log, x, shape[0]);

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <map>
 
-#include "identification/diagnose.h"
+#include "identification/extend.h"
 #include "identification/fit.h"
 #include "tests/identification/hidden_case.h"
 
@@ -76,6 +76,23 @@ TEST_P(HiddenByALaw, IsFoundWithAndWithoutAReference) {
   }
 }
 
+/// What is named is also what improve adds first, and it helps where it acts on motions that took no part.
+TEST_P(HiddenByALaw, IsAddedFirst) {
+  const HiddenLaw& law = GetParam();
+  const Machine machine = drawn_machine("loader_crane");
+  const HiddenCase logs =
+      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, kLogSeed, kLogSeconds);
+  FitOptions fit_options;
+  fit_options.hold_out_every = 0;
+  const CraneModel healthy = fit(machine, {logs.reference}, {}, fit_options).model;
+  ExtendOptions options;
+  options.max_steps = 1;
+  const ExtendResult r = improve(healthy, {logs.train}, {logs.reference}, {}, options);
+  ASSERT_EQ(r.steps.size(), 1u) << r.stopped_because;
+  EXPECT_EQ(r.steps[0].added,
+            *law.at == '\0' ? std::string(law.id) : std::string(law.id) + ":" + law.at);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Catalogue, HiddenByALaw,
     ::testing::Values(HiddenLaw{"leakage", "boom", 0, "laminar past the spool", {"k"}},
@@ -84,7 +101,10 @@ INSTANTIATE_TEST_SUITE_P(
                       HiddenLaw{"pump_lag", "main", 1, "second order", {"tau"}},
                       HiddenLaw{"pump_lag", "main", 2, "slower down than up", {"tau"}},
                       HiddenLaw{"torque_limit", "main", 0, "hyperbola", {"power"}},
-                      HiddenLaw{"torque_limit", "main", 1, "two springs", {"power"}}),
+                      HiddenLaw{"torque_limit", "main", 1, "two springs", {"power"}},
+                      HiddenLaw{"oil_temperature", "", 0, "exponential", {"beta", "return_slope"}},
+                      HiddenLaw{"oil_temperature", "", 1, "Walther", {"return_slope"}},
+                      HiddenLaw{"oil_temperature", "", 2, "straight pieces", {"return_slope"}}),
     [](const ::testing::TestParamInfo<HiddenLaw>& tested) {
       return std::string(tested.param.id) + "_" + std::to_string(tested.param.law);
     });
