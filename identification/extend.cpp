@@ -105,8 +105,31 @@ std::string percent_text(double ratio) {
                       : fmt::format("{:.1f} % larger", 100.0 * (ratio - 1.0));
 }
 
+/// Title of an effect of the model that was known before and is not any more beside the one that came last: what the
+/// one takes, the other gives. Empty: none. In numbers, a parameter whose interval was smaller than its value and is now
+/// larger, and twenty times what it was (strangers widen each other's by a few times at most).
+std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
+  constexpr double kBlurred = 20.0;
+  const auto half = [](const AppliedEffect& e, std::size_t k) {
+    return 0.5 * (e.upper95[k] - e.lower95[k]);
+  };
+  for (std::size_t i = 0; i < before.effects.size(); ++i) {
+    const AppliedEffect &was = before.effects[i], &is = after.effects[i];
+    if (was.lower95.size() != was.values.size() || is.lower95.size() != is.values.size()) continue;
+    for (std::size_t k = 0; k < was.values.size(); ++k) {
+      const bool blurred = half(was, k) < std::abs(was.values[k]) &&
+                           half(is, k) > std::abs(is.values[k]) &&
+                           half(is, k) > kBlurred * half(was, k);
+      if (blurred) return effect_title(was.effect->info(), after.machine, was.at);
+    }
+  }
+  return {};
+}
+
 /// What speaks against a step, as the end of a sentence that begins with it.
 std::string against(const ExtendStep& step) {
+  if (!step.same_as.empty())
+    return fmt::format("these logs cannot tell it from {}, which is in the model", step.same_as);
   if (step.change.own > 1.0) {
     return fmt::format("where it acts the error on the {} is {} with it", step.judged_on,
                        percent_text(step.change.own));
@@ -382,10 +405,12 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       }
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
-      if (step.change.worse()) {
+      step.same_as = blurred_by_last(current.model, next.model);
+      if (step.change.worse() || !step.same_as.empty()) {
         aside.push_back(e->effect);
         // what it does is there and harms elsewhere: another that only looks like it must not come in its place
-        if (step.change.own < 1.0) add_look_alikes(*diagnosis, e->effect, aside);
+        if (step.change.own < 1.0 && step.same_as.empty())
+          add_look_alikes(*diagnosis, e->effect, aside);
         ++tried;
         result.rejected.push_back(std::move(step));
         continue;

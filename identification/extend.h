@@ -22,6 +22,7 @@ struct ExtendStep {
   std::string judged_on;        ///< "test logs", "held-out motions" or "training logs"
   ErrorChange change;
   bool others_kept = false;  ///< the effects that were there before kept their values
+  std::string same_as;  ///< title of an effect of the model that these logs cannot tell it from
   /// That asked for it; absent when the user did. Steps of one diagnosis share it.
   std::shared_ptr<const Diagnosis> diagnosis;
 };
