@@ -164,12 +164,15 @@ const char* bad_data_word(BadDataKind kind) {
       return "drop_out";
     case BadDataKind::kSaturated:
       return "saturated";
+    case BadDataKind::kWild:
+      return "wild";
   }
   return "";
 }
 
 std::string bad_channel_sentence(const BadChannel& bad) {
-  const char* words[] = {"is stuck", "jumps", "is noisy", "drops out", "is cut off"};
+  const char* words[] = {"is stuck",  "jumps",      "is noisy",
+                         "drops out", "is cut off", "has wild samples"};
   return fmt::format("{} {} between {:.1f} and {:.1f} s ({:.2g} % of the log): {}. {}.",
                      bad.channel, words[static_cast<int>(bad.kind)], bad.from_s, bad.to_s,
                      100.0 * bad.share, bad.evidence, bad.remedy);
@@ -188,8 +191,8 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
   }
   // The gravest first: a stuck channel is not also judged for its jump into and out of that value.
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
-  const Check checks[] = {check_missing, check_stuck,     check_stuck_command,
-                          check_noise,   check_saturated, check_jumps};
+  const Check checks[] = {check_missing,   check_stuck, check_stuck_command, check_noise,
+                          check_saturated, check_wild,  check_jumps};
   for (std::size_t i = 0; i < context.channels.size(); ++i) {
     for (const Check check : checks) {
       std::optional<Finding> found = check(context, i);

@@ -13,11 +13,12 @@
 namespace sparflow {
 
 enum class BadDataKind {
-  kStuck,     ///< one value, for longer than its own noise or the machine's motion allows
-  kJumping,   ///< steps away and back that no machine makes and no other channel sees
-  kNoisy,     ///< white noise far above its twins' or its own elsewhere
-  kDropOut,   ///< falls to zero, or is missing
-  kSaturated  ///< cut off at one value, again and again
+  kStuck,      ///< one value, for longer than its own noise or the machine's motion allows
+  kJumping,    ///< steps away and back that no machine makes and no other channel sees
+  kNoisy,      ///< white noise far above its twins' or its own elsewhere
+  kDropOut,    ///< falls to zero, or is missing
+  kSaturated,  ///< cut off at one value, again and again
+  kWild        ///< single samples far off both their neighbours, again and again
 };
 
 struct BadChannel {

@@ -56,6 +56,7 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
 std::optional<Finding> check_stuck(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_saturated(const CheckContext& context, std::size_t channel);
+std::optional<Finding> check_wild(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_jumps(const CheckContext& context, std::size_t channel);
 
 /// Stretches of one value, longer than one sample, inside runs.

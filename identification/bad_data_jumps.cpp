@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "identification/bad_data_checks.h"
 #include "identification/robust.h"
@@ -49,6 +50,16 @@ class Witnesses {
     return false;
   }
 
+  /// A lever on its way out of the valve's dead band makes the pump answer all at once.
+  bool lever_moves(Index k) const {
+    constexpr double kLeverMoves = 2e-3;  // [-] from one sample to the next
+    return std::any_of(commands_.begin(), commands_.end(), [&](std::size_t c) {
+      const VectorXd& u = context_.channels[c].channel->values;
+      const double change = std::abs(u[k + 1] - u[k]);
+      return change > std::max(kLeverMoves, 6.0 * context_.noise[c].typical);
+    });
+  }
+
  private:
   const CheckContext& context_;
   std::vector<std::size_t> twins_, commands_;
@@ -88,6 +99,37 @@ std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t cha
       // no load and no valve moves a boom by degrees within a sample: positions need no witness
       if (!position && witnesses.explain(k, size)) continue;
       out.push_back({k, size});
+    }
+  }
+  return out;
+}
+
+/// Smallest step between samples, 0 for a constant channel.
+double resolution(const VectorXd& x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (Index k = 0; k + 1 < x.size(); ++k) {
+    const double step = std::abs(x[k + 1] - x[k]);
+    if (step > 0.0) least = std::min(least, step);
+  }
+  return std::isfinite(least) ? least : 0.0;
+}
+
+/// Samples far off both their neighbours, which agree with each other: nothing that has a mass or a volume does that. One
+/// alone may be a knock; many are wild however small they are in the channel's units.
+Mask wild_samples(const CheckContext& context, std::size_t channel) {
+  const CheckedChannel& c = context.channels[channel];
+  const VectorXd& x = c.channel->values;
+  const VectorXd noise = local_noise(context.noise[channel], x.size());
+  const Witnesses witnesses(context, channel);
+  Mask out = Mask::Constant(x.size(), false);
+  const double least = 4.0 * resolution(x);  // a logger's last digit may flicker
+  for (const SampleRange& run : context.log.runs) {
+    for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
+      const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
+      if (!(off > std::max(least, context.options.jump_noise * noise[k]))) continue;
+      if (std::abs(x[k + 1] - x[k - 1]) > 0.5 * off) continue;
+      if (c.family != "position" && witnesses.explain(k - 1, off)) continue;
+      out[k] = true;
     }
   }
   return out;
@@ -141,6 +183,9 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
   constexpr double kPulseHeight = 0.3;  // [-] smallest
   constexpr int kPulses = 3;
   const bool command = c.channel->role == Role::kCommand;
+  constexpr double kContact = 0.5;  // [s] a bad contact's; pumps stay at a pressure longer
+  const bool pump = c.channel->role == Role::kPumpPressure;
+  const Witnesses witnesses(context, channel);
   const std::vector<Step> steps = unexplained_steps(context, channel);
   const double noise = context.noise[channel].typical;
   Finding found;
@@ -158,6 +203,10 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
       if (command && std::abs(steps[i].size) < kPulseHeight) break;
       const double left = std::abs(steps[i].size + steps[j].size);
       if (left > kAlike * std::abs(steps[i].size) + 4.0 * noise) continue;
+      if (pump && context.log.time[steps[j].at] - context.log.time[steps[i].at] > kContact &&
+          witnesses.lever_moves(steps[i].at)) {
+        continue;
+      }
       const Index first = steps[i].at + 1, length = steps[j].at - steps[i].at;
       found.affected.segment(first, length).setConstant(true);
       zero = zero && (x.segment(first, length).array() == 0.0).all();
@@ -176,6 +225,27 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
           ? fmt::format("where the machine can do {}", in_field(c, c.fastest * context.log.step))
           : fmt::format("while nothing else in the log changes (its noise is {})",
                         in_field(c, noise)));
+  found.remedy = "Check the sensor's cable and plug, and leave these samples out";
+  return found;
+}
+
+std::optional<Finding> check_wild(const CheckContext& context, std::size_t channel) {
+  constexpr double kMany = 0.003;  // of the samples
+  const CheckedChannel& c = context.channels[channel];
+  const double noise = context.noise[channel].typical;
+  if (c.least_jump <= 0.0 || c.channel->role == Role::kCommand || noise <= 0.0) return {};
+  const Mask wild = wild_samples(context, channel);
+  const auto count = static_cast<double>(wild.count());
+  if (count < std::max(10.0, kMany * static_cast<double>(wild.size()))) return {};
+  if (!(wild && c.channel->values.array() != 0.0).any())
+    return {};  // drop-outs: check_jumps says so
+  Finding found;
+  found.kind = BadDataKind::kWild;
+  found.affected = wild;
+  found.evidence = fmt::format(
+      "{:.0f} single samples lie more than {:.0f} times its noise ({}) off both their neighbours, "
+      "and nothing else in the log changes there",
+      count, context.options.jump_noise, in_field(c, noise));
   found.remedy = "Check the sensor's cable and plug, and leave these samples out";
   return found;
 }

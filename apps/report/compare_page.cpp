@@ -184,6 +184,8 @@ const char* bad_words(BadDataKind kind) {
       return "drops out";
     case BadDataKind::kSaturated:
       return "is cut off";
+    case BadDataKind::kWild:
+      return "has wild samples";
   }
   return "";
 }

@@ -139,6 +139,26 @@ TEST(BadData, JumpsThatComeBack) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("q_arm jumping"));
 }
 
+// 7 bar at 0.5 bar of noise: small for a pressure, and far from both neighbours again and again.
+TEST(BadData, ManyWildSamplesNeedNotBeLarge) {
+  Log log = noisy_arm();
+  std::mt19937 random(5);
+  int wild = 0;
+  for (double& p : channel(log, "pA_arm").values) {
+    if (random() % 100 != 0) continue;
+    p += random() % 2 == 0 ? 7.0 * kBar : -7.0 * kBar;
+    ++wild;
+  }
+  ASSERT_GT(wild, 10);
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("pA_arm wild"));
+  EXPECT_THAT(bad[0].evidence, HasSubstr("single samples"));
+  // one knock in a log is no broken sensor
+  log = noisy_arm();
+  channel(log, "pA_arm").values[log.samples() / 2] += 7.0 * kBar;
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
 TEST(BadData, APressureStepThatAnotherChannelSeesIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200}) {
