@@ -146,11 +146,22 @@ TEST_P(RealCraneImproved, NamesMassAndDryFrictionAndPredictsTheRunLeftOut) {
   const double before = r.steps.front().before.find("force", "main")->rmse;
   const double after = r.steps.back().after.find("force", "main")->rmse;
   EXPECT_LT(after, before / 5.0) << steps_text(r);
+  // Beside its twin a value means nothing (with the sine run left out a load error came beside the jib's mass, and both
+  // were then known to 36 000 t): such an effect is refused.
+  for (const AppliedEffect& e : r.model.effects) {
+    for (std::size_t k = 0; k < e.lower95.size(); ++k) {
+      EXPECT_LT(e.upper95[k] - e.lower95[k], 100.0 * std::abs(e.values[k]))
+          << e.key(machine) << ", parameter " << k;
+    }
+  }
 }
 
-INSTANTIATE_TEST_SUITE_P(LeftOut, RealCraneImproved, testing::Values(0, 3), [](const auto& which) {
-  return std::string(which.param == 0 ? "MainStandard" : "DualSine");
-});
+INSTANTIATE_TEST_SUITE_P(LeftOut, RealCraneImproved, testing::Values(0, 1, 3),
+                         [](const auto& which) {
+                           return std::string(which.param == 0   ? "MainStandard"
+                                              : which.param == 1 ? "MainSine"
+                                                                 : "DualSine");
+                         });
 
 TEST_F(RealCrane, ValveLogsShowTheDeadBand) {
   const std::string folder = kRealLogs + "data/hmf_2020_k4/";
