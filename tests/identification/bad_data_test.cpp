@@ -139,6 +139,13 @@ TEST(BadData, JumpsThatComeBack) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("q_arm jumping"));
 }
 
+TEST(BadData, APumpThatAnswersAMovingLeverDoesNotJump) {
+  Log log = noisy_arm();
+  for (const Eigen::Index k : {700, 1300, 2200})  // for 2 s, as when a valve leaves its dead band
+    channel(log, "p_main").values.segment(k, 100).array() += 12.0 * kBar;
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
 // 7 bar at 0.5 bar of noise: small for a pressure, and far from both neighbours again and again.
 TEST(BadData, ManyWildSamplesNeedNotBeLarge) {
   Log log = noisy_arm();
