@@ -109,5 +109,7 @@ MotionLimits limits_of(const Machine& machine);
 /// planar machine the normal of its plane; empty for a spatial one. A tip goal must agree with the tip
 /// along these, and they carry no information about the posture.
 std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine);
+/// Orthonormal columns normal to these: the directions in which the tip can move [3 x 3 or fewer].
+Eigen::Matrix3Xd moving_tip_directions(const Machine& machine);
 
 }  // namespace sparflow
