@@ -57,4 +57,11 @@ Eigen::Matrix3Xd moving_tip_directions(const Machine& machine) {
   return complement_of(still);
 }
 
+MotionProblem::MotionProblem() = default;
+MotionProblem::MotionProblem(const MotionProblem&) = default;
+MotionProblem::MotionProblem(MotionProblem&&) noexcept = default;
+MotionProblem& MotionProblem::operator=(const MotionProblem&) = default;
+MotionProblem& MotionProblem::operator=(MotionProblem&&) noexcept = default;
+MotionProblem::~MotionProblem() = default;
+
 }  // namespace sparflow

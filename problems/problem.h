@@ -100,6 +100,14 @@ struct MotionProblem {
   std::optional<TipLine> tip_line;
   ObjectiveWeights objective;
   std::optional<int> knots;  ///< knots of the transcription; absent: the optimiser's choice
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  MotionProblem();
+  MotionProblem(const MotionProblem&);
+  MotionProblem(MotionProblem&&) noexcept;
+  MotionProblem& operator=(const MotionProblem&);
+  MotionProblem& operator=(MotionProblem&&) noexcept;
+  ~MotionProblem();
 };
 
 /// The machine's own limits, nothing overridden.
