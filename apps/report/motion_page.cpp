@@ -321,7 +321,8 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
         fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,
                     against.empty() ? "" : ": ", against),
         "All limits are kept at 16 times the knots' density. Energies are those of the exact, "
-        "unsmoothed law.");
+        "unsmoothed law. " +
+            only_strokes_count(model));
   } else {
     // "lift: infeasible. Worst: ..." under its own headline
     const std::string prefix = problem.name + ": infeasible. ";

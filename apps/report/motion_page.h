@@ -20,6 +20,8 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
 /// straight line (85.9 kJ) in the same time", and the cheapest seed path by name where that is none of them; ""
 /// when no seed keeps the limits in that time.
 std::string against_seeds(const OptimizeResult& result);
+/// A sentence where every pump keeps its pressure, so that no motion of the same strokes can cost less; "" else.
+std::string only_strokes_count(const CraneModel& model);
 
 /// `optimize`'s machine-readable result (keys: docs/commands.md).
 std::string optimize_json(const CraneModel& model, const MotionProblem& problem,

@@ -50,6 +50,10 @@ std::string against_seeds(const OptimizeResult& r) {
   const auto add = [&](const std::string& what, double energy) {
     if (energy <= 0.0) return;
     const double saved = 100.0 * (1.0 - r.energy.total / energy);
+    if (std::abs(saved) < 0.05) {  // "0.0 % less" would be nothing to be proud of
+      parts.push_back(fmt::format("as much as {} ({:.1f} kJ)", what, energy / 1e3));
+      return;
+    }
     parts.push_back(fmt::format("{:.{}f} % {} than {} ({:.1f} kJ)", std::abs(saved),
                                 std::abs(saved) < 9.95 ? 1 : 0, saved >= 0.0 ? "less" : "more",
                                 what, energy / 1e3));
@@ -60,6 +64,18 @@ std::string against_seeds(const OptimizeResult& r) {
   if (r.best_seed_energy != r.straight_line_energy)
     add("the best seed, " + r.best_seed_name, r.best_seed_energy);
   return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
+}
+
+std::string only_strokes_count(const CraneModel& model) {
+  const std::vector<Pump>& pumps = model.machine.pumps;
+  const bool constant =
+      !pumps.empty() && std::all_of(pumps.begin(), pumps.end(), [](const Pump& p) {
+        return p.type == PumpType::kConstantPressure;
+      });
+  return constant ? "At constant supply pressure the energy is pressure times the oil drawn: only "
+                    "which strokes are "
+                    "made counts, not when."
+                  : "";
 }
 
 std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
@@ -177,6 +193,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
         "pressure +-{:.1f} bar",
         100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
   }
+  if (const std::string why = only_strokes_count(model); !why.empty())
+    add("  note                 " + why);
   if (r.energy.impossible()) {
     add("  WARNING              the pump gives less energy than machine and load gain: pressures "
         "here are\n"

@@ -28,6 +28,18 @@ TEST(MotionText, BesideTheSeedsByName) {
   r.best_seed_name = "BIT* 3";
   EXPECT_THAT(against_seeds(r),
               testing::HasSubstr("1.3 % more than the best seed, BIT* 3 (79.0 kJ)"));
+  r.best_seed_energy = 80.02e3;
+  EXPECT_THAT(against_seeds(r), testing::HasSubstr("as much as the best seed, BIT* 3 (80.0 kJ)"));
+}
+
+TEST(MotionText, ConstantPressureIsSaid) {
+  CraneModel model;
+  EXPECT_EQ(only_strokes_count(model), "") << "no pump, nothing to say";
+  model.machine.pumps.resize(2);
+  model.machine.pumps[0].type = PumpType::kConstantPressure;
+  EXPECT_EQ(only_strokes_count(model), "") << "one of two senses the load";
+  model.machine.pumps[1].type = PumpType::kConstantPressure;
+  EXPECT_THAT(only_strokes_count(model), testing::HasSubstr("only which strokes"));
 }
 
 }  // namespace
