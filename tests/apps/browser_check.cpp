@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "models/error.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test_support {
 namespace {
@@ -97,7 +98,7 @@ BrowserReport check_page(const std::string& path, const std::string& options) {
   if (errors.empty()) {
     report.errors.emplace_back("the page's scripts did not run to their end");
   } else {
-    for (const auto& error : nlohmann::json::parse(errors)) report.errors.push_back(error);
+    for (const auto& error : test_support::parsed_json(errors)) report.errors.push_back(error);
   }
   return report;
 }

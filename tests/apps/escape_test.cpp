@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/report/chart_json.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -32,7 +33,7 @@ TEST(Escape, ScriptSafeKeepsTheValue) {
   const nlohmann::json value = {{"name", "</script><!-- <b>"}};
   const std::string safe = script_safe(value.dump());
   EXPECT_EQ(safe.find('<'), std::string::npos);
-  EXPECT_EQ(nlohmann::json::parse(safe), value);
+  EXPECT_EQ(test_support::parsed_json(safe), value);
 }
 
 TEST(ChartJson, NumbersAreShortAndNaNIsNull) {

@@ -13,6 +13,7 @@
 #include "problems/problem_file.h"
 #include "tests/apps/browser_check.h"
 #include "tests/optimizer/synthetic_model.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -86,7 +87,7 @@ TEST(StrategiesPage, AboutASetShowsMediansAndTests) {
   EXPECT_THAT(page.html(), HasSubstr("simultaneous to the best end posture +20.0 %"));
   check_in_browser(page, "strategies set page.html");
   const auto json =
-      nlohmann::json::parse(strategies_json(all, std::vector<Machine>(3, problem.machine)));
+      test_support::parsed_json(strategies_json(all, std::vector<Machine>(3, problem.machine)));
   const auto& line = json.at("summary").at("equal").at("simultaneous");
   EXPECT_NEAR(line.at("median_excess_percent").get<double>(), 20.0, 1e-9);
   EXPECT_NEAR(line.at("wilcoxon_p").get<double>(), 0.25, 1e-12);  // 2 / 2^3

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli_fixture.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
@@ -67,7 +68,7 @@ TEST_F(Cli, CompareWritesTheContractsKeys) {
   const Outcome o = run("compare --model " + model() + " -l " + kData +
                         "/logs/loader_crane_test.csv --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json c = json::parse(slurp(at("c.json")));
+  const json c = test_support::parsed_json(slurp(at("c.json")));
   EXPECT_EQ(c.at("samples").get<int>(), 6000);
   for (const char* cylinder : {"boom", "jib", "extension"}) {
     const json& force = c.at("stages").at("force").at(cylinder);
@@ -149,7 +150,7 @@ void expect_motion_costs(const std::string& csv, const json& model, double energ
 TEST_F(Cli, AMachineAloneIsComparedByItsForcesOnly) {
   const Outcome o = run("compare -m " + kCrane + " -l " + kTest + " --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json stages = json::parse(slurp(at("c.json"))).at("stages");
+  const json stages = test_support::parsed_json(slurp(at("c.json"))).at("stages");
   EXPECT_EQ(stages.at("force").size(), 3u);
   for (const char* learned : {"flow", "pressure", "pump", "energy"})
     EXPECT_TRUE(stages.at(learned).empty()) << learned;
@@ -161,7 +162,7 @@ TEST_F(Cli, OptimizeWritesMotionPageAndTheContractsKeys) {
           "/reaches/loader_crane_lift.yaml --paths 3 --intervals 60 --model " + model() + " -o " +
           at("motion.csv") + " --json " + at("o.json") + " --report " + at("o.html"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json r = json::parse(slurp(at("o.json")));
+  const json r = test_support::parsed_json(slurp(at("o.json")));
   EXPECT_EQ(r.at("status"), "optimal");
   for (const char* key : {"energy_J", "energy_exact_J", "duration_s", "iterations", "solve_s",
                           "throttling_J", "seed", "constraint_violation", "starts"}) {
@@ -182,7 +183,7 @@ TEST_F(Cli, OptimizeWritesMotionPageAndTheContractsKeys) {
   EXPECT_EQ(r.at("throttling_J").size(), 3u);
   for (const json& lost : r.at("throttling_J")) EXPECT_GE(lost.get<double>(), 0.0);
   const std::string csv = slurp(at("motion.csv"));
-  expect_motion_costs(csv, json::parse(slurp(model())), energy);
+  expect_motion_costs(csv, test_support::parsed_json(slurp(model())), energy);
   EXPECT_THAT(
       csv.substr(0, csv.find('\n')),
       "t_s,q_boom_rad,q_jib_rad,q_extension_m,qd_boom_rad_s,qd_jib_rad_s,qd_extension_m_s,qdd_boom_"
@@ -201,7 +202,7 @@ TEST_F(Cli, BoundSaysForWhichMotions) {
     const Outcome o = run("optimize --bound --paths 1 --intervals 40 -p " + kData + "/reaches/" +
                           name + ".yaml --model " + model() + " --json " + at("b.json"));
     EXPECT_EQ(o.code, 0) << o.err;
-    json r = json::parse(slurp(at("b.json")));
+    json r = test_support::parsed_json(slurp(at("b.json")));
     EXPECT_LT(r.at("lower_bound_J"), r.at("energy_exact_J"));
     r["text"] = o.out;
     return r;
@@ -224,7 +225,7 @@ TEST_F(Cli, InfeasibleIsFourAndNamed) {
   EXPECT_EQ(o.code, 4);
   EXPECT_FALSE(fs::exists(at("h.csv"))) << "there is no motion to write";
   EXPECT_THAT(o.out, HasSubstr("infeasible"));
-  EXPECT_EQ(json::parse(slurp(at("h.json"))).at("status"), "infeasible");
+  EXPECT_EQ(test_support::parsed_json(slurp(at("h.json"))).at("status"), "infeasible");
 
   std::string far = text;
   far.replace(far.find("[7.5, 0, 3.5]"), 13, "[75, 0, 3.5]");
@@ -239,7 +240,7 @@ TEST_F(Cli, PlanListsPathsWithTheirShortestDuration) {
   const Outcome o = run("plan -p " + kData + "/reaches/loader_crane_over_wall.yaml --paths 4 -o " +
                         at("p.csv") + " --json " + at("p.json"));
   ASSERT_EQ(o.code, 0) << o.err << o.out;
-  const json p = json::parse(slurp(at("p.json")));
+  const json p = test_support::parsed_json(slurp(at("p.json")));
   ASSERT_GE(p.at("paths").size(), 1u);
   EXPECT_GT(p.at("paths")[0].at("shortest_duration_s").get<double>(), 0.0);
   EXPECT_THAT(slurp(at("p.csv")), HasSubstr("q_boom_rad"));

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "cli_fixture.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
@@ -159,7 +160,7 @@ TEST_F(CliSays, NoPercentOfNothing) {
   EXPECT_THAT(o.out,
               HasSubstr("energy of pump main: \u2013 %, nothing was delivered in the 0.6 s"));
   EXPECT_THAT(slurp(at("c.html")), Not(HasSubstr("nan")));
-  EXPECT_TRUE(json::parse(slurp(at("c.json")))
+  EXPECT_TRUE(test_support::parsed_json(slurp(at("c.json")))
                   .at("stages")
                   .at("energy")
                   .at("main")
@@ -275,7 +276,8 @@ TEST_F(CliSays, OneCtrlCKeepsTheBestSoFar) {
       EXPECT_FALSE(fs::exists(at("o.json")));
     }
     ASSERT_THAT(slurp(at("out")), StartsWith("interrupted: ")) << slurp(at("err"));
-    EXPECT_GT(json::parse(slurp(at("o.json"))).at("energy_exact_J").get<double>(), 0.0);
+    EXPECT_GT(test_support::parsed_json(slurp(at("o.json"))).at("energy_exact_J").get<double>(),
+              0.0);
     EXPECT_THAT(slurp(at("motion.csv")), StartsWith("t_s,"));
     fs::remove(at("motion.csv"));
     fs::remove(at("o.json"));

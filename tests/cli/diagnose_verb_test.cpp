@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli_fixture.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
@@ -94,7 +95,7 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
                   at("d.json") + " --report " + at("d.html"));
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(o.err, HasSubstr("reference for forces only"));
-  json d = json::parse(slurp(at("d.json")));
+  json d = test_support::parsed_json(slurp(at("d.json")));
   EXPECT_EQ(d.at("verdict"), "missing");
   EXPECT_EQ(d.at("effects").at(0).at("id"), "coulomb_friction");
   EXPECT_EQ(d.at("effects").at(0).at("at"), "boom");
@@ -103,7 +104,7 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
   o = run("improve --model " + model() + " --log " + log + " --test " + test + few + " -o " +
           at("m2.json") + " --json " + at("i.json") + " --report " + at("i.html"));
   ASSERT_EQ(o.code, 0) << o.err;
-  json i = json::parse(slurp(at("i.json")));
+  json i = test_support::parsed_json(slurp(at("i.json")));
   ASSERT_EQ(i.at("steps").size(), 1u);
   EXPECT_EQ(i.at("steps").at(0).at("added"), "coulomb_friction:boom");
   const json& force = i.at("steps").at(0).at("stages").at("force").at("boom");
@@ -116,7 +117,7 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
   // the same model is read by the other verbs
   o = run("compare --model " + at("m2.json") + " --log " + test + " --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  json c = json::parse(slurp(at("c.json")));
+  json c = test_support::parsed_json(slurp(at("c.json")));
   EXPECT_NEAR(c.at("stages").at("force").at("boom").at("rmse").get<double>(),
               force.at("after").at("rmse").get<double>(), 1.0);  // [N] one computation, two doors
 
@@ -142,7 +143,7 @@ TEST_F(CliDiagnose, AnEffectOfTheUsersOwnIsFoundAndCarried) {
   EXPECT_EQ(run(diagnose).code, 3);  // nobody knows seal_drag
   Outcome o = run(diagnose + own + " --json " + at("d.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json effect = json::parse(slurp(at("d.json"))).at("effects").at(0);
+  const json effect = test_support::parsed_json(slurp(at("d.json"))).at("effects").at(0);
   EXPECT_EQ(effect.at("id"), "seal_drag");
   EXPECT_EQ(effect.at("parameters").at(0).at("unit"), "kN");
 

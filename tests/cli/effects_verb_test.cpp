@@ -11,6 +11,8 @@
 #include <sstream>
 #include <string>
 
+#include "tests/parsed_json.h"
+
 namespace {
 
 using nlohmann::json;
@@ -54,7 +56,7 @@ TEST_F(EffectsVerb, PrintsOneEntryAndItsJson) {
   const std::string file = (folder / "entry.json").string();
   ASSERT_EQ(run("coulomb_friction --json " + file), 0) << read("err");
   EXPECT_THAT(read("out"), HasSubstr("F_static + Fc sign(v)"));
-  const json result = json::parse(read("entry.json"));
+  const json result = sparflow::test_support::parsed_json(read("entry.json"));
   ASSERT_EQ(result["effects"].size(), 1u);
   EXPECT_EQ(result["effects"][0]["id"], "coulomb_friction");
   EXPECT_EQ(result["effects"][0]["parameters"][0]["unit"], "N");
@@ -78,7 +80,7 @@ TEST_F(EffectsVerb, PrintsAnEffectOfTheUsersOwn) {
   EXPECT_THAT(read("out"), HasSubstr("seal_drag:<cyl>: Drag of the seal"));
   EXPECT_THAT(read("out"), HasSubstr("Fc * tanh(v / v0)"));
   EXPECT_THAT(read("out"), HasSubstr("searched from 0.5,"));
-  const json entry = json::parse(read("e.json"))["effects"][0];
+  const json entry = sparflow::test_support::parsed_json(read("e.json"))["effects"][0];
   EXPECT_EQ(entry["built_in"], false);
   EXPECT_EQ(entry["shows_in"][0], "force");
   ASSERT_EQ(run("--effects " + file), 0) << read("err");

@@ -1,5 +1,6 @@
 // selftest as a stranger meets it.
 #include "cli_fixture.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
@@ -24,7 +25,7 @@ TEST_F(CliSelftest, SaysWhatTheLogCouldReveal) {
           at("s.json") + " --report " + at("s.html"));
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(o.out, HasSubstr("checked by injection: 1 of 1 as predicted"));
-  const json s = json::parse(slurp(at("s.json")));
+  const json s = test_support::parsed_json(slurp(at("s.json")));
   ASSERT_EQ(s.at("effects").size(), 2u);
   EXPECT_EQ(s.at("effects").at(0).at("id"), "coulomb_friction");
   EXPECT_EQ(s.at("effects").at(0).at("visibility"), "seen");

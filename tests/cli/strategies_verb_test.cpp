@@ -1,5 +1,6 @@
 // strategies and pareto as a stranger runs them: keys, files, and what they refuse.
 #include "cli_fixture.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
@@ -11,7 +12,7 @@ TEST_F(Cli, StrategiesWritesTheKeysThatScriptsRead) {
   const Outcome o = run("strategies -p " + kHop + " --time equal,own --idle 5 --orders 1" + kQuick +
                         " --json " + at("s.json") + " --report " + at("s.html"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json j = json::parse(slurp(at("s.json")));
+  const json j = test_support::parsed_json(slurp(at("s.json")));
   ASSERT_EQ(j.at("problems").size(), 1U);
   const json& p = j["problems"][0];
   EXPECT_EQ(p.at("name"), "HMF crane, lift");
@@ -56,7 +57,7 @@ TEST_F(Cli, StrategiesTakesFoldersAndLeavesOutWhatNamesNoModel) {
       run("strategies -p " + at("set") + " --orders 0" + kQuick + " --json " + at("s.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(o.err, HasSubstr("b.yaml: names no model, left out"));
-  const json j = json::parse(slurp(at("s.json")));
+  const json j = test_support::parsed_json(slurp(at("s.json")));
   ASSERT_EQ(j["problems"].size(), 2U);
   EXPECT_THAT(j["problems"][1].at("message").get<std::string>(), HasSubstr("infeasible"));
   EXPECT_EQ(j["summary"].at("solved"), 1);
@@ -78,7 +79,7 @@ TEST_F(Cli, ParetoFallsWithTimeAndNamesTheBestTimes) {
       run("pareto -p " + kHop + " --points 4 --longest 3" + kQuick + " --idle 5 --json " +
           at("p.json") + " -o " + at("p.csv") + " --report " + at("p.html"));
   ASSERT_EQ(o.code, 0) << o.err;
-  const json j = json::parse(slurp(at("p.json")));
+  const json j = test_support::parsed_json(slurp(at("p.json")));
   const json& points = j.at("points");
   ASSERT_GE(points.size(), 3U);
   for (std::size_t i = 1; i < points.size(); ++i) {

@@ -6,6 +6,7 @@
 
 #include "arm_log.h"
 #include "identification/compare.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -160,7 +161,7 @@ TEST(CompareJson, HasTheCauses) {
   Eigen::VectorXd& pump = channel(log, "p_main").values;
   pump.segment(1000, 250).setConstant(pump[1000]);
   const CompareResult r = compare(arm_model(), {log});
-  const auto json = nlohmann::json::parse(compare_json(r));
+  const auto json = test_support::parsed_json(compare_json(r));
   EXPECT_EQ(json["stage_at_fault"]["stage"], "force");
   EXPECT_LE(json["residual_tests"]["p_value"], 0.05);
   EXPECT_FALSE(json["regimes"].empty());

@@ -8,6 +8,7 @@
 #include "arm_log.h"
 #include "models/error.h"
 #include "models/linkage.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -346,7 +347,7 @@ TEST(CompareReport, JsonHasTheKeysScriptsRead) {
   for (Eigen::Index k = 0; k < b.size(); ++k) {
     if (q[k] > 0.2) b[k] += 9.0 * units::kBar;
   }
-  const nlohmann::json j = nlohmann::json::parse(compare_json(compare(arm_model(), {log})));
+  const nlohmann::json j = test_support::parsed_json(compare_json(compare(arm_model(), {log})));
   EXPECT_EQ(j["samples"], 3000);
   for (const auto& s : {j["stages"]["force"]["arm"], j["stages"]["flow"]["arm"],
                         j["stages"]["pressure"]["arm"]["extend"],

@@ -11,6 +11,7 @@
 #include "identification/fit.h"
 #include "models/error.h"
 #include "tests/identification/hidden_case.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -254,8 +255,8 @@ TEST(Diagnose, WhatTheModelHasIsNotMissing) {
 TEST(Diagnose, SameLogsSameAnswerAndJsonOfTheContract) {
   const Answer& a = late_pump();
   const Diagnosis again = diagnose(reference_model(), {a.logs.train}, {a.logs.reference});
-  nlohmann::json one = nlohmann::json::parse(a.diagnosis.json()),
-                 two = nlohmann::json::parse(again.json());
+  nlohmann::json one = test_support::parsed_json(a.diagnosis.json()),
+                 two = test_support::parsed_json(again.json());
   one.erase("seconds");
   two.erase("seconds");
   EXPECT_EQ(one, two);

@@ -10,6 +10,7 @@
 #include "models/error.h"
 #include "models/model_file.h"
 #include "tests/identification/arm_log.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -161,7 +162,7 @@ TEST(Extend, EffectTheModelHasIsRefused) {
 }
 
 TEST(Extend, JsonHasTheContractsKeys) {
-  const nlohmann::json j = nlohmann::json::parse(extended().json());
+  const nlohmann::json j = test_support::parsed_json(extended().json());
   const nlohmann::json& step = j.at("steps").at(0);
   EXPECT_EQ(step.at("added"), "coulomb_friction:arm");
   const nlohmann::json& force = step.at("stages").at("force").at("arm");

@@ -10,6 +10,7 @@
 #include "identification/effect_power.h"
 #include "models/error.h"
 #include "tests/identification/arm_log.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -178,7 +179,7 @@ TEST(Selftest, SaysWhatToRecordForEachSet) {
         [&](const std::string& key) { return e.reason.find(key) != std::string::npos; });
     EXPECT_GE(named, 2) << e.reason;
   }
-  const auto json = nlohmann::json::parse(t.json());
+  const auto json = test_support::parsed_json(t.json());
   EXPECT_EQ(json.at("experiments").size(), t.experiments.size());
 }
 
@@ -186,7 +187,7 @@ TEST(Selftest, InjectionAgrees) {
   const Selftest t = test_arm(arm_log(0.8), 3);
   EXPECT_EQ(t.checks.size(), 3u);
   for (const InjectionCheck& c : t.checks) EXPECT_TRUE(c.as_predicted()) << c.key << c.answer;
-  const nlohmann::json j = nlohmann::json::parse(t.json());
+  const nlohmann::json j = test_support::parsed_json(t.json());
   EXPECT_EQ(j.at("checks").size(), 3u);
   EXPECT_EQ(j.at("effects").size(), 9u);
   EXPECT_THAT(t.table(), HasSubstr("checked by injection: 3 of 3 as predicted"));

@@ -12,6 +12,7 @@
 #include "models/error.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/nlp/ipopt_solver.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow::bench {
 namespace {
@@ -29,7 +30,8 @@ std::shared_ptr<const ReferenceProblem> problem() {
 }
 
 const json& checkpoints() {
-  static const json document = json::parse(read_file(kData + "reference_checkpoints.json"));
+  static const json document =
+      test_support::parsed_json(read_file(kData + "reference_checkpoints.json"));
   return document;
 }
 
@@ -217,7 +219,7 @@ TEST(ReferenceNlp, WarmStartAfterTheGoalMovedSavesIterations) {
 
 /// The problem file with one thing changed, written where tests write.
 std::string broken(const std::string& name, const std::function<void(json&)>& change) {
-  json document = json::parse(read_file(kData + "reference_problem.json"));
+  json document = test_support::parsed_json(read_file(kData + "reference_problem.json"));
   change(document);
   const std::string path = testing::TempDir() + "reference_" + name + ".json";
   std::ofstream(path) << document.dump();
@@ -272,7 +274,7 @@ TEST(ReferenceNlp, ProgramReportsAndExitsAsPromised) {
     return WEXITSTATUS(status);
   };
   EXPECT_EQ(run(kData + "reference_problem.json --json " + out), 0);
-  const json result = json::parse(read_file(out));
+  const json result = test_support::parsed_json(read_file(out));
   for (const char* key : {"objective", "iterations", "solve_s", "callbacks_s", "linear_solver_s"}) {
     EXPECT_TRUE(result.contains(key) && result[key].is_number()) << key;
   }
