@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr double kStretchSeconds = 30.0;  // of a log, as much as the eye can compare
-constexpr std::size_t kMostRanked = 10;
+constexpr std::size_t kMostRanked = 10, kFewestRanked = 3;
 constexpr std::size_t kMostChannels = 2;  // of an effect that shows in several
 
 bool suspect_row(const Evidence& evidence, const EvidenceChannel& channel, std::size_t block) {
@@ -259,6 +259,55 @@ void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, con
   }
 }
 
+void add_noise(Page& page, const Diagnosis& d) {
+  constexpr std::size_t kMostPictures = 4;
+  struct Left {
+    std::size_t channel;
+    double share;  // of the residual's variance that its strongest signal explains
+    TellingSignal signal;
+  };
+  std::vector<Left> left;
+  Table table;
+  table.title = "What is left of each quantity";
+  table.columns = {{"quantity"}, {"left, RMS", "", 3}, {"sensor noise", "", 3},
+                   {"unit"},     {"strongest signal"}, {"it explains", "%", 2}};
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = d.evidence.channels[c];
+    if (channel.rows() == 0) continue;
+    const ChannelPicture p = channel_picture(d, -1, c);
+    Left best{c, -1.0, {}};
+    for (TellingSignal& s : telling_signals(d.evidence, channel)) {
+      // the error of a speed goes with the noise of that speed, whatever the model
+      const bool same_sensor = s.id == "speed" || s.id == "acceleration" || s.id.ends_with("flow");
+      if (channel.kind == EvidenceKind::kFlow && same_sensor) continue;
+      const double share = share_explained(s.values, p.with);
+      if (share > best.share) best = {c, share, std::move(s)};
+    }
+    const double rms = std::sqrt(p.with.squaredNorm() / static_cast<double>(p.with.size()));
+    const auto [shown, unit] = readable_error(rms, channel.unit);
+    const double scale = rms > 0.0 ? shown / rms : 1.0 / channel.unit.si;
+    table.rows.push_back({channel.text, shown,
+                          std::isfinite(channel.noise_floor) ? channel.noise_floor * scale : kNaN,
+                          unit, best.signal.words, 100.0 * std::max(0.0, best.share)});
+    if (best.share >= 0.0) left.push_back(std::move(best));
+  }
+  if (table.rows.empty()) return;
+  page.section("What is left");
+  table.note =
+      "Error of the model with the smooth laws these logs allow, filtered as the evidence is. "
+      "Strongest signal: the one "
+      "that explains most of it in bins; some per cent are chance.";
+  page.table(std::move(table));
+  std::stable_sort(left.begin(), left.end(),
+                   [](const Left& a, const Left& b) { return a.share > b.share; });
+  for (std::size_t i = 0; i < std::min(kMostPictures, left.size()); ++i) {
+    ScatterChart chart =
+        residuals(d, channel_picture(d, -1, left[i].channel), left[i].signal, false);
+    chart.width = FigureWidth::kHalf;
+    page.plot(std::move(chart));
+  }
+}
+
 LineChart bad_channel_chart(const BadChannel& bad) {
   LineChart chart;
   chart.title = fmt::format("{} in {}", bad.channel, bad.file);
@@ -286,7 +335,7 @@ void add_ranking(Page& page, const Diagnosis& d) {
   std::vector<double> values;
   for (const auto& [key, gain] : d.ranking) {
     if (values.size() == kMostRanked) break;
-    if (gain <= 0.0 && !values.empty()) break;
+    if (gain <= 0.0 && values.size() >= kFewestRanked) break;
     chart.categories.push_back(key);
     values.push_back(gain);
   }

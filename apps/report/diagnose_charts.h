@@ -38,6 +38,10 @@ void add_effect_pictures(Page& page, const Diagnosis& diagnosis, std::size_t eff
 void add_left_over(Page& page, const Diagnosis& diagnosis, const std::string& stage,
                    const std::string& at, bool swings);
 
+/// Where nothing is missing: how large each quantity's error is beside its sensors' noise, and pictures of those that a
+/// signal explains most of, for eyes to find nothing.
+void add_noise(Page& page, const Diagnosis& diagnosis);
+
 /// A bad channel over time as logged, where it is bad shaded.
 LineChart bad_channel_chart(const BadChannel& bad);
 

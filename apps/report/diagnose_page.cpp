@@ -222,6 +222,7 @@ Page diagnose_page(const CraneModel& model, const Diagnosis& d, const ExtendResu
   add_sets(page, d);
   add_proofs(page, machine, d);
   add_unexplained(page, d);
+  if (d.verdict == Verdict::kNone) add_noise(page, d);
   if (!d.ranking.empty()) {
     page.section("Ranking");
     add_ranking(page, d);

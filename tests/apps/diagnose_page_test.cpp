@@ -224,7 +224,10 @@ TEST(DiagnosePageInBrowser, NothingMissing) {
   d.p_value = 0.4;
   d.ranking = {{"coulomb_friction:arm", -0.5}};
   d.search.threshold = 6.5;
-  expect_good_in_browser(diagnose_page(model, d), "diagnose page none");
+  const Page page = diagnose_page(model, d);
+  EXPECT_GT(page.plot_count(), 1) << "what is left, beside the ranking";
+  EXPECT_THAT(page.html(), HasSubstr("What is left of each quantity"));
+  expect_good_in_browser(page, "diagnose page none");
 }
 
 TEST(ImprovePage, StepsAreWholeNumbersAndSharesOfTheErrorBefore) {
