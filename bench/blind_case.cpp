@@ -262,6 +262,8 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     const ErrorChange change =
         error_change(crane.model.machine, before, after, ours->steps.front().stage);
     run.made_worse = change.overall > kRefitMoves || !change.harmed.empty();
+    if (run.made_worse) run.worse_by = fmt::format("overall {:.3f}", change.overall);
+    for (const HarmedError& h : change.harmed) run.worse_by += "; " + h.sentence;
     run.energy_before = energy_error(before);
     run.energy_after = energy_error(after);
   }

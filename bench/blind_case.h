@@ -53,6 +53,7 @@ struct BlindRun {
   double energy_after = 0.0;
   bool changed = false;              ///< something was named and added
   bool made_worse = false;           ///< and the error on the test log rose
+  std::string worse_by;              ///< which errors rose, in words
   std::vector<Swallowed> swallowed;  ///< judge gp
 
   bool good() const;

@@ -217,7 +217,7 @@ std::string run_line(const BlindRun& r) {
   if (std::isfinite(r.energy_after))
     judged +=
         fmt::format(" energy {:.1f} -> {:.1f} %", 100.0 * r.energy_before, 100.0 * r.energy_after);
-  if (r.made_worse) judged += " WORSE";
+  if (r.made_worse) judged += " WORSE: " + r.worse_by;
   return fmt::format("{} {:8s} {:9s} {:5d} {:24s} {:60s} -> {}{}{}{}\n",
                      r.good() || r.asked.judge == "gp" ? " " : "X", r.asked.row, way, r.asked.seed,
                      r.machine, r.truth, r.asked.judge == "ours" ? "" : r.asked.judge + ": ",
@@ -286,7 +286,8 @@ nlohmann::json run_json(const BlindRun& r) {
           {"rms_ratio", number(r.rms_ratio)},
           {"energy_before", number(r.energy_before)},
           {"energy_after", number(r.energy_after)},
-          {"made_worse", r.made_worse}};
+          {"made_worse", r.made_worse},
+          {"worse_by", r.worse_by}};
 }
 
 nlohmann::json table_json(const std::vector<Measure>& table, const std::string& judge) {

@@ -7,6 +7,7 @@
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
 #include "models/nan.h"
+#include "models/return_rise.h"
 
 namespace sparflow {
 namespace {
@@ -106,8 +107,11 @@ VectorXd sensor_effect(const AppliedEffect& e, const MachineSeries& log, int ind
 void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSignals& signals) {
   const std::size_t m = signals.cylinders.size();
   const bool acts = acts_in_motion(*e.effect);
-  Eigen::MatrixXd pressure, demand;
+  Eigen::MatrixXd pressure, demand, back;
   if (acts) {
+    back = over_log(log, m, [&](const Instant<double>& s, std::span<double> out) {
+      e.effect->add_return(s, e.at, e.values, out);
+    });
     pressure = over_log(log, m, [&](const Instant<double>& s, std::span<double> out) {
       e.effect->add_pressure(s, e.at, e.values, out);
     });
@@ -121,6 +125,7 @@ void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSig
     if (acts) {
       add(pressure.col(index), c.pressure_effect);
       add(demand.col(index), c.demand_effect);
+      if ((back.col(index).array() != 0.0).any()) add(back.col(index), c.return_effect);
     }
     if (e.effect->info().stage == EffectStage::kSensor) {
       add(sensor_effect(e, log, index), c.pressure_sensor_effect);
@@ -196,19 +201,34 @@ void ChainInputs::set(const MachineSignals& signals, Index k) {
     force[i] = c.model_force[k];
     pressure[i] = or_zero(c.pressure_effect, k);
     demand[i] = or_zero(c.demand_effect, k);
+    back[i] = or_zero(c.return_effect, k);
   }
 }
 
 const MachineState& ChainInputs::evaluate(Chain& chain, bool with_std) const {
   return chain.evaluate_pressures(speed.data(), force.data(), with_std, 1e-9, pressure.data(),
-                                  demand.data());
+                                  demand.data(), back.data());
+}
+
+double working_pressure_effect(const CraneModel& model, const MachineSignals& signals, int cylinder,
+                               Index k) {
+  const auto i = static_cast<std::size_t>(cylinder);
+  const CylinderSignals& c = signals.cylinders[i];
+  const double own = or_zero(c.pressure_effect, k), back = or_zero(c.return_effect, k);
+  if (back == 0.0 || c.direction[k] == 0) return own;
+  const CylinderModel& learned = model.cylinders[i];
+  const GaussianProcess& process = c.direction[k] > 0 ? learned.extend : learned.retract;
+  if (process.empty()) return own;
+  const double mean = process.mean(c.flow[k], c.model_force[k]);
+  return own + supply_rise<double>(process, model.machine.cylinders[i], c.direction[k], mean,
+                                   c.flow[k], c.model_force[k], back);
 }
 
 void apply_effects(const CraneModel& model, MachineSignals& signals) {
   for (CylinderSignals& c : signals.cylinders) {
     c.model_force = c.predicted_force = c.static_force;
-    for (VectorXd* v :
-         {&c.pressure_effect, &c.pressure_sensor_effect, &c.demand_effect, &c.flow_effect})
+    for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,
+                        &c.demand_effect, &c.flow_effect})
       v->resize(0);
   }
   for (PumpSignals& p : signals.pumps) p.pressure_effect.resize(0);

@@ -14,14 +14,23 @@ namespace sparflow {
 void apply_effects(const CraneModel& model, MachineSignals& signals);
 
 /// What the chain is to be asked for at one sample: signed speed that makes it see flow and direction of the signals
-/// [m/s], total force [N], what effects add to working pressure and demand [Pa].
+/// [m/s], total force [N], what effects add to working pressure, demand and return chamber [Pa].
 struct ChainInputs {
   explicit ChainInputs(std::size_t cylinders)
-      : speed(cylinders), force(cylinders), pressure(cylinders), demand(cylinders) {}
+      : speed(cylinders),
+        force(cylinders),
+        pressure(cylinders),
+        demand(cylinders),
+        back(cylinders) {}
   void set(const MachineSignals& signals, Eigen::Index k);
   const MachineState& evaluate(Chain& chain, bool with_std = false) const;
-  std::vector<double> speed, force, pressure, demand;  ///< by cylinder
+  std::vector<double> speed, force, pressure, demand, back;  ///< by cylinder
 };
+
+/// What the effects add to the working pressure at one sample, by the process of the side asked for: of the return
+/// chamber what reaches the supply, and what acts on the supply itself. [Pa]
+double working_pressure_effect(const CraneModel& model, const MachineSignals& signals, int cylinder,
+                               Eigen::Index k);
 
 /// signal[k], 0 for an empty one: effects that are not there.
 inline double or_zero(const Eigen::VectorXd& signal, Eigen::Index k) {

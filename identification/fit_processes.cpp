@@ -6,6 +6,7 @@
 #include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
 #include "identification/robust.h"
+#include "models/return_rise.h"
 
 namespace sparflow {
 namespace {
@@ -17,6 +18,27 @@ using Eigen::VectorXd;
 struct ProcessData {
   GpDataset set;
   std::vector<Index> position;  ///< running number over all logs, a gap between logs
+  VectorXd measured;            ///< [Pa] as measured, less the effects on the supply itself
+  VectorXd back;                ///< [Pa] what effects add to the return chamber
+  bool has_back() const { return (back.array() != 0.0).any(); }
+
+  /// Takes what of it reaches the supply off, by a process learned so far.
+  void take_back_off(const Cylinder& cylinder, int side, const GaussianProcess& process) {
+    for (Index k = 0; k < back.size(); ++k) {
+      const double q = set.flow[k], f = set.force[k];
+      set.pressure[k] = measured[k] - supply_rise<double>(process, cylinder, side,
+                                                          process.mean(q, f), q, f, back[k]);
+    }
+  }
+  /// The same before anything is learned: all of it where the load opposes, nothing where it helps.
+  void take_back_off(const Cylinder& cylinder, int side) {
+    const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
+    const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
+    for (Index k = 0; k < back.size(); ++k) {
+      const double load = std::max(0.0, side * set.force[k] / supply);
+      set.pressure[k] = measured[k] - std::clamp(other / supply * back[k], -load, load);
+    }
+  }
 };
 
 GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
@@ -27,7 +49,7 @@ GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
 /// white noise itself, and a filter would blur the steps at starts and stops.
 ProcessData process_data(const Machine& machine, const TrainingData& data, int cylinder,
                          bool extend) {
-  std::vector<double> flow, force, pressure;
+  std::vector<double> flow, force, pressure, back;
   ProcessData out;
   out.set.name = process_name(machine, cylinder, extend);
   Index offset = 0;
@@ -38,10 +60,12 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
       if (!data.counts[l][k] || !c.driven[k] || (c.direction[k] > 0) != extend) continue;
       const double own = c.working_pressure[k] - or_zero(c.pressure_effect, k) -
                          or_zero(c.pressure_sensor_effect, k);
-      if (!std::isfinite(own) || !std::isfinite(c.model_force[k])) continue;
+      if (!std::isfinite(own + or_zero(c.return_effect, k)) || !std::isfinite(c.model_force[k]))
+        continue;
       flow.push_back(c.flow[k]);
       force.push_back(c.model_force[k]);
       pressure.push_back(own);
+      back.push_back(or_zero(c.return_effect, k));
       out.position.push_back(offset + k);
     }
     offset += s.samples() + 2;
@@ -50,6 +74,11 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
   out.set.flow = Eigen::Map<Eigen::ArrayXd>(flow.data(), n);
   out.set.force = Eigen::Map<Eigen::ArrayXd>(force.data(), n);
   out.set.pressure = Eigen::Map<Eigen::ArrayXd>(pressure.data(), n);
+  out.measured = out.set.pressure.matrix();
+  out.back = Eigen::Map<VectorXd>(back.data(), n);
+  if (out.has_back()) {
+    out.take_back_off(machine.cylinders[static_cast<std::size_t>(cylinder)], extend ? 1 : -1);
+  }
   return out;
 }
 
@@ -107,6 +136,32 @@ GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int ste
   return rows_of(data.set, rows);
 }
 
+/// What effects add to the return chambers reaches the supply by the very processes that are being learned: their
+/// slopes over the load, which tell the branches apart, are there after the first round, their values after the second.
+void take_backs_off(const FitOptions& options, std::vector<ProcessData>& samples, FitPass& pass) {
+  const auto take_off = [&](std::size_t i) {
+    const ProcessFit& fitted = pass.processes[i];
+    const auto c = static_cast<std::size_t>(fitted.cylinder);
+    const CylinderModel& m = pass.model.cylinders[c];
+    samples[i].take_back_off(pass.model.machine.cylinders[c], fitted.extend ? 1 : -1,
+                             fitted.extend ? m.extend : m.retract);
+  };
+  std::vector<GpDataset> again;
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!pass.processes[i].report.failure.empty() || !samples[i].has_back()) continue;
+    take_off(i);
+    again.push_back(samples[i].set);
+    which.push_back(i);
+  }
+  if (again.empty()) return;
+  std::vector<LearnedGp> learned = learn_gps(again, options.gp, {}, options.threads);
+  for (std::size_t k = 0; k < learned.size(); ++k) {
+    if (learned[k].report.failure.empty()) take(pass, which[k], std::move(learned[k]));
+    take_off(which[k]);
+  }
+}
+
 void process_notes(const Machine& machine, FitPass& pass) {
   for (const ProcessFit& f : pass.processes) {
     const std::string& name = machine.cylinders[static_cast<std::size_t>(f.cylinder)].name;
@@ -155,6 +210,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   };
   std::vector<LearnedGp> learned = learn_gps(sets, options.gp, tell(0.0), options.threads);
   for (std::size_t i = 0; i < learned.size(); ++i) take(pass, i, std::move(learned[i]));
+  take_backs_off(options, samples, pass);
 
   std::vector<GpDataset> again;
   std::vector<std::size_t> which;

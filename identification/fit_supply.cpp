@@ -42,7 +42,8 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
         const GaussianProcess& process = c.direction[k] > 0 ? m.extend : m.retract;
         clear = c.driven[k] && !process.empty();
         if (!clear) continue;
-        p[f] = process.mean(c.flow[k], c.model_force[k]) + or_zero(c.pressure_effect, k) +
+        p[f] = process.mean(c.flow[k], c.model_force[k]) +
+               working_pressure_effect(pass.model, s, pump.feeds[f], k) +
                or_zero(c.demand_effect, k);
         clear = std::isfinite(p[f]);
       }

@@ -290,8 +290,8 @@ MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signa
                              const SignalOptions& options) {
   MachineSignals out = signals;
   for (CylinderSignals& c : out.cylinders) {
-    for (VectorXd* v :
-         {&c.pressure_effect, &c.pressure_sensor_effect, &c.demand_effect, &c.flow_effect}) {
+    for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,
+                        &c.demand_effect, &c.flow_effect}) {
       v->resize(0);
     }
   }

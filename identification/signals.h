@@ -51,7 +51,8 @@ struct CylinderSignals {
   Eigen::VectorXd model_force;      ///< [N] static force + force effects: what the processes see
   Eigen::VectorXd predicted_force;  ///< [N] what a sensor of the force reads: + sensor effects
   // Empty = none.
-  Eigen::VectorXd pressure_effect;         ///< [Pa] working pressure beyond the process
+  Eigen::VectorXd pressure_effect;  ///< [Pa] working pressure beyond the process
+  Eigen::VectorXd return_effect;  ///< [Pa] return chamber; the process says what reaches the supply
   Eigen::VectorXd pressure_sensor_effect;  ///< [Pa] what its sensor reads beyond that
   Eigen::VectorXd demand_effect;           ///< [Pa] asked of the pump beyond pressure and margin
   Eigen::VectorXd flow_effect;             ///< [m/s] rod speed beyond valve gain * command

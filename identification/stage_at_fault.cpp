@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/apply_effects.h"
 #include "identification/compare.h"
 #include "identification/robust.h"
 #include "models/nan.h"
@@ -63,7 +64,7 @@ class Inheritance {
       double added = model_.cylinders[static_cast<std::size_t>(i)].margin;
       if (c.demand_effect.size() > 0) added += c.demand_effect[k];
       double by_model = p.mean(c.flow[k], predicted_force(c)[k]);
-      if (c.pressure_effect.size() > 0) by_model += c.pressure_effect[k];
+      by_model += working_pressure_effect(model_, signals_, i, k);
       predicted = std::max(predicted, by_model + added);
       measured = std::max(measured, c.working_pressure_smooth[k] + added);
     }

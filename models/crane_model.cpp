@@ -5,6 +5,7 @@
 
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
+#include "models/return_rise.h"
 
 namespace sparflow {
 
@@ -84,13 +85,15 @@ const MachineState& Chain::evaluate(const double* q, const double* qd, double pa
 const MachineState& Chain::evaluate_pressures(const double* speed, const double* force,
                                               bool with_std, double rest_speed,
                                               const double* added_pressure,
-                                              const double* added_demand) {
+                                              const double* added_demand,
+                                              const double* added_return) {
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {
     CylinderState& c = state_.cylinders[i];
     c.speed = speed[i];
     c.force = c.total_force = force[i];
     set_flow(i, rest_speed);
     set_pressure(i, with_std);
+    if (added_return != nullptr) raise_by_return(i, added_return[i]);
     if (added_pressure != nullptr && c.moving && machine_->cylinders[i].hydraulic()) {
       c.pressure += added_pressure[i];
     }
@@ -117,6 +120,18 @@ void Chain::set_pressure(std::size_t cylinder, bool with_std) {
   if (process.empty()) return;
   c.pressure = process.mean(c.flow, c.total_force);
   if (with_std) c.pressure_std = std::sqrt(std::max(0.0, process.variance(c.flow, c.total_force)));
+}
+
+void Chain::raise_by_return(std::size_t cylinder, double rise) {
+  CylinderState& c = state_.cylinders[cylinder];
+  const Cylinder& geometry = machine_->cylinders[cylinder];
+  if (rise == 0.0 || !c.moving || !geometry.hydraulic()) return;
+  const int side = c.speed > 0.0 ? 1 : -1;
+  const CylinderModel& learned = model_->cylinders[cylinder];
+  const GaussianProcess& process = side > 0 ? learned.extend : learned.retract;
+  if (process.empty()) return;
+  c.pressure +=
+      supply_rise<double>(process, geometry, side, c.pressure, c.flow, c.total_force, rise);
 }
 
 void Chain::add_force_effects(const double* q, const double* qd, const double* qdd,
@@ -160,6 +175,9 @@ void Chain::add_force_effects(const double* q, const double* qd, const double* q
 }
 
 void Chain::add_pressure_effects() {
+  std::fill(added_.begin(), added_.end(), 0.0);
+  for (const AppliedEffect& e : laws_) e.effect->add_return(instant_, e.at, e.values, added_);
+  for (std::size_t i = 0; i < added_.size(); ++i) raise_by_return(i, added_[i]);
   for (std::size_t i = 0; i < added_.size(); ++i)
     instant_.pressure[i] = state_.cylinders[i].pressure;
   std::fill(added_.begin(), added_.end(), 0.0);

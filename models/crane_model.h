@@ -134,7 +134,8 @@ inline constexpr double kRestSpeed = 1e-9;
 /// Evaluates the exact chain; a workspace, one a thread, no allocation after construction.
 ///
 /// With the model's effects: static forces of the effective machine (models/effects/effective_machine.h), + force
-/// effects, flows, working pressure p(Q, F total) + pressure effects of the moving hydraulic cylinders, demand =
+/// effects, flows, working pressure p(Q, F total) + what the effects on the return chambers do to it
+/// (models/return_rise.h) + pressure effects of the moving hydraulic cylinders, demand =
 /// working pressure + margin + demand effects, pump = max(standby, demands) + pump effects. An effect of a stage
 /// sees what earlier effects of its stage do not add: all of a stage start from the same state.
 /// Effects with memory (lags, delays) and of flow and sensors say nothing here.
@@ -158,10 +159,12 @@ class Chain {
   /// [N]: for logs, where effects are series (identification/series.h).
   /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
   /// @param added_demand [Pa] by cylinder, asked of the pump on top; nullptr = 0
+  /// @param added_return [Pa] by cylinder, added to its return chamber; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
                                          bool with_std = false, double rest_speed = kRestSpeed,
                                          const double* added_pressure = nullptr,
-                                         const double* added_demand = nullptr);
+                                         const double* added_demand = nullptr,
+                                         const double* added_return = nullptr);
 
   /// The machine whose forces these are.
   const Machine& machine() const { return *machine_; }
@@ -169,6 +172,7 @@ class Chain {
  private:
   void set_flow(std::size_t cylinder, double rest_speed);
   void set_pressure(std::size_t cylinder, bool with_std);
+  void raise_by_return(std::size_t cylinder, double rise);
   void add_force_effects(const double* q, const double* qd, const double* qdd, double payload);
   void add_pressure_effects();
   void pump_stage(const double* added_demand);

@@ -7,18 +7,10 @@
 
 #include "models/effects/effective_machine.h"
 #include "models/error.h"
+#include "models/return_rise.h"
 
 namespace sparflow {
 namespace {
-
-Jet process_mean(const GaussianProcess& process, const Jet& flow, const Jet& force) {
-  if (flow.variables() == 0 && force.variables() == 0) {
-    return process.mean(flow.value, force.value);
-  }
-  const GpDerivatives g = process.mean_derivatives(flow.value, force.value);
-  return Jet::chain(flow, force, g.value, g.d_flow, g.d_force, g.d_flow_flow, g.d_flow_force,
-                    g.d_force_force);
-}
 
 bool nothing(const Jet& x) { return x.variables() == 0 && x.value == 0.0; }
 
@@ -151,6 +143,8 @@ void SmoothEffects::evaluate_side(bool other) {
   std::fill(added_.begin(), added_.end(), Jet(0.0));
   for (const AppliedEffect& e : laws_) e.effect->add_force(s, e.at, e.values, added_);
   for (std::size_t i = 0; i < m; ++i) s.force[i] += added_[i];
+  std::fill(added_.begin(), added_.end(), Jet(0.0));
+  for (const AppliedEffect& e : laws_) e.effect->add_return(s, e.at, e.values, added_);
   for (std::size_t i = 0; i < m; ++i) {
     const sparflow::Cylinder& geometry = machine_->cylinders[i];
     if (s.side[i] == 0 || !geometry.hydraulic()) continue;
@@ -159,7 +153,11 @@ void SmoothEffects::evaluate_side(bool other) {
     const GaussianProcess& process = extend ? learned.extend : learned.retract;
     if (process.empty()) continue;
     const double area = extend ? geometry.area_piston() : geometry.area_rod();
-    s.pressure[i] = process_mean(process, area * cylinders_[i].size, s.force[i]);
+    const Jet flow = area * cylinders_[i].size;
+    s.pressure[i] = process_mean(process, flow, s.force[i]);
+    if (nothing(added_[i])) continue;
+    s.pressure[i] +=
+        supply_rise<Jet>(process, geometry, s.side[i], s.pressure[i], flow, s.force[i], added_[i]);
   }
   std::fill(added_.begin(), added_.end(), Jet(0.0));
   for (const AppliedEffect& e : laws_) e.effect->add_pressure(s, e.at, e.values, added_);

@@ -101,6 +101,12 @@ class Effect {
                             std::span<double>) const {}
   virtual void add_pressure(const Instant<Jet>&, int, std::span<const double>,
                             std::span<Jet>) const {}
+  /// Return chamber of each moving cylinder. What of it reaches the supply the cylinder's learned pressure says
+  /// (models/return_rise.h). [Pa]
+  virtual void add_return(const Instant<double>&, int, std::span<const double>,
+                          std::span<double>) const {}
+  virtual void add_return(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {
+  }
   /// What a cylinder asks of its pump beyond working pressure and margin. [Pa]
   virtual void add_demand(const Instant<double>&, int, std::span<const double>,
                           std::span<double>) const {}

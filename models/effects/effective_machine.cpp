@@ -45,12 +45,13 @@ void fill_random(std::mt19937& random, Instant<double>& s) {
 /// Everything an effect's laws say of one state, one after the other.
 std::vector<double> all_laws(const AppliedEffect& e, const Instant<double>& s) {
   const std::size_t m = s.speed.size();
-  std::vector<double> out(3 * m + s.pump_flow.size(), 0.0);
+  std::vector<double> out(4 * m + s.pump_flow.size(), 0.0);
   const std::span<double> all(out);
   e.effect->add_force(s, e.at, e.values, all.subspan(0, m));
   e.effect->add_pressure(s, e.at, e.values, all.subspan(m, m));
   e.effect->add_demand(s, e.at, e.values, all.subspan(2 * m, m));
-  e.effect->add_pump(s, e.at, e.values, all.subspan(3 * m));
+  e.effect->add_return(s, e.at, e.values, all.subspan(3 * m, m));
+  e.effect->add_pump(s, e.at, e.values, all.subspan(4 * m));
   return out;
 }
 

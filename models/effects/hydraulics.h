@@ -41,18 +41,6 @@ const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder);
 /// The same without the pressures' own noise, where it is known. [N]
 const Eigen::VectorXd& steady_force(const CylinderSeries& cylinder);
 
-/// What a rise of the return pressure does to the supply. p_supply = max(static branch, counterbalance branch): all
-/// of it appears while the load asks for more than that, nothing while the load helps; between the two the
-/// load's own share, so that the law stays continuous.
-/// @param rise A_return/A_supply times the rise [Pa], >= 0 or < 0
-/// @param load side * force / A_supply: pressure the load asks for, negative when it helps [Pa]
-template <class T>
-T opposed_rise(const T& rise, const T& load) {
-  if (!(load > T(0.0))) return T(0.0);
-  if (rise > T(0.0)) return load < rise ? load : rise;
-  return load < -rise ? -load : rise;
-}
-
 /// Side whose return or supply chamber `kind` speaks of: +1, -1, 0 for other kinds.
 int return_side(EvidenceKind kind);
 int supply_side(EvidenceKind kind);

@@ -64,17 +64,15 @@ class OilTemperature final : public Effect {
   }
 
   template <class T>
-  void add_pressure_law(const Instant<T>& s, int, std::span<const double> p,
-                        std::span<T> out) const {
+  void add_return_law(const Instant<T>& s, int, std::span<const double> p, std::span<T> out) const {
     const double excess = factor(s.oil, p[2]);
     for (std::size_t i = 0; i < out.size(); ++i) {
       const Cylinder& c = s.machine->cylinders[i];
       const int side = s.side[i];
       if (side == 0 || !c.hydraulic()) continue;
-      const double area = supply_area(c, side), back = return_area(c, side);
-      const double full = rated_flow(*s.machine, static_cast<int>(i), side) * back / area;
-      out[i] += opposed_rise<T>(s.return_flow[i] * (p[0] * excess / full * back / area),
-                                s.force[i] * (side / area));
+      const double full = rated_flow(*s.machine, static_cast<int>(i), side) * return_area(c, side) /
+                          supply_area(c, side);
+      out[i] += s.return_flow[i] * (p[0] * excess / full);
     }
   }
   template <class T>
@@ -86,7 +84,7 @@ class OilTemperature final : public Effect {
       out[i] += s.flow[i] * (p[1] * excess / full);
     }
   }
-  SPARFLOW_EFFECT_LAW(add_pressure)
+  SPARFLOW_EFFECT_LAW(add_return)
   SPARFLOW_EFFECT_LAW(add_demand)
 
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,

@@ -31,8 +31,8 @@ class ReturnBackPressure final : public Effect {
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (turbulent losses)",
         .form_error = 0.07,
         .in_motion =
-            "pressure: A_return/A_supply of it while the load opposes the motion; under a "
-            "helping load the counterbalance valve sets the supply"};
+            "pressure: as a load larger by A_return times it where the supply follows the load; "
+            "nothing where a counterbalance valve sets the supply"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override { return whole_circuit(machine); }
@@ -41,20 +41,15 @@ class ReturnBackPressure final : public Effect {
   }
 
   template <class T>
-  void add_pressure_law(const Instant<T>& s, int, std::span<const double> p,
-                        std::span<T> out) const {
+  void add_return_law(const Instant<T>& s, int, std::span<const double> p, std::span<T> out) const {
     T total = 0.0;
     for (const T& q : s.return_flow) total += q;
     const T back = p[0] * total * total;
     for (std::size_t i = 0; i < out.size(); ++i) {
-      const Cylinder& c = s.machine->cylinders[i];
-      if (s.side[i] == 0 || !c.hydraulic()) continue;
-      const double area = supply_area(c, s.side[i]);
-      out[i] += opposed_rise<T>(back * (return_area(c, s.side[i]) / area),
-                                s.force[i] * (s.side[i] / area));
+      if (s.side[i] != 0 && s.machine->cylinders[i].hydraulic()) out[i] += back;
     }
   }
-  SPARFLOW_EFFECT_LAW(add_pressure)
+  SPARFLOW_EFFECT_LAW(add_return)
 
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int, std::span<const double>,
                Eigen::MatrixXd& columns) const override {

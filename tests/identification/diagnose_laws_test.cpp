@@ -93,6 +93,28 @@ TEST_P(HiddenByALaw, IsAddedFirst) {
             *law.at == '\0' ? std::string(law.id) : std::string(law.id) + ":" + law.at);
 }
 
+/// On the test log a counterbalance valve sets the boom's supply while the load opposes, too: what the return chamber
+/// has less must not be taken off there.
+TEST(OilTemperatureByALaw, IsKeptWhereAValveRulesAgainstTheLoad) {
+  const Machine machine = drawn_machine("loader_crane");
+  for (const int law : {0, 1, 2}) {
+    SCOPED_TRACE(law);
+    const HiddenCase logs = hidden_case(machine, {{"oil_temperature", "", 1.0, law}}, kLogSeed,
+                                        kLogSeconds, {}, 120.0);
+    FitOptions fit_options;
+    fit_options.hold_out_every = 0;
+    const CraneModel healthy = fit(machine, {logs.reference}, {}, fit_options).model;
+    ExtendOptions options;
+    options.references = {logs.reference};
+    const ExtendResult r = extend(healthy, {parse_effect("oil_temperature", machine)}, {logs.train},
+                                  {logs.test}, options);
+    const ErrorChange& change = r.steps.front().change;
+    EXPECT_FALSE(change.worse()) << "overall " << change.overall << ", own " << change.own;
+    EXPECT_LT(change.own, 0.9) << "a tenth at least: warm oil is what the test log is about";
+    for (const HarmedError& h : change.harmed) ADD_FAILURE() << h.sentence;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Catalogue, HiddenByALaw,
     ::testing::Values(HiddenLaw{"leakage", "boom", 0, "laminar past the spool", {"k"}},

@@ -17,6 +17,7 @@ inline Machine drawn_machine(const std::string& name) {
 struct HiddenCase {
   simulator::GeneratedCase logs;
   Log train, reference;
+  Log test;  ///< warm oil, one payload, other motions
 
   double truth(const std::string& id, const std::string& parameter) const {
     for (const simulator::HiddenTruth& t : logs.train.truth) {
@@ -32,18 +33,20 @@ struct HiddenCase {
 inline HiddenCase hidden_case(const Machine& machine,
                               const std::vector<simulator::HiddenEffect>& effects,
                               std::uint64_t seed, double seconds,
-                              const simulator::LogChannels& channels = {}) {
+                              const simulator::LogChannels& channels = {},
+                              double test_seconds = 5.0) {
   simulator::CaseRequest request;
   request.log.machine = machine;
   request.log.effects = effects;
   request.log.crane_seed = request.log.motion_seed = seed;
   request.log.seconds = seconds;
   request.log.channels = channels;
-  request.test_seconds = 5.0;
+  request.test_seconds = test_seconds;
   HiddenCase c;
   c.logs = simulator::generate_case(request);
   c.train = log_from_text("train.csv", simulator::csv_text(c.logs.train), machine);
   c.reference = log_from_text("reference.csv", simulator::csv_text(c.logs.reference), machine);
+  c.test = log_from_text("test.csv", simulator::csv_text(c.logs.test), machine);
   return c;
 }
 

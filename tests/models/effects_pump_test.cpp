@@ -29,6 +29,12 @@ class PumpEffects : public ::testing::Test {
     effect_named(id).add_pressure(s, at, p, out);
     return out;
   }
+  std::vector<double> rise(const std::string& id, const Instant<double>& s,
+                           const std::vector<double>& p) const {
+    std::vector<double> out(2, 0.0);
+    effect_named(id).add_return(s, -1, p, out);
+    return out;
+  }
   std::vector<double> demand(const std::string& id, const Instant<double>& s,
                              const std::vector<double>& p, int at) const {
     std::vector<double> out(2, 0.0);
@@ -37,15 +43,17 @@ class PumpEffects : public ::testing::Test {
   }
 };
 
-TEST_F(PumpEffects, TankLineRaisesTheSupplyOfAnOpposedLoadByTheAreas) {
+TEST_F(PumpEffects, TankLineRaisesEveryReturnChamberThatMoves) {
   Instant<double> s = two_cylinder_instant<double>(machine);
   const double k = 1e-3 * kBarPerLpm2;
   const double total = 0.1 * b + 0.08 * a;
-  const std::vector<double> out = pressure("return_back_pressure", s, {k});
-  EXPECT_NEAR(out[0], b / a * k * total * total, 1e-6);
-  EXPECT_EQ(out[1], 0.0) << "push retracts under a helping load";
-  s.force[0] = 100.0;  // hardly any load: no more than that
-  EXPECT_NEAR(pressure("return_back_pressure", s, {k})[0], 100.0 / a, 1e-9);
+  const std::vector<double> out = rise("return_back_pressure", s, {k});
+  EXPECT_NEAR(out[0], k * total * total, 1e-6);
+  EXPECT_NEAR(out[1], k * total * total, 1e-6);
+  s.side[1] = 0;
+  EXPECT_EQ(rise("return_back_pressure", s, {k})[1], 0.0) << "push rests";
+  EXPECT_EQ(pressure("return_back_pressure", s, {k})[0], 0.0) << "what reaches the supply the "
+                                                                 "learned pressure says";
 }
 
 TEST_F(PumpEffects, TankLineIsRecoveredFromTheOthersFlow) {
@@ -230,13 +238,15 @@ TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
     const Effect& effect = effect_named(law.id);
     const auto sum = [&]<class T>(const T& x, const T& y) {
       const Instant<T> s = instant(x, y);
-      std::vector<T> force(2, T(0.0)), pressure(2, T(0.0)), asked(2, T(0.0)), pump(1, T(0.0));
+      std::vector<T> force(2, T(0.0)), pressure(2, T(0.0)), asked(2, T(0.0)), pump(1, T(0.0)),
+          back(2, T(0.0));
       effect.add_force(s, law.at, law.p, force);
       effect.add_pressure(s, law.at, law.p, pressure);
+      effect.add_return(s, law.at, law.p, back);
       effect.add_demand(s, law.at, law.p, asked);
       effect.add_pump(s, law.at, law.p, pump);
-      return T(1e-5 *
-               (force[0] + pressure[0] + 2.0 * pressure[1] + asked[0] + 3.0 * asked[1] + pump[0]));
+      return T(1e-5 * (force[0] + pressure[0] + 2.0 * pressure[1] + back[0] + 2.0 * back[1] +
+                       asked[0] + 3.0 * asked[1] + pump[0]));
     };
     const double x = 0.1, y = 0.2;
     const Jet j = sum(Jet::variable(x, 0, 2), Jet::variable(y, 1, 2));
@@ -267,6 +277,7 @@ TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
     const Instant<double> s = instant(x, y);
     effect.add_force(s, law.at, none, out);
     effect.add_pressure(s, law.at, none, out);
+    effect.add_return(s, law.at, none, out);
     effect.add_demand(s, law.at, none, out);
     effect.add_pump(s, law.at, none, out);
     EXPECT_EQ(std::abs(out[0]) + std::abs(out[1]), 0.0) << law.id;

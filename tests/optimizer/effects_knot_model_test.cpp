@@ -225,6 +225,7 @@ TEST_P(EffectsOnMachine, WhatAMotionDoesNotSeeHasNoLaw) {
       }
       a.effect->add_force(s, a.at, a.values, force);
       a.effect->add_pressure(s, a.at, a.values, pressure);
+      a.effect->add_return(s, a.at, a.values, pressure);
       a.effect->add_demand(s, a.at, a.values, demand);
       a.effect->add_pump(s, a.at, a.values, pump);
     }
