@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "identification/effect_estimate.h"
 #include "identification/effect_proof.h"
@@ -351,11 +350,9 @@ const char* verdict_name(Verdict verdict) {
   return "";
 }
 
-namespace {
-
-Diagnosis diagnose_once(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                        const std::vector<MachineSignals>& references,
-                        const DiagnoseOptions& options, const SearchProgress& progress) {
+Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                           const std::vector<MachineSignals>& references,
+                           const DiagnoseOptions& options, const SearchProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   Diagnosis d;
   if (progress) progress(0.02, "arranging the evidence");
@@ -425,30 +422,6 @@ Diagnosis diagnose_once(const CraneModel& model, const std::vector<MachineSignal
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (progress) progress(1.0, "done");
   return d;
-}
-
-}  // namespace
-
-Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                           const std::vector<MachineSignals>& references,
-                           const DiagnoseOptions& options, const SearchProgress& progress) {
-  const bool known =
-      std::any_of(model.effects.begin(), model.effects.end(),
-                  [](const AppliedEffect& e) { return is_of_accelerations(*e.effect); });
-  if (!known) {
-    Diagnosis d = diagnose_once(model, suspects, references, options, progress);
-    const bool found = std::any_of(
-        d.search.found.begin(), d.search.found.end(),
-        [](const FoundEffect& f) { return is_of_accelerations(*f.design.effect.effect); });
-    if (!found) return d;
-    const std::vector<MachineSignals> quiet = with_quiet_accelerations(model.machine, suspects);
-    const bool same = std::equal(
-        quiet.begin(), quiet.end(), suspects.begin(),
-        [](const MachineSignals& a, const MachineSignals& b) { return a.window == b.window; });
-    if (same) return d;
-  }
-  return diagnose_once(model, with_quiet_accelerations(model.machine, suspects),
-                       with_quiet_accelerations(model.machine, references), options, progress);
 }
 
 Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,

@@ -86,13 +86,6 @@ class Estimator {
         sharp_(can_sharpen(suspects) && (references.empty() || can_sharpen(references))),
         leave_out_(leave_out) {
     if (sharp_) sharpen_all();
-    const bool accelerations = std::any_of(wanted.begin(), wanted.end(), [](const EffectAt& e) {
-      return e.effect->columns_filtered();
-    });
-    if (accelerations && !sharp_) {
-      suspects_ = with_quiet_accelerations(model.machine, std::move(suspects_));
-      references_ = with_quiet_accelerations(model.machine, std::move(references_));
-    }
     std::erase_if(base_.effects, [&](const AppliedEffect& a) {
       return std::any_of(wanted.begin(), wanted.end(),
                          [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
@@ -326,19 +319,6 @@ class Estimator {
 };
 
 }  // namespace
-
-bool is_of_accelerations(const Effect& effect) {
-  return effect.columns_filtered() && effect.info().stage == EffectStage::kForce;
-}
-
-std::vector<MachineSignals> with_quiet_accelerations(const Machine& machine,
-                                                     std::vector<MachineSignals> logs) {
-  for (MachineSignals& s : logs) {
-    const double window = quiet_window(s.time, s.runs, s.q_measured, s.window);
-    if (window > s.window) s = smoothed_anew(machine, s, window);
-  }
-  return logs;
-}
 
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 const std::vector<MachineSignals>& suspects,

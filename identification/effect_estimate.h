@@ -17,14 +17,6 @@ struct EffectEstimate {
   double log_likelihood = 0.0;         ///< [nats]
 };
 
-/// Whether noise in accelerations makes this effect's parameters too small.
-bool is_of_accelerations(const Effect& effect);
-
-/// Logs through a wider filter where accelerations are mostly noise (`quiet_window`): what an effect that is made of
-/// accelerations is found and estimated from. Others stay as they are.
-std::vector<MachineSignals> with_quiet_accelerations(const Machine& machine,
-                                                     std::vector<MachineSignals> logs);
-
 /// @param model its margins start the pumps' demand; its effects are starting values of those that are wanted, and
 ///        stay as they are otherwise
 /// @param wanted every effect to be estimated, once each

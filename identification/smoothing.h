@@ -85,13 +85,6 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
 double sharpest_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
                        const Eigen::MatrixXd& positions, double longest, int order = 3);
 
-/// Shortest window from `shortest` to 0.42 s at which noise is at most a fiftieth of the variance of the acceleration of
-/// every position that moves: what an inertia is regressed on. The window of the velocities may let so much more pass
-/// that an inertia comes out a third too small (Fuller, as above), and what it leaves follows the accelerations.
-/// @return full width [s], the widest where none will do
-double quiet_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
-                    const Eigen::MatrixXd& positions, double shortest, int order = 3);
-
 /// The filter for a log: the window of the options, or the one `choose_window` finds for the log's joint
 /// positions and strokes.
 SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options = {});

@@ -16,8 +16,6 @@ constexpr double kLongest = 0.42;                          // [s]
 constexpr double kRatio = 1.2;             // between neighbouring windows of the grid
 constexpr Eigen::Index kEnough = 40000;    // samples looked at, in blocks spread over the log
 constexpr double kLargestDilution = 1e-3;  // share of noise in the variance of an acceleration
-constexpr double kQuietDilution = 0.02;    // the same, where that cannot be had
-constexpr double kMoves = 100.0;           // range / noise of a position that moves
 constexpr double kWhenUnknown = 0.25;      // [s]
 
 /// Standard deviation of white noise on a channel: third differences have 20 times its variance and hardly
@@ -75,17 +73,6 @@ Eigen::VectorXd slope_weights(int half, int padded, int order) {
   return w;
 }
 
-/// Variance of the noise in the filtered second derivative / that of what is not noise.
-double noise_in_acceleration(const SavitzkyGolay& filter, const std::vector<SampleRange>& runs,
-                             const Eigen::VectorXd& position) {
-  const Eigen::ArrayXd a = filter.apply(position, 2).array();
-  const double count = static_cast<double>(a.isFinite().count());
-  const double whole = a.isFinite().select(a.square(), 0.0).sum() / std::max(1.0, count);
-  const double noise = std::pow(noise_of(position, runs) * filter.noise_gain(2), 2);
-  if (noise == 0.0) return 0.0;
-  return whole > noise ? noise / (whole - noise) : INFINITY;
-}
-
 }  // namespace
 
 double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& all_runs,
@@ -138,36 +125,20 @@ double sharpest_window(const Eigen::VectorXd& time, const std::vector<SampleRang
                        const Eigen::MatrixXd& positions, double longest, int order) {
   const std::vector<SampleRange> runs = spread_blocks(all_runs);
   const double step = median_step(time);
-  if (!(step > 0.0) || positions.cols() == 0) return longest;
+  if (!(step > 0.0)) return longest;
   for (double w = kSamples * step; w < longest; w *= kRatio) {
     const SavitzkyGolay filter(time, runs, w, order);
-    bool sharp = true;
-    for (Eigen::Index c = 0; c < positions.cols() && sharp; ++c)
-      sharp = noise_in_acceleration(filter, runs, positions.col(c)) <= kLargestDilution;
+    bool sharp = positions.cols() > 0;
+    for (Eigen::Index c = 0; c < positions.cols() && sharp; ++c) {
+      const Eigen::ArrayXd a = filter.apply(positions.col(c), 2).array();
+      const double count = static_cast<double>(a.isFinite().count());
+      const double whole = a.isFinite().select(a.square(), 0.0).sum() / std::max(1.0, count);
+      const double noise = std::pow(noise_of(positions.col(c), runs) * filter.noise_gain(2), 2);
+      sharp = noise <= kLargestDilution * (whole - noise);
+    }
     if (sharp) return w;
   }
   return longest;
-}
-
-double quiet_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& all_runs,
-                    const Eigen::MatrixXd& positions, double shortest, int order) {
-  const std::vector<SampleRange> runs = spread_blocks(all_runs);
-  std::vector<Eigen::Index> moving;
-  for (Eigen::Index c = 0; c < positions.cols(); ++c) {
-    const auto finite = positions.col(c).array().isFinite();
-    const double range = finite.select(positions.col(c).array(), -INFINITY).maxCoeff() -
-                         finite.select(positions.col(c).array(), INFINITY).minCoeff();
-    if (range > kMoves * noise_of(positions.col(c), runs)) moving.push_back(c);
-  }
-  double w = shortest;
-  for (; w < kLongest; w = std::min(kLongest, w * kRatio)) {
-    const SavitzkyGolay filter(time, runs, w, order);
-    const bool quiet = std::all_of(moving.begin(), moving.end(), [&](Eigen::Index c) {
-      return noise_in_acceleration(filter, runs, positions.col(c)) <= kQuietDilution;
-    });
-    if (quiet) break;
-  }
-  return w;
 }
 
 SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options) {

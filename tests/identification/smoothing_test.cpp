@@ -222,26 +222,5 @@ TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
   EXPECT_DOUBLE_EQ(sharpest_window(time, {{0, 8000}}, rough, 0.2), 0.2);
 }
 
-TEST(QuietWindow, NoiseIsAFiftiethOfTheAcceleration) {
-  const Eigen::VectorXd time = even_time(8000, 1e-2);
-  const double w = 2.0 * M_PI * 0.3, amplitude = 0.1;
-  const Eigen::VectorXd clean = amplitude * (w * time).array().sin();
-  const double acceleration = amplitude * w * w / std::sqrt(2.0);  // RMS
-  const auto share = [&](double sigma, double width) {
-    return std::pow(sigma * filter(time, width).noise_gain(2) / acceleration, 2);
-  };
-  const double sigma = 1.5e-4;
-  Eigen::MatrixXd x(8000, 2);  // the second does not move and has no say
-  x << clean + sigma * white_noise(8000, 5), sigma * white_noise(8000, 6);
-  const double window = quiet_window(time, {{0, 8000}}, x, 0.1);
-  ASSERT_GT(share(sigma, 0.1), 0.1) << "nothing to widen";
-  ASSERT_LT(window, 0.41);
-  EXPECT_LT(share(sigma, window), 0.021);  // the noise's size is itself estimated, to some 2 %
-  EXPECT_GT(share(sigma, window / 1.2), 0.019);
-  EXPECT_DOUBLE_EQ(quiet_window(time, {{0, 8000}}, x, 0.3), 0.3) << "never narrower";
-  const Eigen::VectorXd rough = clean + 5e-2 * white_noise(8000, 4);
-  EXPECT_NEAR(quiet_window(time, {{0, 8000}}, rough, 0.1), 0.42, 1e-12);
-}
-
 }  // namespace
 }  // namespace sparflow
