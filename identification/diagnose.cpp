@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "identification/effect_estimate.h"
+#include "identification/effect_proof.h"
 #include "identification/experiment.h"
 #include "identification/robust.h"
 #include "identification/unexplained.h"
@@ -42,6 +43,27 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   FitControl control;
   control.keep_residuals = true;
   return fit_effects(d.evidence, others, nullptr, control);
+}
+
+/// What another power in the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
+EffectFit fit_with_other_powers(const Diagnosis& d) {
+  std::vector<EffectDesign> powers;
+  powers.reserve(d.search.found.size());
+  std::vector<const EffectDesign*> designs;
+  designs.reserve(2 * d.search.found.size());
+  Index first = 0;
+  for (const FoundEffect& f : d.search.found) {
+    designs.push_back(&f.design);
+    powers.push_back(other_power(f.design, d.search.final.theta.segment(first, f.design.linear)));
+    first += f.design.linear;
+  }
+  for (const EffectDesign& p : powers) {
+    if (p.acts()) designs.push_back(&p);
+  }
+  if (designs.size() == d.search.found.size()) return d.search.final;
+  FitControl control;
+  control.keep_residuals = true;
+  return fit_effects(d.evidence, designs, &d.search.final, control);
 }
 
 /// Whether the model and what was found follow a pump's steps down to what they leave elsewhere: then it is the pump
@@ -203,6 +225,35 @@ bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
   });
 }
 
+/// Whether an effect hardly lowers an error that is far above the sensors' noise where the effect shows best: what makes
+/// that error is not known, and some of it looks like the effect.
+bool is_a_trifle(const DiagnosedEffect& e) {
+  constexpr double kFarAbove = 5.0;  // times the sensors' noise
+  constexpr double kHardly = 1.05;   // RMS without / with it: a tenth of the squared error
+  const ChannelGain& g = e.channels.front();
+  return g.rmse_after > kFarAbove * g.noise_floor && g.rmse_before < kHardly * g.rmse_after;
+}
+
+/// An error without a name and without signals: how large it is and where.
+Unexplained describe_trifle(const Evidence& evidence, const DiagnosedEffect& e) {
+  const ChannelGain& g = e.channels.front();
+  const EvidenceChannel& c = evidence.channels[g.channel];
+  Unexplained u;
+  u.stage = evidence_stage(c.kind);
+  u.at = c.at;
+  u.depends_on = {"no single signal"};
+  u.rmse = g.rmse_after;
+  u.noise_floor = g.noise_floor;
+  u.unit = c.unit;
+  u.share = 1.0 - std::min(1.0, std::pow(g.noise_floor / g.rmse_after, 2));
+  u.sentence = fmt::format(
+      "{}: {} {} (RMS), {:.0f} times the sensors' noise, that follow no single signal; {} would "
+      "explain {:.0f} % of them",
+      c.text, plain_number(g.rmse_after / c.unit.si, 2), c.unit.name, g.rmse_after / g.noise_floor,
+      e.key(), 100.0 * std::max(0.0, 1.0 - std::pow(g.rmse_after / g.rmse_before, 2)));
+  return u;
+}
+
 Unexplained describe(const Evidence& evidence, const Leftover& left) {
   const EvidenceChannel& c = evidence.channels[left.channel];
   Unexplained u;
@@ -324,7 +375,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
   if (progress) progress(0.92, "looking at what is left");
-  const std::vector<Leftover> left = find_leftovers(d.evidence, d.search.final);
+  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_powers(d));
   std::vector<Leftover> riddles;
   bool in_touched = false;
   for (const Leftover& l : left) {
@@ -344,10 +395,12 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe(d, i, options.search));
   // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
-  const bool unknown = !riddles.empty() && std::all_of(d.effects.begin(), d.effects.end(),
-                                                       [&](const DiagnosedEffect& e) {
-                                                         return is_doubtful(d.evidence, e, riddles);
-                                                       });
+  const bool unknown =
+      (!riddles.empty() || !d.effects.empty()) &&
+      std::all_of(d.effects.begin(), d.effects.end(), [&](const DiagnosedEffect& e) {
+        return is_doubtful(d.evidence, e, riddles) || is_a_trifle(e);
+      });
+  if (unknown && !d.unexplained) d.unexplained = describe_trifle(d.evidence, d.effects.front());
   d.verdict = unknown              ? Verdict::kUnknown
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown

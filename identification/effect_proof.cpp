@@ -48,6 +48,27 @@ double form_share(const Effect& effect) {
   return exact ? effect.info().form_error : std::max(effect.info().form_error, kLeastForm);
 }
 
+EffectDesign other_power(const EffectDesign& design, const VectorXd& theta) {
+  constexpr double kPower = 0.2;
+  EffectDesign result;
+  result.columns.resize(design.columns.size());
+  const Effect& effect = *design.effect.effect;
+  if (effect.changes_machine() || effect.columns_filtered()) return result;
+  for (std::size_t c = 0; c < design.columns.size(); ++c) {
+    if (!design.touches(c)) continue;
+    const VectorXd action = design.columns[c] * theta;
+    const double size = std::sqrt(
+        action.squaredNorm() / std::max<double>(1.0, (action.array() != 0.0).cast<double>().sum()));
+    if (!(size > 0.0)) continue;
+    result.columns[c] = action.unaryExpr(
+        [&](double a) { return a == 0.0 ? 0.0 : a * std::log(std::abs(a) / size); });
+  }
+  result.linear = 1;
+  result.lower = {-kPower};
+  result.upper = {kPower};
+  return result;
+}
+
 EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
                            const EffectFit& fit) {

@@ -25,6 +25,12 @@ EffectAction effect_action(const Evidence& evidence,
 /// Share of an effect by which its law may differ from the machine's, sample by sample, even when fitted.
 double form_share(const Effect& effect);
 
+/// What changes when the law grows with another power, to first order: action times the logarithm of its size, one
+/// column in each channel, bounded by what published exponents differ by (friction with v^0.85 for v, pipes with
+/// Q^1.75 for Q^2). Without columns for effects whose law has no such freedom: weights, inertia.
+/// @param theta of the design
+EffectDesign other_power(const EffectDesign& design, const Eigen::VectorXd& theta);
+
 /// Whether one of the design's linear parameters lies on the edge of what is plausible; zero is no edge: no effect.
 bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::VectorXd>& theta);
 

@@ -102,7 +102,7 @@ class Search {
       if (tracing()) trace_found(found, next);
       found.back().gain = best.gain;
       std::string why = why_not_named(found.back(), options_);
-      if (why.empty()) why = only_mends(found);
+      if (why.empty()) why = only_mends(found, found.size() - 1, next);
       if (!why.empty()) {
         result.notes.push_back(
             fmt::format("{} fits best but is not named: {}", key(found.back().design.effect), why));
@@ -170,21 +170,51 @@ class Search {
   }
 
   /// What the form of a law is wrong by leaves that share, squared, of the effect's own gain to whatever else acts in
-  /// the same place. @return why the last of `found` is no more than that; empty: it is more
-  std::string only_mends(const std::vector<FoundEffect>& found) const {
-    const FoundEffect& last = found.back();
-    for (std::size_t i = 0; i + 1 < found.size(); ++i) {
-      const FoundEffect& other = found[i];
-      bool meets = false;
+  /// the same place; and what grows with another power than the law's leaves room for a smaller effect beside it.
+  /// @param fit of all found  @return why found[index] is no more than that; empty: it is more
+  std::string only_mends(const std::vector<FoundEffect>& found, std::size_t index,
+                         const EffectFit& fit) const {
+    const FoundEffect& one = found[index];
+    const auto meets = [&](const EffectDesign& other) {
+      bool both = false;
       for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
-        meets = meets || (other.design.touches(c) && last.design.touches(c));
+        both = both || (other.touches(c) && one.design.touches(c));
+      return both;
+    };
+    std::vector<EffectDesign> powers;
+    std::vector<std::string> names;
+    Eigen::Index first = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const FoundEffect& other = found[i];
+      const Eigen::VectorXd theta = fit.theta.segment(first, other.design.linear);
+      first += other.design.linear;
+      if (i == index || other.gain < one.gain || !meets(other.design)) continue;
       const double form = form_share(*other.design.effect.effect);
-      if (!meets || last.gain > form * form * other.gain) continue;
-      return fmt::format(
-          "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over", last.gain,
-          key(other.design.effect), other.gain);
+      if (one.gain <= form * form * other.gain) {
+        return fmt::format(
+            "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over",
+            one.gain, key(other.design.effect), other.gain);
+      }
+      EffectDesign power = other_power(other.design, theta);
+      if (!power.acts() || !meets(power)) continue;
+      powers.push_back(std::move(power));
+      names.push_back(key(other.design.effect));
     }
-    return {};
+    if (powers.empty()) return {};
+    std::vector<const EffectDesign*> without = designs_of(found, index), with = designs_of(found);
+    for (const EffectDesign& p : powers) {
+      without.push_back(&p);
+      with.push_back(&p);
+    }
+    const double gain = fit_effects(evidence_, with, &fit, final_control()).total() -
+                        fit_effects(evidence_, without, &fit, final_control()).total() -
+                        penalty_of(one.design.effect);
+    if (tracing())
+      fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n", key(one.design.effect),
+                 fmt::join(names, ", "), gain);
+    if (gain > options_.least_gain) return {};
+    return fmt::format("a slightly different power in the law of {} does the same",
+                       fmt::join(names, ", "));
   }
 
   /// Whether `one` leaves significantly less than `other` where every row counts the same.
@@ -265,6 +295,7 @@ class Search {
   bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
       std::string why = why_not_named(found[i], options_);
+      if (why.empty()) why = only_mends(found, i, current);
       // of an effect of its own, motions left out may have shown what ordinary least squares leaves open
       const bool refinement = !found[i].design.effect.effect->info().refines.empty();
       const bool proven = !refinement && found[i].held_out > 2.0 * found[i].held_out_error;

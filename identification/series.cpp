@@ -89,6 +89,25 @@ VectorXd static_forces(const Machine& machine, const MachineSeries& log, int cyl
   return force;
 }
 
+/// What an error of one joint's position does to every cylinder's static force.
+void set_static_slopes(const Machine& machine, MachineSeries& log) {
+  StaticForce statics(machine);
+  VectorXd q(machine.joint_count());
+  for (CylinderSeries& c : log.cylinders)
+    c.static_slope = Eigen::MatrixXd::Constant(log.samples(), machine.joint_count(), kNaN);
+  for (Index k = 0; k < log.samples(); ++k) {
+    q = log.q.row(k);
+    if (!q.allFinite() || !std::isfinite(log.payload[k])) continue;
+    try {
+      statics.update(q.data(), log.payload[k], 1);
+    } catch (const std::domain_error&) {
+      continue;  // a four-bar that cannot close
+    }
+    for (std::size_t i = 0; i < log.cylinders.size(); ++i)
+      log.cylinders[i].static_slope.row(k) = statics.force_jacobian().row(static_cast<Index>(i));
+  }
+}
+
 }  // namespace
 
 MachineSeries make_series(const CraneModel& model, const MachineSignals& signals) {
@@ -114,6 +133,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
                        moving_average(out, c.force - c.static_force, c.direction, kSteadyForce_s);
     }
   }
+  set_static_slopes(machine, out);
   set_openings(model.effects, out);
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     PumpSeries pump;

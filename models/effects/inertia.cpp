@@ -5,6 +5,10 @@
 namespace sparflow {
 namespace {
 
+/// Masses are known to some per cent and inertias to a factor: what accelerates an eighth of them is something else
+/// (a structure that swings).
+constexpr double kLeastShare = 0.125;
+
 class Inertia final : public Effect {
  public:
   const EffectInfo& info() const override {
@@ -16,7 +20,7 @@ class Inertia final : public Effect {
         .parameters = {{"scale",
                         "-",
                         1.0,
-                        0.0,
+                        kLeastShare,
                         2.5,
                         1.0,
                         "1 = the machine file's masses and inertias",

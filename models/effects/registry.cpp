@@ -70,14 +70,30 @@ UserEffectScope::UserEffectScope() : before_(mutable_catalogue().size()) {}
 
 UserEffectScope::~UserEffectScope() { mutable_catalogue().resize(before_); }
 
+namespace {
+
+/// The id that was probably meant, or "".
+std::string nearest_effect(const std::string& id) {
+  std::vector<std::string> ids;
+  ids.reserve(effect_catalogue().size());
+  for (const auto& known : effect_catalogue()) ids.push_back(known->info().id);
+  const std::string near = nearest_word(id, ids);
+  constexpr std::size_t kAWord = 4;  // letters; fewer begin too many ids
+  if (!near.empty() || id.size() < kAWord) return near;
+  for (const std::string& full : ids) {  // "coulomb" is far from coulomb_friction by letters
+    if (full.starts_with(id)) return full;
+  }
+  return {};
+}
+
+}  // namespace
+
 EffectAt parse_effect(const std::string& key, const Machine& machine) {
   const std::size_t colon = key.find(':');
   const std::string id = key.substr(0, colon);
   const Effect* effect = find_effect(id);
   if (effect == nullptr) {
-    std::vector<std::string> ids;
-    for (const auto& known : effect_catalogue()) ids.push_back(known->info().id);
-    const std::string near = nearest_word(id, ids);
+    const std::string near = nearest_effect(id);
     throw InputError({}, key,
                      fmt::format("there is no effect '{}'{}; `sparflow effects` lists them", id,
                                  near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near)));

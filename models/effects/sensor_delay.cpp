@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
 
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
@@ -6,8 +9,11 @@
 namespace sparflow {
 namespace {
 
+constexpr double kMostJoints = 30.0;
+
 /// Positions late by d: q_log(t) = q(t - d), so the force carried now is that of the pose logged d later,
-/// F_static(q_log(t + d)), and the logged speed is that of d ago. Forces late: the measured force is that of d ago.
+/// F_static(q_log(t + d)), and the logged speed is that of d ago. One position late: the same of that joint alone.
+/// Forces late: the measured force is that of d ago.
 class SensorDelay final : public Effect {
  public:
   const EffectInfo& info() const override {
@@ -38,9 +44,10 @@ class SensorDelay final : public Effect {
                         "-",
                         1.0,
                         -1.0,
+                        kMostJoints + 1.0,
                         1.0,
-                        1.0,
-                        "1 positions are late, -1 forces or pressures are late",
+                        "1 all positions are late, -1 forces or pressures are late, 2, 3 ... the "
+                        "position of the first, second ... joint alone is late",
                         false,
                         {1.0, -1.0},
                         true}},
@@ -61,23 +68,71 @@ class SensorDelay final : public Effect {
     return {EvidenceKind::kForce, EvidenceKind::kFlow, EvidenceKind::kPump};
   }
 
+  std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const override {
+    std::vector<double> values = Effect::grid(log, at, shape_index);
+    const Eigen::Index joints = log.q.cols();
+    if (shape_index == 0 || joints < 2) return values;
+    for (Eigen::Index k = 0; k < joints; ++k) values.push_back(2.0 + static_cast<double>(k));
+    return values;
+  }
+
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const bool positions = shape[1] > 0.0;
+    const auto alone = static_cast<Eigen::Index>(std::lround(shape[1])) - 2;  // < 0: all
     if (kind == EvidenceKind::kPump)
       return !positions && switching_late(log, static_cast<std::size_t>(index), shape[0], columns);
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(index)];
     const double shift = positions ? -shape[0] : shape[0];
     if (kind == EvidenceKind::kForce) {
+      if (alone >= 0) return pose_late_in_one(log, c, alone, shape[0], columns);
       columns = delayed(log, c.static_force, shift) - c.static_force;
       return true;
     }
     if (kind != EvidenceKind::kFlow || !positions) return false;
+    const int joint = log.machine->cylinders[static_cast<std::size_t>(index)].joint;
+    if (alone >= 0 && joint != alone) return false;
     columns = c.speed - delayed(log, c.speed, shift);
+    if (c.command.size() > 0) keep_changes(log, c.command, shape[0], columns);
     return true;
   }
 
  private:
+  /// While the command stays as it is there is nothing to be late with: the difference of two measured speeds is their
+  /// noise there, and noise in a regressor makes its share too small.
+  static void keep_changes(const MachineSeries& log, const Eigen::VectorXd& command, double delay,
+                           Eigen::MatrixXd& columns) {
+    constexpr double kSettled_s = 0.4;  // filters and accelerations reach that far
+    constexpr double kSame = 2e-3;      // of the full command: a logger's digits
+    for (const auto& [first, last] : log.runs) {
+      Eigen::Index since = first;  // the command has been `level` from here on
+      double level = command[first];
+      std::vector<std::pair<Eigen::Index, Eigen::Index>> constant;
+      for (Eigen::Index k = first; k <= last; ++k) {
+        if (k < last && std::abs(command[k] - level) <= kSame) continue;
+        constant.emplace_back(since, k);
+        since = k;
+        if (k < last) level = command[k];
+      }
+      for (const auto& [from, to] : constant) {
+        for (Eigen::Index k = from; k < to; ++k) {
+          const bool before = from == first || log.time[k] - log.time[from] > delay + kSettled_s;
+          const bool after = to == last || log.time[to - 1] - log.time[k] > kSettled_s;
+          if (before && after) columns(k, 0) = 0.0;
+        }
+      }
+    }
+  }
+
+  /// To first order: an angle late by 0.2 s is wrong by some hundredths.
+  static bool pose_late_in_one(const MachineSeries& log, const CylinderSeries& c,
+                               Eigen::Index joint, double delay, Eigen::MatrixXd& columns) {
+    if (joint >= c.static_slope.cols()) return false;
+    const Eigen::VectorXd q = log.q.col(joint);
+    columns = c.static_slope.col(joint).cwiseProduct(delayed(log, q, -delay) - q);
+    return true;
+  }
+
   /// Pump and chambers are late together, but not the commands that choose what a pump follows: it seems to follow
   /// the choice of `delay` ago.
   static bool switching_late(const MachineSeries& log, std::size_t pump, double delay,

@@ -16,7 +16,9 @@ struct CylinderSeries {
   Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
   Eigen::VectorXd acceleration;  ///< [m/s^2]
   Eigen::VectorXd
-      static_force;       ///< [N] by virtual work of the machine file, positive pushes the rod in
+      static_force;  ///< [N] by virtual work of the machine file, positive pushes the rod in
+  Eigen::MatrixXd
+      static_slope;  ///< [samples x joints] d static_force / d q, [N/rad] or [N/m]; empty: not computed
   Eigen::VectorXd force;  ///< [N] measured, through the position's filter
   /// [N] static force and the mean, within a motion and half a second either way, of what is measured beyond it: for
   /// laws of one pressure in which the force made from both pressures must not carry that pressure's own noise.

@@ -38,7 +38,10 @@ class PressureOffset final : public HiddenLaw {
 class SensorDelay final : public HiddenLaw {
  public:
   explicit SensorDelay(LawContext& c)
-      : law_(c.law), pick_(c.random->unit()), delay_(c.size * c.draw(0.08, 0.2)) {}
+      : law_(c.law),
+        joints_(c.machine->joint_count()),
+        pick_(std::min(joints_ - 1, static_cast<int>(c.random->unit() * joints_))),
+        delay_(c.size * c.draw(0.08, 0.2)) {}
   void recording(Recording& r, Random&) override {
     if (law_ == 0) {
       for (auto& q : r.q) late(q, r.rate);
@@ -46,13 +49,11 @@ class SensorDelay final : public HiddenLaw {
       for (auto* group : {&r.pressure_a, &r.pressure_b, &r.pump})
         for (auto& p : *group) late(p, r.rate);
     } else {
-      const auto joints = static_cast<int>(r.q.size());
-      late(r.q[static_cast<std::size_t>(std::min(joints - 1, static_cast<int>(pick_ * joints)))],
-           r.rate);
+      late(r.q[static_cast<std::size_t>(pick_)], r.rate);
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    const double late = law_ == 1 ? -1.0 : 1.0;
+    const double late = law_ == 0 ? 1.0 : law_ == 1 ? -1.0 : 2.0 + pick_;
     return {{"delay", delay_, "s", delay_}, {"late", late, "-", late}};
   }
 
@@ -67,8 +68,8 @@ class SensorDelay final : public HiddenLaw {
       values[i] = before[k] * (1.0 - f) + before[std::min(k + 1, before.size() - 1)] * f;
     }
   }
-  int law_;
-  double pick_, delay_;
+  int law_, joints_, pick_;
+  double delay_;
 };
 
 class SensorFault final : public HiddenLaw {
@@ -137,25 +138,26 @@ class SensorFault final : public HiddenLaw {
 }  // namespace
 
 std::vector<LawEntry> sensor_laws() {
-  return {{"pressure_offset",
-           HiddenPlace::kCylinder,
-           true,
-           {"constant", "with a gain error of 0.1 %"},
-           "offset [Pa] added to the reading of chamber 1 (A) or -1 (B)",
-           make_law<PressureOffset>,
-           hydraulic},
-          {"sensor_delay",
-           HiddenPlace::kMachine,
-           true,
-           {"all positions late", "all pressures late", "one position late"},
-           "delay [s]; late 1: positions, -1: pressures",
-           make_law<SensorDelay>},
-          {"sensor_fault",
-           HiddenPlace::kChannel,
-           true,
-           {"noise ten times", "stuck for seconds", "wild samples"},
-           "none",
-           make_law<SensorFault>}};
+  return {
+      {"pressure_offset",
+       HiddenPlace::kCylinder,
+       true,
+       {"constant", "with a gain error of 0.1 %"},
+       "offset [Pa] added to the reading of chamber 1 (A) or -1 (B)",
+       make_law<PressureOffset>,
+       hydraulic},
+      {"sensor_delay",
+       HiddenPlace::kMachine,
+       true,
+       {"all positions late", "all pressures late", "one position late"},
+       "delay [s]; late 1: positions, -1: pressures, 2, 3 ...: that of the first, second ... joint",
+       make_law<SensorDelay>},
+      {"sensor_fault",
+       HiddenPlace::kChannel,
+       true,
+       {"noise ten times", "stuck for seconds", "wild samples"},
+       "none",
+       make_law<SensorFault>}};
 }
 
 }  // namespace sparflow::simulator

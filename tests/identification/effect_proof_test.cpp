@@ -101,6 +101,30 @@ TEST(EffectAction, AShareOfAnotherLawsFormIsNoEffectOfItsOwn) {
   EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
 }
 
+TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
+  VectorXd v(kRows);
+  for (Index k = 0; k < kRows; ++k) v[k] = 0.02 * static_cast<double>(k % 50 - 25);  // m/s
+  EffectDesign viscous = plain_design({v});
+  viscous.effect.effect = find_effect("viscous_friction");
+  const VectorXd theta = VectorXd::Constant(1, 2e5);
+  const EffectDesign power = other_power(viscous, theta);
+  ASSERT_TRUE(power.acts());
+  ASSERT_EQ(power.linear, 1);
+  // v^0.9 for v: what the straight line leaves is nearly all of this form, and a constant friction is not
+  const VectorXd bent = 2e5 * v.cwiseSign().cwiseProduct(v.cwiseAbs().array().pow(0.9).matrix());
+  MatrixXd both(kRows, 2);
+  both << v, power.columns[0];
+  const VectorXd by_line = bent - v * (v.dot(bent) / v.squaredNorm());
+  const VectorXd coefficients = least_squares(both, bent);
+  EXPECT_LT((bent - both * coefficients).norm(), 0.1 * by_line.norm());
+  // the coefficient is the exponent's change, up to the size's own
+  EXPECT_NEAR(coefficients[1], -0.1, 0.03);
+  EXPECT_LE(power.lower[0], -0.15);  // friction with v^0.85
+  EffectDesign mass = plain_design({v});
+  mass.effect.effect = find_effect("unmodelled_mass");
+  EXPECT_FALSE(other_power(mass, theta).acts()) << "weight is what it is";
+}
+
 /// The same by leaving rows out and solving again.
 HeldOutGain by_refitting(const Evidence& e, const std::vector<const EffectDesign*>& designs,
                          std::size_t index, const EffectFit& fit, int folds) {

@@ -90,6 +90,37 @@ TEST_F(FlowEffects, LagAndDelayAreToldApartAndMeasured) {
   }
 }
 
+// A valve that is late is late with what its dead band leaves of the command, not with the command.
+TEST_F(FlowEffects, LagActsBehindTheDeadBandThatTheModelKnows) {
+  CylinderSeries& c = log.cylinders[0];
+  VectorXd opening = c.command;
+  const std::vector<double> band{0.1, 0.15, 0.0};
+  effect_named("valve_deadband").shape_opening(0, 0, band, opening);
+  const double tau = 0.21;
+  const Valve& valve = *machine.valve_of_cylinder(0);
+  for (const auto& [first, last] : log.runs) {
+    double y = 0.0;
+    for (Index k = first; k < last; ++k) {
+      const double u = opening[k];
+      const double flow = u > 0.0 ? u * valve.max_flow_extend / machine.cylinders[0].area_piston()
+                                  : u * valve.max_flow_retract / machine.cylinders[0].area_rod();
+      if (k == first) y = flow;
+      for (int i = 0; i < 200 && k > first; ++i) y += (flow - y) / tau * log.step / 200.0;
+      c.speed[k] = y;
+    }
+  }
+  const auto error_and_share = [&](const VectorXd& behind) {
+    c.opening = behind;
+    MatrixXd x(log.samples(), 3);
+    x << opening.cwiseMax(0.0), opening.cwiseMin(0.0), columns("valve_lag", 0, 0, {tau, 0.0});
+    return std::pair{residual(x, c.speed), scaled_least_squares(x, c.speed)[2]};
+  };
+  const auto [exact, share] = error_and_share(opening);
+  const auto [of_command, other_share] = error_and_share({});
+  EXPECT_NEAR(share, 1.0, 0.01);       // Euler at a thousandth of tau
+  EXPECT_LT(3.0 * exact, of_command);  // late with what the dead band takes away as well
+}
+
 TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
   const double limit = 1.3e-3;
   std::vector<VectorXd> straight;

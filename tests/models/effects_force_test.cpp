@@ -414,6 +414,69 @@ TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
   }
 }
 
+/// One joint's position read late: every cylinder's force is that of a pose with this joint elsewhere, and only its own
+/// cylinder's speed is old.
+TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
+  const Machine machine = test_support::loader_crane();
+  const Index joints = machine.joint_count();
+  const Index joint = 1;
+  const double delay = 0.1;
+  const auto late = [&](double t) {
+    VectorXd x = swinging(machine, t);
+    const VectorXd before = swinging(machine, t - delay);
+    for (const Index k : {joint, joints + joint, 2 * joints + joint}) x[k] = before[k];
+    return x;
+  };
+  MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
+  StaticForce statics(machine);
+  for (CylinderSeries& c : log.cylinders) c.static_slope.resize(log.samples(), joints);
+  for (Index k = 0; k < log.samples(); ++k) {
+    const VectorXd q = log.q.row(k);
+    statics.update(q.data(), 300.0, 1);
+    for (std::size_t i = 0; i < log.cylinders.size(); ++i)
+      log.cylinders[i].static_slope.row(k) = statics.force_jacobian().row(static_cast<Index>(i));
+  }
+  const Effect& e = effect("sensor_delay");
+  const std::vector<double> all{delay, 1.0}, one{delay, 2.0 + static_cast<double>(joint)};
+  for (int i = 0; i < 2; ++i) {
+    double left = 0.0, by_one = 0.0, by_all = 0.0;
+    MatrixXd alone, together;
+    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, one, alone));
+    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, all, together));
+    for (Index k = 0; k + 10 < log.samples(); ++k) {  // what was not recorded yet is not known
+      const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
+                               .static_force[static_cast<std::size_t>(i)];
+      const double y = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
+      left += y * y;
+      by_one += std::pow(y - alone(k, 0), 2);
+      by_all += std::pow(y - together(k, 0), 2);
+    }
+    EXPECT_LT(by_one, 0.01 * left) << i;  // to first order in an angle of some hundredths
+    EXPECT_GT(by_all, 0.1 * left) << i;
+    MatrixXd speed;
+    const bool own = machine.cylinders[static_cast<std::size_t>(i)].joint == joint;
+    EXPECT_EQ(e.columns(log, EvidenceKind::kFlow, i, -1, one, speed), own);
+  }
+  const std::vector<double> grid = e.grid(log, -1, 1);
+  EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
+}
+
+/// Where the command stays as it is nothing can be late: two noisy speeds say nothing there but their noise.
+TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
+  const Machine machine = test_support::loader_crane();
+  MachineSeries log = log_of(
+      machine, [&](double t) { return swinging(machine, t); }, 10.0, 0.02, 300.0);
+  CylinderSeries& c = log.cylinders[0];
+  c.command.setZero(log.samples());
+  c.command.tail(250).setConstant(0.5);  // thrown at 5 s
+  MatrixXd column;
+  ASSERT_TRUE(effect("sensor_delay")
+                  .columns(log, EvidenceKind::kFlow, 0, -1, std::vector<double>{0.1, 1.0}, column));
+  EXPECT_EQ(column.topRows(220).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(column.bottomRows(220).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_GT(column.middleRows(250, 20).cwiseAbs().minCoeff(), 0.0);
+}
+
 // --- words -------------------------------------------------------------------------------------------------------
 
 TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
