@@ -95,6 +95,7 @@ class TimedSearch {
   /// small and so are gains: at most ramp_gain t. What the constant price charges too much there is given back.
   double value_of(double least, double price) const {
     constexpr double kBetweenNodes = 1.02;
+    price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
     const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until a motion can gain the price
     if (energy_weight_ > 0.0) {
