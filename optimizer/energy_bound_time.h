@@ -17,10 +17,13 @@ struct TimeShares {
   double energy_weight = 1.0;  ///< 1, or 0: energy is free, for the least duration
   Eigen::MatrixX2d
       share;  ///< [n x 2] >= 0, of each joint moving in + and - direction [-]; only ratios count
+  /// Coarser and smoother: the least demand at every flow, slopes the least price plus share x alpha / top speed. Kinks
+  /// cost a lattice most where time is very dear.
+  bool straight = false;
 };
 
 /// The price is met, and may be exceeded, by this share of it at the most: what stands for it is charged.
-inline constexpr double kPriceTolerance = 1e-4;
+inline constexpr double kPriceTolerance = 4e-4;
 
 /// Largest slopes B_j+-: what moving j alone costs when the time it takes has the price alpha(q) share_j, at the flow where
 /// that is least, with the largest alpha that keeps the inequality above. A workspace.
@@ -52,14 +55,15 @@ class TimedWeights final : public MoveWeights {
   TimeShares shares_;
   bool possible_ = true;
   mutable double ramp_gain_ = 0.0;
+  mutable double alpha_ratio_ = 0.5;  // where the last root was found
   mutable std::vector<TimedMove> moves_;
   mutable LargestGain gain_;
 };
 
 struct TimedBoundOptions {
   long nodes = 120000;       ///< of the last grid
-  long search_nodes = 4000;  ///< of the grids on which the shares are searched
-  int evaluations = 70;      ///< of that search
+  long search_nodes = 2500;  ///< of the grids on which the shares are searched
+  int evaluations = 90;      ///< of that search
   int most_joints = 4;
 };
 

@@ -25,12 +25,14 @@ double TimedMove::least_slope(double gain) const {
   const double first = flow_step > 0.0 ? std::max(standby, demand[0]) : standby;
   double growth = 0.0, pressure = first, flow_here = flow(first, &growth);
   if (!(gain > 0.0)) return first;
-  double best = flow_here > 0.0 ? first + gain / flow_here : std::numeric_limits<double>::infinity();
+  double best =
+      flow_here > 0.0 ? first + gain / flow_here : std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; flow_here < top && k <= kFlowKnots; ++k) {
     if (demand[k] <= pressure) continue;
     // from here to the knot the flow is straight: P + gain / flow is least where flow^2 = gain growth
     const double flow_at_knot = flow_here + growth * (demand[k] - pressure);
-    const double want = std::clamp(std::sqrt(gain * growth), flow_here, std::min(flow_at_knot, top));
+    const double want =
+        std::clamp(std::sqrt(gain * growth), flow_here, std::min(flow_at_knot, top));
     if (want > 0.0) best = std::min(best, pressure + (want - flow_here) / growth + gain / want);
     pressure = demand[k];
     flow_here = flow(pressure, &growth);
@@ -109,8 +111,7 @@ double LargestGain::of_pump(double pump_flow) {
   return best;
 }
 
-LargestGain::At LargestGain::at(double pressure, double low, double high,
-                                double pump_flow) const {
+LargestGain::At LargestGain::at(double pressure, double low, double high, double pump_flow) const {
   // A fractional knapsack: the dearest volume first. Where the pump is at its limit, what comes last gives way.
   At a;
   double left = pump_flow;

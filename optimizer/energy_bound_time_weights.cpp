@@ -51,11 +51,13 @@ TimedMove TimedWeights::move_of(int joint, int direction, const double* force,
     return m;
   }
   m.top = speed * m.area;
-  m.standby = std::max(0.0, shares_.energy_weight * pump_standby_[static_cast<std::size_t>(m.pump)]);
+  m.standby =
+      std::max(0.0, shares_.energy_weight * pump_standby_[static_cast<std::size_t>(m.pump)]);
   if (hardest->load_sensing && shares_.energy_weight > 0.0) {
     const int side = (direction == 0) == (rate[hardest->cylinder] > 0.0) ? 0 : 1;
     const DemandTable& table = hardest->table[side];
     table.rising(force[hardest->cylinder], m.demand);
+    if (shares_.straight) m.demand.fill(most);
     for (double& p : m.demand) p *= shares_.energy_weight;
     m.flow_step = table.flow_max() / kFlowKnots * m.area / own_area;
   }
@@ -79,24 +81,30 @@ void TimedWeights::prices(const double* force, const double* rate, Eigen::Matrix
   make_moves(force, rate);
   if (moves_.empty() || !(shares_.price > 0.0)) return;
   double largest = 0.0;
-  for (const TimedMove& m : moves_) largest = std::max(largest, shares_.share(m.joint, m.direction));
+  for (const TimedMove& m : moves_)
+    largest = std::max(largest, shares_.share(m.joint, m.direction));
   // What is gained beyond the price of time at these slopes; rises with alpha.
   const auto surplus = [&](double alpha) {
     for (TimedMove& m : moves_) {
-      m.slope = std::max(m.least_slope(alpha * shares_.share(m.joint, m.direction)),
-                         price(m.joint, m.direction) / m.area);
+      const double share = alpha * shares_.share(m.joint, m.direction);
+      const double least = price(m.joint, m.direction) / m.area;
+      m.slope = shares_.straight ? least + share / m.top : std::max(m.least_slope(share), least);
     }
     return gain_.of(moves_, pump_flow_) - shares_.price;
   };
   // False position (Illinois) from where one move alone uses the price up; ends where the inequality holds.
   const double enough = kPriceTolerance * shares_.price;
   double high = shares_.price / largest, over = surplus(high);
+  for (int i = 0; shares_.straight && over <= enough && i < 6; ++i) {
+    high *= 1.5;  // at top speed a move alone needs more than the least pressure
+    over = surplus(high);
+  }
   if (over > enough) {
     double low = 0.0, under = -shares_.price, reached = under;
     int last = 0;
+    double alpha = alpha_ratio_ * high;  // as at the posture before, which mostly is a neighbour
     constexpr int kMost = 40;
     for (int i = 0; i < kMost && reached < -enough; ++i) {
-      const double alpha = (low * over - high * under) / (over - under);
       const double value = surplus(alpha);
       if (value > enough) {
         high = alpha;
@@ -109,8 +117,10 @@ void TimedWeights::prices(const double* force, const double* rate, Eigen::Matrix
         if (last < 0) over *= 0.5;
         last = -1;
       }
+      alpha = (low * over - high * under) / (over - under);
     }
-    surplus(low);
+    if (last > 0) surplus(low);
+    alpha_ratio_ = std::clamp(low * largest / shares_.price, 0.05, 0.95);
   }
   double ramps = 0.0, of_joint = 0.0;
   int joint = -1;
@@ -134,8 +144,7 @@ double TimedWeights::largest_gain(const Eigen::VectorXd& q, const Eigen::VectorX
   moves_.clear();
   for (Eigen::Index j = 0; j < slope.size(); ++j) {
     if (slope[j] == 0.0) continue;
-    TimedMove m =
-        move_of(static_cast<int>(j), slope[j] > 0.0 ? 0 : 1, force_data(), rate_data());
+    TimedMove m = move_of(static_cast<int>(j), slope[j] > 0.0 ? 0 : 1, force_data(), rate_data());
     m.slope = std::abs(slope[j]) / m.area;
     if (m.top > 0.0) moves_.push_back(m);
   }

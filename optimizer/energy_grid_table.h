@@ -10,7 +10,7 @@
 namespace sparflow {
 
 /// Flows at which DemandTable::rising() is given, beside zero.
-inline constexpr std::size_t kFlowKnots = 12;
+inline constexpr std::size_t kFlowKnots = 10;
 
 /// Demand d = P(Q, F) + margin of one cylinder in one direction, without effects. Immutable.
 class DemandTable {
