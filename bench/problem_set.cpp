@@ -36,18 +36,20 @@ struct Task {
 
 struct Figures {
   StrategyComparison comparison;
-  double bound = 0.0;      // [J] certified, of any motion of any duration; 0 = none
-  double unlimited = 0.0;  // [J] cheapest path of the grid at unlimited time, 0 = not asked
-  std::string named;       // what is said of an infeasible one
+  double bound = 0.0;       // [J] certified, of motions in the optimum's time; 0 = none
+  double slow_bound = 0.0;  // [J] of any motion of any duration
+  double unlimited = 0.0;   // [J] cheapest path of the grid at unlimited time, 0 = not asked
+  std::string named;        // what is said of an infeasible one
 };
 
-/// A bound is tight where the cheapest path of the grid, driven slowly, lies this close above it: what is between the
-/// two is then not the bound's own coarseness, whatever the optimiser found.
+/// A bound is tight where the cheapest path of the grid, driven slowly, lies this close above the bound of any motion: the
+/// lattice then is fine enough, whatever the optimiser found.
 constexpr double kTight = 0.015;
 
 struct Settings {
   int intervals = 100, paths = 4;
   bool grid = true, bound = true, timed = true;
+  json optima;  // by problem: of an earlier run, not solved again
 };
 
 std::vector<SeedMotion> seeds_of(const MotionProblem& problem, const Settings& settings,
@@ -74,12 +76,29 @@ const StrategyOutcome* optimum_of(const Figures& f) {
   return best != nullptr && best->found() ? best : nullptr;
 }
 
-Figures solve(const Task& task, const Settings& settings) {
-  Figures f;
+/// What --write-optima wrote of a problem: energies and times without the motions.
+StrategyComparison earlier_comparison(const json& entry) {
+  StrategyComparison c;
+  if (!entry.contains("energies_J")) return c;
+  c.shortest = entry.at("shortest_s").get<double>();
+  c.solve_s = entry.at("solve_s").get<double>();
+  StrategyRow row;
+  row.name = "equal";
+  for (const auto& [kind, energy] : entry.at("energies_J").items()) {
+    StrategyOutcome o;
+    o.kind = kind;
+    o.duration = entry.at("duration_s").get<double>();
+    o.energy.total = energy.get<double>();
+    o.motion.t = Eigen::Vector2d(0.0, o.duration);  // found
+    row.outcomes.push_back(std::move(o));
+  }
+  c.rows.push_back(std::move(row));
+  return c;
+}
+
+void compare(const Task& task, const Settings& settings, Figures& f) {
   const std::vector<SeedMotion> seeds = seeds_of(task.problem, settings, &f.named);
-  f.comparison.problem = task.problem.name;
-  f.comparison.file = task.problem.file;
-  if (seeds.empty()) return f;
+  if (seeds.empty()) return;
   StrategyOptions options;
   options.idle_power = task.problem.idle_power;
   options.least_control = false;
@@ -89,9 +108,22 @@ Figures solve(const Task& task, const Settings& settings) {
   options.baselines.optimize = options.optimize;
   f.comparison = compare_strategies(*task.model, task.problem, seeds, options);
   f.named = f.comparison.message;
+}
+
+Figures solve(const Task& task, const Settings& settings) {
+  Figures f;
+  if (const auto earlier = settings.optima.find(task.problem.name);
+      earlier != settings.optima.end()) {
+    f.comparison = earlier_comparison(*earlier);
+    f.named = earlier->value("named", "");
+  } else {
+    compare(task, settings, f);
+  }
+  f.comparison.problem = task.problem.name;
+  f.comparison.file = task.problem.file;
   if (settings.bound) {
     const EnergyBound bound = energy_bound(*task.model, task.problem);
-    if (bound.valid) f.bound = bound.lower_bound_J;
+    if (bound.valid) f.bound = f.slow_bound = bound.lower_bound_J;
     const StrategyOutcome* best = optimum_of(f);
     if (settings.timed && bound.valid && best != nullptr) {
       const TimedBound timed = energy_bound_at(*task.model, task.problem, best->duration);
@@ -112,6 +144,7 @@ std::string pack_figures(const Figures& f) {
       .text(packed(f.comparison))
       .number(f.unlimited)
       .number(f.bound)
+      .number(f.slow_bound)
       .text(f.named)
       .bytes();
 }
@@ -122,6 +155,7 @@ Figures unpack_figures(const std::string& bytes) {
   f.comparison = unpacked_comparison(u.text());
   f.unlimited = u.number();
   f.bound = u.number();
+  f.slow_bound = u.number();
   f.named = u.text();
   return f;
 }
@@ -184,6 +218,34 @@ struct Count {
   std::vector<double> gap, sequential, line, seconds;
 };
 
+/// The gap by the reach's time as a multiple of the shortest.
+void report_by_time(const std::vector<Task>& tasks, const std::vector<Figures>& figures) {
+  constexpr double kFrom[] = {1.0, 1.3, 2.0, 3.0, 3.4, 1e9};
+  fmt::print(
+      "\ntime / shortest | tight | within 2 % of the bound | optimum above it, median, 95th | "
+      "above the slow path, median\n");
+  for (std::size_t k = 0; k + 1 < std::size(kFrom); ++k) {
+    std::vector<double> excess, slow;
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      const Figures& f = figures[i];
+      const StrategyOutcome* best = optimum_of(f);
+      if (!tasks[i].meant_feasible || best == nullptr || !(f.unlimited > 0.0)) continue;
+      if (!tasks[i].problem.obstacles.empty() || tasks[i].problem.tip_line) continue;
+      const double ratio = best->duration / f.comparison.shortest;
+      if (ratio < (k == 0 ? 0.0 : kFrom[k]) || ratio >= kFrom[k + 1]) continue;
+      slow.push_back(best->energy.total / f.unlimited - 1.0);
+      if (f.unlimited < (1.0 + kTight) * f.slow_bound)
+        excess.push_back(best->energy.total / f.bound - 1.0);
+    }
+    if (excess.empty()) continue;
+    fmt::print("{:.1f} .. {:<6} | {:3} | {:3} | {:.2f} %, {:.2f} % | {:.2f} %\n", kFrom[k],
+               k + 2 < std::size(kFrom) ? fmt::format("{:.1f}", kFrom[k + 1]) : "", excess.size(),
+               std::count_if(excess.begin(), excess.end(), [](double x) { return x <= 0.02; }),
+               100.0 * quantile(excess, 0.5), 100.0 * quantile(excess, 0.95),
+               100.0 * quantile(slow, 0.5));
+  }
+}
+
 void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures) {
   Count c;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
@@ -225,7 +287,7 @@ void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures)
       const bool hemmed = !tasks[i].problem.obstacles.empty() || tasks[i].problem.tip_line;
       const bool slow = best->duration >= 3.0 * f.comparison.shortest;
       if (!hemmed) (slow ? c.bound_slow : c.bound_fast).push_back(excess);
-      if (!hemmed && slow && f.unlimited > 0.0 && f.unlimited < (1.0 + kTight) * f.bound)
+      if (!hemmed && slow && f.unlimited > 0.0 && f.unlimited < (1.0 + kTight) * f.slow_bound)
         c.bound_tight.push_back(excess);
       others += fmt::format("  bound {:+.1f} %", 100.0 * excess);
     }
@@ -270,6 +332,28 @@ void report(const std::vector<Task>& tasks, const std::vector<Figures>& figures)
              quantile(c.seconds, 1.0));
 }
 
+/// Energies and times of all ways, and the bounds, by problem: --optima reads them back.
+void write_optima(const std::string& path, const std::vector<Task>& tasks,
+                  const std::vector<Figures>& figures) {
+  json all = json::object();
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const Figures& f = figures[i];
+    json& entry = all[tasks[i].problem.name];
+    entry = {{"named", f.named}, {"solve_s", f.comparison.solve_s}};
+    const StrategyOutcome* best = optimum_of(f);
+    if (best == nullptr) continue;
+    entry["shortest_s"] = f.comparison.shortest;
+    entry["duration_s"] = best->duration;
+    for (const StrategyOutcome& o : f.comparison.row("equal")->outcomes) {
+      if (o.found() && o.kind != kMinimumTime) entry["energies_J"][o.kind] = o.energy.total;
+    }
+    entry["lower_bound_J"] = f.bound;
+    entry["lower_bound_any_time_J"] = f.slow_bound;
+    entry["unlimited_time_J"] = f.unlimited;
+  }
+  write_file_atomically(path, all.dump(1) + "\n");
+}
+
 /// Best known energies: what the file has, or what was found now where that is less.
 void write_best_known(const std::string& path, const std::vector<Task>& tasks,
                       const std::vector<Figures>& figures) {
@@ -310,12 +394,14 @@ int run(int argc, char** argv) {
   bench::ProgramOptions app("The problem set and random reaches");
   int random_count = 0, processes = 2;
   std::uint64_t seed = 1;
-  std::string only, write;
+  std::string only, write, optima, keep;
   Settings settings;
   app.add("--random", random_count, "random reaches instead of the bundled ones");
   app.add("--seed", seed, "of the first random reach");
   app.add("--only", only, "bundled reaches whose name contains this");
   app.add("--write", write, "best known energies (JSON): kept where they are better");
+  app.add("--write-optima", keep, "energies, times and bounds of this run (JSON)");
+  app.add("--optima", optima, "a file of --write-optima: only the bounds are computed again");
   app.add("--intervals", settings.intervals, "of the mesh");
   app.add("--paths", settings.paths, "seed paths at most");
   app.flag("!--no-bound", settings.bound, "leave out the certified lower bound");
@@ -324,6 +410,13 @@ int run(int argc, char** argv) {
            "leave out the bound of motions in the reach's own time");
   app.add("--processes", processes, "at the same time");
   if (const auto code = app.parse(argc, argv)) return *code;
+  settings.optima = json::object();
+  if (!optima.empty()) {
+    std::ifstream in(optima);
+    settings.optima = json::parse(in, nullptr, false);
+    if (!settings.optima.is_object())
+      throw InputError({optima}, "", "not a file of --write-optima");
+  }
   std::vector<std::unique_ptr<CraneModel>> models;
   std::vector<std::string> model_files;
   const auto model_at = [&](const std::string& file) {
@@ -384,6 +477,8 @@ int run(int argc, char** argv) {
     }
   }
   report(tasks, figures);
+  report_by_time(tasks, figures);
+  if (!keep.empty()) write_optima(keep, tasks, figures);
   if (!write.empty()) write_best_known(write, tasks, figures);
   return 0;
 }

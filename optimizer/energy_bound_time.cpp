@@ -6,6 +6,7 @@
 #include <random>
 
 #include "models/effects/effective_machine.h"
+#include "models/linear_algebra.h"
 #include "optimizer/energy_bound_goal.h"
 #include "optimizer/energy_grid.h"
 
@@ -56,12 +57,23 @@ class TimedSearch {
     const std::vector<int> few =
         balanced_cells(first.losses(), rough.lattice, static_cast<double>(options_.search_nodes));
     const TimedGrid small = grid(few);
-    x = best_shares(small, x);
-    set(x);
-    const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
-    const TimedGrid fine =
-        grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes)));
-    return certified(fine);
+    TimedBound best;
+    double curved_value = 0.0;
+    for (const bool straight : {false, true}) {
+      if (straight && !(energy_weight_ > 0.0)) break;  // without energy the two are one
+      shares_.straight = straight;
+      const VectorXd y = best_shares(small, x);
+      const double value = objective(small, y);
+      constexpr double kNear = 0.99;  // a coarse lattice tells no better
+      if (straight && value < kNear * curved_value) break;
+      curved_value = value;
+      set(y);
+      const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
+      const TimedBound bound = certified(
+          grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
+      if (!straight || bound.value > best.value) best = bound;
+    }
+    return best;
   }
 
  private:
@@ -79,7 +91,9 @@ class TimedSearch {
   void set(const VectorXd& x) {
     shares_.price = energy_weight_ > 0.0 ? std::exp(x[n_]) : 1.0;
     const double top = x.head(n_).maxCoeff();
-    shares_.share = (x.head(n_).array() - top).exp().matrix().asDiagonal() * active_;
+    constexpr double kLeastLog = -6.0;  // of a share: less is none
+    shares_.share =
+        (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * active_;
     weights_->set_shares(shares_);
   }
 
@@ -95,6 +109,7 @@ class TimedSearch {
   /// small and so are gains: at most ramp_gain t. What the constant price charges too much there is given back.
   double value_of(double least, double price) const {
     constexpr double kBetweenNodes = 1.02;
+    price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
     const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until a motion can gain the price
     if (energy_weight_ > 0.0) {
@@ -105,28 +120,41 @@ class TimedSearch {
     return time <= cruise ? cruise + time : 2.0 * std::sqrt(cruise * time);
   }
 
-  /// Compass search: each coordinate up and down, the step halved when nothing helps.
+  /// Compass search along the coordinates and, since the objective has ridges across them, along turned axes in turn; the
+  /// step is halved when neither helps.
   VectorXd best_shares(const TimedGrid& g, VectorXd x) {
     const Eigen::Index count = energy_weight_ > 0.0 ? n_ + 1 : n_;
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
     double best = objective(g, x), step = std::log(4.0);
-    int used = 1;
-    while (used < options_.evaluations && step > std::log(1.03)) {
+    int used = 1, idle = 0;
+    for (int round = 0; used < options_.evaluations && step > std::log(1.02); ++round) {
+      Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(count, count);
+      if (round % 2 == 1) {
+        for (double& entry : axes.reshaped()) entry = normal(random);
+        axes = thin_qr(axes).q;
+      }
       bool any = false;
       for (Eigen::Index k = count; k-- > 0;) {
         for (const double sign : {1.0, -1.0}) {
-          if (used >= options_.evaluations) break;
-          VectorXd y = x;
-          y[k] += sign * step;
-          const double value = objective(g, y);
-          ++used;
-          if (!(value > best)) continue;
-          best = value;
-          x = y;
-          any = true;
-          break;
+          bool better = false;
+          while (used < options_.evaluations) {
+            VectorXd y = x;
+            y.head(count) += sign * step * axes.col(k);
+            const double value = objective(g, y);
+            ++used;
+            if (!(value > best)) break;
+            best = value;
+            x = y;
+            any = better = true;
+          }
+          if (better) break;
         }
       }
-      if (!any) step *= 0.5;
+      idle = any ? 0 : idle + 1;
+      if (idle < 2) continue;
+      step *= 0.5;
+      idle = 0;
     }
     return x;
   }

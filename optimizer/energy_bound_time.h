@@ -7,6 +7,7 @@
 /// docs/energy_bound.md has the proof.
 #include "optimizer/energy_bound.h"
 #include "optimizer/energy_bound_potential.h"
+#include "optimizer/energy_bound_time_gain.h"
 
 namespace sparflow {
 
@@ -16,10 +17,16 @@ struct TimeShares {
   double energy_weight = 1.0;  ///< 1, or 0: energy is free, for the least duration
   Eigen::MatrixX2d
       share;  ///< [n x 2] >= 0, of each joint moving in + and - direction [-]; only ratios count
+  /// Coarser and smoother: the least demand at every flow, slopes the least price plus share x alpha / top speed. Kinks
+  /// cost a lattice most where time is very dear.
+  bool straight = false;
 };
 
-/// Largest slopes B_j+-: the least price of moving j alone, plus alpha(q) * share_j / top speed_j with the largest alpha
-/// that keeps the inequality above. A workspace.
+/// The price is met, and may be exceeded, by this share of it at the most: what stands for it is charged.
+inline constexpr double kPriceTolerance = 4e-4;
+
+/// Largest slopes B_j+-: what moving j alone costs when the time it takes has the price alpha(q) share_j, at the flow where
+/// that is least, with the largest alpha that keeps the inequality above. A workspace.
 class TimedWeights final : public MoveWeights {
  public:
   TimedWeights(const CraneModel& model, const MotionProblem& problem, const Machine& loaded,
@@ -40,32 +47,23 @@ class TimedWeights final : public MoveWeights {
   double largest_gain(const Eigen::VectorXd& q, const Eigen::VectorXd& slope);
 
  private:
-  /// A joint that moves one way: what it costs and how fast it may be.
-  struct Move {
-    int joint = 0, direction = 0, pump = -1;
-    double pressure = 0.0;  ///< least its pump must give [Pa]
-    double area = 0.0;      ///< volume per travel [m^3/rad] or [m^2]
-    double speed = 0.0;     ///< top [rad/s] or [m/s]
-    double slope = 0.0;     ///< p_j, in the direction of the move
-    double growth = 0.0;    ///< d slope / d alpha
-  };
+  TimedMove move_of(int joint, int direction, const double* force, const double* rate) const;
   void make_moves(const double* force, const double* rate) const;
-  /// Gain of the best speeds at the moves' slopes; `derivative` by alpha along it.
-  double gain(double* derivative) const;
 
   std::vector<Range> speed_, acceleration_;
   std::vector<double> pump_flow_, pump_standby_;
   TimeShares shares_;
   bool possible_ = true;
   mutable double ramp_gain_ = 0.0;
-  mutable std::vector<Move> moves_;
-  mutable std::vector<int> order_;
+  mutable double alpha_ratio_ = 0.5;  // where the last root was found
+  mutable std::vector<TimedMove> moves_;
+  mutable LargestGain gain_;
 };
 
 struct TimedBoundOptions {
   long nodes = 120000;       ///< of the last grid
-  long search_nodes = 4000;  ///< of the grids on which the shares are searched
-  int evaluations = 70;      ///< of that search
+  long search_nodes = 2500;  ///< of the grids on which the shares are searched
+  int evaluations = 90;      ///< of that search
   int most_joints = 4;
 };
 

@@ -20,81 +20,59 @@ TimedWeights::TimedWeights(const CraneModel& model, const MotionProblem& problem
   }
 }
 
+TimedMove TimedWeights::move_of(int joint, int direction, const double* force,
+                                const double* rate) const {
+  TimedMove m;
+  m.joint = joint;
+  m.direction = direction;
+  const Range& v = speed_[static_cast<std::size_t>(joint)];
+  double speed = std::max(0.0, direction == 0 ? v.hi : -v.lo);
+  const CylinderDemand* hardest = nullptr;
+  double most = 0.0, own_area = 0.0;
+  for (const CylinderDemand& d : demands()) {
+    if (d.joint != joint) continue;
+    const double r = rate[d.cylinder];
+    const int side = (direction == 0) == (r > 0.0) ? 0 : 1;
+    const double area = d.area[side] * std::abs(r);
+    m.pump = d.pump;
+    m.area += area;
+    if (!(area > 0.0)) continue;
+    speed = std::min(speed, d.valve_flow[side] / area);
+    const double least = d.load_sensing ? d.table[side].least(force[d.cylinder]) : 0.0;
+    if (hardest != nullptr && least <= most) continue;
+    hardest = &d;
+    most = least;
+    own_area = area;
+  }
+  m.top = speed;
+  if (hardest == nullptr) m.pump = -1;
+  if (m.pump < 0) {
+    m.area = 1.0;  // its "volume" is its travel
+    return m;
+  }
+  m.top = speed * m.area;
+  m.standby =
+      std::max(0.0, shares_.energy_weight * pump_standby_[static_cast<std::size_t>(m.pump)]);
+  if (hardest->load_sensing && shares_.energy_weight > 0.0) {
+    const int side = (direction == 0) == (rate[hardest->cylinder] > 0.0) ? 0 : 1;
+    const DemandTable& table = hardest->table[side];
+    table.rising(force[hardest->cylinder], m.demand);
+    if (shares_.straight) m.demand.fill(most);
+    for (double& p : m.demand) p *= shares_.energy_weight;
+    m.flow_step = table.flow_max() / kFlowKnots * m.area / own_area;
+  }
+  return m;
+}
+
 void TimedWeights::make_moves(const double* force, const double* rate) const {
   moves_.clear();
   for (Eigen::Index j = 0; j < shares_.share.rows(); ++j) {
     for (const int direction : {0, 1}) {
       if (!(shares_.share(j, direction) > 0.0)) continue;
-      Move m;
-      m.joint = static_cast<int>(j);
-      m.direction = direction;
-      const Range& v = speed_[static_cast<std::size_t>(j)];
-      m.speed = direction == 0 ? v.hi : -v.lo;
-      if (!(m.speed > 0.0)) continue;
-      for (const CylinderDemand& d : demands()) {
-        if (d.joint != m.joint) continue;
-        const double r = rate[d.cylinder];
-        const int side = (direction == 0) == (r > 0.0) ? 0 : 1;
-        const double area = d.area[side] * std::abs(r);
-        double least = pump_standby_[static_cast<std::size_t>(d.pump)];
-        if (d.load_sensing) least = std::max(least, d.table[side].least(force[d.cylinder]));
-        least = std::max(0.0, shares_.energy_weight * least);
-        m.pump = d.pump;
-        m.pressure = std::max(m.pressure, least);
-        m.area += area;
-        m.slope += least * area;
-        if (area > 0.0) m.speed = std::min(m.speed, d.valve_flow[side] / area);
-      }
-      if (m.area <= 0.0) m.pump = -1;
-      m.growth = shares_.share(j, direction) / m.speed;
-      moves_.push_back(m);
+      TimedMove m = move_of(static_cast<int>(j), direction, force, rate);
+      if (m.top > 0.0) moves_.push_back(m);
     }
   }
-}
-
-double TimedWeights::gain(double* derivative) const {
-  double total = 0.0, slope = 0.0;
-  for (const Move& m : moves_) {  // without hydraulics a move costs nothing
-    if (m.pump >= 0) continue;
-    total += m.slope * m.speed;
-    slope += m.growth * m.speed;
-  }
-  for (std::size_t p = 0; p < pump_flow_.size(); ++p) {
-    order_.clear();
-    for (std::size_t i = 0; i < moves_.size(); ++i) {
-      if (moves_[i].pump == static_cast<int>(p)) order_.push_back(static_cast<int>(i));
-    }
-    if (order_.empty()) continue;
-    const auto at = [&](int i) -> const Move& { return moves_[static_cast<std::size_t>(i)]; };
-    std::sort(order_.begin(), order_.end(), [&](int a, int b) {
-      return at(a).slope * at(b).area > at(b).slope * at(a).area;  // by slope per volume
-    });
-    const double standby = std::max(0.0, shares_.energy_weight * pump_standby_[p]);
-    double best = 0.0, best_slope = 0.0;
-    for (const int leader : order_) {
-      const double pressure = std::max(standby, at(leader).pressure);
-      double left = pump_flow_[p], sum = 0.0, grow = 0.0;
-      for (const int i : order_) {  // a fractional knapsack: the dearest volume first
-        const Move& m = at(i);
-        const double per_volume = m.slope / m.area - pressure;
-        if (per_volume <= 0.0) break;
-        if (m.pressure > pressure) continue;
-        const double flow = std::min(left, m.area * m.speed);
-        sum += per_volume * flow;
-        grow += m.growth / m.area * flow;
-        left -= flow;
-        if (left <= 0.0) break;
-      }
-      if (sum > best) {
-        best = sum;
-        best_slope = grow;
-      }
-    }
-    total += best;
-    slope += best_slope;
-  }
-  if (derivative != nullptr) *derivative = slope;
-  return total;
 }
 
 void TimedWeights::prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const {
@@ -102,28 +80,54 @@ void TimedWeights::prices(const double* force, const double* rate, Eigen::Matrix
   price *= shares_.energy_weight;
   make_moves(force, rate);
   if (moves_.empty() || !(shares_.price > 0.0)) return;
-  // The gain is convex and piecewise linear in alpha and not below the price where one move alone uses it up: Newton
-  // from there comes down to the root.
-  double alpha = std::numeric_limits<double>::infinity();
-  for (const Move& m : moves_) alpha = std::min(alpha, shares_.price / (m.growth * m.speed));
-  const std::vector<Move> base = moves_;
-  double value = 0.0;
-  for (int iteration = 0; iteration < 12; ++iteration) {
-    for (std::size_t i = 0; i < moves_.size(); ++i) {
-      moves_[i].slope = base[i].slope + alpha * base[i].growth;
+  double largest = 0.0;
+  for (const TimedMove& m : moves_)
+    largest = std::max(largest, shares_.share(m.joint, m.direction));
+  // What is gained beyond the price of time at these slopes; rises with alpha.
+  const auto surplus = [&](double alpha) {
+    for (TimedMove& m : moves_) {
+      const double share = alpha * shares_.share(m.joint, m.direction);
+      const double least = price(m.joint, m.direction) / m.area;
+      m.slope = shares_.straight ? least + share / m.top : std::max(m.least_slope(share), least);
     }
-    double derivative = 0.0;
-    value = gain(&derivative);
-    if (value <= shares_.price * (1.0 + 1e-9) || !(derivative > 0.0)) break;
-    alpha -= (value - shares_.price) / derivative;
+    return gain_.of(moves_, pump_flow_) - shares_.price;
+  };
+  // False position (Illinois) from where one move alone uses the price up; ends where the inequality holds.
+  const double enough = kPriceTolerance * shares_.price;
+  double high = shares_.price / largest, over = surplus(high);
+  for (int i = 0; shares_.straight && over <= enough && i < 6; ++i) {
+    high *= 1.5;  // at top speed a move alone needs more than the least pressure
+    over = surplus(high);
   }
-  // convex and zero at zero: what is left over is scaled away
-  const double safe = value > shares_.price ? shares_.price / value : 1.0;
+  if (over > enough) {
+    double low = 0.0, under = -shares_.price, reached = under;
+    int last = 0;
+    double alpha = alpha_ratio_ * high;  // as at the posture before, which mostly is a neighbour
+    constexpr int kMost = 40;
+    for (int i = 0; i < kMost && reached < -enough; ++i) {
+      const double value = surplus(alpha);
+      if (value > enough) {
+        high = alpha;
+        over = value;
+        if (last > 0) under *= 0.5;
+        last = 1;
+      } else {
+        low = alpha;
+        under = reached = value;
+        if (last < 0) over *= 0.5;
+        last = -1;
+      }
+      alpha = (low * over - high * under) / (over - under);
+    }
+    if (last > 0) surplus(low);
+    alpha_ratio_ = std::clamp(low * largest / shares_.price, 0.05, 0.95);
+  }
   double ramps = 0.0, of_joint = 0.0;
   int joint = -1;
-  for (const Move& m : base) {
-    const double extra = safe * alpha * m.growth;
-    price(m.joint, m.direction) += extra;
+  for (const TimedMove& m : moves_) {
+    double& own = price(m.joint, m.direction);
+    const double extra = std::max(0.0, m.slope * m.area - own);
+    own += extra;
     const Range& a = acceleration_[static_cast<std::size_t>(m.joint)];
     if (m.joint != joint) {
       ramps += of_joint;
@@ -137,16 +141,14 @@ void TimedWeights::prices(const double* force, const double* rate, Eigen::Matrix
 
 double TimedWeights::largest_gain(const Eigen::VectorXd& q, const Eigen::VectorXd& slope) {
   update(q);
-  const TimeShares kept = shares_;
-  shares_.share.resize(q.size(), 2);
-  for (Eigen::Index j = 0; j < q.size(); ++j) {
-    shares_.share(j, 0) = slope[j] > 0.0 ? 1.0 : 0.0;
-    shares_.share(j, 1) = slope[j] < 0.0 ? 1.0 : 0.0;
+  moves_.clear();
+  for (Eigen::Index j = 0; j < slope.size(); ++j) {
+    if (slope[j] == 0.0) continue;
+    TimedMove m = move_of(static_cast<int>(j), slope[j] > 0.0 ? 0 : 1, force_data(), rate_data());
+    m.slope = std::abs(slope[j]) / m.area;
+    if (m.top > 0.0) moves_.push_back(m);
   }
-  make_moves(force_data(), rate_data());
-  for (Move& m : moves_) m.slope = std::abs(slope[m.joint]);
-  shares_ = kept;
-  return gain(nullptr);
+  return gain_.of(moves_, pump_flow_);
 }
 
 }  // namespace sparflow

@@ -29,6 +29,7 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
     least_.setConstant(2, margin);
     flow_step_ = flow_max;
     force_step_ = std::max(force.hi - force.lo, 1.0);
+    make_rising();
     return;
   }
   const double width = std::max(force.hi - force.lo, 1.0);
@@ -54,6 +55,49 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
   allowance_ = kSafety / 8.0 *
                (flow_step_ * flow_step_ * flow_curve + force_step_ * force_step_ * force_curve);
   least_ = demand_.colwise().minCoeff().transpose().array() - allowance_;
+  make_rising();
+}
+
+void DemandTable::make_rising() {
+  const auto knots = static_cast<Eigen::Index>(kFlowKnots);
+  const Eigen::Index rows = demand_.rows(), cells = rows - 1;
+  rising_.resize(knots + 1, demand_.cols());
+  Eigen::VectorXd from(rows);  // least demand at this flow or a larger one
+  // at a place along the rows, by straight lines
+  const auto at = [&](double row) {
+    const Eigen::Index r = std::min(static_cast<Eigen::Index>(row), cells - 1);
+    return from[r] + (row - static_cast<double>(r)) * (from[r + 1] - from[r]);
+  };
+  const double per_knot = static_cast<double>(cells) / static_cast<double>(knots);
+  for (Eigen::Index f = 0; f < demand_.cols(); ++f) {
+    from = demand_.col(f).array() - allowance_;
+    for (Eigen::Index r = cells; r-- > 0;) from[r] = std::min(from[r], from[r + 1]);
+    // what straight lines between the knots exceed the finer ones by is taken off both knots
+    auto column = rising_.col(f);
+    Eigen::VectorXd over = Eigen::VectorXd::Zero(knots + 1);
+    for (Eigen::Index k = 0; k <= knots; ++k) column[k] = at(static_cast<double>(k) * per_knot);
+    for (Eigen::Index r = 0; r <= cells; ++r) {
+      const double place = static_cast<double>(r) / per_knot;
+      const Eigen::Index k = std::min(static_cast<Eigen::Index>(place), knots - 1);
+      const double line =
+          column[k] + (place - static_cast<double>(k)) * (column[k + 1] - column[k]);
+      over[k] = std::max(over[k], line - from[r]);
+      over[k + 1] = std::max(over[k + 1], line - from[r]);
+    }
+    column -= over;
+    for (Eigen::Index k = knots; k-- > 0;) column[k] = std::min(column[k], column[k + 1]);
+  }
+}
+
+void DemandTable::rising(double force, Rising& demand) const {
+  const double x =
+      std::clamp((force - force_lo_) / force_step_, 0.0, static_cast<double>(least_.size() - 1));
+  const Eigen::Index f = std::min(static_cast<Eigen::Index>(x), least_.size() - 2);
+  const double share = x - static_cast<double>(f);
+  for (std::size_t k = 0; k <= kFlowKnots; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    demand[k] = rising_(row, f) + share * (rising_(row, f + 1) - rising_(row, f));
+  }
 }
 
 double DemandTable::demand(double flow, double force) const {

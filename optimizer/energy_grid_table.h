@@ -2,11 +2,15 @@
 /// What a cylinder asks of its pump, tabulated over (flow, force), and the least it can ask at any flow: a grid in joint
 /// space looks these up millions of times.
 #include <Eigen/Dense>
+#include <array>
 
 #include "models/crane_model.h"
 #include "problems/problem.h"
 
 namespace sparflow {
+
+/// Flows at which DemandTable::rising() is given, beside zero.
+inline constexpr std::size_t kFlowKnots = 10;
 
 /// Demand d = P(Q, F) + margin of one cylinder in one direction, without effects. Immutable.
 class DemandTable {
@@ -23,14 +27,20 @@ class DemandTable {
   /// interpolation between them, h^2/8 times the second derivative along each axis, is taken off with the largest
   /// second derivative met at the points and midway between them, times 1.5.
   double least(double force) const;
+  /// Lower bound of the demand at that flow and every larger one, at kFlowKnots + 1 flows from 0 to flow_max. Straight lines
+  /// between them are a lower bound, too; not falling. [Pa]
+  using Rising = std::array<double, kFlowKnots + 1>;
+  void rising(double force, Rising& demand) const;
   double flow_max() const { return flow_max_; }
   /// What was taken off in least(), at most. [Pa]
   double allowance() const { return allowance_; }
 
  private:
+  void make_rising();
   double flow_max_ = 0.0, flow_step_ = 1.0, force_lo_ = 0.0, force_step_ = 1.0, allowance_ = 0.0;
   Eigen::MatrixXd demand_;  // [flows x forces]
   Eigen::VectorXd least_;   // [forces]
+  Eigen::MatrixXd rising_;  // [kFlowKnots + 1 x forces]
 };
 
 /// Both directions of every hydraulic, fed cylinder, and what limits its flow.

@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "models/machine_file.h"
+#include "models/model_file.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/exact_energy.h"
 #include "problems/bundled.h"
@@ -34,7 +38,7 @@ TimedBoundOptions quick_bound() {
   TimedBoundOptions options;
   options.nodes = 15000;
   options.search_nodes = 1500;
-  options.evaluations = 25;
+  options.evaluations = 40;
   return options;
 }
 
@@ -148,6 +152,148 @@ TEST(TimedBound, IsBelowEveryMotionFoundAndAboveNothingLess) {
       EXPECT_LE(bound.value, energy * (1.0 + 1e-3)) << reach << " at " << duration;
     }
   }
+}
+
+/// Sleds on one level rail, one upon the other: no loads, so a motion's energy is a matter of flows alone. Ramps take no
+/// time worth speaking of.
+struct Rail {
+  MotionProblem problem;
+  CraneModel model;
+
+  explicit Rail(int sleds) {
+    std::string joints, links, cylinders, feeds, parent = "base", last;
+    for (int k = 0; k < sleds; ++k) {
+      const std::string name = "sled" + std::to_string(k);
+      joints += "  - {name: " + name + ", type: prismatic, parent: " + parent +
+                ", axis: [1, 0, 0], position: [0, 2], velocity: [-0.2, 0.2], "
+                "acceleration: [-1000, 1000]}\n";
+      links +=
+          "  - {name: " + name + ", joint: " + name + ", mass: 100, cog: [0, 0, 0], inertia: 0}\n";
+      cylinders += "  - {name: " + name + ", joint: " + name +
+                   ", bore: 0.1, rod: 0.05, linkage: {type: direct}}\n";
+      feeds += (k == 0 ? "" : ", ") + name;
+      parent = last = name;
+    }
+    problem.machine = parse_machine(
+        "name: rail\njoints:\n" + joints + "tip: {joint: " + last + ", xyz: [0, 0, 1]}\nlinks:\n" +
+            links + "cylinders:\n" + cylinders + "pumps:\n  - {name: main, feeds: [" + feeds +
+            "], max_flow_lpm: 140, max_pressure_bar: 300, standby_bar: 20}\n",
+        "rail", ".");
+    problem.limits = limits_of(problem.machine);
+    problem.start = VectorXd::Zero(sleds);
+    model = CraneModel::untrained(problem.machine);
+    const double area = problem.machine.cylinders[0].area_piston();
+    for (int k = 0; k < sleds; ++k) {  // from 40 or 55 bar up by half as much again at full flow
+      GpParameters p;
+      p.mean_constant = (40.0 + 15.0 * k) * 1e5;
+      p.signal_std = 10e5;
+      p.length_flow = 0.1 * area;
+      p.length_force = 1e5;
+      p.flow = Eigen::ArrayXd::Constant(1, 0.2 * area);
+      p.force = Eigen::ArrayXd::Zero(1);
+      p.weight = Eigen::ArrayXd::Constant(1, 0.5 * p.mean_constant / (p.signal_std * p.signal_std));
+      CylinderModel& c = model.cylinders[static_cast<std::size_t>(k)];
+      c.extend = c.retract = GaussianProcess(p);
+    }
+  }
+};
+
+TEST(TimedBound, KnowsThePriceOfHasteOfOneCylinder) {
+  Rail rail(1);
+  rail.problem.goal = JointGoal{VectorXd::Constant(1, 1.0)};
+  const double area = rail.problem.machine.cylinders[0].area_piston();
+  const GaussianProcess& process = rail.model.cylinders[0].extend;
+  const double slow = area * process.mean(0.0, 0.0);
+  for (const double duration : {5.1, 6.0, 8.0, 12.0, 40.0}) {
+    // the least of a mixture of two speeds that takes this time: all pairs on a fine grid
+    constexpr int kSpeeds = 400;
+    std::vector<double> cost(kSpeeds), pace(kSpeeds);
+    for (int k = 0; k < kSpeeds; ++k) {
+      const double v = 0.2 * (k + 1) / kSpeeds;
+      cost[static_cast<std::size_t>(k)] = area * std::max(20e5, process.mean(area * v, 0.0));
+      pace[static_cast<std::size_t>(k)] = 1.0 / v;
+    }
+    double exact = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < kSpeeds; ++a) {
+      for (std::size_t b = 0; b <= a; ++b) {
+        if (pace[a] > duration || a == b) continue;
+        const double share = std::clamp((duration - pace[a]) / (pace[b] - pace[a]), 0.0, 1.0);
+        exact = std::min(exact, share * cost[b] + (1.0 - share) * cost[a]);
+      }
+    }
+    const TimedBound bound = energy_bound_at(rail.model, rail.problem, duration, quick_bound());
+    ASSERT_TRUE(bound.valid) << bound.message;
+    EXPECT_LE(bound.value, exact * (1.0 + 1e-3)) << duration;  // 400 speeds
+    // twelve straight pieces of the demand, and the price is searched in steps
+    EXPECT_GE(bound.value, 0.99 * exact) << duration;
+    if (duration < 7.0) {
+      EXPECT_GT(bound.value, 1.1 * slow) << "haste costs here";
+    }
+  }
+}
+
+TEST(TimedBound, IsBelowDynamicProgrammingInTimeOfTwoCylindersAndNearIt) {
+  Rail rail(2);
+  constexpr int kWay = 60;  // steps of way that each sled goes
+  const double way[2] = {0.8, 0.5};
+  rail.problem.goal = JointGoal{Eigen::Vector2d(way[0], way[1])};
+  Chain chain(rail.model);
+  for (const double duration : {5.5, 7.0, 9.0, 14.0}) {
+    constexpr int kSteps = 12;
+    const double dt = duration / kSteps;
+    // the exact law's energy of a step in which the sleds go a and b steps of way; flows within the limits
+    LimitRatios ratios(rail.problem);
+    Eigen::MatrixXd stage(kWay + 1, kWay + 1);
+    for (int a = 0; a <= kWay; ++a) {
+      for (int b = 0; b <= kWay; ++b) {
+        const Eigen::Vector2d q(0.1, 0.1), v(a * way[0] / kWay / dt, b * way[1] / kWay / dt);
+        stage(a, b) = ratios.speed(q, v, nullptr) > 1.0 + 1e-9
+                          ? std::numeric_limits<double>::infinity()
+                          : chain.evaluate(q.data(), v.data(), 0.0).power * dt;
+      }
+    }
+    Eigen::MatrixXd best =
+        Eigen::MatrixXd::Constant(kWay + 1, kWay + 1, std::numeric_limits<double>::infinity());
+    best(0, 0) = 0.0;
+    for (int step = 0; step < kSteps; ++step) {
+      Eigen::MatrixXd next = best;
+      for (int x = 0; x <= kWay; ++x) {
+        for (int y = 0; y <= kWay; ++y) {
+          for (int a = 0; a <= x; ++a) {
+            for (int b = 0; b <= y; ++b) {
+              if (!std::isfinite(stage(a, b))) break;
+              next(x, y) = std::min(next(x, y), best(x - a, y - b) + stage(a, b));
+            }
+          }
+        }
+      }
+      best = next;
+    }
+    const double found = best(kWay, kWay);
+    ASSERT_TRUE(std::isfinite(found)) << duration;
+    const TimedBound bound = energy_bound_at(rail.model, rail.problem, duration, quick_bound());
+    ASSERT_TRUE(bound.valid) << bound.message;
+    EXPECT_LE(bound.value, found * (1.0 + 1e-9)) << duration;
+    // whole steps of way cost some percent more than free ones; prices and shares are searched in steps
+    EXPECT_GE(bound.value, 0.96 * found) << duration;
+  }
+}
+
+TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
+  std::ifstream in(bundled_file("best_known.json"));
+  const nlohmann::json known = nlohmann::json::parse(in);
+  int tried = 0;
+  for (const auto& [file, entry] : known.items()) {
+    if (!entry.contains("energy_J") || file.find("loader_crane") == std::string::npos) continue;
+    const CraneModel model = load_model(bundled_file("models/loader_crane.json"));
+    const MotionProblem problem = load_problem(bundled_file("reaches/" + file), &model.machine);
+    const TimedBound bound =
+        energy_bound_at(model, problem, entry.at("duration_s").get<double>(), quick_bound());
+    ASSERT_TRUE(bound.valid) << file << ": " << bound.message;
+    EXPECT_LE(bound.value, entry.at("energy_J").get<double>()) << file;
+    ++tried;
+  }
+  EXPECT_GE(tried, 15);
 }
 
 }  // namespace
