@@ -132,7 +132,7 @@ class TimedSearch {
       Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(count, count);
       if (round % 2 == 1) {
         for (double& entry : axes.reshaped()) entry = normal(random);
-        axes = thin_qr(axes).q;
+        axes = span_of(axes);  // orthonormal
       }
       bool any = false;
       for (Eigen::Index k = count; k-- > 0;) {

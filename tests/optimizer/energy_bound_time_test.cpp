@@ -6,8 +6,8 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <random>
+#include <sstream>
 
 #include "models/machine_file.h"
 #include "models/model_file.h"
@@ -17,6 +17,7 @@
 #include "problems/motion_limits.h"
 #include "problems/problem_file.h"
 #include "tests/optimizer/synthetic_model.h"
+#include "tests/parsed_json.h"
 
 namespace sparflow {
 namespace {
@@ -281,7 +282,9 @@ TEST(TimedBound, IsBelowDynamicProgrammingInTimeOfTwoCylindersAndNearIt) {
 
 TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
   std::ifstream in(bundled_file("best_known.json"));
-  const nlohmann::json known = nlohmann::json::parse(in);
+  std::stringstream text;
+  text << in.rdbuf();
+  const nlohmann::json known = test_support::parsed_json(text.str());
   int tried = 0;
   for (const auto& [file, entry] : known.items()) {
     if (!entry.contains("energy_J") || file.find("loader_crane") == std::string::npos) continue;
