@@ -312,4 +312,11 @@ CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
   return result;
 }
 
+CompareResult::CompareResult() = default;
+CompareResult::CompareResult(const CompareResult&) = default;
+CompareResult::CompareResult(CompareResult&&) noexcept = default;
+CompareResult& CompareResult::operator=(const CompareResult&) = default;
+CompareResult& CompareResult::operator=(CompareResult&&) noexcept = default;
+CompareResult::~CompareResult() = default;
+
 }  // namespace sparflow

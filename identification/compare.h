@@ -110,6 +110,14 @@ struct CompareResult {
 
   const StageScore* find(const std::string& stage, const std::string& at,
                          const std::string& regime = "") const;
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  CompareResult();
+  CompareResult(const CompareResult&);
+  CompareResult(CompareResult&&) noexcept;
+  CompareResult& operator=(const CompareResult&);
+  CompareResult& operator=(CompareResult&&) noexcept;
+  ~CompareResult();
 };
 
 CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,

@@ -407,4 +407,11 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
   return d;
 }
 
+Diagnosis::Diagnosis() = default;
+Diagnosis::Diagnosis(const Diagnosis&) = default;
+Diagnosis::Diagnosis(Diagnosis&&) noexcept = default;
+Diagnosis& Diagnosis::operator=(const Diagnosis&) = default;
+Diagnosis& Diagnosis::operator=(Diagnosis&&) noexcept = default;
+Diagnosis::~Diagnosis() = default;
+
 }  // namespace sparflow

@@ -78,6 +78,14 @@ struct Diagnosis {
   std::string headline() const;  ///< one sentence
   std::string table() const;     ///< one screen for a terminal
   std::string json() const;      ///< keys of the contract and more
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  Diagnosis();
+  Diagnosis(const Diagnosis&);
+  Diagnosis(Diagnosis&&) noexcept;
+  Diagnosis& operator=(const Diagnosis&);
+  Diagnosis& operator=(Diagnosis&&) noexcept;
+  ~Diagnosis();
 };
 
 /// With at least `digits` figures and never an exponent: 12170, 0.0123.

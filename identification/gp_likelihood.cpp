@@ -6,6 +6,7 @@
 
 #include "models/error.h"
 #include "models/gp_kernel.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {
@@ -32,19 +33,19 @@ ExactSystem exact_system(const GpPoints& p, const GpHyper& hyper) {
   s.kernel = kernel_matrix(p.x1, p.x2, p.x1, p.x2, hyper);
   MatrixXd noisy = s.kernel;
   noisy.diagonal().array() += std::exp(hyper[3]);
-  const Eigen::LLT<MatrixXd> factor(noisy);
-  if (factor.info() != Eigen::Success) return s;
-  s.log_det_kernel = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-  s.inverse = factor.solve(MatrixXd::Identity(n, n));
-  s.inverse_basis.noalias() = s.inverse * p.basis;
-  MatrixXd a = p.basis.transpose() * s.inverse_basis;
+  Cholesky factor;
+  if (!factor.compute(noisy)) return s;
+  s.log_det_kernel = factor.log_det();
+  s.inverse = factor.solve_columns(MatrixXd::Identity(n, n));
+  s.inverse_basis = product(s.inverse, p.basis);
+  MatrixXd a = transposed_product(p.basis, s.inverse_basis);
   a.diagonal() += p.basis_precision;
-  const Eigen::LLT<MatrixXd> basis_factor(a);
-  if (basis_factor.info() != Eigen::Success) return s;
-  s.log_det_basis = 2.0 * basis_factor.matrixLLT().diagonal().array().log().sum();
-  s.basis_inverse = basis_factor.solve(MatrixXd::Identity(a.rows(), a.rows()));
-  s.projection = s.inverse;
-  s.projection.noalias() -= s.inverse_basis * s.basis_inverse * s.inverse_basis.transpose();
+  Cholesky basis_factor;
+  if (!basis_factor.compute(a)) return s;
+  s.log_det_basis = basis_factor.log_det();
+  s.basis_inverse = basis_factor.solve_columns(MatrixXd::Identity(a.rows(), a.rows()));
+  s.projection =
+      s.inverse - product(product(s.inverse_basis, s.basis_inverse), s.inverse_basis.transpose());
   s.ok = s.projection.allFinite();
   return s;
 }
@@ -113,7 +114,7 @@ GpPosterior exact_posterior(const GpPoints& p, const GpHyper& hyper) {
   out.weight = s.projection * p.y;
   out.core = MatrixXd(n + b, n + b);
   out.core.topLeftCorner(n, n) = s.projection;
-  out.core.topRightCorner(n, b).noalias() = s.inverse_basis * s.basis_inverse;
+  out.core.topRightCorner(n, b) = product(s.inverse_basis, s.basis_inverse);
   out.core.bottomLeftCorner(b, n) = out.core.topRightCorner(n, b).transpose();
   out.core.bottomRightCorner(b, b) = -s.basis_inverse;
   return out;

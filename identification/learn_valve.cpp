@@ -40,7 +40,7 @@ RobustFit robust_fit(const MatrixXd& features, const VectorXd& y) {
     weight = fit.residuals.unaryExpr([&](double r) { return huber_weight(r, kHuberStds * std); });
     if (i > 0 && (fit.coefficients - before).norm() < 1e-10 * fit.coefficients.norm()) break;
   }
-  fit.covariance = std * std * inverse(normal);
+  fit.covariance = std * std * symmetric_inverse(normal);
   return fit;
 }
 

@@ -312,4 +312,11 @@ Log log_from_text(const std::string& path, std::string bytes, const Machine& mac
   return clean_log(table, path, sha256, machine, options);
 }
 
+Log::Log() = default;
+Log::Log(const Log&) = default;
+Log::Log(Log&&) noexcept = default;
+Log& Log::operator=(const Log&) = default;
+Log& Log::operator=(Log&&) noexcept = default;
+Log::~Log() = default;
+
 }  // namespace sparflow

@@ -76,6 +76,14 @@ struct Log {
   const Channel* find(const std::string& signal) const;
   /// [samples x count] one column for each index of a role, NaN where nothing was measured.
   Eigen::MatrixXd matrix(Role role, int count) const;
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  Log();
+  Log(const Log&);
+  Log(Log&&) noexcept;
+  Log& operator=(const Log&);
+  Log& operator=(Log&&) noexcept;
+  ~Log();
 };
 
 struct LogOptions {

@@ -78,7 +78,7 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
     fixed[c] = rows.leftCols(width);
     VectorXd r = rows.col(width);
     if (width > 0) {  // orthonormal, so that projecting later is one product
-      fixed[c] = thin_qr(fixed[c]).q;
+      fixed[c] = span_of(fixed[c]);
       r -= fixed[c] * (fixed[c].transpose() * r);
     }
     residual[c] = std::move(r);

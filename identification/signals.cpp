@@ -338,4 +338,11 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
   return out;
 }
 
+MachineSignals::MachineSignals() = default;
+MachineSignals::MachineSignals(const MachineSignals&) = default;
+MachineSignals::MachineSignals(MachineSignals&&) noexcept = default;
+MachineSignals& MachineSignals::operator=(const MachineSignals&) = default;
+MachineSignals& MachineSignals::operator=(MachineSignals&&) noexcept = default;
+MachineSignals::~MachineSignals() = default;
+
 }  // namespace sparflow

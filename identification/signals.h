@@ -99,6 +99,14 @@ struct MachineSignals {
   std::vector<std::string> notes;  ///< plain sentences: what was missing, converted, left out
 
   Eigen::Index samples() const { return time.size(); }
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  MachineSignals();
+  MachineSignals(const MachineSignals&);
+  MachineSignals(MachineSignals&&) noexcept;
+  MachineSignals& operator=(const MachineSignals&);
+  MachineSignals& operator=(MachineSignals&&) noexcept;
+  ~MachineSignals();
 };
 
 /// @throws InputError when a stroke lies outside what the linkage can reach at every sample

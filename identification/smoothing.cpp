@@ -27,8 +27,7 @@ Eigen::MatrixXd fit_weights(const Eigen::VectorXd& nodes, double at, int order) 
     if (k >= 1) evaluate(1, k) = k * std::pow(at, k - 1);
     if (k >= 2) evaluate(2, k) = k * (k - 1) * std::pow(at, k - 2);
   }
-  const ThinQr qr = thin_qr(basis);
-  return product(qr.q, solve_transposed_upper(qr.r, evaluate.transpose())).transpose();
+  return least_norm_columns(basis, evaluate.transpose()).transpose();
 }
 
 /// Samples either side of the middle in a window of `window_s`.

@@ -18,10 +18,6 @@ using Eigen::VectorXd;
 /// their conditional variance allows, so this only covers rounding.
 constexpr double kJitter = 1e-9;
 
-double log_det(const Eigen::LLT<MatrixXd>& factor) {
-  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-}
-
 }  // namespace
 
 InducingChoice choose_inducing(const ArrayXd& x1, const ArrayXd& x2, const GpHyper& hyper,
@@ -58,26 +54,24 @@ bool SparseGp::factorise(const GpHyper& hyper) {
   const double signal = std::exp(hyper[2]), noise = std::exp(hyper[3]);
   kuu_ = kernel_matrix(z1_, z2_, z1_, z2_, hyper);
   kuu_.diagonal().array() += kJitter * signal;
-  chol_uu_.compute(kuu_);
-  if (chol_uu_.info() != Eigen::Success) return false;
+  if (!chol_uu_.compute(kuu_)) return false;
   kuf_ = kernel_matrix(z1_, z2_, points_.x1, points_.x2, hyper);
   v_ = kuf_;
-  chol_uu_.matrixL().solveInPlace(v_);
+  chol_uu_.solve_lower(v_);
   const Index m = z1_.size();
-  MatrixXd b = MatrixXd::Zero(m, m);
-  b.selfadjointView<Eigen::Lower>().rankUpdate(v_, 1.0 / noise);
+  MatrixXd b = gram_of_rows(v_) / noise;
   trace_v_ = noise * b.trace();
   b.diagonal().array() += 1.0;
-  chol_b_.compute(b.selfadjointView<Eigen::Lower>());
-  if (chol_b_.info() != Eigen::Success) return false;
-  b_inverse_ = chol_b_.solve(MatrixXd::Identity(m, m));
-  vh_.noalias() = v_ * points_.basis;
+  if (!chol_b_.compute(b)) return false;
+  b_inverse_ = chol_b_.solve_columns(MatrixXd::Identity(m, m));
+  vh_ = product(v_, points_.basis);
   vy_.noalias() = v_ * points_.y;
-  const MatrixXd bh = chol_b_.solve(vh_);
-  MatrixXd a = (points_.basis.transpose() * points_.basis - vh_.transpose() * bh / noise) / noise;
+  const MatrixXd bh = chol_b_.solve_columns(vh_);
+  MatrixXd a =
+      (transposed_product(points_.basis, points_.basis) - transposed_product(vh_, bh) / noise) /
+      noise;
   a.diagonal() += points_.basis_precision;
-  chol_a_.compute(a);
-  if (chol_a_.info() != Eigen::Success) return false;
+  if (!chol_a_.compute(a)) return false;
   beta_ =
       chol_a_.solve((points_.basis.transpose() * points_.y - bh.transpose() * vy_ / noise) / noise);
   return beta_.allFinite();
@@ -99,27 +93,31 @@ double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
   const double lost_trace = n * signal - trace_v_;  // tr(Kff - Qff)
   // With a prior on beta, residual^T gamma is y^T P y only together with beta's own part.
   const double quadratic = residual.dot(gamma) + beta_.cwiseAbs2().dot(points_.basis_precision);
-  const double value = points_.log_constant() - 0.5 * (quadratic + n * hyper[3] + log_det(chol_b_) +
-                                                       log_det(chol_a_) + lost_trace / noise);
+  const double value =
+      points_.log_constant() -
+      0.5 * (quadratic + n * hyper[3] + chol_b_.log_det() + chol_a_.log_det() + lost_trace / noise);
   if (!std::isfinite(value)) return kMinusInfinity;
   if (gradient == nullptr) return value;
 
   // E = Sigma^-1 H A^(-T/2), so that P = Sigma^-1 - E E^T. With respect to Qff the bound has the gradient
   // 1/2 [gamma gamma^T + V^T B^-1 V / noise^2 + E E^T] (the identities cancel against the trace term),
   // which W = Kuu^-1 Kuf turns into gradients with respect to Kuf (2 T) and Kuu (-S).
-  MatrixXd e = points_.basis - v_.transpose() * (chol_b_.solve(vh_) / noise);
-  e /= noise;
-  chol_a_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(e);
-  MatrixXd t(m, count);
+  MatrixXd et =
+      (points_.basis - transposed_product(v_, chol_b_.solve_columns(vh_)) / noise).transpose();
+  et /= noise;
+  chol_a_.solve_lower(et);
+  const MatrixXd e = et.transpose();
   const MatrixXd shrink = (MatrixXd::Identity(m, m) - b_inverse_) / noise;
-  t.noalias() = shrink * v_;
-  t.noalias() += (v_ * gamma) * gamma.transpose();
-  t.noalias() += (v_ * e) * e.transpose();
+  MatrixXd t = product(shrink, v_);
+  const VectorXd v_gamma = v_ * gamma;
+  t.noalias() += v_gamma * gamma.transpose();
+  t += product(product(v_, e), e.transpose());
   t *= 0.5;
-  MatrixXd s = t * v_.transpose();  // L^T S L
-  chol_uu_.matrixL().transpose().solveInPlace(t);
-  chol_uu_.matrixL().transpose().solveInPlace(s);
-  chol_uu_.matrixL().solveInPlace<Eigen::OnTheRight>(s);
+  MatrixXd s = product(t, v_.transpose());  // L^T S L
+  chol_uu_.solve_upper(t);
+  chol_uu_.solve_upper(s);
+  s.transposeInPlace();
+  chol_uu_.solve_upper(s);  // symmetric again: X L^-1 = (L^-T X^T)^T
 
   gradient->setZero();
   for (Index j = 0; j < count; ++j) {
@@ -152,15 +150,16 @@ GpPosterior SparseGp::posterior(const GpHyper& hyper) {
   out.x2 = z2_;
   out.beta = beta_;
   out.weight = chol_b_.solve(vy_ - vh_ * beta_) / noise;
-  chol_uu_.matrixL().transpose().solveInPlace(out.weight);
+  chol_uu_.solve_upper(out.weight);
   // With a = L^-1 k: variance = s^2 - a^T (I - B^-1) a + r^T A^-1 r, r = h - G a, G = (V H)^T B^-1 / noise.
-  const MatrixXd g = (chol_b_.solve(vh_) / noise).transpose();
-  const MatrixXd a_inverse = chol_a_.solve(MatrixXd::Identity(b, b));
-  MatrixXd kk = MatrixXd::Identity(m, m) - b_inverse_ - g.transpose() * a_inverse * g;
-  MatrixXd kh = g.transpose() * a_inverse;
-  chol_uu_.matrixL().transpose().solveInPlace(kk);
-  chol_uu_.matrixL().solveInPlace<Eigen::OnTheRight>(kk);
-  chol_uu_.matrixL().transpose().solveInPlace(kh);
+  const MatrixXd g = (chol_b_.solve_columns(vh_) / noise).transpose();
+  const MatrixXd a_inverse = chol_a_.solve_columns(MatrixXd::Identity(b, b));
+  MatrixXd kh = transposed_product(g, a_inverse);
+  MatrixXd kk = MatrixXd::Identity(m, m) - b_inverse_ - product(kh, g);
+  chol_uu_.solve_upper(kk);
+  kk.transposeInPlace();
+  chol_uu_.solve_upper(kk);
+  chol_uu_.solve_upper(kh);
   out.core = MatrixXd(m + b, m + b);
   out.core.topLeftCorner(m, m) = 0.5 * (kk + kk.transpose());
   out.core.topRightCorner(m, b) = kh;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "identification/gp_likelihood.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 
@@ -39,12 +40,12 @@ class SparseGp {
   bool factorise(const GpHyper& hyper);
 
   const GpPoints& points_;
-  Eigen::ArrayXd z1_, z2_;     // inducing inputs
-  Eigen::MatrixXd kuu_, kuf_;  // [m x m], [m x n], with the signal variance
-  Eigen::MatrixXd v_;          // L^-1 Kuf
-  Eigen::MatrixXd vh_;         // V H, [m x b]
-  Eigen::VectorXd vy_;         // V y
-  Eigen::LLT<Eigen::MatrixXd> chol_uu_, chol_b_, chol_a_;  // Kuu, B = I + V V^T / noise, A
+  Eigen::ArrayXd z1_, z2_;              // inducing inputs
+  Eigen::MatrixXd kuu_, kuf_;           // [m x m], [m x n], with the signal variance
+  Eigen::MatrixXd v_;                   // L^-1 Kuf
+  Eigen::MatrixXd vh_;                  // V H, [m x b]
+  Eigen::VectorXd vy_;                  // V y
+  Cholesky chol_uu_, chol_b_, chol_a_;  // Kuu, B = I + V V^T / noise, A
   Eigen::MatrixXd b_inverse_;
   Eigen::VectorXd beta_;
   double trace_v_ = 0.0;  // tr V V^T

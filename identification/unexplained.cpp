@@ -75,7 +75,7 @@ Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<in
     for (std::size_t f = 0; f < rows.size(); ++f) {
       MatrixXd n = all - gram[f];
       n.diagonal().array() += strength * scale;
-      const VectorXd w = solve_definite(n, g_all - cross[f]);
+      const VectorXd w = solve_symmetric(n, g_all - cross[f]);
       for (const Index i : rows[f]) prediction[i] = x.row(i).dot(w);
     }
     const double explained = 1.0 - (y - prediction).squaredNorm() / y.squaredNorm();
@@ -235,7 +235,7 @@ VectorXd to_explain(const Evidence& evidence, const EvidenceChannel& channel, co
     const MatrixXd own = own_process_basis(evidence, channel, rows);
     MatrixXd gram = transposed_product(own, own);
     gram.diagonal().array() += 1e-3 * gram.diagonal().mean();
-    y -= own * solve_definite(gram, own.transpose() * y);
+    y -= own * solve_symmetric(gram, own.transpose() * y);
     y.array() -= y.mean();
   }
   return y;

@@ -209,4 +209,11 @@ void Chain::add_pump_effects() {
   }
 }
 
+CraneModel::CraneModel() = default;
+CraneModel::CraneModel(const CraneModel&) = default;
+CraneModel::CraneModel(CraneModel&&) noexcept = default;
+CraneModel& CraneModel::operator=(const CraneModel&) = default;
+CraneModel& CraneModel::operator=(CraneModel&&) noexcept = default;
+CraneModel::~CraneModel() = default;
+
 }  // namespace sparflow

@@ -88,6 +88,14 @@ struct CraneModel {
   bool complete() const;
   /// Names of what is missing ("boom retract"), for a message.
   std::vector<std::string> missing() const;
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  CraneModel();
+  CraneModel(const CraneModel&);
+  CraneModel(CraneModel&&) noexcept;
+  CraneModel& operator=(const CraneModel&);
+  CraneModel& operator=(CraneModel&&) noexcept;
+  ~CraneModel();
 };
 
 /// One cylinder at one instant, exact law (paper eqs. 2-13) and the model's effects.

@@ -12,45 +12,49 @@ using VectorIn = Eigen::Ref<const Eigen::VectorXd>;
 Eigen::MatrixXd product(const MatrixIn& a, const MatrixIn& b);
 /// A^T B, [columns of A x columns of B].
 Eigen::MatrixXd transposed_product(const MatrixIn& a, const MatrixIn& b);
-/// A^T diag(weight) A.
+/// A A^T, [rows of A x rows of A], and A^T diag(weight) A.
+Eigen::MatrixXd gram_of_rows(const MatrixIn& a);
 Eigen::MatrixXd weighted_gram(const MatrixIn& a, const VectorIn& weight);
 
 /// A^-1 b and A^-1 B of a symmetric positive semi-definite A, by LDL^T with pivots.
 Eigen::VectorXd solve_symmetric(const MatrixIn& a, const VectorIn& b);
 Eigen::MatrixXd solve_symmetric_columns(const MatrixIn& a, const MatrixIn& b);
-/// A^-1 b of a symmetric positive definite A, by Cholesky.
-Eigen::VectorXd solve_definite(const MatrixIn& a, const VectorIn& b);
-/// A^-1 of a general square A.
-Eigen::MatrixXd inverse(const MatrixIn& a);
+/// A^-1 of a symmetric positive definite A.
+Eigen::MatrixXd symmetric_inverse(const MatrixIn& a);
 
 /// argmin |A x - b| by QR with column pivots; A has full column rank.
 Eigen::VectorXd least_squares(const MatrixIn& a, const VectorIn& b);
+/// The X of least norm with A^T X = B [rows of A x columns of B]; A has full column rank.
+Eigen::MatrixXd least_norm_columns(const MatrixIn& a, const MatrixIn& b);
 /// argmin |A x - b| of least |x|, for A of any rank.
 Eigen::VectorXd least_squares_of_least_norm(const MatrixIn& a, const VectorIn& b);
 /// Columns of A - B X with X their least-squares coefficients on B; `coefficients` takes X where it is not null.
 Eigen::MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b,
                                    Eigen::MatrixXd* coefficients = nullptr);
 
-/// Q and R of the thin QR decomposition of A [n x m], n >= m: orthonormal columns [n x m], upper triangle [m x m].
-struct ThinQr {
-  Eigen::MatrixXd q, r;
-};
-ThinQr thin_qr(const MatrixIn& a);
-/// R^-T B of an upper triangular R.
-Eigen::MatrixXd solve_transposed_upper(const MatrixIn& r, const MatrixIn& b);
 /// Orthonormal columns that span A's columns (scaled to one first) to within rounding.
 Eigen::MatrixXd span_of(const MatrixIn& a);
-/// Orthonormal columns normal to all columns of A, which are independent [n x (n - columns of A)].
-Eigen::MatrixXd complement_of(const MatrixIn& a);
-/// L of A = L L^T, A symmetric positive definite.
-Eigen::MatrixXd cholesky_factor(const MatrixIn& a);
+/// Orthonormal columns normal to all columns of A [n x (n - rank)]; what is below `threshold` of the largest pivot is
+/// rounding.
+Eigen::MatrixXd complement_of(const MatrixIn& a, double threshold = 1e-12);
+/// A = L L^T of a symmetric positive definite A; only its lower triangle is read.
+class Cholesky {
+ public:
+  Cholesky() = default;
+  explicit Cholesky(const MatrixIn& a) { compute(a); }
+  /// false where A is not positive definite; nothing else may be asked for then
+  bool compute(const MatrixIn& a);
+  double log_det() const;                                  ///< of A
+  Eigen::MatrixXd lower() const;                           ///< L
+  Eigen::VectorXd solve(const VectorIn& b) const;          ///< A^-1 b
+  Eigen::MatrixXd solve_columns(const MatrixIn& b) const;  ///< A^-1 B
+  void solve_lower(Eigen::Ref<Eigen::MatrixXd> b) const;   ///< B becomes L^-1 B
+  void solve_upper(Eigen::Ref<Eigen::MatrixXd> b) const;   ///< B becomes L^-T B
 
-/// Eigenvalues of a symmetric A, ascending, and their unit vectors as columns.
-struct SymmetricEigen {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd vectors;
+ private:
+  Eigen::LLT<Eigen::MatrixXd> factor_;
 };
-SymmetricEigen symmetric_eigen(const MatrixIn& a);
+
 /// Number of columns of a square A independent to within `threshold` (relative to the largest pivot).
 Eigen::Index rank(const MatrixIn& a, double threshold);
 

@@ -55,4 +55,11 @@ const Valve* Machine::valve_of_cylinder(int cylinder) const {
   return nullptr;
 }
 
+Machine::Machine() = default;
+Machine::Machine(const Machine&) = default;
+Machine::Machine(Machine&&) noexcept = default;
+Machine& Machine::operator=(const Machine&) = default;
+Machine& Machine::operator=(Machine&&) noexcept = default;
+Machine::~Machine() = default;
+
 }  // namespace sparflow

@@ -138,6 +138,14 @@ struct Machine {
   int cylinder_of_joint(int joint) const;              ///< -1 when the joint has no cylinder
   int pump_of_cylinder(int cylinder) const;            ///< -1 when none feeds it
   const Valve* valve_of_cylinder(int cylinder) const;  ///< nullptr when there is none
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  Machine();
+  Machine(const Machine&);
+  Machine(Machine&&) noexcept;
+  Machine& operator=(const Machine&);
+  Machine& operator=(Machine&&) noexcept;
+  ~Machine();
 };
 
 }  // namespace sparflow

@@ -33,14 +33,7 @@ class TipBoxes {
       reach_[j] = prismatic ? 1.0 : beyond;
       beyond += machine.joints[i].origin.translation().norm();
     }
-    directions_.setIdentity(3, 3);
-    const std::vector<Eigen::Vector3d> fixed = fixed_tip_directions(machine);
-    if (!fixed.empty()) {
-      Eigen::MatrixXd still(3, static_cast<Eigen::Index>(fixed.size()));
-      for (std::size_t k = 0; k < fixed.size(); ++k)
-        still.col(static_cast<Eigen::Index>(k)) = fixed[k];
-      directions_ = complement_of(still);
-    }
+    directions_ = moving_tip_directions(machine);
   }
 
   bool possible(const VectorXd& lo, const VectorXd& hi) {
@@ -69,7 +62,7 @@ class TipBoxes {
     const double small = 1e-12 * gram.trace() + 1e-300;
     const Eigen::MatrixXd back =
         scaled.transpose() *
-        inverse(gram + small * Eigen::MatrixXd::Identity(gram.rows(), gram.cols()));
+        symmetric_inverse(gram + small * Eigen::MatrixXd::Identity(gram.rows(), gram.cols()));
     for (Eigen::Index i = 0; i < n; ++i) {
       const Eigen::RowVectorXd row = back.row(i);
       const double most = (row * scaled).cwiseAbs().sum() + row.norm() * slack;

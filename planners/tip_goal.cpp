@@ -37,10 +37,7 @@ double path_length(const MatrixXd& path, const VectorXd& scale) {
 
 TipSolver::TipSolver(const MotionProblem& problem)
     : machine_(problem.machine), limits_(problem.limits.position), scale_(speed_scale(problem)) {
-  Eigen::Matrix3d projector = Eigen::Matrix3d::Identity();
-  for (const Vector3d& d : fixed_tip_directions(machine_)) projector -= d * d.transpose();
-  const int count = static_cast<int>(std::lround(projector.trace()));
-  moving_ = symmetric_eigen(projector).vectors.rightCols(count);  // eigenvalues ascend: 0s first
+  moving_ = moving_tip_directions(machine_);
 }
 
 int TipSolver::redundancy() const {

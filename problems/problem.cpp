@@ -36,12 +36,11 @@ std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
     const Eigen::Matrix3d along = axis * axis.transpose();
     moved += joint.type == JointType::kRevolute ? Eigen::Matrix3d::Identity() - along : along;
   }
-  const SymmetricEigen eigen = symmetric_eigen(moved);
+  // squared sine of the angle by which the axes miss parallel: 1e-12 is a millionth of a radian
+  const Eigen::MatrixXd still = complement_of(moved, 1e-12);
   std::vector<Eigen::Vector3d> fixed;
-  for (int k = 0; k < 3; ++k) {
-    // squared sine of the angle by which the axes miss parallel: 1e-12 is a millionth of a radian
-    if (eigen.values[k] > 1e-12) continue;
-    Eigen::Vector3d d = eigen.vectors.col(k);
+  for (Eigen::Index k = 0; k < still.cols(); ++k) {
+    Eigen::Vector3d d = still.col(k);
     Eigen::Index largest = 0;
     d.cwiseAbs().maxCoeff(&largest);
     if (d[largest] < 0.0) d = -d;
@@ -49,5 +48,20 @@ std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
   }
   return fixed;
 }
+
+Eigen::Matrix3Xd moving_tip_directions(const Machine& machine) {
+  const std::vector<Eigen::Vector3d> fixed = fixed_tip_directions(machine);
+  if (fixed.empty()) return Eigen::Matrix3d::Identity();
+  Eigen::MatrixXd still(3, static_cast<Eigen::Index>(fixed.size()));
+  for (std::size_t k = 0; k < fixed.size(); ++k) still.col(static_cast<Eigen::Index>(k)) = fixed[k];
+  return complement_of(still);
+}
+
+MotionProblem::MotionProblem() = default;
+MotionProblem::MotionProblem(const MotionProblem&) = default;
+MotionProblem::MotionProblem(MotionProblem&&) noexcept = default;
+MotionProblem& MotionProblem::operator=(const MotionProblem&) = default;
+MotionProblem& MotionProblem::operator=(MotionProblem&&) noexcept = default;
+MotionProblem::~MotionProblem() = default;
 
 }  // namespace sparflow

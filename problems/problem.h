@@ -100,6 +100,14 @@ struct MotionProblem {
   std::optional<TipLine> tip_line;
   ObjectiveWeights objective;
   std::optional<int> knots;  ///< knots of the transcription; absent: the optimiser's choice
+
+  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  MotionProblem();
+  MotionProblem(const MotionProblem&);
+  MotionProblem(MotionProblem&&) noexcept;
+  MotionProblem& operator=(const MotionProblem&);
+  MotionProblem& operator=(MotionProblem&&) noexcept;
+  ~MotionProblem();
 };
 
 /// The machine's own limits, nothing overridden.
@@ -109,5 +117,7 @@ MotionLimits limits_of(const Machine& machine);
 /// planar machine the normal of its plane; empty for a spatial one. A tip goal must agree with the tip
 /// along these, and they carry no information about the posture.
 std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine);
+/// Orthonormal columns normal to these: the directions in which the tip can move [3 x 3 or fewer].
+Eigen::Matrix3Xd moving_tip_directions(const Machine& machine);
 
 }  // namespace sparflow

@@ -101,7 +101,7 @@ TEST(LearnPressure, RecoversTheHyperparametersOfAGaussianProcess) {
   std::mt19937_64 random(2);
   std::normal_distribution<double> normal;
   const Eigen::VectorXd white = Eigen::VectorXd::NullaryExpr(n, [&] { return normal(random); });
-  d.pressure = 50e5 + 20.0 * d.force + (cholesky_factor(k) * white).array();
+  d.pressure = 50e5 + 20.0 * d.force + (Cholesky(k).lower() * white).array();
   for (GpMethod method : {GpMethod::kExact, GpMethod::kInducing}) {
     LearnGpOptions options;
     options.method = method;
