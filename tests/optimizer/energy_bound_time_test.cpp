@@ -225,8 +225,8 @@ TEST(TimedBound, KnowsThePriceOfHasteOfOneCylinder) {
     const TimedBound bound = energy_bound_at(rail.model, rail.problem, duration, quick_bound());
     ASSERT_TRUE(bound.valid) << bound.message;
     EXPECT_LE(bound.value, exact * (1.0 + 1e-3)) << duration;  // 400 speeds
-    // twelve straight pieces of the demand, and the price is searched in steps
-    EXPECT_GE(bound.value, 0.99 * exact) << duration;
+    // ten straight pieces of a demand that rises by half, and the price is searched in steps: 1.9 % at the most
+    EXPECT_GE(bound.value, 0.975 * exact) << duration;
     if (duration < 7.0) {
       EXPECT_GT(bound.value, 1.1 * slow) << "haste costs here";
     }
@@ -285,13 +285,17 @@ TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
   std::stringstream text;
   text << in.rdbuf();
   const nlohmann::json known = test_support::parsed_json(text.str());
+  TimedBoundOptions options;
+  options.nodes = 6000;
+  options.search_nodes = 800;
+  options.evaluations = 20;
   int tried = 0;
   for (const auto& [file, entry] : known.items()) {
     if (!entry.contains("energy_J") || file.find("loader_crane") == std::string::npos) continue;
     const CraneModel model = load_model(bundled_file("models/loader_crane.json"));
     const MotionProblem problem = load_problem(bundled_file("reaches/" + file), &model.machine);
     const TimedBound bound =
-        energy_bound_at(model, problem, entry.at("duration_s").get<double>(), quick_bound());
+        energy_bound_at(model, problem, entry.at("duration_s").get<double>(), options);
     ASSERT_TRUE(bound.valid) << file << ": " << bound.message;
     EXPECT_LE(bound.value, entry.at("energy_J").get<double>()) << file;
     ++tried;
