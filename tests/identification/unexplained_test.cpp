@@ -166,7 +166,7 @@ TEST(Leftovers, ABendOverTheTravelOfALeverThatMostlyRestsIsFound) {
   const std::vector<Leftover> found = find_leftovers(left.evidence, left.fit);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].channel, c);
-  EXPECT_EQ(found[0].depends_on.front(), "u_boom");
+  EXPECT_EQ(found[0].depends_on.front(), "u_" + model().machine.cylinders[0].name);
 }
 
 TEST(Leftovers, ALearnedProcessOwnInputsAreNoRiddle) {
