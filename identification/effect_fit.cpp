@@ -102,16 +102,11 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   EffectDesign d;
   d.effect = effect;
   d.shape = std::move(shape);
-  const std::vector<EffectParameter>& parameters = effect.effect->info().parameters;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!parameters[i].linear) continue;
+  for (const EffectParameter& p : effect.effect->info().parameters) {
+    if (!p.linear) continue;
     ++d.linear;
-    d.lower.push_back(parameters[i].lower);
-    d.upper.push_back(parameters[i].upper);
-    for (const MachineSeries& log : evidence.series) {
-      d.upper.back() =
-          std::min(d.upper.back(), effect.effect->largest_plausible(log, effect.at, i));
-    }
+    d.lower.push_back(p.lower);
+    d.upper.push_back(p.upper);
   }
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c));

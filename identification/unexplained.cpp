@@ -23,37 +23,13 @@ using Eigen::VectorXd;
 constexpr int kHats = 6;
 constexpr int kFourier = 60;
 
-/// The value that more rows hold than lie between two knots (a lever at rest), if there is one.
-std::optional<double> resting_value(const VectorXd& x) {
-  VectorXd sorted = x;
-  std::sort(sorted.begin(), sorted.end());
-  const auto many = sorted.size() / kHats;
-  Index since = 0;
-  for (Index i = 1; i <= sorted.size(); ++i) {
-    if (i < sorted.size() && sorted[i] == sorted[since]) continue;
-    if (i - since > many) return sorted[since];
-    since = i;
-  }
-  return {};
-}
-
-/// Hat functions between quantiles, so that each holds the same number of rows. Of a signal that rests, the quantiles
-/// are those of the rows where it does not: at a lever that rests most of the time they would all be zero, and what
-/// bends over its travel would be seen by nobody.
+/// Hat functions between quantiles, so that each holds the same number of rows.
 MatrixXd hats(const VectorXd& x) {
   std::vector<double> knots;
-  const std::optional<double> rest = resting_value(x);
-  VectorXd moved = x;
-  if (rest) {
-    const auto end = std::remove(moved.begin(), moved.end(), *rest);
-    moved.conservativeResize(end - moved.begin());
-    knots.push_back(*rest);
+  for (int k = 0; k < kHats; ++k) {
+    const double v = quantile(x, 0.01 + 0.98 * k / (kHats - 1));
+    if (knots.empty() || v > knots.back() + 1e-9 * (1.0 + std::abs(v))) knots.push_back(v);
   }
-  for (int k = 0; k < kHats && moved.size() > 0; ++k)
-    knots.push_back(quantile(moved, 0.01 + 0.98 * k / (kHats - 1)));
-  std::sort(knots.begin(), knots.end());
-  const auto apart = [](double a, double b) { return b <= a + 1e-9 * (1.0 + std::abs(b)); };
-  knots.erase(std::unique(knots.begin(), knots.end(), apart), knots.end());
   const auto m = static_cast<Index>(knots.size());
   if (m < 2) return MatrixXd(x.size(), 0);
   MatrixXd h = MatrixXd::Zero(x.size(), m);

@@ -68,10 +68,6 @@ std::vector<int> Effect::places(const Machine& machine) const {
   return all;
 }
 
-double Effect::largest_plausible(const MachineSeries&, int, std::size_t index) const {
-  return info().parameters[index].upper;
-}
-
 std::vector<double> Effect::grid(const MachineSeries&, int, int shape_index) const {
   int k = 0;
   for (const EffectParameter& parameter : info().parameters) {

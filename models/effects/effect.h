@@ -145,9 +145,6 @@ class Effect {
   /// default is the parameter's own grid; limits and thresholds depend on what the log reaches. Empty: the log
   /// lacks what the effect needs.
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
-  /// Largest plausible value of the linear parameter at `index` of info().parameters on this log [SI]: never beyond the
-  /// parameter's own bound, which is the default; how much is too much may depend on the machine and its loads.
-  virtual double largest_plausible(const MachineSeries& log, int at, std::size_t index) const;
   /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
 };

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -39,33 +38,6 @@ std::vector<double> plain_values(const std::vector<Jet>& q) {
   values.reserve(q.size());
   for (const Jet& x : q) values.push_back(x.value);
   return values;
-}
-
-/// A link that sags by more than this under its largest load is no steel boom.
-constexpr double kMostSag = 5.0 * units::kDegree;
-
-/// Largest static torque [N m] of the first luffing joint and of the turning joints beyond it on a log, at least one.
-std::array<double, 2> largest_torque(const MachineSeries& log) {
-  const Machine& machine = *log.machine;
-  const int first = first_luffing_joint(machine);
-  std::array<double, 2> largest{1.0, 1.0};
-  StaticForce statics(machine);
-  Eigen::VectorXd q(machine.joint_count());
-  for (Eigen::Index k = 0; k < log.samples(); ++k) {
-    q = log.q.row(k);
-    if (!q.allFinite() || !std::isfinite(log.payload[k])) continue;
-    try {
-      statics.update(q.data(), log.payload[k], 0);
-    } catch (const std::domain_error&) {
-      continue;  // a four-bar that cannot close
-    }
-    for (int j = first; j < machine.joint_count(); ++j) {
-      if (machine.joints[static_cast<std::size_t>(j)].type != JointType::kRevolute) continue;
-      double& most = largest[j == first ? 0 : 1];
-      most = std::max(most, std::abs(statics.torque()[j]));
-    }
-  }
-  return largest;
 }
 
 /// Each joint that turns gives way by kappa times its static torque: F = tau(q') / (dx/dq)(q'') with
@@ -171,15 +143,30 @@ class StructuralFlex final : public Effect {
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kForce) return false;
     const Machine& machine = *log.machine;
+    const int first = first_luffing_joint(machine);
     columns.setConstant(log.samples(), 2, std::numeric_limits<double>::quiet_NaN());
     // a chord over about one degree of sag, so that the size that matters is met
-    const std::array<double, 2> largest = largest_torque(log);
+    double largest[2] = {1.0, 1.0};
     StaticForce statics(machine);
     Eigen::VectorXd q(machine.joint_count());
     const auto usable = [&](Eigen::Index k) {
       q = log.q.row(k);
       return q.allFinite() && std::isfinite(log.payload[k]);
     };
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      if (!usable(k)) continue;
+      try {
+        statics.update(q.data(), log.payload[k], 0);
+      } catch (const std::domain_error&) {
+        continue;  // a four-bar that cannot close
+      }
+      for (int j = first; j < machine.joint_count(); ++j) {
+        const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
+        if (joint.type != JointType::kRevolute) continue;
+        double& most = largest[j == first ? 0 : 1];
+        most = std::max(most, std::abs(statics.torque()[j]));
+      }
+    }
     Instant<double> instant = make_instant(machine);
     std::vector<double> out(machine.cylinders.size());
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
@@ -187,8 +174,7 @@ class StructuralFlex final : public Effect {
       fill_instant(log, k, instant);
       try {
         for (int c = 0; c < 2; ++c) {
-          const auto side = static_cast<std::size_t>(c);
-          const double kappa = units::kDegree / largest[side];
+          const double kappa = units::kDegree / largest[c];
           const double p[] = {c == 0 ? kappa : 0.0, c == 1 ? kappa : 0.0, shape[0]};
           std::fill(out.begin(), out.end(), 0.0);
           add_bent<double>(statics, instant, p, out);
@@ -199,10 +185,6 @@ class StructuralFlex final : public Effect {
       }
     }
     return true;
-  }
-  double largest_plausible(const MachineSeries& log, int, std::size_t index) const override {
-    const double bound = info().parameters[index].upper;
-    return index < 2 ? std::min(bound, kMostSag / largest_torque(log)[index]) : bound;
   }
 };
 

@@ -154,21 +154,6 @@ TEST(Leftovers, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("late")));
 }
 
-TEST(Leftovers, ABendOverTheTravelOfALeverThatMostlyRestsIsFound) {
-  // a progressive spool: what is left of it by straight gains has no mean and no slope over the lever's travel
-  Left left(26);
-  const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
-  const VectorXd& u = left.evidence.series[0].cylinders[0].command;
-  ASSERT_GT((u.array() == 0.0).count(), u.size() / 2);
-  double u2 = 0.0, u4 = 0.0;
-  for (const double v : u) u2 += v * v, u4 += v * v * v * v;
-  left.add(c, 15.0, [&](Index k) { return u[k] * u[k] * u[k] - u4 / u2 * u[k]; });
-  const std::vector<Leftover> found = find_leftovers(left.evidence, left.fit);
-  ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found[0].channel, c);
-  EXPECT_EQ(found[0].depends_on.front(), "u_" + model().machine.cylinders[0].name);
-}
-
 TEST(Leftovers, ALearnedProcessOwnInputsAreNoRiddle) {
   // smooth laws of a cylinder's own flow are what its pressure process learns
   Left left(23);

@@ -6,7 +6,6 @@
 #include "models/effects/effect_text.h"
 #include "models/error.h"
 #include "models/inertial_torque.h"
-#include "models/units.h"
 #include "tests/models/effects_support.h"
 
 namespace sparflow {
@@ -158,24 +157,6 @@ TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
     const double scale = 1e-9 * (1.0 + std::abs(force[i]));  // the same numbers in another order
     EXPECT_NEAR(bends[i], torque[i] / s.rate[k] - s.static_force[k], scale);
     EXPECT_NEAR(gives_way[i], force[i] - s.static_force[k], scale);
-  }
-}
-
-TEST(StructuralFlex, NoBoomSagsByMoreThanFiveDegrees) {
-  const Machine machine = test_support::loader_crane();
-  const Effect& e = effect("structural_flex");
-  for (const double payload : {300.0, 3000.0}) {
-    const MachineSeries log = swinging_log(machine, payload);
-    double most[2] = {0.0, 0.0};
-    for (Index k = 0; k < log.samples(); ++k) {
-      const VectorXd torque = static_torque<double>(machine, log.q.row(k).transpose(), payload);
-      most[0] = std::max(most[0], std::abs(torque[0]));
-      most[1] = std::max(most[1], std::abs(torque[1]));  // the extension does not turn
-    }
-    for (const std::size_t c : {0, 1}) {
-      EXPECT_NEAR(e.largest_plausible(log, -1, c) * most[c], 5.0 * units::kDegree, 1e-9);
-    }
-    EXPECT_EQ(e.largest_plausible(log, -1, 2), 1.0) << "the lever keeps its own bound";
   }
 }
 

@@ -125,8 +125,8 @@ TEST_F(PumpEffects, ColdOilCostsMoreAndTheReferenceTemperatureNothing) {
   const std::vector<double> p = {0.03 * 4 * kBar, 0.03 * 6 * kBar, 0.03};
   const double excess = std::exp(0.03 * 15.0) - 1.0;
   EXPECT_NEAR(demand("oil_temperature", s, p, -1)[0], 6 * kBar * excess * 0.1 * a / 1.2e-3, 1e-6);
-  EXPECT_NEAR(pressure("oil_temperature", s, p)[0],
-              b / a * 4 * kBar * excess * 0.1 * b / (1.2e-3 * b / a), 1e-6);
+  EXPECT_NEAR(rise("oil_temperature", s, p)[0], 4 * kBar * excess * 0.1 * b / (1.2e-3 * b / a),
+              1e-6);
   s.oil = 40.0;
   EXPECT_EQ(demand("oil_temperature", s, p, -1)[0], 0.0);
   log.oil.resize(0);
