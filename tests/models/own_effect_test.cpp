@@ -71,6 +71,26 @@ TEST(OwnEffect, IsInTheCatalogueWithItsPlaces) {
   EXPECT_THROW(add_user_effect(std::make_unique<BalanceSpring>()), InputError);
 }
 
+TEST(EffectKey, ANearWordOrABeginningIsSuggested) {
+  const Machine machine = test_support::loader_crane();
+  const auto suggested = [&](const std::string& key) {
+    try {
+      parse_effect(key, machine);
+    } catch (const InputError& error) {
+      const std::string text = error.what();
+      const std::size_t at = text.find("did you mean '");
+      if (at == std::string::npos) return std::string();
+      const std::size_t from = at + 14;
+      return text.substr(from, text.find('\'', from) - from);
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(suggested("coulomb_fricton:boom"), "coulomb_friction");
+  EXPECT_EQ(suggested("coulomb:boom"), "coulomb_friction");
+  EXPECT_EQ(suggested("unmodelled"), "unmodelled_mass");
+  EXPECT_EQ(suggested("gremlins"), "");
+}
+
 TEST(OwnEffect, ActsInTheModel) {
   CraneModel model = CraneModel::untrained(test_support::loader_crane());
   const int n = model.machine.joint_count();
