@@ -73,39 +73,39 @@ void demand(const CraneModel& model, const MachineSignals& signals, std::size_t 
   }
 }
 
-VectorXd static_forces(const Machine& machine, const MachineSeries& log, int cylinder) {
+/// Calls visit(sample, statics) wherever pose and payload are known and every four-bar closes.
+template <class Visit>
+void visit_statics(const Machine& machine, const MachineSeries& log, int order,
+                   const Visit& visit) {
   StaticForce statics(machine);
-  VectorXd force = VectorXd::Constant(log.samples(), kNaN), q(machine.joint_count());
+  VectorXd q(machine.joint_count());
   for (Index k = 0; k < log.samples(); ++k) {
     q = log.q.row(k);
     if (!q.allFinite() || !std::isfinite(log.payload[k])) continue;
     try {
-      statics.update(q.data(), log.payload[k], 0);
+      statics.update(q.data(), log.payload[k], order);
     } catch (const std::domain_error&) {
       continue;  // a four-bar that cannot close
     }
-    force[k] = statics.force()[cylinder];
+    visit(k, statics);
   }
+}
+
+VectorXd static_forces(const Machine& machine, const MachineSeries& log, int cylinder) {
+  VectorXd force = VectorXd::Constant(log.samples(), kNaN);
+  visit_statics(machine, log, 0,
+                [&](Index k, const StaticForce& statics) { force[k] = statics.force()[cylinder]; });
   return force;
 }
 
 /// What an error of one joint's position does to every cylinder's static force.
 void set_static_slopes(const Machine& machine, MachineSeries& log) {
-  StaticForce statics(machine);
-  VectorXd q(machine.joint_count());
   for (CylinderSeries& c : log.cylinders)
     c.static_slope = Eigen::MatrixXd::Constant(log.samples(), machine.joint_count(), kNaN);
-  for (Index k = 0; k < log.samples(); ++k) {
-    q = log.q.row(k);
-    if (!q.allFinite() || !std::isfinite(log.payload[k])) continue;
-    try {
-      statics.update(q.data(), log.payload[k], 1);
-    } catch (const std::domain_error&) {
-      continue;  // a four-bar that cannot close
-    }
+  visit_statics(machine, log, 1, [&](Index k, const StaticForce& statics) {
     for (std::size_t i = 0; i < log.cylinders.size(); ++i)
       log.cylinders[i].static_slope.row(k) = statics.force_jacobian().row(static_cast<Index>(i));
-  }
+  });
 }
 
 }  // namespace
