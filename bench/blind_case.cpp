@@ -122,6 +122,10 @@ Crane prepare(const BlindCase& asked) {
   std::string shown;
   const CaseRequest request = draw_case(asked, shown);
   const GeneratedCase logs = simulator::generate_case(request);
+  if (!asked.folder.empty()) {
+    simulator::write_case(request, logs,
+                          fmt::format("{}/{}_{}", asked.folder, asked.row, asked.seed));
+  }
   const Machine& machine = request.log.machine;
   Crane crane;
   crane.shown = std::move(shown);

@@ -22,6 +22,8 @@ struct BlindCase {
       leave_out;  ///< columns the logs do not have: "rod", "payload", "commands", "oil", "pump"
   std::string judge = "ours";  ///< ours, bic, gp, correlation (bench/simple_ways.h)
   bool extend = true;          ///< also add what was named and judge it on the test log
+  std::string
+      folder;  ///< where the case's files are kept (row_seed/train.csv ...); empty = nowhere
 };
 
 /// What the search found, with what spoke for it.

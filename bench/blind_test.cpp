@@ -126,6 +126,7 @@ int run(int argc, char** argv) {
       .one_of({"rod", "payload", "commands", "oil", "pump"});
   app.add("--jobs", options.jobs, "runs at the same time").range(1, 64);
   app.add("--json", options.json, "all runs and the table as JSON");
+  app.add("--write", options.how.folder, "keep every case's logs and machine in this folder");
   bool no_extend = false;
   app.flag("--no-extend", no_extend, "diagnose only: quicker, without the test log's rows");
   app.flag("--no-time", options.no_time, "without timing a diagnosis alone");

@@ -81,6 +81,20 @@ VectorXd local_noise(const NoiseProfile& noise, Index samples) {
   return out;
 }
 
+/// Whether a step is one of three or more in a row, the same way and of like size: a chamber that fills, no sensor.
+bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k) {
+  constexpr double kLike = 0.5;
+  const double size = x[k + 1] - x[k];
+  int in_a_row = 1;
+  for (const int way : {-1, 1}) {
+    for (Index i = k + way; i >= run.begin && i + 1 < run.end; i += way) {
+      if (!((x[i + 1] - x[i]) / size > kLike)) break;
+      if (++in_a_row == 3) return true;
+    }
+  }
+  return false;
+}
+
 /// Steps of one sample that are large for the channel and that nothing else explains.
 std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
@@ -97,7 +111,7 @@ std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t cha
           1.5 * c.fastest * (context.log.time[k + 1] - context.log.time[k]);
       if (!(std::abs(size) > limit)) continue;
       // no load and no valve moves a boom by degrees within a sample: positions need no witness
-      if (!position && witnesses.explain(k, size)) continue;
+      if (!position && (is_on_a_ramp(x, run, k) || witnesses.explain(k, size))) continue;
       out.push_back({k, size});
     }
   }

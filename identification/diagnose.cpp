@@ -225,13 +225,16 @@ bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
   });
 }
 
-/// Whether an effect hardly lowers an error that is far above the sensors' noise where the effect shows best: what makes
-/// that error is not known, and some of it looks like the effect.
-bool is_a_trifle(const DiagnosedEffect& e) {
+/// Whether all that was found explains less than half of an error that is far above the sensors' noise, where the
+/// effect shows best: what makes that error is not known, and some of it looks like the effect.
+bool is_a_trifle(const Diagnosis& d, const DiagnosedEffect& e) {
   constexpr double kFarAbove = 5.0;  // times the sensors' noise
-  constexpr double kHardly = 1.05;   // RMS without / with it: a tenth of the squared error
+  constexpr double kHalf = 0.5;      // of the squared error beyond that noise
   const ChannelGain& g = e.channels.front();
-  return g.rmse_after > kFarAbove * g.noise_floor && g.rmse_before < kHardly * g.rmse_after;
+  if (!(g.rmse_after > kFarAbove * g.noise_floor)) return false;
+  const double before = suspect_rms(d.evidence, g.channel, d.search.null.residual[g.channel]);
+  const double noise = g.noise_floor * g.noise_floor;
+  return before * before - g.rmse_after * g.rmse_after < kHalf * (before * before - noise);
 }
 
 /// An error without a name and without signals: how large it is and where.
@@ -398,7 +401,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   const bool unknown =
       (!riddles.empty() || !d.effects.empty()) &&
       std::all_of(d.effects.begin(), d.effects.end(), [&](const DiagnosedEffect& e) {
-        return is_doubtful(d.evidence, e, riddles) || is_a_trifle(e);
+        return is_doubtful(d.evidence, e, riddles) || is_a_trifle(d, e);
       });
   if (unknown && !d.unexplained) d.unexplained = describe_trifle(d.evidence, d.effects.front());
   d.verdict = unknown              ? Verdict::kUnknown

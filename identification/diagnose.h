@@ -93,7 +93,7 @@ std::string plain_number(double value, int digits);
 
 /// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
 /// cause is not in the catalogue.
-inline constexpr double kLargestLeftoverShare = 0.1;
+inline constexpr double kLargestLeftoverShare = 0.05;
 
 struct DiagnoseOptions {
   SignalOptions signals;

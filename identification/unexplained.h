@@ -5,6 +5,7 @@
 ///             them together (A. Rahimi, B. Recht (2007), NIPS 20), cross-validated by whole blocks of motion
 ///   driven    in forces the sign of the speed, in speeds the command, times hat functions of every signal: what acts
 ///             against the motion or in proportion to the opening by an amount that depends on something
+///   event     one place in time where a force or a speed is far off and nowhere else
 ///   periodic  a line in its periodogram far above its surroundings (N. R. Lomb (1976), Astrophys. Space Sci. 39)
 #include <optional>
 #include <string>
@@ -29,6 +30,7 @@ struct LeftoverOptions {
   /// The same of what acts with the motion or the opening: a valve's or a seal's own small irregularities do that too.
   double least_share_driven = 0.3;
   double least_size = 0.35;   ///< RMS of the explained part / noise of the rest
+  double least_event = 4.0;   ///< times the usual second, in one place alone
   double deepest_dip = -0.3;  ///< of the autocorrelation of what is fast, below which it swings
   int folds = 5;
 };

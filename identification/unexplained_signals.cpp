@@ -16,6 +16,24 @@ using Eigen::VectorXd;
 namespace {
 /// [s] Time constants of what answers the pump's power late. A first-order answer between them is nearly a sum of both.
 constexpr double kLate[] = {0.3, 1.5};
+
+/// [-] of full command. A spool that sticks or a lever with slack follows the command behind a play; the residual then
+/// depends on which side of it the command came from, and on nothing measured.
+constexpr double kPlays[] = {0.05, 0.1, 0.2};
+
+/// Where in its play the command stands, -1 .. 1; centred by its springs where there is no command.
+VectorXd side_of_play(const VectorXd& command, Index samples, double width) {
+  VectorXd side = VectorXd::Zero(samples);
+  double spool = 0.0;
+  for (Index k = 0; k < std::min(samples, command.size()); ++k) {
+    if (!std::isfinite(command[k])) continue;
+    spool = command[k] == 0.0
+                ? 0.0
+                : std::clamp(spool, command[k] - 0.5 * width, command[k] + 0.5 * width);
+    side[k] = (command[k] - spool) / (0.5 * width);
+  }
+  return side;
+}
 }  // namespace
 
 std::vector<SignalColumn> channel_signals(const Evidence& evidence,
@@ -124,6 +142,18 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
       for (std::size_t l = 0; l < power.size(); ++l)
         lagged.push_back(first_order_lag(evidence.series[l], power[l], late));
       add_power(fmt::format("{} {:.1f} s late", name, late), lagged);
+    }
+  }
+  if (channel.kind == EvidenceKind::kFlow) {
+    for (const double width : kPlays) {
+      std::vector<VectorXd> side;
+      side.reserve(evidence.series.size());
+      for (const MachineSeries& s : evidence.series)
+        side.push_back(side_of_play(s.cylinders[own].command, s.samples(), width));
+      add(fmt::format("u_{} behind a play of {:.0f} %", machine.cylinders[own].name, 100.0 * width),
+          [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) {
+            return side[static_cast<std::size_t>(&s - evidence.series.data())][k];
+          });
     }
   }
   if (channel.kind == EvidenceKind::kFlow && machine.pump_of_cylinder(channel.index) >= 0) {

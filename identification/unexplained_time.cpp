@@ -134,4 +134,54 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
   return best;
 }
 
+Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
+                      const VectorXd& residual) {
+  constexpr double kSecond = 1.0;
+  constexpr std::size_t kFewest = 20;  // seconds of motion, to know what is usual
+  struct Second {
+    std::size_t block;
+    Index first, last;
+    double power;
+  };
+  const auto length = std::max<Index>(
+      2, static_cast<Index>(std::lround(kSecond / (evidence.stride * evidence.series[0].step))));
+  std::vector<Second> seconds;
+  double total = 0.0, rows = 0.0;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
+    const NoiseBlock& block = channel.blocks[b];
+    total += residual.segment(block.first, block.last - block.first).squaredNorm();
+    rows += static_cast<double>(block.last - block.first);
+    for (Index i = block.first; i + length <= block.last; i += length) {
+      const double power = residual.segment(i, length).squaredNorm() / static_cast<double>(length);
+      seconds.push_back({b, i, i + length, power});
+    }
+  }
+  if (seconds.size() < kFewest) return {};
+  std::vector<double> powers;
+  powers.reserve(seconds.size());
+  for (const Second& s : seconds) powers.push_back(s.power);
+  const double noise = std::isfinite(channel.noise_floor) ? channel.noise_floor : 0.0;
+  const double usual = std::max(
+      {std::sqrt(median(Eigen::Map<VectorXd>(powers.data(), static_cast<Index>(powers.size())))),
+       noise, 1e-300});
+  auto from = std::max_element(seconds.begin(), seconds.end(),
+                               [](const Second& a, const Second& b) { return a.power < b.power; });
+  Event event;
+  event.times = std::sqrt(from->power) / usual;
+  // the seconds beside it that are out of the ordinary, too
+  const auto out = [&](const Second& s) { return s.power > 4.0 * usual * usual; };
+  auto to = from;
+  while (from != seconds.begin() && (from - 1)->block == from->block && out(*(from - 1))) --from;
+  while (to + 1 != seconds.end() && (to + 1)->block == to->block && out(*(to + 1))) ++to;
+  const double inside = residual.segment(from->first, to->last - from->first).squaredNorm();
+  event.rms = std::sqrt(inside / rows);
+  event.rest = std::sqrt(std::max(0.0, total - inside) / rows);
+  event.log = static_cast<std::size_t>(channel.log[from->block]);
+  const VectorXd& time = evidence.series[event.log].time;
+  event.from = time[channel.sample[static_cast<std::size_t>(from->first)]];
+  event.to = time[channel.sample[static_cast<std::size_t>(to->last - 1)]];
+  return event;
+}
+
 }  // namespace sparflow

@@ -25,4 +25,18 @@ struct Line {
 Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
                     const Eigen::VectorXd& residual);
 
+/// A residual that is far larger in one place than it is everywhere else: something happened there that other motions
+/// do not show, and that no law learned from them can explain.
+struct Event {
+  double times = 0.0;  ///< its RMS over that of the usual second, at least the sensors' noise
+  double rms = 0.0;    ///< [SI] over the whole log, of its own rows
+  double rest = 0.0;   ///< [SI] RMS of all other rows
+  double from = 0.0, to = 0.0;  ///< [s] in its log
+  std::size_t log = 0;
+};
+
+/// The stretch of a motion (a second and what goes on beside it) in which the residual is largest; times = 0: too few.
+Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
+                      const Eigen::VectorXd& residual);
+
 }  // namespace sparflow

@@ -23,7 +23,7 @@ class Deadband final : public HiddenLaw {
     if (law_ == 1) open = std::max(0.0, u - gap) / (1.0 - gap);
     if (law_ == 2) {  // smooth knee, a fifth of the band wide
       const double w = 0.1 * gap;
-      open = w * std::log1p(std::exp(std::min(40.0, (u - gap) / w)));
+      open += w * std::log1p(std::exp(-std::abs(u - gap) / w));
       if (open < kClosed) open = 0.0;
     }
     c.opening = sign_of(c.opening) * open;
