@@ -247,3 +247,88 @@ std::optional<Leftover> event_of(const Evidence& evidence, std::size_t index,
   const EvidenceChannel& channel = evidence.channels[index];
   if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow) return {};
   const Event event = strongest_event(evidence, channel, residual);
+  if (event.times < options.least_event || event.rms < smallest_of_interest(channel)) return {};
+  Leftover left;
+  left.channel = index;
+  left.rms = event.rms;
+  left.noise = event.rest;
+  left.explained = event.rms * event.rms / (event.rms * event.rms + event.rest * event.rest);
+  left.depends_on.push_back(fmt::format(
+      "time: they are {:.0f} times the usual from {:.1f} to {:.1f} s{}", event.times, event.from,
+      event.to, evidence.suspects > 1 ? fmt::format(" of log {}", event.log + 1) : ""));
+  return left;
+}
+
+std::optional<Leftover> leftover_of(const Evidence& evidence, std::size_t index,
+                                    const VectorXd& whole, const LeftoverOptions& options) {
+  const EvidenceChannel& channel = evidence.channels[index];
+  const std::vector<Index> rows = suspect_rows(evidence, channel);
+  if (rows.size() < 80 || whole.size() == 0) return {};
+  const VectorXd y = to_explain(evidence, channel, whole, rows);
+  const std::vector<int> all_folds = folds_of(channel, options.folds);
+  std::vector<int> fold;
+  fold.reserve(rows.size());
+  for (const Index i : rows) fold.push_back(all_folds[static_cast<std::size_t>(i)]);
+  const std::vector<SignalColumn> signals = channel_signals(evidence, channel);
+  std::vector<VectorXd> values;
+  std::vector<MatrixXd> hat;
+  for (const SignalColumn& s : signals) {
+    values.emplace_back(s.values(rows));
+    hat.push_back(hats(values.back()));
+  }
+  Look look = additive_look(values, hat, y, fold, options.folds);
+  const VectorXd driver = driver_of(evidence, channel, rows);
+  if (driver.size() > 0 && driver.squaredNorm() > 0.0) {
+    Look driven = driven_look(driver, hat, y, fold, options.folds);
+    if (driven.ridge.explained > std::max(look.ridge.explained, options.least_share_driven))
+      look = std::move(driven);
+  }
+  Leftover left;
+  left.channel = index;
+  const double variance = y.squaredNorm() / static_cast<double>(y.size());
+  const Line line = strongest_line(evidence, channel, whole);
+  left.explained = std::max(look.ridge.explained, line.share);
+  left.rms = std::sqrt(std::max(0.0, left.explained) * variance);
+  left.noise = std::sqrt(std::max(0.0, 1.0 - left.explained) * variance);
+  const Swing swing = strongest_swing(evidence, channel);
+  if (swing.dip < options.deepest_dip && left.explained < options.least_share) {
+    left.explained = swing.rms * swing.rms / (swing.rms * swing.rms + swing.noise * swing.noise);
+    left.rms = swing.rms;
+    left.noise = swing.noise;
+    left.frequency = swing.frequency;
+    left.depends_on.push_back(fmt::format("time, a swing near {:.1f} Hz", swing.frequency));
+    return left;
+  }
+  if (left.rms < smallest_of_interest(channel) || left.explained < options.least_share ||
+      left.rms < options.least_size * left.noise) {
+    return event_of(evidence, index, whole, options);
+  }
+  if (line.share > 0.5 * left.explained) {
+    left.frequency = line.frequency;
+    left.depends_on.push_back(fmt::format("time, {:.2f} Hz", line.frequency));
+  }
+  for (std::string& name : strongest(look, signals, y, fold, options.folds)) {
+    if (left.depends_on.empty() || name != "several signals together")
+      left.depends_on.push_back(std::move(name));
+  }
+  return left;
+}
+
+}  // namespace
+
+std::vector<Leftover> find_leftovers(const Evidence& evidence, const EffectFit& fit,
+                                     const LeftoverOptions& options) {
+  const std::size_t channels = evidence.channels.size();
+  std::vector<std::optional<Leftover>> each(channels);
+  parallel(channels,
+           [&](std::size_t c) { each[c] = leftover_of(evidence, c, fit.residual[c], options); });
+  std::vector<Leftover> found;
+  for (std::optional<Leftover>& left : each) {
+    if (left) found.push_back(std::move(*left));
+  }
+  std::sort(found.begin(), found.end(),
+            [](const Leftover& a, const Leftover& b) { return a.rms / a.noise > b.rms / b.noise; });
+  return found;
+}
+
+}  // namespace sparflow
