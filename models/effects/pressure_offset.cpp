@@ -80,7 +80,7 @@ class PressureOffset final : public Effect {
       const int side = supply ? supply_side(kind) : return_side(kind);
       value = (side > 0) == supply ? a : b;
     }
-    if (value == 0.0) return false;
+    // zero in the chamber whose sensor is right: what the other's error does there it does by way of the force
     columns.setConstant(log.samples(), 1, value);
     return true;
   }

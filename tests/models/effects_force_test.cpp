@@ -435,6 +435,7 @@ TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
     EXPECT_LT(by_one, 0.01 * left) << i;  // to first order in an angle of some hundredths
     EXPECT_GT(by_all, 0.1 * left) << i;
     MatrixXd speed;
+    log.cylinders[static_cast<std::size_t>(i)].command.setOnes(log.samples());
     const bool own = machine.cylinders[static_cast<std::size_t>(i)].joint == joint;
     EXPECT_EQ(e.columns(log, EvidenceKind::kFlow, i, -1, one, speed), own);
   }
@@ -451,7 +452,7 @@ TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
   c.command.setZero(log.samples());
   c.command.tail(250).setConstant(0.5);
   c.speed = 0.1 * c.command;
-  c.speed.segment(250, 5).setZero();  // five samples late
+  c.speed.segment(log.samples() - 250, 5).setZero();  // five samples late
   MatrixXd column;
   ASSERT_TRUE(effect("sensor_delay")
                   .columns(log, EvidenceKind::kFlow, 0, -1, std::vector<double>{0.1, 1.0}, column));
