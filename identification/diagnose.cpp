@@ -110,6 +110,13 @@ void keep_what_is_no_physics(const Diagnosis& d, const std::vector<std::size_t>&
   bad = std::move(kept);
 }
 
+/// Difference in evidence below which two effects are the same on these logs: what a law's own form is wrong by makes
+/// that share, squared, of its gain. [nats]
+double same_within(const FoundEffect& found, double same_nats) {
+  const double form = form_share(*found.design.effect.effect);
+  return std::max(same_nats, form * form * found.gain);
+}
+
 DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOptions& options) {
   const FoundEffect& f = d.search.found[index];
   const Machine& machine = *d.evidence.series[0].machine;
@@ -132,9 +139,10 @@ DiagnosedEffect describe(const Diagnosis& d, std::size_t index, const SearchOpti
   e.held_out_error = f.held_out_error;
   e.absorbed = f.absorbed;
   double odds = 0.0;
+  const double same = same_within(f, options.same_nats);
   for (const auto& [rival, worse] : f.alternatives) {
-    odds += std::exp(-std::max(0.0, worse));
-    if (worse < options.same_nats)
+    odds += std::exp(-std::max(0.0, worse) * options.same_nats / same);
+    if (worse < same)
       e.rivals.emplace_back(effect_key(rival.effect->info(), machine, rival.at), worse);
   }
   e.probability = (1.0 - f.p_value) / (1.0 + odds);
@@ -325,7 +333,7 @@ void settle_values(const CraneModel& model, const std::vector<MachineSignals>& s
 std::vector<EffectAt> rivals_of(const FoundEffect& found, double same_nats) {
   std::vector<EffectAt> rivals;
   for (const auto& [rival, worse] : found.alternatives) {
-    if (worse < same_nats) rivals.push_back(rival);
+    if (worse < same_within(found, same_nats)) rivals.push_back(rival);
   }
   return rivals;
 }
@@ -386,7 +394,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
     const double share = leftover_share(d, l);
     if (touched) d.leftover_share = std::max(d.leftover_share, share);
-    if (share < kLargestLeftoverShare) continue;
+    if (share < (l.event ? kLargestEventShare : kLargestLeftoverShare)) continue;
     if (!d.unexplained || (touched && !in_touched)) d.unexplained = describe(d.evidence, l);
     in_touched = in_touched || touched;
     riddles.push_back(l);

@@ -94,6 +94,8 @@ std::string plain_number(double value, int digits);
 /// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
 /// cause is not in the catalogue.
 inline constexpr double kLargestLeftoverShare = 0.05;
+/// The same of an event beside an effect: what the effect's form leaves is largest where it acts most, too.
+inline constexpr double kLargestEventShare = 0.25;
 
 struct DiagnoseOptions {
   SignalOptions signals;

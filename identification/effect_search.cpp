@@ -138,7 +138,7 @@ class Search {
   /// plausible.
   void whole_share(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
     constexpr double kSame = 3.0, kSameShare = 0.05;  // [nats]; of the gain
-    constexpr double kFarthest = 2.0;                 // times
+    constexpr double kReaches[] = {1.05, 1.2, 2.0};  // times; a limit beyond all flows says nothing
     constexpr int kHalvings = 9;
     EffectDesign& design = found.back().design;
     const EffectParameter& share = design.effect.effect->info().parameters.front();
@@ -160,8 +160,10 @@ class Search {
     };
     const double at_one = share_at(1.0);
     double a = 1.0, b = 1.0;  // the share crosses one between these factors
-    for (const double factor : {1.0 / kFarthest, kFarthest}) {
-      if (b == 1.0 && (share_at(factor) - 1.0) * (at_one - 1.0) < 0.0) b = factor;
+    for (const double reach : kReaches) {
+      for (const double factor : {1.0 / reach, reach}) {
+        if (b == 1.0 && (share_at(factor) - 1.0) * (at_one - 1.0) < 0.0) b = factor;
+      }
     }
     for (int k = 0; k < kHalvings && b != 1.0; ++k) {
       const double middle = std::sqrt(a * b);

@@ -250,6 +250,7 @@ std::optional<Leftover> event_of(const Evidence& evidence, std::size_t index,
   if (event.times < options.least_event || event.rms < smallest_of_interest(channel)) return {};
   Leftover left;
   left.channel = index;
+  left.event = true;
   left.rms = event.rms;
   left.noise = event.rest;
   left.explained = event.rms * event.rms / (event.rms * event.rms + event.rest * event.rest);

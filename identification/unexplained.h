@@ -23,6 +23,7 @@ struct Leftover {
   double noise = 0.0;                   ///< [SI] standard deviation of the rest
   std::vector<std::string> depends_on;  ///< signals, strongest first
   double frequency = 0.0;               ///< [Hz] of a periodic one, else 0
+  bool event = false;                   ///< in one place in time alone
 };
 
 struct LeftoverOptions {
