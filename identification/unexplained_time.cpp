@@ -174,6 +174,7 @@ Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
   auto to = from;
   while (from != seconds.begin() && (from - 1)->block == from->block && out(*(from - 1))) --from;
   while (to + 1 != seconds.end() && (to + 1)->block == to->block && out(*(to + 1))) ++to;
+  if (from == to) return {};  // a knock: an end stop, a lever thrown
   const double inside = residual.segment(from->first, to->last - from->first).squaredNorm();
   event.rms = std::sqrt(inside / rows);
   event.rest = std::sqrt(std::max(0.0, total - inside) / rows);

@@ -35,7 +35,8 @@ struct Event {
   std::size_t log = 0;
 };
 
-/// The stretch of a motion (a second and what goes on beside it) in which the residual is largest; times = 0: too few.
+/// The stretch of a motion (a second and what goes on beside it) in which the residual is largest; times = 0: none of two
+/// seconds, or too few to know what is usual.
 Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
                       const Eigen::VectorXd& residual);
 

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
-#include "models/effects/valve_flow.h"
 
 namespace sparflow {
 namespace {
@@ -92,12 +92,38 @@ class SensorDelay final : public Effect {
     if (kind != EvidenceKind::kFlow || !positions) return false;
     const int joint = log.machine->cylinders[static_cast<std::size_t>(index)].joint;
     if (alone >= 0 && joint != alone) return false;
-    columns = speed_lacking(log, index,
-                            [&](const Eigen::VectorXd& x) { return delayed(log, x, shape[0]); });
-    return columns.rows() > 0;
+    columns = c.speed - delayed(log, c.speed, shift);
+    if (c.command.size() > 0) keep_changes(log, c.command, shape[0], columns);
+    return true;
   }
 
  private:
+  /// While the command stays as it is there is nothing to be late with: the difference of two measured speeds is their
+  /// noise there, and noise in a regressor makes its share too small.
+  static void keep_changes(const MachineSeries& log, const Eigen::VectorXd& command, double delay,
+                           Eigen::MatrixXd& columns) {
+    constexpr double kSettled_s = 0.4;  // filters and accelerations reach that far
+    constexpr double kSame = 2e-3;      // of the full command: a logger's digits
+    for (const auto& [first, last] : log.runs) {
+      Eigen::Index since = first;  // the command has been `level` from here on
+      double level = command[first];
+      std::vector<std::pair<Eigen::Index, Eigen::Index>> constant;
+      for (Eigen::Index k = first; k <= last; ++k) {
+        if (k < last && std::abs(command[k] - level) <= kSame) continue;
+        constant.emplace_back(since, k);
+        since = k;
+        if (k < last) level = command[k];
+      }
+      for (const auto& [from, to] : constant) {
+        for (Eigen::Index k = from; k < to; ++k) {
+          const bool before = from == first || log.time[k] - log.time[from] > delay + kSettled_s;
+          const bool after = to == last || log.time[to - 1] - log.time[k] > kSettled_s;
+          if (before && after) columns(k, 0) = 0.0;
+        }
+      }
+    }
+  }
+
   /// To first order: an angle late by 0.2 s is wrong by some hundredths.
   static bool pose_late_in_one(const MachineSeries& log, const CylinderSeries& c,
                                Eigen::Index joint, double delay, Eigen::MatrixXd& columns) {

@@ -108,16 +108,4 @@ SectionFit fit_dead_bands(const MachineSeries& log, int cylinder) {
   return fit;
 }
 
-Eigen::VectorXd speed_lacking(const MachineSeries& log, int cylinder,
-                              const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late) {
-  const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
-  const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
-  if (command.size() == 0) return {};
-  // gains from the late command: from the command itself they would come out too small
-  const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
-  const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
-  const SectionFit fit = fit_gains(log, cylinder, late_extend + late_retract);
-  return fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
-}
-
 }  // namespace sparflow

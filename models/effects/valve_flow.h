@@ -1,8 +1,6 @@
 #pragma once
 /// What a log itself says about a valve section: rod speed against command, by plain least squares. The scale
 /// of the flow effects' columns; their parameters are then dimensionless or times.
-#include <functional>
-
 #include "models/effects/series.h"
 
 namespace sparflow {
@@ -24,12 +22,5 @@ SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::Vector
 
 /// Gains and dead bands: the dead band with the smallest sum of squares, by bracketing and golden section.
 SectionFit fit_dead_bands(const MachineSeries& log, int cylinder);
-
-/// What a valve adds to the speed when it follows its command late. The command is free of noise, measured speeds are
-/// not: as regressors these would make a delay's share too small.
-/// @param late the opening [samples] as the valve has it; inside a dead band that the model knows nothing can be late
-/// @return [samples] m/s, gains fitted behind `late`; empty without a command
-Eigen::VectorXd speed_lacking(const MachineSeries& log, int cylinder,
-                              const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late);
 
 }  // namespace sparflow

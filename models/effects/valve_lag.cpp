@@ -63,12 +63,22 @@ class ValveLag final : public Effect {
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;
-    columns = speed_lacking(log, at, [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    // inside a dead band that the model knows there is nothing to be late with
+    const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
+    if (command.size() == 0) return false;
+    const auto late = [&](const Eigen::VectorXd& x) {
       if (shape[1] > 0.75) return delayed(log, x, shape[0]);
       if (shape[1] < 0.25) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
-    });
-    return columns.rows() > 0;
+    };
+    // gains from the late command: from the command itself they would come out too small
+    const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
+    const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
+    const SectionFit fit = fit_gains(log, at, late_extend + late_retract);
+    columns =
+        fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
+    return true;
   }
 };
 
