@@ -139,6 +139,17 @@ TEST(BadData, JumpsThatComeBack) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("q_arm jumping"));
 }
 
+// A swinging load empties one chamber and fills the other, from the tank's pressure upwards by 10 bar a sample.
+TEST(BadData, AChamberThatFillsDoesNotJump) {
+  Log log = noisy_arm();
+  for (const Eigen::Index k : {700, 1300, 2200}) {
+    for (Eigen::Index i = 0; i < 8; ++i)
+      channel(log, "pB_arm").values[k + i] +=
+          static_cast<double>(std::min(i + 1, 8 - i)) * 10.0 * kBar;
+  }
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
+}
+
 TEST(BadData, APumpThatAnswersAMovingLeverDoesNotJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200})  // for 2 s, as when a valve leaves its dead band

@@ -161,11 +161,37 @@ TEST(Diagnose, ReturnBackPressure) {
 }
 
 TEST(Diagnose, DeadBand) {
-  const Answer a = alone({{"valve_deadband", "boom", 1.0, 0}});
+  for (const int law : {0, 2}) {  // a sharp knee and a smooth one
+    const Answer a = alone({{"valve_deadband", "boom", 1.0, law}});
+    EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
+    ASSERT_THAT(a.keys(), ElementsAre("valve_deadband:boom"));
+    EXPECT_LT(a.error("valve_deadband:boom", "u0_extend"), 0.1);
+    EXPECT_LT(a.error("valve_deadband:boom", "u0_retract"), 0.1);
+  }
+}
+
+// The rod side's sensor is wrong, so the force is: while extending the piston side's chamber seems to disagree with it,
+// and no valve on that side does that.
+TEST(Diagnose, AChambersZeroIsNoValveOnTheOtherSide) {
+  const Answer a = with_reference({{"pressure_offset", "jib", 1.0 / 3.0, 0}});
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
-  ASSERT_THAT(a.keys(), ElementsAre("valve_deadband:boom"));
-  EXPECT_LT(a.error("valve_deadband:boom", "u0_extend"), 0.1);
-  EXPECT_LT(a.error("valve_deadband:boom", "u0_retract"), 0.1);
+  ASSERT_THAT(a.keys(), ElementsAre("pressure_offset:jib"));
+  EXPECT_LT(a.error("pressure_offset:jib", "offset"), 0.1);
+}
+
+// The pump follows a spool that closes late: the error there is large, and hardly a late pump's.
+TEST(Diagnose, ALateValveIsNoLatePump) {
+  const Answer a = with_reference({{"valve_lag", "boom", 1.0, 0}});
+  EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
+  EXPECT_THAT(a.keys(), ElementsAre("valve_lag:boom"));
+}
+
+TEST(Diagnose, AStickingSpoolIsNotInTheCatalogue) {
+  for (const int law : {0, 1}) {
+    const Answer a = with_reference({{"spool_hysteresis", "boom", 1.0, law}});
+    EXPECT_EQ(a.diagnosis.verdict, Verdict::kUnknown) << a.diagnosis.table();
+    ASSERT_TRUE(a.diagnosis.unexplained.has_value());
+  }
 }
 
 TEST(Diagnose, APair) {

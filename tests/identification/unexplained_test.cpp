@@ -154,6 +154,57 @@ TEST(Leftovers, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("late")));
 }
 
+TEST(Leftovers, ASpoolBehindAPlayIsFoundThoughNothingMeasuredTellsIt) {
+  Left left(26);
+  const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
+  const VectorXd& u = left.evidence.series[0].cylinders[0].command;
+  const double width = 0.1;
+  VectorXd side = VectorXd::Zero(u.size());  // -1 .. 1: where in its play the spool stands
+  double spool = 0.0;
+  for (Index k = 0; k < u.size(); ++k) {
+    spool = u[k] == 0.0 ? 0.0 : std::clamp(spool, u[k] - 0.5 * width, u[k] + 0.5 * width);
+    side[k] = (u[k] - spool) / (0.5 * width);
+  }
+  left.add(c, 1.5, [&](Index k) { return -side[k]; });
+  const std::vector<Leftover> found = find_leftovers(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("behind a play of 10 %")));
+}
+
+TEST(Leftovers, AnEventOfOneMotionIsFoundWithItsTime) {
+  Left left(27);
+  const std::size_t c = left.channel(EvidenceKind::kForce, 0);
+  const EvidenceChannel& e = left.evidence.channels[c];
+  const VectorXd& time = left.evidence.series[0].time;
+  const double row_s = left.evidence.stride * left.evidence.series[0].step;
+  std::size_t longest = 0;
+  for (std::size_t b = 0; b < e.blocks.size(); ++b) {
+    if (e.blocks[b].last - e.blocks[b].first > e.blocks[longest].last - e.blocks[longest].first)
+      longest = b;
+  }
+  const double from = time[e.sample[static_cast<std::size_t>(e.blocks[longest].first)]];
+  ASSERT_GT(row_s * static_cast<double>(e.blocks[longest].last - e.blocks[longest].first), 4.0);
+  // below a thousandth of the largest force nobody cares, and less than the sensors' noise is none
+  const double noise = std::max(e.noise_floor, 2e-3 * e.largest_force) / e.unit.si;
+  // eight times the usual, to and fro as a load that swings: no signal goes along with it
+  const auto swings = [&](double seconds) {
+    Left one = left;
+    one.add(c, 8.0 * std::numbers::sqrt2 * noise, [&](Index k) {
+      const double t = time[k] - from;
+      return t > 0.0 && t < seconds ? std::sin(2.0 * std::numbers::pi * t / 1.3) : 0.0;
+    });
+    one.fit.residual[c] += (noise - 1.0) * left.fit.residual[c];
+    return find_leftovers(one.evidence, one.fit);
+  };
+  const std::vector<Leftover> found = swings(4.0);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_TRUE(found[0].event);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("times the usual from")));
+  for (const Leftover& l : swings(0.9)) EXPECT_FALSE(l.event) << "a knock";
+}
+
 TEST(Leftovers, ALearnedProcessOwnInputsAreNoRiddle) {
   // smooth laws of a cylinder's own flow are what its pressure process learns
   Left left(23);
