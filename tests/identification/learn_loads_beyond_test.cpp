@@ -22,7 +22,7 @@ class LearnLoadsBeyond : public ::testing::TestWithParam<int> {
   double supply() const { return side() > 0 ? cylinder_.area_piston() : cylinder_.area_rod(); }
   double other() const { return side() > 0 ? cylinder_.area_rod() : cylinder_.area_piston(); }
   double truth(double flow, double load) const {
-    const double line = 4 * kBarSeen + 8e12 * flow * flow;
+    const double line = 4 * kBarSeen + 1.5e12 * flow * flow;
     const double branch = (load + other() * line) / supply();
     return std::max({branch, 40 * kBarSeen + 0.2 * load / supply(), 2.5 * kBarSeen});
   }
