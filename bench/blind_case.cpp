@@ -141,6 +141,35 @@ Crane prepare(const BlindCase& asked) {
   return crane;
 }
 
+DiagnosedEffect named_effect(const EffectAt& e, const Machine& machine) {
+  DiagnosedEffect one;
+  one.effect = e;
+  one.id = e.effect->info().id;
+  const std::string key = effect_key(e.effect->info(), machine, e.at);
+  one.at = key.size() > one.id.size() ? key.substr(one.id.size() + 1) : "";
+  return one;
+}
+
+std::vector<EffectAt> true_effects(const Crane& crane) {
+  std::vector<EffectAt> out;
+  for (const EffectAt& e : candidates(crane.model.machine)) {
+    const std::string key = effect_key(e.effect->info(), crane.model.machine, e.at);
+    for (const HiddenTruth& t : crane.truth) {
+      if (key_of(t.id, t.at) == key) out.push_back(e);
+    }
+  }
+  return out;
+}
+
+/// Told what is hidden, nothing judged: what extending alone does.
+Diagnosis told_diagnosis(const Crane& crane) {
+  Diagnosis d;
+  for (const EffectAt& e : true_effects(crane))
+    d.effects.push_back(named_effect(e, crane.model.machine));
+  d.verdict = d.effects.empty() ? Verdict::kNone : Verdict::kMissing;
+  return d;
+}
+
 /// A simple way's answer in the form of a diagnosis.
 Diagnosis simple_diagnosis(const std::string& judge, const Crane& crane) {
   const RawEvidence evidence(crane.model, crane.train, crane.references);
@@ -150,11 +179,7 @@ Diagnosis simple_diagnosis(const std::string& judge, const Crane& crane) {
   d.verdict = answer.found.empty() ? Verdict::kNone : Verdict::kMissing;
   for (std::size_t k = 0; k < answer.found.size(); ++k) {
     const EffectAt& e = answer.found[k];
-    const std::string key = effect_key(e.effect->info(), crane.model.machine, e.at);
-    DiagnosedEffect one;
-    one.effect = e;
-    one.id = e.effect->info().id;
-    one.at = key.size() > one.id.size() ? key.substr(one.id.size() + 1) : "";
+    DiagnosedEffect one = named_effect(e, crane.model.machine);
     one.applied = {e.effect, e.at, answer.values[k], {}, {}};
     d.effects.push_back(one);
   }
@@ -170,6 +195,7 @@ void judge_parameters(const Diagnosis& d, const std::vector<HiddenTruth>& truth,
       for (std::size_t k = 0; k < info.parameters.size(); ++k) {
         for (const HiddenParameter& p : t.parameters) {
           if (p.name != info.parameters[k].name || p.equivalent == 0.0) continue;
+          if (e.applied.values.empty()) continue;
           run.errors.push_back(std::abs(e.applied.values[k] / p.equivalent - 1.0));
           if (e.applied.lower95.empty()) continue;
           run.covered.push_back(p.equivalent >= e.applied.lower95[k] &&
@@ -230,14 +256,25 @@ double energy_error(const CompareResult& result) {
   return measured > 0.0 ? wrong / measured : kNotJudged;
 }
 
-std::vector<EffectAt> true_effects(const Crane& crane) {
-  std::vector<EffectAt> out;
-  for (const EffectAt& e : candidates(crane.model.machine)) {
-    const std::string key = effect_key(e.effect->info(), crane.model.machine, e.at);
-    for (const HiddenTruth& t : crane.truth) {
-      if (key_of(t.id, t.at) == key) out.push_back(e);
-    }
+/// Errors on the test log that moved, largest change first; of pressures also where both models were learned.
+std::string moved_errors(const CompareResult& before, const CompareResult& after) {
+  std::vector<std::pair<double, std::string>> lines;
+  for (const StageScore& b : before.scores) {
+    const StageScore* a = after.find(b.stage, b.at, b.regime);
+    if (a == nullptr || !(b.rmse > 0.0) || !(a->rmse > 0.0)) continue;
+    const double moved = static_cast<double>(b.n) * std::log(a->rmse / b.rmse);
+    std::string line = fmt::format("   {} {} {}: {:.3g} -> {:.3g} {} (bias {:.2g} -> {:.2g})",
+                                   b.stage, b.at, b.regime, b.rmse / b.unit.si, a->rmse / b.unit.si,
+                                   b.unit.name, b.bias / b.unit.si, a->bias / b.unit.si);
+    if (b.stage == "pressure")
+      line += fmt::format(", {:.0f} -> {:.0f} % outside with {:.0f} -> {:.0f} % of the error",
+                          b.extrapolated_percent, a->extrapolated_percent,
+                          b.extrapolated_error_percent, a->extrapolated_error_percent);
+    lines.emplace_back(-std::abs(moved), line + fmt::format(", {} samples\n", b.n));
   }
+  std::sort(lines.begin(), lines.end());
+  std::string out;
+  for (const auto& [moved, line] : lines) out += line;
   return out;
 }
 
@@ -270,6 +307,7 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     for (const HarmedError& h : change.harmed) run.worse_by += "; " + h.sentence;
     run.energy_before = energy_error(before);
     run.energy_after = energy_error(after);
+    run.details += moved_errors(before, after);
   }
   if (truth.empty()) return;
   if (run.exact) {
@@ -312,13 +350,16 @@ BlindRun run_blind(const BlindCase& asked) {
       run.swallowed = swallowed_by_refit(crane.model, crane.references, crane.train);
       for (const auto& s : run.swallowed)
         run.answer += fmt::format("{} error {:+.0f} % ", s.stage, -100.0 * s.share);
+    } else if (asked.judge == "truth") {
+      d = told_diagnosis(crane);
     } else {
       d = simple_diagnosis(asked.judge, crane);
     }
     run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     judge_answer(d, crane.truth, run);
-    if (asked.judge == "ours" && asked.extend) judge_extended(d, crane, run);
     if (asked.judge == "ours") run.details = d.table() + crane.shown;
+    if ((asked.judge == "ours" || asked.judge == "truth") && asked.extend)
+      judge_extended(d, crane, run);
     for (const HiddenTruth& t : crane.truth) {
       for (const HiddenParameter& p : t.parameters) {
         run.details += fmt::format("   truth {} {} = {:.5g} {} (equivalent {:.5g})\n", t.id, p.name,

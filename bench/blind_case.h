@@ -20,7 +20,7 @@ struct BlindCase {
   std::string only;        ///< this effect; empty = drawn
   std::string
       leave_out;  ///< columns the logs do not have: "rod", "payload", "commands", "oil", "pump"
-  std::string judge = "ours";  ///< ours, bic, gp, correlation (bench/simple_ways.h)
+  std::string judge = "ours";  ///< ours, truth (told the ids), bic, gp, correlation
   bool extend = true;          ///< also add what was named and judge it on the test log
   std::string
       folder;  ///< where the case's files are kept (row_seed/train.csv ...); empty = nowhere

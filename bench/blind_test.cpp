@@ -119,8 +119,9 @@ int run(int argc, char** argv) {
   app.add("--rows", options.rows, "none, clear, small, outside, pairs, fault");
   app.add("--way", options.way, "reference, alone or both").one_of({"reference", "alone", "both"});
   app.add("--ways", options.ways,
-          "who judges: ours, and for comparison bic, gp, correlation (docs/blind_test.md)")
-      .one_of({"ours", "bic", "gp", "correlation"});
+          "who judges: ours, and for comparison truth (told the ids: extend alone), bic, gp, "
+          "correlation (docs/blind_test.md)")
+      .one_of({"ours", "truth", "bic", "gp", "correlation"});
   app.add("--only", options.how.only, "this effect alone");
   app.add("--missing", options.how.leave_out, "columns that no log has")
       .one_of({"rod", "payload", "commands", "oil", "pump"});

@@ -5,6 +5,7 @@
 
 #include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
+#include "identification/learn_loads_beyond.h"
 #include "identification/robust.h"
 #include "models/return_rise.h"
 
@@ -99,11 +100,15 @@ std::vector<Index> thinned(const std::vector<Index>& position, int step) {
   return rows;
 }
 
-void take(FitPass& pass, std::size_t i, LearnedGp learned) {
+/// @param samples that it was learned from
+void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samples) {
   ProcessFit& fitted = pass.processes[i];
   fitted.report = std::move(learned.report);
   if (!fitted.report.failure.empty()) return;
-  CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+  const auto at = static_cast<std::size_t>(fitted.cylinder);
+  learned.parameters.beyond = learn_loads_beyond(
+      learned.parameters, samples, pass.model.machine.cylinders[at], fitted.extend ? 1 : -1);
+  CylinderModel& c = pass.model.cylinders[at];
   (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
 }
 
@@ -157,7 +162,7 @@ void take_backs_off(const FitOptions& options, std::vector<ProcessData>& samples
   if (again.empty()) return;
   std::vector<LearnedGp> learned = learn_gps(again, options.gp, {}, options.threads);
   for (std::size_t k = 0; k < learned.size(); ++k) {
-    if (learned[k].report.failure.empty()) take(pass, which[k], std::move(learned[k]));
+    if (learned[k].report.failure.empty()) take(pass, which[k], std::move(learned[k]), again[k]);
     take_off(which[k]);
   }
 }
@@ -209,7 +214,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
     };
   };
   std::vector<LearnedGp> learned = learn_gps(sets, options.gp, tell(0.0), options.threads);
-  for (std::size_t i = 0; i < learned.size(); ++i) take(pass, i, std::move(learned[i]));
+  for (std::size_t i = 0; i < learned.size(); ++i) take(pass, i, std::move(learned[i]), sets[i]);
   take_backs_off(options, samples, pass);
 
   std::vector<GpDataset> again;
@@ -234,7 +239,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   learned = learn_gps(again, screened, tell(0.5), options.threads);
   for (std::size_t i = 0; i < learned.size(); ++i) {
     // A first fit is better than none.
-    if (learned[i].report.failure.empty()) take(pass, which[i], std::move(learned[i]));
+    if (learned[i].report.failure.empty()) take(pass, which[i], std::move(learned[i]), again[i]);
   }
   process_notes(machine, pass);
 }

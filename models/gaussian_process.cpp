@@ -43,6 +43,16 @@ void check_parameters(const GpParameters& p) {
           fmt::format("got {} x {}, expected {} x {} (centres + 2)", rows, p.variance_core.cols(),
                       n + 2, n + 2));
   require(p.variance_core.allFinite(), "variance_core", "a value is not finite");
+  const LoadsBeyond& b = p.beyond;
+  require(b.side == 0 || (std::abs(b.side) == 1 && p.force_max >= p.force_min), "beyond.side",
+          "expected 1 or -1, and a range of forces");
+  if (b.side == 0) return;
+  positive(b.static_slope, "beyond.static_slope");
+  const auto rises = [&](double slope) { return slope >= 0.0 && slope <= b.static_slope; };
+  require(rises(b.slope_heavier) && rises(b.slope_lighter), "beyond.slopes",
+          "expected numbers from 0 to that of the static branch");
+  require(std::isfinite(b.static_level) && std::isfinite(b.least), "beyond.static_level",
+          "a value is not finite");
 }
 
 ArrayXd padded(const ArrayXd& values, double scale) {
@@ -75,12 +85,35 @@ KernelCentres GaussianProcess::centres() const {
           static_cast<std::size_t>(scaled_weight_.size())};
 }
 
+double GaussianProcess::force_scale() const {
+  if (parameters_.beyond.side == 0) return parameters_.length_force;
+  return std::min(parameters_.length_force, loads_beyond::bend(parameters_.beyond));
+}
+
 double GaussianProcess::mean(double flow, double force) const {
+  if (!is_beyond(force)) return learned_mean(flow, force);
+  return pressure_beyond(parameters_.beyond, force, parameters_.force_min, parameters_.force_max,
+                         [&](double f) { return learned_mean(flow, f); });
+}
+
+GpDerivatives GaussianProcess::mean_derivatives(double flow, double force) const {
+  if (!is_beyond(force)) return learned_derivatives(flow, force);
+  const Jet q = Jet::variable(flow, 0, 2);
+  const Jet p = pressure_beyond(parameters_.beyond, Jet::variable(force, 1, 2),
+                                parameters_.force_min, parameters_.force_max, [&](const Jet& f) {
+                                  const GpDerivatives g = learned_derivatives(flow, f.value);
+                                  return Jet::chain(q, f, g.value, g.d_flow, g.d_force,
+                                                    g.d_flow_flow, g.d_flow_force, g.d_force_force);
+                                });
+  return {p.value, p.gradient(0), p.gradient(1), p.hessian(0, 0), p.hessian(1, 0), p.hessian(1, 1)};
+}
+
+double GaussianProcess::learned_mean(double flow, double force) const {
   return parameters_.mean_constant + parameters_.mean_slope * force +
          kernel_sum(centres(), flow * inverse_length_flow_, force * inverse_length_force_);
 }
 
-GpDerivatives GaussianProcess::mean_derivatives(double flow, double force) const {
+GpDerivatives GaussianProcess::learned_derivatives(double flow, double force) const {
   const double a = inverse_length_flow_, b = inverse_length_force_;
   const KernelSums s = kernel_sum_derivatives(centres(), flow * a, force * b);
   GpDerivatives out;

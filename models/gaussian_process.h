@@ -3,10 +3,12 @@
 ///   p(Q, F) = m0 + m1 F + sum_j w_j s^2 exp(-1/2 [((Q-Q_j)/l_Q)^2 + ((F-F_j)/l_F)^2])
 /// Source: Rasmussen & Williams (2006), ch. 2.2, 2.7; sparse form: Titsias (2009), eqs. 6 and 9.
 /// The mean is linear in F because a zero-mean SE process falls back to a *low* pressure outside its
-/// data, which an optimiser would exploit.
+/// data, which an optimiser would exploit. Beyond the loads it was learned from physics takes over
+/// where it is known (models/loads_beyond.h).
 #include <Eigen/Dense>
 
 #include "models/gp_kernel.h"
+#include "models/loads_beyond.h"
 
 namespace sparflow {
 
@@ -36,6 +38,7 @@ struct GpParameters {
   /// Where the data lies; outside it the mean extrapolates and the variance says so. [lo, hi]
   double flow_min = 0.0, flow_max = 0.0, force_min = 0.0, force_max = 0.0;
   int data_count = 0;  ///< measurements the process has seen
+  LoadsBeyond beyond;  ///< outside force_min .. force_max
 };
 
 /// Immutable and safe to share between threads. Evaluation allocates nothing, except that the variance
@@ -57,10 +60,18 @@ class GaussianProcess {
 
   const GpParameters& parameters() const { return parameters_; }
   bool empty() const { return parameters_.weight.size() == 0; }
+  /// [N] over which the mean may bend: the length-scale, or what it does beyond the learned loads.
+  double force_scale() const;
 
  private:
   GpParameters parameters_;
   KernelCentres centres() const;
+  bool is_beyond(double force) const {
+    return parameters_.beyond.side != 0 &&
+           (force > parameters_.force_max || force < parameters_.force_min);
+  }
+  double learned_mean(double flow, double force) const;
+  GpDerivatives learned_derivatives(double flow, double force) const;
 
   // Padded to whole vector registers; the weight is multiplied by the signal variance.
   Eigen::ArrayXd scaled_flow_, scaled_force_, scaled_weight_;

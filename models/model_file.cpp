@@ -54,27 +54,54 @@ Json process_json(const GaussianProcess& process) {
   for (Eigen::Index i = 0; i < p.variance_core.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) core.push_back(p.variance_core(i, j));
   }
-  return {{"length_flow", p.length_flow},
-          {"length_force", p.length_force},
-          {"signal_std", p.signal_std},
-          {"noise_std", p.noise_std},
-          {"mean_constant", p.mean_constant},
-          {"mean_slope", p.mean_slope},
-          {"flow_range", {p.flow_min, p.flow_max}},
-          {"force_range", {p.force_min, p.force_max}},
-          {"data_count", p.data_count},
-          {"flow", numbers(p.flow)},
-          {"force", numbers(p.force)},
-          {"weight", numbers(p.weight)},
-          {"variance_core", std::move(core)}};
+  Json out = {{"length_flow", p.length_flow},
+              {"length_force", p.length_force},
+              {"signal_std", p.signal_std},
+              {"noise_std", p.noise_std},
+              {"mean_constant", p.mean_constant},
+              {"mean_slope", p.mean_slope},
+              {"flow_range", {p.flow_min, p.flow_max}},
+              {"force_range", {p.force_min, p.force_max}},
+              {"data_count", p.data_count},
+              {"flow", numbers(p.flow)},
+              {"force", numbers(p.force)},
+              {"weight", numbers(p.weight)},
+              {"variance_core", std::move(core)}};
+  const LoadsBeyond& b = p.beyond;
+  if (b.side != 0) {
+    out["beyond"] = {{"side", b.side},
+                     {"static_slope", b.static_slope},
+                     {"static_level", b.static_level},
+                     {"slope_heavier", b.slope_heavier},
+                     {"slope_lighter", b.slope_lighter},
+                     {"least", b.least}};
+  }
+  return out;
 }
 
 // ---------------------------------------------------------------- reading
 
+/// A file of an earlier program has none.
+LoadsBeyond read_beyond(const Cursor& c) {
+  c.keys({"side", "static_slope", "static_level", "slope_heavier", "slope_lighter", "least"});
+  const auto number = [&](const char* key, const char* expected) {
+    return c.at(key, expected).number(expected);
+  };
+  LoadsBeyond b;
+  b.side = number("side", "1 or -1") > 0.0 ? 1 : -1;
+  b.static_slope = number("static_slope", "a positive number [Pa/N]");
+  b.static_level = number("static_level", "a number [Pa]");
+  b.slope_heavier = number("slope_heavier", "a number [Pa/N]");
+  b.slope_lighter = number("slope_lighter", "a number [Pa/N]");
+  b.least = number("least", "a number [Pa]");
+  return b;
+}
+
 GaussianProcess read_process(const Cursor& c) {
   if (c.is_null()) return {};
   c.keys({"length_flow", "length_force", "signal_std", "noise_std", "mean_constant", "mean_slope",
-          "flow_range", "force_range", "data_count", "flow", "force", "weight", "variance_core"});
+          "flow_range", "force_range", "data_count", "flow", "force", "weight", "variance_core",
+          "beyond"});
   const auto positive = [&](const char* key, const char* unit) {
     const Cursor v = c.at(key, fmt::format("a positive number [{}]", unit));
     const double number = v.number(fmt::format("a positive number [{}]", unit));
@@ -123,6 +150,7 @@ GaussianProcess read_process(const Cursor& c) {
       }
     }
   }
+  if (c.has("beyond")) p.beyond = read_beyond(c.at("beyond", ""));
   try {
     return GaussianProcess(std::move(p));
   } catch (const InputError& error) {

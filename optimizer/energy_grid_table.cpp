@@ -34,7 +34,7 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
   }
   const double width = std::max(force.hi - force.lo, 1.0);
   const int flows = points(flow_max, process.parameters().length_flow);
-  const int forces = points(width, process.parameters().length_force);
+  const int forces = points(width, process.force_scale());
   flow_step_ = flow_max / (flows - 1);
   force_step_ = width / (forces - 1);
   demand_.resize(flows, forces);

@@ -43,6 +43,12 @@ TEST(ModelFile, ReadsBackEveryNumberExactly) {
     EXPECT_TRUE((a.force == b.force).all());
     EXPECT_TRUE((a.weight == b.weight).all());
     EXPECT_EQ(a.variance_core, b.variance_core);
+    EXPECT_EQ(a.beyond.side, b.beyond.side);
+    EXPECT_EQ(a.beyond.static_slope, b.beyond.static_slope);
+    EXPECT_EQ(a.beyond.static_level, b.beyond.static_level);
+    EXPECT_EQ(a.beyond.slope_heavier, b.beyond.slope_heavier);
+    EXPECT_EQ(a.beyond.slope_lighter, b.beyond.slope_lighter);
+    EXPECT_EQ(a.beyond.least, b.beyond.least);
   }
   EXPECT_EQ(read.pumps[0].standby, model.pumps[0].standby);
   EXPECT_EQ(read.machine.source_text, model.machine.source_text);

@@ -1,0 +1,72 @@
+#include "identification/learn_loads_beyond.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "identification/robust.h"
+#include "models/return_rise.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+
+/// Of the learned range, the part at its border whose slope tells the branch.
+constexpr double kBorder = 0.1;
+/// Anti-cavitation valves keep chambers near the tank's pressure. [Pa]
+constexpr double kTank = 2e5;
+
+/// Share of a larger load that the supply takes, as that of the branch it shows: all of it, or a valve's.
+double branch_share(double slope) {
+  const double on_static =
+      std::clamp((slope - return_rise::kSteepestValve) /
+                     (return_rise::kFlattestLoad - return_rise::kSteepestValve),
+                 0.0, 1.0);
+  return on_static + (1.0 - on_static) * std::clamp(slope, 0.0, return_rise::kSteepestValve);
+}
+
+}  // namespace
+
+LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& samples,
+                               const Cylinder& cylinder, int side) {
+  LoadsBeyond out;
+  const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
+  const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
+  out.side = side;
+  out.static_slope = 1.0 / supply;
+  const ArrayXd load = side * samples.force;
+  const ArrayXd excess = samples.pressure - load / supply;
+  const double lightest = side > 0 ? parameters.force_min : -parameters.force_max;
+  const double heaviest = side > 0 ? parameters.force_max : -parameters.force_min;
+  out.static_level =
+      std::clamp(quantile(excess.matrix(), 0.1), 0.0, other / supply * return_rise::kReturnLine);
+  out.least = std::clamp(quantile(samples.pressure.matrix(), 0.01), 0.0, kTank);
+  const double seen = heaviest - lightest;
+  if (seen < return_rise::kLeastSeen * supply) {
+    // one load shows no slope: its supply stands near the load, or a valve holds it
+    const double above = quantile(excess.matrix(), 0.5);
+    const double on_static =
+        1.0 / (1.0 + std::exp((above - return_rise::kValveFrom) / return_rise::kValveSpread));
+    out.slope_heavier = out.slope_lighter = on_static * out.static_slope;
+    return out;
+  }
+  const GaussianProcess process(parameters);
+  const double width = std::min(seen, std::max(kBorder * seen, return_rise::kLeastLoad * supply));
+  const auto slope_from = [&](double from) {  // [Pa/N] between from and from + width
+    std::vector<double> flows;
+    for (Index k = 0; k < load.size(); ++k) {
+      if (load[k] >= from && load[k] <= from + width) flows.push_back(samples.flow[k]);
+    }
+    const double flow =
+        median(Eigen::Map<Eigen::VectorXd>(flows.data(), static_cast<Index>(flows.size())));
+    const double rise = process.mean(flow, side * (from + width)) - process.mean(flow, side * from);
+    return branch_share(rise * supply / width) * out.static_slope;
+  };
+  out.slope_heavier = slope_from(heaviest - width);
+  out.slope_lighter = slope_from(lightest);
+  return out;
+}
+
+}  // namespace sparflow
