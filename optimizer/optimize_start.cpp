@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "optimizer/optimize.h"
+#include "optimizer/optimize_outcome.h"
 
 namespace sparflow {
 namespace {
@@ -31,7 +32,7 @@ class Start {
     keep_clear_ends(candidate.guess);
     offer(candidate.guess, false);
     hold(candidate.modes, candidate.guess, true);
-    return result_;
+    return finished();
   }
 
   StartResult run(const std::string& name, const PhasePlan& plan, const Trajectory& guess,
@@ -40,7 +41,7 @@ class Start {
     keep_clear_ends(guess);
     offer(guess, false);
     hold_plan(plan, guess, overlaps);
-    return result_;
+    return finished();
   }
 
   StartResult run(const SeedMotion& seed) {
@@ -61,7 +62,7 @@ class Start {
       const NlpResult solved =
           solve(motion, options_.schedule[stage], rough ? 1e-2 : options_.tolerance);
       note_status(solved);
-      if (solved.status == NlpStatus::kInterrupted) return result_;
+      if (solved.status == NlpStatus::kInterrupted) return finished();
       if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
       motion = transcription_->trajectory(solved.x);
       if (options_.modes || last) {
@@ -69,10 +70,23 @@ class Start {
       }
       if (options_.modes) hold_modes(motion);
     }
-    return result_;
+    return finished();
   }
 
  private:
+  /// A solve may converge and its motion break a limit all the same: one that had no row yet, or one that no drawing in
+  /// keeps between the knots. Then it is the limit that is named, not the convergence.
+  StartResult finished() {
+    const bool converged =
+        result_.status == NlpStatus::kOptimal || result_.status == NlpStatus::kAcceptable;
+    if (converged && result_.motion.size() > 1 && result_.excess > options_.limit_tolerance) {
+      result_.status = NlpStatus::kInfeasible;
+      result_.message =
+          "its motion breaks a limit: " + limit_text(worst_limit(verdict(result_.motion).checks));
+    }
+    return std::move(result_);
+  }
+
   static bool usable(const NlpResult& r) {
     return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
   }
@@ -354,7 +368,7 @@ class Start {
     if (result_.status == NlpStatus::kOptimal && result_.modes_held) return;
     result_.status = solved.status;
     result_.message = solved.message;
-    if (!solved.max_violation_at.empty()) {
+    if (!solved.solved() && !solved.max_violation_at.empty()) {
       result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
     }
   }
