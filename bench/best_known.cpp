@@ -1,5 +1,6 @@
 #include "bench/best_known.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -45,20 +46,22 @@ void write_best_known(const std::string& path, const std::vector<ReachTask>& tas
       if (entry.is_null()) entry = {{"status", "infeasible"}, {"why", figures[i].named}};
       continue;
     }
-    const bool better = entry.is_null() || !entry.contains("energy_J") ||
-                        entry["energy_J"].is_null() ||
-                        best->energy.total < entry["energy_J"].get<double>();
-    const double bound = figures[i].bound;
-    if (!better) {
-      const bool same_time =
-          std::abs(entry.value("duration_s", 0.0) - best->duration) <= 1e-9 * best->duration;
-      if (same_time && bound > entry.value("lower_bound_J", 0.0)) entry["lower_bound_J"] = bound;
+    const bool known_energy =
+        entry.is_object() && entry.contains("energy_J") && !entry["energy_J"].is_null();
+    const bool same_time = known_energy && std::abs(entry.value("duration_s", 0.0) -
+                                                    best->duration) <= 1e-9 * best->duration;
+    double bound = figures[i].bound, shortest = figures[i].comparison.shortest;
+    if (same_time) bound = std::max(bound, entry.value("lower_bound_J", 0.0));
+    if (known_energy) shortest = std::min(shortest, entry.value("shortest_s", shortest));
+    if (known_energy && best->energy.total >= entry["energy_J"].get<double>()) {
+      if (same_time && bound > 0.0) entry["lower_bound_J"] = bound;
+      entry["shortest_s"] = shortest;
       continue;
     }
     entry = {{"status", "optimal"},
              {"energy_J", best->energy.total},
              {"duration_s", best->duration},
-             {"shortest_s", figures[i].comparison.shortest},
+             {"shortest_s", shortest},
              {"share_moving", best->energy.share_moving},
              {"from", best->detail}};
     for (const StrategyOutcome& o : figures[i].comparison.row("equal")->outcomes) {

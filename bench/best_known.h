@@ -11,8 +11,8 @@ namespace sparflow::bench {
 void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
                   const std::vector<ReachFigures>& figures);
 
-/// Best known energies: what the file has, or what was found now where that is less. A bound found now for the same time
-/// stands where it is the larger.
+/// Best known energies: what the file has, or what was found now where that is less. Where it is not, a larger bound found
+/// now for the same time and a shorter shortest time are kept all the same.
 void write_best_known(const std::string& path, const std::vector<ReachTask>& tasks,
                       const std::vector<ReachFigures>& figures);
 

@@ -47,12 +47,6 @@ void compare(const ReachTask& task, const ReachSettings& settings, ReachFigures&
 
 }  // namespace
 
-const StrategyOutcome* ReachFigures::optimum() const {
-  const StrategyRow* row = comparison.row("equal");
-  const StrategyOutcome* best = row != nullptr ? row->find(kOptimal) : nullptr;
-  return best != nullptr && best->found() ? best : nullptr;
-}
-
 ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
   ReachFigures f;
   if (const auto earlier = settings.optima.find(task.problem.name);

@@ -15,7 +15,11 @@ struct ReachFigures {
   double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
   std::string named;        ///< what is said of an infeasible one
   /// The optimum in equal time; null when there is none.
-  const StrategyOutcome* optimum() const;
+  const StrategyOutcome* optimum() const {
+    const StrategyRow* row = comparison.row("equal");
+    const StrategyOutcome* best = row != nullptr ? row->find(kOptimal) : nullptr;
+    return best != nullptr && best->found() ? best : nullptr;
+  }
 };
 
 struct ReachSettings {

@@ -323,6 +323,7 @@ TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
         energy_bound_at(model, problem, entry.at("duration_s").get<double>(), options);
     ASSERT_TRUE(bound.valid) << file << ": " << bound.message;
     EXPECT_LE(bound.value, entry.at("energy_J").get<double>()) << file;
+    EXPECT_LE(entry.at("lower_bound_J").get<double>(), entry.at("energy_J").get<double>()) << file;
     ++tried;
   }
   EXPECT_GE(tried, 15);
