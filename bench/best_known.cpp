@@ -15,6 +15,7 @@ void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
   json all = json::object();
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const ReachFigures& f = figures[i];
+    if (f.left_out) continue;
     json& entry = all[tasks[i].problem.name];
     entry = {{"named", f.named}, {"solve_s", f.comparison.solve_s}};
     const StrategyOutcome* best = f.optimum();
@@ -39,7 +40,7 @@ void write_best_known(const std::string& path, const std::vector<ReachTask>& tas
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const std::string& file = tasks[i].problem.file;
     const std::string name = file.substr(file.find_last_of('/') + 1);
-    if (name.empty()) continue;
+    if (name.empty() || figures[i].left_out) continue;
     const StrategyOutcome* best = figures[i].optimum();
     json& entry = known[name];
     if (best == nullptr) {

@@ -26,17 +26,23 @@ OptimizeOptions usual_options() {
   return options;
 }
 
-OptimizeOptions heavy_options(const HasteSettings& settings) {
+OptimizeOptions heavy_options(const MotionProblem& problem, const HasteSettings& settings) {
   OptimizeOptions options = usual_options();
+  options.sequence_rounds = 6;
+  // beside obstacles a solve takes ten times longer; there the ways round are what differs, and they are in the paths
+  if (!problem.obstacles.empty()) return options;
   options.intervals = settings.intervals;
   options.search_intervals = settings.intervals / 2;
   options.smooth_starts = 4;
   options.sequential_starts = 16;
   options.grid_starts = 8;
   options.grid_nodes = 40000;
-  options.sequence_rounds = 6;
   options.searched_starts = 4;
   return options;
+}
+
+int heavy_paths(const MotionProblem& problem, const HasteSettings& settings) {
+  return problem.obstacles.empty() ? settings.paths : settings.paths_beside_obstacles;
 }
 
 std::string heavy_name(int k) { return fmt::format("heavy {}", k + 1); }
@@ -65,7 +71,7 @@ class Haste {
     usual_ = planned_seeds(problem_, kDefaultPaths, kDefaultIntervals);
     // the default run's random seed is 1
     for (int k = 0; k < settings.seeds; ++k) {
-      heavy_.push_back(planned_seeds(problem_, settings.paths, settings.intervals,
+      heavy_.push_back(planned_seeds(problem_, heavy_paths(problem_, settings), settings.intervals,
                                      static_cast<std::uint64_t>(k) + 2));
     }
   }
@@ -99,8 +105,9 @@ class Haste {
       return std::pair{c.shortest, c.shortest_of};
     });
     for (std::size_t k = 0; k < heavy_.size(); ++k) {
-      add(found, heavy_name(static_cast<int>(k)),
-          [&] { return of(optimize(model_, timed, heavy_[k], heavy_options(settings_))); });
+      add(found, heavy_name(static_cast<int>(k)), [&] {
+        return of(optimize(model_, timed, heavy_[k], heavy_options(problem_, settings_)));
+      });
     }
   }
 
@@ -117,18 +124,19 @@ class Haste {
       return best != nullptr && best->found() ? std::pair{best->energy.total, best->detail}
                                               : std::pair{0.0, c.message};
     });
-    add(found, "dynamic programming", [&] { return driven_grid_path(); });
+    add(found, kDynamicProgramming, [&] { return driven_grid_path(); });
     add(found, "a slower optimum, squeezed", [&] {
       constexpr double kSlower = 1.4;
       const OptimizeResult slow =
           optimize_at(model_, problem_, usual_, kSlower * duration, usual_options());
       if (slow.best_start < 0) return outcome(slow, 0.0);
       return of(optimize_at(model_, problem_, {{"slower optimum", slow.motion, 0.0, false}},
-                            duration, heavy_options(settings_)));
+                            duration, heavy_options(problem_, settings_)));
     });
     for (std::size_t k = 0; k < heavy_.size(); ++k) {
       add(found, heavy_name(static_cast<int>(k)), [&] {
-        return of(optimize_at(model_, problem_, heavy_[k], duration, heavy_options(settings_)));
+        return of(
+            optimize_at(model_, problem_, heavy_[k], duration, heavy_options(problem_, settings_)));
       });
     }
   }

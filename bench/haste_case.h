@@ -9,9 +9,10 @@
 namespace sparflow::bench {
 
 struct HasteSettings {
-  double factor = 1.2;     ///< of the shortest time known, for the energies
-  int paths = 48;          ///< seed paths of a heavy search
-  int intervals = 150;     ///< of its mesh
+  double factor = 1.2;  ///< of the shortest time known, for the energies
+  int paths = 48;       ///< seed paths of a heavy search
+  int paths_beside_obstacles = 12;
+  int intervals = 150;     ///< of its mesh; beside obstacles that of the default
   int seeds = 2;           ///< heavy searches, each with random paths of its own
   int grid_nodes = 60000;  ///< of the dynamic programming whose path is driven as it is
   bool bounds = true;      ///< certified lower bounds
@@ -32,6 +33,9 @@ struct HasteFigures {
   double least_duration = 0.0;       ///< [s] certified, 0 = none
   double least_energy = 0.0;         ///< [J] certified of motions that take `duration`, 0 = none
 };
+
+/// The search on a joint grid, its path driven as it is.
+inline constexpr const char* kDynamicProgramming = "dynamic programming";
 
 /// The least value found; 0 when there is none.
 double best_of(const std::vector<HasteFound>& found);

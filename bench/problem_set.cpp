@@ -31,6 +31,8 @@ int run(int argc, char** argv) {
   app.flag("!--no-grid", settings.grid, "leave out the grid's cheapest path at unlimited time");
   app.flag("!--no-timed-bound", settings.timed,
            "leave out the bound of motions in the reach's own time");
+  app.add("--faster-than", settings.faster_than,
+          "only reaches with less time than this many times the shortest; 0: all");
   app.add("--processes", processes, "at the same time");
   if (const auto code = app.parse(argc, argv)) return *code;
   if (!optima.empty()) {

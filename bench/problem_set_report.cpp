@@ -115,6 +115,7 @@ void print_reaches(const std::vector<ReachTask>& tasks, const std::vector<ReachF
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const ReachFigures& f = figures[i];
     const StrategyOutcome* best = f.optimum();
+    if (f.left_out) continue;
     c.seconds.push_back(f.comparison.solve_s);
     if (!tasks[i].meant_feasible) {
       print_infeasible(tasks[i], f, c);

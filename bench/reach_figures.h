@@ -14,6 +14,7 @@ struct ReachFigures {
   double slow_bound = 0.0;  ///< [J] of any motion of any duration
   double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
   std::string named;        ///< what is said of an infeasible one
+  bool left_out = false;    ///< by ReachSettings::faster_than
   /// The optimum in equal time; null when there is none.
   const StrategyOutcome* optimum() const {
     const StrategyRow* row = comparison.row("equal");
@@ -25,6 +26,7 @@ struct ReachFigures {
 struct ReachSettings {
   int intervals = 100, paths = 4;
   bool grid = true, bound = true, timed = true;
+  double faster_than = 0.0;  ///< times the shortest time: slower reaches are left out; 0 = none is
   nlohmann::json optima =
       nlohmann::json::object();  ///< by problem: of an earlier run, not solved again
 };
