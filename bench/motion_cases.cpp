@@ -11,10 +11,8 @@
 
 #include "identification/fit.h"
 #include "models/machine_file.h"
-#include "planners/seed_paths.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
-#include "problems/time_parametrise.h"
 
 namespace sparflow::bench {
 namespace {
@@ -94,24 +92,6 @@ std::vector<MotionProblem> loader_crane_reaches() {
   reaches.push_back(reach("heavy, up", machine, {0.6, -0.9, 2.0}, {6.5, 0.0, 5.0}, 800.0, 18.0));
   reaches.push_back(reach("fold", machine, {0.5, -0.4, 3.0}, {5.0, 0.0, 1.0}, 200.0, 20.0));
   return reaches;
-}
-
-std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, int intervals,
-                                      std::uint64_t seed) {
-  SeedOptions options;
-  options.count = most;
-  options.random_seed = seed;
-  TimingOptions timing;
-  timing.intervals = intervals;
-  std::vector<SeedMotion> seeds;
-  seeds.reserve(static_cast<std::size_t>(most));
-  for (const SeedPath& path : find_seed_paths(problem, options).paths) {
-    const TimedMotion timed = time_parametrise(problem, path.path, 0.0, timing);
-    if (timed.motion.size() < 2) continue;
-    seeds.push_back({fmt::format("{} {}", path.planner, seeds.size() + 1), timed.motion,
-                     timed.shortest, path.planner == "straight line"});
-  }
-  return seeds;
 }
 
 MotionProblem chain_problem(int joints) {

@@ -1,10 +1,10 @@
 #pragma once
 /// Reaches and models the motion benchmarks are run on.
-#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "optimizer/optimize.h"
+#include "models/crane_model.h"
+#include "problems/problem.h"
 
 namespace sparflow::bench {
 
@@ -18,10 +18,6 @@ std::vector<MotionProblem> loader_crane_reaches();
 MotionProblem reach(const std::string& name, const Machine& machine,
                     const std::vector<double>& start, const Eigen::Vector3d& goal, double payload,
                     double duration);
-
-/// Paths of the planners, timed.
-std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, int intervals,
-                                      std::uint64_t seed = 1);
 
 /// Every joint lifts or sinks a vertical chain of `joints` revolute joints, each with its pinned cylinder, all fed by
 /// one load-sensing pump; lengths and masses fall towards the tip. From posture to posture in 14 s.

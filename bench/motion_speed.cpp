@@ -13,6 +13,7 @@
 
 #include "bench/motion_cases.h"
 #include "bench/motion_speed_derivatives.h"
+#include "bench/planned_seeds.h"
 #include "bench/program_options.h"
 #include "models/error.h"
 #include "optimizer/energy_grid.h"

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/motion_cases.h"
+#include "bench/planned_seeds.h"
 #include "bench/program_options.h"
 #include "identification/fit.h"
 #include "models/error.h"

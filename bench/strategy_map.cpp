@@ -8,16 +8,15 @@
 #include <filesystem>
 #include <limits>
 
+#include "bench/planned_seeds.h"
 #include "bench/program_options.h"
 #include "bench/strategy_map_picture.h"
 #include "models/error.h"
 #include "models/model_file.h"
 #include "optimizer/child_processes.h"
 #include "optimizer/pareto.h"
-#include "planners/seed_paths.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
-#include "problems/time_parametrise.h"
 
 namespace sparflow {
 namespace {
@@ -36,21 +35,6 @@ const std::vector<Pose>& poses() {
       {"swing_crane_side_to_side", {0, 250, 400}}, {"hmf_lift", {0, 150, 300}},
   };
   return all;
-}
-
-std::vector<SeedMotion> seeds_of(const MotionProblem& problem, int intervals) {
-  SeedOptions options;
-  options.count = 4;
-  std::vector<SeedMotion> seeds;
-  TimingOptions timing;
-  timing.intervals = intervals;
-  for (const SeedPath& path : find_seed_paths(problem, options).paths) {
-    const TimedMotion timed = time_parametrise(problem, path.path, 0.0, timing);
-    if (timed.motion.size() < 2) continue;
-    seeds.push_back({fmt::format("{} {}", path.planner, seeds.size() + 1), timed.motion,
-                     timed.shortest, path.planner == "straight line"});
-  }
-  return seeds;
 }
 
 /// Everything of a curve but its motions, through the pipe.
@@ -138,7 +122,8 @@ int run(int argc, char** argv) {
     options.strategies.baselines.intervals = intervals;
     options.strategies.baselines.polished_orders = 1;
     options.strategies.baselines.optimize = optimize;
-    return pack_curve(energy_against_time(model, problem, seeds_of(problem, intervals), options));
+    return pack_curve(
+        energy_against_time(model, problem, bench::planned_seeds(problem, 4, intervals), options));
   };
   const std::vector<ChildResult> results =
       run_in_children(static_cast<int>(tasks.size()), processes, work, [&](int index, int done) {

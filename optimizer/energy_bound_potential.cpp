@@ -212,6 +212,7 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
     }
   }
   for (int j = 0; j < n; ++j) {
+    losses_[ix(j)][1] += (1.0 - chord_factors(axes_[ix(j)]).array()).mean();
     for (const int direction : {0, 1}) edge_costs(j, cost_[ix(j)][ix(direction)]);
     // a cylinder at its dead centre within an edge costs nothing there
     for (std::size_t c = 0; c < cylinders; ++c) {

@@ -69,8 +69,8 @@ class EnergyPotential {
   Eigen::VectorXd gradient(const Eigen::VectorXd& q) const;
   /// Multiplies the potential.
   void scale(double factor);
-  /// Mean over the edges of each axis: relative change of the price along the axis itself (x) and the sum of relative
-  /// curvature allowances across the axis (y), for choosing the number of lines.
+  /// Mean over the edges of each axis: relative change of the price along the axis itself (x) and the sum of what curvature
+  /// costs, of the prices and of the axis' coordinate (y), for choosing the number of lines.
   const std::vector<Eigen::Vector2d>& losses() const { return losses_; }
 
  private:

@@ -100,16 +100,22 @@ double stretch_asked(const LimitCheck& c) {
 
 }  // namespace
 
+const LimitCheck& worst_limit(const std::vector<LimitCheck>& checks) {
+  return *std::max_element(
+      checks.begin(), checks.end(),
+      [](const LimitCheck& x, const LimitCheck& y) { return stretch_asked(x) < stretch_asked(y); });
+}
+
+std::string limit_text(const LimitCheck& check) {
+  return fmt::format("{} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}", check.what,
+                     check.time, check.value, check.limit, check.unit);
+}
+
 void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
                         double duration, OptimizeResult& result) {
   std::string worst;
   if (!result.checks.empty()) {
-    const LimitCheck& c = *std::max_element(result.checks.begin(), result.checks.end(),
-                                            [](const LimitCheck& x, const LimitCheck& y) {
-                                              return stretch_asked(x) < stretch_asked(y);
-                                            });
-    worst = fmt::format(" Worst: {} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}.", c.what,
-                        c.time, c.value, c.limit, c.unit);
+    worst = fmt::format(" Worst: {}.", limit_text(worst_limit(result.checks)));
   } else if (!result.starts.empty()) {
     worst = " The solver says: " + result.starts.front().message + ".";
   }

@@ -1,5 +1,6 @@
 #pragma once
 /// What is made of a search's starts: which one wins, what the seeds would cost, why nothing was found.
+#include <string>
 #include <vector>
 
 #include "optimizer/optimize.h"
@@ -21,6 +22,12 @@ void set_baselines(const CraneModel& model, const MotionProblem& problem,
 
 /// The start nearest to keeping every limit; null when none came to a motion.
 const StartResult* nearest_start(const OptimizeResult& result);
+
+/// The limit that is broken worst: the one that asks for the most time. @param checks not empty
+const LimitCheck& worst_limit(const std::vector<LimitCheck>& checks);
+
+/// "flow of pump main at t=1.84 s, 134 against a limit of 120 l/min".
+std::string limit_text(const LimitCheck& check);
 
 /// Names the worst constraint, where and when, and the shortest feasible duration known.
 /// @param result with the checks of its nearest motion, if there is one

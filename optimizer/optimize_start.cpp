@@ -5,17 +5,11 @@
 #include <cmath>
 
 #include "optimizer/optimize.h"
+#include "optimizer/optimize_outcome.h"
+#include "optimizer/tightening.h"
 
 namespace sparflow {
 namespace {
-
-/// How far limits are drawn in so that they also hold between knots.
-struct Tightening {
-  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  // shares
-  double clearance = 0.0;                                                   // [m]
-  std::vector<double> position;                                             // [rad] or [m] by joint
-  bool limit_pressure = false;
-};
 
 class Start {
  public:
@@ -31,7 +25,7 @@ class Start {
     keep_clear_ends(candidate.guess);
     offer(candidate.guess, false);
     hold(candidate.modes, candidate.guess, true);
-    return result_;
+    return finished();
   }
 
   StartResult run(const std::string& name, const PhasePlan& plan, const Trajectory& guess,
@@ -40,7 +34,7 @@ class Start {
     keep_clear_ends(guess);
     offer(guess, false);
     hold_plan(plan, guess, overlaps);
-    return result_;
+    return finished();
   }
 
   StartResult run(const SeedMotion& seed) {
@@ -61,7 +55,7 @@ class Start {
       const NlpResult solved =
           solve(motion, options_.schedule[stage], rough ? 1e-2 : options_.tolerance);
       note_status(solved);
-      if (solved.status == NlpStatus::kInterrupted) return result_;
+      if (solved.status == NlpStatus::kInterrupted) return finished();
       if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
       motion = transcription_->trajectory(solved.x);
       if (options_.modes || last) {
@@ -69,10 +63,23 @@ class Start {
       }
       if (options_.modes) hold_modes(motion);
     }
-    return result_;
+    return finished();
   }
 
  private:
+  /// A solve may converge and its motion break a limit all the same: one that had no row yet, or one that no drawing in
+  /// keeps between the knots. Then it is the limit that is named, not the convergence.
+  StartResult finished() {
+    const bool converged =
+        result_.status == NlpStatus::kOptimal || result_.status == NlpStatus::kAcceptable;
+    if (converged && result_.motion.size() > 1 && result_.excess > options_.limit_tolerance) {
+      result_.status = NlpStatus::kInfeasible;
+      result_.message =
+          "its motion breaks a limit: " + limit_text(worst_limit(verdict(result_.motion).checks));
+    }
+    return std::move(result_);
+  }
+
   static bool usable(const NlpResult& r) {
     return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
   }
@@ -191,75 +198,6 @@ class Start {
     }
   }
 
-  /// Between far knots a link can cut a corner of an obstacle; drawing in the clearance by as much would close narrow
-  /// ways. Such intervals are cut in four instead. @return false when none is deep enough, or the mesh is full
-  bool split_where_it_touches(const Trajectory& motion) {
-    if (problem_.obstacles.empty() || mesh_.modes.rows() == 0) return false;
-    constexpr double kDeep = 5e-3;  // [m]
-    constexpr int kParts = 4;
-    if (motion.size() > 4 * options_.intervals) return false;
-    ClearanceModel clearance(problem_);
-    std::vector<double> times = {motion.t[0]};
-    std::vector<Eigen::Index> source;
-    for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
-      const double h = motion.t[k + 1] - motion.t[k];
-      bool touches = false;
-      Eigen::VectorXd q;
-      for (int part = 1; part < options_.refine && !touches; ++part) {
-        const double dt = h * part / options_.refine;
-        q = motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k);
-        touches = clearance.nearest(q.data()).distance < -kDeep;
-      }
-      const int parts = touches ? kParts : 1;
-      for (int part = 1; part <= parts; ++part) {
-        times.push_back(part == parts ? motion.t[k + 1] : motion.t[k] + h * part / parts);
-        source.push_back(k);
-      }
-    }
-    const auto intervals = static_cast<Eigen::Index>(source.size());
-    if (intervals + 1 == motion.size()) return false;
-    PhaseMesh split;
-    for (const int knot : mesh_.waypoint_knots) {
-      const auto at = std::find(times.begin(), times.end(), motion.t[knot]);
-      split.waypoint_knots.push_back(static_cast<int>(at - times.begin()));
-    }
-    split.times = Eigen::Map<const Eigen::VectorXd>(times.data(), intervals + 1);
-    split.modes.resize(intervals, mesh_.modes.cols());
-    for (Eigen::Index k = 0; k < intervals; ++k) {
-      const Eigen::Index old = source[static_cast<std::size_t>(k)];
-      split.modes.row(k) = mesh_.modes.row(old);
-      if (!mesh_.of_interval.empty())
-        split.of_interval.push_back(mesh_.of_interval[static_cast<std::size_t>(old)]);
-    }
-    mesh_ = std::move(split);
-    return true;
-  }
-
-  /// Draws in what is broken between the knots. @return false when all limits are kept
-  bool tighten(const std::vector<LimitCheck>& checks) {
-    bool any = false;
-    for (const LimitCheck& c : checks) {
-      if (c.excess <= options_.limit_tolerance) continue;
-      any = true;
-      const double share = 1.0 - 1.3 * c.excess;
-      if (c.what.starts_with("flow of pump")) tightening_.flow *= share;
-      if (c.what.starts_with("flow through valve")) tightening_.valve *= share;
-      if (c.what.starts_with("pressure of pump")) {
-        if (tightening_.limit_pressure) tightening_.pressure *= share;
-        tightening_.limit_pressure = true;
-      }
-      if (c.what.starts_with("distance of the tip from its line")) tightening_.line *= share;
-      if (c.what.starts_with("standard deviation of the pressure")) tightening_.trust *= share;
-      if (c.what.starts_with("clearance")) tightening_.clearance += 1.3 * c.excess;
-      if (c.what.starts_with("position of joint ")) {
-        const int j = model_.machine.joint_index(c.what.substr(18));
-        const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
-        tightening_.position[static_cast<std::size_t>(j)] += 1.3 * c.excess * (r.hi - r.lo);
-      }
-    }
-    return any;
-  }
-
   /// What the exact law says of a motion, between its knots too.
   struct Verdict {
     Trajectory motion;
@@ -318,9 +256,10 @@ class Start {
     for (int attempt = 0;; ++attempt) {
       const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0);
       if (!solve_again || attempt == options_.tightenings) return;
-      if (split_where_it_touches(motion)) {
+      if (split_where_it_touches(problem_, motion, options_.refine, 4 * options_.intervals,
+                                 mesh_)) {
         motion = resampled(motion, mesh_.times);
-      } else if (!tighten(checks)) {
+      } else if (!tightening_.draw_in(problem_, checks, options_.limit_tolerance)) {
         return;
       }
       ++tightenings_used_;
@@ -354,7 +293,7 @@ class Start {
     if (result_.status == NlpStatus::kOptimal && result_.modes_held) return;
     result_.status = solved.status;
     result_.message = solved.message;
-    if (!solved.max_violation_at.empty()) {
+    if (!solved.solved() && !solved.max_violation_at.empty()) {
       result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
     }
   }

@@ -128,6 +128,31 @@ TEST(TimedBound, OneSledTakesDistanceOverSpeedAndARamp) {
   }
 }
 
+TEST(TimedBound, OnePinnedJointTakesAngleOverSpeedAndARamp) {
+  // Its price of time is the same at every angle, so only the curve of the cylinder's length over the angle asks for lines.
+  MotionProblem problem;
+  problem.machine = parse_machine(
+      "name: mast\njoints:\n"
+      "  - {name: boom, type: revolute, parent: base, origin: {xyz: [0, 0, 2]}, axis: [0, -1, 0], "
+      "position: [-0.8, 0.9], velocity: [-0.05, 0.05], acceleration: [-0.4, 0.4]}\n"
+      "tip: {joint: boom, xyz: [2.5, 0, 0]}\nlinks:\n"
+      "  - {name: boom, joint: boom, mass: 400, cog: [1.25, 0, 0], inertia: 200}\n"
+      "cylinders:\n  - {name: boom, joint: boom, bore: 0.15, rod: 0.1, linkage: {type: pins, "
+      "barrel: {frame: base, xyz: [0.2, 0, 0.8]}, rod: {frame: boom, xyz: [0.5, 0, -0.15]}}}\n"
+      "pumps:\n  - {name: main, feeds: [boom], max_flow_lpm: 400, max_pressure_bar: 350, "
+      "standby_bar: 20}\n",
+      "mast", ".");
+  problem.limits = limits_of(problem.machine);
+  problem.start = VectorXd::Constant(1, -0.6);
+  problem.goal = JointGoal{VectorXd::Constant(1, 0.7)};
+  const CraneModel model = test_support::synthetic_model(problem.machine);
+  const TimedBound time = least_duration(model, problem, quick_bound());
+  ASSERT_TRUE(time.valid) << time.message;
+  const double exact = 1.3 / 0.05 + 0.05 / 0.4;
+  EXPECT_LE(time.value, exact);
+  EXPECT_GE(time.value, 0.99 * exact);
+}
+
 TEST(TimedBound, IsBelowEveryMotionFoundAndAboveNothingLess) {
   for (const char* reach : {"loader_crane_lift", "loader_crane_lower"}) {
     const TimedCase c(reach);
@@ -298,6 +323,7 @@ TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
         energy_bound_at(model, problem, entry.at("duration_s").get<double>(), options);
     ASSERT_TRUE(bound.valid) << file << ": " << bound.message;
     EXPECT_LE(bound.value, entry.at("energy_J").get<double>()) << file;
+    EXPECT_LE(entry.at("lower_bound_J").get<double>(), entry.at("energy_J").get<double>()) << file;
     ++tried;
   }
   EXPECT_GE(tried, 15);

@@ -207,6 +207,22 @@ TEST(Optimize, TooShortATimeIsNamedWithTheLimitAndAFeasibleDuration) {
   EXPECT_EQ(optimize(c.model, c.problem, c.seeds, quick()).status, OptimizeStatus::kInfeasible);
 }
 
+TEST(Optimize, AStartThatConvergedToAMotionThatBreaksALimitSaysWhichLimit) {
+  Case c = lift_case();
+  c.problem.payload =
+      9e3;  // more than the pump's pressure lifts: no solve has a row for it at first
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+  ASSERT_EQ(r.status, OptimizeStatus::kInfeasible) << r.message;
+  EXPECT_THAT(r.message, HasSubstr("Worst: pressure of pump"));
+  ASSERT_FALSE(r.starts.empty());
+  int named = 0;
+  for (const StartResult& s : r.starts) {
+    EXPECT_NE(s.status, NlpStatus::kOptimal) << s.seed;
+    if (s.message.find("breaks a limit: pressure of pump") != std::string::npos) ++named;
+  }
+  EXPECT_GT(named, 0);
+}
+
 TEST(Optimize, IdlePowerShortensAFreeMotion) {
   Case c = lift_case();
   c.problem.duration = {0.0, std::numeric_limits<double>::infinity()};

@@ -1,0 +1,230 @@
+#include "bench/haste_case.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <functional>
+#include <limits>
+
+#include "bench/planned_seeds.h"
+#include "optimizer/child_processes.h"
+#include "optimizer/energy_bound_time.h"
+#include "optimizer/energy_grid.h"
+#include "optimizer/strategies.h"
+
+namespace sparflow::bench {
+namespace {
+
+/// As `sparflow optimize` has them.
+constexpr int kDefaultPaths = 8, kDefaultIntervals = 100;
+constexpr double kGridTolerance = 1e-3;  // relative, of limits along a path that no solver has seen
+
+OptimizeOptions usual_options() {
+  OptimizeOptions options;
+  options.intervals = kDefaultIntervals;
+  options.processes = 1;
+  return options;
+}
+
+OptimizeOptions heavy_options(const MotionProblem& problem, const HasteSettings& settings) {
+  OptimizeOptions options = usual_options();
+  options.sequence_rounds = 6;
+  // beside obstacles a solve takes ten times longer; there the ways round are what differs, and they are in the paths
+  if (!problem.obstacles.empty()) return options;
+  options.intervals = settings.intervals;
+  options.search_intervals = settings.intervals / 2;
+  options.smooth_starts = 4;
+  options.sequential_starts = 16;
+  options.grid_starts = 8;
+  options.grid_nodes = 40000;
+  options.searched_starts = 4;
+  return options;
+}
+
+int heavy_paths(const MotionProblem& problem, const HasteSettings& settings) {
+  return problem.obstacles.empty() ? settings.paths : settings.paths_beside_obstacles;
+}
+
+std::string heavy_name(int k) { return fmt::format("heavy {}", k + 1); }
+
+/// Runs one search and keeps what it came to. @param search returns (value, start)
+void add(std::vector<HasteFound>& found, const std::string& name,
+         const std::function<std::pair<double, std::string>()>& search) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto [value, from] = search();
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  found.push_back({name, value, took.count(), from});
+}
+
+std::pair<double, std::string> outcome(const OptimizeResult& r, double value) {
+  if (r.best_start < 0) return {0.0, r.message};
+  return {value, r.starts[static_cast<std::size_t>(r.best_start)].seed};
+}
+
+/// Searches of one reach.
+class Haste {
+ public:
+  Haste(const ReachTask& task, const HasteSettings& settings)
+      : model_(*task.model), settings_(settings), problem_(task.problem) {
+    problem_.idle_power = 0.0;
+    problem_.objective = {};
+    usual_ = planned_seeds(problem_, kDefaultPaths, kDefaultIntervals);
+    // the default run's random seed is 1
+    for (int k = 0; k < settings.seeds; ++k) {
+      heavy_.push_back(planned_seeds(problem_, heavy_paths(problem_, settings), settings.intervals,
+                                     static_cast<std::uint64_t>(k) + 2));
+    }
+  }
+
+  HasteFigures run() {
+    if (usual_.empty()) return figures_;
+    shortest_times();
+    figures_.duration = settings_.factor * best_of(figures_.times);
+    if (!(figures_.duration > 0.0)) return figures_;
+    problem_.duration = {figures_.duration, figures_.duration};
+    energies();
+    if (settings_.bounds) bounds();
+    return figures_;
+  }
+
+ private:
+  void shortest_times() {
+    std::vector<HasteFound>& found = figures_.times;
+    MotionProblem timed = problem_;
+    timed.objective.energy = 0.0;
+    timed.objective.time = 1e3;
+    timed.duration = {0.0, std::numeric_limits<double>::infinity()};
+    const auto of = [](const OptimizeResult& r) { return outcome(r, r.duration); };
+    add(found, "default", [&] { return of(optimize(model_, timed, usual_, usual_options())); });
+    add(found, "named when infeasible",
+        [&] { return of(shortest_motion(model_, problem_, usual_, usual_options())); });
+    add(found, "strategies", [&] {
+      StrategyOptions options = strategy_options();
+      options.equal_time = false;
+      const StrategyComparison c = compare_strategies(model_, problem_, usual_, options);
+      return std::pair{c.shortest, c.shortest_of};
+    });
+    for (std::size_t k = 0; k < heavy_.size(); ++k) {
+      add(found, heavy_name(static_cast<int>(k)), [&] {
+        return of(optimize(model_, timed, heavy_[k], heavy_options(problem_, settings_)));
+      });
+    }
+  }
+
+  void energies() {
+    std::vector<HasteFound>& found = figures_.energies;
+    const double duration = figures_.duration;
+    const auto of = [](const OptimizeResult& r) { return outcome(r, r.energy.total); };
+    add(found, "default",
+        [&] { return of(optimize_at(model_, problem_, usual_, duration, usual_options())); });
+    add(found, "strategies", [&] {
+      const StrategyComparison c = compare_strategies(model_, problem_, usual_, strategy_options());
+      const StrategyRow* row = c.row("equal");
+      const StrategyOutcome* best = row != nullptr ? row->find(kOptimal) : nullptr;
+      return best != nullptr && best->found() ? std::pair{best->energy.total, best->detail}
+                                              : std::pair{0.0, c.message};
+    });
+    add(found, kDynamicProgramming, [&] { return driven_grid_path(); });
+    add(found, "a slower optimum, squeezed", [&] {
+      constexpr double kSlower = 1.4;
+      const OptimizeResult slow =
+          optimize_at(model_, problem_, usual_, kSlower * duration, usual_options());
+      if (slow.best_start < 0) return outcome(slow, 0.0);
+      return of(optimize_at(model_, problem_, {{"slower optimum", slow.motion, 0.0, false}},
+                            duration, heavy_options(problem_, settings_)));
+    });
+    for (std::size_t k = 0; k < heavy_.size(); ++k) {
+      add(found, heavy_name(static_cast<int>(k)), [&] {
+        return of(
+            optimize_at(model_, problem_, heavy_[k], duration, heavy_options(problem_, settings_)));
+      });
+    }
+  }
+
+  StrategyOptions strategy_options() const {
+    StrategyOptions options;
+    options.least_control = false;
+    options.baselines.intervals = kDefaultIntervals;
+    options.optimize = options.baselines.optimize = usual_options();
+    return options;
+  }
+
+  /// The grid's cheapest path for this time, as it is: no solver after it.
+  std::pair<double, std::string> driven_grid_path() const {
+    if (problem_.tip_line || !problem_.waypoints.empty() || model_.machine.joint_count() > 4)
+      return {0.0, "no grid"};
+    EnergyGrid grid(model_, problem_, {settings_.grid_nodes});
+    const GridPath path = grid.path_for_duration(figures_.duration);
+    if (!path.found || path.duration_s > figures_.duration) return {0.0, "no path this fast"};
+    const Trajectory motion = timed_grid_path(model_, problem_, path, figures_.duration);
+    constexpr int kDensity = 16;
+    if (worst_excess(check_limits(model_, problem_, motion, kDensity)) > kGridTolerance)
+      return {0.0, "breaks a limit"};
+    return {exact_total_energy(model_, motion, problem_.payload, kDensity), "grid path"};
+  }
+
+  void bounds() {
+    const TimedBound time = least_duration(model_, problem_);
+    if (time.valid) figures_.least_duration = time.value;
+    const TimedBound energy = energy_bound_at(model_, problem_, figures_.duration);
+    if (energy.valid) figures_.least_energy = energy.value;
+  }
+
+  const CraneModel& model_;
+  const HasteSettings& settings_;
+  MotionProblem problem_;
+  std::vector<SeedMotion> usual_;
+  std::vector<std::vector<SeedMotion>> heavy_;
+  HasteFigures figures_;
+};
+
+void pack_found(Packer& p, const std::vector<HasteFound>& found) {
+  p.number(static_cast<double>(found.size()));
+  for (const HasteFound& f : found) p.text(f.search).number(f.value).number(f.seconds).text(f.from);
+}
+
+std::vector<HasteFound> unpack_found(Unpacker& u) {
+  std::vector<HasteFound> found(static_cast<std::size_t>(u.number()));
+  for (HasteFound& f : found) {
+    f.search = u.text();
+    f.value = u.number();
+    f.seconds = u.number();
+    f.from = u.text();
+  }
+  return found;
+}
+
+}  // namespace
+
+double best_of(const std::vector<HasteFound>& found) {
+  double best = 0.0;
+  for (const HasteFound& f : found) {
+    if (f.value > 0.0 && (best == 0.0 || f.value < best)) best = f.value;
+  }
+  return best;
+}
+
+HasteFigures haste_of(const ReachTask& task, const HasteSettings& settings) {
+  return Haste(task, settings).run();
+}
+
+std::string pack_haste(const HasteFigures& f) {
+  Packer p;
+  pack_found(p, f.times);
+  pack_found(p, f.energies);
+  p.number(f.duration).number(f.least_duration).number(f.least_energy);
+  return p.bytes();
+}
+
+HasteFigures unpack_haste(const std::string& bytes) {
+  Unpacker u(bytes);
+  HasteFigures f;
+  f.times = unpack_found(u);
+  f.energies = unpack_found(u);
+  f.duration = u.number();
+  f.least_duration = u.number();
+  f.least_energy = u.number();
+  return f;
+}
+
+}  // namespace sparflow::bench

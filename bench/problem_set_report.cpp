@@ -1,0 +1,164 @@
+#include "bench/problem_set_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "optimizer/strategies_statistics.h"
+
+namespace sparflow::bench {
+namespace {
+
+/// A bound is tight where the cheapest path of the grid, driven slowly, lies this close above the bound of any motion: the
+/// lattice then is fine enough, whatever the optimiser found.
+constexpr double kTight = 0.015;
+
+constexpr double kWithin = 0.02;  // what is asked of a gap
+
+struct Count {
+  int feasible = 0, solved = 0, infeasible = 0, named = 0, above_baseline = 0, wrongly_solved = 0;
+  int below_bound = 0;
+  // excess over the certified bound, from 3 times the shortest time on and below it
+  std::vector<double> bound_slow, bound_fast;
+  std::vector<double> bound_tight;  // of bound_slow, where the bound is tight
+  std::vector<double> gap, sequential, line, seconds;
+};
+
+bool tight(const ReachFigures& f) {
+  return f.unlimited > 0.0 && f.unlimited < (1.0 + kTight) * f.slow_bound;
+}
+
+std::ptrdiff_t within(const std::vector<double>& excess) {
+  return std::count_if(excess.begin(), excess.end(), [](double x) { return x <= kWithin; });
+}
+
+void print_infeasible(const ReachTask& task, const ReachFigures& f, Count& c) {
+  const bool solved = f.optimum() != nullptr;
+  ++c.infeasible;
+  if (solved) ++c.wrongly_solved;
+  if (!solved && !f.named.empty()) ++c.named;
+  fmt::print("{:44} infeasible ({}): {}\n", task.problem.name, task.why_not,
+             solved            ? "SOLVED"
+             : f.named.empty() ? "NOT NAMED"
+                               : f.named);
+}
+
+/// How the other ways stand to the optimum, counted and in words.
+std::string against_ways(const ReachFigures& f, const StrategyOutcome& best, Count& c) {
+  std::string text;
+  for (const StrategyOutcome& o : f.comparison.row("equal")->outcomes) {
+    if (!o.found() || o.kind == kOptimal || o.kind == kMinimumTime) continue;
+    const double excess = o.energy.total / best.energy.total - 1.0;
+    if (excess < 0.0) ++c.above_baseline;
+    if (o.kind == kSequential) c.sequential.push_back(excess);
+    if (o.kind == kJointLine) c.line.push_back(excess);
+    if (o.kind == kSequential || o.kind == kJointLine || o.kind == kTipLine)
+      text += fmt::format("  {} {:+.1f} %", o.kind, 100.0 * excess);
+  }
+  return text;
+}
+
+/// How the optimum stands to its bounds, counted and in words.
+std::string against_bounds(const ReachTask& task, const ReachFigures& f,
+                           const StrategyOutcome& best, Count& c) {
+  std::string text;
+  if (f.bound > 0.0) {
+    const double excess = best.energy.total / f.bound - 1.0;
+    if (excess < 0.0) ++c.below_bound;
+    const bool slow = best.duration >= 3.0 * f.comparison.shortest;
+    if (!task.hemmed_in()) (slow ? c.bound_slow : c.bound_fast).push_back(excess);
+    if (!task.hemmed_in() && slow && tight(f)) c.bound_tight.push_back(excess);
+    text += fmt::format("  bound {:+.1f} %", 100.0 * excess);
+  }
+  if (f.unlimited > 0.0) {
+    c.gap.push_back(best.energy.total / f.unlimited - 1.0);
+    text += fmt::format("  unlimited time {:.2f} kJ", f.unlimited / 1e3);
+  }
+  return text;
+}
+
+void print_spread(const char* what, const std::vector<double>& v) {
+  if (v.empty()) return;
+  fmt::print(
+      "{}: median {:+.2f} %, quartiles {:+.2f} .. {:+.2f}, 95th {:+.2f}, worst {:+.2f} ({} "
+      "reaches)\n",
+      what, 100 * quantile(v, 0.5), 100 * quantile(v, 0.25), 100 * quantile(v, 0.75),
+      100 * quantile(v, 0.95), 100 * quantile(v, 1.0), v.size());
+}
+
+void print_counts(const Count& c) {
+  fmt::print(
+      "\nfeasible {}: solved {} ({:.1f} %)\ninfeasible {}: named {}, solved all the same {}\n",
+      c.feasible, c.solved, 100.0 * c.solved / std::max(1, c.feasible), c.infeasible, c.named,
+      c.wrongly_solved);
+  fmt::print("optimum above a baseline: {} times\n", c.above_baseline);
+  print_spread("sequential over the optimum", c.sequential);
+  print_spread("simultaneous (best end) over the optimum", c.line);
+  fmt::print("optimum below its certified bound: {} times\n", c.below_bound);
+  print_spread("optimum over the certified bound, from 3 times the shortest time on", c.bound_slow);
+  print_spread("optimum over the certified bound, in less time", c.bound_fast);
+  if (!c.bound_slow.empty()) {
+    fmt::print(
+        "within 2 % of it from 3 times the shortest time on: {} of {}; where the bound is tight: "
+        "{} of {}\n",
+        within(c.bound_slow), c.bound_slow.size(), within(c.bound_tight), c.bound_tight.size());
+  }
+  print_spread("optimum over the grid's cheapest path at unlimited time", c.gap);
+  fmt::print("seconds a comparison: median {:.1f}, worst {:.1f}\n", quantile(c.seconds, 0.5),
+             quantile(c.seconds, 1.0));
+}
+
+}  // namespace
+
+void print_reaches(const std::vector<ReachTask>& tasks, const std::vector<ReachFigures>& figures) {
+  Count c;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const ReachFigures& f = figures[i];
+    const StrategyOutcome* best = f.optimum();
+    if (f.left_out) continue;
+    c.seconds.push_back(f.comparison.solve_s);
+    if (!tasks[i].meant_feasible) {
+      print_infeasible(tasks[i], f, c);
+      continue;
+    }
+    ++c.feasible;
+    if (best == nullptr) {
+      fmt::print("{:44} not solved: {}\n", tasks[i].problem.name, f.named);
+      continue;
+    }
+    ++c.solved;
+    const std::string others = against_ways(f, *best, c) + against_bounds(tasks[i], f, *best, c);
+    fmt::print("{:44} {:8.2f} kJ {:6.2f} s ({:.2f} x shortest){}\n", tasks[i].problem.name,
+               best->energy.total / 1e3, best->duration, best->duration / f.comparison.shortest,
+               others);
+  }
+  print_counts(c);
+}
+
+void print_gap_by_time(const std::vector<ReachTask>& tasks,
+                       const std::vector<ReachFigures>& figures) {
+  constexpr double kFrom[] = {1.0, 1.3, 2.0, 3.0, 3.4, 1e9};
+  fmt::print(
+      "\ntime / shortest | tight | within 2 % of the bound | optimum above it, median, 95th | "
+      "above the slow path, median\n");
+  for (std::size_t k = 0; k + 1 < std::size(kFrom); ++k) {
+    std::vector<double> excess, slow;
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      const ReachFigures& f = figures[i];
+      const StrategyOutcome* best = f.optimum();
+      if (!tasks[i].meant_feasible || best == nullptr || !(f.unlimited > 0.0)) continue;
+      if (tasks[i].hemmed_in()) continue;
+      const double ratio = best->duration / f.comparison.shortest;
+      if (ratio < (k == 0 ? 0.0 : kFrom[k]) || ratio >= kFrom[k + 1]) continue;
+      slow.push_back(best->energy.total / f.unlimited - 1.0);
+      if (tight(f)) excess.push_back(best->energy.total / f.bound - 1.0);
+    }
+    if (excess.empty()) continue;
+    fmt::print("{:.1f} .. {:<6} | {:3} | {:3} | {:.2f} %, {:.2f} % | {:.2f} %\n", kFrom[k],
+               k + 2 < std::size(kFrom) ? fmt::format("{:.1f}", kFrom[k + 1]) : "", excess.size(),
+               within(excess), 100.0 * quantile(excess, 0.5), 100.0 * quantile(excess, 0.95),
+               100.0 * quantile(slow, 0.5));
+  }
+}
+
+}  // namespace sparflow::bench

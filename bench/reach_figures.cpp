@@ -1,0 +1,113 @@
+#include "bench/reach_figures.h"
+
+#include <algorithm>
+
+#include "bench/planned_seeds.h"
+#include "optimizer/child_processes.h"
+#include "optimizer/energy_bound_time.h"
+#include "optimizer/energy_grid.h"
+
+namespace sparflow::bench {
+namespace {
+
+/// What --write-optima wrote of a problem: energies and times without the motions.
+StrategyComparison earlier_comparison(const nlohmann::json& entry) {
+  StrategyComparison c;
+  if (!entry.contains("energies_J")) return c;
+  c.shortest = entry.at("shortest_s").get<double>();
+  c.solve_s = entry.at("solve_s").get<double>();
+  StrategyRow row;
+  row.name = "equal";
+  for (const auto& [kind, energy] : entry.at("energies_J").items()) {
+    StrategyOutcome o;
+    o.kind = kind;
+    o.duration = entry.at("duration_s").get<double>();
+    o.energy.total = energy.get<double>();
+    o.motion.t = Eigen::Vector2d(0.0, o.duration);  // found
+    row.outcomes.push_back(std::move(o));
+  }
+  c.rows.push_back(std::move(row));
+  return c;
+}
+
+void compare(const ReachTask& task, const ReachSettings& settings, ReachFigures& f) {
+  const std::vector<SeedMotion> seeds =
+      planned_seeds(task.problem, settings.paths, settings.intervals, 1, &f.named);
+  if (seeds.empty()) return;
+  if (settings.faster_than > 0.0 && task.meant_feasible) {
+    // a first guess of the shortest time, with room for what it is too long by
+    constexpr double kRoom = 1.02;
+    OptimizeOptions quick;
+    quick.processes = 1;
+    const OptimizeResult fast = shortest_motion(*task.model, task.problem, seeds, quick);
+    f.left_out = fast.best_start >= 0 &&
+                 task.problem.duration.min > kRoom * settings.faster_than * fast.duration;
+    if (f.left_out) return;
+  }
+  StrategyOptions options;
+  options.idle_power = task.problem.idle_power;
+  options.least_control = false;
+  options.baselines.intervals = options.optimize.intervals = settings.intervals;
+  options.baselines.polished_orders = 2;
+  options.optimize.processes = 1;
+  options.baselines.optimize = options.optimize;
+  f.comparison = compare_strategies(*task.model, task.problem, seeds, options);
+  f.named = f.comparison.message;
+}
+
+}  // namespace
+
+ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
+  ReachFigures f;
+  if (const auto earlier = settings.optima.find(task.problem.name);
+      earlier != settings.optima.end()) {
+    f.comparison = earlier_comparison(*earlier);
+    f.named = earlier->value("named", "");
+  } else {
+    compare(task, settings, f);
+  }
+  if (f.left_out) return f;
+  f.comparison.problem = task.problem.name;
+  f.comparison.file = task.problem.file;
+  if (settings.bound) {
+    const EnergyBound bound = energy_bound(*task.model, task.problem);
+    if (bound.valid) f.bound = f.slow_bound = bound.lower_bound_J;
+    const StrategyOutcome* best = f.optimum();
+    if (settings.timed && bound.valid && best != nullptr) {
+      const TimedBound timed = energy_bound_at(*task.model, task.problem, best->duration);
+      if (timed.valid) f.bound = std::max(f.bound, timed.value);
+    }
+  }
+  if (settings.grid && task.problem.machine.joint_count() <= 4) {
+    EnergyGridOptions grid;
+    grid.nodes = 20000;
+    const GridPath path = EnergyGrid(*task.model, task.problem, grid).cheapest_path(0.0);
+    if (path.found) f.unlimited = path.slow_energy_J;
+  }
+  return f;
+}
+
+std::string pack_figures(const ReachFigures& f) {
+  return Packer()
+      .text(packed(f.comparison))
+      .number(f.unlimited)
+      .number(f.bound)
+      .number(f.slow_bound)
+      .text(f.named)
+      .number(f.left_out ? 1.0 : 0.0)
+      .bytes();
+}
+
+ReachFigures unpack_figures(const std::string& bytes) {
+  Unpacker u(bytes);
+  ReachFigures f;
+  f.comparison = unpacked_comparison(u.text());
+  f.unlimited = u.number();
+  f.bound = u.number();
+  f.slow_bound = u.number();
+  f.named = u.text();
+  f.left_out = u.number() > 0.0;
+  return f;
+}
+
+}  // namespace sparflow::bench

@@ -1,0 +1,40 @@
+#pragma once
+/// One reach solved by every way of docs/strategies.md in equal time, with its bounds.
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "bench/reach_tasks.h"
+#include "optimizer/strategies.h"
+
+namespace sparflow::bench {
+
+struct ReachFigures {
+  StrategyComparison comparison;
+  double bound = 0.0;       ///< [J] certified, of motions in the optimum's time; 0 = none
+  double slow_bound = 0.0;  ///< [J] of any motion of any duration
+  double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
+  std::string named;        ///< what is said of an infeasible one
+  bool left_out = false;    ///< by ReachSettings::faster_than
+  /// The optimum in equal time; null when there is none.
+  const StrategyOutcome* optimum() const {
+    const StrategyRow* row = comparison.row("equal");
+    const StrategyOutcome* best = row != nullptr ? row->find(kOptimal) : nullptr;
+    return best != nullptr && best->found() ? best : nullptr;
+  }
+};
+
+struct ReachSettings {
+  int intervals = 100, paths = 4;
+  bool grid = true, bound = true, timed = true;
+  double faster_than = 0.0;  ///< times the shortest time: slower reaches are left out; 0 = none is
+  nlohmann::json optima =
+      nlohmann::json::object();  ///< by problem: of an earlier run, not solved again
+};
+
+ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings);
+
+/// Through the pipe of a child process.
+std::string pack_figures(const ReachFigures& f);
+ReachFigures unpack_figures(const std::string& bytes);
+
+}  // namespace sparflow::bench

@@ -1,0 +1,116 @@
+#include "bench/reach_tasks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include "models/kinematics.h"
+#include "models/model_file.h"
+#include "problems/bundled.h"
+#include "problems/problem_file.h"
+#include "problems/time_parametrise.h"
+
+namespace sparflow::bench {
+namespace {
+
+/// A reach between two random postures, or one made infeasible on purpose (every tenth).
+ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  ReachTask task;
+  task.model = &model;
+  MotionProblem& p = task.problem;
+  p = base;
+  p.file.clear();
+  p.obstacles.clear();
+  p.tip_line.reset();
+  p.idle_power = 0.0;
+  p.name = fmt::format("{} random {}", base.machine.name, seed);
+  const Eigen::Index n = p.start.size();
+  const auto posture = [&] {
+    Eigen::VectorXd q(n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Range& r = p.limits.position[static_cast<std::size_t>(j)];
+      q[j] = r.lo + (0.05 + 0.9 * unit(random)) * (r.hi - r.lo);  // off the ends of the range
+    }
+    return q;
+  };
+  p.start = posture();
+  const Eigen::VectorXd end = posture();
+  p.payload = std::floor(300.0 * unit(random));
+  const Eigen::Vector3d tip = tip_position<double>(p.machine, end);
+  p.goal = TipGoal{tip};
+  Eigen::MatrixXd line(2, n);
+  line << p.start.transpose(), end.transpose();
+  const double reach = time_parametrise(p, line, 0.0).shortest;
+  // time enough: what the straight line to the posture behind the goal needs, up to four times that
+  const double duration = std::max(1.0, reach * (1.02 + 3.0 * unit(random) * unit(random)));
+  p.duration = {duration, duration};
+  if (seed % 10 == 0) {
+    task.meant_feasible = false;
+    const Eigen::Vector3d base_point = tip_position<double>(p.machine, p.start);
+    if (seed % 20 == 0) {
+      task.why_not = "out of reach";
+      Eigen::Vector3d out = tip;
+      out.x() = (out.x() < 0.0 ? -1.0 : 1.0) * (20.0 + base_point.norm());
+      p.goal = TipGoal{out};
+    } else {
+      task.why_not = "too short a time";
+      p.duration = {0.15 * reach, 0.15 * reach};
+    }
+  }
+  return task;
+}
+
+}  // namespace
+
+const CraneModel& ModelShelf::at(const std::string& file) {
+  for (const auto& [name, model] : models_) {
+    if (name == file) return *model;
+  }
+  models_.emplace_back(file, std::make_unique<CraneModel>(load_model(file)));
+  return *models_.back().second;
+}
+
+std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models) {
+  std::vector<ReachTask> tasks;
+  for (const std::string& file : bundled_files("reaches", ".yaml")) {
+    if (file.find(only) == std::string::npos) continue;
+    MotionProblem problem = load_problem(file);
+    std::string model_file = problem.model_path;
+    if (model_file.empty() && problem.machine.name == "loader-crane")
+      model_file = bundled_file("models/loader_crane.json");
+    if (model_file.empty()) continue;
+    ReachTask task;
+    task.model = &models.at(model_file);
+    task.problem = load_problem(file, &task.model->machine);
+    // the infeasible ones say so in their first line
+    std::ifstream in(file);
+    std::string first;
+    std::getline(in, first);
+    task.meant_feasible = first.find("Infeasible") == std::string::npos;
+    task.why_not = first;
+    tasks.push_back(std::move(task));
+  }
+  return tasks;
+}
+
+std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelShelf& models) {
+  std::vector<ReachTask> tasks;
+  tasks.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
+    const char* reach = own % 3 != 0   ? "loader_crane_fold"
+                        : own % 2 != 0 ? "hmf_lift"
+                                       : "swing_crane_far";
+    const std::string file = bundled_file(std::string("reaches/") + reach + ".yaml");
+    const CraneModel& model = models.at(load_problem(file).model_path);
+    tasks.push_back(random_task(load_problem(file, &model.machine), model, own));
+  }
+  return tasks;
+}
+
+}  // namespace sparflow::bench
