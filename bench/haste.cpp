@@ -113,10 +113,13 @@ int run(int argc, char** argv) {
   int random_count = 0, processes = 2;
   std::uint64_t seed = 1;
   std::string only, json;
+  bool open = false;
   HasteSettings settings;
   app.add("--random", random_count, "random reaches instead of the bundled ones");
   app.add("--seed", seed, "of the first random reach");
   app.add("--only", only, "bundled reaches whose name contains this");
+  app.flag("--open", open,
+           "only reaches with nothing in the way: beside obstacles one takes many minutes");
   app.add("--factor", settings.factor, "of the shortest time, for the energies").positive();
   app.add("--paths", settings.paths, "seed paths of a heavy search").positive();
   app.add("--intervals", settings.intervals, "of its mesh").positive();
@@ -129,7 +132,9 @@ int run(int argc, char** argv) {
   ModelShelf models;
   std::vector<ReachTask> tasks =
       random_count > 0 ? random_tasks(random_count, seed, models) : bundled_tasks(only, models);
-  std::erase_if(tasks, [](const ReachTask& task) { return !task.meant_feasible; });
+  std::erase_if(tasks, [&](const ReachTask& task) {
+    return !task.meant_feasible || (open && !task.problem.obstacles.empty());
+  });
   const int count = static_cast<int>(tasks.size());
   const auto task = [&](int i) -> const ReachTask& { return tasks[static_cast<std::size_t>(i)]; };
   const std::vector<ChildResult> results = run_in_children(

@@ -213,6 +213,27 @@ std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
       }
     }
   }
+  // the longest phase in which several move cut in two, each of them at rest in one half
+  Index longest = -1;
+  for (Index p = 0; p < phases; ++p) {
+    const bool several =
+        std::count_if(plan.modes.row(p).begin(), plan.modes.row(p).end(), moves) > 1;
+    if (several && (longest < 0 || plan.durations[p] > plan.durations[longest])) longest = p;
+  }
+  if (longest < 0) return found;
+  ModeTable halves(phases + 1, cylinders);
+  halves << plan.modes.topRows(longest + 1), plan.modes.bottomRows(phases - longest);
+  VectorXd times(phases + 1);
+  times << plan.durations.head(longest + 1), plan.durations.tail(phases - longest);
+  times.segment(longest, 2) *= 0.5;
+  for (Index c = 0; c < cylinders; ++c) {
+    if (!moves(plan.modes(longest, c))) continue;
+    for (const Index half : {longest, longest + 1}) {
+      ModeTable modes = halves;
+      modes(half, c) = CylinderMode::kRest;
+      build(modes, times);
+    }
+  }
   return found;
 }
 

@@ -32,7 +32,8 @@ PhasePlan with_overlaps(const PhasePlan& plan, double share);
 PhasePlan without_short(const PhasePlan& plan, double shortest);
 
 /// Neighbours of a plan, for a search over mode sequences: every phase left out, every two neighbours exchanged or made
-/// one, every cylinder that moves in a phase begun or ended one phase earlier or later. Every cylinder that moves in
+/// one, every cylinder that moves in a phase begun or ended one phase earlier or later; the longest phase in which several
+/// move cut in two, one of them at rest in either half (all together has no other neighbour). Every cylinder that moves in
 /// `plan` moves in each of them too, the same number of directions. None for a plan with waypoints.
 std::vector<PhasePlan> neighbours(const PhasePlan& plan);
 

@@ -78,6 +78,19 @@ TEST(Phases, NeighboursExchangeJoinAndShiftButLoseNoMove) {
   EXPECT_FALSE(has(all, from));
 }
 
+TEST(Phases, AllTogetherHasNeighboursInWhichOneBeginsLaterOrEndsEarlier) {
+  const std::vector<PhasePlan> all = neighbours(plan({{kE, kR}}, {4.0}));
+  EXPECT_EQ(all.size(), 4u);
+  EXPECT_TRUE(has(all, plan({{kO, kR}, {kE, kR}}, {2.0, 2.0})));
+  EXPECT_TRUE(has(all, plan({{kE, kR}, {kO, kR}}, {2.0, 2.0})));
+  EXPECT_TRUE(has(all, plan({{kE, kO}, {kE, kR}}, {2.0, 2.0})));
+  EXPECT_TRUE(has(all, plan({{kE, kR}, {kE, kO}}, {2.0, 2.0})));
+  for (const PhasePlan& p : all) EXPECT_NEAR(p.total(), 4.0, 1e-12);
+  // only the longest such phase is cut
+  EXPECT_FALSE(has(neighbours(plan({{kE, kR}, {kE, kO}, {kE, kR}}, {1.0, 1.0, 4.0})),
+                   plan({{kO, kR}, {kE, kR}, {kE, kO}, {kE, kR}}, {0.5, 0.5, 1.0, 4.0})));
+}
+
 TEST(Phases, AMeshHasAKnotAtEveryChangeAndKeepsTheShares) {
   const PhasePlan p = plan({{kE, kO}, {kO, kR}, {kE, kO}}, {1.0, 0.01, 3.0});
   const PhaseMesh mesh = mesh_of(p, 40, 5);
