@@ -243,9 +243,9 @@ bool comes(const std::string& path, const std::string& text, double seconds) {
 }
 
 TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
-  // starts on a fine mesh between obstacles: minutes of work on one core
-  Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
-                   model(), "--intervals", "400", "--json", at("o.json")},
+  // starts on a very fine mesh between obstacles: minutes of work
+  Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_beam.yaml", "--model",
+                   model(), "--intervals", "2000", "--json", at("o.json")},
                   at("out"), at("err"));
   ASSERT_TRUE(comes(at("err"), "optimize: 10 s, ", 120.0)) << slurp(at("err"));
   EXPECT_THAT(slurp(at("err")), StartsWith("optimize ...\n"));
