@@ -289,13 +289,18 @@ Unexplained describe(const Evidence& evidence, const Leftover& left) {
 
 /// Effects beside others that are none: a large error stays where they show best, and they are no name for it.
 void drop_trifles(Diagnosis& d, const SearchOptions& options) {
-  for (std::size_t i = 0; i < d.search.found.size();) {
-    std::size_t sound = 0;
-    for (std::size_t k = 0; k < d.search.found.size(); ++k)
-      sound += is_a_trifle(d, describe(d, k, options)) ? 0 : 1;
-    const DiagnosedEffect e = describe(d, i, options);
-    if (sound == 0 || !is_a_trifle(d, e)) {
-      ++i;
+  std::vector<DiagnosedEffect> all;
+  all.reserve(d.search.found.size());
+  for (std::size_t i = 0; i < d.search.found.size(); ++i) all.push_back(describe(d, i, options));
+  const auto trifles = std::count_if(all.begin(), all.end(),
+                                     [&](const DiagnosedEffect& e) { return is_a_trifle(d, e); });
+  if (trifles == 0 || trifles == std::ssize(all)) return;
+  std::vector<FoundEffect> kept;
+  kept.reserve(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const DiagnosedEffect& e = all[i];
+    if (!is_a_trifle(d, e)) {
+      kept.push_back(std::move(d.search.found[i]));
       continue;
     }
     d.notes.push_back(
@@ -303,10 +308,9 @@ void drop_trifles(Diagnosis& d, const SearchOptions& options) {
                     e.key(), 100.0 * (1.0 - explained_share(d, e)),
                     d.evidence.channels[e.channels.front().channel].text));
     if (!d.unexplained) d.unexplained = describe_trifle(d.evidence, e);
-    d.search.final = fit_without(d, i);
-    d.search.found.erase(d.search.found.begin() + static_cast<std::ptrdiff_t>(i));
-    i = 0;
   }
+  d.search.found = std::move(kept);
+  d.search.final = fit_without(d, d.search.found.size());
 }
 
 /// Evidence that only an implausible effect would fit: place and size, without a name.
