@@ -229,6 +229,7 @@ void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOpt
     out.q.col(j) = joint.value;
     out.qd.col(j) = joint.first;
     out.qdd.col(j) = joint.second;
+    quieten_acceleration(out.time, out.runs, out.q_measured.col(j), filter, out.qdd.col(j));
     out.usable = out.usable && joint.value.array().isFinite() && joint.first.array().isFinite();
   }
   out.tip = Eigen::MatrixXd::Constant(n, 3, kNaN);

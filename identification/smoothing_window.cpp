@@ -159,4 +159,31 @@ SavitzkyGolay make_filter(const Log& log, const SmoothingOptions& options) {
   return {log.time, log.runs, window, options.order};
 }
 
+void quieten_acceleration(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
+                          const Eigen::VectorXd& positions, const SavitzkyGolay& filter,
+                          Eigen::Ref<Eigen::VectorXd> second) {
+  constexpr double kNoise = 3.0;  // standard deviations
+  const Eigen::VectorXd narrow = second;
+  const double noise = noise_of(positions, runs) * filter.noise_gain(2);
+  for (const double wider : {1.4, 2.0, 3.0}) {
+    const SavitzkyGolay wide(time, runs, wider * filter.window(), filter.order());
+    const Eigen::VectorXd quiet = wide.apply(positions, 2);
+    const double reach = 0.5 * wide.window();
+    const auto differs = [&](Eigen::Index i) {
+      return !(std::abs(narrow[i] - quiet[i]) < kNoise * noise);
+    };
+    for (const SampleRange& run : runs) {
+      double last = -INFINITY;        // time of the last sample in which the windows differ
+      Eigen::Index next = run.begin;  // and the next such sample
+      for (Eigen::Index i = run.begin; i < run.end; ++i) {
+        if (differs(i)) last = time[i];
+        next = std::max(next, i);
+        while (next < run.end && !differs(next)) ++next;
+        const double ahead = next < run.end ? time[next] : INFINITY;
+        if (std::min(time[i] - last, ahead - time[i]) > reach) second[i] = quiet[i];
+      }
+    }
+  }
+}
+
 }  // namespace sparflow

@@ -222,5 +222,46 @@ TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
   EXPECT_DOUBLE_EQ(sharpest_window(time, {{0, 8000}}, rough, 0.2), 0.2);
 }
 
+/// Starts, goes on steadily, stops: noise of the steady part is what makes an inertia too small.
+TEST(QuietenAcceleration, KeepsStartsAndStopsAndLosesTheNoiseBetween) {
+  constexpr int kRows = 600;
+  constexpr double kRow = 0.02, kDigits = 4.5e-4, kRamp = 0.4, kSpeed = 0.1;
+  Eigen::VectorXd time(kRows), smooth(kRows), q(kRows);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  double speed = 0.0, position = 0.0;
+  for (int i = 0; i < kRows; ++i) {
+    time[i] = kRow * i;
+    const bool starts = time[i] >= 2.0 && time[i] < 2.0 + kRamp - 1e-9;
+    const bool stops = time[i] >= 9.0 && time[i] < 9.0 + kRamp - 1e-9;
+    const double acceleration = (starts ? 1.0 : stops ? -1.0 : 0.0) * kSpeed / kRamp;
+    position += kRow * speed + 0.5 * kRow * kRow * acceleration;
+    speed += kRow * acceleration;
+    smooth[i] = position;
+    q[i] = position + kDigits * normal(random);
+  }
+  const std::vector<SampleRange> runs = {{0, kRows}};
+  const SavitzkyGolay filter(time, runs, 0.24);
+  const Eigen::VectorXd narrow = filter.apply(q, 2), truth = filter.apply(smooth, 2);
+  Eigen::VectorXd quiet = narrow;
+  quieten_acceleration(time, runs, q, filter, quiet);
+  const auto rms = [](const auto& v) {
+    return std::sqrt(v.squaredNorm() / static_cast<double>(v.size()));
+  };
+  // three times the window, to the power 2.5: a fifteenth; up to ten where chance makes the windows differ
+  EXPECT_LT(rms(quiet.segment(200, 200)), 0.1 * rms(narrow.segment(200, 200)));
+  // what an inertia is fitted by: its scale against the truth through the same filter
+  const auto scale = [&](const Eigen::VectorXd& a) { return a.dot(truth) / a.squaredNorm(); };
+  EXPECT_LT(scale(narrow), 0.75);
+  EXPECT_NEAR(scale(quiet), 1.0, 0.12);
+  // without noise every window says the same or the narrow one stays
+  Eigen::VectorXd clean(kRows);
+  for (int i = 0; i < kRows; ++i) clean[i] = std::sin(2.0 * time[i]);
+  const Eigen::VectorXd before = filter.apply(clean, 2);
+  Eigen::VectorXd after = before;
+  quieten_acceleration(time, runs, clean, filter, after);
+  EXPECT_LT((after - before).cwiseAbs().maxCoeff(), 1e-3 * before.cwiseAbs().maxCoeff());
+}
+
 }  // namespace
 }  // namespace sparflow
