@@ -172,13 +172,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const UsageError& error) {
-    fmt::print(stderr, "blind_test: {}\n", error.what());
-    return 2;
-  } catch (const InputError& error) {
-    fmt::print(stderr, "blind_test: {}\n", error.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("blind_test", run, argc, argv);
 }

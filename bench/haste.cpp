@@ -167,10 +167,5 @@ int run(int argc, char** argv) {
 }  // namespace sparflow::bench
 
 int main(int argc, char** argv) {
-  try {
-    return sparflow::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "haste: {}\n", error.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("haste", sparflow::bench::run, argc, argv);
 }

@@ -119,13 +119,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const UsageError& error) {
-    fmt::print(stderr, "hidden_log: {}\n", error.what());
-    return 2;
-  } catch (const InputError& error) {
-    fmt::print(stderr, "hidden_log: {}\n", error.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("hidden_log", run, argc, argv);
 }

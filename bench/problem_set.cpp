@@ -76,10 +76,5 @@ int run(int argc, char** argv) {
 }  // namespace sparflow::bench
 
 int main(int argc, char** argv) {
-  try {
-    return sparflow::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "problem_set: {}\n", error.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("problem_set", sparflow::bench::run, argc, argv);
 }

@@ -1,6 +1,11 @@
 #include "bench/program_options.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "models/error.h"
 
 namespace sparflow::bench {
 
@@ -76,6 +81,18 @@ std::optional<int> ProgramOptions::parse(int argc, char** argv) {
     return app_->app.exit(error) == 0 ? 0 : 2;
   }
   return std::nullopt;
+}
+
+int run_program(const char* name, int (*run)(int, char**), int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    fmt::print(stderr, "{}: {}\n", name, error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}: {}\n", name, error.what());
+    return 3;
+  }
 }
 
 }  // namespace sparflow::bench

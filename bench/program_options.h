@@ -38,4 +38,7 @@ class ProgramOptions {
   std::unique_ptr<App> app_;
 };
 
+/// A program's main: what `run` returns; 2 after a UsageError, 3 after any other, said on stderr behind the name.
+int run_program(const char* name, int (*run)(int, char**), int argc, char** argv);
+
 }  // namespace sparflow::bench

@@ -159,10 +159,5 @@ int run(int argc, char** argv) {
 }  // namespace sparflow
 
 int main(int argc, char** argv) {
-  try {
-    return sparflow::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "strategy_map: {}\n", error.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("strategy_map", sparflow::run, argc, argv);
 }

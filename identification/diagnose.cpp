@@ -245,7 +245,7 @@ double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
 }
 
 /// Whether a large error stays that the effect hardly touches: what makes it is not known, and some of it looks like
-/// the effect. True effects of the catalogue leave a twentieth of such errors (docs/blind_test.md, tuning seeds).
+/// the effect. True effects leave no errors of that size where they show best (docs/diagnose.md, section 7).
 bool is_a_trifle(const Diagnosis& d, const DiagnosedEffect& e) {
   constexpr double kMost = 0.8;
   return explained_share(d, e) < kMost;

@@ -20,9 +20,8 @@ struct EffectDesign {
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 
-/// @param about linear parameters about which the columns are taken (Evidence::columns); empty: 0
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
-                         std::vector<double> shape, std::span<const double> about = {});
+                         std::vector<double> shape);
 
 struct EffectFit {
   Eigen::VectorXd theta;               ///< [SI] linear parameters of all designs in turn

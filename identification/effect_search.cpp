@@ -97,7 +97,6 @@ class Search {
       f.p_value = p;
       found.push_back(std::move(f));
       EffectFit next = fit_effects(evidence_, designs_of(found), nullptr, final_control());
-      settle_sensor(found, next);
       whole_share(found, next, best.gain);
       judge(found, found.size() - 1, next);
       if (tracing()) trace_found(found, next);
@@ -117,19 +116,6 @@ class Search {
         continue;
       }
       current = next;
-    }
-  }
-
-  /// A sensor's error moves the measured force along a learned law that bends: columns about the error that was found.
-  void settle_sensor(std::vector<FoundEffect>& found, EffectFit& fit) const {
-    constexpr int kTurns = 2;
-    EffectDesign& design = found.back().design;
-    if (design.effect.effect->info().stage != EffectStage::kSensor) return;
-    for (int turn = 0; turn < kTurns; ++turn) {
-      const Eigen::VectorXd about = fit.theta.tail(design.linear);
-      design = make_design(evidence_, design.effect, design.shape,
-                           {about.data(), static_cast<std::size_t>(about.size())});
-      fit = fit_effects(evidence_, designs_of(found), &fit, final_control());
     }
   }
 

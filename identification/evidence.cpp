@@ -222,20 +222,19 @@ CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspe
   return floor;
 }
 
-/// Of a supply channel: columns of its baseline are 1, Q, Q^2, F, Q F in the builder's units, and what the
-/// anti-cavitation valve adds.
-void answer_of(EvidenceChannel& channel, std::size_t suspects) {
-  ForceAnswer& answer = channel.force_answer;
-  answer.slope = VectorXd::Zero(channel.rows());
+/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the builder's units,
+/// and what the anti-cavitation valve adds.
+void slope_of(EvidenceChannel& channel, std::size_t suspects) {
+  channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
   const CavitationFloor floor = add_cavitation_floor(channel, suspects);
   const auto flow = channel.baseline.col(1).array();
   const VectorXd b = least_squares(channel.baseline, channel.y);
-  answer.slope = (b[3] + b[4] * flow) / kForceScale;
+  channel.force_slope = (b[3] + b[4] * flow) / kForceScale;
   if (floor.law.size() == 0) return;
-  answer.below = floor.level - (channel.baseline.leftCols(5) * floor.law).array();
-  answer.held_slope = (floor.law[3] + floor.law[4] * flow) / kForceScale;
-  answer.share = b[5] * 1e-5;
+  const auto held = (channel.baseline.col(5).array() > 0.0).cast<double>();
+  channel.force_slope.array() -=
+      b[5] * 1e-5 * held * (floor.law[3] + floor.law[4] * flow) / kForceScale;
 }
 
 std::vector<BranchSplit> branches_of(const Evidence& e,
@@ -319,17 +318,8 @@ VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x)
   return convolved(x, kernel, series[log].runs);
 }
 
-double ForceAnswer::change(Index row, double change) const {
-  const double law = slope[row] * change;
-  if (below.size() == 0) return law;
-  const double held = std::max(0.0, below[row] - held_slope[row] * change);
-  return law + share * (held - std::max(0.0, below[row]));
-}
-
 Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
-                                  const EvidenceChannel& channel,
-                                  std::span<const double> about) const {
-  constexpr double kTangent = 1e-3;  // [SI of the parameter] small against any sensor's error
+                                  const EvidenceChannel& channel) const {
   const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
   if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
   Eigen::MatrixXd result;
@@ -338,8 +328,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
       continue;
     Eigen::MatrixXd through_force;  // of a sensor: what its error does by way of the measured force
-    if (effect.effect->info().stage == EffectStage::kSensor &&
-        channel.force_answer.slope.size() > 0 &&
+    if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
         !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,
                                 through_force)) {
       through_force.resize(0, 0);
@@ -358,10 +347,8 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
         for (Index c = 0; c < raw.cols(); ++c) {
           double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
           if (through_force.size() > 0) {
-            const double size = about.empty() ? 0.0 : about[static_cast<std::size_t>(c)];
-            const double step = size == 0.0 ? kTangent : size;
-            const double force = through_force(channel.sample[static_cast<std::size_t>(r)], c);
-            v += channel.force_answer.change(r, -step * force) / step;
+            v -= channel.force_slope[r] *
+                 through_force(channel.sample[static_cast<std::size_t>(r)], c);
           }
           result(r, c) = std::isfinite(v) ? v : 0.0;
         }
@@ -533,7 +520,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         b.channel.unit = {"bar", 1e5};
         b.channel.noise_floor = noise;
         b.channel.text = evidence_text(kind, name);
-        if (b.finish(e.channels) && !returning) answer_of(e.channels.back(), e.suspects);
+        if (b.finish(e.channels) && !returning) slope_of(e.channels.back(), e.suspects);
       }
     }
   }

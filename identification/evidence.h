@@ -18,18 +18,6 @@
 
 namespace sparflow {
 
-/// What the baseline of a supply channel makes of another measured force: a law that is linear in the force down to a
-/// level at which an anti-cavitation valve holds the pressure. Empty where there is none. [rows]
-struct ForceAnswer {
-  Eigen::VectorXd slope;  ///< [Pa/N] of the law
-  Eigen::VectorXd below;  ///< [Pa] level minus the law that ends there; empty: no level is reached
-  Eigen::VectorXd held_slope;  ///< [Pa/N] of that law
-  double share = 0.0;          ///< of what it lacks that the valve adds
-
-  /// Answer at the measured force plus `change` [N] minus that at the measured one. [Pa]
-  double change(Eigen::Index row, double change) const;
-};
-
 struct EvidenceChannel {
   EvidenceKind kind = EvidenceKind::kForce;
   int index = 0;                     ///< cylinder, of kPump the pump
@@ -43,8 +31,9 @@ struct EvidenceChannel {
   std::vector<Eigen::Index> sample;  ///< [rows] in that log
   /// Of forces and pumps, by suspect log: y before the filter [samples]; oscillations are looked for there.
   std::vector<Eigen::VectorXd> raw;
-  /// Of supply channels: a sensor that reads wrong shifts the force too, and with it the baseline's answer.
-  ForceAnswer force_answer;
+  /// Of supply channels: what one newton of measured force adds to y by the baseline [rows, Pa/N]. A sensor that
+  /// reads wrong shifts the force too, and with it the baseline's answer.
+  Eigen::VectorXd force_slope;
   double largest_force = 0.0;  ///< [N] of force channels: largest static force
   double noise_floor = 0.0;    ///< standard deviation of the sensors' noise in y; NaN = not known
 
@@ -63,11 +52,9 @@ struct Evidence {
   const EvidenceChannel* find(EvidenceKind kind, int index) const;
 
   /// What one unit of an effect's linear parameters adds to a channel, filtered like y; zero in reference logs.
-  /// @param about linear parameters up to which a sensor's error by way of the measured force is a secant: the
-  /// baseline bends; empty: its tangent
   /// @return [rows x linear parameters]; no columns when it does not act there
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
-                          const EvidenceChannel& channel, std::span<const double> about = {}) const;
+                          const EvidenceChannel& channel) const;
 
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,

@@ -85,10 +85,10 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
 double sharpest_window(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
                        const Eigen::MatrixXd& positions, double longest, int order = 3);
 
-/// Accelerations by the filter where they change, and by one three times as wide everywhere else: most of a motion is
+/// Accelerations by the filter where they change, and by ones up to three times as wide everywhere else: most of a motion is
 /// steady, and there the narrow window passes noise only. As a regressor that noise makes an inertia too small, on slow
-/// machines by a third (Fuller (1987), ch. 1). Where the two windows differ by more than their noise (and half the wide
-/// window about it) the narrow one stays. Source: O. Lepski (1991), Theory Probab. Appl. 35(3), 454-466.
+/// machines by a third (Fuller (1987), ch. 1). Where a wider window differs from the narrow one by more than their noise
+/// (and half the wide window about it) it is not taken. Source: O. Lepski (1991), Theory Probab. Appl. 35(3), 454-466.
 /// @param positions [samples] of one joint  @param second [samples] by `filter`; changed in place
 void quieten_acceleration(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
                           const Eigen::VectorXd& positions, const SavitzkyGolay& filter,
