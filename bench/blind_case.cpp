@@ -96,13 +96,14 @@ CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
     });
     if (!possible) continue;
     request.log.effects = wanted;
+    const simulator::CaseLogs logs = simulator::case_logs(request);
     const std::vector<simulator::Visibility> seen =
-        simulator::visibility(request.log, !asked.reference);
+        simulator::visibility(logs.train, true, asked.reference ? &logs.reference : nullptr);
     shown.clear();
     for (std::size_t k = 0; k < seen.size(); ++k) {
       shown += fmt::format(
-          "   {} shows most in the {}: {:.2g} times the noise, energy {:.3g}, {:.0f} % swallowed\n",
-          wanted[k].id, seen[k].channel, seen[k].size, seen[k].energy, 100.0 * seen[k].swallowed);
+          "   {} shows most in the {}: {:.2g} times the noise for {:.3g} s, {:.0f} % swallowed\n",
+          wanted[k].id, seen[k].channel, seen[k].size, seen[k].seconds, 100.0 * seen[k].swallowed);
     }
     if (attempt >= kMostCranes || std::all_of(seen.begin(), seen.end(), simulator::visible))
       return request;

@@ -107,7 +107,7 @@ int run(int argc, char** argv) {
       fmt::print("  {} = {:.6g} {}, text-book equivalent {:.6g}\n", p.name, p.value, p.unit,
                  p.equivalent);
   }
-  for (const Visibility& v : visibility(request.log, false)) {
+  for (const Visibility& v : visibility(case_logs(request).train, false)) {
     fmt::print("  shows most in the {}: {:.2g} times its noise where it acts{}\n", v.channel,
                v.size, visible(v) ? "" : "; too little for the blind test");
   }

@@ -7,24 +7,26 @@
 
 namespace sparflow::simulator {
 
-GeneratedCase generate_case(const CaseRequest& request) {
-  GeneratedCase logs;
-  LogRequest log = request.log;
+CaseLogs case_logs(const CaseRequest& request) {
+  CaseLogs logs;
   const std::uint64_t motions = request.log.motion_seed * 3;
-  log.motion_seed = motions;
-  log.warm = false;
-  logs.train = generate(log);
-  LogRequest test = log;
-  test.motion_seed = motions + 1;
-  test.seconds = request.test_seconds;
-  test.warm = true;
-  logs.test = generate(test);
-  LogRequest reference = log;
-  reference.motion_seed = motions + 2;
-  reference.absent = reference.effects;
-  reference.effects.clear();
-  logs.reference = generate(reference);
+  logs.train = request.log;
+  logs.train.motion_seed = motions;
+  logs.train.warm = false;
+  logs.test = logs.train;
+  logs.test.motion_seed = motions + 1;
+  logs.test.seconds = request.test_seconds;
+  logs.test.warm = true;
+  logs.reference = logs.train;
+  logs.reference.motion_seed = motions + 2;
+  logs.reference.absent = logs.reference.effects;
+  logs.reference.effects.clear();
   return logs;
+}
+
+GeneratedCase generate_case(const CaseRequest& request) {
+  const CaseLogs logs = case_logs(request);
+  return {generate(logs.reference), generate(logs.train), generate(logs.test)};
 }
 
 void write_case(const CaseRequest& request, const GeneratedCase& logs, const std::string& folder) {

@@ -104,6 +104,11 @@ struct CaseRequest {
 struct GeneratedCase {
   GeneratedLog reference, train, test;
 };
+/// The three logs of a case: the effects' own motions, others with warm oil, and others without the effects.
+struct CaseLogs {
+  LogRequest train, test, reference;
+};
+CaseLogs case_logs(const CaseRequest& request);
 GeneratedCase generate_case(const CaseRequest& request);
 /// @param folder is made when absent
 void write_case(const CaseRequest& request, const GeneratedCase& logs, const std::string& folder);

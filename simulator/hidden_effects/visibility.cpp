@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "models/linear_algebra.h"
 #include "simulator/hidden_effects/drive.h"
@@ -19,6 +20,7 @@ using Eigen::VectorXd;
 constexpr double kMean_s = 0.3;         // changes and noise are means over this long
 constexpr double kLeastSize = 1.0;      // standard deviations where it acts
 constexpr double kLeastSeconds = 10.0;  // an effect of that size acting so long is enough
+constexpr double kLeastActing_s = 3.0;  // one stroke; a shorter incident proves no law
 constexpr double kMostSwallowed = 0.9;  // what is asked of a diagnosis: nothing above is named
 constexpr double kForceShareNoise = 0.01;
 
@@ -49,6 +51,11 @@ struct Channel {
     sum = 0.0;
     basis_sum = VectorXd();
     count = 0;
+  }
+  /// The means of another log of the same quantity.
+  void append(const Channel& other) {
+    change.insert(change.end(), other.change.begin(), other.change.end());
+    basis.insert(basis.end(), other.basis.begin(), other.basis.end());
   }
 };
 
@@ -93,12 +100,21 @@ std::vector<Channel> channels_like(const Machine& machine, double rate, double f
   return all;
 }
 
+constexpr std::size_t kNothing = std::numeric_limits<std::size_t>::max();
+
+double noise_factor(const LogRequest& request) {
+  return request.noise_factor > 0.0 ? request.noise_factor : 1.0;
+}
+
+/// @param without effect that it lacks, or kNothing
 std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t without,
-                                    const Plant& plant, double factor) {
+                                    const Plant& plant) {
   auto s = std::make_unique<Shadow>();
   const Machine& machine = request.machine;
+  const double factor = noise_factor(request);
   s->crane = draw_hidden(request);
-  s->crane->hidden.erase(s->crane->hidden.begin() + static_cast<std::ptrdiff_t>(without));
+  if (without != kNothing)
+    s->crane->hidden.erase(s->crane->hidden.begin() + static_cast<std::ptrdiff_t>(without));
   s->plant = std::make_unique<Plant>(machine, s->crane->laws, s->crane->hidden, plant.state().q,
                                      plant.state().h);
   const double n = std::max(2.0, kMean_s * request.rate);
@@ -193,13 +209,17 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
   }
 }
 
-void judge_channel(const Channel& c, bool learned_from_it, Visibility& best, double& whole,
-                   double& left) {
+bool shows(const Visibility& v) {
+  return v.size >= kLeastSize && v.seconds >= kLeastActing_s &&
+         v.energy >= kLeastSize * kLeastSize * kLeastSeconds / kMean_s;
+}
+
+void judge_channel(const Channel& c, bool learned, Visibility& best, double& whole, double& left) {
   const auto n = static_cast<Index>(c.change.size());
   if (n < 10 || !(c.deviation > 0.0)) return;
   VectorXd x = Eigen::Map<const VectorXd>(c.change.data(), n) / c.deviation;
   const double before = x.squaredNorm();
-  if (learned_from_it && c.basis.front().size() > 0) {
+  if (learned && c.basis.front().size() > 0) {
     MatrixXd basis(n, c.basis.front().size());
     for (Index i = 0; i < n; ++i) basis.row(i) = c.basis[static_cast<std::size_t>(i)].transpose();
     x -= basis * least_squares(basis, x);
@@ -209,40 +229,49 @@ void judge_channel(const Channel& c, bool learned_from_it, Visibility& best, dou
     whole += before;
     left += energy;
   }
-  if (!(energy > best.energy)) return;
-  best.energy = energy;
-  best.size = std::sqrt(x.array().pow(4).sum() / energy);
-  best.channel = c.name;
-  best.swallowed = c.learned ? 1.0 : 0.0;  // filled in once all are known
+  if (!(energy > 0.0)) return;
+  Visibility v;
+  v.energy = energy;
+  v.size = std::sqrt(x.array().pow(4).sum() / energy);
+  v.seconds = energy / (v.size * v.size) * kMean_s;
+  v.channel = c.name;
+  v.swallowed = c.learned ? 1.0 : 0.0;  // filled in once all are known
+  if (std::make_pair(shows(v), v.energy) > std::make_pair(shows(best), best.energy)) best = v;
 }
 
-Visibility judge(Shadow& s, bool learned_from_it) {
+/// Every channel of a shadow, in a fixed order.
+std::vector<Channel*> channels_of(Shadow& s) {
+  std::vector<Channel*> all;
+  for (auto* group : {&s.force, &s.speed, &s.pump}) {
+    for (Channel& c : *group) all.push_back(&c);
+  }
+  for (auto& group : s.pressure) {
+    for (Channel& c : group) all.push_back(&c);
+  }
+  return all;
+}
+
+Visibility judge(Shadow& s, bool learned) {
   Visibility best;
   double whole = 0.0, left = 0.0;
-  for (const auto* group : {&s.force, &s.speed, &s.pump}) {
-    for (const Channel& c : *group) judge_channel(c, learned_from_it, best, whole, left);
-  }
-  for (const auto& group : s.pressure) {
-    for (const Channel& c : group) judge_channel(c, learned_from_it, best, whole, left);
-  }
+  for (const Channel* c : channels_of(s)) judge_channel(*c, learned, best, whole, left);
   if (best.swallowed > 0.0) best.swallowed = whole > 0.0 ? 1.0 - left / whole : 0.0;
   return best;
 }
 
-}  // namespace
-
-std::vector<Visibility> visibility(const LogRequest& request, bool learned_from_it) {
+/// Drives the request's crane with one shadow for each of `without` beside it.
+std::vector<std::unique_ptr<Shadow>> drive_beside(const LogRequest& request,
+                                                  const std::vector<std::size_t>& without) {
   const Machine& machine = request.machine;
-  const double factor = request.noise_factor > 0.0 ? request.noise_factor : 1.0;
   const std::unique_ptr<HiddenCase> one = draw_hidden(request);
-  std::vector<std::unique_ptr<Shadow>> shadows(request.effects.size());
+  std::vector<std::unique_ptr<Shadow>> shadows(without.size());
   std::vector<double> force_squares(machine.cylinders.size(), 0.0);
   const int mean_rows = std::max(1, static_cast<int>(std::lround(kMean_s * request.rate)));
   SensorState read;
   int row = 0;
   const auto follow = [&](const Plant& plant, const StepInput& in) {
     for (std::size_t k = 0; k < shadows.size(); ++k) {
-      if (!shadows[k]) shadows[k] = make_shadow(request, k, plant, factor);
+      if (!shadows[k]) shadows[k] = make_shadow(request, without[k], plant);
       shadows[k]->plant->follow(plant.state());
       shadows[k]->plant->step(in.payload, in.oil, in.command);
     }
@@ -256,34 +285,48 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned_from_
       s->plant->sense(s->sensors);
       compare_row(machine, plant.state(), read, *s);
       if (row % mean_rows != 0) continue;
-      for (auto* group : {&s->force, &s->speed, &s->pump})
-        for (Channel& c : *group) c.close(mean_rows);
-      for (auto& group : s->pressure)
-        for (Channel& c : group) c.close(mean_rows);
+      for (Channel* c : channels_of(*s)) c->close(mean_rows);
     }
   };
   drive_log(request, *one, follow, compare);
+  for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+    if (machine.cylinders[i].hydraulic()) continue;
+    for (const auto& s : shadows) {
+      s->force[i].deviation = kForceShareNoise * noise_factor(request) *
+                              std::sqrt(force_squares[i] / std::max(1, row) / mean_rows);
+    }
+  }
+  return shadows;
+}
+
+}  // namespace
+
+std::vector<Visibility> visibility(const LogRequest& request, bool learned,
+                                   const LogRequest* reference) {
+  std::vector<std::size_t> each(request.effects.size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
+  const auto shadows = drive_beside(request, each);
+  if (learned && reference) {  // nothing changes there: the same crane beside itself
+    const auto beside = drive_beside(*reference, {kNothing});
+    const std::vector<Channel*> known = channels_of(*beside.front());
+    for (const auto& s : shadows) {
+      const std::vector<Channel*> all = channels_of(*s);
+      for (std::size_t c = 0; c < all.size(); ++c) all[c]->append(*known[c]);
+    }
+  }
   std::vector<Visibility> all;
   for (std::size_t k = 0; k < shadows.size(); ++k) {
     const std::string& id = request.effects[k].id;
     if (id == "sensor_delay" || id == "sensor_fault") {
       constexpr double kAlways = std::numeric_limits<double>::infinity();
-      all.push_back({kAlways, kAlways, "the recording", 0.0});
+      all.push_back({kAlways, kAlways, kAlways, "the recording", 0.0});
       continue;
     }
-    for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
-      if (machine.cylinders[i].hydraulic()) continue;
-      shadows[k]->force[i].deviation =
-          kForceShareNoise * factor * std::sqrt(force_squares[i] / std::max(1, row) / mean_rows);
-    }
-    all.push_back(judge(*shadows[k], learned_from_it));
+    all.push_back(judge(*shadows[k], learned));
   }
   return all;
 }
 
-bool visible(const Visibility& v) {
-  return v.size >= kLeastSize && v.energy >= kLeastSize * kLeastSize * kLeastSeconds / kMean_s &&
-         v.swallowed <= kMostSwallowed;
-}
+bool visible(const Visibility& v) { return shows(v) && v.swallowed <= kMostSwallowed; }
 
 }  // namespace sparflow::simulator

@@ -15,10 +15,11 @@ struct Visibility {
   double size = 0.0;
   double energy =
       0.0;  ///< sum over the log of (change / deviation)^2 in that channel, means over 0.3 s
-  std::string channel;  ///< "force of boom"
+  double seconds = 0.0;  ///< how long it acts at that size: energy / size^2
+  std::string channel;   ///< "force of boom"
   /// Share of the energy of pressures and pumps, in the channel where most is left, that a smooth law of the
   /// cylinder's own flow and force (a margin for each leading cylinder, a gain for each direction) can follow:
-  /// learned from the same log, it contains that much. 0 when a reference pins it.
+  /// learned from the same log (and a reference), it contains that much.
   double swallowed = 0.0;
 };
 
@@ -27,11 +28,14 @@ struct Visibility {
 /// return line or the counterbalance valve rules, pump pressure beyond what the commanded chambers ask. Sensors'
 /// errors count in what they feed. Delays of channels and noise (sensor_delay, sensor_fault) act on the recording and
 /// are not judged: size infinity.
-/// @param learned_from_it no reference: what a law learned from this log can follow is taken off first
-std::vector<Visibility> visibility(const LogRequest& request, bool learned_from_it);
+/// @param learned what laws learned from this log can follow is taken off first
+/// @param reference of learned laws: the same crane without the effects; they follow that log, too, where nothing
+/// changes. What the reference never did pins nothing.
+std::vector<Visibility> visibility(const LogRequest& request, bool learned,
+                                   const LogRequest* reference = nullptr);
 
 /// The rule of the blind test: at least as large as the noise where it acts, with the energy of ten seconds of that,
-/// and no more than nine tenths swallowed.
+/// acting for three seconds or more (an incident proves no law), and no more than nine tenths swallowed.
 bool visible(const Visibility& v);
 
 }  // namespace sparflow::simulator

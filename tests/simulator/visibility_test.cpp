@@ -43,12 +43,35 @@ TEST(HiddenVisibility, WhatIsSmallIsNotAsked) {
   EXPECT_FALSE(visible(seen({"coulomb_friction", "boom", 1e-3, 0})));
 }
 
+TEST(HiddenVisibility, AnIncidentIsNotAsked) {
+  Visibility v = seen({"coulomb_friction", "boom", 1.0, 0});
+  EXPECT_NEAR(v.seconds, 0.3 * v.energy / (v.size * v.size), 1e-9);
+  EXPECT_GT(v.seconds, 20.0);  // it acts whenever the boom moves
+  v.seconds = 1.0;
+  EXPECT_FALSE(visible(v));
+}
+
 TEST(HiddenVisibility, ALawLearnedFromTheSameLogFollowsALossOfItsOwnFlow) {
   const HiddenEffect loss{"flow_dependent_margin", "", 1.0, 0};
   const Visibility with = seen(loss, false), alone = seen(loss, true);
   EXPECT_LT(alone.energy, with.energy);
   EXPECT_GT(alone.swallowed, 0.0);
   EXPECT_LT(alone.swallowed, 1.0);
+}
+
+TEST(HiddenVisibility, AReferencePinsWhatItDidItself) {
+  LogRequest request = quiet_request(machine_named("loader_crane"), 120.0);
+  request.effects = {{"flow_dependent_margin", "", 1.0, 0}};
+  LogRequest reference = request;
+  reference.motion_seed += 1;
+  reference.absent = reference.effects;
+  reference.effects.clear();
+  const double alone = visibility(request, true).front().swallowed;
+  const double pinned = visibility(request, true, &reference).front().swallowed;
+  reference.seconds = 2.0;  // nothing moves yet
+  const double hardly = visibility(request, true, &reference).front().swallowed;
+  EXPECT_LT(pinned, 0.7 * alone);
+  EXPECT_GT(hardly, 0.95 * alone);
 }
 
 TEST(HiddenVisibility, FlowShowsInTheSpeedAndEachOfAPairOnItsOwn) {
