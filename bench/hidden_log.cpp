@@ -108,8 +108,8 @@ int run(int argc, char** argv) {
                  p.equivalent);
   }
   for (const Visibility& v : visibility(case_logs(request).train, false)) {
-    fmt::print("  shows most in the {}: {:.2g} times its noise where it acts{}\n", v.channel,
-               v.size, visible(v) ? "" : "; too little for the blind test");
+    fmt::print("  shows most in the {}: {:.2g} times its noise for {:.3g} s{}\n", v.channel, v.size,
+               v.seconds, visible(v) ? "" : "; too little for the blind test");
   }
   fmt::print("{}: {}, {} + {} + {} rows\n", folder, request.log.machine.name, logs.reference.rows(),
              logs.train.rows(), logs.test.rows());

@@ -10,6 +10,7 @@
 #include "identification/effect_estimate.h"
 #include "identification/effect_proof.h"
 #include "identification/experiment.h"
+#include "identification/incident.h"
 #include "identification/robust.h"
 #include "identification/unexplained.h"
 #include "models/effects/hydraulics.h"
@@ -345,6 +346,29 @@ Unexplained describe_unnamed(const Diagnosis& d) {
   return u;
 }
 
+/// What happened once and that an effect would explain, though it proves none.
+Unexplained describe_incident(const Diagnosis& d) {
+  const EffectDesign& design = d.search.once.front();
+  FitControl control;
+  control.keep_residuals = true;
+  const EffectFit with = fit_effects(d.evidence, {&design}, nullptr, control);
+  const Incident incident = where_it_shows(d.evidence, d.search.null, with);
+  const EvidenceChannel& c = d.evidence.channels[incident.channel];
+  Unexplained u;
+  u.stage = evidence_stage(c.kind);
+  u.at = c.at;
+  u.depends_on = {"time"};
+  u.rmse = suspect_rms(d.evidence, incident.channel, d.search.null.residual[incident.channel]);
+  u.noise_floor = c.noise_floor;
+  u.unit = c.unit;
+  u.share = incident.share;
+  u.once = true;
+  u.sentence = incident_sentence(
+      d.evidence, incident,
+      effect_key(design.effect.effect->info(), *d.evidence.series[0].machine, design.effect.at));
+  return u;
+}
+
 /// Values as a model that is extended with the effects gets them: all together, where the search added one by one.
 void settle_values(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                    const std::vector<MachineSignals>& references, std::vector<FoundEffect>& found) {
@@ -434,6 +458,8 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
   }
+  if (d.search.found.empty() && !d.unexplained && !d.search.once.empty())
+    d.unexplained = describe_incident(d);
   drop_trifles(d, options.search);
   if (!d.search.found.empty()) settle_values(model, suspects, references, d.search.found);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)

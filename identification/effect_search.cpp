@@ -91,7 +91,11 @@ class Search {
         result.threshold = gate.threshold(level);
         result.p_value = p;
       }
-      if (p >= level || best.gain < options_.least_gain) break;
+      if (p >= level || best.gain < options_.least_gain) {
+        if (found.empty() && best.gain > kSurelySomething * options_.least_gain)
+          result.once.push_back(scores_.refined(base, best, current));
+        break;
+      }
       FoundEffect f;
       f.design = scores_.refined(base, best, current);
       f.p_value = p;

@@ -56,6 +56,8 @@ struct SearchResult {
   std::vector<FoundEffect> found;  ///< in the order found
   /// Beyond the gate, but only with parameters that no machine has: something is there, and not this.
   std::vector<FoundEffect> unnamed;
+  /// Nothing passed the gate, but this gains far too much for noise: it shows in one place (incident.h).
+  std::vector<EffectDesign> once;
   EffectFit null, final;   ///< without and with them
   double p_value = 1.0;    ///< of the first gate
   double threshold = 0.0;  ///< [nats] of the first gate

@@ -198,6 +198,8 @@ std::string why_stopped(const Diagnosis& d) {
     case Verdict::kNone:
       return "nothing more is missing that these logs could show";
     case Verdict::kUnknown:
+      if (d.unexplained && d.unexplained->once)
+        return "something happened once: " + d.unexplained->sentence;
       return "what is left is not in the catalogue" +
              (d.unexplained ? ": " + d.unexplained->sentence : std::string());
     case Verdict::kBadData:

@@ -358,5 +358,35 @@ TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
   EXPECT_NEAR(value["inertia"], 1.0, 0.01);
 }
 
+/// In one short stroke the boom is held back as if by friction, never again.
+TEST(Diagnose, WhatHappenedOnceIsNoLawButNoNoiseEither) {
+  HiddenCase logs = hidden_case(crane(), {}, kSeed, kSeconds);
+  simulator::GeneratedLog& train = logs.logs.train;
+  const auto column = [&](const std::string& name) -> std::vector<double>& {
+    const auto at = std::find(train.names.begin(), train.names.end(), name);
+    return train.columns.at(static_cast<std::size_t>(at - train.names.begin()));
+  };
+  const std::vector<double>& lever = column("u_boom");
+  std::size_t from = 0, to = 0;
+  for (std::size_t k = 1; k < train.rows(); ++k) {
+    if (lever[k] > 0.0 && lever[k - 1] == 0.0) from = k;
+    if (lever[k] == 0.0 && lever[k - 1] > 0.0 && k - from >= 50 && k - from <= 100) {
+      to = k;
+      break;
+    }
+  }
+  ASSERT_GT(to, from) << "no stroke of one to two seconds";
+  for (std::size_t k = from; k < to; ++k) column("pA_boom_bar")[k] += 15.0;
+  logs.train = log_from_text("train.csv", simulator::csv_text(train), crane());
+  const Diagnosis d = diagnose(reference_model(), {logs.train}, {logs.reference});
+  EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.table();
+  ASSERT_TRUE(d.unexplained) << d.table();
+  EXPECT_TRUE(d.unexplained->once) << d.table();
+  EXPECT_THAT(d.headline(), HasSubstr("Something happened once: force of boom"));
+  const double when = column("t_s")[from];
+  EXPECT_NEAR(std::stod(d.headline().substr(d.headline().find("from ") + 5)), when, 1.0)
+      << d.headline();
+}
+
 }  // namespace
 }  // namespace sparflow
