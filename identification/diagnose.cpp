@@ -46,8 +46,8 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   return fit_effects(d.evidence, others, nullptr, control);
 }
 
-/// What another power in the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
-EffectFit fit_with_other_powers(const Diagnosis& d) {
+/// What another form of the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
+EffectFit fit_with_other_forms(const Diagnosis& d) {
   std::vector<EffectDesign> powers;
   powers.reserve(d.search.found.size());
   std::vector<const EffectDesign*> designs;
@@ -55,7 +55,8 @@ EffectFit fit_with_other_powers(const Diagnosis& d) {
   Index first = 0;
   for (const FoundEffect& f : d.search.found) {
     designs.push_back(&f.design);
-    powers.push_back(other_power(f.design, d.search.final.theta.segment(first, f.design.linear)));
+    powers.push_back(
+        other_form(d.evidence, f.design, d.search.final.theta.segment(first, f.design.linear)));
     first += f.design.linear;
   }
   for (const EffectDesign& p : powers) {
@@ -442,7 +443,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
   if (progress) progress(0.92, "looking at what is left");
-  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_powers(d));
+  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_forms(d));
   std::vector<Leftover> riddles;
   bool in_touched = false;
   for (const Leftover& l : left) {

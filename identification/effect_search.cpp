@@ -201,7 +201,7 @@ class Search {
             "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over",
             one.gain, key(other.design.effect), other.gain);
       }
-      EffectDesign power = other_power(other.design, theta);
+      EffectDesign power = other_form(evidence_, other.design, theta);
       if (!power.acts() || !meets(power)) continue;
       powers.push_back(std::move(power));
       names.push_back(key(other.design.effect));

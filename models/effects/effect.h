@@ -145,6 +145,10 @@ class Effect {
   /// default is the parameter's own grid; limits and thresholds depend on what the log reaches. Empty: the log
   /// lacks what the effect needs.
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
+  /// Of effects that are another machine: what their law may hold besides, sample by sample, as a multiple of the
+  /// first linear parameter's column, at the most that is usual (a scale in error beside a load it was not told of).
+  /// [samples], in that parameter's unit; empty: nothing.
+  virtual Eigen::VectorXd other_share(const MachineSeries& /*log*/) const { return {}; }
   /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
 };

@@ -35,6 +35,11 @@ class PayloadError final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool changes_machine() const override { return true; }
+  Eigen::VectorXd other_share(const MachineSeries& log) const override {
+    constexpr double kScale =
+        0.05;  // of the reading: crane scales are told to be right within 1 to 5 %
+    return kScale * log.payload;
+  }
   void change_machine(Machine& machine, int, std::span<const double> p) const override {
     if (p[0] == 0.0) return;
     Link load;

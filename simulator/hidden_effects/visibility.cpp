@@ -209,6 +209,14 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
   }
 }
 
+/// @param effect with its place drawn
+bool has_twin(const Machine& machine, const HiddenEffect& effect) {
+  int pump = -1;
+  if (effect.id == "flow_dependent_margin") pump = machine.pump_index(effect.at);
+  if (effect.id == "line_loss") pump = machine.pump_of_cylinder(machine.cylinder_index(effect.at));
+  return pump >= 0 && machine.pumps[static_cast<std::size_t>(pump)].feeds.size() == 1;
+}
+
 bool shows(const Visibility& v) {
   return v.size >= kLeastSize && v.seconds >= kLeastActing_s &&
          v.energy >= kLeastSize * kLeastSize * kLeastSeconds / kMean_s;
@@ -314,6 +322,7 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
       for (std::size_t c = 0; c < all.size(); ++c) all[c]->append(*known[c]);
     }
   }
+  const std::vector<HiddenEffect> drawn = draw_hidden(request)->drawn;
   std::vector<Visibility> all;
   for (std::size_t k = 0; k < shadows.size(); ++k) {
     const std::string& id = request.effects[k].id;
@@ -323,10 +332,11 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
       continue;
     }
     all.push_back(judge(*shadows[k], learned));
+    all.back().twin = has_twin(request.machine, drawn[k]);
   }
   return all;
 }
 
-bool visible(const Visibility& v) { return shows(v) && v.swallowed <= kMostSwallowed; }
+bool visible(const Visibility& v) { return shows(v) && v.swallowed <= kMostSwallowed && !v.twin; }
 
 }  // namespace sparflow::simulator

@@ -21,6 +21,7 @@ struct Visibility {
   /// cylinder's own flow and force (a margin for each leading cylinder, a gain for each direction) can follow:
   /// learned from the same log (and a reference), it contains that much.
   double swallowed = 0.0;
+  bool twin = false;  ///< another effect of the catalogue is the same law at this place
 };
 
 /// One entry for each of the request's effects, all others being there.
@@ -35,7 +36,8 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
                                    const LogRequest* reference = nullptr);
 
 /// The rule of the blind test: at least as large as the noise where it acts, with the energy of ten seconds of that,
-/// acting for three seconds or more (an incident proves no law), and no more than nine tenths swallowed.
+/// acting for three seconds or more (an incident proves no law), no more than nine tenths swallowed, and without a twin:
+/// of a pump with one cylinder, margin and line grow with the same flow.
 bool visible(const Visibility& v);
 
 }  // namespace sparflow::simulator

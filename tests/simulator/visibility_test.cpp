@@ -43,6 +43,26 @@ TEST(HiddenVisibility, WhatIsSmallIsNotAsked) {
   EXPECT_FALSE(visible(seen({"coulomb_friction", "boom", 1e-3, 0})));
 }
 
+TEST(HiddenVisibility, AMarginOfAPumpWithOneCylinderHasATwin) {
+  LogRequest request = quiet_request(machine_named("loader_crane"), 60.0);
+  Machine& machine = request.machine;
+  Pump own = machine.pumps.front();
+  own.name = "own";
+  own.feeds = {machine.pumps.front().feeds.back()};
+  machine.pumps.front().feeds.pop_back();
+  machine.pumps.push_back(own);
+  for (const Pump& p : machine.pumps) {
+    request.effects = {{"flow_dependent_margin", p.name, 1.0, 0}};
+    EXPECT_EQ(visibility(request, false).front().twin, p.feeds.size() == 1) << p.name;
+    request.effects = {
+        {"line_loss", machine.cylinders[static_cast<std::size_t>(p.feeds[0])].name, 1.0, 0}};
+    EXPECT_EQ(visibility(request, false).front().twin, p.feeds.size() == 1) << p.name;
+  }
+  Visibility v = seen({"coulomb_friction", "boom", 1.0, 0});
+  v.twin = true;
+  EXPECT_FALSE(visible(v));
+}
+
 TEST(HiddenVisibility, AnIncidentIsNotAsked) {
   Visibility v = seen({"coulomb_friction", "boom", 1.0, 0});
   EXPECT_NEAR(v.seconds, 0.3 * v.energy / (v.size * v.size), 1e-9);
