@@ -50,6 +50,7 @@ class Search {
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(found, i, current) || reshaped;
       prune(found, current);
+      while (merge(found, current)) prune(found, current);
       if (reshaped) {
         for (std::size_t i = 0; i < found.size(); ++i) judge(found, i, current);
       }
@@ -181,12 +182,7 @@ class Search {
   std::string only_mends(const std::vector<FoundEffect>& found, std::size_t index,
                          const EffectFit& fit) const {
     const FoundEffect& one = found[index];
-    const auto meets = [&](const EffectDesign& other) {
-      bool both = false;
-      for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
-        both = both || (other.touches(c) && one.design.touches(c));
-      return both;
-    };
+    const auto meets = [&](const EffectDesign& other) { return meet(other, one.design); };
     std::vector<EffectDesign> powers;
     std::vector<std::string> names;
     Eigen::Index first = 0;
@@ -223,6 +219,14 @@ class Search {
                        fmt::join(names, ", "));
   }
 
+  /// Whether both show in one channel.
+  bool meet(const EffectDesign& a, const EffectDesign& b) const {
+    bool both = false;
+    for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
+      both = both || (a.touches(c) && b.touches(c));
+    return both;
+  }
+
   /// Whether `one` leaves significantly less than `other` where every row counts the same.
   bool ordinarily_better(const std::vector<const EffectDesign*>& base, const EffectDesign& one,
                          const EffectDesign& other) const {
@@ -238,10 +242,8 @@ class Search {
     std::vector<double> advantage(rivals.size());
     parallel(rivals.size(), [&](std::size_t i) {
       const EffectDesign& d = design_of(*rivals[i]);
-      bool meets = false;
-      for (std::size_t c = 0; c < evidence_.channels.size(); ++c)
-        meets = meets || (d.touches(c) && best.touches(c));
-      if (meets) advantage[i] = ordinary_advantage(evidence_, scores_.ordinary(base, d), one);
+      if (meet(d, best))
+        advantage[i] = ordinary_advantage(evidence_, scores_.ordinary(base, d), one);
     });
     const auto most = std::max_element(advantage.begin(), advantage.end());
     return most == advantage.end() || *most <= 0.0
@@ -387,6 +389,45 @@ class Search {
         break;
       }
     }
+  }
+
+  /// Two effects where one says as much: the first of a pair is chosen when it stands for two causes at once, and what it
+  /// says too much or too little of one of them then finds a second name. @return whether one took the place of two
+  bool merge(std::vector<FoundEffect>& found, EffectFit& current) {
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      for (std::size_t j = i + 1; j < found.size(); ++j) {
+        if (meet(found[i].design, found[j].design) && merge(found, i, j, current)) return true;
+      }
+    }
+    return false;
+  }
+  bool merge(std::vector<FoundEffect>& found, std::size_t i, std::size_t j, EffectFit& current) {
+    constexpr double kBeforeRefined = 0.9;  // of the pair's gain, at the grid's parameters
+    std::vector<FoundEffect> trial = found;
+    trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(j));
+    trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(i));
+    const EffectFit without = fit_effects(evidence_, designs_of(trial), nullptr, final_control());
+    const double price = penalty_of(found[i].design.effect) + penalty_of(found[j].design.effect);
+    const double pair = current.total() - without.total() - price;
+    const std::vector<Score> scores = scores_.beside(designs_of(trial), without, skipped(trial));
+    if (scores.empty() || scores.front().gain < kBeforeRefined * pair) return false;
+    FoundEffect one;
+    one.design = scores_.refined(designs_of(trial), scores.front(), without);
+    one.p_value = std::min(found[i].p_value, found[j].p_value);
+    trial.push_back(one);
+    EffectFit fit = fit_effects(evidence_, designs_of(trial), nullptr, final_control());
+    const double gain = fit.total() - without.total() - penalty_of(one.design.effect);
+    if (tracing())
+      fmt::print(stderr, "  {} for {} and {}: {:.1f} against {:.1f} nats\n",
+                 key(one.design.effect), key(found[i].design.effect), key(found[j].design.effect),
+                 gain, pair);
+    if (gain < pair) return false;
+    judge(trial, trial.size() - 1, fit);
+    trial.back().gain = gain;
+    if (!why_not_named(trial.back(), options_).empty()) return false;
+    found = std::move(trial);
+    current = std::move(fit);
+    return true;
   }
 
   /// Swap moves and indistinguishable alternatives, then intervals.
