@@ -358,6 +358,16 @@ TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
   EXPECT_NEAR(value["inertia"], 1.0, 0.01);
 }
 
+/// The mass found first stands for both causes; when the tilt is known, two masses mend what the true one says alone.
+TEST(Diagnose, OneMassForTwo) {
+  const HiddenCase logs = hidden_case(
+      crane(), {{"unmodelled_mass", "jib", 1.0, 0}, {"base_tilt", "", 1.0, 0}}, 3, kSeconds);
+  const Diagnosis d = diagnose(learned(crane(), logs.reference), {logs.train}, {logs.reference});
+  std::vector<std::string> keys;
+  for (const DiagnosedEffect& e : d.effects) keys.push_back(e.key());
+  EXPECT_THAT(keys, UnorderedElementsAre("unmodelled_mass:jib", "base_tilt")) << d.table();
+}
+
 /// In one short stroke the boom is held back as if by friction, never again.
 TEST(Diagnose, WhatHappenedOnceIsNoLawButNoNoiseEither) {
   HiddenCase logs = hidden_case(crane(), {}, kSeed, kSeconds);
