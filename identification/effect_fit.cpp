@@ -98,7 +98,7 @@ double EffectFit::total() const {
 }
 
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
-                         std::vector<double> shape) {
+                         std::vector<double> shape, std::span<const double> about) {
   EffectDesign d;
   d.effect = effect;
   d.shape = std::move(shape);
@@ -109,7 +109,7 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
     d.upper.push_back(p.upper);
   }
   for (const EvidenceChannel& c : evidence.channels)
-    d.columns.push_back(evidence.columns(effect, d.shape, c));
+    d.columns.push_back(evidence.columns(effect, d.shape, c, about));
   drop_unfelt(evidence, d);
   return d;
 }

@@ -20,8 +20,9 @@ struct EffectDesign {
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 
+/// @param about as Evidence::columns has it
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
-                         std::vector<double> shape);
+                         std::vector<double> shape, std::span<const double> about = {});
 
 struct EffectFit {
   Eigen::VectorXd theta;               ///< [SI] linear parameters of all designs in turn

@@ -318,8 +318,16 @@ VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x)
   return convolved(x, kernel, series[log].runs);
 }
 
+bool bends(const Effect& effect) {
+  return effect.changes_machine() && effect.info().place == EffectPlace::kMachine &&
+         effect.info().parameters.size() == 1;
+}
+
 Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
-                                  const EvidenceChannel& channel) const {
+                                  const EvidenceChannel& channel,
+                                  std::span<const double> about) const {
+  const bool chord = !about.empty() && about[0] != 0.0 && channel.kind == EvidenceKind::kForce &&
+                     bends(*effect.effect);
   const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
   if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
   Eigen::MatrixXd result;
@@ -327,6 +335,11 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     Eigen::MatrixXd raw;
     if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
       continue;
+    if (chord) {
+      raw = effect_series({effect.effect, effect.at, {about[0]}, {}, {}}, series[log], channel.kind,
+                          channel.index) /
+            about[0];
+    }
     Eigen::MatrixXd through_force;  // of a sensor: what its error does by way of the measured force
     if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
         !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,

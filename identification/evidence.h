@@ -40,6 +40,10 @@ struct EvidenceChannel {
   Eigen::Index rows() const { return y.size(); }
 };
 
+/// Whether an effect turns the whole machine, so that its force bends in its only parameter; weights are exact either
+/// way. A joint's offset bends, too, but shows in flows by its slope alone: there both stay with the usual size.
+bool bends(const Effect& effect);
+
 struct Evidence {
   std::vector<MachineSeries> series;  ///< suspect logs first, then references
   std::size_t suspects = 0;           ///< how many are suspect
@@ -52,9 +56,10 @@ struct Evidence {
   const EvidenceChannel* find(EvidenceKind kind, int index) const;
 
   /// What one unit of an effect's linear parameters adds to a channel, filtered like y; zero in reference logs.
+  /// @param about linear parameters up to which a force that bends (an angle's) is the chord; empty: its usual size
   /// @return [rows x linear parameters]; no columns when it does not act there
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
-                          const EvidenceChannel& channel) const;
+                          const EvidenceChannel& channel, std::span<const double> about = {}) const;
 
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
