@@ -8,8 +8,8 @@
 
 #include "bench/planned_seeds.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/driven_grid_path.h"
 #include "optimizer/energy_bound_time.h"
-#include "optimizer/energy_grid.h"
 #include "optimizer/strategies.h"
 
 namespace sparflow::bench {
@@ -17,7 +17,6 @@ namespace {
 
 /// As `sparflow optimize` has them.
 constexpr int kDefaultPaths = 8, kDefaultIntervals = 100;
-constexpr double kGridTolerance = 1e-3;  // relative, of limits along a path that no solver has seen
 
 OptimizeOptions usual_options() {
   OptimizeOptions options;
@@ -124,7 +123,7 @@ class Haste {
       return best != nullptr && best->found() ? std::pair{best->energy.total, best->detail}
                                               : std::pair{0.0, c.message};
     });
-    add(found, kDynamicProgramming, [&] { return driven_grid_path(); });
+    add(found, kDynamicProgramming, [&] { return grid_path_alone(); });
     add(found, "a slower optimum, squeezed", [&] {
       constexpr double kSlower = 1.4;
       const OptimizeResult slow =
@@ -150,17 +149,10 @@ class Haste {
   }
 
   /// The grid's cheapest path for this time, as it is: no solver after it.
-  std::pair<double, std::string> driven_grid_path() const {
-    if (problem_.tip_line || !problem_.waypoints.empty() || model_.machine.joint_count() > 4)
-      return {0.0, "no grid"};
-    EnergyGrid grid(model_, problem_, {settings_.grid_nodes});
-    const GridPath path = grid.path_for_duration(figures_.duration);
-    if (!path.found || path.duration_s > figures_.duration) return {0.0, "no path this fast"};
-    const Trajectory motion = timed_grid_path(model_, problem_, path, figures_.duration);
-    constexpr int kDensity = 16;
-    if (worst_excess(check_limits(model_, problem_, motion, kDensity)) > kGridTolerance)
-      return {0.0, "breaks a limit"};
-    return {exact_total_energy(model_, motion, problem_.payload, kDensity), "grid path"};
+  std::pair<double, std::string> grid_path_alone() const {
+    const DrivenGridPath path =
+        driven_grid_path(model_, problem_, figures_.duration, {settings_.grid_nodes});
+    return {path.energy, path.energy > 0.0 ? "grid path" : path.message};
   }
 
   void bounds() {

@@ -140,7 +140,7 @@ std::vector<adouble> torques(const Machine& machine, const Taped& q, double payl
   return torque;
 }
 
-adouble mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
+adouble learned_mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
   const GpParameters& p = process.parameters();
   adouble sum = p.mean_constant + p.mean_slope * force;
   const adouble x = flow / p.length_flow, y = force / p.length_force;
@@ -150,6 +150,42 @@ adouble mean(const GaussianProcess& process, const adouble& flow, const adouble&
     sum += variance * p.weight[j] * exp(-0.5 * (dx * dx + dy * dy));
   }
   return sum;
+}
+
+/// max(0, x - gap) with its corner rounded, 0 at x = 0.
+adouble above(const adouble& x, const adouble& gap) {
+  constexpr double kSquare = loads_beyond::kRounded * loads_beyond::kRounded;
+  const adouble over = x - gap;
+  return 0.5 * (over + sqrt(over * over + kSquare)) - 0.5 * (sqrt(gap * gap + kSquare) - gap);
+}
+
+/// What is beyond zero, bent: a tape holds every branch, so that it can be replayed at other loads.
+adouble excess(const adouble& x, double bend) {
+  const adouble u = x / bend, none = 0.0;
+  const adouble curve = bend * u * u * u * (1.0 - 0.5 * u), line = x - 0.5 * bend;
+  adouble bent, out;
+  condassign(bent, x - bend, line, curve);
+  condassign(out, x, bent, none);
+  return out;
+}
+
+/// The process, and beyond the learned loads what models/loads_beyond.h says: both sides at once, since within them either's
+/// share is nothing.
+adouble mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
+  const GpParameters& p = process.parameters();
+  const LoadsBeyond& b = p.beyond;
+  if (b.side == 0) return learned_mean(process, flow, force);
+  const double side = b.side, bend = loads_beyond::bend(b);
+  const double heaviest = side > 0.0 ? p.force_max : -p.force_min;
+  const double lightest = side > 0.0 ? p.force_min : -p.force_max;
+  const adouble load = side * force;
+  const adouble heavier = excess(load - heaviest, bend), lighter = excess(lightest - load, bend);
+  const adouble border = load - heavier + lighter;
+  const adouble g = learned_mean(process, flow, side * border);
+  const adouble gap = g - b.static_level - b.static_slope * border;
+  const adouble fall = b.slope_lighter * lighter;
+  return g + b.slope_heavier * heavier + above((b.static_slope - b.slope_heavier) * heavier, gap) -
+         fall + above(fall, g - b.least);
 }
 
 class Adolc final : public WrappedKnotModel {

@@ -28,6 +28,9 @@ bool same_plan(const PhasePlan& a, const PhasePlan& b) {
          (a.modes.array() == b.modes.array()).all();
 }
 
+/// Up to so many times the shortest motion cylinders must move together somewhere: taking turns needs about twice its time.
+constexpr double kHurried = 2.0;
+
 /// Where time is short, the sequences tried are also those of motions so many times slower.
 constexpr double kSlower[] = {1.25, 1.6};
 
@@ -99,7 +102,7 @@ class Search {
   bool hurried() const {
     const double shortest = shortest_seed(seeds_);
     return problem_.objective.energy > 0.0 && problem_.obstacles.empty() &&
-           time_.lower == time_.upper && time_.guess < 1.6 * shortest;
+           time_.lower == time_.upper && time_.guess < kHurried * shortest;
   }
 
   /// One by one in so long a time, and the cheapest ways a search over the whole joint space knows.

@@ -123,6 +123,9 @@ struct OptimizeResult {
       0.0;  ///< [J] no motion takes less (energy_bound.h); 0 = not asked for or none
   double lower_bound_time = 0.0;  ///< [s] it holds for motions that take at most this; 0 = for all
   std::string bound_note;         ///< why there is none, or how the bound was found
+  double grid_path_energy =
+      0.0;  ///< [J] dynamic programming's path, driven in the same time; 0 = none
+  double unlimited_energy = 0.0;  ///< [J] its cheapest path at unlimited time; 0 = none
   double mesh_error = 0.0;  ///< of the answer's last mesh, relative (OptimizeOptions::mesh_error)
   double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
   std::string best_seed_name;

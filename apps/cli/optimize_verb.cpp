@@ -5,6 +5,7 @@
 #include "apps/cli/context.h"
 #include "apps/report/motion_page.h"
 #include "models/error.h"
+#include "optimizer/driven_grid_path.h"
 #include "optimizer/energy_bound_time.h"
 #include "optimizer/motion_table.h"
 
@@ -43,8 +44,12 @@ OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
   return result;
 }
 
-/// The bound of any motion, and the one of motions in the problem's time where that says more.
+/// What dynamic programming alone comes to, the bound of any motion, and the one of motions in the problem's time where
+/// that says more.
 void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
+  const DrivenGridPath path = driven_grid_path(model, problem, result.duration);
+  result.grid_path_energy = path.energy;
+  result.unlimited_energy = path.slow_energy;
   const EnergyBound bound = energy_bound(model, problem);
   result.bound_note = bound.message;
   if (!bound.valid) return;
@@ -144,8 +149,10 @@ void add_optimize_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(1, 256));
   verb->add_flag("--smooth-only", a->smooth_only,
                  "the single smooth NLP without modes (for comparison)");
-  verb->add_flag("--bound", a->bound,
-                 "also a lower bound: no motion takes less energy (docs/energy_bound.md)");
+  verb->add_flag(
+      "--bound", a->bound,
+      "also what dynamic programming on a joint grid comes to, the energy at unlimited time and a "
+      "lower bound: no motion takes less (docs/energy_bound.md)");
   verb->add_option("--from", a->from,
                    "start from this motion (CSV of an earlier run, for another goal or payload) "
                    "and from nothing else")

@@ -114,6 +114,8 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
           r.lower_bound_time > 0.0 ? nlohmann::json(r.lower_bound_time) : nlohmann::json();
       out["gap"] = r.energy.total / r.lower_bound - 1.0;
     }
+    if (r.grid_path_energy > 0.0) out["grid_path_energy_exact_J"] = r.grid_path_energy;
+    if (r.unlimited_energy > 0.0) out["unlimited_time_J"] = r.unlimited_energy;
     out["best_seed_energy_exact_J"] =
         r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
     out["best_seed"] =
@@ -160,6 +162,11 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   against("straight, nearest", r.nearest_line_energy, "");
   against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
   against("best seed path", r.best_seed_energy, r.best_seed_name);
+  if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
+  if (r.unlimited_energy > 0.0) {
+    add(fmt::format("  at unlimited time    {:9.2f} kJ   the cheapest slow path of a joint grid",
+                    r.unlimited_energy / 1e3));
+  }
   if (r.lower_bound > 0.0) {
     const std::string which =
         r.lower_bound_time > 0.0

@@ -204,6 +204,11 @@ TEST_F(Cli, BoundSaysForWhichMotions) {
     EXPECT_EQ(o.code, 0) << o.err;
     json r = test_support::parsed_json(slurp(at("b.json")));
     EXPECT_LT(r.at("lower_bound_J"), r.at("energy_exact_J"));
+    // the solver starts from such paths and only makes them cheaper; a finer grid gains less than a percent
+    EXPECT_GT(r.at("grid_path_energy_exact_J"), 0.99 * r.at("energy_exact_J").get<double>());
+    EXPECT_GT(r.at("unlimited_time_J"), 0.99 * r.at("lower_bound_J").get<double>());
+    EXPECT_THAT(o.out, HasSubstr("dynamic programming"));
+    EXPECT_THAT(o.out, HasSubstr("at unlimited time"));
     r["text"] = o.out;
     return r;
   };

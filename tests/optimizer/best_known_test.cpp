@@ -30,29 +30,65 @@ bench::ReachFigures figures_of(double energy, double duration, double bound, dou
   return f;
 }
 
-TEST(BestKnown, KeepsTheLeastEnergyTheLargestBoundAndTheShortestTime) {
-  const std::string path = testing::TempDir() + "best_known_" + std::to_string(getpid()) + ".json";
-  std::vector<bench::ReachTask> tasks(1);
-  tasks[0].problem.file = "somewhere/lift.yaml";
-  const auto after = [&](const bench::ReachFigures& f) {
-    bench::write_best_known(path, tasks, {f});
-    std::ifstream in(path);
+/// A file of one reach that runs write to, one after the other.
+class BestKnown : public ::testing::Test {
+ protected:
+  BestKnown() { tasks_[0].problem.file = "somewhere/lift.yaml"; }
+  ~BestKnown() override { std::remove(path_.c_str()); }
+  nlohmann::json after(const bench::ReachFigures& f) {
+    bench::write_best_known(path_, tasks_, {f});
+    std::ifstream in(path_);
     std::stringstream text;
     text << in.rdbuf();
-    return test_support::parsed_json(text.str()).at("lift.yaml");
-  };
-  after(figures_of(80e3, 16.0, 70e3, 7.4));
-  nlohmann::json entry = after(figures_of(82e3, 16.0, 78e3, 7.3));
+    return test_support::parsed_json(text.str());
+  }
+  nlohmann::json lift_after(const bench::ReachFigures& f) { return after(f).at("lift.yaml"); }
+
+  std::string path_ = testing::TempDir() + "best_known_" + std::to_string(getpid()) + ".json";
+  std::vector<bench::ReachTask> tasks_ = std::vector<bench::ReachTask>(1);
+};
+
+TEST_F(BestKnown, KeepsTheLeastEnergyTheLargestBoundAndTheShortestTime) {
+  lift_after(figures_of(80e3, 16.0, 70e3, 7.4));
+  nlohmann::json entry = lift_after(figures_of(82e3, 16.0, 78e3, 7.3));
   EXPECT_EQ(entry.at("energy_J"), 80e3) << "dearer";
   EXPECT_EQ(entry.at("lower_bound_J"), 78e3) << "the larger bound";
   EXPECT_EQ(entry.at("shortest_s"), 7.3);
-  entry = after(figures_of(90e3, 12.0, 85e3, 7.5));
+  entry = lift_after(figures_of(90e3, 12.0, 85e3, 7.5));
   EXPECT_EQ(entry.at("lower_bound_J"), 78e3) << "the bound of another time says nothing";
   EXPECT_EQ(entry.at("shortest_s"), 7.3);
-  entry = after(figures_of(79e3, 16.0, 77e3, 7.3));
+  entry = lift_after(figures_of(79e3, 16.0, 77e3, 7.3));
   EXPECT_EQ(entry.at("energy_J"), 79e3);
   EXPECT_EQ(entry.at("lower_bound_J"), 78e3) << "still the larger one";
-  std::remove(path.c_str());
+}
+
+TEST_F(BestKnown, ARunThatFindsNothingOrLeavesAReachOutChangesNothing) {
+  bench::ReachFigures nothing;
+  nothing.named = "too little time";
+  const nlohmann::json named = lift_after(nothing);
+  EXPECT_EQ(named.at("status"), "infeasible");
+  EXPECT_EQ(named.at("why"), "too little time");
+  const nlohmann::json known = lift_after(figures_of(80e3, 16.0, 70e3, 7.4));
+  EXPECT_EQ(known.at("status"), "optimal") << "found later after all";
+  EXPECT_EQ(lift_after(nothing), known);
+  nothing.left_out = true;
+  tasks_[0].problem.file = "somewhere/lower.yaml";
+  EXPECT_FALSE(after(nothing).contains("lower.yaml"));
+}
+
+TEST_F(BestKnown, BaselinesAndTheUnlimitedTimeStandBesideTheOptimum) {
+  bench::ReachFigures f = figures_of(80e3, 16.0, 70e3, 7.4);
+  f.unlimited = 79e3;
+  std::vector<StrategyOutcome>& outcomes = f.comparison.rows[0].outcomes;
+  for (const char* kind : {kJointLine, kMinimumTime}) {
+    outcomes.push_back(outcomes[0]);
+    outcomes.back().kind = kind;
+    outcomes.back().energy.total = 95e3;
+  }
+  const nlohmann::json entry = lift_after(f);
+  EXPECT_EQ(entry.at("unlimited_time_J"), 79e3);
+  EXPECT_EQ(entry.at("baselines_J"), (nlohmann::json{{kJointLine, 95e3}}))
+      << "the optimum is none, nor is what takes another time";
 }
 
 }  // namespace

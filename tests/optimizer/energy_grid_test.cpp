@@ -8,6 +8,7 @@
 
 #include "models/kinematics.h"
 #include "models/linkage.h"
+#include "optimizer/driven_grid_path.h"
 #include "optimizer/exact_energy.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
@@ -167,6 +168,31 @@ TEST(EnergyGrid, SaysWhyThereIsNoPath) {
   const GridPath none = EnergyGrid(c.model, c.problem, {1000, 4}).path_for_duration(20.0);
   EXPECT_FALSE(none.found);
   EXPECT_THAT(none.message, ::testing::HasSubstr("no posture"));
+}
+
+TEST(EnergyGrid, DrivenAsItIsCostsMoreThanSlowlyAndSaysWhyNot) {
+  GridCase c("loader_crane_lift");
+  const EnergyGridOptions small{12000, 4};
+  const DrivenGridPath hurried = driven_grid_path(c.model, c.problem, 10.0, small),
+                       slow = driven_grid_path(c.model, c.problem, 60.0, small);
+  ASSERT_GT(slow.energy, 0.0) << slow.message;
+  EXPECT_GT(slow.energy, slow.slow_energy) << "flow losses";
+  EXPECT_LT(slow.energy, 1.05 * slow.slow_energy);
+  EXPECT_EQ(hurried.slow_energy, slow.slow_energy) << "of no duration";
+  if (hurried.energy > 0.0) {
+    EXPECT_GT(hurried.energy, slow.energy);
+  }
+  const DrivenGridPath never = driven_grid_path(c.model, c.problem, 1.0, small);
+  EXPECT_EQ(never.energy, 0.0);
+  EXPECT_THAT(never.message, ::testing::HasSubstr("this fast"));
+  c.problem.limits.pressure_std = 1e3;  // what a grid does not look at
+  const DrivenGridPath unsure = driven_grid_path(c.model, c.problem, 60.0, small);
+  EXPECT_EQ(unsure.energy, 0.0);
+  EXPECT_THAT(unsure.message, ::testing::HasSubstr("standard deviation of the pressure"));
+  c.problem.waypoints.push_back({6.0, 0.0, 3.0});
+  const DrivenGridPath none = driven_grid_path(c.model, c.problem, 60.0, small);
+  EXPECT_EQ(none.slow_energy, 0.0);
+  EXPECT_THAT(none.message, ::testing::HasSubstr("waypoints"));
 }
 
 TEST(DemandTable, MatchesTheProcessAndItsLeastIsBelowItEverywhere) {

@@ -180,7 +180,7 @@ TEST(Optimize, OneByOneIsTriedDownToTheShortestTimeItNeeds) {
 TEST(Optimize, WhereTimeIsShortSlowerSequencesAreSqueezed) {
   Case c = lift_case();
   c.seeds.resize(1);
-  for (const double times_shortest : {1.3, 2.5}) {
+  for (const double times_shortest : {1.3, 1.9, 2.1}) {
     const double duration = times_shortest * c.seeds[0].shortest_duration;
     c.problem.duration = {duration, duration};
     const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
@@ -188,7 +188,7 @@ TEST(Optimize, WhereTimeIsShortSlowerSequencesAreSqueezed) {
     const bool squeezed = std::any_of(r.starts.begin(), r.starts.end(), [](const StartResult& s) {
       return s.seed.find("squeezed") != std::string::npos;
     });
-    EXPECT_EQ(squeezed, times_shortest < 1.6) << duration << " s";
+    EXPECT_EQ(squeezed, times_shortest < 2.0) << duration << " s";
   }
 }
 

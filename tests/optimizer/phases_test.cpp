@@ -85,10 +85,25 @@ TEST(Phases, AllTogetherHasNeighboursInWhichOneBeginsLaterOrEndsEarlier) {
   EXPECT_TRUE(has(all, plan({{kE, kR}, {kO, kR}}, {2.0, 2.0})));
   EXPECT_TRUE(has(all, plan({{kE, kO}, {kE, kR}}, {2.0, 2.0})));
   EXPECT_TRUE(has(all, plan({{kE, kR}, {kE, kO}}, {2.0, 2.0})));
-  for (const PhasePlan& p : all) EXPECT_NEAR(p.total(), 4.0, 1e-12);
+  for (const PhasePlan& p : all) {
+    EXPECT_NEAR(p.total(), 4.0, 1e-12);
+    EXPECT_NEAR(p.durations[0], 2.0, 1e-12);
+  }
+  for (const PhasePlan& p : neighbours(plan({{kE, kO}, {kE, kR}}, {1.0, 4.0}))) {
+    if (p.count() != 3) continue;
+    EXPECT_NEAR(p.durations[0], 1.0, 1e-12) << "the phase that is not cut keeps its time";
+    EXPECT_NEAR(p.durations[2], 2.0, 1e-12);
+  }
   // only the longest such phase is cut
   EXPECT_FALSE(has(neighbours(plan({{kE, kR}, {kE, kO}, {kE, kR}}, {1.0, 1.0, 4.0})),
                    plan({{kO, kR}, {kE, kR}, {kE, kO}, {kE, kR}}, {0.5, 0.5, 1.0, 4.0})));
+}
+
+TEST(Phases, ThoseThatPassAWaypointHaveNoNeighbours) {
+  PhasePlan through = plan({{kE, kO}, {kO, kR}}, {1.0, 3.0});
+  ASSERT_FALSE(neighbours(through).empty());
+  through.waypoint_after = {0};
+  EXPECT_TRUE(neighbours(through).empty()) << "none knows after which phase the waypoint lies";
 }
 
 TEST(Phases, AMeshHasAKnotAtEveryChangeAndKeepsTheShares) {
