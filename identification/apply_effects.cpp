@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/low_pass.h"
 #include "identification/series.h"
+#include "identification/smoothing.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
 #include "models/nan.h"
@@ -104,6 +106,15 @@ VectorXd sensor_effect(const AppliedEffect& e, const MachineSeries& log, int ind
   return sum;
 }
 
+/// Added to a cylinder's speed, as a filtered speed would show it; raw where that filter reaches beyond a run. [m/s]
+VectorXd flow_effect(const AppliedEffect& e, const MachineSeries& log, double window, int index) {
+  VectorXd speed = effect_series(e, log, EvidenceKind::kFlow, index);
+  if (speed.size() == 0 || !e.effect->columns_of_readings() || !(window > 0.0)) return speed;
+  const VectorXd kernel = low_pass_of(log.step, window, SmoothingOptions{}.order, 1);
+  const VectorXd smooth = convolved(speed, kernel, log.runs);
+  return smooth.array().isFinite().select(smooth, speed);
+}
+
 void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSignals& signals) {
   const std::size_t m = signals.cylinders.size();
   const bool acts = acts_in_motion(*e.effect);
@@ -130,7 +141,7 @@ void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSig
     if (e.effect->info().stage == EffectStage::kSensor) {
       add(sensor_effect(e, log, index), c.pressure_sensor_effect);
     }
-    add(effect_series(e, log, EvidenceKind::kFlow, index), c.flow_effect);
+    add(flow_effect(e, log, signals.window, index), c.flow_effect);
   }
 }
 

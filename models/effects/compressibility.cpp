@@ -66,6 +66,7 @@ class Compressibility final : public Effect {
     return hydraulic_cylinders(machine);
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  bool columns_of_readings() const override { return true; }
 
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {

@@ -151,6 +151,9 @@ class Effect {
   virtual Eigen::VectorXd other_share(const MachineSeries& /*log*/) const { return {}; }
   /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
+  /// Whether columns() hold readings as they are, with their noise: what is smoothed compares with them only after the
+  /// same filter.
+  virtual bool columns_of_readings() const { return false; }
 };
 
 /// Parameters of an effect that is part of a model.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "arm_log.h"
+#include "identification/evidence.h"
 #include "identification/fit.h"
 #include "identification/series.h"
 #include "models/effects/effective_machine.h"
@@ -164,6 +165,30 @@ TEST(ApplyEffects, APumpThatLagsIsLearnedInstant) {
   const FitResult r = fit(truth.machine, {log}, {log}, options);
   EXPECT_NEAR(r.model.cylinders[0].margin, kMargin, 0.05 * units::kBar);
   EXPECT_NEAR(r.model.pumps[0].standby, kStandby, 0.05 * units::kBar);
+}
+
+/// Pressures as they are read hold noise; the flow they compress compares with a filtered speed after the same filter.
+TEST(ApplyEffects, FlowsOfReadingsAreFilteredLikeTheSpeed) {
+  CraneModel model = arm_model();
+  const AppliedEffect oil = typical("compressibility:arm", model.machine);
+  model.effects = {oil};
+  MachineSignals s = make_signals(model.machine, log_of(model, 0.8));
+  apply_effects(model, s);
+  CraneModel without = model;
+  without.effects.clear();
+  const Evidence e = collect_evidence(without, {s});
+  const EvidenceChannel* speed = e.find(EvidenceKind::kFlow, 0);
+  ASSERT_NE(speed, nullptr);
+  const Eigen::MatrixXd by_unit =
+      e.columns({oil.effect, oil.at}, std::vector<double>{oil.values[1]}, *speed);
+  const Eigen::VectorXd& flow = s.cylinders[0].flow_effect;
+  ASSERT_EQ(by_unit.rows(), speed->rows());
+  for (Index r = 0; r < by_unit.rows(); ++r) {
+    EXPECT_NEAR(flow[speed->sample[static_cast<std::size_t>(r)]], oil.values[0] * by_unit(r, 0),
+                1e-12);
+  }
+  const Eigen::VectorXd raw = effect_series(oil, e.series[0], EvidenceKind::kFlow, 0);
+  EXPECT_LT(flow.norm(), 0.9 * raw.norm()) << "noise of one sample to the next";
 }
 
 TEST(ApplyEffects, CalledAgainItStartsAfresh) {
