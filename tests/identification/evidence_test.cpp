@@ -8,6 +8,7 @@
 #include <set>
 
 #include "identification/effect_fit.h"
+#include "models/effects/registry.h"
 #include "tests/identification/arm_log.h"
 #include "tests/identification/hidden_case.h"
 
@@ -233,6 +234,29 @@ TEST(Evidence, ReferenceRowsFeelNoEffect) {
     }
   }
   EXPECT_GT(acting, 60) << "places where some effect of the catalogue shows";
+}
+
+TEST(Evidence, ATiltsColumnIsTheChordUpToItsAngle) {
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train});
+  const EffectAt tilt = parse_effect("base_tilt", arm());
+  const double angle = 0.1;
+  const std::vector<double> up = {angle}, down = {-angle};
+  int rows = 0;
+  for (int i = 0; i < 2; ++i) {
+    const EvidenceChannel* c = e.find(EvidenceKind::kForce, i);
+    ASSERT_NE(c, nullptr);
+    // Gravity turns in the arm's plane: F(a) + F(-a) - 2 F(0) = 2 F(0) (cos a - 1), which a tangent says is zero.
+    const VectorXd both = angle * (e.columns(tilt, {}, *c, up) - e.columns(tilt, {}, *c, down));
+    const VectorXd& force = e.series[0].cylinders[static_cast<std::size_t>(i)].static_force;
+    for (Index r = 0; r < c->rows(); ++r) {
+      const double expected =
+          2.0 * force[c->sample[static_cast<std::size_t>(r)]] * (std::cos(angle) - 1.0);
+      EXPECT_NEAR(both[r], expected, 0.05 * std::abs(expected) + 20.0);  // the filter's share, N
+      ++rows;
+    }
+  }
+  EXPECT_GT(rows, 200);
 }
 
 TEST(Evidence, WhatTheModelKnowsIsTakenOff) {
