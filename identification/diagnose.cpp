@@ -46,8 +46,8 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   return fit_effects(d.evidence, others, nullptr, control);
 }
 
-/// What another form of the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
-EffectFit fit_with_other_forms(const Diagnosis& d) {
+/// What another power of the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
+EffectFit fit_with_other_powers(const Diagnosis& d) {
   std::vector<EffectDesign> powers;
   powers.reserve(d.search.found.size());
   std::vector<const EffectDesign*> designs;
@@ -55,8 +55,7 @@ EffectFit fit_with_other_forms(const Diagnosis& d) {
   Index first = 0;
   for (const FoundEffect& f : d.search.found) {
     designs.push_back(&f.design);
-    powers.push_back(
-        other_form(d.evidence, f.design, d.search.final.theta.segment(first, f.design.linear)));
+    powers.push_back(other_power(f.design, d.search.final.theta.segment(first, f.design.linear)));
     first += f.design.linear;
   }
   for (const EffectDesign& p : powers) {
@@ -349,7 +348,7 @@ Unexplained describe_unnamed(const Diagnosis& d) {
 
 /// What happened once and that an effect would explain, though it proves none.
 Unexplained describe_incident(const Diagnosis& d) {
-  const EffectDesign& design = d.search.once.front();
+  const EffectDesign& design = *d.search.once;
   FitControl control;
   control.keep_residuals = true;
   const EffectFit with = fit_effects(d.evidence, {&design}, nullptr, control);
@@ -363,7 +362,7 @@ Unexplained describe_incident(const Diagnosis& d) {
   u.noise_floor = c.noise_floor;
   u.unit = c.unit;
   u.share = incident.share;
-  u.once = true;
+  u.few_places = true;
   u.sentence = incident_sentence(
       d.evidence, incident,
       effect_key(design.effect.effect->info(), *d.evidence.series[0].machine, design.effect.at));
@@ -443,7 +442,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
   if (progress) progress(0.92, "looking at what is left");
-  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_forms(d));
+  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_powers(d));
   std::vector<Leftover> riddles;
   bool in_touched = false;
   for (const Leftover& l : left) {
@@ -459,7 +458,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
   }
-  if (d.search.found.empty() && !d.unexplained && !d.search.once.empty())
+  if (d.search.found.empty() && !d.unexplained && d.search.once)
     d.unexplained = describe_incident(d);
   drop_trifles(d, options.search);
   if (!d.search.found.empty()) settle_values(model, suspects, references, d.search.found);

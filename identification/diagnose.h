@@ -55,8 +55,8 @@ struct Unexplained {
   double rmse = 0.0, noise_floor = 0.0;  ///< SI
   FieldUnit unit;
   std::string sentence;  ///< where it is largest, in words
-  bool once =
-      false;  ///< an effect would explain it, but it happened in one place alone (incident.h)
+  bool few_places =
+      false;  ///< an effect would explain it, but it happened in one place or few (incident.h)
 };
 
 struct Diagnosis {

@@ -75,8 +75,9 @@ std::string Diagnosis::headline() const {
     case Verdict::kNone:
       return "Nothing is missing: what is left is noise, as far as these logs can tell.";
     case Verdict::kUnknown:
-      if (unexplained && unexplained->once)
-        return fmt::format("Something happened once: {}.", unexplained->sentence);
+      if (unexplained && unexplained->few_places)
+        return fmt::format("Something happened too seldom to prove a law: {}.",
+                           unexplained->sentence);
       return fmt::format("Something is missing that is not in the catalogue{}.",
                          unexplained ? ": " + unexplained->sentence : "");
     case Verdict::kMissing:

@@ -60,24 +60,58 @@ VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* 
   return scale.cwiseProduct(x);
 }
 
+/// Standard deviation of a channel's sensors; where it is not known, what rounding leaves of the measurement.
+double noise_or_rounding(const EvidenceChannel& channel) {
+  if (channel.noise_floor > 0.0) return channel.noise_floor;
+  return 1e-9 * channel.y.cwiseAbs().maxCoeff() + 1e-300;
+}
+
+/// Column `k` of every channel in units of the sensors' noise, less what the columns before it say already.
+VectorXd own_part(const Evidence& evidence, const EffectDesign& design, Index k) {
+  Index rows = 0;
+  for (const MatrixXd& c : design.columns) rows += c.cols() > 0 ? c.rows() : 0;
+  MatrixXd stacked(rows, k + 1);
+  Index at = 0;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    if (!design.touches(c)) continue;
+    const MatrixXd& columns = design.columns[c];
+    stacked.middleRows(at, columns.rows()) =
+        columns.leftCols(k + 1) / noise_or_rounding(evidence.channels[c]);
+    at += columns.rows();
+  }
+  for (Index i = 0; i <= k; ++i) {  // modified Gram-Schmidt
+    for (Index before = 0; before < i; ++before) {
+      const double square = stacked.col(before).squaredNorm();
+      if (square > 0.0)
+        stacked.col(i) -=
+            stacked.col(before).dot(stacked.col(i)) / square * stacked.col(before).eval();
+    }
+  }
+  return stacked.col(k);
+}
+
 /// A parameter that nothing feels even at its bound (the mass of a point on the joint's own axis, beside its moment)
-/// would follow rounding to that bound.
+/// would follow rounding to that bound; one that only says again what those before it say (a scale in error where the
+/// load never changes) would share their value in no way that means anything.
 void drop_unfelt(const Evidence& evidence, EffectDesign& design) {
   constexpr double kUnfelt = 0.05;  // of the sensors' noise
+  if (!design.acts()) return;
   for (Index k = 0; k < design.linear; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const double most = std::max(std::abs(design.lower[at]), std::abs(design.upper[at]));
-    bool felt = false;
-    for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
-      if (!design.touches(c)) continue;
-      const double floor = evidence.channels[c].noise_floor;
-      felt = felt || !(design.columns[c].col(k).cwiseAbs().maxCoeff() * most < kUnfelt * floor);
-    }
-    if (felt) continue;
+    if (!(own_part(evidence, design, k).cwiseAbs().maxCoeff() * most < kUnfelt)) continue;
     for (MatrixXd& c : design.columns) {
       if (c.cols() > 0) c.col(k).setZero();
     }
   }
+}
+
+/// @param k among the linear parameters
+bool is_optional(const EffectDesign& design, Index k) {
+  for (const EffectParameter& p : design.effect.effect->info().parameters) {
+    if (p.linear && k-- == 0) return p.optional;
+  }
+  return false;
 }
 
 struct Whitened {
@@ -98,7 +132,7 @@ double EffectFit::total() const {
 }
 
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
-                         std::vector<double> shape, std::span<const double> about) {
+                         std::vector<double> shape, std::span<const double> about, bool optional) {
   EffectDesign d;
   d.effect = effect;
   d.shape = std::move(shape);
@@ -111,7 +145,24 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c, about));
   drop_unfelt(evidence, d);
+  if (!optional) return without_optional(std::move(d));
+  for (Index k = 0; k < d.linear; ++k) {
+    if (!is_optional(d, k)) continue;
+    for (const MatrixXd& c : d.columns)
+      d.optional = d.optional || (c.cols() > 0 && !c.col(k).isZero(0.0));
+  }
   return d;
+}
+
+EffectDesign without_optional(EffectDesign design) {
+  for (Index k = 0; k < design.linear; ++k) {
+    if (!is_optional(design, k)) continue;
+    for (MatrixXd& c : design.columns) {
+      if (c.cols() > 0) c.col(k).setZero();
+    }
+  }
+  design.optional = false;
+  return design;
 }
 
 MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,

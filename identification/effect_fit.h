@@ -15,14 +15,19 @@ struct EffectDesign {
   std::vector<Eigen::MatrixXd> columns;  ///< [channels]: [rows x linear], or no columns
   std::vector<double> lower, upper;      ///< [SI] bounds of the linear parameters
   int linear = 0;
+  bool optional = false;  ///< an optional parameter acts too
 
   bool acts() const;
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 
-/// @param about as Evidence::columns has it
+/// @param about as Evidence::columns has it  @param optional whether its optional parameters are to act
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
-                         std::vector<double> shape, std::span<const double> about = {});
+                         std::vector<double> shape, std::span<const double> about = {},
+                         bool optional = true);
+
+/// The same without its optional parameters.
+EffectDesign without_optional(EffectDesign design);
 
 struct EffectFit {
   Eigen::VectorXd theta;               ///< [SI] linear parameters of all designs in turn

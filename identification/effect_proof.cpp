@@ -48,44 +48,12 @@ double form_share(const Effect& effect) {
   return exact ? effect.info().form_error : std::max(effect.info().form_error, kLeastForm);
 }
 
-namespace {
-
-/// Columns of Effect::other_share; zero in reference logs.
-EffectDesign other_share(const Evidence& evidence, const EffectDesign& design) {
-  EffectDesign result;
-  result.columns.resize(design.columns.size());
-  for (std::size_t log = 0; log < evidence.suspects && log < evidence.series.size(); ++log) {
-    const VectorXd share = design.effect.effect->other_share(evidence.series[log]);
-    if (share.size() == 0) continue;
-    for (std::size_t c = 0; c < design.columns.size(); ++c) {
-      if (!design.touches(c)) continue;
-      const EvidenceChannel& channel = evidence.channels[c];
-      if (result.columns[c].size() == 0) result.columns[c] = MatrixXd::Zero(channel.rows(), 1);
-      for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
-        if (static_cast<std::size_t>(channel.log[b]) != log) continue;
-        for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
-          const double there = share[channel.sample[static_cast<std::size_t>(r)]];
-          if (std::isfinite(there)) result.columns[c](r, 0) = design.columns[c](r, 0) * there;
-        }
-      }
-    }
-  }
-  result.linear = 1;
-  result.lower = {-1.0};
-  result.upper = {1.0};
-  return result;
-}
-
-}  // namespace
-
-EffectDesign other_form(const Evidence& evidence, const EffectDesign& design,
-                        const VectorXd& theta) {
+EffectDesign other_power(const EffectDesign& design, const VectorXd& theta) {
   constexpr double kPower = 0.2;
   const Effect& effect = *design.effect.effect;
-  if (effect.changes_machine()) return other_share(evidence, design);
   EffectDesign result;
   result.columns.resize(design.columns.size());
-  if (effect.columns_filtered()) return result;
+  if (effect.changes_machine() || effect.columns_filtered()) return result;
   for (std::size_t c = 0; c < design.columns.size(); ++c) {
     if (!design.touches(c)) continue;
     const VectorXd action = design.columns[c] * theta;

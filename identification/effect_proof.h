@@ -27,11 +27,9 @@ double form_share(const Effect& effect);
 
 /// What changes when the law grows with another power, to first order: action times the logarithm of its size, one
 /// column in each channel, bounded by what published exponents differ by (friction with v^0.85 for v, pipes with
-/// Q^1.75 for Q^2); of another machine, Effect::other_share (a scale in error). Without columns for effects whose law
-/// has no such freedom: weights, inertia.
+/// Q^1.75 for Q^2). Without columns for effects whose law has no such freedom: weights, inertia.
 /// @param theta of the design
-EffectDesign other_form(const Evidence& evidence, const EffectDesign& design,
-                        const Eigen::VectorXd& theta);
+EffectDesign other_power(const EffectDesign& design, const Eigen::VectorXd& theta);
 
 /// Whether one of the design's linear parameters lies on the edge of what is plausible; zero is no edge: no effect.
 bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::VectorXd>& theta);

@@ -3,6 +3,7 @@
 /// controlled false alarm, held-out proof, drop and swap moves, indistinguishable sets. docs/diagnose.md has the
 /// method and what each number was measured to be worth.
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,7 +58,7 @@ struct SearchResult {
   /// Beyond the gate, but only with parameters that no machine has: something is there, and not this.
   std::vector<FoundEffect> unnamed;
   /// Nothing passed the gate, but this gains far too much for noise: it shows in one place (incident.h).
-  std::vector<EffectDesign> once;
+  std::optional<EffectDesign> once;
   EffectFit null, final;   ///< without and with them
   double p_value = 1.0;    ///< of the first gate
   double threshold = 0.0;  ///< [nats] of the first gate

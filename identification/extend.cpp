@@ -18,7 +18,6 @@ using Clock = std::chrono::steady_clock;
 /// How often `improve` may try what it then does not keep: each time costs a diagnosis.
 constexpr std::size_t kMostRejected = 8;
 
-bool same(const EffectAt& a, const EffectAt& b) { return a.effect == b.effect && a.at == b.at; }
 
 ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std::string& date) {
   ModelStep record;
@@ -198,8 +197,8 @@ std::string why_stopped(const Diagnosis& d) {
     case Verdict::kNone:
       return "nothing more is missing that these logs could show";
     case Verdict::kUnknown:
-      if (d.unexplained && d.unexplained->once)
-        return "something happened once: " + d.unexplained->sentence;
+      if (d.unexplained && d.unexplained->few_places)
+        return "something happened too seldom to prove a law: " + d.unexplained->sentence;
       return "what is left is not in the catalogue" +
              (d.unexplained ? ": " + d.unexplained->sentence : std::string());
     case Verdict::kBadData:
@@ -214,7 +213,7 @@ std::string why_stopped(const Diagnosis& d) {
 /// What explains the same evidence within what the search calls a rival.
 void add_look_alikes(const Diagnosis& d, const EffectAt& effect, std::vector<EffectAt>& aside) {
   for (const FoundEffect& f : d.search.found) {
-    if (!same(f.design.effect, effect)) continue;
+    if (!(f.design.effect == effect)) continue;
     for (const auto& [rival, worse] : f.alternatives) aside.push_back(rival);
   }
 }
@@ -286,7 +285,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
   const auto start = Clock::now();
   std::vector<EffectAt> all = places_of(model.effects);
   for (const EffectAt& e : add) {
-    if (std::any_of(all.begin(), all.end(), [&](const EffectAt& o) { return same(o, e); })) {
+    if (std::any_of(all.begin(), all.end(), [&](const EffectAt& o) { return o == e; })) {
       throw InputError({}, effect_key(e.effect->info(), model.machine, e.at),
                        "the model has this effect already; take it back first to learn it anew");
     }
@@ -325,7 +324,7 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
   const std::string key = effect_key(effect.effect->info(), model.machine, effect.at);
   std::vector<EffectAt> rest = places_of(model.effects);
   const auto at =
-      std::find_if(rest.begin(), rest.end(), [&](const EffectAt& e) { return same(e, effect); });
+      std::find_if(rest.begin(), rest.end(), [&](const EffectAt& e) { return e == effect; });
   if (at == rest.end()) {
     std::string has;
     for (const AppliedEffect& e : model.effects)

@@ -90,11 +90,11 @@ std::string incident_sentence(const Evidence& evidence, const Incident& incident
                               const std::string& key) {
   const EvidenceChannel& c = evidence.channels[incident.channel];
   return fmt::format(
-      "{}: {} {} (RMS) from {:.1f} to {:.1f} s{}; {} would leave {} {}, but what happened once "
-      "proves no law: drive that motion again",
+      "{}: {} {} (RMS) from {:.1f} to {:.1f} s{}, where {:.0f} % of it is; {} would leave {} {}. "
+      "Drive that motion again",
       c.text, plain_number(incident.before / c.unit.si, 2), c.unit.name, incident.from, incident.to,
-      evidence.suspects > 1 ? fmt::format(" of log {}", incident.log + 1) : "", key,
-      plain_number(incident.after / c.unit.si, 2), c.unit.name);
+      evidence.suspects > 1 ? fmt::format(" of log {}", incident.log + 1) : "",
+      100.0 * incident.share, key, plain_number(incident.after / c.unit.si, 2), c.unit.name);
 }
 
 }  // namespace sparflow

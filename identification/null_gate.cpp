@@ -125,8 +125,10 @@ NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidat
                            evidence.channels[c].blocks, signs[c]);
       }
       z = scale.asDiagonal() * z;
-      best = best.cwiseMax(
-          (0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum()).transpose());
+      const double besides = d.optional ? candidate.optional_penalty : 0.0;
+      const VectorXd gains =
+          0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum().transpose();
+      best = best.cwiseMax((gains.array() - besides).matrix());
     }
     const double usual = upper_decile(best.head(simulations));
     const double scale =

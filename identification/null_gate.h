@@ -27,7 +27,8 @@ struct NullGate {
 /// One candidate: its designs (grid) and its penalty.
 struct GateCandidate {
   const std::vector<EffectDesign>* designs = nullptr;
-  double penalty = 0.0;  ///< [nats]
+  double penalty = 0.0;           ///< [nats]
+  double optional_penalty = 0.0;  ///< [nats] besides, of designs with optional parameters
 };
 
 NullGate make_null_gate(const Evidence& evidence, const std::vector<GateCandidate>& candidates,

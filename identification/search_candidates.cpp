@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "identification/parallel.h"
 #include "models/linear_algebra.h"
@@ -38,9 +40,9 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
 }
 
 /// A mass on the first link acts by its moment alone: one of its two columns.
-int independent_columns(const SearchCandidate& candidate) {
+int independent_columns(const std::vector<EffectDesign>& designs) {
   Index linear = 1;
-  for (const EffectDesign& d : candidate.designs) {
+  for (const EffectDesign& d : designs) {
     MatrixXd gram = MatrixXd::Zero(d.linear, d.linear);
     for (const MatrixXd& c : d.columns) {
       if (c.cols() > 0) gram += transposed_product(c, c) / std::max(c.squaredNorm(), 1e-300);
@@ -73,10 +75,20 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
   });
   std::erase_if(all, [](const SearchCandidate& c) { return c.designs.empty(); });
   for (SearchCandidate& c : all) {
-    c.linear = independent_columns(c);
-    const auto parameters =
-        static_cast<double>(c.linear) + static_cast<double>(c.designs.front().shape.size());
-    c.penalty = 0.5 * parameters * std::log(rows);
+    const double each = 0.5 * std::log(rows);
+    c.linear = independent_columns(c.designs);
+    const bool optional = std::any_of(c.designs.begin(), c.designs.end(),
+                                      [](const EffectDesign& d) { return d.optional; });
+    if (optional) {
+      std::vector<EffectDesign> all_designs;
+      all_designs.reserve(2 * c.designs.size());
+      for (const EffectDesign& d : c.designs) all_designs.push_back(without_optional(d));
+      const int whole = std::exchange(c.linear, independent_columns(all_designs));
+      c.optional_penalty = each * (whole - c.linear);
+      std::move(c.designs.begin(), c.designs.end(), std::back_inserter(all_designs));
+      c.designs = std::move(all_designs);
+    }
+    c.penalty = each * (c.linear + static_cast<double>(c.designs.front().shape.size()));
   }
   return all;
 }

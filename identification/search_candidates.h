@@ -8,9 +8,16 @@ namespace sparflow {
 
 struct SearchCandidate {
   EffectAt effect;
-  std::vector<EffectDesign> designs;  ///< one a point of its grid that acts on this evidence
-  int linear = 1;                     ///< linear parameters with independent columns
-  double penalty = 0.0;               ///< [nats] its gain must exceed
+  std::vector<EffectDesign>
+      designs;           ///< one a point of its grid that acts on this evidence, and again with
+                         ///< optional parameters where those say something of their own
+  int linear = 1;        ///< linear parameters with independent columns, without optional ones
+  double penalty = 0.0;  ///< [nats] its gain must exceed
+  double optional_penalty = 0.0;  ///< [nats] and this besides for its optional parameters
+
+  double price(const EffectDesign& design) const {
+    return penalty + (design.optional ? optional_penalty : 0.0);
+  }
 };
 
 /// Candidates that act somewhere in the evidence, in the order given; the others are left out.

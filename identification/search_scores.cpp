@@ -97,7 +97,8 @@ std::vector<CandidateScore> SearchScores::beside(const std::vector<const EffectD
   parallel(candidates_.size(), [&](std::size_t i) {
     if (skip[i]) return;
     for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
-      const double g = gain(base, candidates_[i].designs[k], current) - candidates_[i].penalty;
+      const double g = gain(base, candidates_[i].designs[k], current) -
+                       candidates_[i].price(candidates_[i].designs[k]);
       if (g > scores[i].gain) scores[i] = {i, k, g};
     }
   });
@@ -118,7 +119,7 @@ std::vector<CandidateScore> SearchScores::instead_of(const EffectDesign& place,
       for (std::size_t ch = 0; ch < touched.size(); ++ch)
         meets = meets || (touched[ch] && c.designs[d].touches(ch));
       if (!meets) return;
-      const double g = gain(others, c.designs[d], without, touched, true) - c.penalty;
+      const double g = gain(others, c.designs[d], without, touched, true) - c.price(c.designs[d]);
       if (g > scores[k].gain) scores[k] = {k, d, g};
     }
   });
@@ -162,7 +163,7 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
           right ? d.shape[k] + golden * (hi - d.shape[k]) : d.shape[k] - golden * (d.shape[k] - lo);
       std::vector<double> shape = d.shape;
       shape[k] = x;
-      trial = make_design(evidence_, d.effect, shape);
+      trial = make_design(evidence_, d.effect, shape, {}, d.optional);
       const double g = trial.acts() ? gain(base, trial, current) : -1e300;
       if (g > at_best) {
         (right ? lo : hi) = d.shape[k];

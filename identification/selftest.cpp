@@ -189,7 +189,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   report(0.3, "the gate on these motions");
   std::vector<GateCandidate> gated;
   gated.reserve(all.size());
-  for (const SearchCandidate& c : all) gated.push_back({&c.designs, c.penalty});
+  for (const SearchCandidate& c : all) gated.push_back({&c.designs, c.penalty, c.optional_penalty});
   std::mt19937_64 random(options.search.seed);
   const NullGate gate =
       make_null_gate(evidence, gated, {}, fit, options.search.simulations, random);

@@ -34,7 +34,8 @@ EffectSize size_effect(const SearchCandidate& candidate) {
       shapes.push_back(&p);
       continue;
     }
-    theta.push_back(p.typical);
+    theta.push_back(p.optional ? 0.0 : p.typical);
+    if (p.optional) continue;
     share = share || p.lower > 0.0;
     if (p.typical > 0.0) out.largest = std::min(out.largest, p.upper / p.typical);
     if (p.typical < 0.0) out.largest = std::min(out.largest, p.lower / p.typical);

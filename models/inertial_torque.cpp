@@ -187,7 +187,7 @@ Vector<T> inertial_torque(const Machine& machine, const Vector<T>& q, const Vect
   if (payload > 0.0 && machine.tip.joint >= 0) {
     Link load;
     load.joint = machine.tip.joint;
-    load.mass = payload;
+    load.mass = machine.tip.payload_scale * payload;
     load.cog = machine.tip.xyz;
     dynamics.add_link(load);
   }

@@ -116,6 +116,8 @@ struct Tip {
   int joint = -1;  ///< -1 = base
   Eigen::Vector3d xyz =
       Eigen::Vector3d::Zero();  ///< [m] in the frame of `joint`; the payload hangs here
+  double payload_scale =
+      1.0;  ///< true payload per payload told: a crane's scale has an error of its own
 };
 
 struct Machine {

@@ -50,7 +50,7 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_torque(const Machine& machine,
     add_rigid(link.mass, link.joint, p);
   }
   if (payload > 0.0) {
-    add_rigid(payload, machine.tip.joint,
+    add_rigid(machine.tip.payload_scale * payload, machine.tip.joint,
               point_in_base(frames, machine.tip.joint, machine.tip.xyz));
   }
   std::vector<LinkageMass<Taylor3>> masses;
@@ -93,7 +93,8 @@ double potential_energy(const Machine& machine, const Eigen::VectorXd& q, double
     }
     moment += link.mass * p;
   }
-  moment += payload * point_in_base(frames, machine.tip.joint, machine.tip.xyz);
+  moment += machine.tip.payload_scale * payload *
+            point_in_base(frames, machine.tip.joint, machine.tip.xyz);
   std::vector<LinkageMass<double>> masses;
   for (int c = 0; c < machine.cylinder_count(); ++c) {
     const int j = machine.cylinders[static_cast<std::size_t>(c)].joint;
@@ -149,7 +150,8 @@ void StaticForce::accumulate_moments(const double* q, double payload) {
     add_rigid(link.mass, link.joint, p);
   }
   if (payload > 0.0) {
-    add_rigid(payload, machine_->tip.joint, chain_.point(machine_->tip.joint, machine_->tip.xyz));
+    add_rigid(machine_->tip.payload_scale * payload, machine_->tip.joint,
+              chain_.point(machine_->tip.joint, machine_->tip.xyz));
   }
   for (int c = 0; c < machine_->cylinder_count(); ++c) {
     const int j = machine_->cylinders[static_cast<std::size_t>(c)].joint;

@@ -166,7 +166,7 @@ void add_sets(Page& page, const Diagnosis& d) {
 void add_unexplained(Page& page, const Diagnosis& d) {
   if (!d.unexplained) return;
   const Unexplained& u = *d.unexplained;
-  page.section(u.once ? "What happened once" : "What nothing in the catalogue explains");
+  page.section(u.few_places ? "What happened too seldom to prove a law" : "What nothing in the catalogue explains");
   page.paragraph(sentence(u.sentence));
   if (u.rmse > 0.0 && u.unit.si > 0.0) {
     const auto [rmse, name] = readable_error(u.rmse, u.unit);
@@ -178,7 +178,7 @@ void add_unexplained(Page& page, const Diagnosis& d) {
                           display_number(u.noise_floor * rmse / u.rmse, 2));
     page.paragraph(text + ".");
   }
-  if (!u.depends_on.empty() && !u.once)
+  if (!u.depends_on.empty() && !u.few_places)
     page.paragraph("It depends on: " + joined(u.depends_on, ", ") + ", strongest first.");
   const bool swings =
       std::any_of(u.depends_on.begin(), u.depends_on.end(),

@@ -32,6 +32,8 @@ struct EffectParameter {
   bool linear = true;
   std::vector<double> grid;  ///< [SI] empty for linear ones
   bool choice = false;  ///< the grid's values name variants of the law: nothing lies between them
+  /// Of linear ones: the effect is whole without it, and a search pays for it only where it says something.
+  bool optional = false;
 };
 
 struct EffectInfo {
@@ -145,10 +147,6 @@ class Effect {
   /// default is the parameter's own grid; limits and thresholds depend on what the log reaches. Empty: the log
   /// lacks what the effect needs.
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
-  /// Of effects that are another machine: what their law may hold besides, sample by sample, as a multiple of the
-  /// first linear parameter's column, at the most that is usual (a scale in error beside a load it was not told of).
-  /// [samples], in that parameter's unit; empty: nothing.
-  virtual Eigen::VectorXd other_share(const MachineSeries& /*log*/) const { return {}; }
   /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
   /// Whether columns() hold readings as they are, with their noise: what is smoothed compares with them only after the

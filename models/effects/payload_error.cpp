@@ -17,10 +17,22 @@ class PayloadError final : public Effect {
                         -2000.0,
                         10e3,
                         80.0,
-                        "true load at the tip minus the logged one",
+                        "at the tip, told by no log: a gear, a rope",
                         true,
-                        {}}},
-        .equation = "F = F_static(payload + mass)",
+                        {}},
+                       {"scale",
+                        "%",
+                        0.01,
+                        -0.1,
+                        0.1,
+                        0.02,
+                        "true load per logged load, less one; crane scales are told to be right "
+                        "within 1 to 5 %",
+                        true,
+                        {},
+                        false,
+                        true}},
+        .equation = "F = F_static(payload (1 + scale) + mass)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"unmodelled_mass", "base_tilt", "angle_offset"},
         .separated_by = "the same poses with two or three weighed loads and a change of reach",
@@ -35,12 +47,8 @@ class PayloadError final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool changes_machine() const override { return true; }
-  Eigen::VectorXd other_share(const MachineSeries& log) const override {
-    constexpr double kScale =
-        0.05;  // of the reading: crane scales are told to be right within 1 to 5 %
-    return kScale * log.payload;
-  }
   void change_machine(Machine& machine, int, std::span<const double> p) const override {
+    machine.tip.payload_scale *= 1.0 + p[1];
     if (p[0] == 0.0) return;
     Link load;
     load.name = "payload error";

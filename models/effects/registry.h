@@ -18,6 +18,7 @@ const Effect* add_user_effect(std::unique_ptr<Effect> effect);
 struct EffectAt {
   const Effect* effect = nullptr;
   int at = -1;
+  bool operator==(const EffectAt&) const = default;
 };
 /// "coulomb_friction:boom" on this machine. @throws InputError naming what exists, with a suggestion
 EffectAt parse_effect(const std::string& key, const Machine& machine);

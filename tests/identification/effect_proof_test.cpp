@@ -101,13 +101,13 @@ TEST(EffectAction, AShareOfAnotherLawsFormIsNoEffectOfItsOwn) {
   EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
 }
 
-TEST(OtherForm, IsTheFirstOrderOfAnotherExponent) {
+TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
   VectorXd v(kRows);
   for (Index k = 0; k < kRows; ++k) v[k] = 0.02 * static_cast<double>(k % 50 - 25);  // m/s
   EffectDesign viscous = plain_design({v});
   viscous.effect.effect = find_effect("viscous_friction");
   const VectorXd theta = VectorXd::Constant(1, 2e5);
-  const EffectDesign power = other_form({}, viscous, theta);
+  const EffectDesign power = other_power(viscous, theta);
   ASSERT_TRUE(power.acts());
   ASSERT_EQ(power.linear, 1);
   // v^0.9 for v: what the straight line leaves is nearly all of this form, and a constant friction is not
@@ -122,30 +122,7 @@ TEST(OtherForm, IsTheFirstOrderOfAnotherExponent) {
   EXPECT_LE(power.lower[0], -0.15);  // friction with v^0.85
   EffectDesign mass = plain_design({v});
   mass.effect.effect = find_effect("unmodelled_mass");
-  EXPECT_FALSE(other_form({}, mass, theta).acts()) << "weight is what it is";
-}
-
-TEST(OtherForm, OfALoadIsAScaleInError) {
-  Evidence e;
-  e.suspects = 1;
-  e.series.resize(2);
-  e.series[0].payload = VectorXd::LinSpaced(kRows, 0.0, 2000.0);
-  e.series[1].payload = VectorXd::Constant(kRows, 1000.0);  // a reference
-  const VectorXd y = VectorXd::Zero(2 * kRows);
-  e.channels = {plain_channel({{0, kRows}, {kRows, 2 * kRows}}, y)};
-  e.channels[0].log = {0, 1};
-  for (Index k = 0; k < 2 * kRows; ++k) e.channels[0].sample.push_back(k % kRows);
-  VectorXd per_kg = VectorXd::Zero(2 * kRows);
-  per_kg.head(kRows).setConstant(30.0);  // N/kg
-  EffectDesign load = plain_design({per_kg});
-  load.effect.effect = find_effect("payload_error");
-  const EffectDesign form = other_form(e, load, VectorXd::Constant(1, 150.0));
-  ASSERT_TRUE(form.acts());
-  // one unit: a scale that reads 5 % low, whatever the load it was not told of
-  EXPECT_NEAR(form.columns[0](kRows - 1, 0), 30.0 * 0.05 * 2000.0, 1e-9);
-  EXPECT_NEAR(form.columns[0](0, 0), 0.0, 1e-9);
-  EXPECT_EQ(form.columns[0].bottomRows(kRows).norm(), 0.0);
-  EXPECT_EQ(form.upper[0], 1.0);
+  EXPECT_FALSE(other_power(mass, theta).acts()) << "weight is what it is";
 }
 
 /// The same by leaving rows out and solving again.

@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <numbers>
 #include <set>
 
 #include "identification/effect_fit.h"
+#include "identification/search_candidates.h"
 #include "models/effects/registry.h"
 #include "tests/identification/arm_log.h"
 #include "tests/identification/hidden_case.h"
@@ -257,6 +259,40 @@ TEST(Evidence, ATiltsColumnIsTheChordUpToItsAngle) {
     }
   }
   EXPECT_GT(rows, 200);
+}
+
+/// The load's candidate where the log tells of `payload`.
+SearchCandidate load_candidate(const std::function<double(Index)>& payload) {
+  const CraneModel model = crane_model();
+  Evidence e = evidence_of(model, {plain_case().train});
+  VectorXd& told = e.series[0].payload;
+  for (Index k = 0; k < told.size(); ++k) told[k] = payload(k);
+  return search_candidates(e, {parse_effect("payload_error", arm())}).at(0);
+}
+
+TEST(Candidates, AScaleInErrorIsPaidForWhereItSaysSomethingOfItsOwn) {
+  const auto sizes = [](const EffectDesign& d) {
+    VectorXd size = VectorXd::Zero(d.linear);
+    for (const MatrixXd& c : d.columns) {
+      if (c.cols() > 0) size += c.colwise().norm().transpose();
+    }
+    return size;
+  };
+  for (const double steady : {0.0, 500.0}) {  // the mass says it already
+    const SearchCandidate one = load_candidate([&](Index) { return steady; });
+    ASSERT_EQ(one.designs.size(), 1U) << steady;
+    EXPECT_GT(sizes(one.designs[0])[0], 0.0);
+    EXPECT_EQ(sizes(one.designs[0])[1], 0.0);
+    EXPECT_EQ(one.optional_penalty, 0.0);
+  }
+  const SearchCandidate two =
+      load_candidate([](Index k) { return (k / 500) % 2 == 0 ? 500.0 : 800.0; });
+  ASSERT_EQ(two.designs.size(), 2U);
+  EXPECT_EQ(two.linear, 1);
+  EXPECT_EQ(sizes(two.designs[0])[1], 0.0);
+  EXPECT_GT(sizes(two.designs[1])[1], 0.0);
+  EXPECT_DOUBLE_EQ(two.price(two.designs[0]), two.penalty);
+  EXPECT_DOUBLE_EQ(two.price(two.designs[1]), 2.0 * two.penalty) << "two parameters for one";
 }
 
 TEST(Evidence, WhatTheModelKnowsIsTakenOff) {

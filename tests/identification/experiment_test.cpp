@@ -99,8 +99,9 @@ TEST(BetterMotion, OtherMotionsTellDryFromViscousFriction) {
 TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {
   // on the only joint a mass at the tip and a moment of the link are one machine
   const Case c(one_speed_log());
-  const BetterMotion m = better_motion(c.model, c.evidence, c.fit, applied("payload_error", {60.0}),
-                                       {parse_effect("unmodelled_mass:arm", c.model.machine)});
+  const BetterMotion m =
+      better_motion(c.model, c.evidence, c.fit, applied("payload_error", {60.0, 0.0}),
+                    {parse_effect("unmodelled_mass:arm", c.model.machine)});
   EXPECT_THAT(m.words, IsEmpty());
 }
 

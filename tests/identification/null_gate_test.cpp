@@ -164,6 +164,13 @@ TEST(NullGate, MoreCandidatesRaiseTheBar) {
   std::mt19937_64 c(1);
   const NullGate dearer = make_null_gate(null.evidence, one, {}, fit, kSimulations, c);
   EXPECT_NEAR(dearer.threshold(0.05), narrow.threshold(0.05) - 3.0, 1e-9);
+  // and so does what its optional parameters cost, of designs that have them
+  std::vector<EffectDesign> wider = null.catalogue[0];
+  for (EffectDesign& design : wider) design.optional = true;
+  std::mt19937_64 d(1);
+  const NullGate optional =
+      make_null_gate(null.evidence, {{&wider, null.penalty, 3.0}}, {}, fit, kSimulations, d);
+  EXPECT_NEAR(optional.threshold(0.05), narrow.threshold(0.05) - 3.0, 1e-9);
 }
 
 TEST(NullGate, PValueCountsTheLargerOfBothWays) {

@@ -169,8 +169,10 @@ TEST(MachineEffects, AreTheMachineTheyDescribe) {
   const auto near = [](const VectorXd& a, const VectorXd& b) {
     return (a - b).norm() < 1e-9 * (1.0 + b.norm());
   };
-  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {37.0}, q, payload),
-                   static_force<double>(machine, q, payload + 37.0)));
+  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {37.0, 0.02}, q, payload),
+                   static_force<double>(machine, q, 1.02 * payload + 37.0)));
+  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {0.0, 0.02}, q, payload),
+                   static_force<double>(machine, q, 1.02 * payload)));
   VectorXd turned = q;
   turned[2] += 0.02;
   EXPECT_TRUE(near(changed_force(machine, effect("angle_offset"), 2, {0.02}, q, payload),

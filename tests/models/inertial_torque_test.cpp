@@ -80,14 +80,15 @@ Machine with_inertias(Machine machine) {
 TEST(InertialTorque, SatisfiesLagrangesEquation) {
   for (const Machine& plain : test_support::effect_machines()) {
     SCOPED_TRACE(plain.name);
-    const Machine machine = with_inertias(plain);
+    Machine machine = with_inertias(plain);
+    machine.tip.payload_scale = 0.9;
     Random random(3);
     const Eigen::Index n = machine.joint_count();
     const VectorXd x = test_support::usable_state(machine, random);
     const VectorXd q = x.head(n), qd = x.segment(n, n), qdd = x.tail(n);
     const double payload = 350.0;
     const auto energy = [&](const VectorXd& at, const VectorXd& rate) {
-      return kinetic_energy(machine, at, rate, payload);
+      return kinetic_energy(machine, at, rate, 0.9 * payload);
     };
     const VectorXd torque = torque_of(machine, x, payload);
     // energies of 1e3 J, differentiated three times in a row: 1e-6 of the torque remains

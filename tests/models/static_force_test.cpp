@@ -50,10 +50,11 @@ Eigen::VectorXd usable_configuration(const Machine& machine, Random& random) {
 /// Calls `check(machine, q, payload)` for every test machine at several random configurations.
 template <class Check>
 void for_random_states(const Check& check) {
-  for (const Machine& machine : test_support::all_test_machines()) {
+  for (Machine machine : test_support::all_test_machines()) {
     SCOPED_TRACE(machine.name);
     Random random(11);
     for (int i = 0; i < 4; ++i) {
+      machine.tip.payload_scale = i == 1 ? 1.0 : 0.9;
       check(machine, usable_configuration(machine, random), i == 0 ? 0.0 : random.uniform(0, 2000));
     }
   }
