@@ -28,6 +28,8 @@ using simulator::HiddenParameter;
 using simulator::HiddenTruth;
 /// Learning again moves errors by some tenths of a percent.
 constexpr double kRefitMoves = 1.005;
+/// And what grows by less than this many standard errors between motions is chance.
+constexpr double kStandardErrors = 2.0;
 /// What a log cannot show is hidden in another crane; after so many other effects are drawn; after so many it stays.
 constexpr std::uint64_t kCranesForIds = 8, kMostCranes = 40;
 constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
@@ -278,6 +280,13 @@ std::string moved_errors(const CompareResult& before, const CompareResult& after
   return out;
 }
 
+std::vector<std::string> stages_of(const std::vector<ExtendStep>& steps) {
+  std::vector<std::string> out;
+  out.reserve(steps.size());
+  for (const ExtendStep& step : steps) out.push_back(step.stage);
+  return out;
+}
+
 /// Adds what was named, and what is true, and judges both on the test log.
 void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
   std::vector<EffectAt> named;
@@ -301,8 +310,10 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     const CompareResult &before = ours->steps.front().before, &after = ours->steps.back().after;
     run.changed = true;
     const ErrorChange change =
-        error_change(crane.model.machine, before, after, ours->steps.front().stage);
-    run.made_worse = change.overall > kRefitMoves || !change.harmed.empty();
+        error_change(crane.model.machine, before, after, stages_of(ours->steps));
+    const bool all_grew = change.overall > kRefitMoves &&
+                          std::log(change.overall) > kStandardErrors * change.overall_deviation;
+    run.made_worse = all_grew || !change.harmed.empty();
     if (run.made_worse) run.worse_by = fmt::format("overall {:.3f}", change.overall);
     for (const HarmedError& h : change.harmed) run.worse_by += "; " + h.sentence;
     run.energy_before = energy_error(before);

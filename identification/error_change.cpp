@@ -17,8 +17,11 @@ using Eigen::VectorXd;
 /// Refitting around something else moves centres and length-scales, and with them errors near the sensor's noise by
 /// some percent. A tenth more is a loss that anybody would see.
 constexpr double kLargeChange = 1.1;
-/// With fewer blocks of motion no noise can be told: only a change so large counts.
+/// With fewer of them no noise can be told. A handful of samples, all that a test log may hold of what was learned, moves
+/// by more than a tenth of its own.
 constexpr int kFewestBlocks = 4;
+/// What stands for motions where there are too few. [s]
+constexpr double kPiece = 1.0;
 constexpr double kStandardErrors = 2.0;
 /// Everything together, noise included, may move by this much when it is learned again.
 constexpr double kRefitMoves = 1.02;
@@ -35,6 +38,8 @@ struct BlockSums {
   explicit BlockSums(std::size_t blocks)
       : before(VectorXd::Zero(static_cast<Index>(blocks))), after(before), weight(before) {}
 
+  double used() const { return static_cast<double>((weight.array() > 0.0).count()); }
+
   /// Whether sum(after) / sum(weight) - sum(before) / sum(weight) is more than chance between blocks.
   bool grew() const {
     const double all = weight.sum();
@@ -42,11 +47,24 @@ struct BlockSums {
     const VectorXd more = after - before;
     const double mean = more.sum() / all;
     if (mean <= 0.0) return false;
-    const auto used = static_cast<double>((weight.array() > 0.0).count());
-    if (used < kFewestBlocks) return after.sum() > kLargeChange * kLargeChange * before.sum();
-    const double error =
-        std::sqrt((more - mean * weight).squaredNorm() * used / (used - 1.0)) / all;
+    const double n = used();
+    if (n < kFewestBlocks) return false;
+    const double error = std::sqrt((more - mean * weight).squaredNorm() * n / (n - 1.0)) / all;
     return mean > kStandardErrors * error;
+  }
+};
+
+/// Motions, and what takes their place where a quantity is seen in too few of them.
+struct Blocks {
+  std::vector<CompareBlock> motions, pieces;
+  explicit Blocks(const CompareResult& result)
+      : motions(compare_blocks(result)), pieces(compare_blocks(result, kPiece)) {}
+
+  /// @param sums_over callable: BlockSums of a list of blocks
+  template <class F>
+  BlockSums enough(const F& sums_over) const {
+    BlockSums sums = sums_over(motions);
+    return sums.used() < kFewestBlocks ? sums_over(pieces) : sums;
   }
 };
 
@@ -75,21 +93,24 @@ void for_each_pair(const CompareResult& before, const CompareResult& after,
   }
 }
 
-bool counts(const ComparedSeries& s, const std::string& regime, Index k) {
+bool counts(const ComparedSeries& s, const std::string& regime, Index k, bool everywhere = false) {
   if (!std::isfinite(s.measured[k]) || !std::isfinite(s.predicted[k])) return false;
   if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) return false;
-  return s.extrapolated.size() == 0 || !s.extrapolated[k];
+  return everywhere || s.extrapolated.size() == 0 || !s.extrapolated[k];
 }
 
+/// @param everywhere also where a pressure was not learned
 BlockSums squared_errors(const CompareResult& before, const CompareResult& after,
-                         const std::vector<CompareBlock>& blocks, const StageScore& of) {
+                         const std::vector<CompareBlock>& blocks, const StageScore& of,
+                         bool everywhere = false) {
   BlockSums sums(blocks.size());
   for_each_pair(before, after, blocks,
                 [&](const ComparedSeries& b, const ComparedSeries& a, std::size_t,
                     const Eigen::VectorXi& block) {
                   if (b.stage != of.stage || b.at != of.at) return;
                   for (Index k = 0; k < b.measured.size(); ++k) {
-                    if (block[k] < 0 || !counts(b, of.regime, k) || !counts(a, of.regime, k))
+                    if (block[k] < 0 || !counts(b, of.regime, k, everywhere) ||
+                        !counts(a, of.regime, k, everywhere))
                       continue;
                     sums.before[block[k]] += std::pow(b.predicted[k] - b.measured[k], 2);
                     sums.after[block[k]] += std::pow(a.predicted[k] - a.measured[k], 2);
@@ -160,10 +181,12 @@ HarmedError harm(const StageScore& b, double before, double after) {
 }
 
 void add_harmed_energy(const Machine& machine, const CompareResult& before,
-                       const CompareResult& after, const std::vector<CompareBlock>& blocks,
+                       const CompareResult& after, const Blocks& blocks,
                        std::vector<HarmedError>& harmed) {
   for (const Pump& pump : machine.pumps) {
-    const BlockSums sums = energy_errors(before, after, blocks, pump);
+    const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
+      return energy_errors(before, after, over, pump);
+    });
     const double all = sums.weight.sum();
     if (!(all > 0.0) || !sums.grew()) continue;
     const double b = sums.before.sum() / all, a = sums.after.sum() / all;
@@ -174,6 +197,30 @@ void add_harmed_energy(const Machine& machine, const CompareResult& before,
   }
 }
 
+/// Standard error of log(overall): what each block adds to it, to first order.
+class OverallNoise {
+ public:
+  explicit OverallNoise(std::size_t blocks)
+      : added_(VectorXd::Zero(static_cast<Index>(blocks))), weight_(added_) {}
+
+  /// @param n samples of the quantity, as its score counts them
+  void add(const BlockSums& sums, double n) {
+    const double both = sums.before.sum() + sums.after.sum(), counted = sums.weight.sum();
+    if (!(both > 0.0) || !(counted > 0.0)) return;
+    added_ += n / both * (sums.after - sums.before);
+    weight_ += n / counted * sums.weight;
+  }
+  double deviation() const {
+    const auto used = static_cast<double>((weight_.array() > 0.0).count());
+    if (used < 2.0) return 0.0;
+    const double mean = added_.sum() / weight_.sum();
+    return std::sqrt((added_ - mean * weight_).squaredNorm() * used / (used - 1.0)) / weight_.sum();
+  }
+
+ private:
+  VectorXd added_, weight_;
+};
+
 }  // namespace
 
 bool ErrorChange::worse() const { return own > 1.0 || overall > kRefitMoves || !harmed.empty(); }
@@ -181,13 +228,24 @@ bool ErrorChange::worse() const { return own > 1.0 || overall > kRefitMoves || !
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::string& stage,
                          const std::string& at) {
-  const std::vector<CompareBlock> blocks = compare_blocks(before);
-  const bool one_stage =
-      stage == "force" || stage == "flow" || stage == "pressure" || stage == "pump";
+  return error_change(machine, before, after, std::vector<std::string>{stage}, at);
+}
+
+ErrorChange error_change(const Machine& machine, const CompareResult& before,
+                         const CompareResult& after, const std::vector<std::string>& stages,
+                         const std::string& at) {
+  const Blocks blocks(before);
+  const bool known_stages = std::all_of(stages.begin(), stages.end(), [](const std::string& s) {
+    return s == "force" || s == "flow" || s == "pressure" || s == "pump";
+  });
+  const auto in_stage = [&](const StageScore& s) {
+    return !known_stages || std::find(stages.begin(), stages.end(), s.stage) != stages.end();
+  };
   const bool one_place =
-      one_stage && std::any_of(before.scores.begin(), before.scores.end(),
-                               [&](const StageScore& s) { return s.stage == stage && s.at == at; });
+      known_stages && std::any_of(before.scores.begin(), before.scores.end(),
+                                  [&](const StageScore& s) { return in_stage(s) && s.at == at; });
   ErrorChange out;
+  OverallNoise noise(blocks.motions.size());
   double all = 0.0, all_n = 0.0;
   struct Pool {
     double before = 0.0, after = 0.0, n = 0.0;
@@ -202,8 +260,9 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
     const double change = std::log(a->rmse / b.rmse);
     all += n * change;
     all_n += n;
-    const bool is_own = (!one_stage || b.stage == stage) &&
-                        (one_place ? b.at == at : acts_on(before, after, blocks, b));
+    noise.add(squared_errors(before, after, blocks.motions, b, true), n);
+    const bool is_own =
+        in_stage(b) && (one_place ? b.at == at : acts_on(before, after, blocks.motions, b));
     if (is_own) {
       Pool& pool = own[b.stage];
       const double was = n * b.rmse * b.rmse, is = n * a->rmse * a->rmse;
@@ -212,7 +271,9 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
       pool.n += n;
       (is < was ? pool.won : pool.lost) += std::abs(is - was);
     }
-    const BlockSums sums = squared_errors(before, after, blocks, b);
+    const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
+      return squared_errors(before, after, over, b);
+    });
     const double counted = std::max(1.0, sums.weight.sum());
     const double was = std::sqrt(sums.before.sum() / counted);
     const double is = std::sqrt(sums.after.sum() / counted);
@@ -226,6 +287,7 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
   }
   add_harmed_energy(machine, before, after, blocks, out.harmed);
   if (all_n > 0.0) out.overall = std::exp(all / all_n);
+  out.overall_deviation = noise.deviation();
   double log_own = 0.0, own_n = 0.0;
   for (const auto& [name, pool] : own) {
     log_own += pool.n * 0.5 * std::log(pool.after / pool.before);

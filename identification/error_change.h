@@ -23,6 +23,8 @@ struct ErrorChange {
   /// overall.
   double own = 1.0;
   std::vector<HarmedError> harmed;
+  /// Standard error of log(overall), from block of motion to block of motion.
+  double overall_deviation = 0.0;
 
   /// Not better where it acts, or worse elsewhere, or worse on the whole by more than learning again moves.
   bool worse() const;
@@ -35,9 +37,16 @@ struct ErrorChange {
 /// Where a change acts on several quantities, one of them counts as harmed when all such take back more than a quarter
 /// of the squared error that the others win.
 /// Noise: both models' squared errors in each block of motion, paired; the mean difference must exceed two standard
-/// errors over the blocks, and the RMS error grow by a tenth (the energy's by 0.2 % of the energy). Pressures count where both models were learned: outside, an error says nothing about a law.
+/// errors over the blocks, and the RMS error grow by a tenth (the energy's by 0.2 % of the energy). Where fewer than four
+/// blocks show a quantity, pieces of one second take their place; what fewer than four of those show is left to chance.
+/// Pressures count where both models were learned: outside, an error says nothing about a law.
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::string& stage,
+                         const std::string& at = "");
+
+/// Of several changes together, each of which acts in its own stage.
+ErrorChange error_change(const Machine& machine, const CompareResult& before,
+                         const CompareResult& after, const std::vector<std::string>& stages,
                          const std::string& at = "");
 
 }  // namespace sparflow

@@ -164,5 +164,51 @@ TEST(ErrorChange, OutsideWhatWasLearnedAPressureHarmsNothing) {
   EXPECT_FALSE(pressure_harmed());
 }
 
+TEST(ErrorChange, WhatAHandfulOfSamplesShowsIsLeftToChance) {
+  // all but a second of the test log lies outside what was learned: its RMS moves by more than a tenth of itself
+  CompareResult before = with_error(compared(), "pressure", 1e5, 2);
+  CompareResult after = with_error(before, "pressure", 1.5e5, 3);
+  const auto learned_for = [&](double seconds) {
+    for (ComparedSeries& s : after.logs[0].series) {
+      if (s.stage != "pressure") continue;
+      s.extrapolated.setConstant(true);
+      double left = seconds;
+      for (Eigen::Index k = 0; k < s.measured.size() && left > 0.0; ++k) {
+        if (!std::isfinite(s.measured[k])) continue;
+        s.extrapolated[k] = false;
+        left -= after.logs[0].signals.step;
+      }
+    }
+    return error_change(arm_machine(), before, after, "force", "arm").harmed;
+  };
+  EXPECT_THAT(learned_for(1.0), IsEmpty());
+  EXPECT_FALSE(learned_for(8.0).empty()) << "pieces of a second tell, too";
+}
+
+TEST(ErrorChange, NoiseOfTheWholeIsThatBetweenMotions) {
+  const CompareResult before = with_error(compared(), "pump", 2e5, 2);
+  int beyond = 0;
+  for (unsigned seed = 10; seed < 30; ++seed) {
+    const ErrorChange c =
+        error_change(arm_machine(), before, with_error(before, "pump", 2e5, seed), "force", "arm");
+    EXPECT_GT(c.overall_deviation, 0.0);
+    beyond += std::abs(std::log(c.overall)) > 2.0 * c.overall_deviation ? 1 : 0;
+  }
+  EXPECT_LE(beyond, 3) << "one in twenty is beyond two standard errors";
+  const ErrorChange grown =
+      error_change(arm_machine(), before, with_error(before, "pump", 2.4e5, 4), "force", "arm");
+  EXPECT_GT(std::log(grown.overall), 2.0 * grown.overall_deviation);
+}
+
+TEST(ErrorChange, OfSeveralStagesCountsEachAsItsOwn) {
+  CompareResult before = with_error(compared(), "force", 4e3, 1);
+  before = with_error(before, "pump", 4e5, 2);
+  const CompareResult after = with_error(with_error(before, "force", 2e3, 3), "pump", 1e5, 4);
+  const ErrorChange both =
+      error_change(arm_machine(), before, after, std::vector<std::string>{"force", "pump"});
+  EXPECT_LT(both.own, error_change(arm_machine(), before, after, "force").own);
+  EXPECT_GT(both.own, error_change(arm_machine(), before, after, "pump").own);
+}
+
 }  // namespace
 }  // namespace sparflow
