@@ -1,0 +1,49 @@
+#pragma once
+/// The corner of a supply pressure where one branch takes over from the other.
+///
+/// The supply holds whichever asks for more, a counterbalance valve V or the static branch S = (load + A_return
+/// p_return)/A_supply (models/return_rise.h): p = max(V, S) = V + max(0, S - V). A process with a smooth kernel rounds such a
+/// corner off by bars and swings beside it, and between loads that its samples hold on either side of the corner it takes the
+/// straight line. So the second term, whose slope the balance of forces gives, is part of the mean, and the process learns
+/// the rest.
+#include <cmath>
+
+namespace sparflow {
+
+/// S - V = level + per_flow Q + per_flow2 Q^2 + per_force F
+struct BranchCorner {
+  double level = 0.0;      ///< [Pa]
+  double per_flow = 0.0;   ///< [Pa/(m^3/s)]
+  double per_flow2 = 0.0;  ///< [Pa/(m^3/s)^2]
+  double per_force = 0.0;  ///< [Pa/N]; 0 = there is no corner
+
+  bool there() const { return per_force != 0.0; }
+};
+
+/// max(0, S - V), rounded, with its derivatives.
+struct CornerRise {
+  double value = 0.0;                                                 ///< [Pa]
+  double d_flow = 0.0, d_force = 0.0;                                 ///< SI
+  double d_flow_flow = 0.0, d_flow_force = 0.0, d_force_force = 0.0;  ///< SI
+};
+
+/// @param flow [m^3/s]  @param force [N]
+inline CornerRise corner_rise(const BranchCorner& c, double flow, double force) {
+  constexpr double kRounded = 2e5;  // [Pa], as that of models/loads_beyond.h
+  const double u = c.level + (c.per_flow + c.per_flow2 * flow) * flow + c.per_force * force;
+  const double root = std::sqrt(u * u + kRounded * kRounded);
+  const double first = 0.5 * (1.0 + u / root);
+  const double second = 0.5 * kRounded * kRounded / (root * root * root);
+  const double u_flow = c.per_flow + 2.0 * c.per_flow2 * flow;
+  return {0.5 * (u + root),
+          first * u_flow,
+          first * c.per_force,
+          second * u_flow * u_flow + 2.0 * first * c.per_flow2,
+          second * u_flow * c.per_force,
+          second * c.per_force * c.per_force};
+}
+
+/// [N] over which the corner bends.
+inline double corner_width(const BranchCorner& c) { return 10e5 / std::abs(c.per_force); }
+
+}  // namespace sparflow

@@ -1,0 +1,75 @@
+// The corner between two branches is part of a process' mean, with exact derivatives.
+#include "models/branch_corner.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "models/error.h"
+#include "models/gaussian_process.h"
+
+namespace sparflow {
+namespace {
+
+GpParameters with_corner() {
+  GpParameters p;
+  p.length_flow = 4e-4;
+  p.length_force = 50e3;
+  p.signal_std = 1e6;
+  p.mean_constant = 40e5;
+  p.mean_slope = 20.0;
+  p.flow = Eigen::ArrayXd::LinSpaced(3, 1e-4, 6e-4);
+  p.force = Eigen::ArrayXd::LinSpaced(3, -40e3, 60e3);
+  p.weight = Eigen::ArrayXd::LinSpaced(3, -2e-7, 3e-7);
+  p.force_min = -40e3;
+  p.force_max = 60e3;
+  p.corner = {-30e5, 8e8, 1e12, 80.0};
+  return p;
+}
+
+TEST(BranchCorner, IsTheHigherOfTwoBranches) {
+  const BranchCorner c = with_corner().corner;
+  EXPECT_NEAR(corner_rise(c, 1e-4, 0.0).value, 0.0, 0.05e5);      // 29 bar below
+  EXPECT_NEAR(corner_rise(c, 1e-4, 80e3).value, 34.9e5, 0.05e5);  // by hand: -30 + 0.8 + 0.1 + 64
+  EXPECT_FALSE(BranchCorner{}.there());
+}
+
+TEST(BranchCorner, HasExactDerivativesInTheProcess) {
+  const GaussianProcess process(with_corner());
+  constexpr double kFlow = 1e-8, kForce = 1.0;
+  for (const double flow : {2e-4, 5e-4}) {
+    for (const double force : {-20e3, 25e3, 32e3, 36e3, 55e3}) {
+      const GpDerivatives d = process.mean_derivatives(flow, force);
+      const auto up_q = process.mean_derivatives(flow + kFlow, force),
+                 down_q = process.mean_derivatives(flow - kFlow, force),
+                 up_f = process.mean_derivatives(flow, force + kForce),
+                 down_f = process.mean_derivatives(flow, force - kForce);
+      EXPECT_EQ(d.value, process.mean(flow, force));
+      EXPECT_NEAR(d.d_flow * 2 * kFlow, up_q.value - down_q.value, 1e-3);
+      EXPECT_NEAR(d.d_force * 2 * kForce, up_f.value - down_f.value, 1e-3);
+      EXPECT_NEAR(d.d_flow_flow, (up_q.d_flow - down_q.d_flow) / (2 * kFlow),
+                  1e-5 * std::abs(d.d_flow_flow) + 1e6);
+      EXPECT_NEAR(d.d_flow_force, (up_f.d_flow - down_f.d_flow) / (2 * kForce),
+                  1e-5 * std::abs(d.d_flow_force) + 1.0);
+      EXPECT_NEAR(d.d_force_force, (up_f.d_force - down_f.d_force) / (2 * kForce),
+                  1e-5 * std::abs(d.d_force_force) + 1e-8);
+    }
+  }
+}
+
+TEST(BranchCorner, BendsOverLessThanAnEndlessKernel) {
+  GpParameters p = with_corner();
+  p.length_force = 1e9;
+  EXPECT_LT(GaussianProcess(p).force_scale(), 20e3);
+  p.corner = {};
+  EXPECT_EQ(GaussianProcess(p).force_scale(), 1e9);
+}
+
+TEST(BranchCorner, OfNoNumberIsRefused) {
+  GpParameters p = with_corner();
+  p.corner.per_flow = std::nan("");
+  EXPECT_THROW(GaussianProcess{p}, InputError);
+}
+
+}  // namespace
+}  // namespace sparflow
