@@ -7,8 +7,10 @@
 #include <functional>
 #include <random>
 
+#include "identification/fit.h"
 #include "identification/learn_loads_beyond.h"
 #include "models/gaussian_process.h"
+#include "tests/identification/hidden_case.h"
 
 namespace sparflow {
 namespace {
@@ -110,6 +112,27 @@ TEST_P(FindBranchCorner, OfTooFewSamplesIsNone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(BothSides, FindBranchCorner, ::testing::Values(1, -1));
+
+TEST(Fit, PutsTheCornerBetweenValveAndLoadIntoTheLaws) {
+  const Machine machine = testing_support::drawn_machine("loader_crane");
+  const auto logs = testing_support::hidden_case(machine, {}, 4, 120.0, {}, 60.0);
+  const FitResult fitted = fit(machine, {logs.train}, {logs.test});
+  int corners = 0;
+  for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+    const CylinderModel& m = fitted.model.cylinders[i];
+    for (const bool extend : {true, false}) {
+      const BranchCorner& c = (extend ? m.extend : m.retract).parameters().corner;
+      if (!c.there()) continue;
+      ++corners;
+      const Cylinder& cylinder = machine.cylinders[i];
+      const double area = extend ? cylinder.area_piston() : cylinder.area_rod();
+      const double share = c.per_force * area * (extend ? 1 : -1);  // what the valve's branch lacks
+      EXPECT_GE(share, 0.4 - 1e-9) << cylinder.name;
+      EXPECT_LE(share, 1.0 + 1e-9) << cylinder.name;
+    }
+  }
+  EXPECT_GE(corners, 2);
+}
 
 }  // namespace
 }  // namespace sparflow
