@@ -20,6 +20,21 @@ struct BranchCorner {
   bool there() const { return per_force != 0.0; }
 };
 
+/// What max(0, S - V) is rounded over, as in models/loads_beyond.h. [Pa]
+inline constexpr double kCornerRounded = 2e5;
+
+/// What the supply gains when the static branch gains `rise` [Pa], of either sign: nothing where the valve rules, all of it where
+/// the load does, and across the corner what is beyond it.
+template <class T>
+T rise_across(const BranchCorner& c, const T& flow, const T& force, const T& rise) {
+  using std::sqrt;
+  const auto positive = [](const T& u) {
+    return 0.5 * (u + sqrt(u * u + T(kCornerRounded * kCornerRounded)));
+  };
+  const T u = T(c.level) + c.per_flow * flow + c.per_flow2 * flow * flow + c.per_force * force;
+  return positive(T(u + rise)) - positive(u);
+}
+
 /// max(0, S - V), rounded, with its derivatives.
 struct CornerRise {
   double value = 0.0;                                                 ///< [Pa]
@@ -29,7 +44,7 @@ struct CornerRise {
 
 /// @param flow [m^3/s]  @param force [N]
 inline CornerRise corner_rise(const BranchCorner& c, double flow, double force) {
-  constexpr double kRounded = 2e5;  // [Pa], as that of models/loads_beyond.h
+  constexpr double kRounded = kCornerRounded;
   const double u = c.level + (c.per_flow + c.per_flow2 * flow) * flow + c.per_force * force;
   const double root = std::sqrt(u * u + kRounded * kRounded);
   const double first = 0.5 * (1.0 + u / root);

@@ -7,6 +7,7 @@
 
 #include "models/error.h"
 #include "models/gaussian_process.h"
+#include "models/return_rise.h"
 
 namespace sparflow {
 namespace {
@@ -55,6 +56,25 @@ TEST(BranchCorner, HasExactDerivativesInTheProcess) {
                   1e-5 * std::abs(d.d_force_force) + 1e-8);
     }
   }
+}
+
+TEST(BranchCorner, TellsWhatOfTheReturnChamberReachesTheSupply) {
+  const GaussianProcess process(with_corner());
+  Cylinder cylinder;
+  cylinder.bore = 0.12;
+  cylinder.rod = 0.08;
+  const double ratio = cylinder.area_rod() / cylinder.area_piston();
+  // S - V is -46, 34 and, near the corner, 2 bar
+  const auto rise = [&](double force, double of_return) {
+    return supply_rise<double>(process, cylinder, 1, process.mean(1e-4, force), 1e-4, force,
+                               of_return);
+  };
+  for (const double of_return : {-12e5, 12e5}) {
+    EXPECT_NEAR(rise(-20e3, of_return), 0.0, 0.05e5);
+    EXPECT_NEAR(rise(79e3, of_return), ratio * of_return, 0.05e5);
+  }
+  EXPECT_NEAR(rise(39e3, -12e5), -2e5, 0.5e5) << "falls to the valve's branch and no further";
+  EXPECT_NEAR(rise(39e3, 12e5), ratio * 12e5, 0.5e5);
 }
 
 TEST(BranchCorner, BendsOverLessThanAnEndlessKernel) {
