@@ -29,7 +29,7 @@ struct Samples {
   Index size() const { return flow.size(); }
 };
 
-/// V = valve.(1, q, load), S = load + line.(1, q^2)
+/// V = valve.(1, q, load), S = load + line.(1, q)
 struct Branches {
   Eigen::Vector3d valve = Eigen::Vector3d::Zero();
   Eigen::Vector2d line = Eigen::Vector2d::Zero();
@@ -37,7 +37,7 @@ struct Branches {
     return valve[0] + valve[1] * s.flow[k] + valve[2] * s.load[k];
   }
   double line_at(const Samples& s, Index k) const {
-    return s.load[k] + line[0] + line[1] * s.flow[k] * s.flow[k];
+    return s.load[k] + line[0] + line[1] * s.flow[k];
   }
 };
 
@@ -54,7 +54,7 @@ bool fit_branches(const Samples& s, const std::vector<char>& on_line, Branches& 
   VectorXd y_line(lines), y_valve(valves);
   for (Index k = 0, l = 0, v = 0; k < s.size(); ++k) {
     if (on_line[static_cast<std::size_t>(k)]) {
-      x_line.row(l) << 1.0, s.flow[k] * s.flow[k];
+      x_line.row(l) << 1.0, s.flow[k];
       y_line[l++] = s.pressure[k] - s.load[k];
     } else {
       x_valve.row(v) << 1.0, s.flow[k], s.load[k];
@@ -125,8 +125,8 @@ BranchCorner find_branch_corner(const GpDataset& samples, const Cylinder& cylind
     }
   }
   if (!found) return {};
-  return {best.line[0] - best.valve[0], -best.valve[1] / flow_scale,
-          best.line[1] / (flow_scale * flow_scale), side * (1.0 - best.valve[2]) / supply};
+  return {best.line[0] - best.valve[0], (best.line[1] - best.valve[1]) / flow_scale,
+          side * (1.0 - best.valve[2]) / supply};
 }
 
 }  // namespace sparflow

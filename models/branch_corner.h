@@ -10,11 +10,11 @@
 
 namespace sparflow {
 
-/// S - V = level + per_flow Q + per_flow2 Q^2 + per_force F
+/// S - V = level + per_flow Q + per_force F. Straight in the flow: its bend is the process' to learn where samples show it, and a
+/// square would run away beyond them.
 struct BranchCorner {
   double level = 0.0;      ///< [Pa]
   double per_flow = 0.0;   ///< [Pa/(m^3/s)]
-  double per_flow2 = 0.0;  ///< [Pa/(m^3/s)^2]
   double per_force = 0.0;  ///< [Pa/N]; 0 = there is no corner
 
   bool there() const { return per_force != 0.0; }
@@ -31,7 +31,7 @@ T rise_across(const BranchCorner& c, const T& flow, const T& force, const T& ris
   const auto positive = [](const T& u) {
     return 0.5 * (u + sqrt(u * u + T(kCornerRounded * kCornerRounded)));
   };
-  const T u = T(c.level) + c.per_flow * flow + c.per_flow2 * flow * flow + c.per_force * force;
+  const T u = T(c.level) + c.per_flow * flow + c.per_force * force;
   return positive(T(u + rise)) - positive(u);
 }
 
@@ -45,16 +45,15 @@ struct CornerRise {
 /// @param flow [m^3/s]  @param force [N]
 inline CornerRise corner_rise(const BranchCorner& c, double flow, double force) {
   constexpr double kRounded = kCornerRounded;
-  const double u = c.level + (c.per_flow + c.per_flow2 * flow) * flow + c.per_force * force;
+  const double u = c.level + c.per_flow * flow + c.per_force * force;
   const double root = std::sqrt(u * u + kRounded * kRounded);
   const double first = 0.5 * (1.0 + u / root);
   const double second = 0.5 * kRounded * kRounded / (root * root * root);
-  const double u_flow = c.per_flow + 2.0 * c.per_flow2 * flow;
   return {0.5 * (u + root),
-          first * u_flow,
+          first * c.per_flow,
           first * c.per_force,
-          second * u_flow * u_flow + 2.0 * first * c.per_flow2,
-          second * u_flow * c.per_force,
+          second * c.per_flow * c.per_flow,
+          second * c.per_flow * c.per_force,
           second * c.per_force * c.per_force};
 }
 

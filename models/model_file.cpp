@@ -69,10 +69,8 @@ Json process_json(const GaussianProcess& process) {
               {"variance_core", std::move(core)}};
   const BranchCorner& corner = p.corner;
   if (corner.there()) {
-    out["corner"] = {{"level", corner.level},
-                     {"per_flow", corner.per_flow},
-                     {"per_flow2", corner.per_flow2},
-                     {"per_force", corner.per_force}};
+    out["corner"] = {
+        {"level", corner.level}, {"per_flow", corner.per_flow}, {"per_force", corner.per_force}};
   }
   const LoadsBeyond& b = p.beyond;
   if (b.side != 0) {
@@ -105,12 +103,12 @@ LoadsBeyond read_beyond(const Cursor& c) {
 }
 
 BranchCorner read_corner(const Cursor& c) {
-  c.keys({"level", "per_flow", "per_flow2", "per_force"});
+  c.keys({"level", "per_flow", "per_force"});
   const auto number = [&](const char* key, const char* expected) {
     return c.at(key, expected).number(expected);
   };
   return {number("level", "a number [Pa]"), number("per_flow", "a number [Pa s/m^3]"),
-          number("per_flow2", "a number [Pa s^2/m^6]"), number("per_force", "a number [Pa/N]")};
+          number("per_force", "a number [Pa/N]")};
 }
 
 GaussianProcess read_process(const Cursor& c) {

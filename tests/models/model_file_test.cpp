@@ -45,7 +45,6 @@ TEST(ModelFile, ReadsBackEveryNumberExactly) {
     EXPECT_EQ(a.variance_core, b.variance_core);
     EXPECT_EQ(a.corner.level, b.corner.level);
     EXPECT_EQ(a.corner.per_flow, b.corner.per_flow);
-    EXPECT_EQ(a.corner.per_flow2, b.corner.per_flow2);
     EXPECT_EQ(a.corner.per_force, b.corner.per_force);
     EXPECT_EQ(a.beyond.side, b.beyond.side);
     EXPECT_EQ(a.beyond.static_slope, b.beyond.static_slope);
