@@ -27,13 +27,60 @@ double branch_share(double slope) {
   return on_static + (1.0 - on_static) * std::clamp(slope, 0.0, return_rise::kSteepestValve);
 }
 
+double supply_area(const Cylinder& cylinder, int side) {
+  return side > 0 ? cylinder.area_piston() : cylinder.area_rod();
+}
+
+/// Share of a larger load that the supply takes where samples show no slope.
+double share_on_static(const GpDataset& samples, double supply, int side) {
+  const ArrayXd excess = samples.pressure - side * samples.force / supply;
+  const double above = quantile(excess.matrix(), 0.5);
+  return 1.0 / (1.0 + std::exp((above - return_rise::kValveFrom) / return_rise::kValveSpread));
+}
+
 }  // namespace
+
+std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& cylinder,
+                                      int side) {
+  if (samples.force.size() == 0) return {};
+  const double supply = supply_area(cylinder, side);
+  if (samples.force.maxCoeff() - samples.force.minCoeff() >= return_rise::kLeastSeen * supply)
+    return {};
+  constexpr double kSurest = 0.1;  // a force that is wrong by a tenth tilts it as much
+  const double share = share_on_static(samples, supply, side);
+  return AlikeLoads{median(samples.force.matrix()), side * share / supply,
+                    std::max(kSurest, std::sqrt(share * (1.0 - share))) / supply};
+}
+
+GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads) {
+  samples.pressure -= loads.slope * (samples.force - loads.force);
+  samples.force.setConstant(loads.force);
+  return samples;
+}
+
+GpParameters for_any_load(GpParameters learned, const AlikeLoads& loads, const GpDataset& samples) {
+  // Longer than any load of a machine: what is learned over the flow does not fade with the force.
+  constexpr double kEndless = 1e9;  // [N]
+  learned.length_force = kEndless;
+  learned.mean_constant -= (loads.slope - learned.mean_slope) * loads.force;
+  learned.mean_slope = loads.slope;
+  learned.force_min = samples.force.minCoeff();
+  learned.force_max = samples.force.maxCoeff();
+  const Eigen::Index n = learned.weight.size();
+  if (learned.variance_core.size() > 0) {
+    const double open = loads.slope_deviation * loads.slope_deviation;
+    learned.variance_core(n, n) -= open * loads.force * loads.force;
+    learned.variance_core(n, n + 1) += open * loads.force;
+    learned.variance_core(n + 1, n) += open * loads.force;
+    learned.variance_core(n + 1, n + 1) -= open;
+  }
+  return learned;
+}
 
 LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& samples,
                                const Cylinder& cylinder, int side) {
   LoadsBeyond out;
-  const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
-  const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
+  const double supply = supply_area(cylinder, side), other = supply_area(cylinder, -side);
   out.side = side;
   out.static_slope = 1.0 / supply;
   const ArrayXd load = side * samples.force;
@@ -45,11 +92,8 @@ LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& 
   out.least = std::clamp(quantile(samples.pressure.matrix(), 0.01), 0.0, kTank);
   const double seen = heaviest - lightest;
   if (seen < return_rise::kLeastSeen * supply) {
-    // one load shows no slope: its supply stands near the load, or a valve holds it
-    const double above = quantile(excess.matrix(), 0.5);
-    const double on_static =
-        1.0 / (1.0 + std::exp((above - return_rise::kValveFrom) / return_rise::kValveSpread));
-    out.slope_heavier = out.slope_lighter = on_static * out.static_slope;
+    out.slope_heavier = out.slope_lighter =
+        share_on_static(samples, supply, side) * out.static_slope;
     return out;
   }
   const GaussianProcess process(parameters);

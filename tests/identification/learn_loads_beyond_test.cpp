@@ -76,6 +76,40 @@ TEST_P(LearnLoadsBeyond, OfBothBranchesGoesOnAlongEach) {
   EXPECT_LT(worst(process, {-400 * kBarSeen}), 5 * kBarSeen);  // the tank
 }
 
+TEST_P(LearnLoadsBeyond, OfOneLoadKeepsWhatTheFlowDoesAndAddsTheBalanceOfForces) {
+  // a slewing cylinder on level ground carries nothing, until friction is added: both must be as before, and more
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> noise(0.0, 0.8 * kBarSeen);
+  constexpr Eigen::Index n = 400;
+  GpDataset set{"", Eigen::ArrayXd(n), Eigen::ArrayXd::Zero(n), Eigen::ArrayXd(n)};
+  const auto line = [](double flow) { return 5 * kBarSeen + 2e12 * flow * flow; };
+  for (Eigen::Index k = 0; k < n; ++k) {
+    set.flow[k] = 1e-4 + 5e-4 * uniform(random);
+    set.pressure[k] = line(set.flow[k]) + noise(random);
+  }
+  const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  ASSERT_TRUE(loads);
+  const GpDataset at_one = at_one_load(set, *loads);
+  const GpParameters fitted = learn_gp(at_one.flow, at_one.force, at_one.pressure).parameters;
+  GpParameters p = for_any_load(fitted, *loads, set);
+  p.beyond = learn_loads_beyond(p, set, cylinder_, side());
+  const GaussianProcess process(p);
+  const double unsure = std::sqrt(GaussianProcess(fitted).variance(3e-4, 0.0));
+  for (const double flow : {2e-4, 5.5e-4}) {
+    EXPECT_NEAR(process.mean(flow, 0.0), line(flow), kBarSeen);
+    for (const double load : {3.0, 8.0, 30.0}) {
+      const double force = side() * load * kBarSeen * supply();
+      EXPECT_NEAR(process.mean(flow, force), line(flow) + load * kBarSeen,
+                  0.05 * load * kBarSeen + kBarSeen)
+          << load;
+      EXPECT_GT(std::sqrt(process.variance(flow, force)), unsure + 0.05 * load * kBarSeen);
+    }
+  }
+  set.force = Eigen::ArrayXd::LinSpaced(n, 0.0, 10 * kBarSeen * supply());
+  EXPECT_FALSE(alike_loads(set, cylinder_, side())) << "these show a slope";
+}
+
 INSTANTIATE_TEST_SUITE_P(BothSides, LearnLoadsBeyond, ::testing::Values(1, -1));
 
 }  // namespace
