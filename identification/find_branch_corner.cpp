@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "identification/robust.h"
+#include "models/linear_algebra.h"
 #include "models/return_rise.h"
 
 namespace sparflow {
@@ -40,10 +40,6 @@ struct Branches {
     return s.load[k] + line[0] + line[1] * s.flow[k];
   }
 };
-
-VectorXd least_squares(const MatrixXd& x, const VectorXd& y) {
-  return x.colPivHouseholderQr().solve(y);
-}
 
 /// Of the samples for which `on_line` says so, and of the others. @return false when one branch has too few
 bool fit_branches(const Samples& s, const std::vector<char>& on_line, Branches& out) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "identification/robust.h"
+#include "models/linear_algebra.h"
 #include "models/return_rise.h"
 
 namespace sparflow {
@@ -15,6 +16,9 @@ using Eigen::Index;
 
 /// Of the learned range, the part at its border whose slope tells the branch.
 constexpr double kBorder = 0.1;
+/// Loads that span less are alike: between no slope and the static branch's, a corner in their middle leaves a straight line
+/// by an eighth of the span at most, about a sensor's noise; what a kernel finds beyond that is friction. [Pa]
+constexpr double kAlike = 8e5;
 /// Anti-cavitation valves keep chambers near the tank's pressure. [Pa]
 constexpr double kTank = 2e5;
 
@@ -38,18 +42,55 @@ double share_on_static(const GpDataset& samples, double supply, int side) {
   return 1.0 / (1.0 + std::exp((above - return_rise::kValveFrom) / return_rise::kValveSpread));
 }
 
+/// Of a larger load, what the supply takes.
+struct Share {
+  double value = 0.0, deviation = 0.0;
+};
+
+/// What the samples themselves show, beside a parabola over the flow. Friction and dynamics make the errors of a motion
+/// alike, so that many samples are worth few.
+Share share_in(const GpDataset& samples, double supply, int side) {
+  constexpr double kUnknown = 1e3, kExact = 1e-3;
+  constexpr double kWorth = 20.0;
+  const Index n = samples.force.size();
+  const double largest_flow = samples.flow.abs().maxCoeff();
+  if (n < 5 || !(largest_flow > 0.0)) return {0.0, kUnknown};
+  const ArrayXd flow = samples.flow / largest_flow;
+  Eigen::MatrixXd by_flow(n, 3);
+  by_flow << ArrayXd::Ones(n), flow, flow.square();
+  const auto beside_flow = [&](const Eigen::VectorXd& y) -> Eigen::VectorXd {
+    return y - by_flow * least_squares_of_least_norm(by_flow, y);
+  };
+  const Eigen::VectorXd load = beside_flow(side / supply * samples.force.matrix());
+  const Eigen::VectorXd pressure = beside_flow(samples.pressure.matrix());
+  const double spread = load.squaredNorm();
+  constexpr double kNoSpread = 1e3;  // [Pa]
+  if (!(spread > kNoSpread * kNoSpread * static_cast<double>(n))) return {0.0, kUnknown};
+  const double share = load.dot(pressure) / spread;
+  const double worth = std::min(1.0, kWorth / static_cast<double>(n));
+  const double left = (pressure - share * load).squaredNorm() / static_cast<double>(n - 4);
+  return {share, std::max(kExact, std::sqrt(left / (worth * spread)))};
+}
+
+/// Two independent estimates as one.
+Share together(const Share& a, const Share& b) {
+  const double of_a = 1.0 / (a.deviation * a.deviation), of_b = 1.0 / (b.deviation * b.deviation);
+  return {(of_a * a.value + of_b * b.value) / (of_a + of_b), 1.0 / std::sqrt(of_a + of_b)};
+}
+
 }  // namespace
 
 std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& cylinder,
                                       int side) {
   if (samples.force.size() == 0) return {};
   const double supply = supply_area(cylinder, side);
-  if (samples.force.maxCoeff() - samples.force.minCoeff() >= return_rise::kLeastSeen * supply)
-    return {};
+  if (samples.force.maxCoeff() - samples.force.minCoeff() >= kAlike * supply) return {};
   constexpr double kSurest = 0.1;  // a force that is wrong by a tenth tilts it as much
-  const double share = share_on_static(samples, supply, side);
-  return AlikeLoads{median(samples.force.matrix()), side * share / supply,
-                    std::max(kSurest, std::sqrt(share * (1.0 - share))) / supply};
+  const double usual = share_on_static(samples, supply, side);
+  const Share known{usual, std::max(kSurest, std::sqrt(usual * (1.0 - usual)))};
+  const Share share = together(known, share_in(samples, supply, side));
+  return AlikeLoads{median(samples.force.matrix()),
+                    side * std::clamp(share.value, 0.0, 1.0) / supply, share.deviation / supply};
 }
 
 GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads) {

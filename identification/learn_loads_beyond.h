@@ -7,9 +7,10 @@
 
 namespace sparflow {
 
-/// Loads so alike that samples show no slope over them (a slewing cylinder on level ground carries none at all). What a
-/// larger one would do follows from where the supply stands: near the load it is the static branch, which takes all of it; far
-/// above a valve holds it.
+/// Loads so alike that samples show little of a slope over them (a slewing cylinder on level ground carries none at all).
+/// Which share of a larger one the supply takes follows from where it stands, near the load on the static branch, which
+/// takes all of it, or far above, where a valve holds it; and from the samples as far as they show one. It lies between 0 and
+/// 1: what is steeper is friction that moves along with the load.
 struct AlikeLoads {
   double force = 0.0;            ///< [N] median
   double slope = 0.0;            ///< [Pa/N] of the supply over the force
