@@ -169,9 +169,13 @@ TEST_P(LearnLoadsBeyond, OfFewLoadsWithoutAnyNoiseIsTheirSlope) {
   const Eigen::ArrayXd load = Eigen::ArrayXd::LinSpaced(n, 10 * kBarSeen, 15 * kBarSeen);
   set.force = side() * supply() * load;
   set.pressure = 40 * kBarSeen + kShare * load;
-  const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
   ASSERT_TRUE(loads);
   EXPECT_NEAR(side() * loads->slope * supply(), kShare, 1e-3);
+  set.pressure.setZero();
+  loads = alike_loads(set, cylinder_, side());
+  ASSERT_TRUE(loads);
+  EXPECT_NEAR(side() * loads->slope * supply(), 0.0, 1e-3) << "no error left at all";
 }
 
 INSTANTIATE_TEST_SUITE_P(BothSides, LearnLoadsBeyond, ::testing::Values(1, -1));
