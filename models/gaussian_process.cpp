@@ -44,8 +44,7 @@ void check_parameters(const GpParameters& p) {
                       n + 2, n + 2));
   require(p.variance_core.allFinite(), "variance_core", "a value is not finite");
   const BranchCorner& c = p.corner;
-  require(std::isfinite(c.level + c.per_flow + c.per_force), "corner",
-          "a value is not finite");
+  require(std::isfinite(c.level + c.per_flow + c.per_force), "corner", "a value is not finite");
   const LoadsBeyond& b = p.beyond;
   require(b.side == 0 || (std::abs(b.side) == 1 && p.force_max >= p.force_min), "beyond.side",
           "expected 1 or -1, and a range of forces");
