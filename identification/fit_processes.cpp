@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "identification/apply_effects.h"
+#include "identification/find_branch_corner.h"
 #include "identification/fit_pass.h"
 #include "identification/learn_loads_beyond.h"
 #include "identification/robust.h"
@@ -112,6 +115,45 @@ void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samp
   (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
 }
 
+void take_corner_off(const BranchCorner& corner, GpDataset& set) {
+  for (Index k = 0; k < set.pressure.size(); ++k)
+    set.pressure[k] -= corner_rise(corner, set.flow[k], set.force[k]).value;
+}
+
+/// Learns processes side by side and takes those that could be learned into the model.
+/// @param which of the pass' processes, as many as sets  @param keep_others a process that there is already stays where
+///        this one cannot be learned, and so does its report
+void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& which,
+           const LearnGpOptions& options, int threads, bool keep_others, FitPass& pass,
+           const std::function<void(int, int, const std::string&)>& progress = {}) {
+  std::vector<GpDataset> asked = sets;
+  std::vector<std::optional<AlikeLoads>> alike(sets.size());
+  std::vector<BranchCorner> corners(sets.size());
+  for (std::size_t k = 0; k < sets.size(); ++k) {
+    const ProcessFit& fitted = pass.processes[which[k]];
+    const int side = fitted.extend ? 1 : -1;
+    const Cylinder& cylinder =
+        pass.model.machine.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+    alike[k] = alike_loads(sets[k], cylinder, side);
+    if (alike[k]) {
+      asked[k] = at_one_load(std::move(asked[k]), *alike[k]);
+      continue;
+    }
+    corners[k] = find_branch_corner(sets[k], cylinder, side);
+    if (corners[k].there()) take_corner_off(corners[k], asked[k]);
+  }
+  std::vector<LearnedGp> learned = learn_gps(asked, options, progress, threads);
+  for (std::size_t k = 0; k < learned.size(); ++k) {
+    const bool there = learned[k].report.failure.empty();
+    if (!there && keep_others) continue;
+    learned[k].parameters.corner = corners[k];
+    if (there && alike[k]) {
+      learned[k].parameters = for_any_load(std::move(learned[k].parameters), *alike[k], sets[k]);
+    }
+    take(pass, which[k], std::move(learned[k]), sets[k]);
+  }
+}
+
 VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
   VectorXd residual(data.set.pressure.size());
   for (Index k = 0; k < residual.size(); ++k) {
@@ -160,11 +202,8 @@ void take_backs_off(const FitOptions& options, std::vector<ProcessData>& samples
     which.push_back(i);
   }
   if (again.empty()) return;
-  std::vector<LearnedGp> learned = learn_gps(again, options.gp, {}, options.threads);
-  for (std::size_t k = 0; k < learned.size(); ++k) {
-    if (learned[k].report.failure.empty()) take(pass, which[k], std::move(learned[k]), again[k]);
-    take_off(which[k]);
-  }
+  learn(again, which, options.gp, options.threads, true, pass);
+  for (const std::size_t i : which) take_off(i);
 }
 
 void process_notes(const Machine& machine, FitPass& pass) {
@@ -213,8 +252,9 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
       if (progress) progress(from + 0.5 * done / total, "pressure of " + name);
     };
   };
-  std::vector<LearnedGp> learned = learn_gps(sets, options.gp, tell(0.0), options.threads);
-  for (std::size_t i = 0; i < learned.size(); ++i) take(pass, i, std::move(learned[i]), sets[i]);
+  std::vector<std::size_t> all(sets.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  learn(sets, all, options.gp, options.threads, false, pass, tell(0.0));
   take_backs_off(options, samples, pass);
 
   std::vector<GpDataset> again;
@@ -236,11 +276,8 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   }
   LearnGpOptions screened = options.gp;
   screened.outlier_threshold = 0.0;
-  learned = learn_gps(again, screened, tell(0.5), options.threads);
-  for (std::size_t i = 0; i < learned.size(); ++i) {
-    // A first fit is better than none.
-    if (learned[i].report.failure.empty()) take(pass, which[i], std::move(learned[i]), again[i]);
-  }
+  // a first fit is better than none
+  learn(again, which, screened, options.threads, true, pass, tell(0.5));
   process_notes(machine, pass);
 }
 

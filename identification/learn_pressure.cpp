@@ -215,9 +215,10 @@ void add_warnings(const Problem& problem, const GpHyper& hyper, GpReport& report
   const bool constant[] = {problem.flow.constant, problem.force.constant};
   for (int i = 0; i < 2; ++i) {
     if (constant[i]) {
-      report.warnings.push_back(fmt::format(
-          "The {} does not vary in these samples: the pressure's dependence on it is not learned.",
-          input[i]));
+      report.warnings.push_back(
+          fmt::format("The {} does not vary enough in these samples for the pressure's dependence "
+                      "on it to be learned.",
+                      input[i]));
     } else if (at_lower(i)) {
       report.warnings.push_back(fmt::format(
           "The length-scale of the {} is at its lower bound: the pressure changes more sharply "

@@ -43,6 +43,8 @@ void check_parameters(const GpParameters& p) {
           fmt::format("got {} x {}, expected {} x {} (centres + 2)", rows, p.variance_core.cols(),
                       n + 2, n + 2));
   require(p.variance_core.allFinite(), "variance_core", "a value is not finite");
+  const BranchCorner& c = p.corner;
+  require(std::isfinite(c.level + c.per_flow + c.per_force), "corner", "a value is not finite");
   const LoadsBeyond& b = p.beyond;
   require(b.side == 0 || (std::abs(b.side) == 1 && p.force_max >= p.force_min), "beyond.side",
           "expected 1 or -1, and a range of forces");
@@ -86,8 +88,10 @@ KernelCentres GaussianProcess::centres() const {
 }
 
 double GaussianProcess::force_scale() const {
-  if (parameters_.beyond.side == 0) return parameters_.length_force;
-  return std::min(parameters_.length_force, loads_beyond::bend(parameters_.beyond));
+  double scale = parameters_.length_force;
+  if (parameters_.corner.there()) scale = std::min(scale, corner_width(parameters_.corner));
+  if (parameters_.beyond.side != 0) scale = std::min(scale, loads_beyond::bend(parameters_.beyond));
+  return scale;
 }
 
 double GaussianProcess::mean(double flow, double force) const {
@@ -109,7 +113,9 @@ GpDerivatives GaussianProcess::mean_derivatives(double flow, double force) const
 }
 
 double GaussianProcess::learned_mean(double flow, double force) const {
+  const BranchCorner& corner = parameters_.corner;
   return parameters_.mean_constant + parameters_.mean_slope * force +
+         (corner.there() ? corner_rise(corner, flow, force).value : 0.0) +
          kernel_sum(centres(), flow * inverse_length_flow_, force * inverse_length_force_);
 }
 
@@ -123,6 +129,14 @@ GpDerivatives GaussianProcess::learned_derivatives(double flow, double force) co
   out.d_flow_flow = s.d_xx * a * a;
   out.d_flow_force = s.d_xy * a * b;
   out.d_force_force = s.d_yy * b * b;
+  if (!parameters_.corner.there()) return out;
+  const CornerRise rise = corner_rise(parameters_.corner, flow, force);
+  out.value += rise.value;
+  out.d_flow += rise.d_flow;
+  out.d_force += rise.d_force;
+  out.d_flow_flow += rise.d_flow_flow;
+  out.d_flow_force += rise.d_flow_force;
+  out.d_force_force += rise.d_force_force;
   return out;
 }
 

@@ -1,12 +1,14 @@
 #pragma once
 /// Working pressure of one cylinder in one direction as a Gaussian process of (flow, static force):
-///   p(Q, F) = m0 + m1 F + sum_j w_j s^2 exp(-1/2 [((Q-Q_j)/l_Q)^2 + ((F-F_j)/l_F)^2])
+///   p(Q, F) = m0 + m1 F + max(0, S - V) + sum_j w_j s^2 exp(-1/2 [((Q-Q_j)/l_Q)^2 + ((F-F_j)/l_F)^2])
 /// Source: Rasmussen & Williams (2006), ch. 2.2, 2.7; sparse form: Titsias (2009), eqs. 6 and 9.
 /// The mean is linear in F because a zero-mean SE process falls back to a *low* pressure outside its
-/// data, which an optimiser would exploit. Beyond the loads it was learned from physics takes over
+/// data, which an optimiser would exploit. max(0, S - V), where the samples show it, is the corner between the
+/// two branches of a supply (models/branch_corner.h). Beyond the loads it was learned from physics takes over
 /// where it is known (models/loads_beyond.h).
 #include <Eigen/Dense>
 
+#include "models/branch_corner.h"
 #include "models/gp_kernel.h"
 #include "models/loads_beyond.h"
 
@@ -37,8 +39,9 @@ struct GpParameters {
   Eigen::MatrixXd variance_core;
   /// Where the data lies; outside it the mean extrapolates and the variance says so. [lo, hi]
   double flow_min = 0.0, flow_max = 0.0, force_min = 0.0, force_max = 0.0;
-  int data_count = 0;  ///< measurements the process has seen
-  LoadsBeyond beyond;  ///< outside force_min .. force_max
+  int data_count = 0;   ///< measurements the process has seen
+  BranchCorner corner;  ///< part of the mean
+  LoadsBeyond beyond;   ///< outside force_min .. force_max
 };
 
 /// Immutable and safe to share between threads. Evaluation allocates nothing, except that the variance
@@ -60,7 +63,7 @@ class GaussianProcess {
 
   const GpParameters& parameters() const { return parameters_; }
   bool empty() const { return parameters_.weight.size() == 0; }
-  /// [N] over which the mean may bend: the length-scale, or what it does beyond the learned loads.
+  /// [N] over which the mean may bend: the length-scale, the corner's, or what it does beyond the learned loads.
   double force_scale() const;
 
  private:

@@ -67,6 +67,11 @@ Json process_json(const GaussianProcess& process) {
               {"force", numbers(p.force)},
               {"weight", numbers(p.weight)},
               {"variance_core", std::move(core)}};
+  const BranchCorner& corner = p.corner;
+  if (corner.there()) {
+    out["corner"] = {
+        {"level", corner.level}, {"per_flow", corner.per_flow}, {"per_force", corner.per_force}};
+  }
   const LoadsBeyond& b = p.beyond;
   if (b.side != 0) {
     out["beyond"] = {{"side", b.side},
@@ -97,11 +102,20 @@ LoadsBeyond read_beyond(const Cursor& c) {
   return b;
 }
 
+BranchCorner read_corner(const Cursor& c) {
+  c.keys({"level", "per_flow", "per_force"});
+  const auto number = [&](const char* key, const char* expected) {
+    return c.at(key, expected).number(expected);
+  };
+  return {number("level", "a number [Pa]"), number("per_flow", "a number [Pa s/m^3]"),
+          number("per_force", "a number [Pa/N]")};
+}
+
 GaussianProcess read_process(const Cursor& c) {
   if (c.is_null()) return {};
   c.keys({"length_flow", "length_force", "signal_std", "noise_std", "mean_constant", "mean_slope",
           "flow_range", "force_range", "data_count", "flow", "force", "weight", "variance_core",
-          "beyond"});
+          "corner", "beyond"});
   const auto positive = [&](const char* key, const char* unit) {
     const Cursor v = c.at(key, fmt::format("a positive number [{}]", unit));
     const double number = v.number(fmt::format("a positive number [{}]", unit));
@@ -150,6 +164,7 @@ GaussianProcess read_process(const Cursor& c) {
       }
     }
   }
+  if (c.has("corner")) p.corner = read_corner(c.at("corner", ""));
   if (c.has("beyond")) p.beyond = read_beyond(c.at("beyond", ""));
   try {
     return GaussianProcess(std::move(p));

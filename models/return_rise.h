@@ -7,7 +7,8 @@
 /// supply takes all of a larger load where the static branch does, and the share A_supply/A_return/(R + A_supply/A_return),
 /// R the valve's pilot ratio, where a counterbalance valve does: at most 0.6 for R >= 1. So
 ///   p = H(F) + w(s) r A_return/A_supply,  s = A_supply (H(F + A_return r) - H(F)) / (A_return r),
-/// w = 0 up to s = 0.6, 1 from 0.9, a straight line between. A valve that is set high, or none, needs no parameter.
+/// A law that knows the corner between both branches (models/branch_corner.h) says so itself: S is higher by r A_return/A_supply.
+/// Elsewhere w = 0 up to s = 0.6, 1 from 0.9, a straight line between. A valve that is set high, or none, needs no parameter.
 /// A large rise carries the static branch over the valve's: beyond the gap between both, H - S with a usual return line's
 /// pressure in S, it appears in the supply although the valve ruled without it.
 #include <cmath>
@@ -87,6 +88,8 @@ T supply_rise(const GaussianProcess& process, const Cylinder& cylinder, int side
   const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
   const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
   const T whole = (other / supply) * rise;
+  const BranchCorner& corner = process.parameters().corner;
+  if (corner.there()) return rise_across<T>(corner, flow, force, whole);
   const T above = own - (side / supply) * force;
   const T share = return_rise::static_share(process, side, supply, other, above, flow, force, rise);
   if (rise <= T(0.0)) return share * whole;

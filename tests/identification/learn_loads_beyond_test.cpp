@@ -76,6 +76,108 @@ TEST_P(LearnLoadsBeyond, OfBothBranchesGoesOnAlongEach) {
   EXPECT_LT(worst(process, {-400 * kBarSeen}), 5 * kBarSeen);  // the tank
 }
 
+TEST_P(LearnLoadsBeyond, OfOneLoadKeepsWhatTheFlowDoesAndAddsTheBalanceOfForces) {
+  // a slewing cylinder on level ground carries nothing, until friction is added: both must be as before, and more
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> noise(0.0, 0.8 * kBarSeen);
+  constexpr Eigen::Index n = 400;
+  GpDataset set{"", Eigen::ArrayXd(n), Eigen::ArrayXd::Zero(n), Eigen::ArrayXd(n)};
+  const auto line = [](double flow) { return 5 * kBarSeen + 2e12 * flow * flow; };
+  for (Eigen::Index k = 0; k < n; ++k) {
+    set.flow[k] = 1e-4 + 5e-4 * uniform(random);
+    set.pressure[k] = line(set.flow[k]) + noise(random);
+  }
+  const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  ASSERT_TRUE(loads);
+  const GpDataset at_one = at_one_load(set, *loads);
+  const GpParameters fitted = learn_gp(at_one.flow, at_one.force, at_one.pressure).parameters;
+  GpParameters p = for_any_load(fitted, *loads, set);
+  p.beyond = learn_loads_beyond(p, set, cylinder_, side());
+  const GaussianProcess process(p);
+  const double unsure = std::sqrt(GaussianProcess(fitted).variance(3e-4, 0.0));
+  for (const double flow : {2e-4, 5.5e-4}) {
+    EXPECT_NEAR(process.mean(flow, 0.0), line(flow), kBarSeen);
+    for (const double load : {3.0, 8.0, 30.0}) {
+      const double force = side() * load * kBarSeen * supply();
+      EXPECT_NEAR(process.mean(flow, force), line(flow) + load * kBarSeen,
+                  0.05 * load * kBarSeen + kBarSeen)
+          << load;
+      EXPECT_GT(std::sqrt(process.variance(flow, force)), unsure + 0.05 * load * kBarSeen);
+    }
+  }
+  set.force = Eigen::ArrayXd::LinSpaced(n, 0.0, 10 * kBarSeen * supply());
+  EXPECT_FALSE(alike_loads(set, cylinder_, side())) << "these show a slope";
+}
+
+TEST_P(LearnLoadsBeyond, OfFewLoadsIsNoSteeperThanTheBalanceOfForces) {
+  // friction that grows along a stroke, as on the real crane's jib, is no slope over the load that moves along with it
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> noise(0.0, 0.5 * kBarSeen);
+  constexpr Eigen::Index n = 900;
+  for (const double span : {2.0, 3.6, 6.4}) {
+    for (const double steep : {2.5, -3.6}) {
+      GpDataset set{"", Eigen::ArrayXd(n), Eigen::ArrayXd(n), Eigen::ArrayXd(n)};
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const double load = (14.0 + span * uniform(random)) * kBarSeen;
+        set.flow[k] = 1e-4 + 2e-4 * uniform(random);
+        set.force[k] = side() * load * supply();
+        set.pressure[k] =
+            65 * kBarSeen + 2e10 * set.flow[k] + steep * (load - 14 * kBarSeen) + noise(random);
+      }
+      const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+      ASSERT_TRUE(loads) << span;
+      EXPECT_GE(side() * loads->slope * supply(), 0.0) << span << " " << steep;
+      EXPECT_LE(side() * loads->slope * supply(), 1.0) << span << " " << steep;
+    }
+  }
+}
+
+TEST_P(LearnLoadsBeyond, OfFewLoadsTakesTheSlopeThatSamplesShow) {
+  // a valve 25 bar above the load would be taken for level beforehand
+  constexpr double kShare = 0.5;
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> noise(0.0, 0.5 * kBarSeen);
+  constexpr Eigen::Index n = 900;
+  double wrong_before = kShare, unsure_before = 1.0;
+  for (const double span : {1.0, 3.0, 7.5}) {
+    GpDataset set{"", Eigen::ArrayXd(n), Eigen::ArrayXd(n), Eigen::ArrayXd(n)};
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double load = (10.0 + span * uniform(random)) * kBarSeen;
+      set.flow[k] = 1e-4 + 2e-4 * uniform(random);
+      set.force[k] = side() * load * supply();
+      set.pressure[k] = 30 * kBarSeen + 3e10 * set.flow[k] + kShare * load + noise(random);
+    }
+    const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+    ASSERT_TRUE(loads) << span;
+    const double wrong = kShare - side() * loads->slope * supply();
+    const double unsure = loads->slope_deviation * supply();
+    EXPECT_LT(wrong, wrong_before) << "more of a slope is seen in " << span << " bar";
+    EXPECT_LT(unsure, unsure_before) << span;
+    wrong_before = wrong;
+    unsure_before = unsure;
+  }
+  EXPECT_NEAR(wrong_before, 0.0, 0.15);
+}
+
+TEST_P(LearnLoadsBeyond, OfFewLoadsWithoutAnyNoiseIsTheirSlope) {
+  constexpr double kShare = 0.3;
+  constexpr Eigen::Index n = 50;
+  GpDataset set{"", Eigen::ArrayXd::Constant(n, 2e-4), Eigen::ArrayXd(n), Eigen::ArrayXd(n)};
+  const Eigen::ArrayXd load = Eigen::ArrayXd::LinSpaced(n, 10 * kBarSeen, 15 * kBarSeen);
+  set.force = side() * supply() * load;
+  set.pressure = 40 * kBarSeen + kShare * load;
+  std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  ASSERT_TRUE(loads);
+  EXPECT_NEAR(side() * loads->slope * supply(), kShare, 1e-3);
+  set.pressure.setZero();
+  loads = alike_loads(set, cylinder_, side());
+  ASSERT_TRUE(loads);
+  EXPECT_NEAR(side() * loads->slope * supply(), 0.0, 1e-3) << "no error left at all";
+}
+
 INSTANTIATE_TEST_SUITE_P(BothSides, LearnLoadsBeyond, ::testing::Values(1, -1));
 
 }  // namespace

@@ -49,6 +49,7 @@ inline CraneModel small_model() {
   p.force_min = 1e4 / 7.0;
   p.force_max = 9e4 / 7.0;
   p.data_count = 1234;
+  p.corner = {-1e6 / 3.0, 1e9 / 7.0, 1e2 / 9.0};
   p.beyond = {1, 1e2 / 3.0, 1e5 / 7.0, 1e2 / 7.0, 1e1 / 3.0, 1e5 / 9.0};
   model.cylinders[0].extend = GaussianProcess(p);
   model.cylinders[0].margin = 1.5e6 / 7.0;

@@ -43,6 +43,9 @@ TEST(ModelFile, ReadsBackEveryNumberExactly) {
     EXPECT_TRUE((a.force == b.force).all());
     EXPECT_TRUE((a.weight == b.weight).all());
     EXPECT_EQ(a.variance_core, b.variance_core);
+    EXPECT_EQ(a.corner.level, b.corner.level);
+    EXPECT_EQ(a.corner.per_flow, b.corner.per_flow);
+    EXPECT_EQ(a.corner.per_force, b.corner.per_force);
     EXPECT_EQ(a.beyond.side, b.beyond.side);
     EXPECT_EQ(a.beyond.static_slope, b.beyond.static_slope);
     EXPECT_EQ(a.beyond.static_level, b.beyond.static_level);
