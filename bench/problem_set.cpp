@@ -24,7 +24,10 @@ int run(int argc, char** argv) {
   app.add("--only", only, "bundled reaches whose name contains this");
   app.add("--write", write, "best known energies (JSON): kept where they are better");
   app.add("--write-optima", keep, "energies, times and bounds of this run (JSON)");
-  app.add("--optima", optima, "a file of --write-optima: only the bounds are computed again");
+  app.add(
+      "--optima", optima,
+      "a file of --write-optima: only the bounds are computed again; with --no-bound --no-grid its "
+      "own are printed");
   app.add("--intervals", settings.intervals, "of the mesh");
   app.add("--paths", settings.paths, "seed paths at most");
   app.flag("!--no-bound", settings.bound, "leave out the certified lower bound");

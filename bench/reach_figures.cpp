@@ -70,6 +70,9 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
     f.comparison = earlier_comparison(*earlier);
     f.named = earlier->value("named", "");
     f.worst = earlier->value("worst", "");
+    f.bound = earlier->value("lower_bound_J", 0.0);
+    f.slow_bound = earlier->value("lower_bound_any_time_J", 0.0);
+    f.unlimited = earlier->value("unlimited_time_J", 0.0);
   } else {
     compare(task, settings, f);
   }
