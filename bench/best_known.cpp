@@ -5,10 +5,21 @@
 #include <fstream>
 
 #include "models/error.h"
+#include "models/model_file.h"
 
 namespace sparflow::bench {
 
 using nlohmann::json;
+
+namespace {
+
+/// What found an entry, and with which model.
+void put_mark(json& entry, const json& model) {
+  entry["model"] = model;
+  entry["program"] = std::string("sparflow ") + program_version();
+}
+
+}  // namespace
 
 void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
                   const std::vector<ReachFigures>& figures) {
@@ -17,7 +28,7 @@ void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
     const ReachFigures& f = figures[i];
     if (f.left_out) continue;
     json& entry = all[tasks[i].problem.name];
-    entry = {{"named", f.named}, {"solve_s", f.comparison.solve_s}};
+    entry = {{"named", f.named}, {"worst", f.worst}, {"solve_s", f.comparison.solve_s}};
     const StrategyOutcome* best = f.optimum();
     if (best == nullptr) continue;
     entry["shortest_s"] = f.comparison.shortest;
@@ -43,8 +54,13 @@ void write_best_known(const std::string& path, const std::vector<ReachTask>& tas
     if (name.empty() || figures[i].left_out) continue;
     const StrategyOutcome* best = figures[i].optimum();
     json& entry = known[name];
+    const json mark = {{"file", tasks[i].mark.file}, {"sha256", tasks[i].mark.sha256}};
+    if (entry.is_object() && entry.value("model", json()) != mark) entry = json();
     if (best == nullptr) {
-      if (entry.is_null()) entry = {{"status", "infeasible"}, {"why", figures[i].named}};
+      if (entry.is_null()) {
+        entry = {{"status", "infeasible"}, {"why", figures[i].named}};
+        put_mark(entry, mark);
+      }
       continue;
     }
     const bool known_energy =
@@ -67,6 +83,7 @@ void write_best_known(const std::string& path, const std::vector<ReachTask>& tas
              {"shortest_s", shortest},
              {"share_moving", best->energy.share_moving},
              {"from", best->detail}};
+    put_mark(entry, mark);
     for (const StrategyOutcome& o : figures[i].comparison.row("equal")->outcomes) {
       if (o.found() && o.kind != kOptimal && o.kind != kMinimumTime)
         entry["baselines_J"][o.kind] = o.energy.total;

@@ -2,20 +2,18 @@
 
 #include <fmt/format.h>
 
-#include "planners/seed_paths.h"
 #include "problems/time_parametrise.h"
 
 namespace sparflow::bench {
 
 std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, int intervals,
-                                      std::uint64_t seed, std::string* message) {
+                                      std::uint64_t seed, SeedResult* planned) {
   SeedOptions options;
   options.count = most;
   options.random_seed = seed;
   TimingOptions timing;
   timing.intervals = intervals;
-  const SeedResult found = find_seed_paths(problem, options);
-  if (message != nullptr) *message = found.message;
+  SeedResult found = find_seed_paths(problem, options);
   std::vector<SeedMotion> seeds;
   seeds.reserve(found.paths.size());
   for (const SeedPath& path : found.paths) {
@@ -24,6 +22,7 @@ std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, in
     seeds.push_back({fmt::format("{} {}", path.planner, seeds.size() + 1), timed.motion,
                      timed.shortest, path.planner == "straight line"});
   }
+  if (planned != nullptr) *planned = std::move(found);
   return seeds;
 }
 

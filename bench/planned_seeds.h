@@ -1,16 +1,16 @@
 #pragma once
 /// Seed paths of the planners as timed motions, as `sparflow optimize` starts from.
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "optimizer/optimize.h"
+#include "planners/seed_paths.h"
 
 namespace sparflow::bench {
 
 /// @param most paths  @param intervals of a motion's mesh  @param seed of the planners' random numbers
-/// @param message if given, what the planner said: how many paths, or why there is none
+/// @param planned if given, what the planner said beside them: how many paths, or why there is none
 std::vector<SeedMotion> planned_seeds(const MotionProblem& problem, int most, int intervals,
-                                      std::uint64_t seed = 1, std::string* message = nullptr);
+                                      std::uint64_t seed = 1, SeedResult* planned = nullptr);
 
 }  // namespace sparflow::bench

@@ -24,7 +24,10 @@ int run(int argc, char** argv) {
   app.add("--only", only, "bundled reaches whose name contains this");
   app.add("--write", write, "best known energies (JSON): kept where they are better");
   app.add("--write-optima", keep, "energies, times and bounds of this run (JSON)");
-  app.add("--optima", optima, "a file of --write-optima: only the bounds are computed again");
+  app.add(
+      "--optima", optima,
+      "a file of --write-optima: only the bounds are computed again; with --no-bound --no-grid its "
+      "own are printed");
   app.add("--intervals", settings.intervals, "of the mesh");
   app.add("--paths", settings.paths, "seed paths at most");
   app.flag("!--no-bound", settings.bound, "leave out the certified lower bound");
@@ -48,7 +51,10 @@ int run(int argc, char** argv) {
   const std::vector<ChildResult> results = run_in_children(
       count, processes,
       [&](int i) {
-        return pack_figures(solve_reach(tasks[static_cast<std::size_t>(i)], settings));
+        const ReachTask& task = tasks[static_cast<std::size_t>(i)];
+        const ReachFigures f = solve_reach(task, settings);
+        print_reach(task, f);
+        return pack_figures(f);
       },
       [&](int i, int done) {
         fmt::print(stderr, "{}/{} {}\n", done, count,
@@ -65,7 +71,7 @@ int run(int argc, char** argv) {
       fmt::print(stderr, "a solve ended: {}\n", r.error);
     }
   }
-  print_reaches(tasks, figures);
+  print_summary(tasks, figures);
   print_gap_by_time(tasks, figures);
   if (!keep.empty()) write_optima(keep, tasks, figures);
   if (!write.empty()) write_best_known(write, tasks, figures);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "optimizer/strategies_statistics.h"
 
@@ -20,8 +21,9 @@ struct Count {
   int below_bound = 0;
   // excess over the certified bound, from 3 times the shortest time on and below it
   std::vector<double> bound_slow, bound_fast;
-  std::vector<double> bound_tight;  // of bound_slow, where the bound is tight
-  std::vector<double> gap, sequential, line, seconds;
+  std::vector<double> bound_tight;            // of bound_slow, where the bound is tight
+  std::vector<double> gap_twice, gap_thrice;  // over the slow path, from 2 and 3 times on
+  std::vector<double> sequential, line, seconds;
 };
 
 bool tight(const ReachFigures& f) {
@@ -32,15 +34,16 @@ std::ptrdiff_t within(const std::vector<double>& excess) {
   return std::count_if(excess.begin(), excess.end(), [](double x) { return x <= kWithin; });
 }
 
-void print_infeasible(const ReachTask& task, const ReachFigures& f, Count& c) {
+/// What is said of one that cannot be done, counted and in words.
+std::string add_infeasible(const ReachTask& task, const ReachFigures& f, Count& c) {
   const bool solved = f.optimum() != nullptr;
   ++c.infeasible;
   if (solved) ++c.wrongly_solved;
-  if (!solved && !f.named.empty()) ++c.named;
-  fmt::print("{:44} infeasible ({}): {}\n", task.problem.name, task.why_not,
-             solved            ? "SOLVED"
-             : f.named.empty() ? "NOT NAMED"
-                               : f.named);
+  if (!solved && !f.worst.empty()) ++c.named;
+  return fmt::format("{:44} infeasible ({}): {}\n", task.problem.name, task.why_not,
+                     solved            ? "SOLVED"
+                     : f.worst.empty() ? "NOT NAMED, only said: " + f.named
+                                       : f.named);
 }
 
 /// How the other ways stand to the optimum, counted and in words.
@@ -71,10 +74,27 @@ std::string against_bounds(const ReachTask& task, const ReachFigures& f,
     text += fmt::format("  bound {:+.1f} %", 100.0 * excess);
   }
   if (f.unlimited > 0.0) {
-    c.gap.push_back(best.energy.total / f.unlimited - 1.0);
+    const double gap = best.energy.total / f.unlimited - 1.0;
+    const double ratio = best.duration / f.comparison.shortest;
+    if (!task.hemmed_in() && ratio >= 2.0) c.gap_twice.push_back(gap);
+    if (!task.hemmed_in() && ratio >= 3.0) c.gap_thrice.push_back(gap);
     text += fmt::format("  unlimited time {:.2f} kJ", f.unlimited / 1e3);
   }
   return text;
+}
+
+/// A reach, counted and in a line.
+std::string add_reach(const ReachTask& task, const ReachFigures& f, Count& c) {
+  c.seconds.push_back(f.comparison.solve_s);
+  if (!task.meant_feasible) return add_infeasible(task, f, c);
+  ++c.feasible;
+  const StrategyOutcome* best = f.optimum();
+  if (best == nullptr) return fmt::format("{:44} not solved: {}\n", task.problem.name, f.named);
+  ++c.solved;
+  const std::string others = against_ways(f, *best, c) + against_bounds(task, f, *best, c);
+  return fmt::format("{:44} {:8.2f} kJ {:6.2f} s ({:.2f} x shortest){}\n", task.problem.name,
+                     best->energy.total / 1e3, best->duration,
+                     best->duration / f.comparison.shortest, others);
 }
 
 void print_spread(const char* what, const std::vector<double>& v) {
@@ -103,34 +123,26 @@ void print_counts(const Count& c) {
         "{} of {}\n",
         within(c.bound_slow), c.bound_slow.size(), within(c.bound_tight), c.bound_tight.size());
   }
-  print_spread("optimum over the grid's cheapest path at unlimited time", c.gap);
+  print_spread("optimum over the cheapest path at unlimited time, from 2 times the shortest on",
+               c.gap_twice);
+  print_spread("the same from 3 times on", c.gap_thrice);
   fmt::print("seconds a comparison: median {:.1f}, worst {:.1f}\n", quantile(c.seconds, 0.5),
              quantile(c.seconds, 1.0));
 }
 
 }  // namespace
 
-void print_reaches(const std::vector<ReachTask>& tasks, const std::vector<ReachFigures>& figures) {
+void print_reach(const ReachTask& task, const ReachFigures& figures) {
+  if (figures.left_out) return;
+  Count alone;
+  fmt::print("{}", add_reach(task, figures, alone));
+  std::fflush(stdout);
+}
+
+void print_summary(const std::vector<ReachTask>& tasks, const std::vector<ReachFigures>& figures) {
   Count c;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
-    const ReachFigures& f = figures[i];
-    const StrategyOutcome* best = f.optimum();
-    if (f.left_out) continue;
-    c.seconds.push_back(f.comparison.solve_s);
-    if (!tasks[i].meant_feasible) {
-      print_infeasible(tasks[i], f, c);
-      continue;
-    }
-    ++c.feasible;
-    if (best == nullptr) {
-      fmt::print("{:44} not solved: {}\n", tasks[i].problem.name, f.named);
-      continue;
-    }
-    ++c.solved;
-    const std::string others = against_ways(f, *best, c) + against_bounds(tasks[i], f, *best, c);
-    fmt::print("{:44} {:8.2f} kJ {:6.2f} s ({:.2f} x shortest){}\n", tasks[i].problem.name,
-               best->energy.total / 1e3, best->duration, best->duration / f.comparison.shortest,
-               others);
+    if (!figures[i].left_out) add_reach(tasks[i], figures[i], c);
   }
   print_counts(c);
 }

@@ -31,8 +31,13 @@ StrategyComparison earlier_comparison(const nlohmann::json& entry) {
 }
 
 void compare(const ReachTask& task, const ReachSettings& settings, ReachFigures& f) {
+  SeedResult planned;
   const std::vector<SeedMotion> seeds =
-      planned_seeds(task.problem, settings.paths, settings.intervals, 1, &f.named);
+      planned_seeds(task.problem, settings.paths, settings.intervals, 1, &planned);
+  f.named = planned.message;
+  // every other failure of the planner is a limit, a reach or an obstacle
+  if (planned.status != SeedStatus::kFound && planned.status != SeedStatus::kNoPath)
+    f.worst = planned.message;
   if (seeds.empty()) return;
   if (settings.faster_than > 0.0 && task.meant_feasible) {
     // a first guess of the shortest time, with room for what it is too long by
@@ -53,6 +58,7 @@ void compare(const ReachTask& task, const ReachSettings& settings, ReachFigures&
   options.baselines.optimize = options.optimize;
   f.comparison = compare_strategies(*task.model, task.problem, seeds, options);
   f.named = f.comparison.message;
+  if (const StrategyRow* row = f.comparison.row("equal")) f.worst = row->outcomes.back().worst;
 }
 
 }  // namespace
@@ -63,6 +69,10 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
       earlier != settings.optima.end()) {
     f.comparison = earlier_comparison(*earlier);
     f.named = earlier->value("named", "");
+    f.worst = earlier->value("worst", "");
+    f.bound = earlier->value("lower_bound_J", 0.0);
+    f.slow_bound = earlier->value("lower_bound_any_time_J", 0.0);
+    f.unlimited = earlier->value("unlimited_time_J", 0.0);
   } else {
     compare(task, settings, f);
   }
@@ -94,6 +104,7 @@ std::string pack_figures(const ReachFigures& f) {
       .number(f.bound)
       .number(f.slow_bound)
       .text(f.named)
+      .text(f.worst)
       .number(f.left_out ? 1.0 : 0.0)
       .bytes();
 }
@@ -106,6 +117,7 @@ ReachFigures unpack_figures(const std::string& bytes) {
   f.bound = u.number();
   f.slow_bound = u.number();
   f.named = u.text();
+  f.worst = u.text();
   f.left_out = u.number() > 0.0;
   return f;
 }

@@ -14,7 +14,9 @@ struct ReachFigures {
   double slow_bound = 0.0;  ///< [J] of any motion of any duration
   double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
   std::string named;        ///< what is said of an infeasible one
-  bool left_out = false;    ///< by ReachSettings::faster_than
+  std::string
+      worst;  ///< the constraint that it names; empty when it only says that nothing was found
+  bool left_out = false;  ///< by ReachSettings::faster_than
   /// The optimum in equal time; null when there is none.
   const StrategyOutcome* optimum() const {
     const StrategyRow* row = comparison.row("equal");

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <fstream>
 #include <random>
+#include <sstream>
 
 #include "models/kinematics.h"
 #include "models/model_file.h"
+#include "models/sha256.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"
@@ -67,12 +69,17 @@ ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::u
 
 }  // namespace
 
-const CraneModel& ModelShelf::at(const std::string& file) {
-  for (const auto& [name, model] : models_) {
-    if (name == file) return *model;
+const ModelShelf::Entry& ModelShelf::entry(const std::string& file) {
+  for (const Entry& e : entries_) {
+    if (e.file == file) return e;
   }
-  models_.emplace_back(file, std::make_unique<CraneModel>(load_model(file)));
-  return *models_.back().second;
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream bytes;
+  bytes << in.rdbuf();
+  entries_.push_back({file,
+                      {file.substr(file.find_last_of('/') + 1), sha256_hex(bytes.str())},
+                      std::make_unique<CraneModel>(load_model(file))});
+  return entries_.back();
 }
 
 std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models) {
@@ -86,6 +93,7 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models
     if (model_file.empty()) continue;
     ReachTask task;
     task.model = &models.at(model_file);
+    task.mark = models.mark_of(model_file);
     task.problem = load_problem(file, &task.model->machine);
     // the infeasible ones say so in their first line
     std::ifstream in(file);
@@ -107,8 +115,10 @@ std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelShelf& m
                         : own % 2 != 0 ? "hmf_lift"
                                        : "swing_crane_far";
     const std::string file = bundled_file(std::string("reaches/") + reach + ".yaml");
-    const CraneModel& model = models.at(load_problem(file).model_path);
+    const std::string model_file = load_problem(file).model_path;
+    const CraneModel& model = models.at(model_file);
     tasks.push_back(random_task(load_problem(file, &model.machine), model, own));
+    tasks.back().mark = models.mark_of(model_file);
   }
   return tasks;
 }

@@ -10,9 +10,16 @@
 
 namespace sparflow::bench {
 
+/// Which model a figure was found with.
+struct ModelMark {
+  std::string file;    ///< name without folder
+  std::string sha256;  ///< of the file's bytes
+};
+
 struct ReachTask {
   MotionProblem problem;
   const CraneModel* model = nullptr;
+  ModelMark mark;
   bool meant_feasible = true;
   std::string why_not;  ///< of one made infeasible on purpose
   /// Obstacles or a tip line, which lower bounds leave out.
@@ -22,10 +29,17 @@ struct ReachTask {
 /// Models by file, each read once. Tasks refer to them: it must outlive what was made with it.
 class ModelShelf {
  public:
-  const CraneModel& at(const std::string& file);
+  const CraneModel& at(const std::string& file) { return *entry(file).model; }
+  ModelMark mark_of(const std::string& file) { return entry(file).mark; }
 
  private:
-  std::vector<std::pair<std::string, std::unique_ptr<CraneModel>>> models_;
+  struct Entry {
+    std::string file;
+    ModelMark mark;
+    std::unique_ptr<CraneModel> model;
+  };
+  const Entry& entry(const std::string& file);
+  std::vector<Entry> entries_;
 };
 
 /// The bundled reaches whose name contains `only` and that have a bundled model.

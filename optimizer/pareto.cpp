@@ -103,7 +103,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     if (kind == kSequential || own <= 0.0 || own > 1.5 * anchor) continue;
     const BaselineMotion m = baselines.at(kind, own);
     if (m.found())
-      first.push_back({kind, m.detail, m.motion, m.duration, own, "", m.energy, {}, {}});
+      first.push_back({kind, m.detail, m.motion, m.duration, own, "", "", m.energy, {}, {}});
   }
   fastest = search.fastest(first);
   double low = fastest.found() ? std::min(anchor, fastest.duration) : anchor;

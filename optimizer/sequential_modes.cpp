@@ -162,9 +162,21 @@ bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       if (!free[static_cast<std::size_t>(j)]) jacobian.col(j).setZero();
     }
-    const Eigen::Matrix3d normal =
-        jacobian * jacobian.transpose() + 1e-9 * Eigen::Matrix3d::Identity();
-    VectorXd step = jacobian.transpose() * solve_symmetric(normal, error);
+    VectorXd step;
+    // A joint at a limit that the step would push further is left out of it: cut short instead, it would hold the
+    // others back for good.
+    for (bool pushes = true; pushes;) {
+      const Eigen::Matrix3d normal =
+          jacobian * jacobian.transpose() + 1e-9 * Eigen::Matrix3d::Identity();
+      step = jacobian.transpose() * solve_symmetric(normal, error);
+      pushes = false;
+      for (Eigen::Index j = 0; j < q.size(); ++j) {
+        const Range& r = limits.position[static_cast<std::size_t>(j)];
+        if (!((q[j] <= r.lo && step[j] < 0.0) || (q[j] >= r.hi && step[j] > 0.0))) continue;
+        jacobian.col(j).setZero();
+        pushes = true;
+      }
+    }
     const double length = step.cwiseAbs().maxCoeff();
     if (length > 0.3) step *= 0.3 / length;
     q += step;

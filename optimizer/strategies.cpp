@@ -9,6 +9,7 @@
 
 #include "models/error.h"
 #include "optimizer/instants.h"
+#include "optimizer/optimize_outcome.h"
 
 namespace sparflow {
 namespace {
@@ -42,7 +43,7 @@ void add_pump_pressures(const CraneModel& model, double payload, StrategyOutcome
 
 StrategyOutcome outcome_of(const CraneModel& model, const MotionProblem& problem,
                            const BaselineMotion& m, double shortest) {
-  StrategyOutcome o{m.kind, m.detail, m.motion, m.duration, shortest, m.why, m.energy, {}, {}};
+  StrategyOutcome o{m.kind, m.detail, m.motion, m.duration, shortest, m.why, "", m.energy, {}, {}};
   add_pump_pressures(model, problem.payload, o);
   return o;
 }
@@ -128,6 +129,7 @@ StrategyOutcome OptimumSearch::solved(const std::string& kind, const MotionProbl
   const OptimizeResult r = optimize_in(model_, problem, from, time, options);
   if (r.best_start < 0) {
     o.why = r.message;
+    if (!r.checks.empty()) o.worst = limit_text(worst_limit(r.checks));
     return o;
   }
   o.motion = r.motion;
@@ -151,6 +153,7 @@ StrategyOutcome OptimumSearch::at(double duration, const std::vector<StrategyOut
   best.duration = duration;
   if (best.found()) {
     best.why.clear();
+    best.worst.clear();
     earlier_.push_back({"optimum at another duration", best.motion, 0.0, false});
   }
   add_pump_pressures(model_, problem_.payload, best);

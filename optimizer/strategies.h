@@ -23,6 +23,7 @@ struct StrategyOutcome {
   double duration = 0.0;
   double shortest = 0.0;  ///< [s] of this way, 0 = not known or at none
   std::string why;        ///< why there is no motion
+  std::string worst;      ///< and the limit broken worst: which, where, when; may be empty
   MotionEnergy energy;
   std::vector<double> peak_pressure;  ///< [Pa] by pump
   std::vector<double> mean_pressure;  ///< [Pa] by pump, over the time in which it delivers

@@ -56,7 +56,7 @@ std::string packed(const StrategyComparison& c) {
     p.text(row.name).number(row.factor).number(row.duration);
     p.number(static_cast<double>(row.outcomes.size()));
     for (const StrategyOutcome& o : row.outcomes) {
-      p.text(o.kind).text(o.detail).text(o.why).number(o.duration).number(o.shortest);
+      p.text(o.kind).text(o.detail).text(o.why).text(o.worst).number(o.duration).number(o.shortest);
       put_motion(p, o.motion);
       put_energy(p, o.energy);
       put_list(p, o.peak_pressure);
@@ -92,6 +92,7 @@ StrategyComparison unpacked_comparison(const std::string& bytes) {
       o.kind = u.text();
       o.detail = u.text();
       o.why = u.text();
+      o.worst = u.text();
       o.duration = u.number();
       o.shortest = u.number();
       o.motion = take_motion(u);

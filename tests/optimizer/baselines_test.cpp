@@ -169,6 +169,7 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
   ASSERT_NE(row, nullptr) << r.message;
   const StrategyOutcome* best = row->find(kOptimal);
   ASSERT_TRUE(best->found()) << best->why;
+  EXPECT_EQ(best->worst, "");
   EXPECT_LE(worst_excess(check_limits(c.model, c.problem, best->motion, 16)), 1e-5);
   for (const StrategyOutcome& o : row->outcomes) {
     if (!o.found() || o.kind == kMinimumTime) continue;
@@ -186,6 +187,25 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
   EXPECT_EQ(again.rows[0].find(kOptimal)->energy.total, best->energy.total);
   EXPECT_EQ(again.rows[0].find(kOptimal)->motion.q, best->motion.q);
   EXPECT_EQ(again.orders.size(), r.orders.size());
+}
+
+TEST(Strategies, TooShortATimeNamesTheLimitThatIsBroken) {
+  BaselineCase c;
+  c.problem.duration = {3.0, 3.0};  // the pump alone asks for more than twice that
+  StrategyOptions options;
+  options.baselines = few_intervals();
+  options.optimize = options.baselines.optimize;
+  options.optimize.intervals = options.optimize.search_intervals = 40;
+  options.optimize.sequence_rounds = 0;
+  options.smooth_seeds = 0;
+  options.least_control = false;
+  const StrategyComparison r =
+      unpacked_comparison(packed(compare_strategies(c.model, c.problem, {}, options)));
+  ASSERT_NE(r.row("equal"), nullptr) << r.message;
+  const StrategyOutcome* best = r.row("equal")->find(kOptimal);
+  EXPECT_FALSE(best->found());
+  EXPECT_THAT(best->worst, HasSubstr("against a limit of"));
+  EXPECT_THAT(best->why, HasSubstr(best->worst));
 }
 
 }  // namespace

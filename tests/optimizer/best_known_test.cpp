@@ -8,6 +8,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "models/model_file.h"
+#include "models/sha256.h"
+#include "problems/bundled.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {
@@ -33,7 +36,10 @@ bench::ReachFigures figures_of(double energy, double duration, double bound, dou
 /// A file of one reach that runs write to, one after the other.
 class BestKnown : public ::testing::Test {
  protected:
-  BestKnown() { tasks_[0].problem.file = "somewhere/lift.yaml"; }
+  BestKnown() {
+    tasks_[0].problem.file = "somewhere/lift.yaml";
+    tasks_[0].mark = {"crane.json", "abc"};
+  }
   ~BestKnown() override { std::remove(path_.c_str()); }
   nlohmann::json after(const bench::ReachFigures& f) {
     bench::write_best_known(path_, tasks_, {f});
@@ -74,6 +80,55 @@ TEST_F(BestKnown, ARunThatFindsNothingOrLeavesAReachOutChangesNothing) {
   nothing.left_out = true;
   tasks_[0].problem.file = "somewhere/lower.yaml";
   EXPECT_FALSE(after(nothing).contains("lower.yaml"));
+}
+
+TEST_F(BestKnown, EntriesNameTheirModelAndAnotherModelForgetsThem) {
+  const nlohmann::json first = lift_after(figures_of(80e3, 16.0, 70e3, 7.4));
+  EXPECT_EQ(first.at("model"), (nlohmann::json{{"file", "crane.json"}, {"sha256", "abc"}}));
+  EXPECT_EQ(first.at("program"), std::string("sparflow ") + program_version());
+  tasks_[0].mark.sha256 = "def";
+  const nlohmann::json again = lift_after(figures_of(90e3, 16.0, 60e3, 7.5));
+  EXPECT_EQ(again.at("energy_J"), 90e3) << "dearer, but of the present model";
+  EXPECT_EQ(again.at("lower_bound_J"), 60e3);
+  EXPECT_EQ(again.at("shortest_s"), 7.5);
+  EXPECT_EQ(again.at("model").at("sha256"), "def");
+  tasks_[0].mark.sha256 = "ghi";
+  const nlohmann::json nothing = lift_after({});
+  EXPECT_EQ(nothing.at("status"), "infeasible") << "the old energy says nothing";
+  EXPECT_EQ(nothing.at("model").at("sha256"), "ghi");
+}
+
+/// The bytes of a bundled file.
+std::string bytes_of(const std::string& name) {
+  std::ifstream in(bundled_file(name), std::ios::binary);
+  std::stringstream bytes;
+  bytes << in.rdbuf();
+  return bytes.str();
+}
+
+TEST(BundledBestKnown, IsOfTheBundledModelsAndAboveItsBounds) {
+  const nlohmann::json known = test_support::parsed_json(bytes_of("best_known.json"));
+  EXPECT_EQ(known.size(), 43u);
+  int optimal = 0;
+  for (const auto& [reach, entry] : known.items()) {
+    EXPECT_FALSE(bytes_of("reaches/" + reach).empty()) << reach;
+    const nlohmann::json& model = entry.at("model");
+    EXPECT_EQ(model.at("sha256"),
+              sha256_hex(bytes_of("models/" + model.at("file").get<std::string>())))
+        << reach << ": found with another model; run bench/problem_set --write";
+    EXPECT_TRUE(entry.at("program").get<std::string>().starts_with("sparflow ")) << reach;
+    if (entry.at("status") == "infeasible") {
+      EXPECT_FALSE(entry.at("why").get<std::string>().empty()) << reach;
+      continue;
+    }
+    ++optimal;
+    const double energy = entry.at("energy_J").get<double>();
+    EXPECT_GE(energy, entry.at("lower_bound_J").get<double>()) << reach;
+    EXPECT_LE(entry.at("shortest_s"), entry.at("duration_s")) << reach;
+    for (const auto& [way, other] : entry.at("baselines_J").items())
+      EXPECT_LE(energy, other.get<double>()) << reach << ": " << way;
+  }
+  EXPECT_EQ(optimal, 36);
 }
 
 TEST_F(BestKnown, BaselinesAndTheUnlimitedTimeStandBesideTheOptimum) {

@@ -180,6 +180,23 @@ TEST(TimedBound, IsBelowEveryMotionFoundAndAboveNothingLess) {
   }
 }
 
+TEST(TimedBound, IsNeverBelowThatOfAnyTime) {
+  // A price of time is charged for every second. A search of forty steps lets it fall with the time there is
+  // (under a milliwatt for an hour); one that is cut short leaves it where an hour costs more than it tells.
+  const TimedCase c("loader_crane_lift");
+  TimedBoundOptions options = quick_bound();
+  options.evaluations = 1;
+  const EnergyBound any = energy_bound(c.model, c.problem, {options.nodes, options.most_joints});
+  ASSERT_TRUE(any.valid) << any.message;
+  const TimedBound hour = energy_bound_at(c.model, c.problem, 3600.0, options);
+  ASSERT_TRUE(hour.valid) << hour.message;
+  EXPECT_EQ(hour.value, any.lower_bound_J);
+  EXPECT_EQ(hour.price_W, 0.0);
+  EXPECT_EQ(hour.shares.cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(hour.lines, any.lines);
+  EXPECT_EQ(hour.checked_scale, any.checked_scale);
+}
+
 /// Sleds on one level rail, one upon the other: no loads, so a motion's energy is a matter of flows alone. Ramps take no
 /// time worth speaking of.
 struct Rail {

@@ -10,6 +10,7 @@
 #include "models/linkage.h"
 #include "optimizer/driven_grid_path.h"
 #include "optimizer/exact_energy.h"
+#include "optimizer/sequential_modes.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "tests/optimizer/synthetic_model.h"
@@ -168,6 +169,24 @@ TEST(EnergyGrid, SaysWhyThereIsNoPath) {
   const GridPath none = EnergyGrid(c.model, c.problem, {1000, 4}).path_for_duration(20.0);
   EXPECT_FALSE(none.found);
   EXPECT_THAT(none.message, ::testing::HasSubstr("no posture"));
+}
+
+TEST(EnergyGrid, FindsAnEndPostureWhenTheWayThereLeadsAlongAJointsLimit) {
+  // Beside the column and far below it: from this start the telescope is at its end long before the booms hang down.
+  GridCase c("loader_crane_fold");
+  c.problem.obstacles.clear();
+  c.problem.start = Eigen::Vector3d(0.537784, -1.03959, 2.14803);
+  c.problem.goal = TipGoal{{0.342203630982588, 0.0, -5.8447191165577994}};
+  VectorXd end = c.problem.start;
+  ASSERT_TRUE(solve_end_posture(c.problem.machine, c.problem.limits,
+                                std::get<TipGoal>(c.problem.goal).tip, {true, true, true}, end));
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    const Range& r = c.problem.limits.position[static_cast<std::size_t>(j)];
+    EXPECT_GE(end[j], r.lo);
+    EXPECT_LE(end[j], r.hi);
+  }
+  const GridPath path = EnergyGrid(c.model, c.problem, {4000, 4}).cheapest_path(0.0);
+  EXPECT_TRUE(path.found) << path.message;
 }
 
 TEST(EnergyGrid, DrivenAsItIsCostsMoreThanSlowlyAndSaysWhyNot) {
