@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "models/effects/builtin.h"
@@ -8,15 +11,31 @@
 namespace sparflow {
 namespace {
 
-/// Shortest and longest length of the cylinder [m]: by its stroke, else by the joint's range.
-Range length_range(const Machine& machine, int cylinder) {
+/// Lengths of the cylinder at the ends of its joint's range [m], if nothing lies beyond them (a linkage that turns round
+/// on the way or cannot close has no stop there).
+std::optional<Range> lengths_at_joint_stops(const Machine& machine, int cylinder) try {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
-  const double zero = c.length_at_zero_stroke.value_or(0.0);
-  if (c.stroke && *c.stroke > 0.0) return {zero, zero + *c.stroke};
   const Range& q = machine.joints[static_cast<std::size_t>(c.joint)].position;
   Range x{cylinder_length(machine, cylinder, q.lo), cylinder_length(machine, cylinder, q.hi)};
   if (x.lo > x.hi) std::swap(x.lo, x.hi);
+  const double middle = cylinder_length(machine, cylinder, 0.5 * (q.lo + q.hi));
+  if (!(x.lo < middle && middle < x.hi)) return std::nullopt;
   return x;
+} catch (const std::domain_error&) {
+  return std::nullopt;
+}
+
+/// Shortest and longest length of the cylinder [m]: where its stroke or the joint's range ends, whichever comes first.
+Range length_range(const Machine& machine, int cylinder) {
+  const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
+  const std::optional<Range> joint = lengths_at_joint_stops(machine, cylinder);
+  constexpr double kNoStop = std::numeric_limits<double>::infinity();
+  if (!c.stroke || *c.stroke <= 0.0) return joint.value_or(Range{-kNoStop, kNoStop});
+  const double zero = c.length_at_zero_stroke.value_or(0.0);
+  const Range stroke{zero, zero + *c.stroke};
+  if (!joint) return stroke;
+  const Range both{std::max(joint->lo, stroke.lo), std::min(joint->hi, stroke.hi)};
+  return both.hi > both.lo ? both : stroke;
 }
 
 /// Shares of the stroke that a zone may take: cushions take some per cent, soft stops more.

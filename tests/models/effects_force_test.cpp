@@ -103,9 +103,37 @@ TEST_F(OneCylinder, FrictionTakesPowerAndNeverGivesIt) {
   }
 }
 
+TEST_F(OneCylinder, CushionStandsWhereStrokeOrJointEndsFirst) {
+  Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
+  const auto length = [&](double q) { return cylinder_length(machine, 0, q); };
+  const bool rises = length(joint.position.hi) > length(joint.position.lo);
+  const double longest = length(rises ? joint.position.hi : joint.position.lo);
+  const auto force_at = [&](double x) {
+    s.length[0] = x;
+    return added(effect("end_cushion"), s, 0, {20e3, 0.1, 0.0})[0];
+  };
+  machine.cylinders[0].stroke.reset();
+  EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
+  machine.cylinders[0].length_at_zero_stroke = 0.0;
+  machine.cylinders[0].stroke = longest + 0.2;  // never driven out
+  EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
+  machine.cylinders[0].stroke = longest - 0.05;  // ends before the joint does
+  EXPECT_NEAR(force_at(longest - 0.05), 20e3, 1e-6);
+  // a joint that takes the cylinder past its longest is no stop
+  machine.cylinders[0].stroke.reset();
+  double dead = joint.position.lo;
+  for (double q = -M_PI; q < M_PI; q += 0.01) {
+    if (length(q) > length(dead)) dead = q;
+  }
+  joint.position = {dead - 0.5, dead + 0.5};
+  EXPECT_EQ(force_at(length(dead)), 0.0);
+}
+
 TEST_F(OneCylinder, CushionActsTowardsItsStopOnly) {
   machine.cylinders[0].length_at_zero_stroke = 1.5;
   machine.cylinders[0].stroke = 1.0;
+  Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
+  joint.position = {0.0, 0.0};  // the stroke alone
   const Effect& e = effect("end_cushion");
   const auto force = [&](double length, int side, double ends) {
     s.length[0] = length;
