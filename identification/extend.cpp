@@ -18,7 +18,6 @@ using Clock = std::chrono::steady_clock;
 /// How often `improve` may try what it then does not keep: each time costs a diagnosis.
 constexpr std::size_t kMostRejected = 8;
 
-
 ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std::string& date) {
   ModelStep record;
   record.added = step.added;

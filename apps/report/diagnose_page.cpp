@@ -166,7 +166,8 @@ void add_sets(Page& page, const Diagnosis& d) {
 void add_unexplained(Page& page, const Diagnosis& d) {
   if (!d.unexplained) return;
   const Unexplained& u = *d.unexplained;
-  page.section(u.few_places ? "What happened too seldom to prove a law" : "What nothing in the catalogue explains");
+  page.section(u.few_places ? "What happened too seldom to prove a law"
+                            : "What nothing in the catalogue explains");
   page.paragraph(sentence(u.sentence));
   if (u.rmse > 0.0 && u.unit.si > 0.0) {
     const auto [rmse, name] = readable_error(u.rmse, u.unit);

@@ -135,9 +135,9 @@ void expect_motion_costs(const std::string& csv, const json& model, double energ
     }
     power[k] = flow * c.at("p_main_bar")[k] * kBar;
     largest = std::max(largest, power[k]);
-    // six digits are written of each factor
-    EXPECT_NEAR(c.at("p_main_bar")[k] * kBar, demand, 2e-6 * demand) << "at " << t[k] << " s";
-    EXPECT_NEAR(c.at("power_W")[k], power[k], 4e-6 * power[k] + 1e-6) << "at " << t[k] << " s";
+    // six digits are written: half a unit of the last of 1.00000 is 5e-6 of each of two pressures; of power and factors
+    EXPECT_NEAR(c.at("p_main_bar")[k] * kBar, demand, 10e-6 * demand) << "at " << t[k] << " s";
+    EXPECT_NEAR(c.at("power_W")[k], power[k], 15e-6 * power[k] + 1e-6) << "at " << t[k] << " s";
   }
   EXPECT_GT(largest, 1e3) << "the crane lifts 400 kg";
   double sum = 0.0;
