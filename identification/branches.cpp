@@ -50,6 +50,21 @@ bool usable(const BranchData& d, Index k) {
          (d.q_return_total.size() == 0 || std::isfinite(d.q_return_total[k]));
 }
 
+/// What the oil's temperature spans, if it is known everywhere and changes: a return line's pressure follows it.
+std::optional<Range> oil_range(const std::vector<BranchData>& logs,
+                               const std::vector<std::pair<int, Index>>& where) {
+  constexpr double kChanges = 2.0;  // [degC]
+  Range range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const auto& [l, k] : where) {
+    const VectorXd& oil = logs[static_cast<std::size_t>(l)].oil;
+    if (oil.size() == 0 || !std::isfinite(oil[k])) return std::nullopt;
+    range.lo = std::min(range.lo, oil[k]);
+    range.hi = std::max(range.hi, oil[k]);
+  }
+  if (!(range.hi - range.lo > kChanges)) return std::nullopt;
+  return range;
+}
+
 Rows gather(const std::vector<BranchData>& logs) {
   Rows r;
   double q_return = 0.0, q_supply = 0.0, q_total = 0.0;
@@ -68,7 +83,9 @@ Rows gather(const std::vector<BranchData>& logs) {
   r.p_return.resize(n);
   r.p_supply.resize(n);
   VectorXd force(n);
-  r.line.setZero(n, 3 + static_cast<Index>(logs.size()));
+  const std::optional<Range> oil = oil_range(logs, r.where);
+  const auto first_oil = 3 + static_cast<Index>(logs.size());
+  r.line.setZero(n, first_oil + (oil ? 2 : 0));
   r.valve.setOnes(n, 5);
   for (Index i = 0; i < n; ++i) {
     const auto& [l, k] = r.where[static_cast<std::size_t>(i)];
@@ -80,6 +97,10 @@ Rows gather(const std::vector<BranchData>& logs) {
     r.line.row(i).head(3) << 1.0, qr, qr * qr;
     if (q_total > 0.0 && d.q_return_total.size() > 0) {
       r.line(i, 3 + l) = std::pow(d.q_return_total[k] / q_total, 2);
+    }
+    if (oil) {
+      const double warm = (2.0 * d.oil[k] - oil->lo - oil->hi) / (oil->hi - oil->lo);
+      r.line.row(i).segment(first_oil, 2) << warm, warm * qr;
     }
     r.valve.row(i).segment(1, 2) << qs, qs * qs;
   }
@@ -315,7 +336,7 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
 BranchSplit split_branches(const VectorXd& p_return, const VectorXd& p_supply,
                            const VectorXd& q_return, const VectorXd& q_supply,
                            const VectorXd& force, const Mask& moving) {
-  return split_branches({{p_return, p_supply, q_return, q_supply, force, {}, moving}}).front();
+  return split_branches({{p_return, p_supply, q_return, q_supply, force, {}, {}, moving}}).front();
 }
 
 }  // namespace sparflow

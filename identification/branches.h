@@ -28,6 +28,8 @@ struct BranchData {
   Eigen::VectorXd force;               ///< [N] measured, of either sign convention
   /// Return flow of all cylinders [m^3/s], so that a shared tank line does not blur the return law; may be empty.
   Eigen::VectorXd q_return_total;
+  /// [degC] the return line's law follows it, so that oil that warms is not taken for a valve; may be empty.
+  Eigen::VectorXd oil;
   Mask moving;  ///< samples to judge
 };
 

@@ -78,17 +78,22 @@ EffectAction effect_action(const Evidence& evidence,
                     fit.theta.segment(layout.first[k], designs[k]->linear));
   };
   EffectAction action;
-  double whole = 0.0, left = 0.0, fourth = 0.0, form = 0.0;
+  double whole = 0.0, left = 0.0, most = 0.0, fourth = 0.0, form = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     if (!designs[index]->touches(c)) continue;
     const EvidenceChannel& channel = evidence.channels[c];
     const double noise = fit.noise[c].deviation();
     VectorXd own = acts_in(index, c);
-    whole += own.squaredNorm() / (noise * noise);
+    const double here = own.squaredNorm();
+    whole += here / (noise * noise);
     if (channel.baseline.cols() > 0) own -= channel.baseline * least_squares(channel.baseline, own);
     const double squares = own.squaredNorm();
     left += squares / (noise * noise);
     if (!(squares > 0.0)) continue;
+    if (squares / (noise * noise) > most) {
+      most = squares / (noise * noise);
+      action.absorbed_where_seen = 1.0 - squares / here;
+    }
     action.size = std::max(action.size, size_where_it_acts(own) / noise);
     fourth += own.array().pow(4).sum() / std::pow(noise, 4);
     for (std::size_t k = 0; k < designs.size(); ++k) {

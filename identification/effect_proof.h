@@ -11,7 +11,8 @@ struct EffectAction {
   /// Largest over channels: sqrt(sum c^4 / sum c^2) of its action c (baseline taken out) / noise. The weighting
   /// measures it where it acts: a lag shows for a second after a step and nowhere else.
   double size = 0.0;
-  double absorbed = 0.0;  ///< 0..1, over all channels, each in units of its noise
+  double absorbed = 0.0;             ///< 0..1, over all channels, each in units of its noise
+  double absorbed_where_seen = 1.0;  ///< the same in the channel in which most of it is left
   /// Where it acts, its size over what the other effects' laws are known to be wrong by there (their form_error
   /// times their action): a small one beside a large one mends that one's form and is no effect of its own.
   double over_form = 1e9;

@@ -39,6 +39,7 @@ struct FoundEffect {
   double p_value = 1.0;   ///< of the gate it passed
   double size = 0.0;      ///< largest over channels: its size where it acts / the channel's noise
   double absorbed = 0.0;  ///< share of its action that the learned baselines imitate
+  double absorbed_where_seen = 1.0;  ///< the same in the channel in which most of it is left
   double held_out = 0.0,
          held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
   double held_out_share = 0.0;  ///< of the parts left out in turn that it improved

@@ -209,6 +209,7 @@ std::vector<BranchSplit> branches_of(const Evidence& e,
     d.q_return_total = VectorXd::Zero(s.return_flow.size());
     for (const CylinderSeries& other : e.series[log].cylinders)
       d.q_return_total += other.return_flow;
+    d.oil = e.series[log].oil;
     d.moving = c.driven && signals[log]->usable && (c.direction.array() == side);
     data.push_back(std::move(d));
     owner.push_back(log);

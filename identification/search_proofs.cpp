@@ -14,6 +14,7 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
   const EffectAction action = effect_action(evidence, designs, index, fit);
   found.size = action.size;
   found.absorbed = action.absorbed;
+  found.absorbed_where_seen = action.absorbed_where_seen;
   found.over_form = action.over_form;
   Index first = 0;
   for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
@@ -27,11 +28,11 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
 std::string why_not_named(const FoundEffect& found, const SearchOptions& options) {
   const EffectStage stage = found.design.effect.effect->info().stage;
   const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
-  if (behind_process && found.absorbed > options.largest_absorbed) {
+  if (behind_process && found.absorbed_where_seen > options.largest_absorbed) {
     return fmt::format(
         "what is learned (pressures, margins, gains) can imitate {:.0f} % of it; a reference log "
         "would tell",
-        100.0 * found.absorbed);
+        100.0 * found.absorbed_where_seen);
   }
   if (found.size < options.smallest_effect) {
     return fmt::format("it is {:.2f} times the noise where it acts, too small to matter",

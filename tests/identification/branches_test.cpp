@@ -22,6 +22,7 @@ struct Scene {
   double least_load = -20e3, largest_load = 250e3;  ///< [N] opposing
   bool valve = true;
   double tank_line = 0.0;  ///< [Pa/(m^3/s)^2] on the flow of all
+  double cold = 0.0;  ///< [Pa] at full flow that oil of 20 degC asks for more than oil of 70 degC
   unsigned seed = 1;
 };
 
@@ -34,7 +35,7 @@ Made make(const Scene& scene) {
   Made m;
   BranchData& d = m.data;
   for (Eigen::VectorXd* v :
-       {&d.p_return, &d.p_supply, &d.q_return, &d.q_supply, &d.force, &d.q_return_total}) {
+       {&d.p_return, &d.p_supply, &d.q_return, &d.q_supply, &d.force, &d.q_return_total, &d.oil}) {
     v->resize(n);
   }
   d.moving = Mask::Constant(n, true);
@@ -50,7 +51,9 @@ Made make(const Scene& scene) {
     d.q_supply[k] = flow;
     d.q_return[k] = flow * kReturn / kSupply;
     d.q_return_total[k] = d.q_return[k] + other;
-    const double line = 4e5 + 3e8 * d.q_return[k] + 4e11 * std::pow(d.q_return[k], 2) +
+    d.oil[k] = 20.0 + 50.0 * static_cast<double>(k) / static_cast<double>(n);
+    const double colder = scene.cold * (70.0 - d.oil[k]) / 50.0 * d.q_return[k] / 0.83e-3;
+    const double line = 4e5 + colder + 3e8 * d.q_return[k] + 4e11 * std::pow(d.q_return[k], 2) +
                         scene.tank_line * std::pow(d.q_return_total[k], 2);
     const double by_line = (force + line * kReturn) / kSupply;
     const double by_valve =
@@ -85,6 +88,7 @@ TEST(Branches, BothAreFoundAlsoWhereTheValveRulesAgainstAnOpposingLoad) {
 TEST(Branches, TheShortCallIsTheOneLogCall) {
   Made m = make({});
   m.data.q_return_total.resize(0);
+  m.data.oil.resize(0);
   const BranchData& d = m.data;
   const BranchSplit one =
       split_branches(d.p_return, d.p_supply, d.q_return, d.q_supply, d.force, d.moving);
@@ -99,6 +103,22 @@ TEST(Branches, ASharedTankLineDoesNotLookLikeAValve) {
   scene.tank_line = 4e12;
   const Made m = make(scene);
   check(m, split_branches({m.data}).front(), 0.85);
+}
+
+// Cold oil asks 40 bar more of the return line than warm oil: neither is a valve, and the rows are not strays.
+TEST(Branches, OilThatWarmsDoesNotLookLikeAValve) {
+  Scene scene;
+  scene.cold = 40e5;
+  check(make(scene), split_branches({make(scene).data}).front(), 0.85);
+  scene.valve = false;
+  scene.least_load = 20e3;
+  Made m = make(scene);
+  const BranchSplit seen = split_branches({m.data}).front();
+  EXPECT_GT(seen.return_line.count(), 5700);
+  EXPECT_EQ(seen.counterbalance.count(), 0);
+  m.data.oil.resize(0);
+  EXPECT_LT(split_branches({m.data}).front().return_line.count(), seen.return_line.count() - 100)
+      << "the oil's temperature decides nothing here";
 }
 
 TEST(Branches, WithoutValveAllIsTheReturnLines) {

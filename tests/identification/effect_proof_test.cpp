@@ -56,6 +56,19 @@ TEST(EffectAction, SizeIsMeasuredWhereItActs) {
   }
 }
 
+TEST(EffectAction, WhatOneChannelHidesAnotherMayShow) {
+  std::mt19937_64 random(4);
+  const VectorXd a = white(kRows, random), b = white(kRows, random);
+  Evidence e = evidence_with(300.0 * a, 1.0, 3, a);  // learned whole
+  e.channels.push_back(evidence_with(20.0 * b, 1.0, 5).channels[0]);
+  const EffectDesign d = plain_design({300.0 * a, 20.0 * b});
+  EffectFit fit = fit_effects(e, {&d});
+  fit.theta[0] = 1.0;
+  const EffectAction action = effect_action(e, {&d}, 0, fit);
+  EXPECT_GT(action.absorbed, 0.95);
+  EXPECT_NEAR(action.absorbed_where_seen, 0.0, 1e-9);
+}
+
 TEST(EffectAction, AbsorbedIsTheShareThatLearnedLawsImitate) {
   std::mt19937_64 random(2);
   VectorXd a = white(kRows, random), b = white(kRows, random);
