@@ -199,6 +199,11 @@ void add_one(Page& page, const StrategyComparison& c, const CraneModel& model,
   }
 }
 
+/// [%] Two sums of the same motion's energy differ by rounding: below a ten-thousandth of a percent is nothing.
+double excess_percent(double cost, double best) {
+  return std::round(1e6 * (cost / best - 1.0)) / 1e4;
+}
+
 /// By how much each way is dearer, problem by problem.
 BarChart excess_bars(const std::vector<StrategyComparison>& all, const std::string& name) {
   BarChart bars;
@@ -216,10 +221,9 @@ BarChart excess_bars(const std::vector<StrategyComparison>& all, const std::stri
     bars.categories.push_back(c.problem);
     for (std::size_t k = 0; k < kinds.size(); ++k) {
       const StrategyOutcome* o = row->find(kinds[k]);
-      values[k].push_back(
-          o != nullptr && o->found()
-              ? 100.0 * (cost_with_idling(*o, idle) / cost_with_idling(*best, idle) - 1.0)
-              : std::nan(""));
+      values[k].push_back(o != nullptr && o->found() ? excess_percent(cost_with_idling(*o, idle),
+                                                                      cost_with_idling(*best, idle))
+                                                     : std::nan(""));
     }
   }
   for (std::size_t k = 0; k < kinds.size(); ++k) {

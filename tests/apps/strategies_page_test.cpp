@@ -97,6 +97,14 @@ TEST(StrategiesPage, AboutASetShowsMediansAndTests) {
   EXPECT_EQ(json["problems"][0]["strategies"]["tip_line"]["energy_J"], nullptr);
 }
 
+TEST(StrategiesPage, RoundingIsNoExcess) {
+  const MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
+  const std::string html =
+      strategies_page({comparison(problem, 4e-14), comparison(problem, 0.2)}, nullptr, nullptr)
+          .html();
+  EXPECT_THAT(html, HasSubstr("[0,20]"));
+}
+
 TEST(ParetoPage, ShowsTheCurveItsLimitAndTheBestTimes) {
   const MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   const CraneModel model = test_support::synthetic_model(problem.machine);
