@@ -12,6 +12,7 @@
 #include "identification/experiment.h"
 #include "identification/incident.h"
 #include "identification/robust.h"
+#include "identification/search_leaders.h"
 #include "identification/unexplained.h"
 #include "models/effects/hydraulics.h"
 #include "models/error.h"
@@ -37,13 +38,24 @@ double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd
 
 /// @param index of a found effect; their number: all of them
 EffectFit fit_without(const Diagnosis& d, std::size_t index) {
-  std::vector<const EffectDesign*> others;
+  std::vector<EffectDesign> others;
+  std::vector<AppliedEffect> acting;
   for (std::size_t i = 0; i < d.search.found.size(); ++i) {
-    if (i != index) others.push_back(&d.search.found[i].design);
+    if (i == index) continue;
+    const FoundEffect& f = d.search.found[i];
+    others.push_back(f.design);
+    acting.push_back({f.design.effect.effect, f.design.effect.at, f.values, {}, {}});
   }
+  // without it, others may lead a pump
+  std::optional<Evidence> led;
+  if (d.search.led && index < d.search.found.size()) led = d.evidence.led_by(acting);
+  if (led) others = remade(*led, others);
+  std::vector<const EffectDesign*> pointers;
+  pointers.reserve(others.size());
+  for (const EffectDesign& o : others) pointers.push_back(&o);
   FitControl control;
   control.keep_residuals = true;
-  return fit_effects(d.evidence, others, nullptr, control);
+  return fit_effects(led ? *led : d.evidence, pointers, nullptr, control);
 }
 
 /// What another power of the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
@@ -436,6 +448,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     }
   }
   d.search = search_effects(d.evidence, candidates_here, options.search, progress);
+  if (d.search.led) d.evidence = *d.search.led;
   d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
   d.p_value = d.search.p_value;
   for (const auto& [effect, gain] : d.search.ranking) {

@@ -9,6 +9,7 @@
 #include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
 #include "identification/search_candidates.h"
+#include "identification/search_leaders.h"
 #include "identification/series.h"
 #include "models/error.h"
 
@@ -19,6 +20,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 /// The chord converges by the share of the non-linearity each time: a tenth for angles of a few degrees.
 constexpr int kChords = 3;
+constexpr int kTurns = 5;             // of who leads the pumps with these values
 constexpr int kSections = 10;         // of the golden section: a bracket shrinks to 1 %
 constexpr double kMuchSharper = 0.5;  // a window that is hardly shorter changes nothing
 constexpr int kSweeps = 2;            // over all nonlinear parameters
@@ -106,8 +108,17 @@ class Estimator {
       for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
       tell(0.3 + 0.3 * sweep, "parameters of the effects");
     }
-    const double log_likelihood = likelihood();
+    double log_likelihood = likelihood();
     std::vector<FoundEffect> found = with_intervals();
+    for (int turn = 0; turn < kTurns; ++turn) {
+      std::optional<Evidence> led = evidence_.led_by(applied(found));
+      if (!led) break;
+      evidence_ = std::move(*led);
+      designs_ = remade(evidence_, designs_);
+      for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
+      log_likelihood = likelihood();
+      found = with_intervals();
+    }
     const bool machine = std::any_of(designs_.begin(), designs_.end(), [](const EffectDesign& d) {
       return d.effect.effect->changes_machine();
     });
@@ -117,10 +128,7 @@ class Estimator {
     }
     EffectEstimate out;
     out.log_likelihood = log_likelihood;
-    for (const FoundEffect& f : found) {
-      const EffectAt& e = f.design.effect;
-      out.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
-    }
+    out.effects = applied(found);
     add_notes(out);
     tell(1.0, "parameters of the effects");
     return out;
@@ -260,6 +268,18 @@ class Estimator {
     }
   }
 
+  /// @param machine also those that are another machine
+  static std::vector<AppliedEffect> applied(const std::vector<FoundEffect>& found,
+                                            bool machine = true) {
+    std::vector<AppliedEffect> out;
+    for (const FoundEffect& f : found) {
+      const EffectAt& e = f.design.effect;
+      if (machine || !e.effect->changes_machine())
+        out.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
+    }
+    return out;
+  }
+
   /// Data = measured - exact law + its linearisation, for effects that are another machine.
   bool correct_linearisation(const std::vector<FoundEffect>& found) {
     CraneModel exact = base_;
@@ -269,6 +289,7 @@ class Estimator {
         exact.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
     }
     Evidence left = collect(exact);
+    if (std::optional<Evidence> led = left.led_by(applied(found, false))) left = std::move(*led);
     if (left.channels.size() != evidence_.channels.size()) return false;
     for (std::size_t c = 0; c < left.channels.size(); ++c) {
       EvidenceChannel& channel = left.channels[c];

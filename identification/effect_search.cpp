@@ -9,6 +9,7 @@
 #include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
 #include "identification/search_choice.h"
+#include "identification/search_leaders.h"
 #include "identification/search_moves.h"
 #include "identification/search_proofs.h"
 #include "identification/search_state.h"
@@ -18,9 +19,10 @@ namespace {
 
 class Search {
  public:
+  /// @param follows whether to stop, with `led` set, where what is found changes who leads a pump
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
-         const SearchOptions& options, const SearchProgress& progress)
-      : search_(evidence, effects, options, progress), random_(options.seed) {}
+         const SearchOptions& options, const SearchProgress& progress, bool follows)
+      : search_(evidence, effects, options, progress), random_(options.seed), follows_(follows) {}
 
   SearchResult run() {
     SearchResult result;
@@ -29,6 +31,7 @@ class Search {
     std::vector<FoundEffect> found;
     for (int round = 0; round < 3; ++round) {
       select(found, current, result);
+      if (result.led) return result;
       bool reshaped = false;
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(search_, found, i, current) || reshaped;
@@ -88,6 +91,7 @@ class Search {
       found.push_back(std::move(f));
       EffectFit next = search_.fit(designs_of(found));
       whole_share(found, next, best.gain);
+      if (follows_ && (result.led = led_by_found(search_, found, next))) return;
       search_.judge(found, found.size() - 1, next);
       if (tracing()) trace_found(search_, found, next);
       found.back().gain = best.gain;
@@ -260,13 +264,31 @@ class Search {
 
   SearchState search_;
   std::mt19937_64 random_;
+  bool follows_;
 };
 
 }  // namespace
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options, const SearchProgress& progress) {
-  return Search(evidence, candidates, options, progress).run();
+  constexpr int kTurns = 3;  // of finding who leads; what is found then was found with that
+  SearchResult result, first;
+  std::optional<Evidence> led;
+  for (int turn = 0; turn <= kTurns; ++turn) {
+    result = Search(led ? *led : evidence, candidates, options, progress, turn < kTurns).run();
+    if (turn == 0) first = result;
+    if (!result.led) break;
+    if (tracing()) fmt::print(stderr, "  others lead the pump with what was found\n");
+    led = std::move(result.led);
+  }
+  if (led) {
+    result.null = std::move(first.null);
+    result.ranking = std::move(first.ranking);
+    result.p_value = first.p_value;
+    result.threshold = first.threshold;
+    result.led = std::move(led);
+  }
+  return result;
 }
 
 }  // namespace sparflow

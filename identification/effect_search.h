@@ -60,7 +60,10 @@ struct SearchResult {
   std::vector<FoundEffect> unnamed;
   /// Nothing passed the gate, but this gains far too much for noise: it shows in one place (incident.h).
   std::optional<EffectDesign> once;
-  EffectFit null, final;   ///< without and with them
+  EffectFit null, final;  ///< without and with them
+  /// The evidence that `found` and `final` belong to, where what was found changes who leads a pump
+  /// (Evidence::led_by); else nothing: the one given.
+  std::optional<Evidence> led;
   double p_value = 1.0;    ///< of the first gate
   double threshold = 0.0;  ///< [nats] of the first gate
   /// Best penalised gain of every candidate in the first step.

@@ -7,6 +7,7 @@
 
 #include "identification/branches.h"
 #include "identification/low_pass.h"
+#include "identification/pump_leaders.h"
 #include "identification/robust.h"
 #include "identification/series.h"
 #include "models/effects/hydraulics.h"
@@ -91,13 +92,7 @@ struct Builder {
     channel.baseline.resize(n, rows.front().size());
     for (Index i = 0; i < n; ++i)
       channel.baseline.row(i) = rows[static_cast<std::size_t>(i)].transpose();
-    // learned laws that never act in these rows
-    std::vector<Index> used;
-    for (Index c = 0; c < channel.baseline.cols(); ++c) {
-      if (channel.baseline.col(c).cwiseAbs().maxCoeff() > 0.0) used.push_back(c);
-    }
-    const Eigen::MatrixXd kept = channel.baseline(Eigen::all, used);
-    channel.baseline = kept;
+    channel.baseline = acting_columns(channel.baseline);
     out.push_back(std::move(channel));
     return true;
   }
@@ -354,9 +349,14 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
   for (const MachineSignals& s : suspects) signals.push_back(&s);
   for (const MachineSignals& s : references) signals.push_back(&s);
   e.suspects = suspects.size();
+  e.known_ = model.effects;
+  e.known_in_references_ = in_references != nullptr ? *in_references : model.effects;
   std::vector<double> gain_force, gain_pressure;
   for (const MachineSignals* s : signals) {
+    const std::size_t log = e.series.size();
     e.series.push_back(make_series(model, *s));
+    if (log >= e.suspects && in_references != nullptr)
+      e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
     const int order = SmoothingOptions{}.order;
     Evidence::Kernels k;
     k.force = low_pass_of(s->step, s->window, order, 2);
@@ -375,17 +375,6 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     return static_cast<Index>(std::lround(0.5 * signals[log]->window / signals[log]->step));
   };
 
-  // what the model's own effects already explain
-  const auto known = [&](std::size_t log, EvidenceKind kind, int index) {
-    VectorXd sum = VectorXd::Zero(e.series[log].samples());
-    const bool reference = log >= e.suspects && in_references != nullptr;
-    for (const AppliedEffect& effect : reference ? *in_references : model.effects) {
-      const VectorXd one = effect_series(effect, e.series[log], kind, index);
-      if (one.size() > 0) sum += one;
-    }
-    return sum;
-  };
-
   for (int i = 0; i < machine.cylinder_count(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const std::string& name = machine.cylinders[at].name;
@@ -398,7 +387,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         const CylinderSignals& c = signals[log]->cylinders[at];
         if (!c.has_force()) continue;
         const VectorXd y =
-            e.filter(log, EvidenceKind::kForce, c.force - known(log, EvidenceKind::kForce, i)) -
+            e.filter(log, EvidenceKind::kForce, c.force - e.known(log, EvidenceKind::kForce, i)) -
             c.static_force;
         if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
         for (const double f : c.static_force) {
@@ -431,7 +420,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
         base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
         const VectorXd y =
-            c.speed - e.filter(log, EvidenceKind::kFlow, known(log, EvidenceKind::kFlow, i));
+            c.speed - e.filter(log, EvidenceKind::kFlow, e.known(log, EvidenceKind::kFlow, i));
         b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
         for (Index k = 0; k < y.size(); ++k) {
           if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
@@ -468,7 +457,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0 || split.return_line.size() == 0)
             continue;
           const VectorXd& raw = (side > 0) != returning ? c.pressure_a : c.pressure_b;
-          const VectorXd y = e.filter(log, kind, raw - known(log, kind, i));
+          const VectorXd y = e.filter(log, kind, raw - e.known(log, kind, i));
           const VectorXd& q = returning ? s.return_flow : s.flow;
           Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
           const double q0 = kFlowScale, f0 = kForceScale;
@@ -496,20 +485,14 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     Builder b{e, signals, {}, {}, {}};
     b.channel.kind = EvidenceKind::kPump;
     double noise = kNaN;
-    const std::vector<int>& feeds = machine.pumps[at].feeds;
     for (std::size_t log = 0; log < signals.size(); ++log) {
       const PumpSignals& s = signals[log]->pumps[at];
       const PumpSeries& series = e.series[log].pumps[at];
       if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
-      const VectorXd y = e.filter(log, EvidenceKind::kPump,
-                                  s.pressure - series.demand - known(log, EvidenceKind::kPump, p));
-      Eigen::MatrixXd base(y.size(), static_cast<Index>(feeds.size()) + 1);
-      for (std::size_t k = 0; k <= feeds.size(); ++k) {
-        const int leader = k < feeds.size() ? feeds[k] : -1;
-        base.col(static_cast<Index>(k)) = e.filter(
-            log, EvidenceKind::kPump, (series.leader.array() == leader).cast<double>().matrix());
-      }
-      b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
+      const VectorXd y =
+          e.filter(log, EvidenceKind::kPump,
+                   s.pressure - series.demand - e.known(log, EvidenceKind::kPump, p));
+      b.add(log, signals[log]->usable && !signals[log]->edge, y, e.margins(log, p), 0);
       if (log < e.suspects) b.channel.raw.push_back(s.pressure - series.demand);
       if (log < e.suspects) noise = raw_noise(s.pressure) * gain_pressure[log];
     }

@@ -7,6 +7,7 @@
 /// Filters. A force is compared with an acceleration that a differentiating filter made: both must have passed the
 /// same low-pass. The kernel g with g'' = h (h the filter's second-derivative kernel) does that for the force, the
 /// kernel with g' = h for a command against a speed, the smoothing kernel itself for pressures.
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -61,6 +62,12 @@ struct Evidence {
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
                           const EvidenceChannel& channel, std::span<const double> about = {}) const;
 
+  /// The same evidence with pumps led as the model's effects and these, in suspect logs, make them: a loss of a line
+  /// can let another cylinder lead, which its columns, made at the leader without it, do not know. Rows stay.
+  /// @param found values are those in whose neighbourhood columns are to hold
+  /// @return nothing when the leaders are these already
+  std::optional<Evidence> led_by(std::span<const AppliedEffect> found) const;
+
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
                                    const std::vector<MachineSignals>&,
@@ -69,8 +76,20 @@ struct Evidence {
     Eigen::VectorXd force, speed, pressure;
   };
   std::vector<Kernels> kernels_;
+  std::vector<AppliedEffect> known_,
+      known_in_references_;  // the model's effects, in either kind of log
   Eigen::VectorXd filter(std::size_t log, EvidenceKind kind, const Eigen::VectorXd& x) const;
+  const std::vector<AppliedEffect>& known_in(std::size_t log) const {
+    return log < suspects ? known_ : known_in_references_;
+  }
+  /// What the model's own effects already explain. [samples]
+  Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
+  /// One margin for each leader, and one for standby. [samples x feeds + 1]
+  Eigen::MatrixXd margins(std::size_t log, int pump) const;
 };
+
+/// Without columns of learned laws that never act in these rows.
+Eigen::MatrixXd acting_columns(const Eigen::MatrixXd& baseline);
 
 /// @param model its effects are in every channel's model part; its margins start the pump's demand
 /// @param in_references effects that the references have; null: the model's

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/pump_leaders.h"
 #include "models/effects/memory.h"
 #include "models/error.h"
 #include "models/nan.h"
@@ -43,10 +44,11 @@ void demand(const CraneModel& model, const MachineSignals& signals, std::size_t 
             PumpSeries& out) {
   const Pump& pump = model.machine.pumps[index];
   const Index n = signals.samples();
-  const double standby = model.pumps[index].standby;
+  out.standby = model.pumps[index].standby;
   out.leader = Eigen::VectorXi::Constant(n, -1);
-  out.demand = VectorXd::Constant(n, standby);
+  out.demand = VectorXd::Constant(n, out.standby);
   if (pump.type != PumpType::kLoadSensing) return;
+  out.asked = Eigen::MatrixXd::Constant(n, static_cast<Index>(pump.feeds.size()), kNaN);
   for (const int feed : pump.feeds) {
     const auto i = static_cast<std::size_t>(feed);
     const CylinderSignals& c = signals.cylinders[i];
@@ -57,19 +59,16 @@ void demand(const CraneModel& model, const MachineSignals& signals, std::size_t 
       return;
     }
     const double margin = model.cylinders[i].margin;
+    const auto column = static_cast<Index>(out.feeds.size());
+    out.feeds.push_back(feed);
     for (Index k = 0; k < n; ++k) {
       if (c.direction[k] == 0) continue;
-      const double asked = c.working_pressure[k] + margin;
-      if (std::isnan(asked)) out.demand[k] = kNaN;  // and stays so: no comparison is true
-      if (asked > out.demand[k]) {
-        out.demand[k] = asked;
-        out.leader[k] = feed;
-      }
+      out.asked(k, column) = c.working_pressure[k] + margin;
+      if (std::isnan(out.asked(k, column))) out.demand[k] = kNaN;  // nobody knows who leads
     }
   }
   for (Index k = 0; k < n; ++k) {
     if (!signals.usable[k]) out.demand[k] = kNaN;
-    if (std::isnan(out.demand[k])) out.leader[k] = -1;
   }
 }
 
@@ -141,6 +140,8 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     demand(model, signals, p, pump);
     out.pumps.push_back(std::move(pump));
   }
+  out.pumps = pumps_led_by({}, out);  // what effects add to a demand may depend on the pump's own
+  if (!model.effects.empty()) out.pumps = pumps_led_by(model.effects, out);
   return out;
 }
 

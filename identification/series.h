@@ -6,7 +6,8 @@
 
 namespace sparflow {
 
-/// @param model gives machine, standby and margins (for the pumps' demand); must outlive the result
+/// @param model gives machine, standby and margins (for the pumps' demand) and, by what its effects add to demands, the
+///        cylinder that leads; must outlive the result
 /// @param signals of the machine as its file says. Measured forces and chamber pressures are taken through the
 ///        position's filter; the demand is made of the pressures as logged. It is empty for a load-sensing pump
 ///        when a command or both chamber pressures of a cylinder it feeds are not logged, and NaN where the

@@ -41,6 +41,10 @@ struct PumpSeries {
   /// not filtered. Empty: working pressures or commands are not measured.
   Eigen::VectorXd demand;
   Eigen::VectorXi leader;  ///< cylinder that sets it, -1 = standby
+  double standby = 0.0;    ///< [Pa]
+  std::vector<int> feeds;  ///< hydraulic cylinders, the columns of `asked`
+  /// [samples x feeds, Pa] measured working pressure + margin of each; NaN at rest. No rows: not load-sensing.
+  Eigen::MatrixXd asked;
 };
 
 struct MachineSeries {
