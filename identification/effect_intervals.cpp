@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "identification/effect_proof.h"
+#include "models/linear_algebra.h"
 
 namespace sparflow {
 namespace {
@@ -36,17 +37,29 @@ bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
   return false;
 }
 
-/// Whether the effect is told from nothing, and from the plainer effect it contains.
-bool could_be_nothing(const Effect& effect, const std::vector<double>& values,
-                      const std::vector<double>& half) {
-  bool any_linear = false, shape_at_zero = false;
+/// Whether the joint 95 % region of the linear parameters holds zero: of two that say nearly the same (a laminar and a
+/// turbulent part) either may be nothing beside the other, and yet not both.
+bool holds_nothing(const VectorXd& theta, const Eigen::MatrixXd& covariance) {
+  constexpr double kChiSquare95[] = {3.841, 5.991, 7.815, 9.488, 11.070};  // 1 .. 5 parameters
+  const VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const bool none = (theta.cwiseAbs().array() <= kTwoSided95 * sd.array()).all();
+  const Index n = theta.size();
+  if (!none || n < 2 || n > 5 || !(sd.minCoeff() > 0.0)) return none;
+  const VectorXd scaled = theta.cwiseQuotient(sd), scale = sd.cwiseInverse();
+  Cholesky correlation;
+  if (!correlation.compute(scale.asDiagonal() * covariance * scale.asDiagonal())) return none;
+  return scaled.dot(correlation.solve(scaled)) <= kChiSquare95[n - 1];
+}
+
+/// Whether a nonlinear parameter without which the effect is a plainer one may be zero.
+bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
+                    const std::vector<double>& half) {
+  if (effect.info().refines.empty()) return false;
   for (std::size_t k = 0; k < values.size(); ++k) {
     const EffectParameter& p = effect.info().parameters[k];
-    const bool holds_zero = std::abs(values[k]) <= half[k];
-    if (p.linear) any_linear = any_linear || !holds_zero;
-    if (!p.linear && !p.choice) shape_at_zero = shape_at_zero || holds_zero;
+    if (!p.linear && !p.choice && std::abs(values[k]) <= half[k]) return true;
   }
-  return !any_linear || (!effect.info().refines.empty() && shape_at_zero);
+  return false;
 }
 
 }  // namespace
@@ -79,7 +92,9 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     for (std::size_t k = 0; k < shape_sd.size(); ++k) shape_sd[k] = choices[k] ? 0.0 : shape_sd[k];
     std::vector<double> half = parameter_values(effect, sd.head(linear), shape_sd);
     for (double& h : half) h *= kTwoSided95;
-    f.could_be_nothing = could_be_nothing(effect, f.values, half);
+    f.could_be_nothing = holds_nothing(fit.theta.segment(plain, linear),
+                                       sloped.covariance.block(at, at, linear, linear)) ||
+                         may_be_plainer(effect, f.values, half);
     f.lower95 = f.upper95 = f.values;
     for (std::size_t k = 0; k < half.size(); ++k) {
       const double whole =

@@ -45,8 +45,8 @@ struct FoundEffect {
   double held_out_share = 0.0;  ///< of the parts left out in turn that it improved
   double over_form =
       1e9;  ///< its size / what the other effects' laws may be wrong by where it acts
-  /// The 95 % interval (sampling error alone) of every linear parameter holds zero, or, where the effect refines a
-  /// plainer one, that of a nonlinear parameter does: the plainer effect, or none, would do.
+  /// The joint 95 % region (sampling error alone) of its linear parameters holds zero, or, where the effect refines a
+  /// plainer one, the interval of a nonlinear parameter does: the plainer effect, or none, would do.
   bool could_be_nothing = false;
   bool at_bound = false;  ///< a parameter rests on the edge of what is plausible
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
