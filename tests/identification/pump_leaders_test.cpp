@@ -1,0 +1,143 @@
+// A loss that only the leader's pump sees can make another cylinder lead: evidence, search and extension with the leader
+// that what was found makes.
+#include "identification/pump_leaders.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "arm_log.h"
+#include "hidden_case.h"
+#include "identification/effect_estimate.h"
+#include "identification/effect_search.h"
+#include "identification/evidence.h"
+#include "identification/series.h"
+#include "models/effects/registry.h"
+
+namespace sparflow {
+namespace {
+
+using namespace testing_support;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kMargin = 15e5, kStandby = 20e5;
+constexpr double kLoss = 0.05 * 1e5 / (1e-3 / 60.0 * 1e-3 / 60.0);  // 0.05 bar/(l/min)^2
+
+/// Where pumps_led_by is not asked: what each cylinder's pressures, margin and a loss of the jib's line come to.
+struct LossyCrane {
+  Machine machine = drawn_machine("loader_crane");
+  CraneModel model = CraneModel::untrained(machine);
+  AppliedEffect loss;
+  MachineSignals signals;
+  Index moved = 0;  ///< samples in which another cylinder leads than without it
+
+  explicit LossyCrane(std::uint64_t seed = 3) {
+    for (CylinderModel& c : model.cylinders) c.margin = kMargin;
+    model.pumps[0].standby = kStandby;
+    const EffectAt place = parse_effect("line_loss:extension", machine);
+    loss = {place.effect, place.at, {kLoss, 0.0, 0.0}, {}, {}};
+    Log log = hidden_case(machine, {}, seed, 60.0).train;
+    signals = make_signals(machine, log);
+    VectorXd& pump = channel(log, "p_" + machine.pumps[0].name).values;
+    const MachineSeries series = make_series(model, signals);
+    for (Index k = 0; k < signals.samples(); ++k) {
+      double with = kStandby, without = kStandby;
+      int leader = -1, before = -1;
+      for (const int i : machine.pumps[0].feeds) {
+        const CylinderSignals& c = signals.cylinders[static_cast<std::size_t>(i)];
+        if (c.direction[k] == 0) continue;
+        const double asked = c.working_pressure[k] + kMargin;
+        const double flow = c.flow[k], more = i == loss.at ? kLoss * flow * flow : 0.0;
+        if (asked > without) without = asked, before = i;
+        if (asked + more > with) with = asked + more, leader = i;
+      }
+      pump[k] = with;
+      if (std::isfinite(series.pumps[0].demand[k]) && leader != before) ++moved;
+    }
+    signals = make_signals(machine, log);
+  }
+};
+
+const LossyCrane& lossy() {
+  static const LossyCrane crane;
+  return crane;
+}
+
+double largest_left(const Evidence& e, const AppliedEffect& loss) {
+  const EvidenceChannel* pump = e.find(EvidenceKind::kPump, 0);
+  const Eigen::MatrixXd columns = e.columns({loss.effect, loss.at}, {&loss.values[2], 1}, *pump);
+  return (pump->y - columns.leftCols(1) * loss.values[0]).cwiseAbs().maxCoeff();
+}
+
+TEST(PumpLeaders, WithTheLeaderItMakesALossIsExact) {
+  const LossyCrane& crane = lossy();
+  ASSERT_GT(crane.moved, 50) << "the case must show it";
+  const Evidence plain = collect_evidence(crane.model, {crane.signals});
+  EXPECT_GT(largest_left(plain, crane.loss), 2e5) << "at the leader without it";
+  const std::optional<Evidence> led = plain.led_by({&crane.loss, 1});
+  ASSERT_TRUE(led.has_value());
+  EXPECT_LT(largest_left(*led, crane.loss), 1.0) << "[Pa] of hundreds of bar, by rounding";
+  EXPECT_FALSE(led->led_by({&crane.loss, 1}).has_value()) << "they lead already";
+  const std::optional<Evidence> back = led->led_by({});
+  ASSERT_TRUE(back.has_value());
+  const EvidenceChannel *one = plain.find(EvidenceKind::kPump, 0),
+                        *two = back->find(EvidenceKind::kPump, 0);
+  EXPECT_LT((one->y - two->y).cwiseAbs().maxCoeff(), 1.0);
+  EXPECT_EQ(one->baseline, two->baseline);
+  EXPECT_LT((one->raw[0] - two->raw[0])
+                .array()
+                .isFinite()
+                .select(one->raw[0] - two->raw[0], 0.0)
+                .cwiseAbs()
+                .maxCoeff(),
+            1.0);
+}
+
+TEST(PumpLeaders, ReferencesKeepTheirsAndTheModelsOwnLossIsInIt) {
+  const LossyCrane& crane = lossy();
+  const LossyCrane other(5);
+  const Evidence e = collect_evidence(crane.model, {crane.signals}, {other.signals});
+  const std::optional<Evidence> led = e.led_by({&crane.loss, 1});
+  ASSERT_TRUE(led.has_value());
+  EXPECT_EQ(led->series[1].pumps[0].leader, e.series[1].pumps[0].leader);
+  EXPECT_NE(led->series[0].pumps[0].leader, e.series[0].pumps[0].leader);
+  CraneModel knows = crane.model;
+  knows.effects = {crane.loss};
+  const Evidence known = collect_evidence(knows, {crane.signals});
+  EXPECT_LT(known.find(EvidenceKind::kPump, 0)->y.cwiseAbs().maxCoeff(), 1.0);
+  // references that have it already
+  const Evidence both = collect_evidence(knows, {crane.signals}, {other.signals});
+  EXPECT_LT(both.find(EvidenceKind::kPump, 0)->y.cwiseAbs().maxCoeff(), 1.0);
+  const std::vector<AppliedEffect> none;
+  const Evidence without = collect_evidence(knows, {crane.signals}, {other.signals}, &none);
+  EXPECT_EQ(without.series[1].pumps[0].leader, e.series[1].pumps[0].leader);
+}
+
+TEST(PumpLeaders, ASearchFollowsThem) {
+  const LossyCrane& crane = lossy();
+  const Evidence e = collect_evidence(crane.model, {crane.signals});
+  std::vector<EffectAt> candidates;
+  for (const char* key : {"line_loss:extension", "line_loss:boom", "flow_dependent_margin:main",
+                          "torque_limit:main", "return_back_pressure"}) {
+    candidates.push_back(parse_effect(key, crane.machine));
+  }
+  const SearchResult r = search_effects(e, candidates);
+  ASSERT_EQ(r.found.size(), 1u);
+  EXPECT_EQ(r.found[0].design.effect.at, crane.loss.at);
+  ASSERT_TRUE(r.led.has_value());
+  EXPECT_FALSE(r.led->led_by({&crane.loss, 1}).has_value());
+  EXPECT_NEAR(r.found[0].values[0], kLoss, 0.01 * kLoss);
+  EXPECT_EQ(r.null.residual[0].size(), e.channels[0].rows());
+}
+
+TEST(PumpLeaders, ExtensionHasThemToo) {
+  const LossyCrane& crane = lossy();
+  const EffectEstimate estimate =
+      estimate_effects(crane.model, {{crane.loss.effect, crane.loss.at}}, {crane.signals}, {});
+  ASSERT_EQ(estimate.effects.size(), 1u);
+  EXPECT_NEAR(estimate.effects[0].values[0], kLoss, 0.01 * kLoss);
+}
+
+}  // namespace
+}  // namespace sparflow
