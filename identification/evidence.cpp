@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "identification/branches.h"
+#include "identification/channel_builder.h"
 #include "identification/low_pass.h"
 #include "identification/pump_leaders.h"
 #include "identification/robust.h"
 #include "identification/series.h"
 #include "models/effects/hydraulics.h"
-#include "models/linear_algebra.h"
 #include "models/nan.h"
 
 namespace sparflow {
@@ -21,82 +21,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 /// Rows a third of the filter's width apart are nearly independent: keeping more costs time and tells nothing.
 constexpr double kRowsAWindow = 3.0;
-constexpr double kShortestBlock_s = 0.3;
-/// Longer motions are cut: blocks are what is held out and resampled.
-constexpr double kLongestBlock_s = 8.0;
-constexpr Index kFewestRows = 30;
-constexpr double kFlowScale = 1e-3, kForceScale = 1e5;  ///< of the baselines: near one
-
-/// Cuts the true stretches of a mask, shortened by `margin` samples at both ends, into blocks.
-struct Builder {
-  const Evidence& evidence;
-  const std::vector<const MachineSignals*>& signals;
-  EvidenceChannel channel;
-  std::vector<double> y;
-  std::vector<VectorXd> rows;  // baseline
-
-  void add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
-           const VectorXd& values, const Eigen::MatrixXd& base, Index margin) {
-    const MachineSeries& s = evidence.series[log];
-    const Index stride = evidence.stride;
-    const auto longest = std::max<Index>(4 * stride, static_cast<Index>(kLongestBlock_s / s.step));
-    const auto shortest = static_cast<Index>(kShortestBlock_s / s.step);
-    for (const auto& [run_first, run_last] : s.runs) {
-      for (Index i = run_first; i < run_last;) {
-        if (!mask[i]) {
-          ++i;
-          continue;
-        }
-        Index end = i;
-        while (end < run_last && mask[end]) ++end;
-        const Index first = i + margin, last = end - margin;
-        i = end;
-        if (last - first < std::max<Index>(shortest, 2 * stride)) continue;
-        const Index pieces = std::max<Index>(1, (last - first + longest - 1) / longest);
-        for (Index piece = 0; piece < pieces; ++piece) {
-          block(log, first + (last - first) * piece / pieces,
-                first + (last - first) * (piece + 1) / pieces, values, base, stride);
-        }
-      }
-    }
-  }
-
-  void block(std::size_t log, Index first, Index last, const VectorXd& values,
-             const Eigen::MatrixXd& base, Index stride) {
-    NoiseBlock b{static_cast<Index>(y.size()), 0};
-    for (Index k = first; k < last; k += stride) {
-      if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a hole ends the block
-        b.last = static_cast<Index>(y.size());
-        close(log, b);
-        b.first = b.last;
-        continue;
-      }
-      y.push_back(values[k]);
-      rows.push_back(base.row(k));
-      channel.sample.push_back(k);
-    }
-    b.last = static_cast<Index>(y.size());
-    close(log, b);
-  }
-
-  void close(std::size_t log, const NoiseBlock& b) {
-    if (b.last <= b.first) return;
-    channel.blocks.push_back(b);
-    channel.log.push_back(static_cast<int>(log));
-  }
-
-  bool finish(std::vector<EvidenceChannel>& out) {
-    const auto n = static_cast<Index>(y.size());
-    if (n < kFewestRows || channel.blocks.size() < 2) return false;
-    channel.y = Eigen::Map<VectorXd>(y.data(), n);
-    channel.baseline.resize(n, rows.front().size());
-    for (Index i = 0; i < n; ++i)
-      channel.baseline.row(i) = rows[static_cast<std::size_t>(i)].transpose();
-    channel.baseline = acting_columns(channel.baseline);
-    out.push_back(std::move(channel));
-    return true;
-  }
-};
 
 /// White noise of a raw channel from third differences (robust, so that motion does not count).
 double raw_noise(const VectorXd& x) {
@@ -107,82 +31,6 @@ double raw_noise(const VectorXd& x) {
   }
   if (d.size() < 20) return kNaN;
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
-}
-
-/// A chamber falls no further than its anti-cavitation valve lets it: below a level the law of flow and force ends.
-struct CavitationFloor {
-  VectorXd law;        ///< of the baseline's columns; empty: no such level is reached
-  double level = 0.0;  ///< [Pa]
-
-  /// By how much the valve holds the pressure above the law. [rows, Pa]
-  VectorXd held(const Eigen::MatrixXd& baseline) const {
-    return (level - (baseline * law).array()).cwiseMax(0.0);
-  }
-};
-
-/// max(law, level) by alternating assignment, where that leaves much less than the law alone.
-CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y) {
-  constexpr Index kFewestOfOne = 20;  // rows of either piece
-  constexpr double kMuchLess = 0.8;   // of the sum of squares
-  constexpr int kTurns = 25;
-  CavitationFloor best;
-  if (y.size() < 3 * kFewestOfOne) return best;
-  const VectorXd plain = least_squares(baseline, y);
-  double least = kMuchLess * (y - baseline * plain).squaredNorm();
-  for (const double start : {0.15, 0.4, 0.7}) {
-    CavitationFloor f{plain, quantile(VectorXd(baseline * plain), start)};
-    for (int turn = 0; turn < kTurns; ++turn) {
-      const VectorXd by_law = baseline * f.law;
-      std::vector<Index> on_law, held;
-      on_law.reserve(static_cast<std::size_t>(y.size()));
-      held.reserve(static_cast<std::size_t>(y.size()));
-      for (Index i = 0; i < y.size(); ++i) (by_law[i] < f.level ? held : on_law).push_back(i);
-      if (static_cast<Index>(std::min(on_law.size(), held.size())) < kFewestOfOne) break;
-      f.law = least_squares(baseline(on_law, Eigen::all), y(on_law));
-      f.level = y(held).mean();
-      const double squares = (y - baseline * f.law - f.held(baseline)).squaredNorm();
-      if (squares < least) {
-        least = squares;
-        best = f;
-      }
-    }
-  }
-  return best;
-}
-
-/// The law's end joins a supply channel's baseline; learned from the references, where there are any.
-CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects) {
-  std::vector<Index> rows;
-  for (const bool references : {true, false}) {
-    rows.clear();
-    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
-      if (references && static_cast<std::size_t>(channel.log[b]) < suspects) continue;
-      for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) rows.push_back(i);
-    }
-    if (static_cast<Index>(rows.size()) >= 2 * kFewestRows) break;
-  }
-  const CavitationFloor floor =
-      cavitation_floor(channel.baseline(rows, Eigen::all), channel.y(rows));
-  if (floor.law.size() == 0) return floor;
-  Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + 1);
-  wider << channel.baseline, floor.held(channel.baseline) * 1e-5;
-  channel.baseline = std::move(wider);
-  return floor;
-}
-
-/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the builder's units,
-/// and what the anti-cavitation valve adds.
-void slope_of(EvidenceChannel& channel, std::size_t suspects) {
-  channel.force_slope = VectorXd::Zero(channel.rows());
-  if (channel.baseline.cols() != 5) return;
-  const CavitationFloor floor = add_cavitation_floor(channel, suspects);
-  const auto flow = channel.baseline.col(1).array();
-  const VectorXd b = least_squares(channel.baseline, channel.y);
-  channel.force_slope = (b[3] + b[4] * flow) / kForceScale;
-  if (floor.law.size() == 0) return;
-  const auto held = (channel.baseline.col(5).array() > 0.0).cast<double>();
-  channel.force_slope.array() -=
-      b[5] * 1e-5 * held * (floor.law[3] + floor.law[4] * flow) / kForceScale;
 }
 
 std::vector<BranchSplit> branches_of(const Evidence& e,
@@ -379,7 +227,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     const auto at = static_cast<std::size_t>(i);
     const std::string& name = machine.cylinders[at].name;
     {  // force
-      Builder b{e, signals, {}, {}, {}};
+      ChannelBuilder b(e);
       b.channel.kind = EvidenceKind::kForce;
       double noise = 0.0;
       int logs = 0;
@@ -410,7 +258,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
       }
     }
     {  // flow
-      Builder b{e, signals, {}, {}, {}};
+      ChannelBuilder b(e);
       b.channel.kind = EvidenceKind::kFlow;
       std::vector<double> still;
       for (std::size_t log = 0; log < signals.size(); ++log) {
@@ -447,7 +295,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         const EvidenceKind kind =
             returning ? (side > 0 ? EvidenceKind::kReturnExtend : EvidenceKind::kReturnRetract)
                       : (side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract);
-        Builder b{e, signals, {}, {}, {}};
+        ChannelBuilder b(e);
         b.channel.kind = kind;
         double noise = kNaN;
         for (std::size_t log = 0; log < signals.size(); ++log) {
@@ -460,7 +308,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           const VectorXd y = e.filter(log, kind, raw - e.known(log, kind, i));
           const VectorXd& q = returning ? s.return_flow : s.flow;
           Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
-          const double q0 = kFlowScale, f0 = kForceScale;
+          const double q0 = kBaselineFlow, f0 = kBaselineForce;
           base.col(0).setOnes();
           base.col(1) = q / q0;
           base.col(2) = (q / q0).cwiseAbs2();
@@ -476,13 +324,13 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         b.channel.unit = {"bar", 1e5};
         b.channel.noise_floor = noise;
         b.channel.text = evidence_text(kind, name);
-        if (b.finish(e.channels) && !returning) slope_of(e.channels.back(), e.suspects);
+        if (b.finish(e.channels) && !returning) set_force_slope(e.channels.back(), e.suspects);
       }
     }
   }
   for (int p = 0; p < machine.pump_count(); ++p) {
     const auto at = static_cast<std::size_t>(p);
-    Builder b{e, signals, {}, {}, {}};
+    ChannelBuilder b(e);
     b.channel.kind = EvidenceKind::kPump;
     double noise = kNaN;
     for (std::size_t log = 0; log < signals.size(); ++log) {
