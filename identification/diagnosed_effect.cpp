@@ -27,7 +27,9 @@ double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd
 
 EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   std::vector<EffectDesign> others;
+  others.reserve(d.search.found.size());
   std::vector<AppliedEffect> acting;
+  acting.reserve(d.search.found.size());
   for (std::size_t i = 0; i < d.search.found.size(); ++i) {
     if (i == index) continue;
     const FoundEffect& f = d.search.found[i];

@@ -55,6 +55,7 @@ std::optional<Evidence> led_by_found(const SearchState& search,
     led = std::move(next);
     designs = remade(*led, designs);
     std::vector<const EffectDesign*> pointers;
+    pointers.reserve(designs.size());
     for (const EffectDesign& d : designs) pointers.push_back(&d);
     const EffectFit there = fit_effects(*led, pointers, &fit);
     total = there.total();
