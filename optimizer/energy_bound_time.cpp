@@ -230,6 +230,7 @@ class TimedSearch {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> share(0.0, 1.0);
     VectorXd q(n_);
+    Eigen::MatrixX2d price;
     double worst = 0.0;
     constexpr int kSamples = 4000;
     for (int i = 0; i < kSamples; ++i) {
@@ -238,6 +239,7 @@ class TimedSearch {
         q[j] = r.lo + (r.hi - r.lo) * share(random);
       }
       worst = std::max(worst, weights_->largest_gain(q, potential.gradient(q)));
+      weights_->at(q, price);  // ramp_gain() sees this posture, too
     }
     return worst;
   }

@@ -36,8 +36,9 @@ class TimedWeights final : public MoveWeights {
     shares_ = shares;
     ramp_gain_ = 0.0;
   }
-  /// Largest sum over joints of (B_j - W_j) a_j met by prices() since set_shares(), a_j the acceleration limit: near its
-  /// ends, where |v_j| <= a_j t, a motion gains at most this times t. [W/s]; [1/s] for the least duration
+  /// Near its ends, where |v_j| <= a_j t with a_j the acceleration limit, a motion gains at most this times t: the largest sum
+  /// over cylinders of (B_j - P A_j) a_j, each moving one asking for at most P, met by prices() since set_shares(). [W/s]; [1/s]
+  /// for the least duration
   double ramp_gain() const { return ramp_gain_; }
   /// False when a joint's cylinders are fed by different pumps: the inequality then is not covered.
   bool possible() const { return possible_; }
@@ -56,6 +57,7 @@ class TimedWeights final : public MoveWeights {
  private:
   /// Moves that have a share, and those shares.
   void make_moves(const double* q, const double* force, const double* rate) const;
+  double gain_from_rest() const;
 
   std::vector<Range> position_, speed_, acceleration_;
   std::vector<double> pump_flow_, pump_standby_;

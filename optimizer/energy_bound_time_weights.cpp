@@ -133,21 +133,43 @@ void TimedWeights::prices(const double* q, const double* force, const double* ra
     if (last > 0) surplus(low);
     alpha_ratio_ = std::clamp(low * largest / shares_.price, 0.05, 0.95);
   }
-  double ramps = 0.0, of_joint = 0.0;
-  int joint = -1;
   for (const TimedMove& m : moves_) {
     double& own = price(m.joint, m.direction);
-    const double extra = std::max(0.0, m.slope * m.area - own);
-    own += extra;
-    const Range& a = acceleration_[static_cast<std::size_t>(m.joint)];
-    if (m.joint != joint) {
-      ramps += of_joint;
-      of_joint = 0.0;
-      joint = m.joint;
-    }
-    of_joint = std::max(of_joint, extra * std::max(a.hi, -a.lo));
+    own = std::max(own, m.slope * m.area);
   }
-  ramp_gain_ = std::max(ramp_gain_, ramps + of_joint);
+  ramp_gain_ = std::max(ramp_gain_, gain_from_rest());
+}
+
+double TimedWeights::gain_from_rest() const {
+  const auto least_pressure = [](const TimedMove& m) {
+    return m.flow_step > 0.0 ? std::max(m.standby, m.demand[0]) : m.standby;
+  };
+  // with a pump at that pressure; of a joint only the better direction
+  const auto at = [&](int pump, double pressure) {
+    double total = 0.0, of_joint = 0.0;
+    int joint = -1;
+    for (const TimedMove& m : moves_) {  // by joint
+      if (m.pump != pump || (pump >= 0 && least_pressure(m) > pressure)) continue;
+      if (m.joint != joint) {
+        total += of_joint;
+        of_joint = 0.0;
+        joint = m.joint;
+      }
+      const Range& a = acceleration_[static_cast<std::size_t>(m.joint)];
+      const double margin = pump >= 0 ? m.slope - pressure : m.slope;
+      of_joint = std::max(of_joint, margin * m.area * std::max(a.hi, -a.lo));
+    }
+    return total + of_joint;
+  };
+  double total = at(-1, 0.0);
+  for (int pump = 0; pump < static_cast<int>(pump_flow_.size()); ++pump) {
+    double most = 0.0;  // falls with the pressure between two cylinders' least ones
+    for (const TimedMove& m : moves_) {
+      if (m.pump == pump) most = std::max(most, at(pump, least_pressure(m)));
+    }
+    total += most;
+  }
+  return total;
 }
 
 double TimedWeights::largest_gain(const Eigen::VectorXd& q, const Eigen::VectorXd& slope) {
