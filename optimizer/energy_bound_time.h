@@ -2,7 +2,8 @@
 /// Lower bounds when time is short: of the energy at a given duration, and of the duration itself. By Lagrangian duality
 ///   E(T) >= V(lambda) - lambda T,   V = least of E + lambda T over all motions >= potential(end) - potential(start)
 /// for every potential whose slopes p satisfy max over admissible speeds v of p.v - power(q, v) <= lambda at every
-/// posture. Admissible: joint speeds, valve flows, pump flow; accelerations are left out, as are obstacles. Only slopes in
+/// posture. Admissible: joint speeds, valve flows, pump flow; accelerations count at a motion's two ends
+/// alone, obstacles not at all. Only slopes in
 /// a box |p_j| <= B_j(q) are used, so that the grid of optimizer/energy_bound.h serves; which box, is searched for.
 /// docs/energy_bound.md has the proof.
 #include "optimizer/energy_bound.h"
