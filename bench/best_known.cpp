@@ -39,6 +39,7 @@ void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
     entry["lower_bound_J"] = f.bound;
     entry["lower_bound_any_time_J"] = f.slow_bound;
     entry["unlimited_time_J"] = f.unlimited;
+    if (f.grid_path > 0.0) entry["grid_path_J"] = f.grid_path;
   }
   write_file_atomically(path, all.dump(1) + "\n");
 }

@@ -4,8 +4,8 @@
 
 #include "bench/planned_seeds.h"
 #include "optimizer/child_processes.h"
+#include "optimizer/driven_grid_path.h"
 #include "optimizer/energy_bound_time.h"
-#include "optimizer/energy_grid.h"
 
 namespace sparflow::bench {
 namespace {
@@ -73,6 +73,7 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
     f.bound = earlier->value("lower_bound_J", 0.0);
     f.slow_bound = earlier->value("lower_bound_any_time_J", 0.0);
     f.unlimited = earlier->value("unlimited_time_J", 0.0);
+    f.grid_path = earlier->value("grid_path_J", 0.0);
   } else {
     compare(task, settings, f);
   }
@@ -89,10 +90,12 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
     }
   }
   if (settings.grid && task.problem.machine.joint_count() <= 4) {
-    EnergyGridOptions grid;
-    grid.nodes = 20000;
-    const GridPath path = EnergyGrid(*task.model, task.problem, grid).cheapest_path(0.0);
-    if (path.found) f.unlimited = path.slow_energy_J;
+    constexpr int kNodes = 20000;
+    const StrategyOutcome* best = f.optimum();
+    const double time = best != nullptr ? best->duration : task.problem.duration.min;
+    const DrivenGridPath path = driven_grid_path(*task.model, task.problem, time, {kNodes});
+    f.unlimited = path.slow_energy;
+    f.grid_path = path.energy;
   }
   return f;
 }
@@ -103,6 +106,7 @@ std::string pack_figures(const ReachFigures& f) {
       .number(f.unlimited)
       .number(f.bound)
       .number(f.slow_bound)
+      .number(f.grid_path)
       .text(f.named)
       .text(f.worst)
       .number(f.left_out ? 1.0 : 0.0)
@@ -116,6 +120,7 @@ ReachFigures unpack_figures(const std::string& bytes) {
   f.unlimited = u.number();
   f.bound = u.number();
   f.slow_bound = u.number();
+  f.grid_path = u.number();
   f.named = u.text();
   f.worst = u.text();
   f.left_out = u.number() > 0.0;

@@ -70,7 +70,8 @@ MoveWeights::MoveWeights(const CraneModel& model, const MotionProblem& problem,
   for (const PumpModel& pump : model.pumps) standby_.push_back(pump.standby);
 }
 
-void MoveWeights::prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const {
+void MoveWeights::prices(const double* /*q*/, const double* force, const double* rate,
+                         Eigen::MatrixX2d& price) const {
   price.setZero();
   for (const CylinderDemand& d : demands_) {
     for (const int direction : {0, 1}) {
@@ -94,7 +95,7 @@ void MoveWeights::update(const VectorXd& q) {
 void MoveWeights::at(const VectorXd& q, Eigen::MatrixX2d& weight) {
   update(q);
   weight.resize(q.size(), 2);
-  prices(force_.data(), rate_.data(), weight);
+  prices(q.data(), force_.data(), rate_.data(), weight);
 }
 
 Lattice bound_lattice(const MotionProblem& problem, const std::vector<int>& cells) {
@@ -157,11 +158,9 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
   std::vector<double> force(cylinders), rate(cylinders);
   Eigen::MatrixX2d price(n, 2);
   for (long node = 0; node < lattice_.nodes; ++node) {
-    for (std::size_t c = 0; c < cylinders; ++c) {
-      force[c] = static_cast<double>(forces.force(static_cast<Eigen::Index>(c), node));
-      rate[c] = forces.rate[c][lattice_.line(node, machine_->cylinders[c].joint)];
-    }
-    weights.prices(force.data(), rate.data(), price);
+    forces.at(*machine_, lattice_, node, force.data(), rate.data());
+    const VectorXd q = lattice_.posture(node);
+    weights.prices(q.data(), force.data(), rate.data(), price);
     for (int j = 0; j < n; ++j) {
       for (const int direction : {0, 1}) {
         cost_[ix(j)][ix(direction)][ix(node)] = static_cast<float>(price(j, direction));
@@ -374,7 +373,8 @@ double EnergyPotential::coordinate_rate(int joint, int cell, double q) const {
   return rate * (axis.m[cell] + std::clamp(share, 0.0, 1.0) * (axis.m[cell + 1] - axis.m[cell]));
 }
 
-double EnergyPotential::value(const VectorXd& q) const {
+template <class Function>
+void EnergyPotential::over_corners(const VectorXd& q, const Function& function) const {
   const int n = lattice_.joints();
   long base = 0;
   std::array<double, 8> share{};
@@ -385,7 +385,6 @@ double EnergyPotential::value(const VectorXd& q) const {
     share[ix(j)] = (coordinate(j, cell, q[j]) - u[cell]) / (u[cell + 1] - u[cell]);
     base += cell * lattice_.stride[ix(j)];
   }
-  double sum = 0.0;
   for (unsigned corner = 0; corner < 1u << n; ++corner) {
     double weight = 1.0;
     long node = base;
@@ -394,9 +393,20 @@ double EnergyPotential::value(const VectorXd& q) const {
       weight *= up ? share[ix(j)] : 1.0 - share[ix(j)];
       if (up) node += lattice_.stride[ix(j)];
     }
-    if (weight > 0.0) sum += weight * phi_[ix(node)];
+    if (weight > 0.0) function(node, weight);
   }
+}
+
+double EnergyPotential::value(const VectorXd& q) const {
+  double sum = 0.0;
+  over_corners(q, [&](long node, double weight) { sum += weight * phi_[ix(node)]; });
   return sum;
+}
+
+std::vector<double> EnergyPotential::corner_weights(const VectorXd& q) const {
+  std::vector<double> weights(ix(lattice_.nodes), 0.0);
+  over_corners(q, [&](long node, double weight) { weights[ix(node)] += weight; });
+  return weights;
 }
 
 VectorXd EnergyPotential::gradient(const VectorXd& q) const {

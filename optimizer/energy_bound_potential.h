@@ -19,8 +19,9 @@ class MoveWeights {
 
   /// @param weight [n x 2] in + and - direction [J/rad] or [J/m]
   void at(const Eigen::VectorXd& q, Eigen::MatrixX2d& weight);
-  /// The same from tabulated forces and rates dx/dq. @param force [N] and rate by cylinder
-  virtual void prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const;
+  /// The same from tabulated forces and rates dx/dq. @param q posture  @param force [N] and rate by cylinder
+  virtual void prices(const double* q, const double* force, const double* rate,
+                      Eigen::MatrixX2d& price) const;
   const std::vector<CylinderDemand>& demands() const { return demands_; }
 
  protected:
@@ -67,6 +68,10 @@ class EnergyPotential {
   double value(const Eigen::VectorXd& q) const;
   /// Its gradient inside a cell [J/rad] or [J/m].
   Eigen::VectorXd gradient(const Eigen::VectorXd& q) const;
+  /// Weights of the nodes in value(q), by node: zero but at the corners of its cell.
+  std::vector<double> corner_weights(const Eigen::VectorXd& q) const;
+  /// Other values at the nodes: what is asked then is interpolated between them.
+  void replace(std::vector<double> values) { phi_ = std::move(values); }
   /// Multiplies the potential.
   void scale(double factor);
   /// Mean over the edges of each axis: relative change of the price along the axis itself (x) and the sum of what curvature
@@ -81,6 +86,9 @@ class EnergyPotential {
   double coordinate(int joint, int cell, double q) const;
   double coordinate_rate(int joint, int cell, double q) const;
   int cell_of(int joint, double q) const;
+  /// function(node, weight) for every corner of the cell that counts.
+  template <class Function>
+  void over_corners(const Eigen::VectorXd& q, const Function& function) const;
 
   const Machine* machine_;
   Lattice lattice_;

@@ -8,6 +8,7 @@
 #include "models/effects/effective_machine.h"
 #include "models/linear_algebra.h"
 #include "optimizer/energy_bound_goal.h"
+#include "optimizer/energy_bound_time_guide.h"
 #include "optimizer/energy_grid.h"
 
 namespace sparflow {
@@ -49,6 +50,7 @@ class TimedSearch {
       active_(j, 0) = moves[j] > -small ? 1.0 : 0.0;
       active_(j, 1) = moves[j] < small ? 1.0 : 0.0;
     }
+    base_ = active_;
     const TimedGrid rough = grid(uniform(n_ <= 3 ? 12 : 6));
     VectorXd x = VectorXd::Zero(n_ + 1);
     x[n_] = std::log(price);
@@ -57,23 +59,12 @@ class TimedSearch {
     const std::vector<int> few =
         balanced_cells(first.losses(), rough.lattice, static_cast<double>(options_.search_nodes));
     const TimedGrid small = grid(few);
-    TimedBound best;
-    double curved_value = 0.0;
-    for (const bool straight : {false, true}) {
-      if (straight && !(energy_weight_ > 0.0)) break;  // without energy the two are one
-      shares_.straight = straight;
-      const VectorXd y = best_shares(small, x);
-      const double value = objective(small, y);
-      constexpr double kNear = 0.99;  // a coarse lattice tells no better
-      if (straight && value < kNear * curved_value) break;
-      curved_value = value;
-      set(y);
-      const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
-      const TimedBound bound = certified(
-          grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
-      if (!straight || bound.value > best.value) best = bound;
-    }
-    return best;
+    x = best_shares(small, x, options_.evaluations, std::log(4.0));
+    x = along_the_way(small, x);
+    set(x);
+    const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
+    return certified(
+        grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
   }
 
  private:
@@ -87,14 +78,67 @@ class TimedSearch {
     return g;
   }
 
-  /// x = logarithms of the shares and of the price.
+  /// Shares that change along the way: searched on from those of dynamic programming or from constant ones, whichever is
+  /// better. @param x constant shares and the price
+  VectorXd along_the_way(const TimedGrid& g, const VectorXd& x) {
+    const double constant = objective(g, x), price = shares_.price;
+    constexpr double kHaste = 0.01;  // with less the slow bound is as good
+    if (energy_weight_ > 0.0 && price * duration_ < kHaste * constant) return x;
+    TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
+    double guide_price = price;
+    if (energy_weight_ > 0.0) {  // the price at which the guide's own bound is the largest
+      double best = guide.solve(price) - price * duration_;
+      for (const double factor : {1.6, 1.0 / 1.6}) {
+        const double before = best;
+        constexpr int kMost = 4;  // on so coarse a grid the shortest time may be longer than this
+        for (int k = 0; k < kMost; ++k) {
+          const double next = guide_price * factor, value = guide.solve(next) - next * duration_;
+          if (!(value > best)) break;
+          best = value;
+          guide_price = next;
+        }
+        if (best > before) break;
+      }
+    }
+    guide.solve(guide_price);
+    const TimeShares found = guide.shares(shares_);
+    const Eigen::MatrixX2d constant_base = base_;
+    base_ = found.share;
+    VectorXd y(n_ + 1 + 2 * n_ * n_);
+    y << VectorXd::Zero(n_), std::log(guide_price), found.tilt.reshaped();
+    if (!(found.share.maxCoeff() > 0.0) || !(objective(g, y) > constant)) {
+      base_ = constant_base;
+      y << x, VectorXd::Zero(2 * n_ * n_);
+    }
+    constexpr double kStep = 0.7;
+    constexpr int kTimes = 3;
+    return best_shares(g, y, kTimes * options_.evaluations, kStep);
+  }
+
+  int guide_cells() const { return n_ == 1 ? 60 : n_ == 2 ? 40 : n_ == 3 ? 10 : 5; }
+
+  /// x = logarithms of the shares (beside base_) and of the price, and the tilts column by column, if any.
   void set(const VectorXd& x) {
     shares_.price = energy_weight_ > 0.0 ? std::exp(x[n_]) : 1.0;
     const double top = x.head(n_).maxCoeff();
     constexpr double kLeastLog = -6.0;  // of a share: less is none
     shares_.share =
-        (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * active_;
+        (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * base_;
+    shares_.tilt.resize(0, 0);
+    if (x.size() > n_ + 1) shares_.tilt = x.tail(2 * n_ * n_).reshaped(2 * n_, n_);
     weights_->set_shares(shares_);
+  }
+
+  /// Entries of x that mean something.
+  std::vector<Eigen::Index> free_entries(const VectorXd& x) const {
+    std::vector<Eigen::Index> free;
+    free.reserve(static_cast<std::size_t>(x.size()));
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const Eigen::Index row = (i - n_ - 1) % (2 * n_);  // of a tilt: 2 j + direction
+      if (i == n_ ? energy_weight_ > 0.0 : i < n_ || base_(row / 2, row % 2) > 0.0)
+        free.push_back(i);
+    }
+    return free;
   }
 
   double objective(const TimedGrid& g, const VectorXd& x) {
@@ -122,13 +166,14 @@ class TimedSearch {
 
   /// Compass search along the coordinates and, since the objective has ridges across them, along turned axes in turn; the
   /// step is halved when neither helps.
-  VectorXd best_shares(const TimedGrid& g, VectorXd x) {
-    const Eigen::Index count = energy_weight_ > 0.0 ? n_ + 1 : n_;
+  VectorXd best_shares(const TimedGrid& g, VectorXd x, int evaluations, double step) {
+    const std::vector<Eigen::Index> free = free_entries(x);
+    const auto count = static_cast<Eigen::Index>(free.size());
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
-    double best = objective(g, x), step = std::log(4.0);
+    double best = objective(g, x);
     int used = 1, idle = 0;
-    for (int round = 0; used < options_.evaluations && step > std::log(1.02); ++round) {
+    for (int round = 0; used < evaluations && step > std::log(1.02); ++round) {
       Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(count, count);
       if (round % 2 == 1) {
         for (double& entry : axes.reshaped()) entry = normal(random);
@@ -138,9 +183,9 @@ class TimedSearch {
       for (Eigen::Index k = count; k-- > 0;) {
         for (const double sign : {1.0, -1.0}) {
           bool better = false;
-          while (used < options_.evaluations) {
+          while (used < evaluations) {
             VectorXd y = x;
-            y.head(count) += sign * step * axes.col(k);
+            y(free) += sign * step * axes.col(k);
             const double value = objective(g, y);
             ++used;
             if (!(value > best)) break;
@@ -185,6 +230,7 @@ class TimedSearch {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> share(0.0, 1.0);
     VectorXd q(n_);
+    Eigen::MatrixX2d price;
     double worst = 0.0;
     constexpr int kSamples = 4000;
     for (int i = 0; i < kSamples; ++i) {
@@ -193,6 +239,7 @@ class TimedSearch {
         q[j] = r.lo + (r.hi - r.lo) * share(random);
       }
       worst = std::max(worst, weights_->largest_gain(q, potential.gradient(q)));
+      weights_->at(q, price);  // ramp_gain() sees this posture, too
     }
     return worst;
   }
@@ -204,7 +251,7 @@ class TimedSearch {
   Eigen::Index n_;
   std::unique_ptr<TimedWeights> weights_;
   TimeShares shares_;
-  Eigen::MatrixX2d active_;
+  Eigen::MatrixX2d active_, base_;
 };
 
 TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem,

@@ -2,7 +2,8 @@
 /// Lower bounds when time is short: of the energy at a given duration, and of the duration itself. By Lagrangian duality
 ///   E(T) >= V(lambda) - lambda T,   V = least of E + lambda T over all motions >= potential(end) - potential(start)
 /// for every potential whose slopes p satisfy max over admissible speeds v of p.v - power(q, v) <= lambda at every
-/// posture. Admissible: joint speeds, valve flows, pump flow; accelerations are left out, as are obstacles. Only slopes in
+/// posture. Admissible: joint speeds, valve flows, pump flow; accelerations count at a motion's two ends
+/// alone, obstacles not at all. Only slopes in
 /// a box |p_j| <= B_j(q) are used, so that the grid of optimizer/energy_bound.h serves; which box, is searched for.
 /// docs/energy_bound.md has the proof.
 #include "optimizer/energy_bound.h"
@@ -17,9 +18,9 @@ struct TimeShares {
   double energy_weight = 1.0;  ///< 1, or 0: energy is free, for the least duration
   Eigen::MatrixX2d
       share;  ///< [n x 2] >= 0, of each joint moving in + and - direction [-]; only ratios count
-  /// Coarser and smoother: the least demand at every flow, slopes the least price plus share x alpha / top speed. Kinks
-  /// cost a lattice most where time is very dear.
-  bool straight = false;
+  /// [2n x n] or empty: the logarithm of joint j's share in direction d (row 2j + d) grows by so much from one end of joint
+  /// k's range to the other; `share` is that in the middle of all ranges.
+  Eigen::MatrixXd tilt;
 };
 
 /// The price is met, and may be exceeded, by this share of it at the most: what stands for it is charged.
@@ -36,27 +37,37 @@ class TimedWeights final : public MoveWeights {
     shares_ = shares;
     ramp_gain_ = 0.0;
   }
-  /// Largest sum over joints of (B_j - W_j) a_j met by prices() since set_shares(), a_j the acceleration limit: near its
-  /// ends, where |v_j| <= a_j t, a motion gains at most this times t. [W/s]; [1/s] for the least duration
+  /// Near its ends, where |v_j| <= a_j t with a_j the acceleration limit, a motion gains at most this times t: the largest sum
+  /// over cylinders of (B_j - P A_j) a_j, each moving one asking for at most P, met by prices() since set_shares(). [W/s]; [1/s]
+  /// for the least duration
   double ramp_gain() const { return ramp_gain_; }
   /// False when a joint's cylinders are fed by different pumps: the inequality then is not covered.
   bool possible() const { return possible_; }
 
-  void prices(const double* force, const double* rate, Eigen::MatrixX2d& price) const override;
+  void prices(const double* q, const double* force, const double* rate,
+              Eigen::MatrixX2d& price) const override;
   /// max over v of p.v - power(q, v) [W] of slopes within the signs of p. @param slope by joint
   double largest_gain(const Eigen::VectorXd& q, const Eigen::VectorXd& slope);
 
- private:
+  /// What a joint asks for when it moves that way. @param direction 0 is +, 1 is -
   TimedMove move_of(int joint, int direction, const double* force, const double* rate) const;
-  void make_moves(const double* force, const double* rate) const;
+  const std::vector<double>& pump_flow() const { return pump_flow_; }
+  /// Posture as shares of the ranges from their middle, -0.5 to 0.5: what TimeShares::tilt counts in.
+  Eigen::VectorXd place_of(const double* q) const;
 
-  std::vector<Range> speed_, acceleration_;
+ private:
+  /// Moves that have a share, and those shares.
+  void make_moves(const double* q, const double* force, const double* rate) const;
+  double gain_from_rest() const;
+
+  std::vector<Range> position_, speed_, acceleration_;
   std::vector<double> pump_flow_, pump_standby_;
   TimeShares shares_;
   bool possible_ = true;
   mutable double ramp_gain_ = 0.0;
   mutable double alpha_ratio_ = 0.5;  // where the last root was found
   mutable std::vector<TimedMove> moves_;
+  mutable std::vector<double> move_share_;
   mutable LargestGain gain_;
 };
 

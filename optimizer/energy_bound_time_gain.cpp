@@ -99,10 +99,13 @@ double LargestGain::of_pump(double pump_flow) {
   double best = 0.0;
   for (std::size_t b = 0; b + 1 < breaks_.size(); ++b) {
     if (breaks_[b + 1] <= breaks_[b]) continue;
+    const double half = 0.5 * (breaks_[b + 1] - breaks_[b]);
     double most = 0.0;  // nothing in here can gain more
     for (std::size_t i = 0; i < order_.size(); ++i) {
-      flow_[i] = order_[i]->flow(breaks_[b], &growth_[i]);
-      const double at_end = flow_[i] + growth_[i] * (breaks_[b + 1] - breaks_[b]);
+      // seen from the middle: at a break itself rounding decides which of the two lines is met
+      const double middle = order_[i]->flow(breaks_[b] + half, &growth_[i]);
+      flow_[i] = middle - growth_[i] * half;
+      const double at_end = middle + growth_[i] * half;
       most += std::max(0.0, order_[i]->slope - breaks_[b]) * at_end;
     }
     if (most <= best) continue;

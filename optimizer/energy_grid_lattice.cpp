@@ -58,6 +58,14 @@ Eigen::VectorXd axis_lines(const Range& range, const std::vector<double>& on_lin
   return Eigen::Map<const Eigen::VectorXd>(lines.data(), static_cast<Eigen::Index>(lines.size()));
 }
 
+void LatticeForces::at(const Machine& machine, const Lattice& lattice, long node,
+                       double* force_there, double* rate_there) const {
+  for (std::size_t c = 0; c < length.size(); ++c) {
+    force_there[c] = static_cast<double>(force(static_cast<Eigen::Index>(c), node));
+    rate_there[c] = rate[c][lattice.line(node, machine.cylinders[c].joint)];
+  }
+}
+
 LatticeForces lattice_forces(const Machine& machine, const Lattice& lattice, double payload) {
   LatticeForces result;
   const int cylinders = machine.cylinder_count();

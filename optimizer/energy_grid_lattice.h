@@ -39,6 +39,10 @@ struct LatticeForces {
   std::vector<Eigen::VectorXd> length;  ///< by cylinder: x at the lines of the joint it drives [m]
   std::vector<Eigen::VectorXd> rate;    ///< by cylinder: dx/dq there
   std::vector<Range> range;             ///< [N] by cylinder, of the forces, widened by 2 %
+
+  /// Of one node. @param force [N] and rate by cylinder, filled
+  void at(const Machine& machine, const Lattice& lattice, long node, double* force_there,
+          double* rate_there) const;
 };
 
 /// @param machine that carries the loads (effective_machine())

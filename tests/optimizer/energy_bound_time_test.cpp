@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "models/machine_file.h"
 #include "models/model_file.h"
+#include "optimizer/energy_bound_time_guide.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/exact_energy.h"
 #include "problems/bundled.h"
@@ -90,6 +92,119 @@ TEST(TimedBound, NoAdmissibleSpeedGainsMoreThanItSays) {
       }
     }
     EXPECT_GT(nearest, 0.9) << reach << ": the largest gain is nearly met";
+  }
+}
+
+TEST(LargestGain, IsThatOfAFineScanOfPressures) {
+  // Most top flows lie between two knots of the demand: there the flow stops growing with the pressure.
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  LargestGain largest;
+  for (int trial = 0; trial < 300; ++trial) {
+    std::vector<TimedMove> moves(3);
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+      TimedMove& m = moves[i];
+      m.joint = static_cast<int>(i);
+      m.pump = 0;
+      m.area = 0.01;
+      m.standby = 22e5;
+      m.flow_step = 1e-4;
+      m.top = m.flow_step * (2.0 + 7.9 * unit(random));
+      m.slope = (60.0 + 60.0 * unit(random)) * 1e5;
+      double pressure = (40.0 + 30.0 * unit(random)) * 1e5;
+      const double rise = 3e5 * unit(random);
+      for (double& p : m.demand) p = pressure += rise * unit(random);
+    }
+    const std::vector<double> pump = {1.2e-3};
+    double best = 0.0;
+    for (double pressure = 22e5; pressure < 120e5; pressure += 0.05e5) {
+      std::vector<TimedMove> order = moves;
+      std::sort(order.begin(), order.end(),
+                [](const TimedMove& a, const TimedMove& b) { return a.slope > b.slope; });
+      double left = pump[0], gain = 0.0, growth = 0.0;
+      for (const TimedMove& m : order) {
+        if (!(m.slope > pressure)) break;
+        const double flow = std::min(left, m.flow(pressure, &growth));
+        gain += (m.slope - pressure) * flow;
+        left -= flow;
+      }
+      best = std::max(best, gain);
+    }
+    const double said = largest.of(moves, pump);
+    EXPECT_GE(said, best * (1.0 - 1e-9)) << trial;
+    EXPECT_LE(said, 1.01 * best + 1.0) << trial;  // a scan in steps of 0.05 bar misses that much
+  }
+}
+
+TEST(TimedBound, NoCornerOfABoxGainsMoreThanThePriceWhateverTheShares) {
+  const TimedCase c("loader_crane_lift");
+  constexpr int kJoints = 3;
+  const Lattice lattice = bound_lattice(c.problem, std::vector<int>(kJoints, 6));
+  const LatticeForces forces = lattice_forces(c.model.machine, lattice, c.problem.payload);
+  TimedWeights weights(c.model, c.problem, c.model.machine, forces.range);
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  TimeShares shares;
+  shares.price = 2000.0;
+  shares.share = Eigen::MatrixX2d::Ones(kJoints, 2);
+  double least = shares.price;
+  for (int trial = 0; trial < 40; ++trial) {
+    shares.tilt =
+        Eigen::MatrixXd::NullaryExpr(2 * kJoints, kJoints, [&] { return 3.0 * unit(random); });
+    weights.set_shares(shares);
+    VectorXd q(kJoints);
+    for (int j = 0; j < kJoints; ++j) {
+      const Range& r = c.problem.limits.position[static_cast<std::size_t>(j)];
+      q[j] = r.lo + (r.hi - r.lo) * (0.5 + 0.5 * unit(random));
+    }
+    Eigen::MatrixX2d price;
+    weights.at(q, price);
+    double most = 0.0;  // one of the corners uses the price up
+    for (unsigned corner = 0; corner < 1u << kJoints; ++corner) {
+      VectorXd p(kJoints);
+      for (int j = 0; j < kJoints; ++j) {
+        p[j] = (corner >> j & 1u) != 0 ? price(j, 0) : -price(j, 1);
+      }
+      most = std::max(most, weights.largest_gain(q, p));
+    }
+    EXPECT_LE(most, shares.price * (1.0 + kPriceTolerance + 1e-6)) << trial;
+    least = std::min(least, most);
+  }
+  EXPECT_GT(least, 0.99 * shares.price);
+}
+
+TEST(TimedBound, RampsGainWhatSpeedsThatGrowFromRestGain) {
+  const TimedCase c("loader_crane_lift");
+  constexpr int kJoints = 3;
+  const Lattice lattice = bound_lattice(c.problem, std::vector<int>(kJoints, 6));
+  const LatticeForces forces = lattice_forces(c.model.machine, lattice, c.problem.payload);
+  TimedWeights weights(c.model, c.problem, c.model.machine, forces.range);
+  TimeShares shares;
+  shares.price = 3000.0;
+  shares.share = Eigen::MatrixX2d::Ones(kJoints, 2);
+  std::vector<double> force(forces.length.size()), rate(forces.length.size());
+  LargestGain largest;
+  for (long node = 0; node < lattice.nodes; node += 7) {
+    weights.set_shares(shares);
+    forces.at(c.model.machine, lattice, node, force.data(), rate.data());
+    const VectorXd q = lattice.posture(node);
+    Eigen::MatrixX2d price(kJoints, 2);
+    weights.prices(q.data(), force.data(), rate.data(), price);
+    constexpr double kTime = 1e-4;  // short: flows ask for hardly more than none does
+    std::vector<TimedMove> moves;
+    moves.reserve(2 * kJoints);
+    for (int j = 0; j < kJoints; ++j) {
+      for (const int direction : {0, 1}) {
+        TimedMove m = weights.move_of(j, direction, force.data(), rate.data());
+        m.slope = price(j, direction) / m.area;
+        const Range& a = c.problem.limits.acceleration[static_cast<std::size_t>(j)];
+        m.top = std::min(m.top, m.area * a.hi * kTime);
+        moves.push_back(m);
+      }
+    }
+    const double gain = largest.of(moves, weights.pump_flow()) / kTime;
+    EXPECT_LE(gain, weights.ramp_gain() * (1.0 + 1e-6)) << node;
+    EXPECT_GE(gain, 0.97 * weights.ramp_gain()) << node;
   }
 }
 
@@ -240,6 +355,33 @@ struct Rail {
     }
   }
 };
+
+TEST(TimeGuide, KnowsWhatOneSledCostsWithItsTime) {
+  Rail rail(1);
+  rail.problem.goal = JointGoal{VectorXd::Constant(1, 1.0)};
+  const Lattice coarse = bound_lattice(rail.problem, {4});
+  const LatticeForces forces = lattice_forces(rail.problem.machine, coarse, 0.0);
+  TimedWeights weights(rail.model, rail.problem, rail.problem.machine, forces.range);
+  TimeShares one;
+  one.share = Eigen::MatrixX2d::Ones(1, 2);
+  weights.set_shares(one);
+  TimeGuide guide(rail.problem.machine, rail.problem, weights, {20});
+  const double area = rail.problem.machine.cylinders[0].area_piston();
+  for (const double price : {500.0, 5000.0, 50000.0}) {
+    double best =
+        std::numeric_limits<double>::infinity();  // over one metre, the best of 400 speeds
+    for (int k = 1; k <= 400; ++k) {
+      const double v = 0.2 * k / 400;
+      const double pressure = rail.model.cylinders[0].extend.mean(area * v, 0.0);
+      best = std::min(best, area * pressure + price / v);
+    }
+    EXPECT_NEAR(guide.solve(price), best, 0.01 * best) << price;
+    const TimeShares found = guide.shares(one);
+    EXPECT_NEAR(found.share(0, 0), 1.0, 0.01) << "it alone uses the price up";
+    EXPECT_EQ(found.share(0, 1), 0.0) << "it never goes back";
+    EXPECT_LT(found.tilt.cwiseAbs().maxCoeff(), 0.02) << "the same everywhere";
+  }
+}
 
 TEST(TimedBound, KnowsThePriceOfHasteOfOneCylinder) {
   Rail rail(1);

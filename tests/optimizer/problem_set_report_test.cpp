@@ -63,6 +63,18 @@ TEST(ProblemSetReport, DistanceFromTheUnlimitedTimeIsThatOfLongTimes) {
   EXPECT_THAT(text, HasSubstr("2.0 .. 3.0    |   1 |   1 |"));
 }
 
+TEST(ProblemSetReport, CountsByTheFineLatticeAndByThePathInItsOwnTime) {
+  bench::ReachFigures coarse = solved_in(1.5, 0.10), loose = solved_in(1.5, 0.10);
+  coarse.slow_bound = 0.9 * coarse.unlimited;  // not tight by its slow path
+  coarse.grid_path = 1.03 * coarse.bound;
+  loose.bound = 95e3;
+  loose.grid_path = 1.05 * loose.bound;
+  bench::ReachFigures none = solved_in(1.5, 0.10);
+  none.grid_path = 0.0;  // no path of the grid keeps all limits in that time
+  const std::string text = printed({coarse, loose, none}, true);
+  EXPECT_THAT(text, HasSubstr("within 2 % of the bound: 1 of 2 where the lattice is fine, 1 of 1"));
+}
+
 TEST(ProblemSetReport, WhatIsLeftOutIsNeitherPrintedNorCounted) {
   bench::ReachFigures out;
   out.left_out = true;
