@@ -60,11 +60,18 @@ class TimedSearch {
         balanced_cells(first.losses(), rough.lattice, static_cast<double>(options_.search_nodes));
     const TimedGrid small = grid(few);
     x = best_shares(small, x, options_.evaluations, std::log(4.0));
-    x = along_the_way(small, x);
-    set(x);
-    const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
-    return certified(
-        grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
+    TimedBound bound;
+    bound.value = -1.0;
+    for (const Found& found :
+         along_the_way(small, x)) {  // the small grid's best need not be the fine one's
+      base_ = found.base;
+      set(found.x);
+      const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
+      TimedBound one = certified(
+          grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
+      if (one.value > bound.value) bound = std::move(one);
+    }
+    return bound;
   }
 
  private:
@@ -78,12 +85,17 @@ class TimedSearch {
     return g;
   }
 
-  /// Shares that change along the way: searched on from those of dynamic programming or from constant ones, whichever is
-  /// better. @param x constant shares and the price
-  VectorXd along_the_way(const TimedGrid& g, const VectorXd& x) {
+  struct Found {
+    Eigen::MatrixX2d base;  ///< what the shares of x stand beside
+    VectorXd x;
+  };
+
+  /// Shares that change along the way: searched on from those of dynamic programming and, where those are not better to
+  /// begin with, from constant ones too. @param x constant shares and the price
+  std::vector<Found> along_the_way(const TimedGrid& g, const VectorXd& x) {
     const double constant = objective(g, x), price = shares_.price;
     constexpr double kHaste = 0.01;  // with less the slow bound is as good
-    if (energy_weight_ > 0.0 && price * duration_ < kHaste * constant) return x;
+    if (energy_weight_ > 0.0 && price * duration_ < kHaste * constant) return {{base_, x}};
     TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
     double guide_price = price;
     if (energy_weight_ > 0.0) {  // the price at which the guide's own bound is the largest
@@ -103,16 +115,24 @@ class TimedSearch {
     guide.solve(guide_price);
     const TimeShares found = guide.shares(shares_);
     const Eigen::MatrixX2d constant_base = base_;
-    base_ = found.share;
-    VectorXd y(n_ + 1 + 2 * n_ * n_);
-    y << VectorXd::Zero(n_), std::log(guide_price), found.tilt.reshaped();
-    if (!(found.share.maxCoeff() > 0.0) || !(objective(g, y) > constant)) {
-      base_ = constant_base;
-      y << x, VectorXd::Zero(2 * n_ * n_);
-    }
     constexpr double kStep = 0.7;
     constexpr int kTimes = 3;
-    return best_shares(g, y, kTimes * options_.evaluations, kStep);
+    const auto searched = [&](const Eigen::MatrixX2d& base, const VectorXd& from) -> Found {
+      base_ = base;
+      return {base, best_shares(g, from, kTimes * options_.evaluations, kStep)};
+    };
+    std::vector<Found> all;
+    bool better = false;
+    VectorXd y(n_ + 1 + 2 * n_ * n_);
+    if (found.share.maxCoeff() > 0.0) {
+      y << VectorXd::Zero(n_), std::log(guide_price), found.tilt.reshaped();
+      base_ = found.share;
+      better = objective(g, y) > constant;
+      all.push_back(searched(found.share, y));
+    }
+    y << x, VectorXd::Zero(2 * n_ * n_);
+    if (!better) all.push_back(searched(constant_base, y));
+    return all;
   }
 
   int guide_cells() const { return n_ == 1 ? 60 : n_ == 2 ? 40 : n_ == 3 ? 10 : 5; }

@@ -206,7 +206,10 @@ TEST_F(Cli, BoundSaysForWhichMotions) {
     EXPECT_LT(r.at("lower_bound_J"), r.at("energy_exact_J"));
     // the solver starts from such paths and only makes them cheaper; a finer grid gains less than a percent
     EXPECT_GT(r.at("grid_path_energy_exact_J"), 0.99 * r.at("energy_exact_J").get<double>());
-    EXPECT_GT(r.at("unlimited_time_J"), 0.99 * r.at("lower_bound_J").get<double>());
+    // a slow motion, so no measure of a bound for motions in a hurry
+    if (r.at("lower_bound_time_s").is_null()) {
+      EXPECT_GT(r.at("unlimited_time_J"), r.at("lower_bound_J"));
+    }
     EXPECT_THAT(o.out, HasSubstr("dynamic programming"));
     EXPECT_THAT(o.out, HasSubstr("at unlimited time"));
     r["text"] = o.out;

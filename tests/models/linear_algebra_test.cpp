@@ -46,6 +46,13 @@ TEST(LinearAlgebra, LeastSquaresOfLeastNormWithoutFullRank) {
   }
 }
 
+TEST(LinearAlgebra, OfNothingTheLeastNormIsZero) {
+  const VectorXd x = least_squares_of_least_norm(MatrixXd::Zero(4, 3), VectorXd::Ones(4));
+  EXPECT_EQ(x, VectorXd::Zero(3));
+  const MatrixXd none = least_norm_columns(MatrixXd(5, 0), MatrixXd(0, 2));
+  EXPECT_EQ(none, MatrixXd::Zero(5, 2));
+}
+
 TEST(LinearAlgebra, ComplementAndSpanMakeUpTheSpace) {
   MatrixXd a = normal_matrix(6, 3, 6);
   a.col(2) = a.col(0) - 2.0 * a.col(1);
