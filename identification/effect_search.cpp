@@ -281,6 +281,11 @@ SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt
     if (tracing()) fmt::print(stderr, "  others lead the pump with what was found\n");
     led = std::move(result.led);
   }
+  // what was to lead did not stand its proofs: then those lead who lead without it
+  if (led && !adds_demand(*led, result.found)) {
+    led.reset();
+    result = Search(evidence, candidates, options, progress, false).run();
+  }
   if (led) {
     result.null = std::move(first.null);
     result.ranking = std::move(first.ranking);

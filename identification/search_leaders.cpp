@@ -6,6 +6,24 @@
 #include "identification/pump_leaders.h"
 
 namespace sparflow {
+namespace {
+
+bool adds_demand(const Evidence& evidence, std::span<const AppliedEffect> effects) {
+  const auto first = evidence.series.begin();
+  return std::any_of(
+      first, first + static_cast<std::ptrdiff_t>(evidence.suspects),
+      [&](const MachineSeries& s) { return asked_by_effects(effects, s).rows() > 0; });
+}
+
+}  // namespace
+
+bool adds_demand(const Evidence& evidence, const std::vector<FoundEffect>& found) {
+  std::vector<AppliedEffect> acting;
+  acting.reserve(found.size());
+  for (const FoundEffect& f : found)
+    acting.push_back({f.design.effect.effect, f.design.effect.at, f.values, {}, {}});
+  return adds_demand(evidence, std::span<const AppliedEffect>(acting));
+}
 
 std::vector<EffectDesign> remade(const Evidence& evidence,
                                  const std::vector<EffectDesign>& designs) {
@@ -40,13 +58,7 @@ std::optional<Evidence> led_by_found(const SearchState& search,
   for (const FoundEffect& f : found) designs.push_back(f.design);
   std::vector<AppliedEffect> acting = applied_effects(designs, fit.theta);
   const Evidence& given = search.evidence;
-  if (std::none_of(given.series.begin(),
-                   given.series.begin() + static_cast<std::ptrdiff_t>(given.suspects),
-                   [&](const MachineSeries& s) {
-                     return asked_by_effects({&acting.back(), 1}, s).rows() > 0;
-                   })) {
-    return {};
-  }
+  if (!adds_demand(given, std::span<const AppliedEffect>(&acting.back(), 1))) return {};
   std::optional<Evidence> led;
   double total = fit.total();
   for (int turn = 0; turn < kTurns; ++turn) {

@@ -13,6 +13,9 @@ namespace sparflow {
 std::optional<Evidence> led_by_found(const SearchState& search,
                                      const std::vector<FoundEffect>& found, const EffectFit& fit);
 
+/// Whether any of them adds to what a cylinder asks of its pump in the suspect logs.
+bool adds_demand(const Evidence& evidence, const std::vector<FoundEffect>& found);
+
 /// The same designs on other evidence of the same logs and channels.
 std::vector<EffectDesign> remade(const Evidence& evidence,
                                  const std::vector<EffectDesign>& designs);

@@ -143,6 +143,17 @@ TEST(PumpLeaders, ASearchFollowsThem) {
   EXPECT_GT(std::abs(without_effects(*r.led).total() - r.null.total()), 5.0);
 }
 
+TEST(PumpLeaders, WhatIsNotNamedDoesNotLead) {
+  const LossyCrane& crane = lossy();
+  const Evidence e = collect_evidence(crane.model, {crane.signals});
+  SearchOptions options;
+  options.smallest_effect = 1e300;  // whatever is found is too small to matter
+  const SearchResult r = search_effects(e, pump_effects(crane.machine), options);
+  EXPECT_TRUE(r.found.empty());
+  EXPECT_FALSE(r.led.has_value());
+  EXPECT_NEAR(r.final.total(), without_effects(e).total(), 1.0);
+}
+
 TEST(PumpLeaders, ADiagnosisSaysTheErrorThatThereIsWithoutIt) {
   const LossyCrane& crane = lossy();
   DiagnoseOptions options;
