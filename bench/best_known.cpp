@@ -4,8 +4,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow::bench {
 

@@ -11,8 +11,8 @@
 #include <set>
 
 #include "identification/extend.h"
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
 #include "problems/bundled.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 #include "simulator/hidden_effects/random_machine.h"

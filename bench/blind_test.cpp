@@ -15,7 +15,7 @@
 
 #include "bench/blind_table.h"
 #include "bench/program_options.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace {
 

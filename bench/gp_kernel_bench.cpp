@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "models/gp_kernel.h"
+#include "models/hydraulics/gp_kernel.h"
 
 namespace {
 

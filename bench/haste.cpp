@@ -8,7 +8,7 @@
 
 #include "bench/haste_case.h"
 #include "bench/program_options.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/child_processes.h"
 #include "optimizer/strategies_statistics.h"
 

@@ -10,7 +10,7 @@
 #include <random>
 
 #include "identification/fit.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 

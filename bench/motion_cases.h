@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "problems/problem.h"
 
 namespace sparflow::bench {

@@ -15,7 +15,7 @@
 #include "bench/motion_speed_derivatives.h"
 #include "bench/planned_seeds.h"
 #include "bench/program_options.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/energy_grid.h"
 #include "problems/time_parametrise.h"
 

@@ -17,9 +17,9 @@ std::shared_ptr<KnotModel> with_adolc(const CraneModel& /*model*/, const MotionP
 #include <numeric>
 #include <vector>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace Eigen {
 template <>
@@ -169,7 +169,7 @@ adouble excess(const adouble& x, double bend) {
   return out;
 }
 
-/// The process, and beyond the learned loads what models/loads_beyond.h says: both sides at once, since within them either's
+/// The process, and beyond the learned loads what models/hydraulics/loads_beyond.h says: both sides at once, since within them either's
 /// share is nothing.
 adouble mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
   const GpParameters& p = process.parameters();

@@ -7,7 +7,7 @@
 #include "bench/best_known.h"
 #include "bench/problem_set_report.h"
 #include "bench/program_options.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/child_processes.h"
 
 namespace sparflow::bench {

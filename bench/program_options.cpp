@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::bench {
 

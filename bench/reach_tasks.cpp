@@ -8,9 +8,9 @@
 #include <random>
 #include <sstream>
 
-#include "models/kinematics.h"
-#include "models/model_file.h"
-#include "models/sha256.h"
+#include "models/files/model_file.h"
+#include "models/machine/kinematics.h"
+#include "models/math/sha256.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/reference_model.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::bench {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "models/gp_kernel.h"
+#include "models/hydraulics/gp_kernel.h"
 #include "optimizer/transcription.h"
 
 namespace sparflow::bench {

@@ -10,7 +10,7 @@
 
 #include "bench/program_options.h"
 #include "bench/reference_model.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/ipopt_solver.h"
 
 namespace {

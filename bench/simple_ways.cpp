@@ -8,8 +8,8 @@
 #include "identification/effect_intervals.h"
 #include "identification/effect_search.h"
 #include "identification/fit.h"
-#include "models/error.h"
-#include "models/linear_algebra.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow::bench {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "identification/learn_pressure.h"
 #include "identification/signals.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 
 namespace {
 

@@ -8,8 +8,8 @@
 #include "identification/smoothing.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
-#include "models/nan.h"
-#include "models/return_rise.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

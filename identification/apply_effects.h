@@ -1,7 +1,7 @@
 #pragma once
 /// A model's effects on a log: what each stage of fitting and comparing adds to the law without effects.
 #include "identification/signals.h"
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 namespace sparflow {
 

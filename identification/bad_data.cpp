@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "identification/bad_data_checks.h"
-#include "models/linkage.h"
-#include "models/units.h"
+#include "models/machine/linkage.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "identification/robust.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

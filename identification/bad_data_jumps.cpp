@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "identification/bad_data_checks.h"
-#include "identification/robust.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "identification/robust.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

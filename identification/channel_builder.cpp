@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/robust.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

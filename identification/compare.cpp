@@ -8,9 +8,9 @@
 
 #include "identification/apply_effects.h"
 #include "identification/compare_stages.h"
-#include "models/error.h"
-#include "models/nan.h"
-#include "models/units.h"
+#include "models/math/error.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -18,7 +18,7 @@
 #include "identification/signals.h"
 #include "identification/stage_at_fault.h"
 #include "identification/worst_segments.h"
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 namespace sparflow {
 

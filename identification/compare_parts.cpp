@@ -8,8 +8,8 @@
 #include <set>
 
 #include "identification/compare.h"
-#include "identification/robust.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "identification/compare.h"
 #include "identification/report_numbers.h"
-#include "models/units.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "identification/apply_effects.h"
-#include "models/nan.h"
-#include "models/units.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 

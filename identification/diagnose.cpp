@@ -11,9 +11,9 @@
 #include "identification/effect_estimate.h"
 #include "identification/effect_proof.h"
 #include "identification/experiment.h"
-#include "identification/robust.h"
 #include "identification/unexplained.h"
-#include "models/error.h"
+#include "models/math/error.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

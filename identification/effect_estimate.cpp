@@ -11,7 +11,7 @@
 #include "identification/search_candidates.h"
 #include "identification/search_leaders.h"
 #include "identification/series.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

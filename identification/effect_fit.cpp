@@ -5,7 +5,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "identification/effect_proof.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -9,10 +9,10 @@
 #include "identification/channel_builder.h"
 #include "identification/low_pass.h"
 #include "identification/pump_leaders.h"
-#include "identification/robust.h"
 #include "identification/series.h"
 #include "models/effects/hydraulics.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

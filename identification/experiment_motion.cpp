@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "identification/experiment.h"
-#include "models/static_force.h"
-#include "models/units.h"
+#include "models/machine/static_force.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "identification/extend_workshop.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

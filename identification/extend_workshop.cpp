@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

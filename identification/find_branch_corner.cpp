@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "models/linear_algebra.h"
-#include "models/return_rise.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
-/// Finds where a supply pressure goes from the counterbalance valve's branch to the static one (models/branch_corner.h).
+/// Finds where a supply pressure goes from the counterbalance valve's branch to the static one (models/hydraulics/branch_corner.h).
 #include "identification/learn_pressure.h"
-#include "models/branch_corner.h"
-#include "models/machine.h"
+#include "models/hydraulics/branch_corner.h"
+#include "models/machine/machine.h"
 
 namespace sparflow {
 

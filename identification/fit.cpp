@@ -8,7 +8,7 @@
 
 #include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -9,8 +9,8 @@
 #include "identification/find_branch_corner.h"
 #include "identification/fit_pass.h"
 #include "identification/learn_loads_beyond.h"
-#include "identification/robust.h"
-#include "models/return_rise.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "identification/fit.h"
-#include "models/units.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "identification/apply_effects.h"
 #include "identification/fit_pass.h"
-#include "models/error.h"
-#include "models/units.h"
+#include "models/math/error.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

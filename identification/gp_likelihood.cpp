@@ -4,9 +4,9 @@
 #include <limits>
 #include <numbers>
 
-#include "models/error.h"
-#include "models/gp_kernel.h"
-#include "models/linear_algebra.h"
+#include "models/hydraulics/gp_kernel.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

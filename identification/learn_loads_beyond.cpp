@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "identification/robust.h"
-#include "models/linear_algebra.h"
-#include "models/return_rise.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

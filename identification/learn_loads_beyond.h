@@ -1,9 +1,9 @@
 #pragma once
-/// What a learned pressure says beyond the loads it has seen (models/loads_beyond.h), from the same samples.
+/// What a learned pressure says beyond the loads it has seen (models/hydraulics/loads_beyond.h), from the same samples.
 #include <optional>
 
 #include "identification/learn_pressure.h"
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow {
 

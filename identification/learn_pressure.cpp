@@ -14,8 +14,8 @@
 #include "identification/gp_likelihood.h"
 #include "identification/gp_screening.h"
 #include "identification/sparse_gp.h"
-#include "models/error.h"
-#include "models/linear_algebra.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

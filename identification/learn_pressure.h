@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "models/gaussian_process.h"
+#include "models/hydraulics/gaussian_process.h"
 
 namespace sparflow {
 

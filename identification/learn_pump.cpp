@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/robust.h"
-#include "models/error.h"
+#include "models/math/error.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "identification/robust.h"
-#include "models/error.h"
-#include "models/linear_algebra.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -13,8 +13,8 @@
 #include "identification/log_mapping.h"
 #include "identification/log_matlab.h"
 #include "identification/log_time.h"
-#include "models/error.h"
-#include "models/sha256.h"
+#include "models/math/error.h"
+#include "models/math/sha256.h"
 
 namespace sparflow {
 namespace {

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "models/linkage.h"
-#include "models/nan.h"
-#include "models/static_force.h"
-#include "models/units.h"
+#include "models/machine/linkage.h"
+#include "models/machine/static_force.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "identification/log_dialect.h"
-#include "models/error.h"
-#include "models/units.h"
+#include "models/math/error.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

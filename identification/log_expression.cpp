@@ -9,7 +9,7 @@
 
 #include "identification/log_mapping.h"
 #include "identification/text_encoding.h"
-#include "models/units.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/yaml_reader.h"
+#include "models/yaml/yaml_reader.h"
 
 namespace sparflow {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "identification/smoothing.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

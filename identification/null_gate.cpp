@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

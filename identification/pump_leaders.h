@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "models/effects/series.h"
 
 namespace sparflow {

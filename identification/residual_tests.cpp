@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "models/nan.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

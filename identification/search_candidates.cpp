@@ -5,8 +5,8 @@
 #include <iterator>
 #include <utility>
 
-#include "identification/parallel.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "identification/parallel.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {

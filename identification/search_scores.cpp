@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "identification/effect_proof.h"
-#include "identification/parallel.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {

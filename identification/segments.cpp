@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

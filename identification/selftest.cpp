@@ -9,7 +9,7 @@
 
 #include "identification/null_gate.h"
 #include "identification/selftest_study.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "identification/effect_intervals.h"
 #include "identification/effect_proof.h"
-#include "identification/parallel.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {

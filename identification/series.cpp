@@ -5,8 +5,8 @@
 
 #include "identification/pump_leaders.h"
 #include "models/effects/memory.h"
-#include "models/error.h"
-#include "models/nan.h"
+#include "models/math/error.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

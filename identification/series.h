@@ -1,7 +1,7 @@
 #pragma once
 /// A log's signals as the physical effects see them, and what a model's effects say about a log.
 #include "identification/signals.h"
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "models/effects/series.h"
 
 namespace sparflow {

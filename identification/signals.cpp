@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linkage.h"
-#include "models/nan.h"
-#include "models/static_force.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/machine/static_force.h"
+#include "models/math/error.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

@@ -8,7 +8,7 @@
 #include "identification/log.h"
 #include "identification/segments.h"
 #include "identification/smoothing.h"
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow {
 

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "identification/log_time.h"
-#include "models/error.h"
-#include "models/linear_algebra.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

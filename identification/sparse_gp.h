@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "identification/gp_likelihood.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 

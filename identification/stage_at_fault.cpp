@@ -7,8 +7,8 @@
 
 #include "identification/apply_effects.h"
 #include "identification/compare.h"
-#include "identification/robust.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

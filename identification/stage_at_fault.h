@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 namespace sparflow {
 

@@ -9,10 +9,10 @@
 #include <optional>
 #include <random>
 
-#include "identification/parallel.h"
-#include "identification/robust.h"
 #include "identification/unexplained_time.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/parallel.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

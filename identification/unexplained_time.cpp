@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "identification/robust.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

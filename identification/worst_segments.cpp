@@ -8,7 +8,7 @@
 #include <set>
 
 #include "identification/compare.h"
-#include "identification/robust.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <variant>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "models/machine.h"
-#include "models/trajectory.h"
+#include "models/machine/machine.h"
+#include "models/machine/trajectory.h"
 
 namespace sparflow {
 

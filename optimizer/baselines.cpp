@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linear_algebra.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 #include "problems/motion_limits.h"
 #include "problems/time_parametrise.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <map>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 #include "optimizer/baselines.h"
 #include "optimizer/phases.h"
 #include "problems/clearance.h"

@@ -13,7 +13,7 @@
 #include <cstring>
 #include <exception>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "models/effects/effective_machine.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/crane_knot_units.h"
 
 namespace sparflow {

@@ -1,14 +1,14 @@
 #pragma once
 /// The machine as a KnotModel: power of its pumps under the smooth law and every limit that is not a plain
 /// bound (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks. A model's
-/// effects are in it: masses and angles in the forces, laws by models/smooth_effects.h, limits in the rows.
+/// effects are in it: masses and angles in the forces, laws by models/chain/smooth_effects.h, limits in the rows.
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "models/crane_model.h"
-#include "models/smooth_effects.h"
-#include "models/smooth_power.h"
+#include "models/chain/crane_model.h"
+#include "models/chain/smooth_effects.h"
+#include "models/chain/smooth_power.h"
 #include "optimizer/knot_model.h"
 #include "problems/clearance.h"
 #include "problems/problem.h"

@@ -2,7 +2,7 @@
 /// What the files of CraneKnotModel share: the units its rows and costs are scaled to.
 #include <limits>
 
-#include "models/effects/jet.h"
+#include "models/math/jet.h"
 
 namespace sparflow::knot_units {
 

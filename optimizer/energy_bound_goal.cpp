@@ -4,8 +4,8 @@
 #include <cmath>
 #include <queue>
 
-#include "models/kinematics.h"
-#include "models/linear_algebra.h"
+#include "models/machine/kinematics.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "models/error.h"
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

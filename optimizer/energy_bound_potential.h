@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 #include "optimizer/energy_grid_lattice.h"
 #include "optimizer/energy_grid_table.h"
 

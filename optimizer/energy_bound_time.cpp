@@ -6,7 +6,7 @@
 #include <random>
 
 #include "models/effects/effective_machine.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "optimizer/energy_bound_goal.h"
 #include "optimizer/energy_bound_time_guide.h"
 #include "optimizer/energy_grid.h"

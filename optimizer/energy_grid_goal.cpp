@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/kinematics.h"
-#include "models/linear_algebra.h"
+#include "models/machine/kinematics.h"
+#include "models/math/linear_algebra.h"
 #include "optimizer/sequential_modes.h"
 
 namespace sparflow {

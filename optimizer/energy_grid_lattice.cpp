@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
-#include "models/linkage.h"
-#include "models/static_force.h"
+#include "models/machine/linkage.h"
+#include "models/machine/static_force.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 

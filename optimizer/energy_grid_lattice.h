@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 #include "problems/problem.h"
 
 namespace sparflow {

@@ -2,7 +2,7 @@
 /// What straight moves in joint space cost under the quasi-static law, and a path made of few of them.
 #include <vector>
 
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 #include "optimizer/energy_grid_table.h"
 
 namespace sparflow {

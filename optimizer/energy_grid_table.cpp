@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "models/effects/effective_machine.h"
-#include "models/error.h"
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

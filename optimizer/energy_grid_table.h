@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <array>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "problems/problem.h"
 
 namespace sparflow {

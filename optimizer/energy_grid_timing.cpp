@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/exact_energy.h"
 #include "optimizer/transcription.h"

@@ -2,7 +2,7 @@
 /// Speeds along a path of straight legs: a ramp, a constant speed and a ramp in each, the same times for all joints.
 #include <Eigen/Dense>
 
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 #include "optimizer/crane_knot_model.h"
 
 namespace sparflow {

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "models/effects/effective_machine.h"
-#include "models/units.h"
+#include "models/math/units.h"
 #include "optimizer/crane_knot_model.h"
 #include "optimizer/instants.h"
 #include "problems/clearance.h"

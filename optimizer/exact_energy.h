@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "models/crane_model.h"
-#include "models/trajectory.h"
+#include "models/chain/crane_model.h"
+#include "models/machine/trajectory.h"
 #include "problems/problem.h"
 
 namespace sparflow {

@@ -2,7 +2,7 @@
 /// The instants at which a motion is judged by the exact law.
 #include <Eigen/Core>
 
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 
 namespace sparflow {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 /// Modes read off a smooth motion: which cylinder moves, in which direction, in which interval.
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 #include "optimizer/crane_knot_model.h"
 #include "optimizer/transcription.h"
 

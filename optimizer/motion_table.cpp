@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
-#include "models/error.h"
-#include "models/units.h"
+#include "models/math/error.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -2,8 +2,8 @@
 /// The motion file (CSV) of the contract: what the optimiser found, with everything the exact law says of it.
 #include <string>
 
-#include "models/crane_model.h"
-#include "models/trajectory.h"
+#include "models/chain/crane_model.h"
+#include "models/machine/trajectory.h"
 
 namespace sparflow {
 

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/child_processes.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/optimize_outcome.h"

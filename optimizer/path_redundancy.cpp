@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/self_motion.h"
 #include "problems/clearance.h"
 #include "problems/motion_limits.h"

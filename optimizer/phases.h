@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 #include "optimizer/crane_knot_model.h"
 
 namespace sparflow {

@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 #include "problems/problem.h"
 
 namespace sparflow {

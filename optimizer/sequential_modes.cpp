@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "models/effects/effective_machine.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "optimizer/exact_energy.h"
 #include "problems/clearance.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/instants.h"
 #include "optimizer/optimize_outcome.h"
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <unordered_map>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 

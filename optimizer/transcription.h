@@ -13,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 #include "optimizer/knot_model.h"
 #include "optimizer/nlp/nlp_problem.h"
 

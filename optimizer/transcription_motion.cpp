@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/transcription.h"
 
 namespace sparflow {

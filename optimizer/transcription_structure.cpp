@@ -6,7 +6,7 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/transcription.h"
 
 namespace sparflow {

@@ -1,7 +1,7 @@
 // Free durations of phases: what they add to gradient and Hessian.
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/transcription.h"
 
 namespace sparflow {

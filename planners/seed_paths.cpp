@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "planners/configuration_space.h"
 #include "planners/ompl_query.h"
 #include "planners/tip_goal.h"

@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linear_algebra.h"
+#include "models/machine/kinematics.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

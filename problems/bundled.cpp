@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 // Set by the build: the `problems` folder of the source tree, and where `cmake --install` puts its copy.
 #ifndef SPARFLOW_SOURCE_DATA

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "models/kinematics.h"
-#include "models/trajectory.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/trajectory.h"
 #include "problems/obstacle_distance.h"
 #include "problems/problem.h"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "models/file_quantities.h"
+#include "models/files/file_quantities.h"
 
 namespace sparflow {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 /// One entry of a problem file's `obstacles`.
-#include "models/yaml_reader.h"
+#include "models/yaml/yaml_reader.h"
 #include "problems/problem.h"
 
 namespace sparflow {

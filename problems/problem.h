@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow {
 

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <limits>
 
-#include "models/file_quantities.h"
-#include "models/kinematics.h"
-#include "models/machine_file.h"
-#include "models/yaml_reader.h"
+#include "models/files/file_quantities.h"
+#include "models/files/machine_file.h"
+#include "models/machine/kinematics.h"
+#include "models/yaml/yaml_reader.h"
 #include "problems/bundled.h"
 #include "problems/obstacle_file.h"
 

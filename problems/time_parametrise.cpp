@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "problems/clearance.h"
 
 namespace sparflow {

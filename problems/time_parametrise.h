@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <string>
 
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 #include "problems/motion_limits.h"
 #include "problems/problem.h"
 

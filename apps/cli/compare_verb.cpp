@@ -4,9 +4,9 @@
 
 #include "apps/cli/context.h"
 #include "apps/report/compare_page.h"
-#include "models/error.h"
-#include "models/machine_file.h"
-#include "models/model_file.h"
+#include "models/files/machine_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

@@ -12,11 +12,11 @@
 #include <filesystem>
 #include <new>
 
-#include "models/effects/user_effect.h"
-#include "models/error.h"
-#include "models/machine_check.h"
-#include "models/machine_file.h"
-#include "models/model_file.h"
+#include "models/effects/formula/user_effect.h"
+#include "models/files/machine_file.h"
+#include "models/files/model_file.h"
+#include "models/machine/machine_check.h"
+#include "models/math/error.h"
 #include "optimizer/exact_energy.h"
 #include "optimizer/transcription.h"
 #include "problems/problem_file.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "identification/log.h"
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "optimizer/optimize.h"
 #include "planners/seed_paths.h"
 

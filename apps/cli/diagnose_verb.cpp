@@ -6,7 +6,7 @@
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/diagnose_page.h"
 #include "identification/extend.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

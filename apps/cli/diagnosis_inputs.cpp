@@ -6,7 +6,7 @@
 #include <chrono>
 #include <ctime>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "apps/cli/context.h"
 #include "models/effects/effect_text.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

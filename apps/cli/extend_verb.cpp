@@ -3,8 +3,8 @@
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/improve_page.h"
 #include "identification/extend.h"
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

@@ -6,10 +6,10 @@
 #include "apps/cli/context.h"
 #include "apps/report/compare_page.h"
 #include "identification/fit.h"
-#include "models/error.h"
-#include "models/machine_file.h"
-#include "models/model_file.h"
-#include "models/units.h"
+#include "models/files/machine_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
+#include "models/math/units.h"
 
 namespace sparflow::cli {
 namespace {

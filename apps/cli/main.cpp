@@ -3,8 +3,8 @@
 #include <exception>
 
 #include "apps/cli/context.h"
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 int main(int argc, char** argv) {
   using namespace sparflow;

@@ -4,7 +4,7 @@
 
 #include "apps/cli/context.h"
 #include "apps/report/motion_page.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/driven_grid_path.h"
 #include "optimizer/energy_bound_time.h"
 #include "optimizer/motion_table.h"

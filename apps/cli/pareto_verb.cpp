@@ -2,7 +2,7 @@
 
 #include "apps/cli/context.h"
 #include "apps/report/pareto_page.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/context.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "problems/problem_file.h"
 
 namespace sparflow::cli {

@@ -3,7 +3,7 @@
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/selftest_page.h"
 #include "identification/selftest.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::cli {
 namespace {

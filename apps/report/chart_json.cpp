@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "apps/report/decimate.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 /// What can be drawn on a page, as plain data. Values are given in the unit named beside them: a page is a
-/// door out of the program, so its caller converts (models/units.h). NaN means "no value" everywhere.
+/// door out of the program, so its caller converts (models/math/units.h). NaN means "no value" everywhere.
 #include <Eigen/Dense>
 #include <limits>
 #include <optional>

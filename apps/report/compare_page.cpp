@@ -9,7 +9,7 @@
 #include "apps/report/compare_causes.h"
 #include "apps/report/compare_charts.h"
 #include "apps/report/score_judgement.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
 
 namespace sparflow {
 namespace {

@@ -7,7 +7,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

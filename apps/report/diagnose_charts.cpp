@@ -8,7 +8,7 @@
 
 #include "apps/report/compare_charts.h"
 #include "apps/report/effect_text.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

@@ -9,8 +9,8 @@
 #include "apps/report/diagnose_charts.h"
 #include "apps/report/effect_text.h"
 #include "apps/report/improve_page.h"
-#include "models/model_file.h"
-#include "models/nan.h"
+#include "models/files/model_file.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

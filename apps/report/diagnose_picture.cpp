@@ -2,9 +2,9 @@
 #include <cmath>
 
 #include "apps/report/diagnose_charts.h"
-#include "models/linear_algebra.h"
-#include "models/nan.h"
-#include "models/units.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -6,9 +6,9 @@
 #include "apps/report/compare_charts.h"
 #include "apps/report/compare_page.h"
 #include "apps/report/score_judgement.h"
-#include "models/model_file.h"
-#include "models/nan.h"
-#include "models/units.h"
+#include "models/files/model_file.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

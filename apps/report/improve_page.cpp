@@ -8,8 +8,8 @@
 #include "apps/report/compare_charts.h"
 #include "apps/report/effect_text.h"
 #include "apps/report/score_judgement.h"
-#include "models/model_file.h"
-#include "models/nan.h"
+#include "models/files/model_file.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

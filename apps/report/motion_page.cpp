@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "apps/report/obstacle_drawing.h"
-#include "models/model_file.h"
-#include "models/units.h"
+#include "models/files/model_file.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/report/motion_page.h"
-#include "models/units.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

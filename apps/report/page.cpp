@@ -9,7 +9,7 @@
 #include "apps/report/assets.h"
 #include "apps/report/chart_json.h"
 #include "apps/report/escape.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

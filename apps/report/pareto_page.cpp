@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "models/model_file.h"
+#include "models/files/model_file.h"
 
 namespace sparflow {
 namespace {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "apps/report/compare_charts.h"
-#include "models/nan.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

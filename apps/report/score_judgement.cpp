@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/nan.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/model_file.h"
-#include "models/nan.h"
+#include "models/files/model_file.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {

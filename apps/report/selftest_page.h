@@ -2,7 +2,7 @@
 /// What logs could reveal, as a page: power of every effect, what would be confused, what is missing from the logs.
 #include "apps/report/page.h"
 #include "identification/selftest.h"
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 namespace sparflow {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/report/strategies_page.h"
-#include "models/units.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

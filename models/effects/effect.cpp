@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "models/effects/instant.h"
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 
 namespace sparflow {
 namespace {

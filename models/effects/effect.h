@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "models/effects/jet.h"
 #include "models/effects/series.h"
-#include "models/machine.h"
+#include "models/machine/machine.h"
+#include "models/math/jet.h"
 
 namespace sparflow {
 
@@ -104,7 +104,7 @@ class Effect {
   virtual void add_pressure(const Instant<Jet>&, int, std::span<const double>,
                             std::span<Jet>) const {}
   /// Return chamber of each moving cylinder. What of it reaches the supply the cylinder's learned pressure says
-  /// (models/return_rise.h). [Pa]
+  /// (models/hydraulics/return_rise.h). [Pa]
   virtual void add_return(const Instant<double>&, int, std::span<const double>,
                           std::span<double>) const {}
   virtual void add_return(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "models/effects/registry.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "models/effects/series.h"
-#include "models/machine.h"
-#include "models/units.h"
+#include "models/machine/machine.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 

@@ -4,7 +4,7 @@
 
 #include "models/effects/builtin.h"
 #include "models/effects/user_effect_scope.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

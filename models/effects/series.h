@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/chain_ldl_kernel.h"
 
 namespace sparflow {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/chain_ldl.h"
 #include "optimizer/nlp/chain_ldl_kernel.h"
 #include "optimizer/nlp/chain_ldl_order.h"

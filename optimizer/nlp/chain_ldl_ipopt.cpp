@@ -5,7 +5,7 @@
 
 #include <exception>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow::detail {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <mutex>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/chain_ldl_ipopt.h"
 #include "optimizer/nlp/ipopt_adapter.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 
 namespace sparflow::simulator {
 namespace {

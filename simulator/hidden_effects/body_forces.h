@@ -3,7 +3,7 @@
 /// own, so that a generated log does not inherit a mistake of models/static_force. SI throughout.
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow::simulator {
 

@@ -1,8 +1,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 
 namespace sparflow::simulator {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 #include "simulator/hidden_effects/body_forces.h"
 
 namespace sparflow::simulator {

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 #include "simulator/hidden_effects/random.h"
 
 namespace sparflow::simulator {

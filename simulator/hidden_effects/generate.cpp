@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "simulator/hidden_effects/drive.h"
 #include "simulator/hidden_effects/log_columns.h"
 

@@ -2,7 +2,7 @@
 
 #include <iterator>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {

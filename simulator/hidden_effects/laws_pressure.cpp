@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {

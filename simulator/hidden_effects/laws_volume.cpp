@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {

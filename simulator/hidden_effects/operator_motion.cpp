@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 
 namespace sparflow::simulator {
 namespace {

@@ -3,7 +3,7 @@
 /// those of a working log: moves of 3 to 10 s, rest a seventh of the time, two functions at once a third of it.
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 #include "simulator/hidden_effects/crane_laws.h"
 
 namespace sparflow::simulator {

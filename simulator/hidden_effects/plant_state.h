@@ -2,7 +2,7 @@
 /// The plant at one instant. SI; by joint or by cylinder in the machine's order.
 #include <vector>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow::simulator {
 

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "models/error.h"
-#include "models/machine_check.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/machine/machine_check.h"
+#include "models/math/error.h"
 #include "simulator/hidden_effects/random.h"
 
 namespace sparflow::simulator {

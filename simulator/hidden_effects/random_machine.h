@@ -2,7 +2,7 @@
 /// Machines that no file describes: variations of a template, so that a diagnosis is not tuned to one crane.
 #include <cstdint>
 
-#include "models/machine.h"
+#include "models/machine/machine.h"
 
 namespace sparflow::simulator {
 

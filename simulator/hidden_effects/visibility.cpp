@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "simulator/hidden_effects/drive.h"
 #include "simulator/hidden_effects/log_columns.h"
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test_support {

@@ -8,8 +8,8 @@
 
 #include "apps/report/compare_charts.h"
 #include "apps/report/score_judgement.h"
-#include "models/error.h"
-#include "models/units.h"
+#include "models/math/error.h"
+#include "models/math/units.h"
 #include "tests/apps/browser_check.h"
 #include "tests/identification/arm_log.h"
 

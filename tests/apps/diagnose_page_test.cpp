@@ -10,7 +10,7 @@
 #include "apps/report/diagnose_charts.h"
 #include "apps/report/effect_text.h"
 #include "apps/report/improve_page.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/apps/browser_check.h"
 #include "tests/identification/arm_log.h"
 

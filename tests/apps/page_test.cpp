@@ -8,8 +8,8 @@
 #include <string>
 
 #include "apps/report/assets.h"
-#include "models/error.h"
-#include "models/nan.h"
+#include "models/math/error.h"
+#include "models/math/nan.h"
 #include "tests/apps/browser_check.h"
 #include "tests/apps/sample_page.h"
 

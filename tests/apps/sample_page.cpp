@@ -4,7 +4,7 @@
 #include <numbers>
 #include <random>
 
-#include "models/nan.h"
+#include "models/math/nan.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow::test_support {

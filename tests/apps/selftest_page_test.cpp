@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/apps/browser_check.h"
 #include "tests/identification/arm_log.h"
 

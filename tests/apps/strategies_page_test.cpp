@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/report/pareto_page.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "tests/apps/browser_check.h"

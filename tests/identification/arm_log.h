@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "identification/log.h"
-#include "models/crane_model.h"
-#include "models/machine_file.h"
-#include "models/static_force.h"
-#include "models/units.h"
+#include "models/chain/crane_model.h"
+#include "models/files/machine_file.h"
+#include "models/machine/static_force.h"
+#include "models/math/units.h"
 
 namespace sparflow::testing_support {
 

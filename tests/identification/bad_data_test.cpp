@@ -7,7 +7,7 @@
 #include <random>
 
 #include "arm_log.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 
 namespace sparflow {
 namespace {

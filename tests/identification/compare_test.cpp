@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "arm_log.h"
-#include "models/error.h"
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {

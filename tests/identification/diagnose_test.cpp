@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/fit.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/identification/hidden_case.h"
 #include "tests/parsed_json.h"
 

@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {

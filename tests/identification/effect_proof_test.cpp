@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {

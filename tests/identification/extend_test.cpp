@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/effect_estimate.h"
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 #include "tests/identification/arm_log.h"
 #include "tests/parsed_json.h"
 

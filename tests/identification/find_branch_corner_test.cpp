@@ -9,7 +9,7 @@
 
 #include "identification/fit.h"
 #include "identification/learn_loads_beyond.h"
-#include "models/gaussian_process.h"
+#include "models/hydraulics/gaussian_process.h"
 #include "tests/identification/hidden_case.h"
 
 namespace sparflow {

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "arm_log.h"
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "identification/log.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 
 namespace sparflow::testing_support {

@@ -8,7 +8,7 @@
 #include "identification/box_bfgs.h"
 #include "identification/gp_likelihood.h"
 #include "identification/sparse_gp.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

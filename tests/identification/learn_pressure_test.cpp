@@ -8,8 +8,8 @@
 #include <random>
 
 #include "identification/gp_likelihood.h"
-#include "models/error.h"
-#include "models/linear_algebra.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 namespace {

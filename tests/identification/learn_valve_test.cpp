@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "identification/log.h"
-#include "models/error.h"
-#include "models/machine.h"
+#include "models/machine/machine.h"
+#include "models/math/error.h"
 
 namespace sparflow::test {
 

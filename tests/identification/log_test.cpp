@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "identification/log_columns.h"
-#include "models/sha256.h"
+#include "models/math/sha256.h"
 #include "tests/identification/log_machines.h"
 
 namespace sparflow {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "tests/identification/evidence_support.h"
 
 namespace sparflow {

@@ -7,8 +7,8 @@
 
 #include "identification/extend.h"
 #include "identification/fit.h"
-#include "models/machine_file.h"
-#include "models/units.h"
+#include "models/files/machine_file.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {

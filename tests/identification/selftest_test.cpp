@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "identification/effect_power.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/identification/arm_log.h"
 #include "tests/parsed_json.h"
 

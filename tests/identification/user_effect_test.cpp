@@ -1,6 +1,6 @@
 // An effect that only a user's file describes, hidden in a log: found by diagnosis among the whole catalogue, its
 // parameters recovered, added, carried by the model file.
-#include "models/effects/user_effect.h"
+#include "models/effects/formula/user_effect.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -13,9 +13,9 @@
 #include "identification/series.h"
 #include "models/effects/registry.h"
 #include "models/effects/user_effect_scope.h"
-#include "models/error.h"
-#include "models/linkage.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 #include "tests/identification/arm_log.h"
 
 namespace sparflow {

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "models/machine_file.h"
-#include "models/static_force.h"
+#include "models/files/machine_file.h"
+#include "models/machine/static_force.h"
 
 int main(int argc, char** argv) {
   if (argc != 3) return 2;

@@ -1,13 +1,13 @@
 // The corner between two branches is part of a process' mean, with exact derivatives.
-#include "models/branch_corner.h"
+#include "models/hydraulics/branch_corner.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "models/error.h"
-#include "models/gaussian_process.h"
-#include "models/return_rise.h"
+#include "models/hydraulics/gaussian_process.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

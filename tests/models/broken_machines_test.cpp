@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <ostream>
 
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

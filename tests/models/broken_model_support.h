@@ -3,8 +3,8 @@
 #include <limits>
 #include <string>
 
-#include "models/crane_model.h"
-#include "models/machine_file.h"
+#include "models/chain/crane_model.h"
+#include "models/files/machine_file.h"
 
 namespace sparflow {
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "broken_model_support.h"
-#include "models/error.h"
-#include "models/model_file.h"
+#include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

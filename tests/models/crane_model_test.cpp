@@ -1,11 +1,11 @@
 /// The exact chain of the crane model: flows, working pressures, pump law and energy balance.
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "models/units.h"
+#include "models/math/units.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {
@@ -30,7 +30,7 @@ GpParameters small_process(double constant, double slope) {
   return p;
 }
 
-/// The formula in the head of models/gaussian_process.h, term by term.
+/// The formula in the head of models/hydraulics/gaussian_process.h, term by term.
 double by_hand(const GpParameters& p, double flow, double force) {
   double pressure = p.mean_constant + p.mean_slope * force;
   for (Eigen::Index j = 0; j < p.weight.size(); ++j) {

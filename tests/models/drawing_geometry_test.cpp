@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {

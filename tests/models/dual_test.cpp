@@ -1,5 +1,5 @@
 /// Dual2 and Taylor3 against numeric derivatives, function by function.
-#include "models/dual.h"
+#include "models/math/dual.h"
 
 #include <gtest/gtest.h>
 

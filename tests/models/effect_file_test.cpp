@@ -1,5 +1,5 @@
 /// User effects from YAML: what is read, and every broken file we could think of with the whole sentence the user sees.
-#include "models/effects/effect_file.h"
+#include "models/effects/formula/effect_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 #include <filesystem>
 #include <ostream>
 
-#include "models/dual.h"
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/dual.h"
+#include "models/math/error.h"
 #include "tests/models/broken_model_support.h"
 
 namespace sparflow {

@@ -7,7 +7,7 @@
 
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow::test_support {

@@ -4,8 +4,8 @@
 
 #include "models/effects/builtin.h"
 #include "models/effects/effect_text.h"
-#include "models/error.h"
-#include "models/inertial_torque.h"
+#include "models/machine/inertial_torque.h"
+#include "models/math/error.h"
 #include "tests/models/effects_support.h"
 
 namespace sparflow {

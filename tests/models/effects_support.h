@@ -2,7 +2,7 @@
 /// What tests of effects share: instants with consistent mechanics, as numbers or as Jets, and small logs.
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow::test_support {

@@ -1,6 +1,6 @@
 /// Laws of user effects: values against the same formula in C++, derivatives against numeric twins and against each
 /// other, units, linearity, and messages for every way of writing a law wrong.
-#include "models/effects/expression.h"
+#include "models/effects/formula/expression.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "models/dual.h"
-#include "models/effects/jet.h"
+#include "models/math/dual.h"
+#include "models/math/jet.h"
 #include "tests/models/numeric.h"
 
 namespace sparflow {

@@ -1,4 +1,4 @@
-#include "models/gaussian_process.h"
+#include "models/hydraulics/gaussian_process.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "models/error.h"
-#include "models/gp_kernel.h"
+#include "models/hydraulics/gp_kernel.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

@@ -1,12 +1,12 @@
 /// Inertial torques by other paths: Lagrange's equation on numeric kinetic energy, Orocos KDL, the pendulum by hand,
 /// and the balance of energy along a motion.
-#include "models/inertial_torque.h"
+#include "models/machine/inertial_torque.h"
 
 #include <gtest/gtest.h>
 
 #include <kdl/chaindynparam.hpp>
 
-#include "models/taylor.h"
+#include "models/math/taylor.h"
 #include "tests/models/effects_support.h"
 
 namespace sparflow {

@@ -1,5 +1,5 @@
 /// Kinematics against Orocos KDL, an independent library, for random chains of one to seven joints.
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "models/linear_algebra.h"
+#include "models/math/linear_algebra.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 /// Cylinder lengths of every linkage against closed forms, their derivatives, their inverse.
-#include "models/linkage.h"
+#include "models/machine/linkage.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // Loads that a process has not seen: the balance of forces says what it cannot know.
-#include "models/loads_beyond.h"
+#include "models/hydraulics/loads_beyond.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "models/error.h"
-#include "models/gaussian_process.h"
+#include "models/hydraulics/gaussian_process.h"
+#include "models/math/error.h"
 #include "tests/models/numeric.h"
 
 namespace sparflow::test_support {

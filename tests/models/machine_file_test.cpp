@@ -1,4 +1,4 @@
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <numbers>
 
-#include "models/error.h"
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

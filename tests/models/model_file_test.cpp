@@ -1,4 +1,4 @@
-#include "models/model_file.h"
+#include "models/files/model_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,10 +9,10 @@
 #include <limits>
 
 #include "broken_model_support.h"
+#include "models/effects/formula/user_effect.h"
 #include "models/effects/registry.h"
-#include "models/effects/user_effect.h"
 #include "models/effects/user_effect_scope.h"
-#include "models/error.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {

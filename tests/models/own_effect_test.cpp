@@ -4,10 +4,10 @@
 
 #include <filesystem>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/models/effects_support.h"
 
 // [own effect]

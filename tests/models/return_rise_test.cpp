@@ -1,5 +1,5 @@
 // What of a higher return pressure reaches the supply: a process that follows max(static branch, valve) knows.
-#include "models/return_rise.h"
+#include "models/hydraulics/return_rise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 /// Static torques and cylinder forces, each recomputed by another code path: numeric gradients of the
 /// potential energy, duals through the templated form, and Orocos KDL.
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "models/machine.h"
-#include "models/units.h"
+#include "models/machine/machine.h"
+#include "models/math/units.h"
 #include "tests/models/numeric.h"
 
 namespace sparflow::test_support {

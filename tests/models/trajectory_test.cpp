@@ -1,5 +1,5 @@
 /// A refined motion is the same motion.
-#include "models/trajectory.h"
+#include "models/machine/trajectory.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 /// Unit texts: dimension and factor against hand-computed values, and every way of writing them wrong.
-#include "models/effects/unit_algebra.h"
+#include "models/effects/formula/unit_algebra.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 /// Effects as a test puts them into a model: at their typical or at no strength.
 #include <string>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 #include "models/effects/registry.h"
 
 namespace sparflow::test_support {

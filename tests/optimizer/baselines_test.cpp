@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "models/kinematics.h"
-#include "models/linear_algebra.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
+#include "models/math/linear_algebra.h"
 #include "optimizer/strategies.h"
 #include "problems/bundled.h"
 #include "problems/motion_limits.h"

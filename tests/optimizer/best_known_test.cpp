@@ -8,8 +8,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "models/model_file.h"
-#include "models/sha256.h"
+#include "models/files/model_file.h"
+#include "models/math/sha256.h"
 #include "problems/bundled.h"
 #include "tests/parsed_json.h"
 

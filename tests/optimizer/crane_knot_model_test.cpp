@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/transcription.h"
 #include "problems/bundled.h"

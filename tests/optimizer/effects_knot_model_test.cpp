@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "models/effects/effective_machine.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/crane_knot_model.h"
 #include "optimizer/exact_energy.h"
 #include "optimizer/nlp/derivative_check.h"

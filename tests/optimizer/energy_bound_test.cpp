@@ -8,8 +8,8 @@
 #include <random>
 
 #include "models/effects/effective_machine.h"
-#include "models/linkage.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/machine/linkage.h"
 #include "optimizer/energy_bound_goal.h"
 #include "optimizer/energy_bound_potential.h"
 #include "optimizer/energy_grid.h"

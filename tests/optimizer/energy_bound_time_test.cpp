@@ -10,8 +10,8 @@
 #include <random>
 #include <sstream>
 
-#include "models/machine_file.h"
-#include "models/model_file.h"
+#include "models/files/machine_file.h"
+#include "models/files/model_file.h"
 #include "optimizer/energy_bound_time_guide.h"
 #include "optimizer/energy_grid.h"
 #include "optimizer/exact_energy.h"

@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "models/kinematics.h"
-#include "models/linkage.h"
+#include "models/machine/kinematics.h"
+#include "models/machine/linkage.h"
 #include "optimizer/driven_grid_path.h"
 #include "optimizer/exact_energy.h"
 #include "optimizer/sequential_modes.h"

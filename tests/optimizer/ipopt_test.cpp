@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/nlp/ipopt_solver.h"
 

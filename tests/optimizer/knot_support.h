@@ -5,7 +5,7 @@
 #include <functional>
 #include <random>
 
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "problems/bundled.h"
 #include "problems/problem.h"
 

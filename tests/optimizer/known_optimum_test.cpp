@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/kinematics.h"
-#include "models/machine_file.h"
-#include "models/units.h"
+#include "models/files/machine_file.h"
+#include "models/machine/kinematics.h"
+#include "models/math/units.h"
 #include "optimizer/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"

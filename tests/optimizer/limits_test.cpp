@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "models/machine_file.h"
-#include "models/units.h"
+#include "models/files/machine_file.h"
+#include "models/math/units.h"
 #include "optimizer/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"

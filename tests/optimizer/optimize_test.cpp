@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
 #include "optimizer/child_processes.h"
 #include "optimizer/motion_table.h"
 #include "problems/bundled.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 #include "optimizer/baselines.h"
 #include "optimizer/self_motion.h"
 #include "problems/bundled.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "problems/bundled.h"
 
 namespace sparflow {

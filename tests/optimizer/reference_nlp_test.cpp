@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/reference_model.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/nlp/ipopt_solver.h"
 #include "tests/parsed_json.h"

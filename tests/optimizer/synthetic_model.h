@@ -3,7 +3,7 @@
 /// with a few kernel bumps on top so that every derivative of the process is exercised.
 #include <random>
 
-#include "models/crane_model.h"
+#include "models/chain/crane_model.h"
 
 namespace sparflow::test_support {
 

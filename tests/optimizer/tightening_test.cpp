@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "models/kinematics.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/machine/kinematics.h"
 #include "problems/bundled.h"
 #include "problems/clearance.h"
 #include "problems/problem_file.h"

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "optimizer/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"

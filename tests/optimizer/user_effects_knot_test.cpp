@@ -2,8 +2,8 @@
 // law of each stage that a motion sees.
 #include <gtest/gtest.h>
 
+#include "models/effects/formula/user_effect.h"
 #include "models/effects/registry.h"
-#include "models/effects/user_effect.h"
 #include "models/effects/user_effect_scope.h"
 #include "optimizer/crane_knot_model.h"
 #include "optimizer/nlp/derivative_check.h"

@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 #include "planners/tip_goal.h"
 #include "problems/clearance.h"
 #include "tests/problems/arms.h"

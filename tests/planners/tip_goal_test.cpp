@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "models/kinematics.h"
+#include "models/machine/kinematics.h"
 #include "tests/problems/arms.h"
 
 namespace sparflow {

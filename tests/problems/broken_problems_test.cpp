@@ -4,7 +4,7 @@
 #include <cctype>
 #include <ostream>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "problems/problem_file.h"
 
 namespace sparflow {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "models/error.h"
+#include "models/math/error.h"
 #include "tests/problems/arms.h"
 
 namespace sparflow {

@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "models/error.h"
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
 #include "problems/bundled.h"
 
 namespace sparflow {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "models/units.h"
+#include "models/math/units.h"
 #include "problems/clearance.h"
 #include "tests/problems/arms.h"
 

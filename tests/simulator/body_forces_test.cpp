@@ -4,7 +4,7 @@
 #include <random>
 
 #include "hidden_log_support.h"
-#include "models/static_force.h"
+#include "models/machine/static_force.h"
 
 namespace sparflow::simulator {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/machine_file.h"
+#include "models/files/machine_file.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 
 namespace sparflow::simulator {

@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "hidden_log_support.h"
-#include "models/error.h"
+#include "models/math/error.h"
 #include "simulator/hidden_effects/random_machine.h"
 
 namespace sparflow::simulator {

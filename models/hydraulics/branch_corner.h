@@ -1,0 +1,63 @@
+#pragma once
+/// The corner of a supply pressure where one branch takes over from the other.
+///
+/// The supply holds whichever asks for more, a counterbalance valve V or the static branch S = (load + A_return
+/// p_return)/A_supply (models/hydraulics/return_rise.h): p = max(V, S) = V + max(0, S - V). A process with a smooth kernel rounds such a
+/// corner off by bars and swings beside it, and between loads that its samples hold on either side of the corner it takes the
+/// straight line. So the second term, whose slope the balance of forces gives, is part of the mean, and the process learns
+/// the rest.
+#include <cmath>
+
+namespace sparflow {
+
+/// S - V = level + per_flow Q + per_force F. Straight in the flow: its bend is the process' to learn where samples show it, and a
+/// square would run away beyond them.
+struct BranchCorner {
+  double level = 0.0;      ///< [Pa]
+  double per_flow = 0.0;   ///< [Pa/(m^3/s)]
+  double per_force = 0.0;  ///< [Pa/N]; 0 = there is no corner
+
+  bool there() const { return per_force != 0.0; }
+};
+
+/// What max(0, S - V) is rounded over, as in models/hydraulics/loads_beyond.h. [Pa]
+inline constexpr double kCornerRounded = 2e5;
+
+/// What the supply gains when the static branch gains `rise` [Pa], of either sign: nothing where the valve rules, all of it where
+/// the load does, and across the corner what is beyond it.
+template <class T>
+T rise_across(const BranchCorner& c, const T& flow, const T& force, const T& rise) {
+  using std::sqrt;
+  const auto positive = [](const T& u) {
+    return 0.5 * (u + sqrt(u * u + T(kCornerRounded * kCornerRounded)));
+  };
+  const T u = T(c.level) + c.per_flow * flow + c.per_force * force;
+  return positive(T(u + rise)) - positive(u);
+}
+
+/// max(0, S - V), rounded, with its derivatives.
+struct CornerRise {
+  double value = 0.0;                                                 ///< [Pa]
+  double d_flow = 0.0, d_force = 0.0;                                 ///< SI
+  double d_flow_flow = 0.0, d_flow_force = 0.0, d_force_force = 0.0;  ///< SI
+};
+
+/// @param flow [m^3/s]  @param force [N]
+inline CornerRise corner_rise(const BranchCorner& c, double flow, double force) {
+  constexpr double kRounded = kCornerRounded;
+  const double u = c.level + c.per_flow * flow + c.per_force * force;
+  const double root = std::sqrt(u * u + kRounded * kRounded);
+  const double first = 0.5 * (1.0 + u / root);
+  const double second = 0.5 * kRounded * kRounded / (root * root * root);
+  return {0.5 * (u + root),
+          first * c.per_flow,
+          first * c.per_force,
+          second * c.per_flow * c.per_flow,
+          second * c.per_flow * c.per_force,
+          second * c.per_force * c.per_force};
+}
+
+/// [N] over which the corner bends.
+inline double corner_width(const BranchCorner& c) { return 10e5 / std::abs(c.per_force); }
+
+}  // namespace sparflow

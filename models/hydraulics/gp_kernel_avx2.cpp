@@ -1,0 +1,15 @@
+// Compiled for its own instruction set (see CMakeLists.txt); called only after the CPU was asked.
+#include "models/hydraulics/gp_kernel_body.h"
+
+#ifdef __x86_64__
+namespace sparflow {
+namespace {
+typedef double Doubles __attribute__((vector_size(32)));
+typedef unsigned long long Integers __attribute__((vector_size(32)));
+constexpr KernelTable kTable = KernelLoops<Doubles, Integers>::table();
+}  // namespace
+
+const KernelTable& kernel_table_avx2() { return kTable; }
+
+}  // namespace sparflow
+#endif
