@@ -9,7 +9,7 @@
 #include <fstream>
 #include <random>
 
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"

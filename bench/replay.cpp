@@ -14,7 +14,7 @@
 #include "bench/motion_cases.h"
 #include "bench/planned_seeds.h"
 #include "bench/program_options.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"

@@ -7,7 +7,7 @@
 
 #include "identification/effect_intervals.h"
 #include "identification/effect_search.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
 

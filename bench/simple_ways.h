@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "identification/evidence.h"
-#include "identification/log.h"
+#include "identification/log/log.h"
 
 namespace sparflow::bench {
 

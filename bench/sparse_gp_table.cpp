@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "identification/learn_pressure.h"
-#include "identification/signals.h"
+#include "identification/learning/gaussian_process/learn_pressure.h"
+#include "identification/signals/signals.h"
 #include "models/files/machine_file.h"
 
 namespace {

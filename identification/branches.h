@@ -12,7 +12,7 @@
 /// J. R. Stat. Soc. B 39 (1977) 1-38.
 #include <vector>
 
-#include "identification/signals.h"
+#include "identification/signals/signals.h"
 
 namespace sparflow {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "identification/bad_data.h"
+#include "identification/data_checks/bad_data.h"
 #include "identification/effect_search.h"
 #include "identification/experiment.h"
 

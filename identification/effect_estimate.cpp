@@ -10,7 +10,7 @@
 #include "identification/effect_proof.h"
 #include "identification/search_candidates.h"
 #include "identification/search_leaders.h"
-#include "identification/series.h"
+#include "identification/signals/series.h"
 #include "models/math/error.h"
 
 namespace sparflow {

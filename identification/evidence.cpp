@@ -7,9 +7,9 @@
 
 #include "identification/branches.h"
 #include "identification/channel_builder.h"
-#include "identification/low_pass.h"
-#include "identification/pump_leaders.h"
-#include "identification/series.h"
+#include "identification/signals/low_pass.h"
+#include "identification/signals/pump_leaders.h"
+#include "identification/signals/series.h"
 #include "models/effects/hydraulics.h"
 #include "models/math/nan.h"
 #include "models/math/robust.h"

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 #include "identification/noise_model.h"
 #include "models/effects/registry.h"
 #include "models/effects/series.h"

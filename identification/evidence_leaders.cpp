@@ -1,7 +1,7 @@
 // What of the evidence depends on the cylinder that leads a pump.
 #include "identification/evidence.h"
-#include "identification/pump_leaders.h"
-#include "identification/series.h"
+#include "identification/signals/pump_leaders.h"
+#include "identification/signals/series.h"
 
 namespace sparflow {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "identification/comparison/error_change.h"
 #include "identification/diagnose.h"
-#include "identification/error_change.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 
 namespace sparflow {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "identification/comparison/report_numbers.h"
 #include "identification/extend.h"
-#include "identification/report_numbers.h"
 
 namespace sparflow {
 namespace {

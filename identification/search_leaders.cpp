@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "identification/effect_intervals.h"
-#include "identification/pump_leaders.h"
+#include "identification/signals/pump_leaders.h"
 
 namespace sparflow {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "identification/report_numbers.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/selftest.h"
 
 namespace sparflow {

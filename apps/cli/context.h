@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "identification/log.h"
+#include "identification/log/log.h"
 #include "models/chain/crane_model.h"
 #include "optimizer/optimize.h"
 #include "planners/seed_paths.h"

@@ -6,7 +6,7 @@
 #include "apps/cli/context.h"
 #include "apps/report/compare_page.h"
 #include "apps/report/motion_page.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "optimizer/motion_table.h"

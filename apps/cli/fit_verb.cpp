@@ -5,7 +5,7 @@
 
 #include "apps/cli/context.h"
 #include "apps/report/compare_page.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"

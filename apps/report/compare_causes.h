@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/report/page.h"
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 
 namespace sparflow {
 

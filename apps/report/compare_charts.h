@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/report/page.h"
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 
 namespace sparflow {
 

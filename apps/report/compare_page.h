@@ -1,7 +1,7 @@
 #pragma once
 /// Pages about a model and its measurements.
 #include "apps/report/page.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 
 namespace sparflow {
 

@@ -1,7 +1,7 @@
 #pragma once
 /// What a score is worth in words and colours.
 #include "apps/report/page.h"
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 
 namespace sparflow {
 

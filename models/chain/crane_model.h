@@ -156,7 +156,7 @@ class Chain {
                                const double* qdd = nullptr);
 
   /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
-  /// [N]: for logs, where effects are series (identification/series.h).
+  /// [N]: for logs, where effects are series (identification/signals/series.h).
   /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
   /// @param added_demand [Pa] by cylinder, asked of the pump on top; nullptr = 0
   /// @param added_return [Pa] by cylinder, added to its return chamber; nullptr = 0

@@ -29,7 +29,7 @@ struct CylinderSeries {
   Eigen::VectorXd opening;
   Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] chambers, through the position's filter
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
-  /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals.h).
+  /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals/signals.h).
   Eigen::VectorXi direction;
   Eigen::VectorXd flow;  ///< [m^3/s] into the chamber of that side, never negative; 0 at rest
   Eigen::VectorXd return_flow;  ///< [m^3/s] out of the other chamber, never negative; 0 at rest

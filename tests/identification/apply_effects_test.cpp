@@ -1,13 +1,13 @@
 // A model's effects on logs: the same numbers as the exact chain's, sample by sample, and a fit that learns
 // everything else around them.
-#include "identification/apply_effects.h"
+#include "identification/signals/apply_effects.h"
 
 #include <gtest/gtest.h>
 
 #include "arm_log.h"
 #include "identification/evidence.h"
-#include "identification/fit.h"
-#include "identification/series.h"
+#include "identification/learning/fit.h"
+#include "identification/signals/series.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/memory.h"
 #include "models/effects/registry.h"

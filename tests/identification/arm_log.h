@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "identification/log.h"
+#include "identification/log/log.h"
 #include "models/chain/crane_model.h"
 #include "models/files/machine_file.h"
 #include "models/machine/static_force.h"

@@ -1,4 +1,4 @@
-#include "identification/bad_data.h"
+#include "identification/data_checks/bad_data.h"
 
 #include <gmock/gmock.h>
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "arm_log.h"
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {

@@ -1,4 +1,4 @@
-#include "identification/compare.h"
+#include "identification/comparison/compare.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

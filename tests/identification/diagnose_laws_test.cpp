@@ -7,7 +7,7 @@
 #include <map>
 
 #include "identification/extend.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "tests/identification/hidden_case.h"
 
 namespace sparflow {

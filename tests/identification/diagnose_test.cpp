@@ -8,7 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/math/error.h"
 #include "tests/identification/hidden_case.h"
 #include "tests/parsed_json.h"

@@ -1,4 +1,4 @@
-#include "identification/error_change.h"
+#include "identification/comparison/error_change.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Two branches, one of which takes over from the other: what a smooth process cannot bend to is found from its samples.
-#include "identification/find_branch_corner.h"
+#include "identification/learning/find_branch_corner.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <functional>
 #include <random>
 
-#include "identification/fit.h"
-#include "identification/learn_loads_beyond.h"
+#include "identification/learning/fit.h"
+#include "identification/learning/learn_loads_beyond.h"
 #include "models/hydraulics/gaussian_process.h"
 #include "tests/identification/hidden_case.h"
 

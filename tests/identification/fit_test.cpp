@@ -1,4 +1,4 @@
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

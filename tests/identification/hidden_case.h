@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "identification/log.h"
+#include "identification/log/log.h"
 #include "models/files/machine_file.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 

@@ -1,5 +1,5 @@
 // A process that has seen one branch is right on the other: the balance of forces is no matter of data.
-#include "identification/learn_loads_beyond.h"
+#include "identification/learning/learn_loads_beyond.h"
 
 #include <gtest/gtest.h>
 

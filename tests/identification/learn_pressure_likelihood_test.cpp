@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
-#include "identification/box_bfgs.h"
-#include "identification/gp_likelihood.h"
-#include "identification/sparse_gp.h"
+#include "identification/learning/gaussian_process/box_bfgs.h"
+#include "identification/learning/gaussian_process/gp_likelihood.h"
+#include "identification/learning/gaussian_process/sparse_gp.h"
 #include "models/math/linear_algebra.h"
 
 namespace sparflow {

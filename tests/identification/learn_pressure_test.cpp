@@ -1,4 +1,4 @@
-#include "identification/learn_pressure.h"
+#include "identification/learning/gaussian_process/learn_pressure.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "identification/gp_likelihood.h"
+#include "identification/learning/gaussian_process/gp_likelihood.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
 

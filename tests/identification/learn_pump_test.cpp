@@ -1,4 +1,4 @@
-#include "identification/learn_pump.h"
+#include "identification/learning/learn_pump.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "identification/learn_valve.h"
+#include "identification/learning/learn_valve.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 /// The same numbers from every dialect of text, and how fast they are read.
-#include "identification/log_dialect.h"
+#include "identification/log/log_dialect.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

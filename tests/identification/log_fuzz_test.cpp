@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "identification/log_dialect.h"
-#include "identification/log_mapping.h"
+#include "identification/log/log_dialect.h"
+#include "identification/log/log_mapping.h"
 #include "tests/identification/log_machines.h"
 
 namespace sparflow {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "identification/log.h"
+#include "identification/log/log.h"
 #include "models/machine/machine.h"
 #include "models/math/error.h"
 

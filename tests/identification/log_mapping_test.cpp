@@ -1,5 +1,5 @@
 /// Foreign logs through a mapping file; the expressions in it.
-#include "identification/log_mapping.h"
+#include "identification/log/log_mapping.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

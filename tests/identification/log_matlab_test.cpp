@@ -1,5 +1,5 @@
 /// .mat files of both formats, in the three shapes people save logs in.
-#include "identification/log_matlab.h"
+#include "identification/log/log_matlab.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

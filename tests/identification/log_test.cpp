@@ -1,12 +1,12 @@
 /// What a log becomes: numbers in SI, runs, holes, counts.
-#include "identification/log.h"
+#include "identification/log/log.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <numbers>
 
-#include "identification/log_columns.h"
+#include "identification/log/log_columns.h"
 #include "models/math/sha256.h"
 #include "tests/identification/log_machines.h"
 

@@ -1,6 +1,6 @@
 // A loss that only the leader's pump sees can make another cylinder lead: evidence, search and extension with the leader
 // that what was found makes.
-#include "identification/pump_leaders.h"
+#include "identification/signals/pump_leaders.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "identification/effect_estimate.h"
 #include "identification/effect_search.h"
 #include "identification/evidence.h"
-#include "identification/series.h"
+#include "identification/signals/series.h"
 #include "models/effects/registry.h"
 
 namespace sparflow {

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "identification/extend.h"
-#include "identification/fit.h"
+#include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/math/units.h"
 

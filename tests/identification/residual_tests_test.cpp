@@ -1,4 +1,4 @@
-#include "identification/residual_tests.h"
+#include "identification/comparison/residual_tests.h"
 
 #include <gmock/gmock.h>
 

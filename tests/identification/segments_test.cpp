@@ -1,11 +1,11 @@
-#include "identification/segments.h"
+#include "identification/log/segments.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numeric>
 
-#include "identification/smoothing.h"
+#include "identification/signals/smoothing.h"
 #include "tests/identification/log_machines.h"
 
 namespace sparflow {

@@ -1,5 +1,5 @@
 /// The filter against closed forms: polynomials, known coefficients, known noise gains, gaps.
-#include "identification/smoothing.h"
+#include "identification/signals/smoothing.h"
 
 #include <gmock/gmock.h>
 

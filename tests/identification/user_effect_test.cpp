@@ -10,7 +10,7 @@
 #include <random>
 
 #include "identification/extend.h"
-#include "identification/series.h"
+#include "identification/signals/series.h"
 #include "models/effects/registry.h"
 #include "models/effects/user_effect_scope.h"
 #include "models/files/model_file.h"

@@ -1,0 +1,322 @@
+#include "identification/comparison/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "identification/comparison/compare_stages.h"
+#include "identification/signals/apply_effects.h"
+#include "models/math/error.h"
+#include "models/math/nan.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Sums over all logs of one quantity.
+StageScore score(const std::vector<LogComparison>& logs, const std::string& stage,
+                 const std::string& at, const std::string& regime) {
+  StageScore out;
+  out.stage = stage;
+  out.at = at;
+  out.regime = regime;
+  double sum = 0.0, sum_y = 0.0, squares = 0.0;
+  double outside_squares = 0.0;
+  long inside = 0, judged = 0, outside = 0, ranged = 0;
+  std::vector<double> measured;
+  for (const LogComparison& log : logs) {
+    for (const ComparedSeries& s : log.series) {
+      if (s.stage != stage || s.at != at) continue;
+      out.unit = s.unit;
+      for (Index k = 0; k < s.measured.size(); ++k) {
+        if (!std::isfinite(s.measured[k])) continue;
+        if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) continue;
+        const double e = s.predicted[k] - s.measured[k];
+        sum += e;
+        squares += e * e;
+        sum_y += s.measured[k];
+        measured.push_back(s.measured[k]);
+        if (s.extrapolated.size() > 0) {
+          ++ranged;
+          if (s.extrapolated[k]) {
+            ++outside;
+            outside_squares += e * e;
+          }
+        }
+        if (s.deviation.size() > 0) {
+          ++judged;
+          if (std::abs(e) <= 1.959964 * s.deviation[k]) ++inside;
+        }
+      }
+    }
+  }
+  out.n = static_cast<long>(measured.size());
+  if (out.n == 0) return out;
+  const double n = static_cast<double>(out.n), mean = sum_y / n;
+  double spread = 0.0;
+  for (const double y : measured) spread += (y - mean) * (y - mean);
+  out.rmse = std::sqrt(squares / n);
+  out.bias = sum / n;
+  out.fit_percent = spread > 0.0 ? 100.0 * (1.0 - std::sqrt(squares / spread)) : kNaN;
+  out.within_95_percent =
+      judged > 0 ? 100.0 * static_cast<double>(inside) / static_cast<double>(judged) : kNaN;
+  const double part = static_cast<double>(outside);
+  out.extrapolated_percent = ranged > 0 ? 100.0 * part / static_cast<double>(ranged) : kNaN;
+  out.extrapolated_error_percent =
+      ranged > 0 && squares > 0.0 ? 100.0 * outside_squares / squares : kNaN;
+  return out;
+}
+
+/// Where a process was asked for what it has not seen, an error says nothing about its law.
+void extrapolation_notes(const CraneModel& model, const std::vector<StageScore>& scores,
+                         std::set<std::string>& notes) {
+  for (const StageScore& s : scores) {
+    // Worth a word where it happens often and does harm.
+    if (!(s.extrapolated_percent >= 5.0)) continue;
+    if (!(s.extrapolated_error_percent > 1.25 * s.extrapolated_percent)) continue;
+    const bool extend = s.regime == "extend";
+    const auto i = static_cast<std::size_t>(model.machine.cylinder_index(s.at));
+    const CylinderModel& c = model.cylinders[i];
+    const GpParameters& p = (extend ? c.extend : c.retract).parameters();
+    notes.insert(fmt::format(
+        "pressure of {} {}: {:.0f} % of the samples lie outside what it was learned from "
+        "({:.1f}..{:.1f} l/min, "
+        "{:.1f}..{:.1f} kN) and hold {:.0f} % of its squared error; fit with such motions",
+        s.at, extend ? "extending" : "retracting", s.extrapolated_percent,
+        p.flow_min / units::kLitrePerMinute, p.flow_max / units::kLitrePerMinute, p.force_min / 1e3,
+        p.force_max / 1e3, s.extrapolated_error_percent));
+  }
+}
+
+std::vector<StageScore> scores(const Machine& machine, const std::vector<LogComparison>& logs) {
+  std::vector<StageScore> out;
+  const auto add = [&](const char* stage, const std::string& at, const std::string& regime) {
+    StageScore s = score(logs, stage, at, regime);
+    if (s.n > 0) out.push_back(std::move(s));
+  };
+  for (const char* stage : {"force", "flow", "flow_sensor"}) {
+    for (const Cylinder& c : machine.cylinders) add(stage, c.name, "");
+  }
+  for (const Cylinder& c : machine.cylinders) {
+    add("pressure", c.name, "extend");
+    add("pressure", c.name, "retract");
+  }
+  for (const Pump& p : machine.pumps) add("pump", p.name, "");
+  return out;
+}
+
+std::string regime_words(const ComparedSeries& s, std::size_t regime) {
+  const std::string& name = s.regimes[regime];
+  if (s.stage != "pump") return s.at + (name == "extend" ? " extending" : " retracting");
+  if (regime == 0) return "pump " + s.at + (name == "standby" ? " at standby" : "");
+  return fmt::format("pump {} led by {}", s.at, name);
+}
+
+/// Shares are among quantities that can be added up: forces of cylinders of different size cannot.
+void set_pool(ErrorGroup& group) {
+  group.pool = group.stage == "force" ? "force " + group.at : group.stage;
+  const std::string what = group.stage == "flow_sensor" ? "flow sensor" : group.stage;
+  group.pool_words = group.stage == "force" ? fmt::format("the force error of {}", group.at)
+                                            : fmt::format("the {} error", what);
+}
+
+/// The compared samples of one regime over all logs with every signal that all of them have.
+ErrorGroup gather(const Machine& machine, const std::vector<LogComparison>& logs,
+                  const ComparedSeries& like, std::size_t regime) {
+  ErrorGroup group;
+  group.stage = like.stage;
+  group.at = like.at;
+  group.regime = like.regimes[regime];
+  group.words = regime_words(like, regime);
+  group.unit = like.unit.name;
+  group.scale = like.unit.si;
+  set_pool(group);
+  std::vector<double> errors;
+  std::vector<std::vector<double>> columns;
+  bool first = true;
+  for (const LogComparison& log : logs) {
+    for (const ComparedSeries& s : log.series) {
+      if (s.stage != like.stage || s.at != like.at) continue;
+      const std::vector<RegimeSignal> signals = regime_signals(machine, log.signals, s);
+      if (first) {
+        for (const RegimeSignal& signal : signals) {
+          group.signals.push_back({signal.key, signal.words, signal.unit, signal.scale, {}});
+        }
+        columns.resize(group.signals.size());
+        first = false;
+      }
+      const std::size_t before = errors.size();
+      for (Index k = 0; k < s.measured.size(); ++k) {
+        if (!std::isfinite(s.measured[k]) || s.regime[k] != static_cast<int>(regime)) continue;
+        const double e = s.predicted[k] - s.measured[k];
+        errors.push_back(e * e);
+      }
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        columns[c].resize(errors.size(), kNaN);
+        for (const RegimeSignal& signal : signals) {
+          if (signal.key != group.signals[c].key) continue;
+          std::size_t row = before;
+          for (Index k = 0; k < s.measured.size(); ++k) {
+            if (!std::isfinite(s.measured[k]) || s.regime[k] != static_cast<int>(regime)) continue;
+            columns[c][row++] = signal.values[k];
+          }
+        }
+      }
+    }
+  }
+  group.squared_error = Eigen::Map<VectorXd>(errors.data(), static_cast<Index>(errors.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    group.signals[c].values =
+        Eigen::Map<VectorXd>(columns[c].data(), static_cast<Index>(columns[c].size()));
+  }
+  return group;
+}
+
+std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult& result) {
+  std::vector<ErrorGroup> groups;
+  std::set<std::pair<std::string, std::string>> seen;
+  for (const LogComparison& log : result.logs) {
+    for (const ComparedSeries& s : log.series) {
+      if (!seen.insert({s.stage, s.at}).second) continue;
+      // Pools are ordered by how much of what varies they fail to explain.
+      const StageScore whole = score(result.logs, s.stage, s.at, "");
+      for (std::size_t r = 0; r < s.regimes.size(); ++r) {
+        ErrorGroup group = gather(machine, result.logs, s, r);
+        if (std::isfinite(whole.fit_percent)) {
+          group.severity = std::min(1.0, 1.0 - whole.fit_percent / 100.0);
+        }
+        if (group.squared_error.size() > 0) groups.push_back(std::move(group));
+      }
+    }
+  }
+  return groups;
+}
+
+/// Quantities whose prediction is off to one side nearly always, as regions without bounds: no place explains that.
+std::vector<WorstRegion> biased_everywhere(const std::vector<ComparedPart>& parts,
+                                           const ResidualTests& tests) {
+  constexpr double kShare = 0.5;     // of the squared error that is the mean's
+  constexpr double kOneSided = 0.9;  // of the samples
+  std::vector<WorstRegion> out;
+  for (const ResidualTest& t : tests.tests) {
+    if (!t.depends_on.empty() || t.p_value > kAlarm || t.share_explained < kShare) continue;
+    for (const ComparedPart& part : parts) {
+      if (part.stage != t.stage || part.at != t.at || part.regime != t.regime) continue;
+      const auto positive = (part.error.array() > 0.0).cast<double>().mean();
+      if (std::max(positive, 1.0 - positive) < kOneSided) continue;
+      WorstRegion w;
+      w.stage = t.stage;
+      w.at = t.at;
+      w.regime = t.regime;
+      w.rmse =
+          std::sqrt(part.error.squaredNorm() / static_cast<double>(part.error.size())) / part.scale;
+      w.unit = t.unit;
+      w.share_of_error = w.share_of_samples = 1.0;
+      const bool kilo = t.unit == "N" && std::abs(t.size) >= 1e3;
+      w.sentence = fmt::format(
+          "the {} is predicted {:.3g} {} too {} everywhere: {:.0f} % of its error is this one "
+          "offset (RMSE {:.3g} {})",
+          part.words, std::abs(t.size) / (kilo ? 1e3 : 1.0), kilo ? "kN" : t.unit,
+          t.size > 0.0 ? "high" : "low", 100.0 * t.share_explained, w.rmse / (kilo ? 1e3 : 1.0),
+          kilo ? "kN" : t.unit);
+      out.push_back(std::move(w));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+const StageScore* CompareResult::find(const std::string& stage, const std::string& at,
+                                      const std::string& regime) const {
+  for (const StageScore& s : scores) {
+    if (s.stage == stage && s.at == at && s.regime == regime) return &s;
+  }
+  return nullptr;
+}
+
+std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data) {
+  std::vector<StageQuality> out;
+  for (const StageScore& s : result.scores) {
+    out.push_back({s.stage, s.regime.empty() ? s.at : s.at + " " + s.regime, data,
+                   s.rmse / s.unit.si, s.unit.name, s.fit_percent, s.n});
+  }
+  for (const EnergyScore& e : result.energy) {
+    out.push_back({"energy", e.pump, data, 100.0 * std::abs(e.relative_error), "%", kNaN, 1});
+  }
+  return out;
+}
+
+CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignals> signals,
+                              const std::vector<Mask>& only, const CompareOptions& options) {
+  SPARFLOW_CHECK(only.empty() || only.size() == signals.size(), "one mask a log");
+  CompareResult result;
+  std::set<std::string> notes;
+  std::vector<EnergyScore> energy(model.machine.pumps.size());
+  for (std::size_t p = 0; p < energy.size(); ++p) {
+    energy[p].pump = model.machine.pumps[p].name;
+    energy[p].from_commands = 0.0;
+  }
+  for (std::size_t l = 0; l < signals.size(); ++l) {
+    LogComparison log;
+    log.signals = std::move(signals[l]);
+    apply_effects(model, log.signals);
+    Comparison comparison(model, log.signals, only.empty() ? nullptr : &only[l]);
+    log.series = comparison.series(notes);
+    comparison.energy(energy);
+    result.samples += only.empty() ? log.signals.samples() : only[l].cast<long>().sum();
+    for (const std::string& note : log.signals.notes) notes.insert(log.signals.file + ": " + note);
+    result.logs.push_back(std::move(log));
+  }
+  result.scores = scores(model.machine, result.logs);
+  extrapolation_notes(model, result.scores, notes);
+  for (EnergyScore& e : energy) {
+    if (e.duration <= 0.0) continue;
+    e.relative_error = e.measured > 0.0 ? (e.predicted - e.measured) / e.measured : kNaN;
+    result.energy.push_back(e);
+  }
+  if (options.find_regions) {
+    result.worst = worst_regions(error_groups(model.machine, result), options.regions);
+  }
+  if (options.find_regions && options.find_causes) {
+    const std::vector<CompareBlock> blocks = compare_blocks(result);
+    const std::vector<ComparedPart> parts = compare_parts(model.machine, result, blocks);
+    result.tests = test_residuals(parts, static_cast<int>(blocks.size()), options.tests);
+    result.fault = find_stage_at_fault(model, result);
+    result.regimes = errors_by_regime(result, parts, blocks);
+    result.segments = worst_segments(model.machine, result, parts, blocks);
+    const std::vector<WorstRegion> biased = biased_everywhere(parts, result.tests);
+    result.worst.insert(result.worst.begin(), biased.begin(), biased.end());
+  }
+  result.notes.assign(notes.begin(), notes.end());
+  return result;
+}
+
+CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
+                      const CompareOptions& options) {
+  std::vector<MachineSignals> signals;
+  signals.reserve(logs.size());
+  std::vector<BadChannelOfLog> bad;
+  for (const Log& log : logs) {
+    signals.push_back(make_signals(model.machine, log, options.signals));
+    for (BadChannel& b : find_bad_channels(model.machine, log, signals.back()))
+      bad.push_back({log.file, std::move(b)});
+  }
+  CompareResult result = compare_signals(model, std::move(signals), {}, options);
+  result.bad_data = std::move(bad);
+  return result;
+}
+
+CompareResult::CompareResult() = default;
+CompareResult::CompareResult(const CompareResult&) = default;
+CompareResult::CompareResult(CompareResult&&) noexcept = default;
+CompareResult& CompareResult::operator=(const CompareResult&) = default;
+CompareResult& CompareResult::operator=(CompareResult&&) noexcept = default;
+CompareResult::~CompareResult() = default;
+
+}  // namespace sparflow

@@ -1,0 +1,322 @@
+// The result of a comparison as JSON and as a table, and the signals a residual is searched over.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "identification/comparison/compare.h"
+#include "identification/comparison/report_numbers.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using Json = nlohmann::ordered_json;
+
+Json score_json(const StageScore& s) {
+  Json out = {{"rmse", s.rmse / s.unit.si},
+              {"unit", s.unit.name},
+              {"fit_percent", s.fit_percent},
+              {"bias", s.bias / s.unit.si},
+              {"within_95_percent", s.within_95_percent},
+              {"n", s.n}};
+  if (s.stage == "pressure") {
+    out["extrapolated_percent"] = s.extrapolated_percent;
+    out["extrapolated_error_percent"] = s.extrapolated_error_percent;
+  }
+  return out;
+}
+
+void add_cylinder(const Machine& machine, const MachineSignals& signals, int index,
+                  std::vector<RegimeSignal>& out) {
+  const std::string& name = machine.cylinders[static_cast<std::size_t>(index)].name;
+  const CylinderSignals& c = signals.cylinders[static_cast<std::size_t>(index)];
+  out.push_back({"speed_" + name + "_mm_s", name + " speed", "mm/s", 1e-3, c.speed.cwiseAbs()});
+  out.push_back(
+      {"acceleration_" + name + "_m_s2", name + " acceleration", "m/s2", 1.0, c.acceleration});
+  out.push_back({"load_" + name + "_kN", name + " load", "kN", 1e3, c.static_force});
+  if (c.has_command()) {
+    out.push_back({"u_" + name, name + " command", "", 1.0, c.command.cwiseAbs()});
+  }
+}
+
+/// A column without a meaning, in the units of the field where its own is SI.
+RegimeSignal candidate_signal(const CandidateSignal& c) {
+  if (c.unit == "Pa") return {c.name + "_bar", c.name, "bar", units::kBar, c.values};
+  if (c.unit == "m^3/s")
+    return {c.name + "_lpm", c.name, "l/min", units::kLitrePerMinute, c.values};
+  if (c.unit == "rad") return {c.name + "_deg", c.name, "deg", units::kDegree, c.values};
+  return {c.name, c.name, c.unit, 1.0, c.values};
+}
+
+/// Lines of at most about 110 characters; the ones that follow are indented by four.
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t kWidth = 110;
+  std::string out, line = " ";
+  std::size_t start = 0;
+  while (start < text.size()) {
+    const std::size_t end = std::min(text.find(' ', start), text.size());
+    const std::string word = text.substr(start, end - start);
+    if (line.size() + 1 + word.size() > kWidth) {
+      out += line + "\n";
+      line = "   ";
+    }
+    line += " " + word;
+    start = end + 1;
+  }
+  return out + line + "\n";
+}
+
+/// Flow of a pump's other cylinders, the sign of motions that overlap.
+VectorXd other_flow(const Machine& machine, const MachineSignals& signals, int pump, int cylinder) {
+  VectorXd sum = VectorXd::Zero(signals.samples());
+  if (pump < 0) return sum;
+  for (const int i : machine.pumps[static_cast<std::size_t>(pump)].feeds) {
+    if (i != cylinder) sum += signals.cylinders[static_cast<std::size_t>(i)].flow;
+  }
+  return sum;
+}
+
+Json range_json(const Range& r) {
+  if (!std::isfinite(r.lo)) return nullptr;
+  return {r.lo, r.hi};
+}
+
+/// Everything beyond the scores: what repeats, where it arises, in which regimes and motions, bad channels.
+void causes_json(const CompareResult& result, Json& root) {
+  Json& tests = root["residual_tests"];
+  tests = {{"blocks", result.tests.blocks},
+           {"tested", result.tests.tested},
+           {"p_value", result.tests.smallest_p()},
+           {"tests", Json::array()}};
+  for (const ResidualTest& t : result.tests.tests) {
+    Json test = {{"stage", t.stage},     {"at", t.at},
+                 {"regime", t.regime},   {"depends_on", t.depends_on},
+                 {"p_value", t.p_value}, {"size", t.size},
+                 {"unit", t.unit},       {"share_explained", t.share_explained},
+                 {"samples", t.samples}, {"effective_samples", t.effective_samples},
+                 {"blocks", t.blocks},   {"sentence", t.sentence}};
+    if (t.depends_on.empty()) test["ci95"] = range_json(t.ci95);
+    tests["tests"].push_back(std::move(test));
+  }
+  Json& fault = root["stage_at_fault"];
+  fault = {{"stage", nullptr}, {"at", nullptr}, {"sentence", result.fault.sentence}};
+  if (result.fault.fault >= 0) {
+    const StageSplit& f = result.fault.stages[static_cast<std::size_t>(result.fault.fault)];
+    fault["stage"] = f.stage;
+    fault["at"] = f.at;
+    fault["regime"] = f.regime;
+  }
+  fault["stages"] = Json::array();
+  for (const StageSplit& s : result.fault.stages) {
+    fault["stages"].push_back({{"stage", s.stage},
+                               {"at", s.at},
+                               {"regime", s.regime},
+                               {"error", s.error},
+                               {"own", s.own},
+                               {"inherited", s.inherited},
+                               {"noise", s.noise},
+                               {"unit", s.unit},
+                               {"severity", s.severity},
+                               {"n", s.n}});
+  }
+  root["regimes"] = Json::array();
+  for (const RegimeError& r : result.regimes) {
+    root["regimes"].push_back({{"stage", r.stage},
+                               {"at", r.at},
+                               {"regime", r.regime},
+                               {"factor", r.factor},
+                               {"level", r.level},
+                               {"rmse", r.rmse},
+                               {"rmse_ci95", range_json(r.rmse_ci95)},
+                               {"bias", r.bias},
+                               {"bias_ci95", range_json(r.bias_ci95)},
+                               {"unit", r.unit},
+                               {"samples", r.samples},
+                               {"blocks", r.blocks}});
+  }
+  root["worst_segments"] = Json::array();
+  for (const WorstSegment& w : result.segments) {
+    root["worst_segments"].push_back({{"stage", w.stage},
+                                      {"at", w.at},
+                                      {"regime", w.regime},
+                                      {"file", w.file},
+                                      {"from_s", w.from_s},
+                                      {"to_s", w.to_s},
+                                      {"moved", w.moved},
+                                      {"rmse", w.rmse},
+                                      {"bias", w.bias},
+                                      {"unit", w.unit},
+                                      {"share_of_error", w.share_of_error},
+                                      {"share_of_samples", w.share_of_samples},
+                                      {"sentence", w.sentence}});
+  }
+  root["bad_data"] = Json::array();
+  for (const BadChannelOfLog& b : result.bad_data) {
+    root["bad_data"].push_back({{"file", b.file},
+                                {"channel", b.bad.channel},
+                                {"kind", bad_data_word(b.bad.kind)},
+                                {"from_s", b.bad.from_s},
+                                {"to_s", b.bad.to_s},
+                                {"share", b.bad.share},
+                                {"evidence", b.bad.evidence},
+                                {"remedy", b.bad.remedy}});
+  }
+}
+
+std::string duration_text(double seconds) {
+  return seconds < 120.0 ? fmt::format("{:.1f} s", seconds)
+                         : fmt::format("{:.1f} min", seconds / 60.0);
+}
+
+std::string repeats_text(const CompareResult& result) {
+  constexpr std::size_t kMost = 6;
+  const ResidualTests& tests = result.tests;
+  if (tests.tests.empty()) return "";
+  std::string text = "\nwhat repeats in the error";
+  text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
+                      tests.tested, tests.blocks, 100.0 * kAlarm);
+  if (tests.smallest_p() > kAlarm) return text + "  nothing: no bias, no signal it depends on\n";
+  std::size_t shown = 0, alarms = 0;
+  for (const ResidualTest& t : tests.tests) {
+    if (t.p_value > kAlarm) continue;
+    ++alarms;
+    if (shown < kMost) text += wrapped(t.stage + ": " + t.sentence);
+    shown += shown < kMost ? 1 : 0;
+  }
+  if (alarms > shown) text += fmt::format("  and {} more, in --json\n", alarms - shown);
+  return text;
+}
+
+}  // namespace
+
+std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
+                                         const ComparedSeries& series) {
+  std::vector<RegimeSignal> out;
+  const int cylinder = series.stage == "pump" ? -1 : machine.cylinder_index(series.at);
+  const int pump =
+      series.stage == "pump" ? machine.pump_index(series.at) : machine.pump_of_cylinder(cylinder);
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
+    if (joint.type == JointType::kRevolute) {
+      out.push_back({"q_" + joint.name + "_deg", joint.name + " angle", "deg", units::kDegree,
+                     signals.q.col(j)});
+    } else {
+      out.push_back(
+          {"q_" + joint.name + "_m", joint.name + " position", "m", 1.0, signals.q.col(j)});
+    }
+  }
+  if (cylinder >= 0) add_cylinder(machine, signals, cylinder, out);
+  if (pump >= 0) {
+    out.push_back({cylinder >= 0 ? "other_flow_lpm" : "flow_lpm",
+                   cylinder >= 0 ? "flow to the other cylinders" : "total flow", "l/min",
+                   units::kLitrePerMinute, other_flow(machine, signals, pump, cylinder)});
+  }
+  if (series.stage == "pump") {
+    out.push_back({"predicted_bar", "predicted pressure", "bar", units::kBar, series.predicted});
+  }
+  if (signals.payload_measured)
+    out.push_back({"payload_kg", "payload", "kg", 1.0, signals.payload});
+  if (signals.oil.size() > 0) out.push_back({"oil_C", "oil temperature", "degC", 1.0, signals.oil});
+  if (signals.return_pressure.size() > 0) {
+    out.push_back({"p_return_bar", "return pressure", "bar", units::kBar, signals.return_pressure});
+  }
+  for (const CandidateSignal& c : signals.candidates) out.push_back(candidate_signal(c));
+  return out;
+}
+
+std::string compare_json(const CompareResult& result) {
+  Json stages = Json::object();
+  for (const char* stage : {"force", "flow", "pressure", "pump", "energy"})
+    stages[stage] = Json::object();
+  for (const StageScore& s : result.scores) {
+    if (s.regime.empty()) {
+      stages[s.stage][s.at] = score_json(s);
+    } else {
+      stages[s.stage][s.at][s.regime] = score_json(s);
+    }
+  }
+  for (const EnergyScore& e : result.energy) {
+    Json& at = stages["energy"][e.pump];
+    at = {{"measured_J", e.measured},
+          {"predicted_J", e.predicted},
+          {"relative_error", e.relative_error},
+          {"duration_s", e.duration}};
+    if (e.from_commands) at["predicted_from_commands_J"] = *e.from_commands;
+  }
+  Json worst = Json::array();
+  for (const WorstRegion& w : result.worst) {
+    Json where = Json::object();
+    for (const RegionBound& b : w.where) where[b.key] = {b.lo, b.hi};
+    worst.push_back({{"stage", w.stage},
+                     {"at", w.at},
+                     {"regime", w.regime},
+                     {"where", where},
+                     {"rmse", w.rmse},
+                     {"unit", w.unit},
+                     {"share_of_error", w.share_of_error},
+                     {"share_of_samples", w.share_of_samples},
+                     {"sentence", w.sentence}});
+  }
+  Json logs = Json::array();
+  for (const LogComparison& log : result.logs) {
+    logs.push_back({{"file", log.signals.file},
+                    {"samples", log.signals.samples()},
+                    {"filter_window_s", log.signals.window}});
+  }
+  Json root = {{"samples", result.samples},
+               {"stages", stages},
+               {"worst", worst},
+               {"notes", result.notes},
+               {"logs", logs}};
+  causes_json(result, root);
+  return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string compare_table(const CompareResult& result) {
+  std::string text = fmt::format("{} samples in {} log{}\n", result.samples, result.logs.size(),
+                                 result.logs.size() == 1 ? "" : "s");
+  std::size_t width = 12;
+  for (const StageScore& s : result.scores)
+    width = std::max(width, s.at.size() + s.regime.size() + 1);
+  if (result.scores.empty()) {
+    text += "nothing could be compared\n";
+  } else {
+    text += fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", "stage", "at", width,
+                        "RMSE", "bias", "unit", "fit %", "n");
+  }
+  for (const StageScore& s : result.scores) {
+    text +=
+        fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", s.stage,
+                    s.regime.empty() ? s.at : s.at + " " + s.regime, width,
+                    short_number(s.rmse / s.unit.si), short_number(s.bias / s.unit.si), s.unit.name,
+                    std::isfinite(s.fit_percent) ? fmt::format("{:.1f}", s.fit_percent) : "-", s.n);
+  }
+  for (const EnergyScore& e : result.energy) {
+    text += fmt::format("{:<12}{:<{}}  measured {} kJ, predicted {} kJ ({:+.2f} %)", "energy",
+                        e.pump, width, short_number(e.measured / 1e3),
+                        short_number(e.predicted / 1e3), 100.0 * e.relative_error);
+    if (e.from_commands)
+      text += fmt::format(", from commands {} kJ", short_number(*e.from_commands / 1e3));
+    text += fmt::format(" in {}\n", duration_text(e.duration));
+  }
+  text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
+  if (!result.bad_data.empty())
+    text += "\nbad data: repair this before anything is learned from it\n";
+  for (const BadChannelOfLog& b : result.bad_data)
+    text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
+  if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);
+  if (!result.worst.empty()) text += "\nwhere it fails most\n";
+  for (const WorstRegion& w : result.worst) text += wrapped(w.stage + ": " + w.sentence);
+  if (!result.segments.empty()) text += "\nwhen it fails most\n";
+  for (const WorstSegment& w : result.segments) text += wrapped(w.stage + ": " + w.sentence);
+  text += repeats_text(result);
+  if (!result.notes.empty()) text += "\nnot compared, or with care\n";
+  for (const std::string& note : result.notes) text += wrapped(note);
+  return text;
+}
+
+}  // namespace sparflow

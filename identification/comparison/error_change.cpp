@@ -1,0 +1,300 @@
+#include "identification/comparison/error_change.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "identification/comparison/compare_parts.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Refitting around something else moves centres and length-scales, and with them errors near the sensor's noise by
+/// some percent. A tenth more is a loss that anybody would see.
+constexpr double kLargeChange = 1.1;
+/// With fewer of them no noise can be told. A handful of samples, all that a test log may hold of what was learned, moves
+/// by more than a tenth of its own.
+constexpr int kFewestBlocks = 4;
+/// What stands for motions where there are too few. [s]
+constexpr double kPiece = 1.0;
+constexpr double kStandardErrors = 2.0;
+/// Everything together, noise included, may move by this much when it is learned again.
+constexpr double kRefitMoves = 1.02;
+/// Of what a change takes away where it acts, the share it may bring in at another place where it acts.
+constexpr double kLargestLoss = 0.25;
+/// A change acts on a quantity when it moves its prediction by this share of the error.
+constexpr double kActs = 0.02;
+/// A relative error of energy that moves by less does not matter to anybody: flows are measured to some percent.
+constexpr double kEnergyMoves = 2e-3;
+
+/// Sums of one value a block of motion, before and after.
+struct BlockSums {
+  VectorXd before, after, weight;
+  explicit BlockSums(std::size_t blocks)
+      : before(VectorXd::Zero(static_cast<Index>(blocks))), after(before), weight(before) {}
+
+  double used() const { return static_cast<double>((weight.array() > 0.0).count()); }
+
+  /// Whether sum(after) / sum(weight) - sum(before) / sum(weight) is more than chance between blocks.
+  bool grew() const {
+    const double all = weight.sum();
+    if (!(all > 0.0)) return false;
+    const VectorXd more = after - before;
+    const double mean = more.sum() / all;
+    if (mean <= 0.0) return false;
+    const double n = used();
+    if (n < kFewestBlocks) return false;
+    const double error = std::sqrt((more - mean * weight).squaredNorm() * n / (n - 1.0)) / all;
+    return mean > kStandardErrors * error;
+  }
+};
+
+/// Motions, and what takes their place where a quantity is seen in too few of them.
+struct Blocks {
+  std::vector<CompareBlock> motions, pieces;
+  explicit Blocks(const CompareResult& result)
+      : motions(compare_blocks(result)), pieces(compare_blocks(result, kPiece)) {}
+
+  /// @param sums_over callable: BlockSums of a list of blocks
+  template <class F>
+  BlockSums enough(const F& sums_over) const {
+    BlockSums sums = sums_over(motions);
+    return sums.used() < kFewestBlocks ? sums_over(pieces) : sums;
+  }
+};
+
+/// Block of motion of every sample of a log, -1 = rest.
+Eigen::VectorXi blocks_of(const std::vector<CompareBlock>& blocks, std::size_t log, Index samples) {
+  Eigen::VectorXi out = Eigen::VectorXi::Constant(samples, -1);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (blocks[b].log != log) continue;
+    out.segment(blocks[b].samples.begin, blocks[b].samples.size()).setConstant(static_cast<int>(b));
+  }
+  return out;
+}
+
+/// Calls visit(before, after, log, block numbers) for each quantity of both.
+template <class F>
+void for_each_pair(const CompareResult& before, const CompareResult& after,
+                   const std::vector<CompareBlock>& blocks, const F& visit) {
+  for (std::size_t l = 0; l < std::min(before.logs.size(), after.logs.size()); ++l) {
+    const Eigen::VectorXi block = blocks_of(blocks, l, before.logs[l].signals.samples());
+    for (const ComparedSeries& b : before.logs[l].series) {
+      for (const ComparedSeries& a : after.logs[l].series) {
+        if (a.stage == b.stage && a.at == b.at && a.measured.size() == b.measured.size())
+          visit(b, a, l, block);
+      }
+    }
+  }
+}
+
+bool counts(const ComparedSeries& s, const std::string& regime, Index k, bool everywhere = false) {
+  if (!std::isfinite(s.measured[k]) || !std::isfinite(s.predicted[k])) return false;
+  if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) return false;
+  return everywhere || s.extrapolated.size() == 0 || !s.extrapolated[k];
+}
+
+/// @param everywhere also where a pressure was not learned
+BlockSums squared_errors(const CompareResult& before, const CompareResult& after,
+                         const std::vector<CompareBlock>& blocks, const StageScore& of,
+                         bool everywhere = false) {
+  BlockSums sums(blocks.size());
+  for_each_pair(before, after, blocks,
+                [&](const ComparedSeries& b, const ComparedSeries& a, std::size_t,
+                    const Eigen::VectorXi& block) {
+                  if (b.stage != of.stage || b.at != of.at) return;
+                  for (Index k = 0; k < b.measured.size(); ++k) {
+                    if (block[k] < 0 || !counts(b, of.regime, k, everywhere) ||
+                        !counts(a, of.regime, k, everywhere))
+                      continue;
+                    sums.before[block[k]] += std::pow(b.predicted[k] - b.measured[k], 2);
+                    sums.after[block[k]] += std::pow(a.predicted[k] - a.measured[k], 2);
+                    sums.weight[block[k]] += 1.0;
+                  }
+                });
+  return sums;
+}
+
+/// Energy error of each block, with the sign that makes the whole's error positive; weight: measured energy. Errors of
+/// motions that cancel each other are no accuracy, but they are what the whole is made of.
+BlockSums energy_errors(const CompareResult& before, const CompareResult& after,
+                        const std::vector<CompareBlock>& blocks, const Pump& pump) {
+  BlockSums sums(blocks.size());
+  for_each_pair(before, after, blocks,
+                [&](const ComparedSeries& b, const ComparedSeries& a, std::size_t l,
+                    const Eigen::VectorXi& block) {
+                  if (b.stage != "pump" || b.at != pump.name) return;
+                  const MachineSignals& s = after.logs[l].signals;
+                  const VectorXd duration = sample_durations(s.time, s.runs);
+                  for (Index k = 0; k < b.measured.size(); ++k) {
+                    if (block[k] < 0 || !counts(b, "", k) || !counts(a, "", k)) continue;
+                    double flow = 0.0;
+                    for (const int i : pump.feeds) {
+                      const VectorXd& q = s.cylinders[static_cast<std::size_t>(i)].flow;
+                      if (q.size() > 0 && std::isfinite(q[k])) flow += q[k];
+                    }
+                    const double volume = flow * duration[k];
+                    sums.before[block[k]] += (b.predicted[k] - b.measured[k]) * volume;
+                    sums.after[block[k]] += (a.predicted[k] - a.measured[k]) * volume;
+                    sums.weight[block[k]] += b.measured[k] * volume;
+                  }
+                });
+  if (sums.before.sum() < 0.0) sums.before = -sums.before;
+  if (sums.after.sum() < 0.0) sums.after = -sums.after;
+  return sums;
+}
+
+/// Whether the change moved this quantity's prediction by a share of its error that matters.
+bool acts_on(const CompareResult& before, const CompareResult& after,
+             const std::vector<CompareBlock>& blocks, const StageScore& of) {
+  double moved = 0.0, error = 0.0;
+  for_each_pair(
+      before, after, blocks,
+      [&](const ComparedSeries& b, const ComparedSeries& a, std::size_t, const Eigen::VectorXi&) {
+        if (b.stage != of.stage || b.at != of.at) return;
+        for (Index k = 0; k < b.measured.size(); ++k) {
+          if (!counts(b, of.regime, k) || !counts(a, of.regime, k)) continue;
+          moved += std::pow(a.predicted[k] - b.predicted[k], 2);
+          error += std::pow(b.predicted[k] - b.measured[k], 2);
+        }
+      });
+  return moved > kActs * kActs * error && moved > 0.0;
+}
+
+/// @param before, after RMS errors over the samples that count, SI
+HarmedError harm(const StageScore& b, double before, double after) {
+  const bool kilo = b.unit.name == "N" && after >= 1e4;
+  const double si = kilo ? 1e3 : b.unit.si;
+  return {b.stage,
+          b.at,
+          b.regime,
+          before,
+          after,
+          fmt::format("the error of {} {}{} grew from {:.3g} to {:.3g} {}", b.stage, b.at,
+                      b.regime.empty() ? "" : " " + b.regime, before / si, after / si,
+                      kilo ? "kN" : b.unit.name)};
+}
+
+void add_harmed_energy(const Machine& machine, const CompareResult& before,
+                       const CompareResult& after, const Blocks& blocks,
+                       std::vector<HarmedError>& harmed) {
+  for (const Pump& pump : machine.pumps) {
+    const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
+      return energy_errors(before, after, over, pump);
+    });
+    const double all = sums.weight.sum();
+    if (!(all > 0.0) || !sums.grew()) continue;
+    const double b = sums.before.sum() / all, a = sums.after.sum() / all;
+    if (a - b < kEnergyMoves) continue;
+    harmed.push_back({"energy", pump.name, "", b, a,
+                      fmt::format("the error of the energy of pump {} grew from {:.2f} to {:.2f} %",
+                                  pump.name, 100.0 * b, 100.0 * a)});
+  }
+}
+
+/// Standard error of log(overall): what each block adds to it, to first order.
+class OverallNoise {
+ public:
+  explicit OverallNoise(std::size_t blocks)
+      : added_(VectorXd::Zero(static_cast<Index>(blocks))), weight_(added_) {}
+
+  /// @param n samples of the quantity, as its score counts them
+  void add(const BlockSums& sums, double n) {
+    const double both = sums.before.sum() + sums.after.sum(), counted = sums.weight.sum();
+    if (!(both > 0.0) || !(counted > 0.0)) return;
+    added_ += n / both * (sums.after - sums.before);
+    weight_ += n / counted * sums.weight;
+  }
+  double deviation() const {
+    const auto used = static_cast<double>((weight_.array() > 0.0).count());
+    if (used < 2.0) return 0.0;
+    const double mean = added_.sum() / weight_.sum();
+    return std::sqrt((added_ - mean * weight_).squaredNorm() * used / (used - 1.0)) / weight_.sum();
+  }
+
+ private:
+  VectorXd added_, weight_;
+};
+
+}  // namespace
+
+bool ErrorChange::worse() const { return own > 1.0 || overall > kRefitMoves || !harmed.empty(); }
+
+ErrorChange error_change(const Machine& machine, const CompareResult& before,
+                         const CompareResult& after, const std::string& stage,
+                         const std::string& at) {
+  return error_change(machine, before, after, std::vector<std::string>{stage}, at);
+}
+
+ErrorChange error_change(const Machine& machine, const CompareResult& before,
+                         const CompareResult& after, const std::vector<std::string>& stages,
+                         const std::string& at) {
+  const Blocks blocks(before);
+  const bool known_stages = std::all_of(stages.begin(), stages.end(), [](const std::string& s) {
+    return s == "force" || s == "flow" || s == "pressure" || s == "pump";
+  });
+  const auto in_stage = [&](const StageScore& s) {
+    return !known_stages || std::find(stages.begin(), stages.end(), s.stage) != stages.end();
+  };
+  const bool one_place =
+      known_stages && std::any_of(before.scores.begin(), before.scores.end(),
+                                  [&](const StageScore& s) { return in_stage(s) && s.at == at; });
+  ErrorChange out;
+  OverallNoise noise(blocks.motions.size());
+  double all = 0.0, all_n = 0.0;
+  struct Pool {
+    double before = 0.0, after = 0.0, n = 0.0;
+    double won = 0.0, lost = 0.0;  // squared error taken away and brought in, by quantity
+    std::vector<HarmedError> harmed;
+  };
+  std::map<std::string, Pool> own;  // by stage, whose quantities have one unit
+  for (const StageScore& b : before.scores) {
+    const StageScore* a = after.find(b.stage, b.at, b.regime);
+    if (a == nullptr || a->n == 0 || b.n == 0 || !(b.rmse > 0.0) || !(a->rmse > 0.0)) continue;
+    const double n = 0.5 * static_cast<double>(a->n + b.n);
+    const double change = std::log(a->rmse / b.rmse);
+    all += n * change;
+    all_n += n;
+    noise.add(squared_errors(before, after, blocks.motions, b, true), n);
+    const bool is_own =
+        in_stage(b) && (one_place ? b.at == at : acts_on(before, after, blocks.motions, b));
+    if (is_own) {
+      Pool& pool = own[b.stage];
+      const double was = n * b.rmse * b.rmse, is = n * a->rmse * a->rmse;
+      pool.before += was;
+      pool.after += is;
+      pool.n += n;
+      (is < was ? pool.won : pool.lost) += std::abs(is - was);
+    }
+    const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
+      return squared_errors(before, after, over, b);
+    });
+    const double counted = std::max(1.0, sums.weight.sum());
+    const double was = std::sqrt(sums.before.sum() / counted);
+    const double is = std::sqrt(sums.after.sum() / counted);
+    if (is > kLargeChange * was && sums.grew())
+      (is_own ? own[b.stage].harmed : out.harmed).push_back(harm(b, was, is));
+  }
+  // where it acts on several quantities, one may give a little for what the others win
+  for (auto& [name, pool] : own) {
+    if (pool.lost <= kLargestLoss * pool.won) continue;
+    out.harmed.insert(out.harmed.end(), pool.harmed.begin(), pool.harmed.end());
+  }
+  add_harmed_energy(machine, before, after, blocks, out.harmed);
+  if (all_n > 0.0) out.overall = std::exp(all / all_n);
+  out.overall_deviation = noise.deviation();
+  double log_own = 0.0, own_n = 0.0;
+  for (const auto& [name, pool] : own) {
+    log_own += pool.n * 0.5 * std::log(pool.after / pool.before);
+    own_n += pool.n;
+  }
+  out.own = own_n > 0.0 ? std::exp(log_own / own_n) : out.overall;
+  return out;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,218 @@
+#include "identification/comparison/stage_at_fault.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identification/comparison/compare.h"
+#include "identification/signals/apply_effects.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// What the errors of the stages before change in one series; NaN where the measured inputs are not known.
+class Inheritance {
+ public:
+  Inheritance(const CraneModel& model, const LogComparison& log)
+      : model_(model), signals_(log.signals) {}
+
+  double at(const ComparedSeries& series, Index k) const {
+    if (series.stage == "pressure") {
+      const int i = model_.machine.cylinder_index(series.at);
+      return pressure(i, k);
+    }
+    if (series.stage == "pump") return pump(model_.machine.pump_index(series.at), k);
+    return 0.0;
+  }
+
+ private:
+  const VectorXd& predicted_force(const CylinderSignals& c) const {
+    return c.model_force.size() > 0 ? c.model_force : c.static_force;
+  }
+
+  const GaussianProcess& process(int cylinder, int direction) const {
+    const CylinderModel& m = model_.cylinders[static_cast<std::size_t>(cylinder)];
+    return direction > 0 ? m.extend : m.retract;
+  }
+
+  double pressure(int cylinder, Index k) const {
+    const CylinderSignals& c = signals_.cylinders[static_cast<std::size_t>(cylinder)];
+    if (c.force_smooth.size() == 0 || c.direction[k] == 0) return kNaN;
+    const GaussianProcess& p = process(cylinder, c.direction[k]);
+    if (p.empty()) return kNaN;
+    // Far outside its data a process says little: a measured force there splits nothing.
+    return p.mean(c.flow[k], predicted_force(c)[k]) - p.mean(c.flow[k], c.force_smooth[k]);
+  }
+
+  double pump(int pump_index, Index k) const {
+    const Pump& pump = model_.machine.pumps[static_cast<std::size_t>(pump_index)];
+    if (pump.type == PumpType::kConstantPressure) return 0.0;
+    const double standby = model_.pumps[static_cast<std::size_t>(pump_index)].standby;
+    double predicted = standby, measured = standby;
+    for (const int i : pump.feeds) {
+      const CylinderSignals& c = signals_.cylinders[static_cast<std::size_t>(i)];
+      if (c.direction[k] == 0) continue;
+      if (!c.has_pressure()) return kNaN;
+      const GaussianProcess& p = process(i, c.direction[k]);
+      if (p.empty()) return kNaN;
+      double added = model_.cylinders[static_cast<std::size_t>(i)].margin;
+      if (c.demand_effect.size() > 0) added += c.demand_effect[k];
+      double by_model = p.mean(c.flow[k], predicted_force(c)[k]);
+      by_model += working_pressure_effect(model_, signals_, i, k);
+      predicted = std::max(predicted, by_model + added);
+      measured = std::max(measured, c.working_pressure_smooth[k] + added);
+    }
+    return predicted - measured;
+  }
+
+  const CraneModel& model_;
+  const MachineSignals& signals_;
+};
+
+/// Measured minus smoothed: what the sensor adds; NaN for speeds, which are smoothed already.
+double roughness(const Machine& machine, const MachineSignals& signals, const ComparedSeries& s,
+                 Index k) {
+  if (s.stage == "pump") {
+    const auto p = static_cast<std::size_t>(machine.pump_index(s.at));
+    return signals.pumps[p].pressure[k] - signals.pumps[p].pressure_smooth[k];
+  }
+  const CylinderSignals& c =
+      signals.cylinders[static_cast<std::size_t>(machine.cylinder_index(s.at))];
+  if (s.stage == "force") return c.force[k] - c.force_smooth[k];
+  if (s.stage == "pressure") return c.working_pressure[k] - c.working_pressure_smooth[k];
+  return kNaN;
+}
+
+std::string words_of(const StageSplit& s) {
+  const std::string side = s.regime.empty()       ? ""
+                           : s.regime == "extend" ? " extending"
+                                                  : " retracting";
+  if (s.stage == "pump") return "pressure of pump " + s.at;
+  if (s.stage == "pressure") return "working pressure of " + s.at + side;
+  if (s.stage == "flow") return "flow of " + s.at + " from its command";
+  return s.stage + " of " + s.at;
+}
+
+std::string amount(double value, const std::string& unit) {
+  if (unit == "N" && std::abs(value) >= 1e3) return fmt::format("{:.3g} kN", value / 1e3);
+  return fmt::format("{:.3g} {}", value, unit);
+}
+
+StageSplit split(const CraneModel& model, const CompareResult& result, const std::string& stage,
+                 const std::string& at, const std::string& regime) {
+  StageSplit out;
+  out.stage = stage;
+  out.at = at;
+  out.regime = regime;
+  double error = 0.0, own = 0.0, inherited = 0.0, sum = 0.0, squares = 0.0, n = 0.0;
+  std::vector<double> rough;
+  FieldUnit unit;
+  for (const LogComparison& log : result.logs) {
+    const Inheritance before(model, log);
+    for (const ComparedSeries& s : log.series) {
+      if (s.stage != stage || s.at != at) continue;
+      unit = s.unit;
+      for (Index k = 0; k < s.measured.size(); ++k) {
+        if (!std::isfinite(s.measured[k])) continue;
+        // outside what a process was learned from neither of its two answers means anything
+        if (s.extrapolated.size() > 0 && s.extrapolated[k]) continue;
+        if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) continue;
+        const double e = s.predicted[k] - s.measured[k], from_before = before.at(s, k);
+        if (!std::isfinite(from_before)) continue;
+        error += e * e;
+        own += (e - from_before) * (e - from_before);
+        inherited += from_before * from_before;
+        sum += s.measured[k];
+        squares += s.measured[k] * s.measured[k];
+        n += 1.0;
+        const double r = roughness(model.machine, log.signals, s, k);
+        if (std::isfinite(r)) rough.push_back(r);
+      }
+    }
+  }
+  out.n = static_cast<long>(n);
+  if (n < 2.0) return out;
+  out.unit = unit.name;
+  out.error = std::sqrt(error / n) / unit.si;
+  out.own = std::sqrt(own / n) / unit.si;
+  out.inherited = std::sqrt(inherited / n) / unit.si;
+  out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
+  if (!rough.empty()) {
+    // the smoothed signal keeps a part of the noise: what is taken off is a little low
+    constexpr double kAllowance = 1.1;
+    const Eigen::Map<const VectorXd> r(rough.data(), static_cast<Index>(rough.size()));
+    out.noise = kAllowance * robust_std(r) / unit.si;
+  }
+  // A law learned with wrong inputs makes up for them: what right inputs then do to it is not its fault.
+  const double at_fault = std::min(out.own, out.error);
+  const double beyond = std::sqrt(std::max(0.0, at_fault * at_fault - out.noise * out.noise));
+  out.severity = out.spread > 0.0 ? beyond / out.spread : 0.0;
+  out.words = words_of(out);
+  return out;
+}
+
+std::string describe(const StageAtFault& found) {
+  if (found.stages.empty()) return "";
+  if (found.fault < 0)
+    return "No stage stands out: with measured inputs every stage is as good as its sensor.";
+  const StageSplit& f = found.stages[static_cast<std::size_t>(found.fault)];
+  std::string text =
+      fmt::format("The error arises in the {}: {} RMS of its own", f.words, amount(f.own, f.unit));
+  if (f.inherited > 0.25 * f.own)
+    text += fmt::format(" and {} inherited", amount(f.inherited, f.unit));
+  // what it does further down: the worst heir
+  const StageSplit* heir = nullptr;
+  for (const StageSplit& s : found.stages) {
+    const bool next = (f.stage == "force" && s.stage == "pressure" && s.at == f.at) ||
+                      (f.stage == "pressure" && s.stage == "pump");
+    if (next && !s.makes_up() && s.inherited > 0.25 * s.error &&
+        (heir == nullptr || s.inherited > heir->inherited))
+      heir = &s;
+  }
+  if (heir != nullptr) {
+    text += fmt::format("; the {} inherits {} of it, its own error is {}", heir->words,
+                        amount(heir->inherited, heir->unit), amount(heir->own, heir->unit));
+  }
+  // a law that was learned with the wrong input and hides it
+  const StageSplit* hides = nullptr;
+  for (const StageSplit& s : found.stages) {
+    const bool next = f.stage == "force" && s.stage == "pressure" && s.at == f.at;
+    if (next && s.makes_up() && (hides == nullptr || s.own > hides->own)) hides = &s;
+  }
+  if (hides != nullptr) {
+    text += fmt::format(
+        "; the {} was learned with it and makes up for it: {} along the chain, {} once the force "
+        "is "
+        "right",
+        hides->words, amount(hides->error, hides->unit), amount(hides->own, hides->unit));
+  }
+  return text + ".";
+}
+
+}  // namespace
+
+StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& result,
+                                 const StageAtFaultOptions& options) {
+  StageAtFault out;
+  for (const StageScore& score : result.scores) {
+    if (score.stage == "flow_sensor") continue;
+    StageSplit s = split(model, result, score.stage, score.at, score.regime);
+    if (s.n > 1) out.stages.push_back(std::move(s));
+  }
+  double worst = options.least_severity;
+  for (std::size_t i = 0; i < out.stages.size(); ++i) {
+    if (out.stages[i].severity <= worst) continue;
+    worst = out.stages[i].severity;
+    out.fault = static_cast<int>(i);
+  }
+  out.sentence = describe(out);
+  return out;
+}
+
+}  // namespace sparflow

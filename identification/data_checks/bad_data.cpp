@@ -1,0 +1,210 @@
+#include "identification/data_checks/bad_data.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identification/data_checks/bad_data_checks.h"
+#include "models/machine/linkage.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+
+/// Stroke of a cylinder over its joint's whole range. [m]
+double full_stroke(const Machine& machine, int cylinder) {
+  const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
+  if (c.stroke) return *c.stroke;
+  const Range range = machine.joints[static_cast<std::size_t>(c.joint)].position;
+  return std::abs(stroke_at(machine, cylinder, range.hi) - stroke_at(machine, cylinder, range.lo));
+}
+
+/// Positions: what share of the joint's range, and how fast it can go.
+void describe_position(const CheckContext& context, CheckedChannel& c) {
+  const Machine& machine = context.machine;
+  const bool stroke = c.channel->role == Role::kStroke;
+  const int joint = stroke ? machine.cylinders[static_cast<std::size_t>(c.channel->index)].joint
+                           : c.channel->index;
+  c.cylinder = stroke ? c.channel->index : machine.cylinder_of_joint(joint);
+  const Joint& j = machine.joints[static_cast<std::size_t>(joint)];
+  const double range = j.position.hi - j.position.lo;
+  c.family = "position";
+  c.scale = stroke ? full_stroke(machine, c.channel->index) : range;
+  const double limit = std::max(std::abs(j.velocity.lo), std::abs(j.velocity.hi));
+  // a stroke's largest speed: the joint's by the mean lever
+  c.fastest = limit * (range > 0.0 ? c.scale / range : 1.0);
+  if (j.type == JointType::kRevolute && !stroke) {
+    c.field = units::kDegree;
+    c.field_unit = "deg";
+  } else {
+    c.field = 1e-3;
+    c.field_unit = "mm";
+  }
+  const SavitzkyGolay filter(context.log.time, context.log.runs, context.signals.window);
+  const double gain = filter.noise_gain(1);
+  c.least_noise = gain > 0.0 ? context.options.least_speed_share * c.fastest / gain : 0.0;
+  c.least_jump = 1.5 * c.fastest * context.log.step;
+}
+
+CheckedChannel describe(const CheckContext& context, const Channel& channel) {
+  CheckedChannel c;
+  c.channel = &channel;
+  c.field_unit = channel.unit;
+  const auto pressure = [&] {
+    c.field = units::kBar;
+    c.field_unit = "bar";
+    c.least_noise = context.options.least_pressure;
+    c.least_jump = 20.0 * context.options.least_pressure;
+  };
+  switch (channel.role) {
+    case Role::kJointPosition:
+    case Role::kStroke:
+      describe_position(context, c);
+      break;
+    case Role::kPressureA:
+    case Role::kPressureB:
+      c.cylinder = channel.index;
+      c.family = "pressure";
+      pressure();
+      break;
+    case Role::kPumpPressure:
+      c.family = "pressure";
+      pressure();
+      break;
+    case Role::kReturnPressure:  // often a sensor of another range: no twin
+      pressure();
+      break;
+    case Role::kCommand:
+      c.cylinder = channel.index;
+      c.field_unit = "";
+      c.least_noise = context.options.least_command;
+      c.least_jump = 5.0 * context.options.least_command;
+      break;
+    case Role::kOilTemperature:
+      c.field_unit = "degC";
+      c.least_noise = 1.0;
+      c.least_jump = 3.0;  // litres of oil do not warm by 3 K from one sample to the next
+      break;
+    default:
+      c.cylinder = channel.role == Role::kPayload ? -1 : channel.index;
+      break;
+  }
+  return c;
+}
+
+/// Affected stretches [s]; short gaps between them are closed, so that a picture can show them.
+std::vector<std::pair<double, double>> stretches_of(const Log& log, const Mask& affected) {
+  const double gap = 0.01 * log.duration();
+  std::vector<std::pair<double, double>> out;
+  for (Index k = 0; k < affected.size(); ++k) {
+    if (!affected[k]) continue;
+    const double t = log.time[k];
+    if (!out.empty() && t - out.back().second <= std::max(gap, 1.5 * log.step)) {
+      out.back().second = t;
+    } else {
+      out.emplace_back(t, t);
+    }
+  }
+  return out;
+}
+
+BadChannel report(const CheckContext& context, std::size_t i, Finding found) {
+  BadChannel bad;
+  const Index n = context.log.samples();
+  bad.channel = context.channels[i].channel->signal;
+  bad.kind = found.kind;
+  Index first = 0, last = n - 1;
+  while (first < last && !found.affected[first]) ++first;
+  while (last > first && !found.affected[last]) --last;
+  bad.from_s = context.log.time[first];
+  bad.to_s = context.log.time[last];
+  bad.share = static_cast<double>(found.affected.cast<Index>().sum()) / static_cast<double>(n);
+  bad.evidence = std::move(found.evidence);
+  bad.remedy = std::move(found.remedy);
+  bad.file = context.log.file;
+  bad.unit = context.channels[i].field_unit;
+  bad.time = context.log.time;
+  bad.values = context.channels[i].channel->values / context.channels[i].field;
+  bad.stretches = stretches_of(context.log, found.affected);
+  return bad;
+}
+
+/// A command is judged by the motion: where that channel is bad itself, the command is not accused.
+void blame_position_alone(const CheckContext& context, std::vector<BadChannel>& bad) {
+  std::vector<int> lost;
+  const auto find = [&](const BadChannel& b) -> const CheckedChannel& {
+    return *std::find_if(context.channels.begin(), context.channels.end(),
+                         [&](const CheckedChannel& c) { return c.channel->signal == b.channel; });
+  };
+  for (const BadChannel& b : bad) {
+    const CheckedChannel& c = find(b);
+    if (c.family == "position") lost.push_back(c.cylinder);
+  }
+  std::erase_if(bad, [&](const BadChannel& b) {
+    const CheckedChannel& c = find(b);
+    return c.channel->role == Role::kCommand &&
+           std::find(lost.begin(), lost.end(), c.cylinder) != lost.end();
+  });
+}
+
+}  // namespace
+
+const char* bad_data_word(BadDataKind kind) {
+  switch (kind) {
+    case BadDataKind::kStuck:
+      return "stuck";
+    case BadDataKind::kJumping:
+      return "jumping";
+    case BadDataKind::kNoisy:
+      return "noisy";
+    case BadDataKind::kDropOut:
+      return "drop_out";
+    case BadDataKind::kSaturated:
+      return "saturated";
+    case BadDataKind::kWild:
+      return "wild";
+  }
+  return "";
+}
+
+std::string bad_channel_sentence(const BadChannel& bad) {
+  const char* words[] = {"is stuck",  "jumps",      "is noisy",
+                         "drops out", "is cut off", "has wild samples"};
+  return fmt::format("{} {} between {:.1f} and {:.1f} s ({:.2g} % of the log): {}. {}.",
+                     bad.channel, words[static_cast<int>(bad.kind)], bad.from_s, bad.to_s,
+                     100.0 * bad.share, bad.evidence, bad.remedy);
+}
+
+std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log,
+                                          const MachineSignals& signals,
+                                          const BadDataOptions& options) {
+  std::vector<BadChannel> out;
+  if (log.samples() < 2) return out;
+  CheckContext context{machine, log, signals, options, {}, {}};
+  for (const Channel& channel : log.channels) {
+    if (channel.role == Role::kCandidate) continue;
+    context.channels.push_back(describe(context, channel));
+    context.noise.push_back(noise_profile(channel.values, log));
+  }
+  // The gravest first: a stuck channel is not also judged for its jump into and out of that value.
+  using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
+  const Check checks[] = {check_missing,   check_stuck, check_stuck_command, check_noise,
+                          check_saturated, check_wild,  check_jumps};
+  for (std::size_t i = 0; i < context.channels.size(); ++i) {
+    for (const Check check : checks) {
+      std::optional<Finding> found = check(context, i);
+      if (!found) continue;
+      out.push_back(report(context, i, std::move(*found)));
+      break;
+    }
+  }
+  blame_position_alone(context, out);
+  std::stable_sort(out.begin(), out.end(),
+                   [](const BadChannel& a, const BadChannel& b) { return a.share > b.share; });
+  return out;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,392 @@
+#include "identification/data_checks/bad_data_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Median magnitude of the differences of `order` in begin..end-1, scaled to the standard deviation of
+/// white noise: the sum of squared binomial coefficients is C(2 order, order).
+double difference_level(const VectorXd& values, SampleRange range, int order) {
+  const double scale = order == 3 ? std::sqrt(20.0) : std::sqrt(924.0);
+  static constexpr std::array<double, 4> kThird = {-1, 3, -3, 1};
+  static constexpr std::array<double, 7> kSixth = {1, -6, 15, -20, 15, -6, 1};
+  std::vector<double> size;
+  for (Index k = range.begin; k + order < range.end; ++k) {
+    double sum = 0.0;
+    for (int i = 0; i <= order; ++i) {
+      const auto c = static_cast<std::size_t>(i);
+      sum += values[k + i] * (order == 3 ? kThird[c] : kSixth[c]);
+    }
+    if (std::isfinite(sum)) size.push_back(std::abs(sum));
+  }
+  if (size.size() < 10) return std::nan("");
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  std::nth_element(size.begin(), middle, size.end());
+  return 1.4826 * *middle / scale;
+}
+
+/// Channels of the same family.
+std::vector<std::size_t> twins_of(const CheckContext& context, std::size_t channel) {
+  std::vector<std::size_t> twins;
+  for (std::size_t i = 0; i < context.channels.size(); ++i) {
+    if (i != channel && !context.channels[channel].family.empty() &&
+        context.channels[i].family == context.channels[channel].family) {
+      twins.push_back(i);
+    }
+  }
+  return twins;
+}
+
+/// The upper median of the twins' noise, in this channel's unit; 0 without twins. Of two it is the larger.
+double twins_noise(const CheckContext& context, std::size_t channel,
+                   const std::vector<std::size_t>& twins) {
+  std::vector<double> levels;
+  levels.reserve(twins.size());
+  for (const std::size_t i : twins) {
+    levels.push_back(context.noise[i].typical / context.channels[i].scale);
+  }
+  if (levels.empty()) return 0.0;
+  const auto middle = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() / 2);
+  std::nth_element(levels.begin(), middle, levels.end());
+  return *middle * context.channels[channel].scale;
+}
+
+/// How much more than usual the liveliest twin is disturbed in this block: then the machine shakes.
+double twins_disturbance(const CheckContext& context, const std::vector<std::size_t>& twins,
+                         Index block) {
+  double most = 1.0;
+  for (const std::size_t i : twins) {
+    const NoiseProfile& n = context.noise[i];
+    if (n.typical > 0.0 && std::isfinite(n.level[block]))
+      most = std::max(most, n.level[block] / n.typical);
+  }
+  return most;
+}
+
+/// Whether the machine is asked to do something that this channel would show: its cylinder (any, for a pump)
+/// has a direction.
+Mask driven(const CheckContext& context, const CheckedChannel& c) {
+  Mask out = Mask::Constant(context.log.samples(), false);
+  for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
+    if (c.cylinder >= 0 && c.cylinder != static_cast<int>(i)) continue;
+    out = out || (context.signals.cylinders[i].direction.array() != 0);
+  }
+  return out;
+}
+
+/// Steps of a channel and how many of them repeat the value, by state of the machine (rest, driven).
+struct Repeats {
+  std::array<double, 2> equal = {0, 0}, steps = {0, 0};
+  void add(const VectorXd& values, const Mask& state, SampleRange range) {
+    for (Index k = range.begin; k + 1 < range.end; ++k) {
+      if (!std::isfinite(values[k]) || !std::isfinite(values[k + 1])) continue;
+      const std::size_t s = state[k] ? 1 : 0;
+      steps[s] += 1.0;
+      if (values[k] == values[k + 1]) equal[s] += 1.0;
+    }
+  }
+};
+
+/// log10 of the chance that `inside` happens by the habits of all the rest.
+double log_chance(const Repeats& all, const Repeats& inside) {
+  constexpr double kFewest = 50.0;
+  constexpr double kTooCommon =
+      0.7;  // a channel that mostly repeats itself has nothing to be found out by
+  double sum = 0.0;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const double steps = all.steps[s] - inside.steps[s], equal = all.equal[s] - inside.equal[s];
+    if (steps < kFewest) continue;
+    const double p = (equal + 1.0) / (steps + 2.0);
+    if (p < kTooCommon) sum += inside.equal[s] * std::log10(p);
+  }
+  return sum;
+}
+
+/// Whether the channel's cylinder (any, for a pump) is set going, stopped or turned round near a sample: a chamber
+/// is filled or emptied then, at once.
+bool turns_near(const CheckContext& context, const CheckedChannel& c, Index k) {
+  constexpr double kAnswers = 0.3;  // [s] of a valve
+  const auto around = static_cast<Index>(std::ceil(kAnswers / std::max(context.log.step, 1e-9)));
+  for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
+    if (c.cylinder >= 0 && c.cylinder != static_cast<int>(i)) continue;
+    const Eigen::VectorXi& direction = context.signals.cylinders[i].direction;
+    const Index last = std::min(k + around, direction.size() - 1);
+    for (Index j = std::max<Index>(1, k - around); j <= last; ++j) {
+      if (direction[j] != direction[j - 1]) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether a stretch at the end of the range was reached and left as pressures are: gently, or by what the machine
+/// did itself just then. A broken sensor knows nothing of that.
+bool reached_by_machine(const CheckContext& context, const CheckedChannel& c,
+                        const VectorXd& values, SampleRange s, double gentle) {
+  const auto by_machine = [&](Index k) {  // from k - 1 to k
+    return k <= 0 || k >= values.size() || std::abs(values[k] - values[k - 1]) < gentle ||
+           turns_near(context, c, k);
+  };
+  return by_machine(s.begin) && by_machine(s.end);
+}
+
+/// Never changes although its cylinder is driven both ways: the habits of the channel say nothing then.
+std::optional<Finding> constant_throughout(const CheckContext& context, std::size_t channel) {
+  const CheckedChannel& c = context.channels[channel];
+  const VectorXd& values = c.channel->values;
+  if (c.family.empty() || c.cylinder < 0 || !values.array().isFinite().any()) return {};
+  const VectorXd known = finite_values(values);
+  if (known.maxCoeff() != known.minCoeff()) return {};
+  const CylinderSignals& s = context.signals.cylinders[static_cast<std::size_t>(c.cylinder)];
+  const bool position = c.family == "position";
+  if (position && !s.has_command()) return {};
+  double ways[2] = {0.0, 0.0};
+  for (Index k = 0; k < s.direction.size(); ++k) {
+    constexpr double kFirm = 0.25;  // well outside any dead band
+    if (position ? std::abs(s.command[k]) > kFirm : static_cast<bool>(s.moving[k])) {
+      ways[s.direction[k] > 0 ? 1 : 0] += context.log.step;
+    }
+  }
+  if (std::min(ways[0], ways[1]) < context.options.stuck_s) return {};
+  Finding found;
+  const bool zero = known[0] == 0.0;
+  found.kind = zero ? BadDataKind::kDropOut : BadDataKind::kStuck;
+  found.affected = values.array().isFinite();
+  found.evidence = fmt::format(
+      "it is {} in the whole log, while {} {} for {:.0f} s in both directions",
+      in_field(c, known[0]), context.machine.cylinders[static_cast<std::size_t>(c.cylinder)].name,
+      position ? "is commanded" : "moves", ways[0] + ways[1]);
+  found.remedy = "Check that the sensor is connected, or remove the column from the log";
+  return found;
+}
+
+}  // namespace
+
+std::string in_field(const CheckedChannel& channel, double value) {
+  return fmt::format("{:.3g}{}{}", value / channel.field, channel.field_unit.empty() ? "" : " ",
+                     channel.field_unit);
+}
+
+VectorXd finite_values(const VectorXd& values) {
+  VectorXd out(values.size());
+  Index n = 0;
+  for (const double v : values) {
+    if (std::isfinite(v)) out[n++] = v;
+  }
+  out.conservativeResize(n);
+  return out;
+}
+
+NoiseProfile noise_profile(const VectorXd& values, const Log& log) {
+  constexpr double kBlock = 1.0;    // [s]
+  constexpr double kFewest = 40.0;  // samples: a median of differences scatters by a fifth
+  NoiseProfile out;
+  const auto size = static_cast<Index>(std::max(kFewest, kBlock / std::max(log.step, 1e-9)));
+  for (const SampleRange& run : log.runs) {
+    for (Index k = run.begin; k < run.end; k += size) {
+      out.blocks.push_back({k, std::min(k + size, run.end)});
+    }
+  }
+  const auto count = static_cast<Index>(out.blocks.size());
+  out.level.resize(count);
+  out.whiteness.resize(count);
+  for (Index b = 0; b < count; ++b) {
+    const SampleRange& block = out.blocks[static_cast<std::size_t>(b)];
+    out.level[b] = difference_level(values, block, 3);
+    out.whiteness[b] = out.level[b] > 0.0 ? difference_level(values, block, 6) / out.level[b] : 0.0;
+  }
+  const VectorXd known = finite_values(out.level);
+  out.typical = median(known);
+  out.quiet = quantile(known, 0.25);
+  return out;
+}
+
+std::vector<SampleRange> constant_stretches(const VectorXd& values, const Log& log) {
+  std::vector<SampleRange> out;
+  for (const SampleRange& run : log.runs) {
+    Index begin = run.begin;
+    for (Index k = run.begin + 1; k <= run.end; ++k) {
+      if (k < run.end && values[k] == values[begin]) continue;  // NaN equals nothing
+      if (k - begin > 1) out.push_back({begin, k});
+      begin = k;
+    }
+  }
+  return out;
+}
+
+std::optional<Finding> check_missing(const CheckContext& context, std::size_t channel) {
+  const VectorXd& values = context.channels[channel].channel->values;
+  Finding found;
+  found.kind = BadDataKind::kDropOut;
+  found.affected = !values.array().isFinite();
+  const double share = found.affected.cast<double>().mean();
+  if (share < context.options.missing_share || share == 1.0) return {};
+  found.evidence = fmt::format("{:.0f} % of its samples have no value", 100.0 * share);
+  found.remedy = "Check cable and logger, or cut the stretches out of the log";
+  return found;
+}
+
+std::optional<Finding> check_noise(const CheckContext& context, std::size_t channel) {
+  constexpr double kWhite = 0.7;     // an oscillation of a quarter of the sampling rate has 0.42
+  constexpr double kLivelier = 1.6;  // than the liveliest twin
+  const CheckedChannel& c = context.channels[channel];
+  const NoiseProfile& noise = context.noise[channel];
+  const std::vector<std::size_t> twins = twins_of(context, channel);
+  const double twin_noise = twins_noise(context, channel, twins);
+  // one twin alone can be the quiet one by its make, and a stroke sensor shakes with its own cylinder
+  constexpr double kShaking = 1e-3;  // of the range
+  const bool few = twins.size() < 2;
+  const double caution = twins.size() == 1 ? 2.0 : 1.0;
+  const double least =
+      few && c.family == "position" ? std::max(c.least_noise, kShaking * c.scale) : c.least_noise;
+  const bool has_twins = twin_noise > 0.0;
+  const double reference = has_twins ? twin_noise : noise.quiet;
+  // Over many blocks the level is known well: less than the ratio of one block will do.
+  constexpr double kThroughout = 0.83, kThroughoutBlock = 0.5;
+  const double ratio = context.options.noise_ratio * caution;
+  const bool throughout = has_twins && noise.typical > kThroughout * ratio * twin_noise;
+  // A burst, far above the channel's own quiet blocks (their lower quartile is 0.87 of the median).
+  constexpr double kOwn = 1.33, kBurstTwins = 0.67;
+  const auto noisy = [&](double level) {
+    if (!has_twins) return level > ratio * noise.quiet;
+    if (level > (throughout ? kThroughoutBlock : 1.0) * ratio * twin_noise) return true;
+    return noise.quiet > 0.0 && level > kOwn * ratio * noise.quiet &&
+           level > kBurstTwins * ratio * twin_noise;
+  };
+  Finding found;
+  found.kind = BadDataKind::kNoisy;
+  found.affected = Mask::Constant(context.log.samples(), false);
+  double seconds = 0.0, worst = 0.0, squares = 0.0, blocks = 0.0;
+  for (Index b = 0; b < noise.level.size(); ++b) {
+    const double level = noise.level[b];
+    if (!(level > least && noisy(level))) continue;
+    if (!(noise.whiteness[b] > kWhite)) continue;
+    if (reference > 0.0 && level / reference < kLivelier * twins_disturbance(context, twins, b)) {
+      continue;
+    }
+    const SampleRange& block = noise.blocks[static_cast<std::size_t>(b)];
+    found.affected.segment(block.begin, block.size()).setConstant(true);
+    seconds += static_cast<double>(block.size()) * context.log.step;
+    worst = std::max(worst, level);
+    squares += level * level;
+    blocks += 1.0;
+  }
+  if (seconds < context.options.noise_bursts_s || blocks < 2.0) return {};
+  const double level = std::sqrt(squares / blocks);
+  found.evidence =
+      twin_noise > 0.0
+          ? fmt::format(
+                "its noise there is {} (standard deviation), that of its {} fellow {} "
+                "channel{} is {:.3g} times smaller",
+                in_field(c, level), twins.size(), c.family, twins.size() == 1 ? "" : "s",
+                level / twin_noise)
+          : fmt::format("its noise there is {} (standard deviation), elsewhere in the log {}",
+                        in_field(c, level), in_field(c, noise.quiet));
+  found.remedy = "Check the sensor, its cable, shield and supply, and record again";
+  return found;
+}
+
+std::optional<Finding> check_stuck(const CheckContext& context, std::size_t channel) {
+  const CheckedChannel& c = context.channels[channel];
+  const Role role = c.channel->role;
+  if (role == Role::kCommand || role == Role::kPayload) return {};  // constant by nature
+  if (std::optional<Finding> whole = constant_throughout(context, channel)) return whole;
+  const VectorXd& values = c.channel->values;
+  const Mask state = driven(context, c);
+  const std::vector<SampleRange> stretches = constant_stretches(values, context.log);
+  if (stretches.empty()) return {};
+  VectorXd lengths(static_cast<Index>(stretches.size()));
+  for (Index i = 0; i < lengths.size(); ++i) {
+    lengths[i] = static_cast<double>(stretches[static_cast<std::size_t>(i)].size());
+  }
+  const double usual = quantile(lengths, 0.9);
+  Repeats all;
+  for (const SampleRange& run : context.log.runs) all.add(values, state, run);
+  const double limit =
+      std::log10(context.options.stuck_chance / static_cast<double>(context.log.samples()));
+  Finding found;
+  found.affected = Mask::Constant(context.log.samples(), false);
+  SampleRange longest;
+  bool zero = true;
+  for (const SampleRange& s : stretches) {
+    const double seconds = context.log.time[s.end - 1] - context.log.time[s.begin];
+    if (seconds < context.options.stuck_s) continue;
+    // with few stretches the usual length is that of the fault itself
+    if (stretches.size() >= 10 && static_cast<double>(s.size()) < 3.0 * usual) continue;
+    Repeats inside;
+    inside.add(values, state, s);
+    if (log_chance(all, inside) > limit) continue;
+    // a sensor that ends at zero is clipped there but not broken
+    const double gentle = 10.0 * context.noise[channel].typical + c.least_jump;
+    if (values[s.begin] == 0.0 && reached_by_machine(context, c, values, s, gentle)) continue;
+    zero = zero && values[s.begin] == 0.0;
+    found.affected.segment(s.begin, s.size()).setConstant(true);
+    if (s.size() > longest.size()) longest = s;
+  }
+  if (longest.size() == 0) return {};
+  found.kind = zero ? BadDataKind::kDropOut : BadDataKind::kStuck;
+  const double seconds = context.log.time[longest.end - 1] - context.log.time[longest.begin];
+  found.evidence = fmt::format(
+      "it stays at exactly {} for {:.1f} s, elsewhere it repeats a value at most {:.0f} samples "
+      "on end in nine stretches of ten",
+      in_field(c, values[longest.begin]), seconds, usual);
+  found.remedy = zero ? "Check the sensor's cable and supply, and leave this stretch out"
+                      : "Check the sensor and the logger's update, and leave this stretch out";
+  return found;
+}
+
+std::optional<Finding> check_saturated(const CheckContext& context, std::size_t channel) {
+  constexpr double kLively = 0.3;  // more repeats than this elsewhere: equal values mean nothing
+  constexpr Index kShortest = 5;   // [samples] a stretch on the rail
+  constexpr int kFewest = 3;       // stretches
+  constexpr double kTotal = 0.5;   // [s]
+  const CheckedChannel& c = context.channels[channel];
+  const Role role = c.channel->role;
+  if (role == Role::kCommand || role == Role::kPayload || role == Role::kOilTemperature) return {};
+  const VectorXd& values = c.channel->values;
+  const VectorXd known = finite_values(values);
+  if (known.size() == 0) return {};
+  // without noise a standby or a relief valve looks the same
+  constexpr double kNoiseless = 1e-4;
+  const double lively = quantile(finite_values(context.noise[channel].level), 0.75);
+  if (lively < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
+  Repeats all;
+  const Mask state = driven(context, c);
+  for (const SampleRange& run : context.log.runs) all.add(values, state, run);
+  for (const double rail : {known.maxCoeff(), known.minCoeff()}) {
+    if (rail == 0.0) continue;  // pressures end at zero by nature
+    Finding found;
+    found.affected = Mask::Constant(context.log.samples(), false);
+    Repeats inside;
+    int count = 0;
+    double seconds = 0.0;
+    for (const SampleRange& s : constant_stretches(values, context.log)) {
+      if (values[s.begin] != rail || s.size() < kShortest) continue;
+      inside.add(values, state, s);
+      found.affected.segment(s.begin, s.size()).setConstant(true);
+      seconds += static_cast<double>(s.size()) * context.log.step;
+      ++count;
+    }
+    if (count < kFewest || seconds < kTotal) continue;
+    const double steps = all.steps[0] + all.steps[1] - inside.steps[0] - inside.steps[1];
+    const double equal = all.equal[0] + all.equal[1] - inside.equal[0] - inside.equal[1];
+    if (equal > kLively * steps) continue;
+    found.kind = BadDataKind::kSaturated;
+    found.evidence = fmt::format("it ends at exactly {} {} times, for {:.1f} s together",
+                                 in_field(c, rail), count, seconds);
+    found.remedy = "Choose a larger measuring range, or leave these stretches out";
+    return found;
+  }
+  return {};
+}
+
+}  // namespace sparflow

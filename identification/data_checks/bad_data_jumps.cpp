@@ -1,0 +1,327 @@
+// Jumps that come back, and commands that the machine does not follow: what is found by looking at the other
+// channels of the same moment.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "identification/data_checks/bad_data_checks.h"
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Whether another channel answers a step between samples k and k+1: a twin steps too, or a command starts,
+/// ends or steps nearby.
+class Witnesses {
+ public:
+  Witnesses(const CheckContext& context, std::size_t channel) : context_(context) {
+    const CheckedChannel& c = context.channels[channel];
+    for (std::size_t i = 0; i < context.channels.size(); ++i) {
+      if (i == channel) continue;
+      const CheckedChannel& other = context.channels[i];
+      if (other.channel->role == Role::kCommand) commands_.push_back(i);
+      if (!c.family.empty() && other.family == c.family) twins_.push_back(i);
+    }
+  }
+
+  bool explain(Index k, double step) const {
+    constexpr Index kNear = 3;      // samples: a sensor's and the logger's own delay
+    constexpr double kPart = 0.05;  // of the step, that a twin must show at least
+    const Index n = context_.log.samples();
+    for (Index i = std::max<Index>(0, k - kNear); i <= std::min(n - 2, k + kNear); ++i) {
+      for (const std::size_t c : commands_) {
+        const VectorXd& u = context_.channels[c].channel->values;
+        const double change = std::abs(u[i + 1] - u[i]);
+        const bool starts = (u[i] == 0.0) != (u[i + 1] == 0.0);
+        if (starts || change > context_.channels[c].least_jump) return true;
+      }
+      for (const std::size_t t : twins_) {
+        const VectorXd& y = context_.channels[t].channel->values;
+        const double noise = context_.noise[t].typical;
+        if (std::abs(y[i + 1] - y[i]) > std::max(6.0 * noise, kPart * std::abs(step))) return true;
+      }
+    }
+    return false;
+  }
+
+  /// A lever on its way out of the valve's dead band makes the pump answer all at once.
+  bool lever_moves(Index k) const {
+    constexpr double kLeverMoves = 2e-3;  // [-] from one sample to the next
+    return std::any_of(commands_.begin(), commands_.end(), [&](std::size_t c) {
+      const VectorXd& u = context_.channels[c].channel->values;
+      const double change = std::abs(u[k + 1] - u[k]);
+      return change > std::max(kLeverMoves, 6.0 * context_.noise[c].typical);
+    });
+  }
+
+ private:
+  const CheckContext& context_;
+  std::vector<std::size_t> twins_, commands_;
+};
+
+struct Step {
+  Index at = 0;       ///< between samples `at` and `at` + 1
+  double size = 0.0;  ///< [unit]
+};
+
+/// Noise of each sample's block, at least the channel's typical.
+VectorXd local_noise(const NoiseProfile& noise, Index samples) {
+  VectorXd out = VectorXd::Constant(samples, noise.typical);
+  for (std::size_t b = 0; b < noise.blocks.size(); ++b) {
+    const double level = noise.level[static_cast<Index>(b)];
+    const SampleRange& block = noise.blocks[b];
+    if (level > noise.typical) out.segment(block.begin, block.size()).setConstant(level);
+  }
+  return out;
+}
+
+/// Whether a step is one of three or more in a row, the same way and of like size: a chamber that fills, no sensor.
+bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k) {
+  constexpr double kLike = 0.5;
+  const double size = x[k + 1] - x[k];
+  int in_a_row = 1;
+  for (const int way : {-1, 1}) {
+    for (Index i = k + way; i >= run.begin && i + 1 < run.end; i += way) {
+      if (!((x[i + 1] - x[i]) / size > kLike)) break;
+      if (++in_a_row == 3) return true;
+    }
+  }
+  return false;
+}
+
+/// Steps of one sample that are large for the channel and that nothing else explains.
+std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t channel) {
+  const CheckedChannel& c = context.channels[channel];
+  const VectorXd& x = c.channel->values;
+  const VectorXd noise = local_noise(context.noise[channel], x.size());
+  const bool position = c.family == "position";
+  const Witnesses witnesses(context, channel);
+  std::vector<Step> out;
+  for (const SampleRange& run : context.log.runs) {
+    for (Index k = run.begin; k + 1 < run.end; ++k) {
+      const double size = x[k + 1] - x[k];
+      const double limit =
+          std::max(context.options.jump_noise * std::max(noise[k], noise[k + 1]), c.least_jump) +
+          1.5 * c.fastest * (context.log.time[k + 1] - context.log.time[k]);
+      if (!(std::abs(size) > limit)) continue;
+      // no load and no valve moves a boom by degrees within a sample: positions need no witness
+      if (!position && (is_on_a_ramp(x, run, k) || witnesses.explain(k, size))) continue;
+      out.push_back({k, size});
+    }
+  }
+  return out;
+}
+
+/// Smallest step between samples, 0 for a constant channel.
+double resolution(const VectorXd& x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (Index k = 0; k + 1 < x.size(); ++k) {
+    const double step = std::abs(x[k + 1] - x[k]);
+    if (step > 0.0) least = std::min(least, step);
+  }
+  return std::isfinite(least) ? least : 0.0;
+}
+
+/// Samples far off both their neighbours, which agree with each other: nothing that has a mass or a volume does that. One
+/// alone may be a knock; many are wild however small they are in the channel's units.
+Mask wild_samples(const CheckContext& context, std::size_t channel) {
+  const CheckedChannel& c = context.channels[channel];
+  const VectorXd& x = c.channel->values;
+  const VectorXd noise = local_noise(context.noise[channel], x.size());
+  const Witnesses witnesses(context, channel);
+  Mask out = Mask::Constant(x.size(), false);
+  const double least = 4.0 * resolution(x);  // a logger's last digit may flicker
+  for (const SampleRange& run : context.log.runs) {
+    for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
+      const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
+      if (!(off > std::max(least, context.options.jump_noise * noise[k]))) continue;
+      if (std::abs(x[k + 1] - x[k - 1]) > 0.5 * off) continue;
+      if (c.family != "position" && witnesses.explain(k - 1, off)) continue;
+      out[k] = true;
+    }
+  }
+  return out;
+}
+
+/// Speed that a command usually brings, v = a + b |u| by direction: a dead band and a gain. [m/s]
+struct UsualSpeed {
+  double a = 0.0, b = 0.0;
+  bool known = false;
+  double at(double command) const { return std::max(0.0, a + b * std::abs(command)); }
+};
+
+UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
+  constexpr std::size_t kFewest = 100;
+  std::vector<double> u, v;
+  for (Index k = 0; k < s.speed.size(); ++k) {
+    if (!s.driven[k] || s.direction[k] != direction) continue;
+    u.push_back(std::abs(s.command[k]));
+    v.push_back(std::abs(s.speed[k]));
+  }
+  UsualSpeed out;
+  if (u.size() < kFewest) return out;
+  const auto n = static_cast<Index>(u.size());
+  Eigen::MatrixXd x(n, 2);
+  x.col(0).setOnes();
+  x.col(1) = Eigen::Map<VectorXd>(u.data(), n);
+  const VectorXd y = Eigen::Map<VectorXd>(v.data(), n);
+  VectorXd weight = VectorXd::Ones(n);
+  for (int pass = 0; pass < 5; ++pass) {  // Huber's weights: what is sought must not bend the line
+    const Eigen::MatrixXd wx = weight.asDiagonal() * x;
+    const Eigen::Vector2d p = solve_symmetric(transposed_product(x, wx), wx.transpose() * y);
+    out.a = p[0];
+    out.b = p[1];
+    const VectorXd r = y - x * p;
+    const double limit = kHuberStds * robust_std(r);
+    weight = r.unaryExpr([&](double e) { return huber_weight(e, limit); });
+  }
+  out.known = out.b > 0.0;
+  return out;
+}
+
+}  // namespace
+
+std::optional<Finding> check_jumps(const CheckContext& context, std::size_t channel) {
+  constexpr double kAlike = 0.35;  // how well the way back must match, beyond noise
+  const CheckedChannel& c = context.channels[channel];
+  const VectorXd& x = c.channel->values;
+  if (c.least_jump <= 0.0) return {};
+  // A controller may step a command at will, also for one sample across a dead band.
+  constexpr double kPulse = 0.2;        // [s] longest of a command's
+  constexpr double kPulseHeight = 0.3;  // [-] smallest
+  constexpr int kPulses = 3;
+  const bool command = c.channel->role == Role::kCommand;
+  constexpr double kContact = 0.5;  // [s] a bad contact's; pumps stay at a pressure longer
+  const bool pump = c.channel->role == Role::kPumpPressure;
+  const Witnesses witnesses(context, channel);
+  const std::vector<Step> steps = unexplained_steps(context, channel);
+  const double noise = context.noise[channel].typical;
+  Finding found;
+  found.kind = BadDataKind::kJumping;
+  found.affected = Mask::Constant(x.size(), false);
+  int count = 0;
+  bool zero = true;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    for (std::size_t j = i + 1; j < steps.size(); ++j) {
+      if (context.log.time[steps[j].at] - context.log.time[steps[i].at] >
+          (command ? kPulse : context.options.jump_back_s)) {
+        break;
+      }
+      if (command && std::abs(steps[i].size) < kPulseHeight) break;
+      const double left = std::abs(steps[i].size + steps[j].size);
+      if (left > kAlike * std::abs(steps[i].size) + 4.0 * noise) continue;
+      if (pump && context.log.time[steps[j].at] - context.log.time[steps[i].at] > kContact &&
+          witnesses.lever_moves(steps[i].at)) {
+        continue;
+      }
+      const Index first = steps[i].at + 1, length = steps[j].at - steps[i].at;
+      found.affected.segment(first, length).setConstant(true);
+      zero = zero && (x.segment(first, length).array() == 0.0).all();
+      largest = std::max(largest, std::abs(steps[i].size));
+      ++count;
+      i = j;
+      break;
+    }
+  }
+  if (count < (command ? kPulses : 1)) return {};
+  if (zero) found.kind = BadDataKind::kDropOut;
+  found.evidence = fmt::format(
+      "it {} {} time{} and comes back, by up to {} from one sample to the next, {}",
+      zero ? "falls to zero" : "jumps away", count, count == 1 ? "" : "s", in_field(c, largest),
+      c.fastest > 0.0
+          ? fmt::format("where the machine can do {}", in_field(c, c.fastest * context.log.step))
+          : fmt::format("while nothing else in the log changes (its noise is {})",
+                        in_field(c, noise)));
+  found.remedy = "Check the sensor's cable and plug, and leave these samples out";
+  return found;
+}
+
+std::optional<Finding> check_wild(const CheckContext& context, std::size_t channel) {
+  constexpr double kMany = 0.003;  // of the samples
+  const CheckedChannel& c = context.channels[channel];
+  const double noise = context.noise[channel].typical;
+  if (c.least_jump <= 0.0 || c.channel->role == Role::kCommand || noise <= 0.0) return {};
+  const Mask wild = wild_samples(context, channel);
+  const auto count = static_cast<double>(wild.count());
+  if (count < std::max(10.0, kMany * static_cast<double>(wild.size()))) return {};
+  if (!(wild && c.channel->values.array() != 0.0).any())
+    return {};  // drop-outs: check_jumps says so
+  Finding found;
+  found.kind = BadDataKind::kWild;
+  found.affected = wild;
+  found.evidence = fmt::format(
+      "{:.0f} single samples lie more than {:.0f} times its noise ({}) off both their neighbours, "
+      "and nothing else in the log changes there",
+      count, context.options.jump_noise, in_field(c, noise));
+  found.remedy = "Check the sensor's cable and plug, and leave these samples out";
+  return found;
+}
+
+std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel) {
+  constexpr double kStretch = 1.5;        // [s] of one value
+  constexpr double kContradiction = 0.8;  // [s] on end in which the cylinder does something else
+  constexpr double kFirm = 0.15;          // [-] outside any dead band
+  // Pumps that run short slow a cylinder to half its speed, a compensator that fails lets it run at up to twice.
+  constexpr double kSlow = 0.4, kFast = 2.2;
+  constexpr double kHabit = 0.02;  // of the other samples may be as far off
+  const CheckedChannel& c = context.channels[channel];
+  if (c.channel->role != Role::kCommand) return {};
+  const CylinderSignals& s = context.signals.cylinders[static_cast<std::size_t>(c.cylinder)];
+  if (!s.has_command()) return {};  // zero throughout while it moves: not recorded, and said so
+  const VectorXd& u = c.channel->values;
+  const VectorXd lengths = finite_values(s.length);
+  if (lengths.size() == 0) return {};
+  const double lo = lengths.minCoeff(), hi = lengths.maxCoeff(), end = 0.03 * (hi - lo);
+  const UsualSpeed usual[2] = {usual_speed(s, -1), usual_speed(s, 1)};
+  const auto off = [&](Index k) {
+    if (!(std::abs(u[k]) > kFirm)) return false;
+    const UsualSpeed& expected = usual[u[k] > 0.0 ? 1 : 0];
+    const bool at_end = u[k] > 0.0 ? s.length[k] > hi - end : s.length[k] < lo + end;
+    if (!expected.known || at_end) return false;
+    const double follows = s.speed[k] * (u[k] > 0.0 ? 1.0 : -1.0) / expected.at(u[k]);
+    return follows < kSlow || follows > kFast;
+  };
+  Finding found;
+  found.affected = Mask::Constant(u.size(), false);
+  double longest = 0.0, value = 0.0;
+  for (const SampleRange& stretch : constant_stretches(u, context.log)) {
+    if (std::abs(u[stretch.begin]) < kFirm) continue;
+    if (context.log.time[stretch.end - 1] - context.log.time[stretch.begin] < kStretch) continue;
+    double since = 0.0;
+    bool bad = false;
+    for (Index k = stretch.begin; k < stretch.end; ++k) {
+      since = off(k) ? since + context.log.step : 0.0;
+      bad = bad || since > kContradiction;
+      if (since > longest) {
+        longest = since;
+        value = u[k];
+      }
+    }
+    if (bad) found.affected.segment(stretch.begin, stretch.size()).setConstant(true);
+  }
+  if (!found.affected.any()) return {};
+  // Where the cylinder departs from its commands at other times too, it is the valve or the pump.
+  double others = 0.0, astray = 0.0;
+  for (Index k = 0; k < u.size(); ++k) {
+    if (found.affected[k] || !(std::abs(u[k]) > kFirm)) continue;
+    others += 1.0;
+    if (off(k)) astray += 1.0;
+  }
+  if (astray > kHabit * others) return {};
+  found.kind = BadDataKind::kStuck;
+  found.evidence = fmt::format(
+      "it stays at exactly {:.3g} while the cylinder, away from its ends, does something else for "
+      "{:.1f} s; elsewhere it follows",
+      value, longest);
+  found.remedy = "Check where the command is logged, and leave this stretch out";
+  return found;
+}
+
+}  // namespace sparflow

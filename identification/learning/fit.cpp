@@ -1,0 +1,203 @@
+#include "identification/learning/fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "identification/learning/fit_pass.h"
+#include "identification/signals/apply_effects.h"
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using Progress = std::function<void(double, const std::string&)>;
+
+/// @param signals get the effects of the model learned
+FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
+              std::vector<Mask> counts, const FitOptions& options, const Progress& progress) {
+  FitPass pass;
+  pass.model = CraneModel::untrained(machine);
+  pass.model.effects = options.effects;
+  for (MachineSignals& s : signals) apply_effects(pass.model, s);
+  const TrainingData data{&signals, std::move(counts)};
+  learn_processes(data, options, pass, progress);
+  learn_valves(data, pass);
+  const std::vector<std::string> notes = pass.notes;
+  learn_pumps(data, options, pass);
+  const bool again = std::any_of(signals.begin(), signals.end(), [](const MachineSignals& s) {
+    return std::any_of(s.pumps.begin(), s.pumps.end(),
+                       [](const PumpSignals& p) { return p.pressure_effect.size() > 0; });
+  });
+  if (!again) return pass;
+  // effects on a pump's pressure build on its demand, which is only known with its margins: in turns until settled
+  constexpr int kTurns = 6;
+  constexpr double kSettled = 1e3;  // [Pa]
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const CraneModel before = pass.model;
+    for (MachineSignals& s : signals) apply_effects(before, s);
+    pass.notes = notes;
+    learn_pumps(data, options, pass);
+    double change = 0.0;
+    for (std::size_t i = 0; i < before.cylinders.size(); ++i)
+      change =
+          std::max(change, std::abs(pass.model.cylinders[i].margin - before.cylinders[i].margin));
+    for (std::size_t p = 0; p < before.pumps.size(); ++p)
+      change = std::max(change, std::abs(pass.model.pumps[p].standby - before.pumps[p].standby));
+    if (change < kSettled) break;
+  }
+  return pass;
+}
+
+std::vector<MachineSignals> all_signals(const Machine& machine, const std::vector<Log>& logs,
+                                        const SignalOptions& options) {
+  std::vector<MachineSignals> out;
+  out.reserve(logs.size());
+  for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
+  return out;
+}
+
+/// Usable samples away from the runs' ends, where one-sided windows make poor speeds.
+std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
+  std::vector<Mask> out;
+  out.reserve(signals.size());
+  for (const MachineSignals& s : signals) out.push_back(s.usable && !s.edge);
+  return out;
+}
+
+/// A figure for data the model has not seen, from whole blocks of motion.
+std::optional<CompareResult> judge_held_out(const Machine& machine,
+                                            std::vector<MachineSignals>& signals,
+                                            const FitOptions& options,
+                                            std::vector<std::string>& notes) {
+  const std::vector<Mask> held = held_out_samples(signals, options);
+  if (std::none_of(held.begin(), held.end(), [](const Mask& m) { return m.any(); })) {
+    notes.push_back("no held-out figure: the logs hold too few separate motions; give --test logs");
+    return std::nullopt;
+  }
+  std::vector<Mask> counts = inside(signals);
+  for (std::size_t l = 0; l < held.size(); ++l) counts[l] = counts[l] && !held[l];
+  FitOptions without = options;
+  if (!options.effects_held_out.empty()) without.effects = options.effects_held_out;
+  const FitPass pass = learn(machine, signals, std::move(counts), without, {});
+  CompareOptions compare_options;
+  compare_options.signals = options.signals;
+  compare_options.find_regions = false;
+  return compare_signals(pass.model, signals, held, compare_options);
+}
+
+}  // namespace
+
+std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
+                                   const FitOptions& options) {
+  std::vector<Mask> held;
+  int block = 0, taken = 0;
+  for (const MachineSignals& s : signals) {
+    held.push_back(Mask::Constant(s.samples(), false));
+    if (options.hold_out_every < 2) continue;
+    for (const SampleRange& r : motion_blocks(s, options.hold_out_block_s)) {
+      if (block++ % options.hold_out_every != options.hold_out_every / 2) continue;
+      held.back().segment(r.begin, r.size()).setConstant(true);
+      ++taken;
+    }
+  }
+  if (taken < 2) {
+    for (Mask& m : held) m.setConstant(false);
+  }
+  return held;
+}
+
+std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double block_s) {
+  std::vector<SampleRange> out;
+  for (const Segment& segment : signals.segments) {
+    if (!segment.moving) continue;
+    const SampleRange r = segment.samples;
+    const double lasts = signals.time[r.end - 1] - signals.time[r.begin];
+    const auto parts = std::max<Index>(1, std::lround(lasts / block_s));
+    for (Index i = 0; i < parts; ++i) {
+      out.push_back({r.begin + r.size() * i / parts, r.begin + r.size() * (i + 1) / parts});
+    }
+  }
+  return out;
+}
+
+double integrated_autocorrelation(const VectorXd& residual, const std::vector<Index>& position) {
+  const Index n = residual.size();
+  SPARFLOW_CHECK(static_cast<std::size_t>(n) == position.size(), "one position a residual");
+  const double power = n == 0 ? 0.0 : residual.squaredNorm() / static_cast<double>(n);
+  if (power <= 0.0) return 1.0;
+  double sum = 1.0;
+  for (Index lag = 1; lag < n / 4; ++lag) {
+    double product = 0.0;
+    Index pairs = 0;
+    for (Index i = 0; i + lag < n; ++i) {
+      if (position[static_cast<std::size_t>(i + lag)] - position[static_cast<std::size_t>(i)] !=
+          lag)
+        continue;
+      product += residual[i] * residual[i + lag];
+      ++pairs;
+    }
+    if (pairs < 20) break;
+    const double correlation = product / (static_cast<double>(pairs) * power);
+    if (correlation < 0.05) break;
+    sum += 2.0 * correlation;
+  }
+  return sum;
+}
+
+FitResult fit(const Machine& machine, const std::vector<Log>& logs,
+              const std::vector<Log>& test_logs, const FitOptions& options,
+              const Progress& progress) {
+  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
+  const auto start = std::chrono::steady_clock::now();
+  const auto tell = [&](double share, const std::string& what) {
+    if (progress) progress(share, what);
+  };
+  tell(0.0, "speeds and forces");
+  std::vector<MachineSignals> signals = all_signals(machine, logs, options.signals);
+  const bool hold_out = test_logs.empty() && options.hold_out_every > 1;
+  FitPass pass =
+      learn(machine, signals, inside(signals), options, [&](double share, const std::string& what) {
+        tell(0.05 + (hold_out ? 0.4 : 0.8) * share, what);
+      });
+
+  FitResult result;
+  result.notes = std::move(pass.notes);
+  if (hold_out) {
+    tell(0.5, "held-out motions");
+    result.held_out = judge_held_out(machine, signals, options, result.notes);
+  }
+  tell(0.9, "errors");
+  CompareOptions compare_options;
+  compare_options.signals = options.signals;
+  if (!test_logs.empty()) {
+    result.test = compare_signals(pass.model, all_signals(machine, test_logs, options.signals), {},
+                                  compare_options);
+  }
+  result.train = compare_signals(pass.model, std::move(signals), {}, compare_options);
+
+  result.model = std::move(pass.model);
+  result.processes = std::move(pass.processes);
+  result.pumps = std::move(pass.pumps);
+  result.valves = std::move(pass.valves);
+  for (const Log& log : logs)
+    result.model.data.push_back({log.file, log.sha256, log.samples(), "train"});
+  for (const Log& log : test_logs)
+    result.model.data.push_back({log.file, log.sha256, log.samples(), "test"});
+  const auto keep = [&](const CompareResult& r, const char* name) {
+    const std::vector<StageQuality> q = stage_quality(r, name);
+    result.model.quality.insert(result.model.quality.end(), q.begin(), q.end());
+  };
+  keep(result.train, "train");
+  if (result.test) keep(*result.test, "test");
+  if (result.held_out) keep(*result.held_out, "held out");
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  tell(1.0, "done");
+  return result;
+}
+
+}  // namespace sparflow

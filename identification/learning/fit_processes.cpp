@@ -1,0 +1,284 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "identification/learning/find_branch_corner.h"
+#include "identification/learning/fit_pass.h"
+#include "identification/learning/learn_loads_beyond.h"
+#include "identification/signals/apply_effects.h"
+#include "models/hydraulics/return_rise.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Samples of one process in order of time, with places by which stretches can be told.
+struct ProcessData {
+  GpDataset set;
+  std::vector<Index> position;  ///< running number over all logs, a gap between logs
+  VectorXd measured;            ///< [Pa] as measured, less the effects on the supply itself
+  VectorXd back;                ///< [Pa] what effects add to the return chamber
+  bool has_back() const { return (back.array() != 0.0).any(); }
+
+  /// Takes what of it reaches the supply off, by a process learned so far.
+  void take_back_off(const Cylinder& cylinder, int side, const GaussianProcess& process) {
+    for (Index k = 0; k < back.size(); ++k) {
+      const double q = set.flow[k], f = set.force[k];
+      set.pressure[k] = measured[k] - supply_rise<double>(process, cylinder, side,
+                                                          process.mean(q, f), q, f, back[k]);
+    }
+  }
+  /// The same before anything is learned: all of it where the load opposes, nothing where it helps.
+  void take_back_off(const Cylinder& cylinder, int side) {
+    const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
+    const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
+    for (Index k = 0; k < back.size(); ++k) {
+      const double load = std::max(0.0, side * set.force[k] / supply);
+      set.pressure[k] = measured[k] - std::clamp(other / supply * back[k], -load, load);
+    }
+  }
+};
+
+GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
+  return {all.name, all.flow(rows), all.force(rows), all.pressure(rows)};
+}
+
+/// Driven samples: they move, and towards the side of the command. Pressures as logged: a process averages
+/// white noise itself, and a filter would blur the steps at starts and stops.
+ProcessData process_data(const Machine& machine, const TrainingData& data, int cylinder,
+                         bool extend) {
+  std::vector<double> flow, force, pressure, back;
+  ProcessData out;
+  out.set.name = process_name(machine, cylinder, extend);
+  Index offset = 0;
+  for (std::size_t l = 0; l < data.signals->size(); ++l) {
+    const MachineSignals& s = (*data.signals)[l];
+    const CylinderSignals& c = s.cylinders[static_cast<std::size_t>(cylinder)];
+    for (Index k = 0; k < s.samples() && c.has_pressure(); ++k) {
+      if (!data.counts[l][k] || !c.driven[k] || (c.direction[k] > 0) != extend) continue;
+      const double own = c.working_pressure[k] - or_zero(c.pressure_effect, k) -
+                         or_zero(c.pressure_sensor_effect, k);
+      if (!std::isfinite(own + or_zero(c.return_effect, k)) || !std::isfinite(c.model_force[k]))
+        continue;
+      flow.push_back(c.flow[k]);
+      force.push_back(c.model_force[k]);
+      pressure.push_back(own);
+      back.push_back(or_zero(c.return_effect, k));
+      out.position.push_back(offset + k);
+    }
+    offset += s.samples() + 2;
+  }
+  const auto n = static_cast<Index>(flow.size());
+  out.set.flow = Eigen::Map<Eigen::ArrayXd>(flow.data(), n);
+  out.set.force = Eigen::Map<Eigen::ArrayXd>(force.data(), n);
+  out.set.pressure = Eigen::Map<Eigen::ArrayXd>(pressure.data(), n);
+  out.measured = out.set.pressure.matrix();
+  out.back = Eigen::Map<VectorXd>(back.data(), n);
+  if (out.has_back()) {
+    out.take_back_off(machine.cylinders[static_cast<std::size_t>(cylinder)], extend ? 1 : -1);
+  }
+  return out;
+}
+
+/// Every `step`-th sample, evenly over each unbroken stretch and at least one of it, so that a short motion
+/// under a rare load is not lost.
+std::vector<Index> thinned(const std::vector<Index>& position, int step) {
+  std::vector<Index> rows;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= position.size(); ++i) {
+    if (i < position.size() && position[i] == position[i - 1] + 1) continue;
+    const std::size_t length = i - begin;
+    const std::size_t picks = std::max<std::size_t>(1, length / static_cast<std::size_t>(step));
+    for (std::size_t k = 0; k < picks; ++k) {
+      rows.push_back(static_cast<Index>(begin + (2 * k + 1) * length / (2 * picks)));
+    }
+    begin = i;
+  }
+  return rows;
+}
+
+/// @param samples that it was learned from
+void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samples) {
+  ProcessFit& fitted = pass.processes[i];
+  fitted.report = std::move(learned.report);
+  if (!fitted.report.failure.empty()) return;
+  const auto at = static_cast<std::size_t>(fitted.cylinder);
+  learned.parameters.beyond = learn_loads_beyond(
+      learned.parameters, samples, pass.model.machine.cylinders[at], fitted.extend ? 1 : -1);
+  CylinderModel& c = pass.model.cylinders[at];
+  (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
+}
+
+void take_corner_off(const BranchCorner& corner, GpDataset& set) {
+  for (Index k = 0; k < set.pressure.size(); ++k)
+    set.pressure[k] -= corner_rise(corner, set.flow[k], set.force[k]).value;
+}
+
+/// Learns processes side by side and takes those that could be learned into the model.
+/// @param which of the pass' processes, as many as sets  @param keep_others a process that there is already stays where
+///        this one cannot be learned, and so does its report
+void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& which,
+           const LearnGpOptions& options, int threads, bool keep_others, FitPass& pass,
+           const std::function<void(int, int, const std::string&)>& progress = {}) {
+  std::vector<GpDataset> asked = sets;
+  std::vector<std::optional<AlikeLoads>> alike(sets.size());
+  std::vector<BranchCorner> corners(sets.size());
+  for (std::size_t k = 0; k < sets.size(); ++k) {
+    const ProcessFit& fitted = pass.processes[which[k]];
+    const int side = fitted.extend ? 1 : -1;
+    const Cylinder& cylinder =
+        pass.model.machine.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+    alike[k] = alike_loads(sets[k], cylinder, side);
+    if (alike[k]) {
+      asked[k] = at_one_load(std::move(asked[k]), *alike[k]);
+      continue;
+    }
+    corners[k] = find_branch_corner(sets[k], cylinder, side);
+    if (corners[k].there()) take_corner_off(corners[k], asked[k]);
+  }
+  std::vector<LearnedGp> learned = learn_gps(asked, options, progress, threads);
+  for (std::size_t k = 0; k < learned.size(); ++k) {
+    const bool there = learned[k].report.failure.empty();
+    if (!there && keep_others) continue;
+    learned[k].parameters.corner = corners[k];
+    if (there && alike[k]) {
+      learned[k].parameters = for_any_load(std::move(learned[k].parameters), *alike[k], sets[k]);
+    }
+    take(pass, which[k], std::move(learned[k]), sets[k]);
+  }
+}
+
+VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
+  VectorXd residual(data.set.pressure.size());
+  for (Index k = 0; k < residual.size(); ++k) {
+    residual[k] = data.set.pressure[k] - process.mean(data.set.flow[k], data.set.force[k]);
+  }
+  return residual;
+}
+
+/// How many samples one independent sample is worth, as a step; 1 = all are used.
+int thinning_step(double autocorrelation, Index samples, double thin_from) {
+  if (thin_from <= 0.0 || autocorrelation < thin_from) return 1;
+  // Enough must remain to see the shape, however alike the samples are.
+  constexpr double kLeast = 400.0;
+  const double most = static_cast<double>(samples) / kLeast;
+  return std::max(1, static_cast<int>(std::lround(std::min(autocorrelation, most))));
+}
+
+/// The thinned samples, without what the first fit, on all of them, calls outliers. Few samples cannot be
+/// screened again: a single motion under a rare load would look like one.
+GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int step,
+                      double threshold) {
+  const double limit = threshold * robust_std(residual);
+  std::vector<Index> rows;
+  for (const Index row : thinned(data.position, step)) {
+    if (threshold <= 0.0 || std::abs(residual[row]) <= limit) rows.push_back(row);
+  }
+  return rows_of(data.set, rows);
+}
+
+/// What effects add to the return chambers reaches the supply by the very processes that are being learned: their
+/// slopes over the load, which tell the branches apart, are there after the first round, their values after the second.
+void take_backs_off(const FitOptions& options, std::vector<ProcessData>& samples, FitPass& pass) {
+  const auto take_off = [&](std::size_t i) {
+    const ProcessFit& fitted = pass.processes[i];
+    const auto c = static_cast<std::size_t>(fitted.cylinder);
+    const CylinderModel& m = pass.model.cylinders[c];
+    samples[i].take_back_off(pass.model.machine.cylinders[c], fitted.extend ? 1 : -1,
+                             fitted.extend ? m.extend : m.retract);
+  };
+  std::vector<GpDataset> again;
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!pass.processes[i].report.failure.empty() || !samples[i].has_back()) continue;
+    take_off(i);
+    again.push_back(samples[i].set);
+    which.push_back(i);
+  }
+  if (again.empty()) return;
+  learn(again, which, options.gp, options.threads, true, pass);
+  for (const std::size_t i : which) take_off(i);
+}
+
+void process_notes(const Machine& machine, FitPass& pass) {
+  for (const ProcessFit& f : pass.processes) {
+    const std::string& name = machine.cylinders[static_cast<std::size_t>(f.cylinder)].name;
+    const char* what = f.extend ? "extending" : "retracting";
+    if (!f.report.failure.empty()) {
+      pass.notes.push_back(
+          fmt::format("pressure of {} {}: not learned, the logs hold {} sample(s) of it with a "
+                      "measured pressure; record {} {} "
+                      "at several speeds and loads, with p{}_{}_bar",
+                      name, what, f.offered, name, what, f.extend ? "A" : "B", name));
+    }
+    for (const std::string& w : f.report.warnings) {
+      pass.notes.push_back(fmt::format("pressure of {} {}: {}", name, what, w));
+    }
+  }
+}
+
+}  // namespace
+
+std::string process_name(const Machine& machine, int cylinder, bool extend) {
+  return machine.cylinders[static_cast<std::size_t>(cylinder)].name +
+         (extend ? " extend" : " retract");
+}
+
+void learn_processes(const TrainingData& data, const FitOptions& options, FitPass& pass,
+                     const std::function<void(double, const std::string&)>& progress) {
+  const Machine& machine = pass.model.machine;
+  std::vector<ProcessData> samples;
+  std::vector<GpDataset> sets;
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
+    for (const bool extend : {true, false}) {
+      samples.push_back(process_data(machine, data, i, extend));
+      sets.push_back(samples.back().set);
+      ProcessFit fitted;
+      fitted.cylinder = i;
+      fitted.extend = extend;
+      fitted.offered = static_cast<long>(samples.back().position.size());
+      pass.processes.push_back(fitted);
+    }
+  }
+  const auto tell = [&](double from) {
+    return [&progress, from](int done, int total, const std::string& name) {
+      if (progress) progress(from + 0.5 * done / total, "pressure of " + name);
+    };
+  };
+  std::vector<std::size_t> all(sets.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  learn(sets, all, options.gp, options.threads, false, pass, tell(0.0));
+  take_backs_off(options, samples, pass);
+
+  std::vector<GpDataset> again;
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ProcessFit& fitted = pass.processes[i];
+    if (!fitted.report.failure.empty()) continue;
+    const CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
+    const VectorXd residual = residuals(samples[i], fitted.extend ? c.extend : c.retract);
+    fitted.autocorrelation = integrated_autocorrelation(residual, samples[i].position);
+    fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options.thin_from);
+    if (fitted.step == 1) continue;
+    again.push_back(thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
+    which.push_back(i);
+  }
+  if (again.empty()) {
+    process_notes(machine, pass);
+    return;
+  }
+  LearnGpOptions screened = options.gp;
+  screened.outlier_threshold = 0.0;
+  // a first fit is better than none
+  learn(again, which, screened, options.threads, true, pass, tell(0.5));
+  process_notes(machine, pass);
+}
+
+}  // namespace sparflow

@@ -1,0 +1,378 @@
+#include "identification/learning/gaussian_process/learn_pressure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "identification/learning/gaussian_process/box_bfgs.h"
+#include "identification/learning/gaussian_process/gp_likelihood.h"
+#include "identification/learning/gaussian_process/gp_screening.h"
+#include "identification/learning/gaussian_process/sparse_gp.h"
+#include "models/math/error.h"
+#include "models/math/linear_algebra.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// value = offset + scale * scaled
+struct Scale {
+  double offset = 0.0, scale = 1.0;
+  bool constant = false;
+  ArrayXd apply(const ArrayXd& x) const { return (x - offset) / scale; }
+};
+
+Scale input_scale(const ArrayXd& x) {
+  Scale s;
+  const double lo = x.minCoeff(), hi = x.maxCoeff();
+  s.offset = lo;
+  s.scale = hi - lo;
+  // A spread of one millionth of the value is rounding of the log, not variation.
+  s.constant = s.scale <= 1e-6 * std::max(std::abs(lo), std::abs(hi));
+  if (s.constant) s.scale = std::max({std::abs(lo), std::abs(hi), 1e-9});
+  return s;
+}
+
+/// The data of one process in scaled units, and the way back.
+struct Problem {
+  Scale flow, force, pressure;
+  double line_constant = 0.0, line_slope = 0.0;  // of the straight line taken off points.y
+  GpPoints points;
+  GpHyper lower, upper;
+};
+
+Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& pressure,
+                     const LearnGpOptions& options) {
+  Problem p;
+  p.flow = input_scale(flow);
+  p.force = input_scale(force);
+  p.pressure.offset = pressure.mean();
+  const double spread = std::sqrt((pressure - p.pressure.offset).square().mean());
+  p.pressure.scale = std::max(spread, options.smallest_noise);
+  p.points.x1 = p.flow.apply(flow);
+  p.points.x2 = p.force.apply(force);
+  p.points.y = p.pressure.apply(pressure);
+  p.points.basis = MatrixXd::Ones(flow.size(), p.force.constant ? 1 : 2);
+  p.points.basis_precision = VectorXd::Zero(p.points.basis.cols());
+  if (!p.force.constant) {
+    p.points.basis.col(1) = p.points.x2;
+    const ArrayXd x = p.points.x2 - p.points.x2.mean();
+    p.line_slope = (x * p.points.y.array()).sum() / x.square().sum();
+    p.line_constant = -p.line_slope * p.points.x2.mean();
+    p.points.y.array() -= p.line_constant + p.line_slope * p.points.x2;
+    p.points.basis_precision[1] = 1.0 / (options.slope_std * options.slope_std);
+  }
+  const double shortest = std::log(options.shortest_length);
+  const double longest = std::log(options.longest_length);
+  const double noise = 2.0 * std::log(options.smallest_noise / p.pressure.scale);
+  // The signal deviates from its linear mean by at most ten and at least a thousandth of the spread.
+  p.lower = GpHyper(p.flow.constant ? longest : shortest, p.force.constant ? longest : shortest,
+                    std::log(1e-6), noise);
+  p.upper = GpHyper(longest, longest, 2.0 * std::log(options.largest_signal),
+                    std::max(noise, std::log(4.0)));
+  return p;
+}
+
+/// Maximises a likelihood; counts its evaluations in the report.
+template <class Likelihood>
+GpHyper maximise(const Problem& problem, const GpHyper& start, int iterations, GpReport& report,
+                 Likelihood&& likelihood) {
+  BoxBfgsOptions options;
+  options.max_iterations = iterations;
+  options.gradient_tolerance = 0.02;  // nats for each e-fold: far below what the data can tell
+  const auto negative = [&](const VectorXd& x, VectorXd& gradient) {
+    GpHyper g = GpHyper::Zero();
+    const double value = likelihood(GpHyper(x), &g);
+    gradient = -g;
+    return -value;
+  };
+  const BoxBfgsResult r = minimise_in_box(negative, start, problem.lower, problem.upper, options);
+  report.evaluations += r.evaluations;
+  report.converged = r.converged;
+  report.log_likelihood = -r.value;
+  return r.x;
+}
+
+GpHyper maximise_exact(const Problem& problem, const GpPoints& points, const GpHyper& start,
+                       int iterations, GpReport& report) {
+  return maximise(problem, start, iterations, report,
+                  [&](const GpHyper& h, GpHyper* g) { return exact_log_likelihood(points, h, g); });
+}
+
+/// Few representatives, several starts: the likelihood has one optimum that explains the data by a
+/// smooth signal and often another that calls the signal noise.
+GpHyper preliminary_fit(const Problem& problem, const GpPoints& few, GpReport& report) {
+  GpHyper best;
+  double best_value = -INFINITY;
+  for (const double length : {0.3, 1.2}) {
+    for (const double noise : {0.02, 0.3}) {
+      const GpHyper start(std::log(length), std::log(length), std::log(0.5), 2.0 * std::log(noise));
+      const GpHyper found = maximise_exact(problem, few, start, 15, report);
+      if (report.log_likelihood > best_value) {
+        best_value = report.log_likelihood;
+        best = found;
+      }
+    }
+  }
+  return std::isfinite(best_value) ? best : GpHyper(0.0, 0.0, std::log(0.5), std::log(0.1));
+}
+
+std::vector<Index> every_kth(Index n, Index at_most) {
+  const Index step = (n + at_most - 1) / at_most;
+  std::vector<Index> rows;
+  for (Index i = step / 2; i < n; i += step) rows.push_back(i);
+  return rows;
+}
+
+/// Inducing points depend on the length-scales and the other way round: alternate until both agree.
+GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
+                         const LearnGpOptions& options, GpHyper& hyper, GpReport& report) {
+  const auto choose = [&](const GpPoints& from) {
+    const double tolerance = options.sparse_tolerance * std::exp(hyper[3] - hyper[2]);
+    return choose_inducing(from.x1, from.x2, hyper, options.max_centres, tolerance);
+  };
+  const GpPoints thinned = points.select(every_kth(points.size(), options.hyper_samples));
+  for (int round = 0; round < 3; ++round) {
+    const GpHyper before = hyper;
+    SparseGp sparse(thinned, choose(thinned).rows);
+    hyper = maximise(problem, before, 30, report,
+                     [&](const GpHyper& h, GpHyper* g) { return sparse.bound(h, g); });
+    if ((hyper - before).head<2>().cwiseAbs().maxCoeff() < 0.1) break;
+  }
+  const InducingChoice choice = choose(points);
+  const double left = choice.mean_variance * std::exp(hyper[2] - hyper[3]);
+  if (left > 10.0 * options.sparse_tolerance) {
+    report.warnings.push_back(fmt::format(
+        "{} centres leave {:.0f} % of the noise variance open; more centres would fit closer.",
+        choice.rows.size(), 100.0 * left));
+  }
+  SparseGp sparse(points, choice.rows);
+  report.log_likelihood = sparse.bound(hyper, nullptr);
+  return sparse.posterior(hyper);
+}
+
+GpPosterior fit_subset(const Problem& problem, const GpPoints& points,
+                       const LearnGpOptions& options, GpHyper& hyper, GpReport& report) {
+  // Where the inputs are covered a further point adds only averaging: the rest comes evenly from the log.
+  const double tolerance = options.sparse_tolerance * std::exp(hyper[3] - hyper[2]);
+  std::vector<Index> rows =
+      choose_inducing(points.x1, points.x2, hyper, options.max_centres, tolerance).rows;
+  const Index open =
+      std::min<Index>(options.max_centres, points.size()) - static_cast<Index>(rows.size());
+  if (open > 0) {
+    const std::vector<Index> even = every_kth(points.size(), open);
+    rows.insert(rows.end(), even.begin(), even.end());
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  }
+  const GpPoints chosen = points.select(rows);
+  hyper = maximise_exact(problem, chosen, hyper, 30, report);
+  return exact_posterior(chosen, hyper);
+}
+
+/// From scaled units to SI.
+GpParameters to_si(const Problem& problem, const GpPosterior& posterior, const GpHyper& hyper) {
+  const Scale &q = problem.flow, &f = problem.force, &p = problem.pressure;
+  const Index m = posterior.weight.size(), b = posterior.beta.size();
+  GpParameters out;
+  out.length_flow = std::exp(hyper[0]) * q.scale;
+  out.length_force = std::exp(hyper[1]) * f.scale;
+  out.signal_std = std::exp(0.5 * hyper[2]) * p.scale;
+  out.noise_std = std::exp(0.5 * hyper[3]) * p.scale;
+  const double slope = problem.line_slope + (b == 2 ? posterior.beta[1] : 0.0);
+  out.mean_slope = slope * p.scale / f.scale;
+  out.mean_constant =
+      p.offset + (problem.line_constant + posterior.beta[0]) * p.scale - out.mean_slope * f.offset;
+  out.flow = q.offset + q.scale * posterior.x1;
+  out.force = f.offset + f.scale * posterior.x2;
+  out.weight = posterior.weight.array() / p.scale;
+  // Scaled basis = T * SI basis: k' = k / p^2, 1 = 1, x2 = (F - offset) / scale.
+  MatrixXd t = MatrixXd::Zero(m + b, m + 2);
+  t.topLeftCorner(m, m).diagonal().setConstant(1.0 / (p.scale * p.scale));
+  t(m, m) = 1.0;
+  if (b == 2) {
+    t(m + 1, m) = -f.offset / f.scale;
+    t(m + 1, m + 1) = 1.0 / f.scale;
+  }
+  const MatrixXd core = p.scale * p.scale * product(transposed_product(t, posterior.core), t);
+  out.variance_core = 0.5 * (core + core.transpose());
+  return out;
+}
+
+void add_warnings(const Problem& problem, const GpHyper& hyper, GpReport& report) {
+  const auto at_lower = [&](int i) { return hyper[i] <= problem.lower[i] + 1e-6; };
+  const char* input[] = {"flow", "force"};
+  const bool constant[] = {problem.flow.constant, problem.force.constant};
+  for (int i = 0; i < 2; ++i) {
+    if (constant[i]) {
+      report.warnings.push_back(
+          fmt::format("The {} does not vary enough in these samples for the pressure's dependence "
+                      "on it to be learned.",
+                      input[i]));
+    } else if (at_lower(i)) {
+      report.warnings.push_back(fmt::format(
+          "The length-scale of the {} is at its lower bound: the pressure changes more sharply "
+          "than a smooth law does (friction, a dead band, too little data?).",
+          input[i]));
+    }
+  }
+  if (!report.converged) {
+    report.warnings.push_back("The likelihood's maximum was not reached within its iterations.");
+  }
+}
+
+double rms_error(const GaussianProcess& process, const ArrayXd& flow, const ArrayXd& force,
+                 const ArrayXd& pressure) {
+  double sum = 0.0;
+  for (Index i = 0; i < flow.size(); ++i) {
+    const double error = process.mean(flow[i], force[i]) - pressure[i];
+    sum += error * error;
+  }
+  return std::sqrt(sum / static_cast<double>(flow.size()));
+}
+
+}  // namespace
+
+const char* gp_method_name(GpMethod method) {
+  switch (method) {
+    case GpMethod::kAutomatic:
+      return "automatic";
+    case GpMethod::kExact:
+      return "exact";
+    case GpMethod::kInducing:
+      return "inducing points";
+    default:
+      return "subset";
+  }
+}
+
+LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const ArrayXd>& force,
+                   const Eigen::Ref<const ArrayXd>& pressure, const LearnGpOptions& options) {
+  const auto start_time = std::chrono::steady_clock::now();
+  SPARFLOW_CHECK(flow.size() == force.size() && flow.size() == pressure.size(),
+                 "flow, force and pressure must be equally long");
+  LearnedGp learned;
+  GpReport& report = learned.report;
+  report.given = static_cast<int>(flow.size());
+  std::vector<Index> rows;
+  for (Index i = 0; i < flow.size(); ++i) {
+    if (std::isfinite(flow[i]) && std::isfinite(force[i]) && std::isfinite(pressure[i])) {
+      rows.push_back(i);
+    }
+  }
+  report.invalid = report.given - static_cast<int>(rows.size());
+  if (static_cast<int>(rows.size()) < std::max(options.min_samples, 3)) {
+    throw InputError(
+        {}, "pressure",
+        fmt::format("got {} usable samples ({} given, {} not finite), expected at "
+                    "least {}; log more motion in this direction",
+                    rows.size(), report.given, report.invalid, std::max(options.min_samples, 3)));
+  }
+  ArrayXd q = flow(rows), f = force(rows), p = pressure(rows);
+  Problem problem = make_problem(q, f, p, options);
+
+  // Preliminary fit on representatives: start values, and a yardstick for outliers.
+  const std::vector<Index> few = representative_points(problem.points, 11);
+  GpHyper hyper = preliminary_fit(problem, problem.points.select(few), report);
+  const Screening screening = screen_outliers(problem.points, few, hyper, options.outlier_threshold,
+                                              options.max_outlier_fraction);
+  if (screening.too_many) {
+    report.warnings.push_back(
+        "So many samples lie far from a smooth pressure that they are no outliers: all are kept.");
+  }
+  report.outliers = static_cast<int>(rows.size() - screening.kept.size());
+  report.used = static_cast<int>(screening.kept.size());
+  if (report.outliers > 0) {
+    q = ArrayXd(q(screening.kept));
+    f = ArrayXd(f(screening.kept));
+    p = ArrayXd(p(screening.kept));
+    // Scales of the inputs may shrink with an outlier; length-scales follow.
+    const Problem before = problem;
+    problem = make_problem(q, f, p, options);
+    hyper[0] += std::log(before.flow.scale / problem.flow.scale);
+    hyper[1] += std::log(before.force.scale / problem.force.scale);
+    const double ratio = 2.0 * std::log(before.pressure.scale / problem.pressure.scale);
+    hyper.tail<2>().array() += ratio;
+  }
+  const GpPoints& points = problem.points;
+
+  report.method = options.method;
+  if (report.method == GpMethod::kAutomatic) {
+    report.method = report.used <= options.exact_limit ? GpMethod::kExact : GpMethod::kInducing;
+  }
+  GpPosterior posterior;
+  if (report.method == GpMethod::kExact) {
+    hyper = maximise_exact(problem, points, hyper, 40, report);
+    posterior = exact_posterior(points, hyper);
+  } else if (report.method == GpMethod::kInducing) {
+    posterior = fit_inducing(problem, points, options, hyper, report);
+  } else {
+    posterior = fit_subset(problem, points, options, hyper, report);
+  }
+
+  GpParameters& out = learned.parameters;
+  out = to_si(problem, posterior, hyper);
+  out.flow_min = q.minCoeff();
+  out.flow_max = q.maxCoeff();
+  out.force_min = f.minCoeff();
+  out.force_max = f.maxCoeff();
+  out.data_count = report.used;
+  report.centres = static_cast<int>(out.weight.size());
+  report.noise_std = out.noise_std;
+  report.rmse = rms_error(GaussianProcess(out), q, f, p);
+  add_warnings(problem, hyper, report);
+  report.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start_time).count();
+  return learned;
+}
+
+std::vector<LearnedGp> learn_gps(const std::vector<GpDataset>& datasets,
+                                 const LearnGpOptions& options,
+                                 const std::function<void(int, int, const std::string&)>& progress,
+                                 int threads) {
+  const int total = static_cast<int>(datasets.size());
+  std::vector<LearnedGp> learned(datasets.size());
+  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::atomic<int> next{0};
+  int done = 0;
+  std::mutex mutex;
+  std::exception_ptr defect;  // anything but the user's data
+  const auto work = [&] {
+    for (int i = next++; i < total; i = next++) {
+      const std::size_t at = static_cast<std::size_t>(i);
+      const GpDataset& data = datasets[at];
+      try {
+        try {
+          learned[at] = learn_gp(data.flow, data.force, data.pressure, options);
+        } catch (const InputError& error) {
+          learned[at].report.failure = fmt::format("{}: {}", data.name, error.what());
+        }
+        const std::lock_guard lock(mutex);
+        ++done;
+        if (progress) progress(done, total, data.name);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        defect = std::current_exception();
+        next = total;
+      }
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < std::min(threads, total); ++i) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+  if (defect) std::rethrow_exception(defect);
+  return learned;
+}
+
+}  // namespace sparflow

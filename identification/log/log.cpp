@@ -1,0 +1,322 @@
+#include "identification/log/log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "identification/log/log_checks.h"
+#include "identification/log/log_columns.h"
+#include "identification/log/log_dialect.h"
+#include "identification/log/log_mapping.h"
+#include "identification/log/log_matlab.h"
+#include "identification/log/log_time.h"
+#include "models/math/error.h"
+#include "models/math/sha256.h"
+
+namespace sparflow {
+namespace {
+
+struct UnderstoodColumn {
+  const RawColumn* raw = nullptr;
+  ColumnMeaning meaning;
+};
+
+std::string column_list(const RawTable& table) {
+  std::string list;
+  for (const RawColumn& column : table.columns) {
+    if (list.size() > 400) return list + ", ...";
+    list += (list.empty() ? "" : ", ") + column.name;
+  }
+  return list;
+}
+
+bool same_place(const ColumnMeaning& a, const ColumnMeaning& b) {
+  return a.is_time == b.is_time && a.role == b.role && a.index == b.index &&
+         (a.is_time || a.role != Role::kCandidate);
+}
+
+/// Gives each column its meaning; refuses two columns for one quantity and units that are not known.
+std::vector<UnderstoodColumn> understand(const RawTable& table, const Machine& machine) {
+  const FilePlace header = {table.file, table.header_line, 0};
+  std::vector<UnderstoodColumn> columns;
+  for (const RawColumn& raw : table.columns) {
+    columns.push_back({&raw, column_meaning(raw.name, raw.unit, machine)});
+  }
+  for (UnderstoodColumn& column : columns) {
+    if (column.meaning.error.empty()) continue;
+    // "q_boom_raw" beside "q_boom_rad" is another signal, alone it is a unit nobody knows.
+    const bool another = std::any_of(columns.begin(), columns.end(), [&](const auto& other) {
+      return other.meaning.error.empty() && same_place(other.meaning, column.meaning);
+    });
+    if (!another) {
+      throw InputError(header, column.raw->name, column.meaning.error);
+    }
+    column.meaning = ColumnMeaning{};
+    column.meaning.signal = column.raw->name;
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!same_place(columns[i].meaning, columns[j].meaning)) continue;
+      throw InputError(
+          header, columns[i].raw->name,
+          fmt::format("measures the same as column {}; leave one out, or name it under "
+                      "`ignore` in a mapping file",
+                      columns[j].raw->name));
+    }
+  }
+  return columns;
+}
+
+/// Names of candidates stay apart from all other signals; a repeated column is left out.
+void settle_signal_names(std::vector<UnderstoodColumn>* columns,
+                         std::vector<std::string>* warnings) {
+  std::vector<UnderstoodColumn> kept;
+  const auto taken = [&](const std::string& signal) {
+    return std::any_of(columns->begin(), columns->end(),
+                       [&](const auto& c) {
+                         return c.meaning.role != Role::kCandidate && c.meaning.signal == signal;
+                       }) ||
+           std::any_of(kept.begin(), kept.end(),
+                       [&](const auto& c) { return c.meaning.signal == signal; });
+  };
+  for (UnderstoodColumn& column : *columns) {
+    if (column.meaning.role == Role::kCandidate && !column.meaning.is_time) {
+      // a pressure under its old name would be the best of all explanations of that pressure
+      if (column.raw->mapped_from) continue;
+      if (taken(column.meaning.signal)) column.meaning.signal = column.raw->name;
+      if (taken(column.meaning.signal)) {
+        warnings->push_back(
+            fmt::format("column {} occurs twice; the second is left out", column.raw->name));
+        continue;
+      }
+    }
+    kept.push_back(column);
+  }
+  *columns = std::move(kept);
+}
+
+/// The column that holds time. @throws InputError when there is none
+UnderstoodColumn time_column(const RawTable& table, const std::vector<UnderstoodColumn>& columns) {
+  const auto found = std::find_if(columns.begin(), columns.end(),
+                                  [](const UnderstoodColumn& c) { return c.meaning.is_time; });
+  if (found == columns.end()) {
+    throw InputError(
+        {table.file, table.header_line, 0}, "t_s",
+        fmt::format("no column of this name; found {}; rename the column of time, or give a "
+                    "mapping file with columns: {{t_s: \"...\"}}",
+                    column_list(table)));
+  }
+  if (found->raw->text) {
+    throw InputError({table.file, found->raw->example_line, 0}, found->raw->name,
+                     fmt::format("got \"{}\", expected a number of seconds from any start; export "
+                                 "relative time instead of clock time",
+                                 found->raw->example));
+  }
+  return *found;
+}
+
+/// Every joint needs a position, or the stroke of its cylinder.
+void require_positions(const RawTable& table, const std::vector<UnderstoodColumn>& columns,
+                       const Machine& machine) {
+  const auto usable = [&](Role role, int index) {
+    return std::any_of(columns.begin(), columns.end(), [&](const UnderstoodColumn& c) {
+      return c.meaning.role == role && c.meaning.index == index && !c.raw->text &&
+             std::any_of(c.raw->values.begin(), c.raw->values.end(),
+                         [](double v) { return !std::isnan(v); });
+    });
+  };
+  for (int joint = 0; joint < machine.joint_count(); ++joint) {
+    const int cylinder = machine.cylinder_of_joint(joint);
+    if (usable(Role::kJointPosition, joint)) continue;
+    if (cylinder >= 0 && usable(Role::kStroke, cylinder)) continue;
+    const std::string expected = usual_name(Role::kJointPosition, joint, machine);
+    std::string hint;
+    for (const UnderstoodColumn& column : columns) {
+      if (column.meaning.suggestion != expected) continue;
+      hint = fmt::format("; is \"{}\" meant to be {}?", column.raw->name, expected);
+    }
+    const std::string stroke =
+        cylinder < 0 ? "" : " or " + usual_name(Role::kStroke, cylinder, machine);
+    throw InputError({table.file, table.header_line, 0}, "",
+                     fmt::format("no position of joint {}: expected column {}{}; found {}{}",
+                                 machine.joints[static_cast<std::size_t>(joint)].name, expected,
+                                 stroke, column_list(table),
+                                 hint.empty() ? "; rename it, or give a mapping file" : hint));
+  }
+}
+
+Channel make_channel(const UnderstoodColumn& column, const std::vector<std::size_t>& rows) {
+  const ColumnMeaning& meaning = column.meaning;
+  Channel channel;
+  channel.column = column.raw->name;
+  channel.signal = meaning.signal;
+  channel.role = meaning.role;
+  channel.index = meaning.index;
+  channel.unit = meaning.unit;
+  channel.values.resize(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    channel.values[static_cast<Eigen::Index>(i)] =
+        meaning.factor * column.raw->values[rows[i]] + meaning.offset;
+  }
+  return channel;
+}
+
+/// Whether the column can be a channel at all; if not, says why.
+bool is_usable(const UnderstoodColumn& column, const Channel& channel, Log* log) {
+  const RawColumn& raw = *column.raw;
+  if (raw.text) {
+    log->warnings.push_back(fmt::format("column {} left out: it holds text (\"{}\" in line {})",
+                                        raw.name, raw.example, raw.example_line));
+    return false;
+  }
+  if (!channel.values.array().isFinite().any()) {
+    log->warnings.push_back(fmt::format("column {} left out: it is empty", raw.name));
+    return false;
+  }
+  return true;
+}
+
+void note_holes(const RawColumn& raw, const Channel& channel, std::int64_t filled, Log* log) {
+  if (raw.unreadable > 0) {
+    log->warnings.push_back(
+        fmt::format("{}: {} {} no number (the first \"{}\" in line {}), taken as missing", raw.name,
+                    raw.unreadable, raw.unreadable == 1 ? "cell is" : "cells are", raw.example,
+                    raw.example_line));
+  }
+  const Eigen::Index invalid = channel.valid.size() - channel.valid.count();
+  if (invalid > 0) {
+    log->warnings.push_back(fmt::format(
+        "{}: missing in {:.2g} % of the samples after {} short-hole {} filled", raw.name,
+        100.0 * static_cast<double>(invalid) / static_cast<double>(channel.valid.size()), filled,
+        filled == 1 ? "value was" : "values were"));
+  }
+}
+
+void add_channels(const std::vector<UnderstoodColumn>& columns,
+                  const std::vector<std::size_t>& rows, const LogOptions& options, Log* log) {
+  for (const UnderstoodColumn& column : columns) {
+    if (column.meaning.is_time) continue;
+    Channel channel = make_channel(column, rows);
+    if (!is_usable(column, channel, log)) continue;
+    if (!column.meaning.suggestion.empty() &&
+        std::none_of(columns.begin(), columns.end(), [&](const UnderstoodColumn& c) {
+          return c.raw->name == column.meaning.suggestion;
+        })) {
+      log->warnings.push_back(
+          fmt::format("column {} names no part of the machine; did you mean {}?", column.raw->name,
+                      column.meaning.suggestion));
+    }
+    log->counts.cells_missing += (!channel.values.array().isFinite()).count();
+    log->counts.cells_unreadable += column.raw->unreadable;
+    const std::int64_t filled = fill_holes(log->time, log->runs, options, &channel);
+    log->counts.cells_interpolated += filled;
+    note_holes(*column.raw, channel, filled, log);
+    log->channels.push_back(std::move(channel));
+  }
+  std::stable_partition(log->channels.begin(), log->channels.end(),
+                        [](const Channel& c) { return c.role != Role::kCandidate; });
+}
+
+void note_runs(Log* log) {
+  if (log->runs.size() < 2) return;
+  double longest = 0.0, at = 0.0;
+  for (std::size_t i = 1; i < log->runs.size(); ++i) {
+    const Eigen::Index k = log->runs[i].begin;
+    const double gap = log->time[k] - log->time[k - 1];
+    if (gap > longest) longest = gap, at = log->time[k - 1];
+  }
+  log->warnings.push_back(fmt::format(
+      "{} {} in time split the log into {} runs; the longest is {:.3g} s after t = {:.3f} s",
+      log->runs.size() - 1, log->runs.size() == 2 ? "gap" : "gaps", log->runs.size(), longest, at));
+}
+
+Log clean_log(const RawTable& table, const std::string& path, const std::string& sha256,
+              const Machine& machine, const LogOptions& options) {
+  Log log;
+  log.path = path;
+  log.file = path.substr(path.find_last_of('/') + 1);
+  log.sha256 = sha256;
+  log.dialect = table.dialect;
+  log.warnings = table.warnings;
+  log.counts.rows_wrong_width = table.rows_wrong_width;
+  log.counts.rows_read = static_cast<std::int64_t>(table.rows()) + table.rows_wrong_width;
+
+  std::vector<UnderstoodColumn> columns = understand(table, machine);
+  const UnderstoodColumn clock = time_column(table, columns);
+  std::vector<double> time = clock.raw->values;
+  for (double& t : time) t = clock.meaning.factor * t + clock.meaning.offset;
+  require_positions(table, columns, machine);
+  settle_signal_names(&columns, &log.warnings);
+
+  const std::vector<std::size_t> rows =
+      rows_in_time(table, clock.raw->name, time, &log.counts, &log.warnings);
+  log.time.resize(static_cast<Eigen::Index>(rows.size()));
+  log.line.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    log.time[static_cast<Eigen::Index>(i)] = time[rows[i]];
+    log.line[i] = table.line(rows[i]);
+  }
+  log.step = median_step(log.time);
+  log.runs = runs_between_gaps(log.time, log.step, options);
+  note_runs(&log);
+  add_channels(columns, rows, options, &log);
+  check_plausible(machine, &log);
+  return log;
+}
+
+LogMapping mapping_of(const LogOptions& options) {
+  return options.mapping_file.empty() ? LogMapping{} : read_log_mapping(options.mapping_file);
+}
+
+}  // namespace
+
+const Channel* Log::find(Role role, int index) const {
+  const auto it = std::find_if(channels.begin(), channels.end(), [&](const Channel& c) {
+    return c.role == role && c.index == index;
+  });
+  return it == channels.end() ? nullptr : &*it;
+}
+
+const Channel* Log::find(const std::string& signal) const {
+  const auto it = std::find_if(channels.begin(), channels.end(),
+                               [&](const Channel& c) { return c.signal == signal; });
+  return it == channels.end() ? nullptr : &*it;
+}
+
+Eigen::MatrixXd Log::matrix(Role role, int count) const {
+  Eigen::MatrixXd all =
+      Eigen::MatrixXd::Constant(samples(), count, std::numeric_limits<double>::quiet_NaN());
+  for (int i = 0; i < count; ++i) {
+    if (const Channel* channel = find(role, i)) all.col(i) = channel->values;
+  }
+  return all;
+}
+
+Log load_log(const std::string& path, const Machine& machine, const LogOptions& options) {
+  std::string bytes = read_file(path);
+  if (!is_matlab(bytes, path)) return log_from_text(path, std::move(bytes), machine, options);
+  RawTable table = read_matlab(path);
+  apply_mapping(mapping_of(options), &table);
+  return clean_log(table, path, sha256_hex(bytes), machine, options);
+}
+
+Log log_from_text(const std::string& path, std::string bytes, const Machine& machine,
+                  const LogOptions& options) {
+  const LogMapping mapping = mapping_of(options);
+  const std::string sha256 = sha256_hex(bytes);
+  RawTable table = read_delimited(path, std::move(bytes), mapping.dialect);
+  apply_mapping(mapping, &table);
+  return clean_log(table, path, sha256, machine, options);
+}
+
+Log::Log() = default;
+Log::Log(const Log&) = default;
+Log::Log(Log&&) noexcept = default;
+Log& Log::operator=(const Log&) = default;
+Log& Log::operator=(Log&&) noexcept = default;
+Log::~Log() = default;
+
+}  // namespace sparflow

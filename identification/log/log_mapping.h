@@ -1,0 +1,45 @@
+#pragma once
+/// A mapping file gives a log with foreign column names the program's names, by small expressions:
+///   columns: {t_s: "Time [ms] * 0.001", pA_boom_bar: "PT01 / 1e5 - 1.01"}
+/// Described in docs/log_format.md.
+#include <set>
+#include <string>
+#include <vector>
+
+#include "identification/log/log_dialect.h"
+#include "identification/log/log_table.h"
+
+namespace sparflow {
+
+struct MappedColumn {
+  std::string name;        ///< the program's name, with its unit
+  std::string expression;  ///< over the file's own column names
+  FilePlace place;         ///< of the expression in the mapping file
+};
+
+struct LogMapping {
+  std::vector<MappedColumn> columns;
+  std::vector<std::string> ignore;  ///< columns of the log to leave out
+  FilePlace ignore_place;
+  DialectOptions dialect;
+};
+
+/// @throws InputError with file:line:column for unknown keys, wrong types, names given twice
+LogMapping read_log_mapping(const std::string& path);
+/// The same from YAML in memory. @param path name for messages
+LogMapping parse_log_mapping(const std::string& path, const std::string& text);
+
+/// Adds the mapped columns (replacing a column of the same name), drops the ignored ones and marks those an
+/// expression read.
+/// @throws InputError at the expression's place: unknown column (with the nearest one), text column, syntax
+void apply_mapping(const LogMapping& mapping, RawTable* table);
+
+/// One expression over columns, row by row: + - * / ^ ( ), abs sqrt sin cos min max, pi deg rad; a column is
+/// written by its name (the longest that fits) or between backticks. Missing in, missing out.
+/// @param place and @param key for messages  @param read gets the names of the columns used; may be null
+/// @throws InputError
+std::vector<double> evaluate_expression(const std::string& expression, const RawTable& table,
+                                        const FilePlace& place, const std::string& key,
+                                        std::set<std::string>* read = nullptr);
+
+}  // namespace sparflow
