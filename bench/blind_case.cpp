@@ -10,7 +10,7 @@
 #include <random>
 #include <set>
 
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
 #include "problems/bundled.h"

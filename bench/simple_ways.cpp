@@ -5,8 +5,8 @@
 #include <limits>
 #include <map>
 
-#include "identification/effect_intervals.h"
-#include "identification/effect_search.h"
+#include "diagnosis/selection/effect_intervals.h"
+#include "diagnosis/selection/effect_search.h"
 #include "identification/learning/fit.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"

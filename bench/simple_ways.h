@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "identification/evidence.h"
+#include "diagnosis/evidence/evidence.h"
 #include "identification/log/log.h"
 
 namespace sparflow::bench {

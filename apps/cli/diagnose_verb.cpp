@@ -5,7 +5,7 @@
 
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/diagnose_page.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {

@@ -5,7 +5,7 @@
 
 #include "apps/cli/context.h"
 #include "apps/report/page.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 namespace sparflow::cli {
 

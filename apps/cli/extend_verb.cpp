@@ -2,7 +2,7 @@
 
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/improve_page.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 

@@ -1,5 +1,5 @@
 #include "apps/cli/diagnosis_inputs.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 namespace sparflow::cli {
 namespace {

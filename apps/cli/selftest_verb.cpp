@@ -2,7 +2,7 @@
 
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/report/selftest_page.h"
-#include "identification/selftest.h"
+#include "diagnosis/selftest/selftest.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {

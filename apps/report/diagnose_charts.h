@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/report/page.h"
-#include "identification/diagnose.h"
+#include "diagnosis/verdict/diagnose.h"
 
 namespace sparflow {
 

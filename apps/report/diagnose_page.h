@@ -1,7 +1,7 @@
 #pragma once
 /// A diagnosis as a page: verdict, effects with their proofs, what is left.
 #include "apps/report/page.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 namespace sparflow {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/report/charts.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 namespace sparflow {
 

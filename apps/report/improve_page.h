@@ -1,7 +1,7 @@
 #pragma once
 /// Pages about extending a model.
 #include "apps/report/page.h"
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 namespace sparflow {
 

@@ -1,7 +1,7 @@
 #pragma once
 /// What logs could reveal, as a page: power of every effect, what would be confused, what is missing from the logs.
 #include "apps/report/page.h"
-#include "identification/selftest.h"
+#include "diagnosis/selftest/selftest.h"
 #include "models/chain/crane_model.h"
 
 namespace sparflow {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "arm_log.h"
-#include "identification/evidence.h"
+#include "diagnosis/evidence/evidence.h"
 #include "identification/learning/fit.h"
 #include "identification/signals/series.h"
 #include "models/effects/effective_machine.h"

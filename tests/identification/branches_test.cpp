@@ -1,5 +1,5 @@
 // The split of return line and counterbalance valve on pressures made by the maximum of both laws.
-#include "identification/branches.h"
+#include "diagnosis/evidence/branches.h"
 
 #include <gtest/gtest.h>
 

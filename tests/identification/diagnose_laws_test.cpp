@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <map>
 
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "identification/learning/fit.h"
 #include "tests/identification/hidden_case.h"
 

@@ -1,5 +1,5 @@
 /// Diagnosis end to end: logs with a hidden effect in, a verdict out.
-#include "identification/diagnose.h"
+#include "diagnosis/verdict/diagnose.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

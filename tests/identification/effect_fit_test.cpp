@@ -1,4 +1,4 @@
-#include "identification/effect_fit.h"
+#include "diagnosis/regression/effect_fit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "identification/effect_intervals.h"
+#include "diagnosis/selection/effect_intervals.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "identification/effect_proof.h"
+#include "diagnosis/regression/effect_proof.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "identification/effect_fit.h"
+#include "diagnosis/regression/effect_fit.h"
 
 namespace sparflow::testing_support {
 

@@ -1,4 +1,4 @@
-#include "identification/evidence.h"
+#include "diagnosis/evidence/evidence.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <set>
 
-#include "identification/effect_fit.h"
-#include "identification/search_candidates.h"
+#include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/selection/search_candidates.h"
 #include "models/effects/registry.h"
 #include "tests/identification/arm_log.h"
 #include "tests/identification/hidden_case.h"

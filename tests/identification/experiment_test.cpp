@@ -1,11 +1,11 @@
-#include "identification/experiment.h"
+#include "diagnosis/experiment/experiment.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "identification/diagnose.h"
+#include "diagnosis/verdict/diagnose.h"
 #include "tests/identification/arm_log.h"
 #include "tests/identification/hidden_case.h"
 

@@ -1,4 +1,4 @@
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "identification/effect_estimate.h"
+#include "diagnosis/selection/effect_estimate.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "tests/identification/arm_log.h"

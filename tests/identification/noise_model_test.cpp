@@ -1,4 +1,4 @@
-#include "identification/noise_model.h"
+#include "diagnosis/evidence/noise_model.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "identification/null_gate.h"
+#include "diagnosis/regression/null_gate.h"
 
 #include <gtest/gtest.h>
 

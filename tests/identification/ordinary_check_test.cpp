@@ -1,4 +1,4 @@
-#include "identification/ordinary_check.h"
+#include "diagnosis/regression/ordinary_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,11 +7,11 @@
 #include <algorithm>
 
 #include "arm_log.h"
+#include "diagnosis/evidence/evidence.h"
+#include "diagnosis/selection/effect_estimate.h"
+#include "diagnosis/selection/effect_search.h"
+#include "diagnosis/verdict/diagnose.h"
 #include "hidden_case.h"
-#include "identification/diagnose.h"
-#include "identification/effect_estimate.h"
-#include "identification/effect_search.h"
-#include "identification/evidence.h"
 #include "identification/signals/series.h"
 #include "models/effects/registry.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/math/units.h"

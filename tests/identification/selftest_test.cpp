@@ -1,5 +1,5 @@
 // What logs could reveal: the formula against closed forms and against the search itself.
-#include "identification/selftest.h"
+#include "diagnosis/selftest/selftest.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "identification/effect_power.h"
+#include "diagnosis/experiment/effect_power.h"
 #include "models/math/error.h"
 #include "tests/identification/arm_log.h"
 #include "tests/parsed_json.h"

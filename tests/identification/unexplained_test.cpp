@@ -1,4 +1,4 @@
-#include "identification/unexplained.h"
+#include "diagnosis/residual/unexplained.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

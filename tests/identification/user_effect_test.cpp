@@ -9,7 +9,7 @@
 #include <cmath>
 #include <random>
 
-#include "identification/extend.h"
+#include "diagnosis/extension/extend.h"
 #include "identification/signals/series.h"
 #include "models/effects/registry.h"
 #include "models/effects/user_effect_scope.h"

@@ -1,0 +1,342 @@
+#include "diagnosis/evidence/branches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kFewest = 60;
+/// Of one branch; fewer say nothing about a law with four or five coefficients.
+constexpr Index kFewestOfOne = 30;
+/// Samples are alike over a filter's width: more than this make the fit slower, not better.
+constexpr Index kMostFitted = 3000;
+constexpr double kStrays = 0.02;   ///< prior share of samples that follow neither law
+constexpr double kSharpest = 0.3;  ///< [bar] no law is believed to hold better than sensors do
+constexpr double kSure = 0.95;     ///< least posterior probability of a member
+/// A member of one branch lies this many standard deviations above the other law; nearer is the kink.
+constexpr double kClear = 3.0;
+/// The supply takes all of a load (slope 1) where the return line rules, 1/(1 + R A_hold/A_supply) < 0.6 of it
+/// where a counterbalance valve of pilot ratio R > 1 does.
+constexpr double kSteepest = 0.75;
+constexpr Index kGuard = 2;          ///< samples dropped either side of a switch
+constexpr double kAlikeRows = 10.0;  ///< neighbouring samples that tell no more than one
+/// [nats] by which laws of their own must explain two states of a machine better than common ones.
+constexpr double kApart = 10.0;
+
+/// Rows of all logs; pressures [bar], regressors near one.
+struct Rows {
+  VectorXd p_return, p_supply;
+  MatrixXd line, valve;                      ///< regressors of f and g
+  VectorXd load;                             ///< [bar] force as pressure of the supply chamber
+  std::vector<std::pair<int, Index>> where;  ///< log and sample
+  Index count() const { return p_return.size(); }
+};
+
+bool usable(const BranchData& d, Index k) {
+  return d.moving[k] && std::isfinite(d.p_return[k]) && std::isfinite(d.p_supply[k]) &&
+         std::isfinite(d.q_return[k]) && std::isfinite(d.q_supply[k]) &&
+         std::isfinite(d.force[k]) &&
+         (d.q_return_total.size() == 0 || std::isfinite(d.q_return_total[k]));
+}
+
+/// What the oil's temperature spans, if it is known everywhere and changes: a return line's pressure follows it.
+std::optional<Range> oil_range(const std::vector<BranchData>& logs,
+                               const std::vector<std::pair<int, Index>>& where) {
+  constexpr double kChanges = 2.0;  // [degC]
+  Range range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const auto& [l, k] : where) {
+    const VectorXd& oil = logs[static_cast<std::size_t>(l)].oil;
+    if (oil.size() == 0 || !std::isfinite(oil[k])) return std::nullopt;
+    range.lo = std::min(range.lo, oil[k]);
+    range.hi = std::max(range.hi, oil[k]);
+  }
+  if (!(range.hi - range.lo > kChanges)) return std::nullopt;
+  return range;
+}
+
+Rows gather(const std::vector<BranchData>& logs) {
+  Rows r;
+  double q_return = 0.0, q_supply = 0.0, q_total = 0.0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const BranchData& d = logs[l];
+    for (Index k = 0; k < d.moving.size(); ++k) {
+      if (!usable(d, k)) continue;
+      r.where.emplace_back(static_cast<int>(l), k);
+      q_return = std::max(q_return, d.q_return[k]);
+      q_supply = std::max(q_supply, d.q_supply[k]);
+      if (d.q_return_total.size() > 0) q_total = std::max(q_total, d.q_return_total[k]);
+    }
+  }
+  const auto n = static_cast<Index>(r.where.size());
+  if (n < kFewest || !(q_return > 0.0) || !(q_supply > 0.0)) return {};
+  r.p_return.resize(n);
+  r.p_supply.resize(n);
+  VectorXd force(n);
+  const std::optional<Range> oil = oil_range(logs, r.where);
+  const auto first_oil = 3 + static_cast<Index>(logs.size());
+  r.line.setZero(n, first_oil + (oil ? 2 : 0));
+  r.valve.setOnes(n, 5);
+  for (Index i = 0; i < n; ++i) {
+    const auto& [l, k] = r.where[static_cast<std::size_t>(i)];
+    const BranchData& d = logs[static_cast<std::size_t>(l)];
+    r.p_return[i] = d.p_return[k] * 1e-5;
+    r.p_supply[i] = d.p_supply[k] * 1e-5;
+    force[i] = d.force[k];
+    const double qr = d.q_return[k] / q_return, qs = d.q_supply[k] / q_supply;
+    r.line.row(i).head(3) << 1.0, qr, qr * qr;
+    if (q_total > 0.0 && d.q_return_total.size() > 0) {
+      r.line(i, 3 + l) = std::pow(d.q_return_total[k] / q_total, 2);
+    }
+    if (oil) {
+      const double warm = (2.0 * d.oil[k] - oil->lo - oil->hi) / (oil->hi - oil->lo);
+      r.line.row(i).segment(first_oil, 2) << warm, warm * qr;
+    }
+    r.valve.row(i).segment(1, 2) << qs, qs * qs;
+  }
+  // force = A_supply p_supply - A_return p_return, times the side: areas and sign from the data
+  MatrixXd pressures(n, 2);
+  pressures << r.p_supply, r.p_return;
+  const VectorXd areas = least_squares(pressures, force);
+  r.load = std::abs(areas[0]) > 0.0 ? VectorXd(force / areas[0]) : VectorXd::Zero(n);
+  const double largest = std::max(1.0, r.load.cwiseAbs().maxCoeff());
+  r.valve.col(3) = r.load / largest;
+  r.valve.col(4) = r.valve.col(3).cwiseProduct(r.valve.col(1));
+  return r;
+}
+
+struct Law {
+  VectorXd coefficients;
+  double deviation = 1.0;  ///< [bar]
+  double share = 0.0;
+
+  void fit(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
+    const double total = weight.sum();
+    MatrixXd normal = weighted_gram(x, weight);
+    // regressors are near one: this holds what the samples do not show at zero and changes nothing else
+    normal.diagonal().array() += 1e-6 * total + 1e-12;
+    coefficients = solve_symmetric(normal, x.transpose() * weight.cwiseProduct(y));
+    const VectorXd r = y - x * coefficients;
+    deviation = std::max(kSharpest, std::sqrt(weight.dot(r.cwiseAbs2()) / std::max(total, 1e-9)));
+    share = total / static_cast<double>(y.size());
+  }
+};
+
+double above(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
+double density(double z) { return std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI); }
+
+double spread(const VectorXd& v) { return std::max(10.0, quantile(v, 0.99) - quantile(v, 0.01)); }
+
+struct Mixture {
+  Law line, valve;
+  double range_return = 0.0, range_supply = 0.0;  ///< [bar] of the pressure a law leaves free
+  double likelihood = -std::numeric_limits<double>::infinity();
+
+  /// Posterior weights of both laws, and the log likelihood. [rows]
+  void expect(const Rows& r, VectorXd& on_line, VectorXd& on_valve) {
+    const Index n = r.count();
+    const VectorXd e1 = line.share > 0.0 ? VectorXd(r.p_return - r.line * line.coefficients)
+                                         : VectorXd::Constant(n, 1e9);
+    const VectorXd e2 = valve.share > 0.0 ? VectorXd(r.p_supply - r.valve * valve.coefficients)
+                                          : VectorXd::Constant(n, 1e9);
+    on_line.resize(n);
+    on_valve.resize(n);
+    likelihood = 0.0;
+    const double stray = kStrays / (range_return * range_supply);
+    for (Index i = 0; i < n; ++i) {
+      const double z1 = e1[i] / line.deviation, z2 = e2[i] / valve.deviation;
+      const double a = line.share * density(z1) / line.deviation * above(z2) / range_supply;
+      const double b = valve.share * density(z2) / valve.deviation * above(z1) / range_return;
+      const double sum = a + b + stray;
+      on_line[i] = a / sum;
+      on_valve[i] = b / sum;
+      likelihood += std::log(sum);
+    }
+  }
+
+  /// Expectation maximisation from a first assignment.
+  void settle(const Rows& r, VectorXd on_line, VectorXd on_valve) {
+    double before = -std::numeric_limits<double>::infinity();
+    constexpr int kMostSteps = 60;
+    for (int step = 0; step < kMostSteps; ++step) {
+      line.share = valve.share = 0.0;
+      const double few = static_cast<double>(kFewestOfOne) * static_cast<double>(r.count()) /
+                         static_cast<double>(std::max(r.count(), kMostFitted));
+      if (on_line.sum() > few) line.fit(r.line, r.p_return, on_line);
+      if (on_valve.sum() > few) valve.fit(r.valve, r.p_supply, on_valve);
+      // a "valve" whose supply takes all of the load is the return line again
+      if (valve.share > 0.0 && slope(r, on_valve) > kSteepest) {
+        likelihood = -std::numeric_limits<double>::infinity();
+        return;
+      }
+      expect(r, on_line, on_valve);
+      if (likelihood - before < 1e-4 * static_cast<double>(r.count()) && step > 4) break;
+      before = likelihood;
+    }
+    // each law's coefficients cost; samples are alike over about ten
+    const double cost = 0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / kAlikeRows));
+    if (line.share > 0.0) likelihood -= cost * static_cast<double>(line.coefficients.size() + 1);
+    if (valve.share > 0.0) likelihood -= cost * static_cast<double>(valve.coefficients.size() + 1);
+  }
+
+  /// Share of the load that the supply takes where the valve rules.
+  double slope(const Rows& r, const VectorXd& weight) const {
+    const double mean_load = weight.dot(r.load) / weight.sum();
+    const VectorXd d = r.load.array() - mean_load;
+    const double variance = weight.dot(d.cwiseAbs2());
+    if (variance < weight.sum()) return 0.0;  // load varies by less than 1 bar: not known
+    const VectorXd by_load = r.valve.rightCols(2) * valve.coefficients.tail(2);
+    return weight.dot(d.cwiseProduct(by_load)) / variance;
+  }
+};
+
+Rows chosen(const Rows& all, const std::vector<Index>& keep) {
+  Rows r;
+  r.p_return = all.p_return(keep);
+  r.p_supply = all.p_supply(keep);
+  r.line = all.line(keep, Eigen::all);
+  r.valve = all.valve(keep, Eigen::all);
+  r.load = all.load(keep);
+  for (const Index i : keep) r.where.push_back(all.where[static_cast<std::size_t>(i)]);
+  return r;
+}
+
+Rows thinned(const Rows& all) {
+  const Index stride = (all.count() + kMostFitted - 1) / kMostFitted;
+  if (stride <= 1) return all;
+  std::vector<Index> keep;
+  for (Index i = 0; i < all.count(); i += stride) keep.push_back(i);
+  return chosen(all, keep);
+}
+
+/// Rows of some logs.
+Rows of_logs(const Rows& all, int first, int last) {
+  std::vector<Index> keep;
+  for (Index i = 0; i < all.count(); ++i) {
+    const int log = all.where[static_cast<std::size_t>(i)].first;
+    if (log >= first && log < last) keep.push_back(i);
+  }
+  return chosen(all, keep);
+}
+
+/// @param range_return, range_supply [bar] of all samples, so that likelihoods of parts of them compare
+Mixture most_likely(const Rows& r, double range_return, double range_supply) {
+  const Index n = r.count();
+  const VectorXd none = VectorXd::Zero(n), every = VectorXd::Ones(n);
+  Mixture fresh;
+  fresh.range_return = range_return;
+  fresh.range_supply = range_supply;
+  Mixture best = fresh;
+  best.settle(r, every, none);
+  const auto consider = [&](const VectorXd& on_line, const VectorXd& on_valve) {
+    Mixture m = fresh;
+    m.settle(r, on_line, on_valve);
+    if (m.likelihood > best.likelihood) best = m;
+  };
+  Mixture valve_alone = fresh;
+  valve_alone.settle(r, none, every);
+  if (valve_alone.likelihood > best.likelihood) best = valve_alone;
+  if (valve_alone.valve.share >
+      0.0) {  // strays above it may be a return line under high back pressure
+    const VectorXd e = r.p_supply - r.valve * valve_alone.valve.coefficients;
+    const VectorXd high = (e.array() > kClear * valve_alone.valve.deviation).cast<double>();
+    consider(high, every - high);
+  }
+  for (const double level : {0.1, 0.25, 0.5, 0.75, 0.9}) {
+    const double threshold = quantile(r.p_return, level);
+    const VectorXd low = (r.p_return.array() < threshold).cast<double>();
+    consider(low, every - low);
+  }
+  return best;
+}
+
+/// Appends one label a row: 1 return line, 2 valve, 0 not sure.
+void label_rows(const Rows& rows, Mixture& laws, std::vector<int>& label) {
+  VectorXd on_line, on_valve;
+  laws.expect(rows, on_line, on_valve);
+  const bool both = laws.line.share > 0.0 && laws.valve.share > 0.0;
+  for (Index i = 0; i < rows.count(); ++i) {
+    int own = on_line[i] > kSure ? 1 : (on_valve[i] > kSure ? 2 : 0);
+    if (both) {
+      const double above_line =
+          (rows.p_return[i] - rows.line.row(i).dot(laws.line.coefficients)) / laws.line.deviation;
+      const double above_valve =
+          (rows.p_supply[i] - rows.valve.row(i).dot(laws.valve.coefficients)) /
+          laws.valve.deviation;
+      if (own == 1 && above_valve < kClear) own = 0;
+      if (own == 2 && above_line < kClear) own = 0;
+    }
+    label.push_back(own);
+  }
+}
+
+}  // namespace
+
+std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
+                                        std::size_t first_machine) {
+  std::vector<BranchSplit> splits;
+  for (const BranchData& d : logs) {
+    const Mask none = Mask::Constant(d.moving.size(), false);
+    splits.push_back({none, none});
+  }
+  const Rows rows = gather(logs);
+  if (rows.count() == 0) return splits;
+  const double range_return = spread(rows.p_return), range_supply = spread(rows.p_supply);
+  const auto laws_of = [&](const Rows& r) { return most_likely(r, range_return, range_supply); };
+  const Rows some = thinned(rows);
+  Mixture laws = laws_of(some);
+  std::vector<int> label;
+  const auto cut = static_cast<int>(std::min(first_machine, logs.size()));
+  const Rows before = of_logs(some, 0, cut),
+             after = of_logs(some, cut, static_cast<int>(logs.size()));
+  bool apart = before.count() >= kFewest && after.count() >= kFewest;
+  if (apart) {
+    Mixture one = laws_of(before), other = laws_of(after);
+    apart = one.likelihood + other.likelihood > laws.likelihood + kApart * kAlikeRows;
+    if (apart) {
+      label_rows(of_logs(rows, 0, cut), one, label);
+      label_rows(of_logs(rows, cut, static_cast<int>(logs.size())), other, label);
+    }
+  }
+  if (!apart) label_rows(rows, laws, label);
+  // hysteresis: near a switch the filter mixes both
+  for (std::size_t i = 0; i < label.size(); ++i) {
+    const auto& [log, sample] = rows.where[i];
+    bool steady = label[i] != 0;
+    for (const int step : {-1, 1}) {
+      for (std::size_t j = i; steady;) {
+        if ((step < 0 && j == 0) || (step > 0 && j + 1 == label.size())) break;
+        j = step < 0 ? j - 1 : j + 1;
+        if (rows.where[j].first != log || std::abs(rows.where[j].second - sample) > kGuard) break;
+        steady = label[j] == 0 || label[j] == label[i];
+      }
+    }
+    if (!steady) continue;
+    BranchSplit& split = splits[static_cast<std::size_t>(log)];
+    (label[i] == 1 ? split.return_line : split.counterbalance)[sample] = true;
+  }
+  for (BranchSplit& split : splits) {
+    for (Mask* mask : {&split.return_line, &split.counterbalance}) {
+      if (mask->count() < kFewestOfOne) mask->setConstant(false);
+    }
+  }
+  return splits;
+}
+
+BranchSplit split_branches(const VectorXd& p_return, const VectorXd& p_supply,
+                           const VectorXd& q_return, const VectorXd& q_supply,
+                           const VectorXd& force, const Mask& moving) {
+  return split_branches({{p_return, p_supply, q_return, q_supply, force, {}, {}, moving}}).front();
+}
+
+}  // namespace sparflow

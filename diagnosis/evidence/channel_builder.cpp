@@ -1,0 +1,156 @@
+#include "diagnosis/evidence/channel_builder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/math/linear_algebra.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kShortestBlock_s = 0.3;
+/// Longer motions are cut: blocks are what is held out and resampled.
+constexpr double kLongestBlock_s = 8.0;
+
+/// A chamber falls no further than its anti-cavitation valve lets it: below a level the law of flow and force ends.
+struct CavitationFloor {
+  VectorXd law;        ///< of the baseline's columns; empty: no such level is reached
+  double level = 0.0;  ///< [Pa]
+
+  /// By how much the valve holds the pressure above the law. [rows, Pa]
+  VectorXd held(const Eigen::MatrixXd& baseline) const {
+    return (level - (baseline * law).array()).cwiseMax(0.0);
+  }
+};
+
+/// max(law, level) by alternating assignment, where that leaves much less than the law alone.
+CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y) {
+  constexpr Index kFewestOfPiece = 20;
+  constexpr double kMuchLess = 0.8;  // of the sum of squares
+  constexpr int kTurns = 25;
+  CavitationFloor best;
+  if (y.size() < 3 * kFewestOfPiece) return best;
+  const VectorXd plain = least_squares(baseline, y);
+  double least = kMuchLess * (y - baseline * plain).squaredNorm();
+  for (const double start : {0.15, 0.4, 0.7}) {
+    CavitationFloor f{plain, quantile(VectorXd(baseline * plain), start)};
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const VectorXd by_law = baseline * f.law;
+      std::vector<Index> on_law, held;
+      on_law.reserve(static_cast<std::size_t>(y.size()));
+      held.reserve(static_cast<std::size_t>(y.size()));
+      for (Index i = 0; i < y.size(); ++i) (by_law[i] < f.level ? held : on_law).push_back(i);
+      if (static_cast<Index>(std::min(on_law.size(), held.size())) < kFewestOfPiece) break;
+      f.law = least_squares(baseline(on_law, Eigen::all), y(on_law));
+      f.level = y(held).mean();
+      const double squares = (y - baseline * f.law - f.held(baseline)).squaredNorm();
+      if (squares < least) {
+        least = squares;
+        best = f;
+      }
+    }
+  }
+  return best;
+}
+
+/// The law's end joins a supply channel's baseline; learned from the references, where there are any.
+CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects) {
+  std::vector<Index> rows;
+  for (const bool references : {true, false}) {
+    rows.clear();
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (references && static_cast<std::size_t>(channel.log[b]) < suspects) continue;
+      for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) rows.push_back(i);
+    }
+    if (static_cast<Index>(rows.size()) >= 2 * kFewestRows) break;
+  }
+  const CavitationFloor floor =
+      cavitation_floor(channel.baseline(rows, Eigen::all), channel.y(rows));
+  if (floor.law.size() == 0) return floor;
+  Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + 1);
+  wider << channel.baseline, floor.held(channel.baseline) * 1e-5;
+  channel.baseline = std::move(wider);
+  return floor;
+}
+
+}  // namespace
+
+void ChannelBuilder::add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
+                         const VectorXd& values, const Eigen::MatrixXd& base, Index margin) {
+  const MachineSeries& s = evidence_.series[log];
+  const Index stride = evidence_.stride;
+  const auto longest = std::max<Index>(4 * stride, static_cast<Index>(kLongestBlock_s / s.step));
+  const auto shortest = static_cast<Index>(kShortestBlock_s / s.step);
+  for (const auto& [run_first, run_last] : s.runs) {
+    for (Index i = run_first; i < run_last;) {
+      if (!mask[i]) {
+        ++i;
+        continue;
+      }
+      Index end = i;
+      while (end < run_last && mask[end]) ++end;
+      const Index first = i + margin, last = end - margin;
+      i = end;
+      if (last - first < std::max<Index>(shortest, 2 * stride)) continue;
+      const Index pieces = std::max<Index>(1, (last - first + longest - 1) / longest);
+      for (Index piece = 0; piece < pieces; ++piece) {
+        block(log, first + (last - first) * piece / pieces,
+              first + (last - first) * (piece + 1) / pieces, values, base, stride);
+      }
+    }
+  }
+}
+
+void ChannelBuilder::block(std::size_t log, Index first, Index last, const VectorXd& values,
+                           const Eigen::MatrixXd& base, Index stride) {
+  NoiseBlock b{static_cast<Index>(y_.size()), 0};
+  for (Index k = first; k < last; k += stride) {
+    if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a hole ends the block
+      b.last = static_cast<Index>(y_.size());
+      close(log, b);
+      b.first = b.last;
+      continue;
+    }
+    y_.push_back(values[k]);
+    rows_.push_back(base.row(k));
+    channel.sample.push_back(k);
+  }
+  b.last = static_cast<Index>(y_.size());
+  close(log, b);
+}
+
+void ChannelBuilder::close(std::size_t log, const NoiseBlock& b) {
+  if (b.last <= b.first) return;
+  channel.blocks.push_back(b);
+  channel.log.push_back(static_cast<int>(log));
+}
+
+bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
+  const auto n = static_cast<Index>(y_.size());
+  if (n < kFewestRows || channel.blocks.size() < 2) return false;
+  channel.y = Eigen::Map<VectorXd>(y_.data(), n);
+  channel.baseline.resize(n, rows_.front().size());
+  for (Index i = 0; i < n; ++i)
+    channel.baseline.row(i) = rows_[static_cast<std::size_t>(i)].transpose();
+  channel.baseline = acting_columns(channel.baseline);
+  out.push_back(std::move(channel));
+  return true;
+}
+
+void set_force_slope(EvidenceChannel& channel, std::size_t suspects) {
+  channel.force_slope = VectorXd::Zero(channel.rows());
+  if (channel.baseline.cols() != 5) return;
+  const CavitationFloor floor = add_cavitation_floor(channel, suspects);
+  const auto flow = channel.baseline.col(1).array();
+  const VectorXd b = least_squares(channel.baseline, channel.y);
+  channel.force_slope = (b[3] + b[4] * flow) / kBaselineForce;
+  if (floor.law.size() == 0) return;
+  const auto held = (channel.baseline.col(5).array() > 0.0).cast<double>();
+  channel.force_slope.array() -=
+      b[5] * 1e-5 * held * (floor.law[3] + floor.law[4] * flow) / kBaselineForce;
+}
+
+}  // namespace sparflow

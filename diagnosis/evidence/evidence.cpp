@@ -1,0 +1,361 @@
+#include "diagnosis/evidence/evidence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/evidence/branches.h"
+#include "diagnosis/evidence/channel_builder.h"
+#include "identification/signals/low_pass.h"
+#include "identification/signals/pump_leaders.h"
+#include "identification/signals/series.h"
+#include "models/effects/hydraulics.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+/// Rows a third of the filter's width apart are nearly independent: keeping more costs time and tells nothing.
+constexpr double kRowsAWindow = 3.0;
+
+/// White noise of a raw channel from third differences (robust, so that motion does not count).
+double raw_noise(const VectorXd& x) {
+  std::vector<double> d;
+  for (Index i = 3; i < x.size(); ++i) {
+    const double v = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
+    if (std::isfinite(v)) d.push_back(v);
+  }
+  if (d.size() < 20) return kNaN;
+  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
+}
+
+std::vector<BranchSplit> branches_of(const Evidence& e,
+                                     const std::vector<const MachineSignals*>& signals,
+                                     std::size_t cylinder, int side) {
+  std::vector<BranchData> data;
+  std::vector<std::size_t> owner;
+  std::vector<BranchSplit> result(signals.size());
+  for (std::size_t log = 0; log < signals.size(); ++log) {
+    const CylinderSignals& c = signals[log]->cylinders[cylinder];
+    const CylinderSeries& s = e.series[log].cylinders[cylinder];
+    if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0 || s.force.size() == 0) continue;
+    BranchData d;
+    d.p_return = side > 0 ? s.pressure_b : s.pressure_a;
+    d.p_supply = side > 0 ? s.pressure_a : s.pressure_b;
+    d.q_return = s.return_flow;
+    d.q_supply = s.flow;
+    d.force = s.force;
+    d.q_return_total = VectorXd::Zero(s.return_flow.size());
+    for (const CylinderSeries& other : e.series[log].cylinders)
+      d.q_return_total += other.return_flow;
+    d.oil = e.series[log].oil;
+    d.moving = c.driven && signals[log]->usable && (c.direction.array() == side);
+    data.push_back(std::move(d));
+    owner.push_back(log);
+  }
+  if (data.empty()) return result;
+  const auto suspects =
+      std::count_if(owner.begin(), owner.end(), [&](std::size_t log) { return log < e.suspects; });
+  std::vector<BranchSplit> splits = split_branches(data, static_cast<std::size_t>(suspects));
+  for (std::size_t k = 0; k < owner.size(); ++k) result[owner[k]] = std::move(splits[k]);
+  return result;
+}
+
+}  // namespace
+
+const char* evidence_stage(EvidenceKind kind) {
+  switch (kind) {
+    case EvidenceKind::kForce:
+      return "force";
+    case EvidenceKind::kFlow:
+      return "flow";
+    case EvidenceKind::kPump:
+      return "pump";
+    default:
+      return "pressure";
+  }
+}
+
+std::string evidence_text(EvidenceKind kind, const std::string& at) {
+  switch (kind) {
+    case EvidenceKind::kForce:
+      return "force of " + at;
+    case EvidenceKind::kFlow:
+      return "speed of " + at;
+    case EvidenceKind::kReturnExtend:
+      return "return pressure of " + at + " extending";
+    case EvidenceKind::kReturnRetract:
+      return "return pressure of " + at + " retracting";
+    case EvidenceKind::kSupplyExtend:
+      return "supply pressure of " + at + " extending";
+    case EvidenceKind::kSupplyRetract:
+      return "supply pressure of " + at + " retracting";
+    case EvidenceKind::kPump:
+      return "pressure of pump " + at;
+  }
+  return at;
+}
+
+const EvidenceChannel* Evidence::find(EvidenceKind kind, int index) const {
+  for (const EvidenceChannel& c : channels) {
+    if (c.kind == kind && c.index == index) return &c;
+  }
+  return nullptr;
+}
+
+VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x) const {
+  const Kernels& k = kernels_[log];
+  const VectorXd& kernel = kind == EvidenceKind::kForce  ? k.force
+                           : kind == EvidenceKind::kFlow ? k.speed
+                                                         : k.pressure;
+  return convolved(x, kernel, series[log].runs);
+}
+
+bool bends(const Effect& effect) {
+  return effect.changes_machine() && effect.info().place == EffectPlace::kMachine &&
+         effect.info().parameters.size() == 1;
+}
+
+Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
+                                  const EvidenceChannel& channel,
+                                  std::span<const double> about) const {
+  const bool chord = !about.empty() && about[0] != 0.0 && channel.kind == EvidenceKind::kForce &&
+                     bends(*effect.effect);
+  const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
+  if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
+  Eigen::MatrixXd result;
+  for (std::size_t log = 0; log < suspects; ++log) {
+    Eigen::MatrixXd raw;
+    if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
+      continue;
+    if (chord) {
+      raw = effect_series({effect.effect, effect.at, {about[0]}, {}, {}}, series[log], channel.kind,
+                          channel.index) /
+            about[0];
+    }
+    Eigen::MatrixXd through_force;  // of a sensor: what its error does by way of the measured force
+    if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
+        !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,
+                                through_force)) {
+      through_force.resize(0, 0);
+    }
+    if (!effect.effect->columns_filtered()) {
+      for (Index c = 0; c < raw.cols(); ++c) {
+        raw.col(c) = filter(log, channel.kind, raw.col(c).unaryExpr([](double v) {
+          return std::isfinite(v) ? v : 0.0;  // the rows themselves were chosen where y is known
+        }));
+      }
+    }
+    if (result.size() == 0) result.setZero(channel.rows(), raw.cols());
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (channel.log[b] != static_cast<int>(log)) continue;
+      for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
+        for (Index c = 0; c < raw.cols(); ++c) {
+          double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
+          if (through_force.size() > 0) {
+            v -= channel.force_slope[r] *
+                 through_force(channel.sample[static_cast<std::size_t>(r)], c);
+          }
+          result(r, c) = std::isfinite(v) ? v : 0.0;
+        }
+      }
+    }
+  }
+  if (result.size() > 0 && result.cwiseAbs().maxCoeff() == 0.0) return {};
+  return result;
+}
+
+std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
+                                                 const std::vector<MachineSignals>& references) {
+  const auto is_reference = [&](const DataSource& d) {
+    return d.use == "train" &&
+           std::any_of(references.begin(), references.end(),
+                       [&](const MachineSignals& r) { return r.sha256 == d.sha256; });
+  };
+  std::vector<AppliedEffect> out = model.effects;
+  std::erase_if(out, [&](const AppliedEffect& e) {
+    const auto step =
+        std::find_if(model.steps.rbegin(), model.steps.rend(),
+                     [&](const ModelStep& s) { return s.added == e.key(model.machine); });
+    return step != model.steps.rend() &&
+           std::none_of(step->data.begin(), step->data.end(), is_reference);
+  });
+  return out;
+}
+
+Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                          const std::vector<MachineSignals>& references,
+                          const std::vector<AppliedEffect>* in_references, bool whole_motions) {
+  Evidence e;
+  const Machine& machine = model.machine;
+  std::vector<const MachineSignals*> signals;
+  signals.reserve(suspects.size() + references.size());
+  for (const MachineSignals& s : suspects) signals.push_back(&s);
+  for (const MachineSignals& s : references) signals.push_back(&s);
+  e.suspects = suspects.size();
+  e.known_ = model.effects;
+  e.known_in_references_ = in_references != nullptr ? *in_references : model.effects;
+  std::vector<double> gain_force, gain_pressure;
+  for (const MachineSignals* s : signals) {
+    const std::size_t log = e.series.size();
+    e.series.push_back(make_series(model, *s));
+    if (log >= e.suspects && in_references != nullptr)
+      e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
+    const int order = SmoothingOptions{}.order;
+    Evidence::Kernels k;
+    k.force = low_pass_of(s->step, s->window, order, 2);
+    k.speed = low_pass_of(s->step, s->window, order, 1);
+    k.pressure = low_pass_of(s->step, s->window, order, 0);
+    if (whole_motions) k.force = k.speed = k.pressure = VectorXd::Ones(1);
+    gain_force.push_back(k.force.norm());
+    gain_pressure.push_back(k.pressure.norm());
+    e.kernels_.push_back(std::move(k));
+    e.window = std::max(e.window, s->window);
+    e.stride =
+        std::max(e.stride, static_cast<int>(std::lround(s->window / s->step / kRowsAWindow)));
+  }
+  const auto margin_of = [&](std::size_t log) -> Index {
+    if (whole_motions) return 0;
+    return static_cast<Index>(std::lround(0.5 * signals[log]->window / signals[log]->step));
+  };
+
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const std::string& name = machine.cylinders[at].name;
+    {  // force
+      ChannelBuilder b(e);
+      b.channel.kind = EvidenceKind::kForce;
+      double noise = 0.0;
+      int logs = 0;
+      for (std::size_t log = 0; log < signals.size(); ++log) {
+        const CylinderSignals& c = signals[log]->cylinders[at];
+        if (!c.has_force()) continue;
+        const VectorXd y =
+            e.filter(log, EvidenceKind::kForce, c.force - e.known(log, EvidenceKind::kForce, i)) -
+            c.static_force;
+        if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
+        for (const double f : c.static_force) {
+          if (std::isfinite(f))
+            b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
+        }
+        b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
+              margin_of(log));
+        const double raw = raw_noise(c.force);
+        if (log < e.suspects && std::isfinite(raw)) noise += raw * gain_force[log], ++logs;
+      }
+      b.channel.index = i;
+      b.channel.at = name;
+      b.channel.unit = {"N", 1.0};
+      b.channel.noise_floor = logs > 0 ? noise / logs : kNaN;
+      b.channel.text = evidence_text(b.channel.kind, name);
+      if (!b.finish(e.channels)) {
+        e.notes.push_back(fmt::format(
+            "{}: no measured force while it moves, force effects cannot be judged", name));
+      }
+    }
+    {  // flow
+      ChannelBuilder b(e);
+      b.channel.kind = EvidenceKind::kFlow;
+      std::vector<double> still;
+      for (std::size_t log = 0; log < signals.size(); ++log) {
+        const CylinderSignals& c = signals[log]->cylinders[at];
+        if (!c.has_command()) continue;
+        Eigen::MatrixXd base(c.command.size(), 2);
+        base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
+        base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
+        const VectorXd y =
+            c.speed - e.filter(log, EvidenceKind::kFlow, e.known(log, EvidenceKind::kFlow, i));
+        b.add(log, signals[log]->usable && !signals[log]->edge, y, base, 0);
+        for (Index k = 0; k < y.size(); ++k) {
+          if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
+        }
+      }
+      b.channel.index = i;
+      b.channel.at = name;
+      b.channel.unit = {"mm/s", 1e-3};
+      b.channel.noise_floor =
+          still.size() > 50
+              ? robust_std(Eigen::Map<VectorXd>(still.data(), static_cast<Index>(still.size())))
+              : kNaN;
+      b.channel.text = evidence_text(b.channel.kind, name);
+      if (!b.finish(e.channels)) {
+        e.notes.push_back(
+            fmt::format("{}: no command is logged, valve effects cannot be judged", name));
+      }
+    }
+    // pressures: return line or counterbalance valve, by direction
+    std::vector<BranchSplit> splits[2];
+    for (const int side : {1, -1}) splits[side > 0 ? 0 : 1] = branches_of(e, signals, at, side);
+    for (const int side : {1, -1}) {
+      for (const bool returning : {true, false}) {
+        const EvidenceKind kind =
+            returning ? (side > 0 ? EvidenceKind::kReturnExtend : EvidenceKind::kReturnRetract)
+                      : (side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract);
+        ChannelBuilder b(e);
+        b.channel.kind = kind;
+        double noise = kNaN;
+        for (std::size_t log = 0; log < signals.size(); ++log) {
+          const CylinderSignals& c = signals[log]->cylinders[at];
+          const CylinderSeries& s = e.series[log].cylinders[at];
+          const BranchSplit& split = splits[side > 0 ? 0 : 1][log];
+          if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0 || split.return_line.size() == 0)
+            continue;
+          const VectorXd& raw = (side > 0) != returning ? c.pressure_a : c.pressure_b;
+          const VectorXd y = e.filter(log, kind, raw - e.known(log, kind, i));
+          const VectorXd& q = returning ? s.return_flow : s.flow;
+          Eigen::MatrixXd base(y.size(), returning ? 3 : 5);
+          const double q0 = kBaselineFlow, f0 = kBaselineForce;
+          base.col(0).setOnes();
+          base.col(1) = q / q0;
+          base.col(2) = (q / q0).cwiseAbs2();
+          if (!returning) {
+            base.col(3) = steady_force(s) / f0;
+            base.col(4) = (steady_force(s) / f0).cwiseProduct(q / q0);
+          }
+          b.add(log, returning ? split.return_line : split.counterbalance, y, base, margin_of(log));
+          if (log < e.suspects) noise = raw_noise(raw) * gain_pressure[log];
+        }
+        b.channel.index = i;
+        b.channel.at = name;
+        b.channel.unit = {"bar", 1e5};
+        b.channel.noise_floor = noise;
+        b.channel.text = evidence_text(kind, name);
+        if (b.finish(e.channels) && !returning) set_force_slope(e.channels.back(), e.suspects);
+      }
+    }
+  }
+  for (int p = 0; p < machine.pump_count(); ++p) {
+    const auto at = static_cast<std::size_t>(p);
+    ChannelBuilder b(e);
+    b.channel.kind = EvidenceKind::kPump;
+    double noise = kNaN;
+    for (std::size_t log = 0; log < signals.size(); ++log) {
+      const PumpSignals& s = signals[log]->pumps[at];
+      const PumpSeries& series = e.series[log].pumps[at];
+      if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
+      const VectorXd y =
+          e.filter(log, EvidenceKind::kPump,
+                   s.pressure - series.demand - e.known(log, EvidenceKind::kPump, p));
+      b.add(log, signals[log]->usable && !signals[log]->edge, y, e.margins(log, p), 0);
+      if (log < e.suspects) b.channel.raw.push_back(s.pressure - series.demand);
+      if (log < e.suspects) noise = raw_noise(s.pressure) * gain_pressure[log];
+    }
+    b.channel.index = p;
+    b.channel.at = machine.pumps[at].name;
+    b.channel.unit = {"bar", 1e5};
+    b.channel.noise_floor = noise;
+    b.channel.text = evidence_text(b.channel.kind, b.channel.at);
+    if (!b.finish(e.channels)) {
+      e.notes.push_back(fmt::format(
+          "pump {}: its pressure or what it feeds is not measured, pump effects cannot be judged",
+          b.channel.at));
+    }
+  }
+  return e;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,288 @@
+// The menu of motions, and a log of each on the machine.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "diagnosis/experiment/experiment.h"
+#include "models/machine/static_force.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kLow = 0.2, kHigh = 0.8;  ///< of a joint's range: clear of its ends
+constexpr double kFlowShare = 0.9;         ///< of pump and valves: nothing saturates
+/// A return line of the size that cranes have: what it is hardly matters, the logs' own laws are not copied.
+constexpr double kReturnPressure = 4.0 * units::kBar;
+constexpr double kReturnLoss = 3.0 * units::kBar / (1e-3 * 1e-3);  ///< [Pa/(m^3/s)^2]
+constexpr double kLeastSupply = 15.0 * units::kBar;  ///< a load that helps still asks for this
+
+double middle(const Joint& j, double share) {
+  return j.position.lo + share * (j.position.hi - j.position.lo);
+}
+
+/// Progress along a leg, 0..1: a half cosine, or a trapezoid that speeds up in `rise` of the time.
+double progress(double t, bool steps, double rise) {
+  t = std::clamp(t, 0.0, 1.0);
+  if (!steps) return 0.5 * (1.0 - std::cos(std::numbers::pi * t));
+  const double top = 1.0 / (1.0 - rise);
+  if (t < rise) return 0.5 * top * t * t / rise;
+  if (t > 1.0 - rise) return 1.0 - 0.5 * top * (1.0 - t) * (1.0 - t) / rise;
+  return top * (t - 0.5 * rise);
+}
+
+/// Flow of a cylinder's section at full command. [m^3/s]
+double full_flow(const CraneModel& model, int cylinder, bool extend) {
+  const CylinderModel& c = model.cylinders[static_cast<std::size_t>(cylinder)];
+  const double learned = extend ? c.valve_gain_extend : c.valve_gain_retract;
+  if (learned > 0.0) return learned;
+  for (const Valve& v : model.machine.valves) {
+    if (v.cylinder == cylinder) return extend ? v.max_flow_extend : v.max_flow_retract;
+  }
+  return 1e-3;  // 60 l/min
+}
+
+/// Mean joint speed that limits, valve and pump allow when this joint moves with `count` others. [rad/s, m/s]
+double fastest(const CraneModel& model, int joint, std::size_t count) {
+  const Machine& m = model.machine;
+  const auto at = static_cast<std::size_t>(joint);
+  double speed = std::min(std::abs(m.joints[at].velocity.lo), std::abs(m.joints[at].velocity.hi));
+  VectorXd q(m.joint_count());
+  for (int j = 0; j < m.joint_count(); ++j)
+    q[j] = middle(m.joints[static_cast<std::size_t>(j)], 0.5);
+  StaticForce statics(m);
+  for (int i = 0; i < m.cylinder_count(); ++i) {
+    const Cylinder& c = m.cylinders[static_cast<std::size_t>(i)];
+    if (c.joint != joint || !c.hydraulic()) continue;
+    double flow = std::min(full_flow(model, i, true), full_flow(model, i, false));
+    const int pump = m.pump_of_cylinder(i);
+    if (pump >= 0 && m.pumps[static_cast<std::size_t>(pump)].max_flow > 0.0)
+      flow = std::min(
+          flow, m.pumps[static_cast<std::size_t>(pump)].max_flow / static_cast<double>(count));
+    for (const double share : {kLow, 0.5, kHigh}) {
+      q[joint] = middle(m.joints[at], share);
+      try {
+        statics.update(q.data(), 0.0, 0);
+      } catch (const std::domain_error&) {
+        continue;  // a four-bar that cannot close with the others in the middle
+      }
+      const double rate = std::abs(statics.length(i).d1);
+      if (rate > 0.0) speed = std::min(speed, kFlowShare * flow / (c.area_piston() * rate));
+    }
+  }
+  return speed * 2.0 / std::numbers::pi;  // mean of a half sine with that peak
+}
+
+std::vector<MotionLeg> up_and_down(const std::vector<int>& joints,
+                                   const std::vector<double>& speeds,
+                                   const std::vector<double>& payloads) {
+  std::vector<MotionLeg> legs;
+  for (const double payload : payloads) {
+    for (const double speed : speeds) {
+      legs.push_back({joints, kHigh, speed, 1.0, payload});
+      legs.push_back({joints, kLow, speed, 1.0, payload});
+    }
+  }
+  return legs;
+}
+
+}  // namespace
+
+std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
+  std::vector<MotionRecipe> menu;
+  std::vector<int> all;
+  const auto at_two_loads = [&](const std::string& name) {
+    return fmt::format(
+        "{} up and down at a quarter of its speed, once with no load and once with "
+        "about {:.0f} kg",
+        name, heaviest);
+  };
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const auto driven = std::any_of(machine.cylinders.begin(), machine.cylinders.end(),
+                                    [&](const Cylinder& c) { return c.joint == j; });
+    if (!driven) continue;
+    all.push_back(j);
+    const std::string& name = machine.joints[static_cast<std::size_t>(j)].name;
+    const std::vector<int> own = {j};
+    menu.push_back({fmt::format("{} alone, slowly out and back over its range", name),
+                    up_and_down(own, {0.1}, {0.0}), false, false});
+    menu.push_back({fmt::format("{} alone, fast out and back over its range", name),
+                    up_and_down(own, {1.0}, {0.0}), false, false});
+    menu.push_back({fmt::format("{} alone, out and back at three speeds: slow, half, full", name),
+                    up_and_down(own, {0.1, 0.4, 1.0}, {0.0}), false, false});
+    menu.push_back({at_two_loads(name), up_and_down(own, {0.25}, {0.0, heaviest}), false, false});
+    menu.push_back({fmt::format("{} alone, out and back with the lever thrown at once and held, "
+                                "rests of two seconds between",
+                                name),
+                    {{own, kHigh, 0.8, 2.0, 0.0}, {own, kLow, 0.8, 2.0, 0.0}},
+                    true,
+                    false});
+    menu.push_back({fmt::format("{} alone, short moves back and forth about one pose", name),
+                    {{own, 0.52, 0.05, 0.5, 0.0},
+                     {own, 0.48, 0.05, 0.5, 0.0},
+                     {own, 0.50, 0.02, 0.5, 0.0},
+                     {own, 0.49, 0.02, 0.5, 0.0}},
+                    false,
+                    false});
+    menu.push_back({fmt::format("{} in five poses with a hold of five seconds in each, with about "
+                                "{:.0f} kg",
+                                name, heaviest),
+                    {{own, 0.2, 0.5, 5.0, heaviest},
+                     {own, 0.35, 0.5, 5.0, heaviest},
+                     {own, 0.5, 0.5, 5.0, heaviest},
+                     {own, 0.65, 0.5, 5.0, heaviest},
+                     {own, 0.8, 0.5, 5.0, heaviest}},
+                    false,
+                    false});
+  }
+  if (all.size() > 1) {
+    menu.push_back(
+        {"all joints together, fast out and back", up_and_down(all, {1.0}, {0.0}), false, false});
+    std::vector<MotionLeg> turns;
+    for (const double payload : {0.0, heaviest}) {
+      for (const double others : {kLow, kHigh}) {
+        for (const int j : all) {
+          turns.push_back({{j}, others, 0.5, 0.5, payload});
+          turns.push_back({{j}, 1.0 - others, 0.5, 0.5, payload});
+        }
+      }
+    }
+    menu.push_back({fmt::format("each joint in turn out and back, the others in and then out, with "
+                                "no load and with about {:.0f} kg",
+                                heaviest),
+                    std::move(turns), false, false});
+  }
+  menu.push_back({"the same few moves from cold until the oil is warm",
+                  up_and_down(all, {0.6}, {0.0}), false, true});
+  return menu;
+}
+
+Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
+                      double duration) {
+  const Machine& m = model.machine;
+  const auto joints = static_cast<Index>(m.joint_count());
+  const auto cylinders = static_cast<std::size_t>(m.cylinder_count());
+  const auto n = static_cast<Index>(duration / step);
+  Log log;
+  log.path = log.file = "motion";
+  log.sha256 = std::string(64, '0');
+  log.step = step;
+  log.time = VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
+  log.runs = {{0, n}};
+
+  Eigen::MatrixXd q(n, joints);
+  VectorXd payload(n), here(joints), goal(joints);
+  for (Index j = 0; j < joints; ++j) here[j] = middle(m.joints[static_cast<std::size_t>(j)], 0.5);
+  const VectorXd start = here;
+  const auto pause = [&](Index& k, double seconds, double load) {
+    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
+      q.row(k) = here;
+      payload[k] = load;
+    }
+  };
+  Index k = 0;
+  pause(k, 0.5, recipe.legs.front().payload);
+  for (std::size_t turn = 0; k < n; ++turn) {
+    const MotionLeg& leg = recipe.legs[turn % recipe.legs.size()];
+    goal = here;
+    double seconds = 4.0 * step;
+    for (const int j : leg.joints) {
+      const auto at = static_cast<std::size_t>(j);
+      goal[j] = middle(m.joints[at], leg.to);
+      const double mean = leg.speed * fastest(model, j, leg.joints.size());
+      const double way = std::abs(goal[j] - here[j]);
+      const double brake =
+          std::min(std::abs(m.joints[at].acceleration.lo), std::abs(m.joints[at].acceleration.hi));
+      seconds = std::max(seconds, way / std::max(mean, 1e-9));
+      // peak acceleration of the half cosine: way pi^2 / (2 T^2)
+      if (brake > 0.0) seconds = std::max(seconds, std::sqrt(way * 4.94 / brake));
+    }
+    const double rise = std::clamp(0.3 / seconds, 0.02, 0.4);
+    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
+      q.row(k) = here + progress(t / seconds, recipe.steps, rise) * (goal - here);
+      payload[k] = leg.payload;
+    }
+    here = goal;
+    pause(k, leg.pause, leg.payload);
+  }
+
+  const auto add = [&](Role role, int index, const std::string& signal, const VectorXd& values) {
+    Channel c;
+    c.column = c.signal = signal;
+    c.role = role;
+    c.index = index;
+    c.values = values;
+    c.valid = values.array().isFinite();
+    log.channels.push_back(std::move(c));
+  };
+  for (Index j = 0; j < joints; ++j) {
+    add(Role::kJointPosition, static_cast<int>(j),
+        "q_" + m.joints[static_cast<std::size_t>(j)].name, q.col(j));
+  }
+  Eigen::MatrixXd length(n, m.cylinder_count()), force(n, m.cylinder_count());
+  StaticForce statics(m);
+  VectorXd pose(joints);
+  for (Index i = 0; i < n; ++i) {
+    pose = q.row(i);
+    statics.update(pose.data(), payload[i], 0);
+    force.row(i) = statics.force();
+    for (int c = 0; c < m.cylinder_count(); ++c) length(i, c) = statics.length(c).value;
+  }
+  Eigen::MatrixXd asked = Eigen::MatrixXd::Zero(n, m.pump_count());
+  for (int p = 0; p < m.pump_count(); ++p)
+    asked.col(p).setConstant(model.pumps[static_cast<std::size_t>(p)].standby);
+  for (std::size_t c = 0; c < cylinders; ++c) {
+    const Cylinder& cylinder = m.cylinders[c];
+    const auto at = static_cast<Index>(c);
+    VectorXd u = VectorXd::Zero(n), pa(n), pb(n);
+    for (Index i = 0; i < n; ++i) {
+      const Index before = std::max<Index>(0, i - 1), after = std::min<Index>(n - 1, i + 1);
+      const double v = (length(after, at) - length(before, at)) /
+                       (step * static_cast<double>(std::max<Index>(1, after - before)));
+      const bool extends = v >= 0.0, moves = std::abs(v) > 1e-7;
+      if (!cylinder.hydraulic()) {
+        u[i] = moves ? (extends ? 1.0 : -1.0) : 0.0;
+        continue;
+      }
+      const double a = cylinder.area_piston(), b = cylinder.area_rod();
+      const double supply_area = extends ? a : b, return_area = extends ? b : a;
+      const double flow = supply_area * std::abs(v), back = return_area * std::abs(v);
+      if (moves)
+        u[i] = (extends ? 1.0 : -1.0) * flow / full_flow(model, static_cast<int>(c), extends);
+      // return line sets the return chamber, unless the load helps so much that a valve must hold it
+      double p_return = kReturnPressure + kReturnLoss * back * back;
+      const double load = extends ? force(i, at) : -force(i, at);  // against the motion
+      double p_supply = (load + p_return * return_area) / supply_area;
+      if (p_supply < kLeastSupply) {
+        p_supply = kLeastSupply;
+        p_return = (p_supply * supply_area - load) / return_area;
+      }
+      pa[i] = extends ? p_supply : p_return;
+      pb[i] = extends ? p_return : p_supply;
+      const int pump = m.pump_of_cylinder(static_cast<int>(c));
+      if (moves && pump >= 0)
+        asked(i, pump) = std::max(asked(i, pump), p_supply + model.cylinders[c].margin);
+    }
+    add(Role::kCommand, static_cast<int>(c), "u_" + cylinder.name, u);
+    if (cylinder.hydraulic()) {
+      add(Role::kPressureA, static_cast<int>(c), "pA_" + cylinder.name, pa);
+      add(Role::kPressureB, static_cast<int>(c), "pB_" + cylinder.name, pb);
+    } else {
+      add(Role::kForce, static_cast<int>(c), "force_" + cylinder.name, force.col(at));
+    }
+  }
+  for (int p = 0; p < m.pump_count(); ++p)
+    add(Role::kPumpPressure, p, "p_" + m.pumps[static_cast<std::size_t>(p)].name, asked.col(p));
+  add(Role::kPayload, -1, "payload", payload);
+  add(Role::kOilTemperature, -1, "oil",
+      recipe.warms_up ? VectorXd(VectorXd::LinSpaced(n, 20.0, 60.0))
+                      : VectorXd(VectorXd::Constant(n, 45.0)));
+  return log;
+}
+
+}  // namespace sparflow

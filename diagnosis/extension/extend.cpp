@@ -1,0 +1,432 @@
+#include "diagnosis/extension/extend.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <tuple>
+
+#include "diagnosis/extension/extend_workshop.h"
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How often `improve` may try what it then does not keep: each time costs a diagnosis.
+constexpr std::size_t kMostRejected = 8;
+
+ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std::string& date) {
+  ModelStep record;
+  record.added = step.added;
+  record.removed = step.removed;
+  record.date = date;
+  record.data = workshop.data();
+  const AppliedEffect& e = step.effect;
+  for (std::size_t p = 0; step.removed.empty() && p < e.values.size(); ++p) {
+    const EffectParameter& parameter = e.effect->info().parameters[p];
+    StepParameter out{parameter.name, parameter.unit, e.values[p]};
+    if (p < e.lower95.size()) out.lower95 = e.lower95[p];
+    if (p < e.upper95.size()) out.upper95 = e.upper95[p];
+    record.parameters.push_back(std::move(out));
+  }
+  const std::string data = step.judged_on == "test logs"          ? "test"
+                           : step.judged_on == "held-out motions" ? "held out"
+                                                                  : "train";
+  record.before = stage_quality(step.before, data);
+  record.after = stage_quality(step.after, data);
+  return record;
+}
+
+/// Where an effect acts, as scores call it; empty: everywhere in its stage.
+std::string place_name(const Machine& machine, const EffectAt& e) {
+  const auto i = static_cast<std::size_t>(e.at);
+  if (e.at < 0) return "";
+  if (e.effect->info().place == EffectPlace::kCylinder) return machine.cylinders[i].name;
+  if (e.effect->info().place == EffectPlace::kPump) return machine.pumps[i].name;
+  return "";
+}
+
+void set_errors(const Workshop& workshop, const Machine& machine, const EffectAt& e,
+                const CompareResult& before, const CompareResult& after, ExtendStep& step) {
+  step.stage = effect_stage_name(e.effect->info().stage);
+  step.before = before;
+  step.after = after;
+  step.judged_on = workshop.judged_on();
+  step.change = error_change(machine, before, after, step.stage, place_name(machine, e));
+}
+
+/// Adds one effect to `current`. @return the step and the model with it, which the caller may keep or not
+std::pair<ExtendStep, Judged> one_step(const Workshop& workshop, const Judged& current,
+                                       const EffectAt& add, Others others,
+                                       std::vector<std::string>& notes,
+                                       const SearchProgress& progress) {
+  const Machine& machine = current.model.machine;
+  const EffectInfo& info = add.effect->info();
+  std::vector<EffectAt> effects = places_of(current.model.effects);
+  effects.push_back(add);
+  Judged next = workshop.with(current, effects, others, progress, &notes);
+  ExtendStep step;
+  step.added = effect_key(info, machine, add.at);
+  step.title = effect_title(info, machine, add.at);
+  step.effect = next.model.effects.back();
+  step.others_kept = others == Others::kKept;
+  set_errors(workshop, machine, add, current.error, next.error, step);
+  return {std::move(step), std::move(next)};
+}
+
+void keep(ExtendStep step, Judged next, const Workshop& workshop, const std::string& date,
+          Judged& current, ExtendResult& result) {
+  next.model.steps.push_back(record_of(step, workshop, date));
+  current = std::move(next);
+  result.steps.push_back(std::move(step));
+}
+
+void add_notes(std::vector<std::string> notes, ExtendResult& result) {
+  for (std::string& n : notes) {
+    if (std::find(result.notes.begin(), result.notes.end(), n) == result.notes.end())
+      result.notes.push_back(std::move(n));
+  }
+}
+
+void finish(Judged current, Clock::time_point start, ExtendResult& result) {
+  result.model = std::move(current.model);
+  if (!result.model.steps.empty() && (!result.steps.empty()))
+    result.model.steps.back().stopped_because = result.stopped_because;
+  result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::string percent_text(double ratio) {
+  return ratio <= 1.0 ? fmt::format("{:.1f} % smaller", 100.0 * (1.0 - ratio))
+                      : fmt::format("{:.1f} % larger", 100.0 * (ratio - 1.0));
+}
+
+/// Title of an effect of the model that was known before and is not any more beside the one that came last: what the
+/// one takes, the other gives. Empty: none. In numbers, a parameter whose interval was smaller than its value and is now
+/// larger, and twenty times what it was (strangers widen each other's by a few times at most).
+std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
+  constexpr double kBlurred = 20.0;
+  const auto half = [](const AppliedEffect& e, std::size_t k) {
+    return 0.5 * (e.upper95[k] - e.lower95[k]);
+  };
+  for (std::size_t i = 0; i < before.effects.size(); ++i) {
+    const AppliedEffect &was = before.effects[i], &is = after.effects[i];
+    if (was.lower95.size() != was.values.size() || is.lower95.size() != is.values.size()) continue;
+    for (std::size_t k = 0; k < was.values.size(); ++k) {
+      const bool blurred = half(was, k) < std::abs(was.values[k]) &&
+                           half(is, k) > std::abs(is.values[k]) &&
+                           half(is, k) > kBlurred * half(was, k);
+      if (blurred) return effect_title(was.effect->info(), after.machine, was.at);
+    }
+  }
+  return {};
+}
+
+/// What speaks against a step, as the end of a sentence that begins with it.
+std::string against(const ExtendStep& step) {
+  if (!step.same_as.empty())
+    return fmt::format("these logs cannot tell it from {}, which is in the model", step.same_as);
+  if (step.change.own > 1.0) {
+    return fmt::format("where it acts the error on the {} is {} with it", step.judged_on,
+                       percent_text(step.change.own));
+  }
+  if (step.change.harmed.empty()) {
+    return fmt::format("the error on the {} is {} on the whole with it", step.judged_on,
+                       percent_text(step.change.overall));
+  }
+  std::vector<std::string> harm;
+  for (const HarmedError& h : step.change.harmed) harm.push_back(h.sentence);
+  return fmt::format("on the {} {}", step.judged_on, fmt::join(harm, ", "));
+}
+
+/// A diagnosis together with the model it speaks of: its evidence refers to that model's machine.
+std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
+                                               const std::vector<Log>& logs,
+                                               const std::vector<Log>& references,
+                                               const DiagnoseOptions& options,
+                                               const SearchProgress& progress) {
+  struct Kept {
+    CraneModel model;
+    Diagnosis diagnosis;
+  };
+  const auto kept = std::make_shared<Kept>();
+  kept->model = model;
+  kept->diagnosis = diagnose(kept->model, logs, references, options, progress);
+  return {kept, &kept->diagnosis};
+}
+
+/// How many times smaller an effect makes the error of the channel where it does most, all others in.
+double times_smaller(const DiagnosedEffect& e) {
+  double most = 1.0;
+  for (const ChannelGain& c : e.channels)
+    most = std::max(most, c.rmse_before / std::max(c.rmse_after, 1e-300));
+  return most;
+}
+
+/// What a diagnosis asks for, that which takes most of an error away first: a likelihood counts what is sharp for
+/// more than what is large. Where logs cannot tell several effects apart, the one that explains them best stands
+/// for all.
+std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel& model) {
+  std::vector<const DiagnosedEffect*> out;
+  if (d.verdict == Verdict::kBadData || d.verdict == Verdict::kNone) return out;
+  for (const DiagnosedEffect& e : d.effects) {
+    const bool has = std::any_of(model.effects.begin(), model.effects.end(), [&](const auto& o) {
+      return o.effect == e.effect.effect && o.at == e.effect.at;
+    });
+    if (!has && (d.verdict == Verdict::kMissing || e.probability >= 0.5)) out.push_back(&e);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const auto* a, const auto* b) {
+    return times_smaller(*a) > times_smaller(*b);
+  });
+  return out;
+}
+
+std::string stands_for(const DiagnosedEffect& e) {
+  std::string rivals;
+  for (const auto& [key, worse] : e.rivals) rivals += (rivals.empty() ? "" : ", ") + key;
+  return fmt::format("{} stands for a set that these logs cannot tell apart: {} would do as well",
+                     e.key(), rivals);
+}
+
+/// Why a diagnosis leads no further.
+std::string why_stopped(const Diagnosis& d) {
+  switch (d.verdict) {
+    case Verdict::kNone:
+      return "nothing more is missing that these logs could show";
+    case Verdict::kUnknown:
+      if (d.unexplained && d.unexplained->few_places)
+        return "something happened too seldom to prove a law: " + d.unexplained->sentence;
+      return "what is left is not in the catalogue" +
+             (d.unexplained ? ": " + d.unexplained->sentence : std::string());
+    case Verdict::kBadData:
+      return "data is bad: " +
+             (d.bad.empty() ? std::string() : bad_channel_sentence(d.bad.front()));
+    case Verdict::kMissing:
+      return "what the diagnosis names is in the model already";
+  }
+  return {};
+}
+
+/// What explains the same evidence within what the search calls a rival.
+void add_look_alikes(const Diagnosis& d, const EffectAt& effect, std::vector<EffectAt>& aside) {
+  for (const FoundEffect& f : d.search.found) {
+    if (!(f.design.effect == effect)) continue;
+    for (const auto& [rival, worse] : f.alternatives) aside.push_back(rival);
+  }
+}
+
+/// Whether other effects of the valve act behind this one (a lag behind a dead band): they look different once it is in
+/// the model, and what came beside it in the same diagnosis may only have stood for them.
+bool shapes_opening(const AppliedEffect& e) {
+  const Eigen::VectorXd small = Eigen::Vector2d(1e-3, -1e-3);
+  Eigen::VectorXd opening = small;
+  e.effect->shape_opening(e.at, e.at, e.values, opening);
+  return opening != small;
+}
+
+/// Those that were not kept in the end, and why, once each, as part of why it stopped.
+void name_rejected(ExtendResult& result) {
+  std::erase_if(result.rejected, [&](const ExtendStep& r) {
+    return std::any_of(result.steps.begin(), result.steps.end(),
+                       [&](const ExtendStep& s) { return s.added == r.added; });
+  });
+  std::vector<ExtendStep> once;
+  for (ExtendStep& r : result.rejected) {
+    const auto had = std::find_if(once.begin(), once.end(),
+                                  [&](const ExtendStep& o) { return o.added == r.added; });
+    if (had == once.end()) {
+      once.push_back(std::move(r));
+    } else {
+      *had = std::move(r);
+    }
+  }
+  result.rejected = std::move(once);
+  for (const ExtendStep& r : result.rejected)
+    result.stopped_because += fmt::format("; {} was tried and not kept: {}", r.title, against(r));
+}
+
+/// Effects to choose from: all that were asked for, or the catalogue, without those set aside.
+std::vector<EffectAt> choices(const ExtendOptions& options, const CraneModel& model,
+                              const std::vector<EffectAt>& aside) {
+  std::vector<EffectAt> out =
+      options.diagnose.candidates.empty() ? candidates(model.machine) : options.diagnose.candidates;
+  std::erase_if(out, [&](const EffectAt& c) {
+    const auto is_it = [&](const auto& o) { return o.effect == c.effect && o.at == c.at; };
+    return std::any_of(aside.begin(), aside.end(), is_it) ||
+           std::any_of(model.effects.begin(), model.effects.end(), is_it);
+  });
+  return out;
+}
+
+}  // namespace
+
+std::string effect_title(const EffectInfo& info, const Machine& machine, int at) {
+  const auto i = static_cast<std::size_t>(at);
+  switch (info.place) {
+    case EffectPlace::kMachine:
+      break;
+    case EffectPlace::kJoint:
+      return info.title + " of " + machine.joints[i].name;
+    case EffectPlace::kCylinder:
+      if (at >= 0) return info.title + " of " + machine.cylinders[i].name;
+      break;
+    case EffectPlace::kPump:
+      return info.title + " of pump " + machine.pumps[i].name;
+  }
+  return info.title;
+}
+
+ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
+                    const std::vector<Log>& logs, const std::vector<Log>& tests,
+                    const ExtendOptions& options, const SearchProgress& progress) {
+  const auto start = Clock::now();
+  std::vector<EffectAt> all = places_of(model.effects);
+  for (const EffectAt& e : add) {
+    if (std::any_of(all.begin(), all.end(), [&](const EffectAt& o) { return o == e; })) {
+      throw InputError({}, effect_key(e.effect->info(), model.machine, e.at),
+                       "the model has this effect already; take it back first to learn it anew");
+    }
+    all.push_back(e);
+  }
+  const Workshop workshop(model, logs, options.references, tests, options);
+  const double parts = static_cast<double>(add.size()) + 1.0;
+  const auto part = [&](std::size_t i) {
+    return [&progress, i, parts](double share, const std::string& what) {
+      if (progress) progress((static_cast<double>(i) + share) / parts, what);
+    };
+  };
+  ExtendResult result;
+  Judged current = workshop.as_it_is(model, result.notes, part(0));
+  for (std::size_t i = 0; i < add.size(); ++i) {
+    std::vector<std::string> notes;
+    auto [step, next] =
+        one_step(workshop, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
+    add_notes(std::move(notes), result);
+    if (step.change.worse()) {
+      result.notes.push_back(
+          fmt::format("{} is in the model as asked, but the data speak against it: {}", step.title,
+                      against(step)));
+    }
+    keep(std::move(step), std::move(next), workshop, options.date, current, result);
+  }
+  result.stopped_because = "all effects asked for were added";
+  finish(std::move(current), start, result);
+  return result;
+}
+
+ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
+                       const std::vector<Log>& logs, const std::vector<Log>& tests,
+                       const ExtendOptions& options, const SearchProgress& progress) {
+  const auto start = Clock::now();
+  const std::string key = effect_key(effect.effect->info(), model.machine, effect.at);
+  std::vector<EffectAt> rest = places_of(model.effects);
+  const auto at =
+      std::find_if(rest.begin(), rest.end(), [&](const EffectAt& e) { return e == effect; });
+  if (at == rest.end()) {
+    std::string has;
+    for (const AppliedEffect& e : model.effects)
+      has += (has.empty() ? "" : ", ") + e.key(model.machine);
+    throw InputError({}, key,
+                     has.empty() ? "the model has no effects to take back"
+                                 : "the model does not have this effect; it has " + has);
+  }
+  const AppliedEffect was = model.effects[static_cast<std::size_t>(at - rest.begin())];
+  rest.erase(at);
+  const Workshop workshop(model, logs, options.references, tests, options);
+  const auto part = [&](double first) {
+    return [&progress, first](double share, const std::string& what) {
+      if (progress) progress(first + 0.5 * share, what);
+    };
+  };
+  ExtendResult result;
+  const Judged current = workshop.as_it_is(model, result.notes, part(0.0));
+  std::vector<std::string> notes;
+  Judged next = workshop.with(current, rest, Others::kEstimatedAnew, part(0.5), &notes);
+  add_notes(std::move(notes), result);
+  ExtendStep step;
+  step.removed = key;
+  step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " taken back";
+  step.effect = was;
+  set_errors(workshop, model.machine, effect, current.error, next.error, step);
+  Judged kept = current;
+  keep(std::move(step), std::move(next), workshop, options.date, kept, result);
+  result.stopped_because = "the effect was taken back as asked";
+  finish(std::move(kept), start, result);
+  return result;
+}
+
+ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
+                     const std::vector<Log>& references, const std::vector<Log>& tests,
+                     const ExtendOptions& options, const SearchProgress& progress) {
+  const auto start = Clock::now();
+  const Workshop workshop(model, logs, references, tests, options);
+  // nobody knows how many rounds there will be: each fills half of what is left
+  double done = 0.0;
+  const auto round = [&](double width) {
+    return [&progress, &done, width](double share, const std::string& what) {
+      if (progress) progress(done + (1.0 - done) * width * share, what);
+    };
+  };
+  ExtendResult result;
+  Judged current = workshop.as_it_is(model, result.notes, round(0.05));
+  done = 0.05;
+  const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
+  std::vector<EffectAt> aside;  // not kept since the last step that was
+  std::size_t tried = 0;
+  DiagnoseOptions diagnose_options = options.diagnose;
+  while (result.stopped_because.empty()) {
+    diagnose_options.candidates = choices(options, current.model, aside);
+    if (diagnose_options.candidates.empty()) {  // which would mean all
+      result.stopped_because = "no other effect is left to try";
+      break;
+    }
+    const std::shared_ptr<const Diagnosis> diagnosis =
+        diagnose_kept(current.model, logs, references, diagnose_options, round(0.4));
+    done += (1.0 - done) * 0.4;
+    result.last = diagnosis;
+    const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
+    if (wanted.empty()) result.stopped_because = why_stopped(*diagnosis);
+    for (const DiagnosedEffect* e : wanted) {
+      if (!steps_left()) {
+        result.stopped_because =
+            fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
+                        effect_title(e->effect.effect->info(), model.machine, e->effect.at));
+        break;
+      }
+      std::vector<std::string> notes;
+      auto [step, next] =
+          one_step(workshop, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
+      if (step.change.worse() && !current.model.effects.empty()) {
+        notes.clear();
+        std::tie(step, next) =
+            one_step(workshop, current, e->effect, Others::kKept, notes, round(0.15));
+      }
+      done += (1.0 - done) * 0.2;
+      step.diagnosis = diagnosis;
+      step.same_as = blurred_by_last(current.model, next.model);
+      if (step.change.worse() || !step.same_as.empty()) {
+        aside.push_back(e->effect);
+        // what it does is there and harms elsewhere: another that only looks like it must not come in its place
+        if (step.change.own < 1.0 && step.same_as.empty())
+          add_look_alikes(*diagnosis, e->effect, aside);
+        ++tried;
+        result.rejected.push_back(std::move(step));
+        continue;
+      }
+      aside.clear();
+      if (!e->rivals.empty()) notes.push_back(stands_for(*e));
+      add_notes(std::move(notes), result);
+      keep(std::move(step), std::move(next), workshop, options.date, current, result);
+      if (shapes_opening(current.model.effects.back())) break;
+    }
+    if (tried > kMostRejected && result.stopped_because.empty())
+      result.stopped_because = "what is found does not hold on data that took no part";
+  }
+  name_rejected(result);
+  finish(std::move(current), start, result);
+  return result;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,354 @@
+#include "diagnosis/selection/effect_estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/selection/effect_intervals.h"
+#include "diagnosis/selection/search_candidates.h"
+#include "diagnosis/selection/search_leaders.h"
+#include "identification/signals/series.h"
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+/// The chord converges by the share of the non-linearity each time: a tenth for angles of a few degrees.
+constexpr int kChords = 3;
+constexpr int kTurns = 5;             // of who leads the pumps with these values
+constexpr int kSections = 10;         // of the golden section: a bracket shrinks to 1 %
+constexpr double kMuchSharper = 0.5;  // a window that is hardly shorter changes nothing
+constexpr int kSweeps = 2;            // over all nonlinear parameters
+
+std::vector<double> shape_of(const AppliedEffect& e) {
+  std::vector<double> shape;
+  const auto& parameters = e.effect->info().parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (!parameters[p].linear) shape.push_back(e.values[p]);
+  }
+  return shape;
+}
+
+/// The nonlinear parameters' descriptions, in order.
+std::vector<const EffectParameter*> shape_parameters(const Effect& effect) {
+  std::vector<const EffectParameter*> out;
+  for (const EffectParameter& p : effect.info().parameters) {
+    if (!p.linear) out.push_back(&p);
+  }
+  return out;
+}
+
+/// Rows outside the masks; a block that loses rows in its middle becomes two.
+EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& leave_out) {
+  EvidenceChannel out = all;
+  out.blocks.clear();
+  out.log.clear();
+  out.sample.clear();
+  std::vector<Index> kept;
+  for (std::size_t b = 0; b < all.blocks.size(); ++b) {
+    const auto log = static_cast<std::size_t>(all.log[b]);
+    bool open = false;
+    for (Index r = all.blocks[b].first; r < all.blocks[b].last; ++r) {
+      const Index k = all.sample[static_cast<std::size_t>(r)];
+      if (log < leave_out.size() && leave_out[log][k]) {
+        open = false;
+        continue;
+      }
+      const auto row = static_cast<Index>(kept.size());
+      if (!open) {
+        out.blocks.push_back({row, row});
+        out.log.push_back(all.log[b]);
+        open = true;
+      }
+      kept.push_back(r);
+      out.sample.push_back(k);
+      out.blocks.back().last = row + 1;
+    }
+  }
+  out.y = all.y(kept).eval();
+  out.baseline = all.baseline(kept, Eigen::all).eval();
+  return out;
+}
+
+class Estimator {
+ public:
+  Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted,
+            const std::vector<MachineSignals>& suspects,
+            const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
+            const std::vector<AppliedEffect>* in_references)
+      : base_(model),
+        known_(model.effects),
+        suspects_(suspects),
+        references_(references),
+        sharp_(can_sharpen(suspects) && (references.empty() || can_sharpen(references))),
+        leave_out_(leave_out) {
+    if (sharp_) sharpen_all();
+    std::erase_if(base_.effects, [&](const AppliedEffect& a) {
+      return std::any_of(wanted.begin(), wanted.end(),
+                         [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
+    });
+    in_references_ = in_references != nullptr ? *in_references : base_.effects;
+    evidence_ = collect(base_);
+    active_.assign(evidence_.channels.size(), false);
+    for (const EffectAt& e : wanted) add_design(model, e);
+  }
+
+  EffectEstimate run(const SearchProgress& progress) {
+    const auto tell = [&](double share, const char* what) {
+      if (progress) progress(share, what);
+    };
+    tell(0.0, "parameters of the effects");
+    search_grids();
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
+      tell(0.3 + 0.3 * sweep, "parameters of the effects");
+    }
+    double log_likelihood = likelihood();
+    std::vector<FoundEffect> found = with_intervals();
+    for (int turn = 0; turn < kTurns; ++turn) {
+      std::optional<Evidence> led = evidence_.led_by(applied(found));
+      if (!led) break;
+      evidence_ = std::move(*led);
+      designs_ = remade(evidence_, designs_);
+      for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
+      log_likelihood = likelihood();
+      found = with_intervals();
+    }
+    const bool machine = std::any_of(designs_.begin(), designs_.end(), [](const EffectDesign& d) {
+      return d.effect.effect->changes_machine();
+    });
+    for (int chord = 0; machine && chord < kChords; ++chord) {
+      if (!correct_linearisation(found)) break;
+      found = with_intervals();
+    }
+    EffectEstimate out;
+    out.log_likelihood = log_likelihood;
+    out.effects = applied(found);
+    add_notes(out);
+    tell(1.0, "parameters of the effects");
+    return out;
+  }
+
+ private:
+  /// Positions so finely measured that a shorter window than the search's will do, in every log.
+  bool can_sharpen(const std::vector<MachineSignals>& logs) const {
+    return std::all_of(logs.begin(), logs.end(), [&](const MachineSignals& s) {
+      return sharp_window(s) < kMuchSharper * s.window;
+    });
+  }
+  static double sharp_window(const MachineSignals& s) {
+    return sharpest_window(s.time, s.runs, s.q_measured, s.window);
+  }
+  void sharpen_all() {
+    for (auto* logs : {&suspects_, &references_}) {
+      for (MachineSignals& s : *logs) s = smoothed_anew(base_.machine, s, sharp_window(s));
+    }
+  }
+
+  Evidence collect(const CraneModel& model) const {
+    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, sharp_);
+    // a lag stays behind the dead band that was known before, also while both are estimated
+    for (MachineSeries& s : evidence.series) set_openings(known_, s);
+    if (leave_out_.empty()) return evidence;
+    for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
+    return evidence;
+  }
+
+  void add_design(const CraneModel& model, const EffectAt& e) {
+    const auto known =
+        std::find_if(model.effects.begin(), model.effects.end(),
+                     [&](const AppliedEffect& a) { return a.effect == e.effect && a.at == e.at; });
+    std::vector<EffectDesign> acting;
+    if (known != model.effects.end()) {
+      acting.push_back(make_design(evidence_, e, shape_of(*known)));
+      if (!acting.back().acts()) acting.clear();
+    } else {
+      for (SearchCandidate& c : search_candidates(evidence_, {e})) acting = std::move(c.designs);
+    }
+    if (acting.empty()) {
+      throw InputError(
+          {}, effect_key(e.effect->info(), base_.machine, e.at),
+          fmt::format("these logs do not show it; it needs {}, and motions in which it acts",
+                      fmt::join(e.effect->info().signals, ", ")));
+    }
+    for (const EffectDesign& d : acting) {
+      for (std::size_t c = 0; c < active_.size(); ++c) active_[c] = active_[c] || d.touches(c);
+    }
+    designs_.push_back(acting.front());
+    grids_.push_back(std::move(acting));
+  }
+
+  std::vector<const EffectDesign*> pointers() const {
+    std::vector<const EffectDesign*> out;
+    for (const EffectDesign& d : designs_) out.push_back(&d);
+    return out;
+  }
+  double likelihood() const {
+    FitControl control;
+    control.active = active_;  // the others say nothing about these effects
+    return fit_effects(evidence_, pointers(), nullptr, control).total();
+  }
+  /// As diagnosis does it: what it prints and what a model gets are one figure.
+  std::vector<FoundEffect> with_intervals() const {
+    std::vector<FoundEffect> found(designs_.size());
+    for (std::size_t d = 0; d < designs_.size(); ++d) found[d].design = designs_[d];
+    estimate_intervals(evidence_, found);
+    return found;
+  }
+
+  void search_grids() {
+    for (std::size_t d = 0; d < designs_.size(); ++d) {
+      if (grids_[d].size() < 2) continue;
+      double best = -std::numeric_limits<double>::infinity();
+      std::size_t at = 0;
+      for (std::size_t i = 0; i < grids_[d].size(); ++i) {
+        designs_[d] = grids_[d][i];
+        const double l = likelihood();
+        if (l > best) best = l, at = i;
+      }
+      designs_[d] = grids_[d][at];
+    }
+  }
+
+  double likelihood_at(std::size_t d, std::size_t s, double value) {
+    std::vector<double> shape = designs_[d].shape;
+    shape[s] = value;
+    EffectDesign design = make_design(evidence_, designs_[d].effect, std::move(shape));
+    if (!design.acts()) return -std::numeric_limits<double>::infinity();
+    std::swap(designs_[d], design);
+    const double l = likelihood();
+    std::swap(designs_[d], design);
+    return l;
+  }
+
+  /// Between the grid's neighbours of where it stands; of an effect already known, the effect's own grid.
+  std::pair<double, double> bracket(std::size_t d, std::size_t s) const {
+    const EffectAt& e = designs_[d].effect;
+    const EffectParameter& p = *shape_parameters(*e.effect)[s];
+    const double x = designs_[d].shape[s];
+    double lo = p.lower, hi = p.upper;
+    for (const double v : e.effect->grid(evidence_.series[0], e.at, static_cast<int>(s))) {
+      if (v < x - 1e-9 * std::abs(x)) lo = std::max(lo, v);
+      if (v > x + 1e-9 * std::abs(x)) hi = std::min(hi, v);
+    }
+    // beyond the grid's ends: as far as half and twice the value
+    return {std::max(lo, x > 0.0 ? 0.5 * x : lo), std::min(hi, x > 0.0 ? 2.0 * x : hi)};
+  }
+
+  void refine(std::size_t d) {
+    const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
+    const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect);
+    for (std::size_t s = 0; s < designs_[d].shape.size(); ++s) {
+      if (choices[s]) continue;  // the grid has all there are
+      auto [a, b] = bracket(d, s);
+      if (!(b > a)) continue;
+      const double start = designs_[d].shape[s], at_start = likelihood();
+      double x1 = b - golden * (b - a), x2 = a + golden * (b - a);
+      double f1 = likelihood_at(d, s, x1), f2 = likelihood_at(d, s, x2);
+      for (int i = 0; i < kSections; ++i) {
+        if (f1 > f2) {
+          b = x2, x2 = x1, f2 = f1;
+          x1 = b - golden * (b - a);
+          f1 = likelihood_at(d, s, x1);
+        } else {
+          a = x1, x1 = x2, f1 = f2;
+          x2 = a + golden * (b - a);
+          f2 = likelihood_at(d, s, x2);
+        }
+      }
+      const double best = f1 > f2 ? x1 : x2;
+      std::vector<double> shape = designs_[d].shape;
+      shape[s] = std::max(f1, f2) > at_start ? best : start;
+      designs_[d] = make_design(evidence_, designs_[d].effect, std::move(shape));
+    }
+  }
+
+  /// @param machine also those that are another machine
+  static std::vector<AppliedEffect> applied(const std::vector<FoundEffect>& found,
+                                            bool machine = true) {
+    std::vector<AppliedEffect> out;
+    for (const FoundEffect& f : found) {
+      const EffectAt& e = f.design.effect;
+      if (machine || !e.effect->changes_machine())
+        out.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
+    }
+    return out;
+  }
+
+  /// Data = measured - exact law + its linearisation, for effects that are another machine.
+  bool correct_linearisation(const std::vector<FoundEffect>& found) {
+    CraneModel exact = base_;
+    for (const FoundEffect& f : found) {
+      const EffectAt& e = f.design.effect;
+      if (e.effect->changes_machine())
+        exact.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
+    }
+    Evidence left = collect(exact);
+    if (std::optional<Evidence> led = left.led_by(applied(found, false))) left = std::move(*led);
+    if (left.channels.size() != evidence_.channels.size()) return false;
+    for (std::size_t c = 0; c < left.channels.size(); ++c) {
+      EvidenceChannel& channel = left.channels[c];
+      // a pose that the changed machine cannot take drops out of the rows: the linearised fit stands
+      if (channel.sample != evidence_.channels[c].sample) return false;
+      for (std::size_t d = 0; d < designs_.size(); ++d) {
+        if (!designs_[d].effect.effect->changes_machine() || !designs_[d].touches(c)) continue;
+        VectorXd theta(designs_[d].linear);
+        Index k = 0;
+        const auto& parameters = designs_[d].effect.effect->info().parameters;
+        for (std::size_t p = 0; p < parameters.size(); ++p) {
+          if (parameters[p].linear) theta[k++] = found[d].values[p];
+        }
+        channel.y += designs_[d].columns[c] * theta;
+      }
+    }
+    for (std::size_t c = 0; c < left.channels.size(); ++c) {
+      evidence_.channels[c].y = std::move(left.channels[c].y);
+    }
+    return true;
+  }
+
+  void add_notes(EffectEstimate& out) const {
+    for (const AppliedEffect& e : out.effects) {
+      for (std::size_t p = 0; p < e.values.size(); ++p) {
+        const EffectParameter& parameter = e.effect->info().parameters[p];
+        if (parameter.choice) continue;
+        const double span = parameter.upper - parameter.lower, v = e.values[p];
+        if (v > parameter.lower + 1e-6 * span && v < parameter.upper - 1e-6 * span) continue;
+        out.notes.push_back(fmt::format(
+            "{} of {} rests on the bound of what is plausible, {:.4g} {}: another effect may act, "
+            "or it does not act at all",
+            parameter.name, e.key(base_.machine), v / parameter.si, parameter.unit));
+      }
+    }
+  }
+
+  CraneModel base_;
+  std::vector<AppliedEffect> known_;  ///< the model's, wanted or not
+  std::vector<MachineSignals> suspects_, references_;
+  bool sharp_ = false;  // all logs through a shorter window than the search's, rows up to the ends
+  const std::vector<Mask>& leave_out_;
+  std::vector<AppliedEffect> in_references_;
+  Evidence evidence_;
+  std::vector<bool> active_;  // by channel: touched by an effect
+  std::vector<EffectDesign> designs_;
+  std::vector<std::vector<EffectDesign>> grids_;
+};
+
+}  // namespace
+
+EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
+                                const std::vector<MachineSignals>& suspects,
+                                const std::vector<MachineSignals>& references,
+                                const std::vector<Mask>& leave_out, const SearchProgress& progress,
+                                const std::vector<AppliedEffect>* in_references) {
+  if (wanted.empty()) return {};
+  SPARFLOW_CHECK(!suspects.empty(), "effects need a log to be estimated from");
+  return Estimator(model, wanted, suspects, references, leave_out, in_references).run(progress);
+}
+
+}  // namespace sparflow

@@ -1,0 +1,124 @@
+#include "diagnosis/selection/effect_intervals.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "models/math/linear_algebra.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kTwoSided95 = 1.96;
+
+FitControl all_rows_alike() {
+  FitControl control;
+  control.covariance = true;
+  control.ordinary = true;
+  return control;
+}
+
+std::vector<const EffectDesign*> pointers(const std::vector<EffectDesign>& designs) {
+  std::vector<const EffectDesign*> out;
+  out.reserve(designs.size());
+  for (const EffectDesign& d : designs) out.push_back(&d);
+  return out;
+}
+
+/// Where every row counts the same, less of it than a law of this kind must have: part of another effect.
+bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
+  for (Index k = 0; k < design.linear; ++k) {
+    const double lo = design.lower[static_cast<std::size_t>(k)];
+    const double hi = design.upper[static_cast<std::size_t>(k)];
+    if (lo > 0.0 && theta[k] < lo + 1e-6 * (hi - lo)) return true;
+  }
+  return false;
+}
+
+/// Whether the joint 95 % region of the linear parameters holds zero: of two that say nearly the same (a laminar and a
+/// turbulent part) either may be nothing beside the other, and yet not both.
+bool holds_nothing(const VectorXd& theta, const Eigen::MatrixXd& covariance) {
+  constexpr double kChiSquare95[] = {3.841, 5.991, 7.815, 9.488, 11.070};  // 1 .. 5 parameters
+  const VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const bool none = (theta.cwiseAbs().array() <= kTwoSided95 * sd.array()).all();
+  const Index n = theta.size();
+  if (!none || n < 2 || n > 5 || !(sd.minCoeff() > 0.0)) return none;
+  const VectorXd scaled = theta.cwiseQuotient(sd), scale = sd.cwiseInverse();
+  Cholesky correlation;
+  if (!correlation.compute(scale.asDiagonal() * covariance * scale.asDiagonal())) return none;
+  return scaled.dot(correlation.solve(scaled)) <= kChiSquare95[n - 1];
+}
+
+/// Whether a nonlinear parameter without which the effect is a plainer one may be zero.
+bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
+                    const std::vector<double>& half) {
+  if (effect.info().refines.empty()) return false;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const EffectParameter& p = effect.info().parameters[k];
+    if (!p.linear && !p.choice && std::abs(values[k]) <= half[k]) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& found) {
+  std::vector<EffectDesign> designs;
+  designs.reserve(found.size());
+  for (const FoundEffect& f : found) designs.push_back(f.design);
+  const EffectFit fit = fit_effects(evidence, pointers(designs), nullptr, all_rows_alike());
+  Index first = 0;
+  for (EffectDesign& d : designs) {  // one more column for each nonlinear parameter
+    const VectorXd theta = fit.theta.segment(first, d.linear);
+    first += d.linear;
+    d = with_shape_slopes(evidence, d, theta);
+  }
+  const EffectFit sloped = fit_effects(evidence, pointers(designs), nullptr, all_rows_alike());
+
+  Index plain = 0, at = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    FoundEffect& f = found[i];
+    const Effect& effect = *f.design.effect.effect;
+    const auto linear = static_cast<Index>(f.design.linear);
+    f.at_bound = f.at_bound || less_than_plausible(f.design, fit.theta.segment(plain, linear));
+    f.values = parameter_values(effect, fit.theta.segment(plain, linear), f.design.shape);
+    VectorXd sd(designs[i].linear);
+    for (Index k = 0; k < sd.size(); ++k)
+      sd[k] = std::sqrt(std::max(0.0, sloped.covariance(at + k, at + k)));
+    const std::vector<bool> choices = shape_choices(effect);
+    std::vector<double> shape_sd(sd.begin() + linear, sd.end());
+    for (std::size_t k = 0; k < shape_sd.size(); ++k) shape_sd[k] = choices[k] ? 0.0 : shape_sd[k];
+    std::vector<double> half = parameter_values(effect, sd.head(linear), shape_sd);
+    for (double& h : half) h *= kTwoSided95;
+    f.could_be_nothing = holds_nothing(fit.theta.segment(plain, linear),
+                                       sloped.covariance.block(at, at, linear, linear)) ||
+                         may_be_plainer(effect, f.values, half);
+    f.lower95 = f.upper95 = f.values;
+    for (std::size_t k = 0; k < half.size(); ++k) {
+      const double whole =
+          effect.info().parameters[k].choice
+              ? 0.0
+              : std::hypot(half[k], kTwoSided95 * effect.info().form_error * f.values[k]);
+      f.lower95[k] -= whole;
+      f.upper95[k] += whole;
+    }
+    plain += linear;
+    at += designs[i].linear;
+  }
+}
+
+std::vector<double> parameter_values(const Effect& effect, const VectorXd& linear,
+                                     const std::vector<double>& shape) {
+  std::vector<double> values;
+  values.reserve(effect.info().parameters.size());
+  Index l = 0;
+  std::size_t s = 0;
+  for (const EffectParameter& p : effect.info().parameters) {
+    values.push_back(p.linear ? linear[l++] : shape[s++]);
+  }
+  return values;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,299 @@
+#include "diagnosis/selection/effect_search.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/selection/effect_intervals.h"
+#include "diagnosis/selection/search_choice.h"
+#include "diagnosis/selection/search_leaders.h"
+#include "diagnosis/selection/search_moves.h"
+#include "diagnosis/selection/search_proofs.h"
+#include "diagnosis/selection/search_state.h"
+
+namespace sparflow {
+namespace {
+
+class Search {
+ public:
+  /// @param follows whether to stop, with `led` set, where what is found changes who leads a pump
+  Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
+         const SearchOptions& options, const SearchProgress& progress, bool follows)
+      : search_(evidence, effects, options, progress), random_(options.seed), follows_(follows) {}
+
+  SearchResult run() {
+    SearchResult result;
+    EffectFit current = search_.fit({});
+    result.null = current;
+    std::vector<FoundEffect> found;
+    for (int round = 0; round < 3; ++round) {
+      select(found, current, result);
+      if (result.led) return result;
+      bool reshaped = false;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        reshaped = reshape(search_, found, i, current) || reshaped;
+      settle_angles(found, current);
+      prune(search_, found, current);
+      while (merge(search_, found, current)) prune(search_, found, current);
+      if (reshaped) {
+        for (std::size_t i = 0; i < found.size(); ++i) search_.judge(found, i, current);
+      }
+      finish(found, current);
+      estimate_intervals(search_.evidence, found);
+      if (!drop_unproven(found, current, result)) break;
+    }
+    estimate_intervals(search_.evidence, found);
+    result.final = current;
+    result.found = std::move(found);
+    return result;
+  }
+
+ private:
+  /// Adds the best candidate while it passes the gate and its proofs.
+  void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
+    for (int step = 0; static_cast<int>(found.size()) < search_.options.max_effects &&
+                       step < 3 * search_.options.max_effects;) {
+      search_.report(found.size(), "searching");
+      const std::vector<const EffectDesign*> base = designs_of(found);
+      std::vector<CandidateScore> scores =
+          search_.scores.beside(base, current, search_.skipped(found));
+      if (scores.empty()) break;
+      if (result.ranking.empty()) {
+        for (const CandidateScore& s : scores)
+          result.ranking.emplace_back(search_.candidates[s.candidate].effect, s.gain);
+      }
+      std::vector<GateCandidate> gated;
+      for (const SearchCandidate& c : search_.candidates)
+        gated.push_back({&c.designs, c.penalty, c.optional_penalty});
+      const NullGate gate = make_null_gate(search_.evidence, gated, base, current,
+                                           search_.options.simulations, random_);
+      const double level =
+          found.empty() ? search_.options.false_alarm : 0.5 * search_.options.false_alarm;
+      const CandidateScore best = chosen(search_, scores, gate, level, base);
+      const double p = gate.p_value(best.gain, best.candidate);
+      if (tracing()) trace_scores(search_, step, scores, gate);
+      ++step;
+      if (found.empty() && result.threshold == 0.0) {
+        result.threshold = gate.threshold(level);
+        result.p_value = p;
+      }
+      if (p >= level || best.gain < search_.options.least_gain) {
+        if (found.empty() && best.gain > kSurelySomething * search_.options.least_gain)
+          result.once = search_.scores.refined(base, best, current);
+        break;
+      }
+      FoundEffect f;
+      f.design = search_.scores.refined(base, best, current);
+      f.p_value = p;
+      found.push_back(std::move(f));
+      EffectFit next = search_.fit(designs_of(found));
+      whole_share(found, next, best.gain);
+      if (follows_ && (result.led = led_by_found(search_, found, next))) return;
+      search_.judge(found, found.size() - 1, next);
+      if (tracing()) trace_found(search_, found, next);
+      found.back().gain = best.gain;
+      std::string why = why_not_named(found.back(), search_.options);
+      if (why.empty()) why = only_mends(found, found.size() - 1, next);
+      if (!why.empty()) {
+        result.notes.push_back(fmt::format("{} fits best but is not named: {}",
+                                           search_.key(found.back().design.effect), why));
+        if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
+        if (found.back().at_bound && found.back().size >= search_.options.smallest_effect &&
+            best.gain > kSurelySomething * search_.options.least_gain) {
+          result.unnamed.push_back(found.back());
+        }
+        found.pop_back();
+        search_.refused[best.candidate] = true;
+        continue;
+      }
+      current = next;
+    }
+  }
+
+  /// A tilt of three degrees takes a thousandth off every weight, which its slope at rest does not know: what is left
+  /// would be named as a mass or another angle. Chords up to what was found.
+  void settle_angles(std::vector<FoundEffect>& found, EffectFit& fit) const {
+    bool any = false;
+    Eigen::Index first = 0;
+    for (FoundEffect& f : found) {
+      const double about = fit.theta[first];
+      first += f.design.linear;
+      if (!bends(*f.design.effect.effect)) continue;
+      f.design = make_design(search_.evidence, f.design.effect, f.design.shape, {&about, 1},
+                             f.design.optional);
+      any = true;
+    }
+    if (any) fit = search_.fit(designs_of(found), &fit);
+  }
+
+  /// A short lag shows by the product of its share and its time alone, a limit that is hardly reached by share and
+  /// excess: where the share rests on its bound, the whole share with another time or limit says nearly the same and is
+  /// plausible.
+  void whole_share(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
+    constexpr double kSame = 3.0, kSameShare = 0.05;  // [nats]; of the gain
+    constexpr double kReaches[] = {1.05, 1.2, 2.0};  // times; a limit beyond all flows says nothing
+    constexpr int kHalvings = 9;
+    EffectDesign& design = found.back().design;
+    const EffectParameter& share = design.effect.effect->info().parameters.front();
+    if (!share.linear || share.name != "share" || design.shape.empty() || design.linear != 1 ||
+        !rests_on_bound(design, fit.theta.tail(1)))
+      return;
+    const EffectDesign before = design;
+    const auto share_at = [&](double factor) {
+      std::vector<double> shape = before.shape;
+      shape[0] *= factor;
+      design = make_design(search_.evidence, before.effect, std::move(shape), {}, before.optional);
+      if (!design.acts()) return std::numeric_limits<double>::quiet_NaN();
+      design.lower = {-std::numeric_limits<double>::max()};
+      design.upper = {std::numeric_limits<double>::max()};
+      FitControl control;
+      control.noise_passes = 1;
+      const EffectFit f = fit_effects(search_.evidence, designs_of(found), &fit, control);
+      return f.theta[f.theta.size() - 1];
+    };
+    const double at_one = share_at(1.0);
+    double a = 1.0, b = 1.0;  // the share crosses one between these factors
+    for (const double reach : kReaches) {
+      for (const double factor : {1.0 / reach, reach}) {
+        if (b == 1.0 && (share_at(factor) - 1.0) * (at_one - 1.0) < 0.0) b = factor;
+      }
+    }
+    for (int k = 0; k < kHalvings && b != 1.0; ++k) {
+      const double middle = std::sqrt(a * b);
+      ((share_at(middle) - 1.0) * (at_one - 1.0) > 0.0 ? a : b) = middle;
+    }
+    std::vector<double> shape = before.shape;
+    shape[0] *= std::sqrt(a * b);
+    design = make_design(search_.evidence, before.effect, std::move(shape), {}, before.optional);
+    EffectFit whole = search_.fit(designs_of(found));
+    const double least = fit.total() - std::max(kSame, kSameShare * gain);
+    if (tracing()) {
+      fmt::print(stderr, "  whole share at [{:.4g}]: {:.1f} nats\n", fmt::join(design.shape, " "),
+                 whole.total() - fit.total());
+    }
+    if (whole.total() > least && !rests_on_bound(design, whole.theta.tail(1))) {
+      fit = std::move(whole);
+    } else {
+      design = before;
+    }
+  }
+
+  /// What the form of a law is wrong by leaves that share, squared, of the effect's own gain to whatever else acts in
+  /// the same place; and what grows with another power than the law's leaves room for a smaller effect beside it.
+  /// @param fit of all found  @return why found[index] is no more than that; empty: it is more
+  std::string only_mends(const std::vector<FoundEffect>& found, std::size_t index,
+                         const EffectFit& fit) const {
+    const FoundEffect& one = found[index];
+    const auto meets = [&](const EffectDesign& other) { return search_.meet(other, one.design); };
+    std::vector<EffectDesign> powers;
+    std::vector<std::string> names;
+    Eigen::Index first = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const FoundEffect& other = found[i];
+      const Eigen::VectorXd theta = fit.theta.segment(first, other.design.linear);
+      first += other.design.linear;
+      if (i == index || other.gain < one.gain || !meets(other.design)) continue;
+      const double form = form_share(*other.design.effect.effect);
+      if (one.gain <= form * form * other.gain) {
+        return fmt::format(
+            "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over",
+            one.gain, search_.key(other.design.effect), other.gain);
+      }
+      EffectDesign power = other_power(other.design, theta);
+      if (!power.acts() || !meets(power)) continue;
+      powers.push_back(std::move(power));
+      names.push_back(search_.key(other.design.effect));
+    }
+    if (powers.empty()) return {};
+    std::vector<const EffectDesign*> without = designs_of(found, index), with = designs_of(found);
+    for (const EffectDesign& p : powers) {
+      without.push_back(&p);
+      with.push_back(&p);
+    }
+    const double gain = search_.fit(with, &fit).total() - search_.fit(without, &fit).total() -
+                        search_.price_of(one.design);
+    if (tracing())
+      fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n",
+                 search_.key(one.design.effect), fmt::join(names, ", "), gain);
+    if (gain > search_.options.least_gain) return {};
+    return fmt::format("a slightly different power in the law of {} does the same",
+                       fmt::join(names, ", "));
+  }
+
+  /// What the later ones turned into a remnant. @return whether any was dropped
+  bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      std::string why = why_not_named(found[i], search_.options);
+      if (why.empty()) why = only_mends(found, i, current);
+      // of an effect of its own, motions left out may have shown what ordinary least squares leaves open
+      const bool refinement = !found[i].design.effect.effect->info().refines.empty();
+      const bool proven = !refinement && found[i].held_out > 2.0 * found[i].held_out_error;
+      if (why.empty() && found[i].could_be_nothing && !proven) {
+        why = "the interval of a parameter without which it is nothing holds zero";
+      }
+      if (why.empty()) continue;
+      result.notes.push_back(
+          fmt::format("{} is taken back: {}", search_.key(found[i].design.effect), why));
+      if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
+      for (std::size_t c = 0; c < search_.candidates.size(); ++c) {
+        if (search_.candidates[c].effect == found[i].design.effect) search_.refused[c] = true;
+      }
+      found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+      current = search_.fit(designs_of(found));
+      return true;
+    }
+    return false;
+  }
+
+  /// Swap moves and indistinguishable alternatives, then intervals.
+  void finish(std::vector<FoundEffect>& found, EffectFit& current) {
+    for (int round = 0; round < 2; ++round) {
+      bool swapped = false;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        search_.report(found.size(),
+                       "telling " + search_.key(found[i].design.effect) + " from its rivals");
+        swapped = rivals(search_, found, i, current) || swapped;
+      }
+      if (!swapped) break;
+    }
+    for (std::size_t i = 0; i < found.size(); ++i) search_.judge(found, i, current);
+  }
+
+  SearchState search_;
+  std::mt19937_64 random_;
+  bool follows_;
+};
+
+}  // namespace
+
+SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
+                            const SearchOptions& options, const SearchProgress& progress) {
+  constexpr int kTurns = 3;  // of finding who leads; what is found then was found with that
+  SearchResult result, first;
+  std::optional<Evidence> led;
+  for (int turn = 0; turn <= kTurns; ++turn) {
+    result = Search(led ? *led : evidence, candidates, options, progress, turn < kTurns).run();
+    if (turn == 0) first = result;
+    if (!result.led) break;
+    if (tracing()) fmt::print(stderr, "  others lead the pump with what was found\n");
+    led = std::move(result.led);
+  }
+  // what was to lead did not stand its proofs: then those lead who lead without it
+  if (led && !adds_demand(*led, result.found)) {
+    led.reset();
+    result = Search(evidence, candidates, options, progress, false).run();
+  }
+  if (led) {
+    result.null = std::move(first.null);
+    result.ranking = std::move(first.ranking);
+    result.p_value = first.p_value;
+    result.threshold = first.threshold;
+    result.led = std::move(led);
+  }
+  return result;
+}
+
+}  // namespace sparflow

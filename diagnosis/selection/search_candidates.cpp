@@ -1,0 +1,96 @@
+#include "diagnosis/selection/search_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "models/math/linear_algebra.h"
+#include "models/math/parallel.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
+  // limits depend on what a log reaches: the longest suspect log decides
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < evidence.suspects; ++k) {
+    if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
+  }
+  std::vector<std::vector<double>> points = {{}};
+  int shape = 0;
+  for (const EffectParameter& p : effect.effect->info().parameters) {
+    if (p.linear) continue;
+    const std::vector<double> values =
+        effect.effect->grid(evidence.series[longest], effect.at, shape++);
+    std::vector<std::vector<double>> next;
+    for (const auto& point : points) {
+      for (const double v : values) {
+        next.push_back(point);
+        next.back().push_back(v);
+      }
+    }
+    points = std::move(next);
+  }
+  return points;
+}
+
+/// A mass on the first link acts by its moment alone: one of its two columns.
+int independent_columns(const std::vector<EffectDesign>& designs) {
+  Index linear = 1;
+  for (const EffectDesign& d : designs) {
+    MatrixXd gram = MatrixXd::Zero(d.linear, d.linear);
+    for (const MatrixXd& c : d.columns) {
+      if (c.cols() > 0) gram += transposed_product(c, c) / std::max(c.squaredNorm(), 1e-300);
+    }
+    const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Index here = 0;
+    for (Index i = 0; i < d.linear; ++i)
+      here += gram(i, i) > 1e-12 * gram.diagonal().maxCoeff() ? 1 : 0;
+    const MatrixXd correlation = scale.asDiagonal() * gram * scale.asDiagonal();
+    here = std::min(here, rank(correlation, 1e-6));
+    linear = std::max(linear, here);
+  }
+  return static_cast<int>(linear);
+}
+
+}  // namespace
+
+std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
+                                               const std::vector<EffectAt>& effects) {
+  double rows = 10.0;
+  for (const EvidenceChannel& c : evidence.channels)
+    rows = std::max(rows, static_cast<double>(c.rows()));
+  std::vector<SearchCandidate> all(effects.size());
+  parallel(effects.size(), [&](std::size_t i) {
+    all[i].effect = effects[i];
+    for (auto& shape : grid_of(effects[i], evidence)) {
+      EffectDesign d = make_design(evidence, effects[i], std::move(shape));
+      if (d.acts()) all[i].designs.push_back(std::move(d));
+    }
+  });
+  std::erase_if(all, [](const SearchCandidate& c) { return c.designs.empty(); });
+  for (SearchCandidate& c : all) {
+    const double each = 0.5 * std::log(rows);
+    c.linear = independent_columns(c.designs);
+    const bool optional = std::any_of(c.designs.begin(), c.designs.end(),
+                                      [](const EffectDesign& d) { return d.optional; });
+    if (optional) {
+      std::vector<EffectDesign> all_designs;
+      all_designs.reserve(2 * c.designs.size());
+      for (const EffectDesign& d : c.designs) all_designs.push_back(without_optional(d));
+      const int whole = std::exchange(c.linear, independent_columns(all_designs));
+      c.optional_penalty = each * (whole - c.linear);
+      std::move(c.designs.begin(), c.designs.end(), std::back_inserter(all_designs));
+      c.designs = std::move(all_designs);
+    }
+    c.penalty = each * (c.linear + static_cast<double>(c.designs.front().shape.size()));
+  }
+  return all;
+}
+
+}  // namespace sparflow

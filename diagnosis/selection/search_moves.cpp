@@ -1,0 +1,153 @@
+#include "diagnosis/selection/search_moves.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/selection/search_choice.h"
+#include "diagnosis/selection/search_proofs.h"
+
+namespace sparflow {
+namespace {
+
+bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+               std::size_t j, EffectFit& current) {
+  constexpr double kBeforeRefined = 0.9;  // of the pair's gain, at the grid's parameters
+  std::vector<FoundEffect> trial = found;
+  trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(j));
+  trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(i));
+  const EffectFit without = search.fit(designs_of(trial));
+  const double price = search.price_of(found[i].design) + search.price_of(found[j].design);
+  const double pair = current.total() - without.total() - price;
+  const std::vector<CandidateScore> scores =
+      search.scores.beside(designs_of(trial), without, search.skipped(trial));
+  if (scores.empty() || scores.front().gain < kBeforeRefined * pair) return false;
+  FoundEffect one;
+  one.design = search.scores.refined(designs_of(trial), scores.front(), without);
+  one.p_value = std::min(found[i].p_value, found[j].p_value);
+  trial.push_back(one);
+  EffectFit fit = search.fit(designs_of(trial));
+  const double gain = fit.total() - without.total() - search.price_of(one.design);
+  if (tracing())
+    fmt::print(stderr, "  {} for {} and {}: {:.1f} against {:.1f} nats\n",
+               search.key(one.design.effect), search.key(found[i].design.effect),
+               search.key(found[j].design.effect), gain, pair);
+  if (gain < pair) return false;
+  search.judge(trial, trial.size() - 1, fit);
+  trial.back().gain = gain;
+  if (!why_not_named(trial.back(), search.options).empty()) return false;
+  found = std::move(trial);
+  current = std::move(fit);
+  return true;
+}
+
+}  // namespace
+
+void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current) {
+  for (bool changed = true; changed && found.size() > 1;) {
+    changed = false;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const EffectFit without = search.fit(designs_of(found, i));
+      found[i].gain = current.total() - without.total() - search.price_of(found[i].design);
+      if (found[i].gain > search.options.least_gain) continue;
+      if (tracing())
+        fmt::print(stderr, "  dropped {} ({:.1f})\n", search.key(found[i].design.effect),
+                   found[i].gain);
+      found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+      current = without;
+      changed = true;
+      break;
+    }
+  }
+}
+
+bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current) {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    for (std::size_t j = i + 1; j < found.size(); ++j) {
+      if (search.meet(found[i].design, found[j].design) && merge_two(search, found, i, j, current))
+        return true;
+    }
+  }
+  return false;
+}
+
+bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+             EffectFit& current) {
+  const std::vector<bool> choices = shape_choices(*found[i].design.effect.effect);
+  if (std::find(choices.begin(), choices.end(), true) == choices.end()) return false;
+  const std::vector<const EffectDesign*> others = designs_of(found, i);
+  const EffectFit without = fit_effects(search.evidence, others, &current, {});
+  double most = search.scores.gain(others, found[i].design, without) + 1.0;
+  const CandidateScore* best = nullptr;
+  std::vector<CandidateScore> variants;
+  for (std::size_t c = 0; c < search.candidates.size(); ++c) {
+    if (!(search.candidates[c].effect == found[i].design.effect)) continue;
+    variants.reserve(search.candidates[c].designs.size());
+    for (std::size_t d = 0; d < search.candidates[c].designs.size(); ++d) {
+      const std::vector<double>& shape = search.candidates[c].designs[d].shape;
+      bool other = false;
+      for (std::size_t k = 0; k < shape.size(); ++k)
+        other = other || (choices[k] && shape[k] != found[i].design.shape[k]);
+      if (other) variants.push_back({c, d, 0.0});
+    }
+  }
+  for (CandidateScore& s : variants) {
+    s.gain = search.scores.gain(others, search.design_of(s), without);
+    if (s.gain > most) most = s.gain, best = &s;
+  }
+  if (best == nullptr) return false;
+  FoundEffect variant;
+  variant.design = search.scores.refined(others, *best, without);
+  variant.p_value = found[i].p_value;
+  if (tracing()) {
+    fmt::print(stderr, "  {} changes shape [{:.4g}] -> [{:.4g}]\n",
+               search.key(variant.design.effect), fmt::join(found[i].design.shape, " "),
+               fmt::join(variant.design.shape, " "));
+  }
+  found[i] = std::move(variant);
+  current = search.fit(designs_of(found));
+  return true;
+}
+
+bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+            EffectFit& current) {
+  FoundEffect& f = found[i];
+  const std::vector<const EffectDesign*> others = designs_of(found, i);
+  const EffectFit without = fit_effects(search.evidence, others, &current, {});
+  const std::vector<CandidateScore> scores =
+      search.scores.instead_of(f.design, others, without, search.skipped(found));
+  const double own =
+      search.scores.gain_instead(f.design, f.design, others, without) - search.price_of(f.design);
+  f.gain = own;
+  const CandidateScore* challenger = nullptr;
+  if (!scores.empty() && scores.front().gain > own + 1.0 &&
+      !ordinarily_better(search, others, f.design, search.design_of(scores.front()))) {
+    challenger = &scores.front();
+  }
+  if (challenger != nullptr) {
+    FoundEffect rival;
+    rival.design = search.scores.refined(others, *challenger, without);
+    rival.p_value = f.p_value;
+    std::vector<FoundEffect> trial = found;
+    trial[i] = rival;
+    const EffectFit fit = search.fit(designs_of(trial));
+    search.judge(trial, i, fit);
+    if (why_not_named(trial[i], search.options).empty() && fit.total() > current.total()) {
+      if (tracing())
+        fmt::print(stderr, "  {} takes the place of {}\n", search.key(rival.design.effect),
+                   search.key(f.design.effect));
+      found = std::move(trial);
+      current = fit;
+      return true;
+    }
+  }
+  f.alternatives.clear();
+  for (const CandidateScore& s : scores) {
+    if (s.gain < own - 50.0) break;
+    f.alternatives.emplace_back(search.candidates[s.candidate].effect, own - s.gain);
+  }
+  return false;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,180 @@
+#include "diagnosis/selection/search_scores.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "models/math/parallel.h"
+
+namespace sparflow {
+namespace {
+
+std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
+  std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });
+  std::sort(scores.begin(), scores.end(),
+            [](const CandidateScore& a, const CandidateScore& b) { return a.gain > b.gain; });
+  return scores;
+}
+
+}  // namespace
+
+/// Channels a design touches, and all that share a parameter with them.
+std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>& designs,
+                                          const EffectDesign& d) const {
+  std::vector<bool> active(evidence_.channels.size());
+  for (std::size_t c = 0; c < active.size(); ++c) active[c] = d.touches(c);
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const EffectDesign* other : designs) {
+      bool meets = false, outside = false;
+      for (std::size_t c = 0; c < active.size(); ++c) {
+        meets = meets || (other->touches(c) && active[c]);
+        outside = outside || (other->touches(c) && !active[c]);
+      }
+      if (!meets || !outside) continue;
+      grown = true;
+      for (std::size_t c = 0; c < active.size(); ++c) active[c] = active[c] || other->touches(c);
+    }
+  }
+  return active;
+}
+
+/// Noise that was fitted without an effect may hold the effect for noise: what is slow (oil that warms, a wrong mass)
+/// then stays offsets of motions. The likelihood has both maxima; from white noise the effect comes first.
+bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) const {
+  constexpr double kOffsets = 0.2,
+                   kSlow = 0.85;  // share of the variance; correlation of neighbours
+  for (std::size_t c = 0; c < current.noise.size(); ++c) {
+    if (!d.touches(c)) continue;
+    const NoiseModel& noise = current.noise[c];
+    const double whole = noise.deviation() * noise.deviation();
+    if (noise.offset_variance > kOffsets * whole || noise.phi1 > kSlow * (1.0 - noise.phi2))
+      return true;
+  }
+  return false;
+}
+
+/// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
+double SearchScores::gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
+                          const EffectFit& current, const std::vector<bool>& also,
+                          bool only_there) const {
+  FitControl c;
+  c.active = connected(base, d);
+  for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
+  c.noise_passes = 2;
+  std::vector<const EffectDesign*> with;
+  for (const EffectDesign* b : base) {
+    bool needed = false;
+    for (std::size_t k = 0; k < c.active.size(); ++k)
+      needed = needed || (b->touches(k) && c.active[k]);
+    if (needed) with.push_back(b);
+  }
+  with.push_back(&d);
+  const auto gained = [&](const EffectFit& fit) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < c.active.size(); ++k) {
+      // a rival must explain the same evidence, not other evidence as much
+      if (only_there ? also[k] : c.active[k])
+        sum += fit.log_likelihood[k] - current.log_likelihood[k];
+    }
+    return sum;
+  };
+  const double from_current = gained(fit_effects(evidence_, with, &current, c));
+  if (!may_hide(current, d)) return from_current;
+  return std::max(from_current, gained(fit_effects(evidence_, with, nullptr, c)));
+}
+
+std::vector<bool> SearchScores::touched_by(const EffectDesign& design) const {
+  std::vector<bool> touched(evidence_.channels.size());
+  for (std::size_t c = 0; c < touched.size(); ++c) touched[c] = design.touches(c);
+  return touched;
+}
+
+std::vector<CandidateScore> SearchScores::beside(const std::vector<const EffectDesign*>& base,
+                                                 const EffectFit& current,
+                                                 const std::vector<bool>& skip) const {
+  std::vector<CandidateScore> scores(candidates_.size());
+  parallel(candidates_.size(), [&](std::size_t i) {
+    if (skip[i]) return;
+    for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
+      const double g = gain(base, candidates_[i].designs[k], current) -
+                       candidates_[i].price(candidates_[i].designs[k]);
+      if (g > scores[i].gain) scores[i] = {i, k, g};
+    }
+  });
+  return sorted(std::move(scores));
+}
+
+std::vector<CandidateScore> SearchScores::instead_of(const EffectDesign& place,
+                                                     const std::vector<const EffectDesign*>& others,
+                                                     const EffectFit& without,
+                                                     const std::vector<bool>& skip) const {
+  const std::vector<bool> touched = touched_by(place);
+  std::vector<CandidateScore> scores(candidates_.size());
+  parallel(candidates_.size(), [&](std::size_t k) {
+    const SearchCandidate& c = candidates_[k];
+    if (skip[k]) return;
+    for (std::size_t d = 0; d < c.designs.size(); ++d) {
+      bool meets = false;
+      for (std::size_t ch = 0; ch < touched.size(); ++ch)
+        meets = meets || (touched[ch] && c.designs[d].touches(ch));
+      if (!meets) return;
+      const double g = gain(others, c.designs[d], without, touched, true) - c.price(c.designs[d]);
+      if (g > scores[k].gain) scores[k] = {k, d, g};
+    }
+  });
+  return sorted(std::move(scores));
+}
+
+double SearchScores::gain_instead(const EffectDesign& design, const EffectDesign& place,
+                                  const std::vector<const EffectDesign*>& others,
+                                  const EffectFit& without) const {
+  return gain(others, design, without, touched_by(place), true);
+}
+
+OrdinaryResidual SearchScores::ordinary(const std::vector<const EffectDesign*>& base,
+                                        const EffectDesign& design) const {
+  return ordinary_residual(evidence_, base, design, connected(base, design));
+}
+
+/// Nonlinear parameters between grid points, by golden section in each in turn.
+EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
+                                   const CandidateScore& score, const EffectFit& current) const {
+  const SearchCandidate& candidate = candidates_[score.candidate];
+  EffectDesign d = candidate.designs[score.design];
+  if (d.shape.empty()) return d;
+  double at_best = gain(base, d, current);
+  const std::vector<bool> choices = shape_choices(*d.effect.effect);
+  for (std::size_t k = 0; k < d.shape.size(); ++k) {
+    if (choices[k]) continue;
+    std::vector<double> values;
+    for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
+    std::sort(values.begin(), values.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+    const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
+    if (here == values.end()) continue;
+    double lo = here == values.begin() ? *here : *(here - 1);
+    double hi = here + 1 == values.end() ? *here : *(here + 1);
+    const double golden = 0.381966;
+    for (int i = 0; i < 14 && hi - lo > 2e-3 * std::max(std::abs(hi), 1e-12); ++i) {
+      const bool right = hi - d.shape[k] > d.shape[k] - lo;
+      EffectDesign trial = d;
+      const double x =
+          right ? d.shape[k] + golden * (hi - d.shape[k]) : d.shape[k] - golden * (d.shape[k] - lo);
+      std::vector<double> shape = d.shape;
+      shape[k] = x;
+      trial = make_design(evidence_, d.effect, shape, {}, d.optional);
+      const double g = trial.acts() ? gain(base, trial, current) : -1e300;
+      if (g > at_best) {
+        (right ? lo : hi) = d.shape[k];
+        d = std::move(trial);
+        at_best = g;
+      } else {
+        (right ? hi : lo) = x;
+      }
+    }
+  }
+  return d;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,233 @@
+#include "diagnosis/selftest/selftest.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <set>
+
+#include "diagnosis/regression/null_gate.h"
+#include "diagnosis/selftest/selftest_study.h"
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+/// Residual so far above the sensors' own noise is no noise: something is missing already.
+constexpr double kSuspiciousNoise = 3.0;
+
+/// An effect without action in these logs: signals missing, or a motion that never provokes it.
+InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
+                              const EffectAt& effect) {
+  const EffectInfo& info = effect.effect->info();
+  InjectedEffect out;
+  out.effect = effect;
+  out.id = info.id;
+  const std::string key = effect_key(info, machine, effect.at);
+  out.at = key.size() > info.id.size() ? key.substr(info.id.size() + 1) : "";
+  out.stage = effect_stage_name(info.stage);
+  out.separated_by = info.separated_by;
+  const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
+  const bool placed = info.place == EffectPlace::kCylinder;
+  const bool measured = std::any_of(
+      evidence.channels.begin(), evidence.channels.end(), [&](const EvidenceChannel& c) {
+        return std::find(kinds.begin(), kinds.end(), c.kind) != kinds.end() &&
+               (!placed || c.kind == EvidenceKind::kPump || c.index == effect.at);
+      });
+  const bool oil = std::any_of(info.signals.begin(), info.signals.end(), [](const std::string& w) {
+    return w.find("oil temperature") != std::string::npos;
+  });
+  const bool no_oil = std::all_of(evidence.series.begin(), evidence.series.end(),
+                                  [](const MachineSeries& s) { return s.oil.size() == 0; });
+  out.reason = oil && no_oil ? "not measured: it needs the oil temperature"
+               : measured    ? "no motion of these logs provokes it"
+                          : fmt::format("not measured: it needs {}", fmt::join(info.signals, ", "));
+  return out;
+}
+
+/// Effects to inject: stage by stage in turn, clearly predicted ones only, seen before unseen, drawn at random.
+std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects, int count,
+                                     unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::vector<std::vector<std::size_t>> piles;
+  for (const bool seen : {true, false}) {
+    for (const char* stage : {"force", "flow", "pressure", "pump", "sensor"}) {
+      piles.emplace_back();
+      for (std::size_t i = 0; i < effects.size(); ++i) {
+        const InjectedEffect& e = effects[i];
+        const bool clear =
+            seen ? e.power > 0.97 && e.times95 < 0.8 : e.power < 0.03 && !e.typical.empty();
+        if (e.stage == stage && clear) piles.back().push_back(i);
+      }
+      std::shuffle(piles.back().begin(), piles.back().end(), random);
+    }
+  }
+  std::vector<std::size_t> out;
+  const auto take = [&](std::size_t pile) {
+    if (static_cast<int>(out.size()) >= count || piles[pile].empty()) return false;
+    out.push_back(piles[pile].back());
+    piles[pile].pop_back();
+    return true;
+  };
+  for (bool any = true; any;) {
+    any = false;
+    for (std::size_t p = 0; p < 5; ++p) any = take(p) || any;
+    for (std::size_t p = 5; p < 10 && count > 3; ++p) {  // one that should stay unseen a round
+      if (!take(p)) continue;
+      any = true;
+      break;
+    }
+  }
+  return out;
+}
+
+std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>& effects) {
+  std::set<std::vector<std::string>> sets;
+  for (const InjectedEffect& e : effects) {
+    if (e.confused_with.empty()) continue;
+    std::vector<std::string> keys = {e.key()};
+    for (const Confusion& c : e.confused_with) keys.push_back(c.key);
+    std::sort(keys.begin(), keys.end());
+    sets.insert(std::move(keys));
+  }
+  std::vector<std::vector<std::string>> out;
+  for (const auto& s : sets) {  // a set inside another says nothing new
+    const bool inside = std::any_of(sets.begin(), sets.end(), [&](const auto& other) {
+      return other.size() > s.size() &&
+             std::includes(other.begin(), other.end(), s.begin(), s.end());
+    });
+    if (!inside) out.push_back(s);
+  }
+  return out;
+}
+
+/// For a set, the motion that tells the effect it was found for, at its typical size, from the others.
+std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evidence,
+                                    const EffectFit& fit,
+                                    const std::vector<InjectedEffect>& effects,
+                                    const std::vector<std::vector<std::string>>& sets) {
+  const auto named = [&](const std::string& key) {
+    return std::find_if(effects.begin(), effects.end(),
+                        [&](const InjectedEffect& e) { return e.key() == key; });
+  };
+  std::vector<Experiment> out;
+  for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
+    // all others are its rivals; of the other members that need not hold
+    const auto whole = std::find_if(sets[k].begin(), sets[k].end(), [&](const std::string& key) {
+      return named(key)->confused_with.size() + 1 == sets[k].size();
+    });
+    const InjectedEffect& first = *named(whole != sets[k].end() ? *whole : sets[k].front());
+    AppliedEffect typical{first.effect.effect, first.effect.at, {}, {}, {}};
+    for (std::size_t p = 0; p < first.typical.size(); ++p)
+      typical.values.push_back(first.typical[p].value *
+                               first.effect.effect->info().parameters[p].si);
+    std::vector<EffectAt> rivals;
+    for (const std::string& key : sets[k]) {
+      if (key != first.key()) rivals.push_back(named(key)->effect);
+    }
+    out.push_back(next_experiment(model, evidence, fit, typical, rivals));
+  }
+  return out;
+}
+
+}  // namespace
+
+Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
+                  const std::vector<Log>& references, const SelftestOptions& options,
+                  const SearchProgress& progress) {
+  if (logs.empty()) throw InputError({}, "logs", "no log to test: give at least one with --log");
+  const auto start = std::chrono::steady_clock::now();
+  const auto report = [&](double share, const std::string& what) {
+    if (progress) progress(share, what);
+  };
+  Selftest out;
+  report(0.02, "arranging the evidence");
+  std::vector<MachineSignals> suspects, pinned;
+  for (const Log& log : logs) {
+    suspects.push_back(make_signals(model.machine, log, options.signals));
+    out.samples += static_cast<double>(log.samples());
+    out.duration += log.time.size() > 0 ? log.time[log.time.size() - 1] - log.time[0] : 0.0;
+  }
+  for (const Log& log : references)
+    pinned.push_back(make_signals(model.machine, log, options.signals));
+  out.logs = logs.size();
+  out.references = references.size();
+  out.false_alarm = options.search.false_alarm;
+  const Evidence evidence = collect_evidence(model, suspects, pinned);
+  const Evidence alone = references.empty() ? Evidence{} : collect_evidence(model, suspects);
+  out.notes = evidence.notes;
+
+  std::vector<EffectAt> wanted = options.candidates;
+  if (wanted.empty()) {
+    for (const EffectAt& c : candidates(model.machine)) {
+      const bool known =
+          std::any_of(model.effects.begin(), model.effects.end(),
+                      [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
+      if (!known) wanted.push_back(c);
+    }
+  }
+  FitControl control;
+  const EffectFit fit = fit_effects(evidence, {}, nullptr, control);
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = evidence.channels[c];
+    const double ratio = fit.noise[c].deviation() / channel.noise_floor;
+    if (!(ratio > kSuspiciousNoise)) continue;
+    out.notes.push_back(fmt::format(
+        "{}: what the model leaves is {:.0f} times the sensors' noise and counts as noise here; "
+        "`diagnose` may find its cause, then more can be seen",
+        channel.text, ratio));
+  }
+  report(0.1, "making the effects' signatures");
+  std::vector<SearchCandidate> all = search_candidates(evidence, wanted);
+  for (const EffectAt& w : wanted) {
+    const bool acts = std::any_of(all.begin(), all.end(), [&](const SearchCandidate& c) {
+      return c.effect.effect == w.effect && c.effect.at == w.at;
+    });
+    if (!acts) out.effects.push_back(without_action(evidence, model.machine, w));
+  }
+  report(0.3, "the gate on these motions");
+  std::vector<GateCandidate> gated;
+  gated.reserve(all.size());
+  for (const SearchCandidate& c : all) gated.push_back({&c.designs, c.penalty, c.optional_penalty});
+  std::mt19937_64 random(options.search.seed);
+  const NullGate gate =
+      make_null_gate(evidence, gated, {}, fit, options.search.simulations, random);
+  out.threshold = gate.threshold(options.search.false_alarm);
+  report(0.5, "power and confusion");
+  SelftestStudy study(model, evidence, references.empty() ? nullptr : &alone, fit, std::move(all),
+                      gate, options.search);
+  const std::vector<InjectedEffect> seen = study.run();
+
+  const std::vector<std::size_t> drawn = draw_checks(seen, options.check, options.search.seed);
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    const std::size_t i = drawn[k];
+    report(0.6 + 0.35 * static_cast<double>(k) / static_cast<double>(drawn.size()),
+           "injecting " + seen[i].key());
+    const SearchCandidate& c = study.candidate(i);
+    InjectionCheck check =
+        inject_and_search(evidence, fit, c.designs[study.size(i).typical], study.size(i).theta,
+                          wanted, options.search, options.search.seed + static_cast<unsigned>(k));
+    check.power = seen[i].power;
+    check.predicted = seen[i].visibility == Visibility::kSeen;
+    out.checks.push_back(std::move(check));
+  }
+  out.sets = sets_of(seen);
+  report(0.97, "motions that would tell effects apart");
+  out.experiments = motions_for(model, evidence, fit, seen, out.sets);
+  out.effects.insert(out.effects.end(), seen.begin(), seen.end());
+  const auto place = [&](const InjectedEffect& e) {
+    return std::find_if(wanted.begin(), wanted.end(),
+                        [&](const EffectAt& w) {
+                          return w.effect == e.effect.effect && w.at == e.effect.at;
+                        }) -
+           wanted.begin();
+  };
+  std::sort(out.effects.begin(), out.effects.end(),
+            [&](const auto& a, const auto& b) { return place(a) < place(b); });
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report(1.0, "done");
+  return out;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,253 @@
+#include "diagnosis/selftest/selftest_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/selection/effect_intervals.h"
+#include "models/math/parallel.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<ShownValue> shown(const EffectInfo& info, const std::vector<double>& values) {
+  std::vector<ShownValue> out;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const EffectParameter& p = info.parameters[k];
+    out.push_back({p.name, p.unit, values[k] / p.si});
+  }
+  return out;
+}
+
+EffectFit noise_only(const EffectFit& fit, const VectorXd& theta) {
+  EffectFit out;
+  out.noise = fit.noise;
+  out.theta = theta;
+  return out;
+}
+
+/// Whether so few motions show it that leaving some out would not prove it: the rule of the held-out gain on the
+/// expected gains of the folds, noise aside.
+bool in_too_few_motions(const Evidence& evidence, const Signature& s, int folds) {
+  VectorXd gains = VectorXd::Zero(folds);
+  for (std::size_t c = 0; c < s.white.size(); ++c) {
+    if (s.white[c].size() == 0) continue;
+    const std::vector<NoiseBlock>& blocks = evidence.channels[c].blocks;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      gains[static_cast<Index>(b) % folds] +=
+          s.white[c].segment(blocks[b].first, blocks[b].last - blocks[b].first).squaredNorm();
+    }
+  }
+  const double n = folds,
+               error = std::sqrt((gains.array() - gains.mean()).square().sum() * n / (n - 1.0));
+  const auto positive = (gains.array() > 1e-6 * gains.sum()).count();
+  return gains.sum() <= error && static_cast<double>(positive) < 0.79 * n;
+}
+
+}  // namespace
+
+bool behind_learned_law(EffectStage stage) {
+  return stage == EffectStage::kPressure || stage == EffectStage::kPump;
+}
+
+SelftestStudy::SelftestStudy(const CraneModel& model, const Evidence& evidence,
+                             const Evidence* alone, const EffectFit& fit,
+                             std::vector<SearchCandidate> candidates, NullGate gate,
+                             const SearchOptions& options)
+    : machine_(model.machine),
+      evidence_(evidence),
+      alone_(alone),
+      fit_(fit),
+      options_(options),
+      gate_(std::move(gate)),
+      threshold_(std::max(gate_.threshold(options.false_alarm), options.least_gain)),
+      power_(evidence, fit, options.seed),
+      candidates_(std::move(candidates)),
+      sizes_(candidates_.size()),
+      projected_(candidates_.size()),
+      result_(candidates_.size()) {
+  parallel(candidates_.size(), [&](std::size_t i) {
+    sizes_[i] = size_effect(candidates_[i]);
+    for (const EffectDesign& d : candidates_[i].designs) projected_[i].push_back(power_.project(d));
+  });
+}
+
+std::vector<InjectedEffect> SelftestStudy::run() {
+  parallel(candidates_.size(), [&](std::size_t i) { see(i); });
+  parallel(candidates_.size(), [&](std::size_t i) { confuse(i); });
+  return result_;
+}
+Signature SelftestStudy::typical_signature(std::size_t i) const {
+  return signature(projected_[i][sizes_[i].typical], sizes_[i].theta);
+}
+
+double SelftestStudy::price(std::size_t i) const {
+  return gate_.scale[i] * (threshold_ + candidates_[i].penalty);
+}
+
+/// Chance that a gain of that mean passes the gate.
+double SelftestStudy::chance(std::size_t i, double gain) const {
+  const SearchCandidate& c = candidates_[i];
+  return chance_above(2.0 * price(i), c.linear, 2.0 * gain);
+}
+
+/// Least number of times the typical size with that mean gain, and parameter values there.
+std::pair<double, std::vector<double>> SelftestStudy::times_for(std::size_t i,
+                                                                const Signature& typical,
+                                                                double gain) const {
+  const EffectSize& s = sizes_[i];
+  const SearchCandidate& c = candidates_[i];
+  if (s.rungs.empty()) {
+    double lo = std::log(1e-4), hi = std::log(s.largest);
+    if (power_.gain(typical, s.largest) < gain) return {kInfinity, {}};
+    for (int k = 0; k < 22; ++k) {  // to 3e-6 of the range of logarithms
+      const double middle = 0.5 * (lo + hi);
+      (power_.gain(typical, std::exp(middle)) < gain ? lo : hi) = middle;
+    }
+    const double times = std::exp(hi);
+    return {times, parameter_values(*c.effect.effect, times * s.theta, c.designs[s.typical].shape)};
+  }
+  // by rungs of its grid, from the weakest to the strongest, interpolated between two
+  double before_gain = 0.0, before_value = 0.0, before_times = 0.0;
+  for (std::size_t k = 0; k < s.rungs.size(); ++k) {
+    const Rung& rung = s.rungs[k];
+    const double g = power_.gain(signature(projected_[i][rung.design], s.theta));
+    if (g < gain) {
+      before_gain = g, before_value = rung.value, before_times = rung.times;
+      continue;
+    }
+    std::vector<double> shape = c.designs[rung.design].shape;
+    double times = rung.times;
+    if (k > 0 && g > before_gain) {
+      const double t =
+          (std::sqrt(gain) - std::sqrt(before_gain)) / (std::sqrt(g) - std::sqrt(before_gain));
+      shape[0] = before_value + t * (rung.value - before_value);
+      times = before_times + t * (rung.times - before_times);
+    }
+    return {times, parameter_values(*c.effect.effect, s.theta, shape)};
+  }
+  return {kInfinity, {}};
+}
+
+double SelftestStudy::absorbed_alone(const SearchCandidate& c, const EffectSize& s) const {
+  const EffectDesign d = make_design(*alone_, c.effect, c.designs[s.typical].shape);
+  EffectFit fit;
+  fit.theta = s.theta;
+  for (const EvidenceChannel& channel : alone_->channels) {
+    fit.noise.emplace_back();
+    for (std::size_t k = 0; k < evidence_.channels.size(); ++k) {
+      if (evidence_.channels[k].kind == channel.kind &&
+          evidence_.channels[k].index == channel.index)
+        fit.noise.back() = fit_.noise[k];
+    }
+  }
+  return d.acts() ? effect_action(*alone_, {&d}, 0, fit).absorbed : 1.0;
+}
+
+void SelftestStudy::see(std::size_t i) {
+  const SearchCandidate& c = candidates_[i];
+  const EffectSize& s = sizes_[i];
+  const EffectDesign& design = c.designs[s.typical];
+  const EffectInfo& info = c.effect.effect->info();
+  InjectedEffect& out = result_[i];
+  out.effect = c.effect;
+  out.id = info.id;
+  const std::string key = effect_key(info, machine_, c.effect.at);
+  out.at = key.size() > info.id.size() ? key.substr(info.id.size() + 1) : "";
+  out.stage = effect_stage_name(info.stage);
+  out.separated_by = info.separated_by;
+  out.typical = shown(info, parameter_values(*c.effect.effect, s.theta, design.shape));
+  const EffectAction action = effect_action(evidence_, {&design}, 0, noise_only(fit_, s.theta));
+  out.size = action.size;
+  out.absorbed = out.absorbed_alone = action.absorbed;
+  if (alone_ != nullptr) out.absorbed_alone = absorbed_alone(c, s);
+  const Signature typical = typical_signature(i);
+  out.gain = power_.gain(typical);
+  if (behind_learned_law(info.stage) && out.absorbed > options_.largest_absorbed) {
+    out.reason = fmt::format("learned laws imitate {:.0f} % of it; {}", 100.0 * out.absorbed,
+                             evidence_.has_reference() ? "the references pin too little"
+                                                       : "give a log without it as --reference");
+    return;
+  }
+  if (in_too_few_motions(evidence_, typical, options_.folds)) {
+    out.reason = "too few motions show it: repeat what provokes it";
+    return;
+  }
+  const double nats = price(i);
+  const auto [t80, v80] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.8, c.linear));
+  const auto [t95, v95] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.95, c.linear));
+  out.times80 = t80;
+  out.times95 = t95;
+  std::vector<double> values = v80;
+  // the estimate of its size must also pass what is worth a name; its relative error is that of a known noise
+  const double squares = typical.squares();
+  const double deviation = squares > 0.0 ? 1.0 / std::sqrt(squares) : kInfinity;
+  const auto large_enough = [&](double quantile) {
+    return options_.smallest_effect / std::max(out.size, 1e-12) + quantile * deviation;
+  };
+  if (s.rungs.empty()) {
+    if (large_enough(0.84) > out.times80) {
+      out.times80 = large_enough(0.84);
+      values = parameter_values(*c.effect.effect, out.times80 * s.theta, design.shape);
+    }
+    out.times95 = std::max(out.times95, large_enough(1.64));
+    if (out.times80 > s.largest) out.times80 = kInfinity;
+    if (out.times95 > s.largest) out.times95 = kInfinity;
+  }
+  out.power = chance(i, out.gain);
+  if (std::isfinite(deviation)) {
+    const double beyond = (1.0 - options_.smallest_effect / std::max(out.size, 1e-12)) / deviation;
+    out.power *= 0.5 * std::erfc(-beyond / std::sqrt(2.0));
+  }
+  out.visibility = out.power >= 0.8             ? Visibility::kSeen
+                   : std::isfinite(out.times80) ? Visibility::kOnlyLarge
+                                                : Visibility::kNever;
+  if (std::isfinite(out.times80)) out.smallest = shown(info, values);
+  if (out.visibility == Visibility::kOnlyLarge)
+    out.reason = fmt::format("{:.2f} times the noise where it acts", out.size);
+  if (out.visibility == Visibility::kNever)
+    out.reason = "below the noise at any plausible size: stronger or more motions are needed";
+}
+
+/// Rivals, at the typical size or at the smallest that would be seen, whichever is larger.
+void SelftestStudy::confuse(std::size_t i) {
+  InjectedEffect& out = result_[i];
+  if (out.visibility == Visibility::kNever) return;
+  Signature s = typical_signature(i);
+  if (sizes_[i].rungs.empty() && out.times80 > 1.0)
+    s = signature(projected_[i][sizes_[i].typical], out.times80 * sizes_[i].theta);
+  const double squares = s.squares();
+  for (std::size_t k = 0; k < candidates_.size(); ++k) {
+    if (k == i) continue;
+    const EffectInfo& rival = candidates_[k].effect.effect->info();
+    // a rival that would be refused is none
+    if (behind_learned_law(rival.stage) && result_[k].absorbed > options_.largest_absorbed)
+      continue;
+    Confusion worst{effect_key(rival, machine_, candidates_[k].effect.at), kInfinity, 0.0};
+    Signature left;
+    for (const ProjectedDesign& p : projected_[k]) {
+      bool meets = false;
+      for (std::size_t c = 0; c < p.white.size(); ++c)
+        meets = meets || (p.white[c].cols() > 0 && s.white[c].size() > 0);
+      if (!meets) break;
+      Signature here = left_by(s, p);
+      const double share = 1.0 - here.squares() / squares;
+      if (share <= worst.share) continue;
+      worst.share = share;
+      left = std::move(here);
+    }
+    if (worst.share < 0.2) continue;  // four nats of a gain that passes any gate are more than that
+    worst.nats = std::min(power_.gain(left), 0.5 * left.squares());
+    if (worst.nats < options_.same_nats) out.confused_with.push_back(std::move(worst));
+  }
+  std::sort(out.confused_with.begin(), out.confused_with.end(),
+            [](const Confusion& a, const Confusion& b) { return a.nats < b.nats; });
+}
+
+}  // namespace sparflow

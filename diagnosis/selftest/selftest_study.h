@@ -1,0 +1,54 @@
+#pragma once
+/// Power and confusion of every candidate on the user's own motions. Used by selftest.cpp only.
+#include <utility>
+#include <vector>
+
+#include "diagnosis/experiment/effect_power.h"
+#include "diagnosis/regression/null_gate.h"
+#include "diagnosis/selftest/selftest.h"
+#include "diagnosis/selftest/selftest_size.h"
+
+namespace sparflow {
+
+/// Learned laws stand between the effect and the logs: what they imitate is not named.
+bool behind_learned_law(EffectStage stage);
+
+class SelftestStudy {
+ public:
+  /// @param alone the same evidence without references; null when there are none
+  /// @param fit of nothing: the channels' noise  @param gate of these candidates, in their order
+  /// All references and pointers must outlive this.
+  SelftestStudy(const CraneModel& model, const Evidence& evidence, const Evidence* alone,
+                const EffectFit& fit, std::vector<SearchCandidate> candidates, NullGate gate,
+                const SearchOptions& options);
+
+  std::vector<InjectedEffect> run();
+  const EffectSize& size(std::size_t i) const { return sizes_[i]; }
+  const SearchCandidate& candidate(std::size_t i) const { return candidates_[i]; }
+
+ private:
+  Signature typical_signature(std::size_t i) const;
+  /// [nats] a gain must reach before its price: the gate's threshold, calibrated for this candidate.
+  double price(std::size_t i) const;
+  double chance(std::size_t i, double gain) const;
+  std::pair<double, std::vector<double>> times_for(std::size_t i, const Signature& typical,
+                                                   double gain) const;
+  double absorbed_alone(const SearchCandidate& c, const EffectSize& s) const;
+  void see(std::size_t i);
+  void confuse(std::size_t i);
+
+  const Machine& machine_;
+  const Evidence& evidence_;
+  const Evidence* alone_;
+  const EffectFit& fit_;
+  const SearchOptions& options_;
+  NullGate gate_;
+  double threshold_;
+  PowerStudy power_;
+  std::vector<SearchCandidate> candidates_;
+  std::vector<EffectSize> sizes_;
+  std::vector<std::vector<ProjectedDesign>> projected_;
+  std::vector<InjectedEffect> result_;
+};
+
+}  // namespace sparflow

@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "diagnosis/verdict/diagnose.h"
+#include "identification/comparison/report_numbers.h"
+
+namespace sparflow {
+namespace {
+
+std::string with_interval(const ParameterEstimate& p) {
+  const std::string unit = p.unit.empty() || p.unit == "-" ? "" : " " + p.unit;
+  if (p.lower95 == p.upper95) return fmt::format("{} = {:g}{}", p.name, p.value, unit);
+  return fmt::format("{} = {}{} ({} .. {})", p.name, plain_number(p.value, 4), unit,
+                     plain_number(p.lower95, 4), plain_number(p.upper95, 4));
+}
+
+std::string title_of(const DiagnosedEffect& e) {
+  const std::string& title = e.effect.effect->info().title;
+  return e.at.empty() ? title : title + " of " + e.at;
+}
+
+/// JSON has no NaN.
+nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
+  nlohmann::json j = {
+      {"id", e.id},
+      {"at", e.at},
+      {"stage", e.stage},
+      {"probability", e.probability},
+      {"p_value", e.p_value},
+      {"log_likelihood_gain", e.gain},
+      {"held_out_gain", {{"value", e.held_out_gain}, {"standard_error", e.held_out_error}}},
+      {"absorbed", e.absorbed},
+      {"evidence", e.evidence}};
+  j["parameters"] = nlohmann::json::array();
+  for (const ParameterEstimate& p : e.parameters) {
+    j["parameters"].push_back({{"name", p.name},
+                               {"value", json_number(p.value)},
+                               {"unit", p.unit},
+                               {"ci95", {json_number(p.lower95), json_number(p.upper95)}}});
+  }
+  j["channels"] = nlohmann::json::array();
+  for (const ChannelGain& g : e.channels) {
+    const EvidenceChannel& c = evidence.channels[g.channel];
+    j["channels"].push_back({{"what", c.text},
+                             {"unit", c.unit.name},
+                             {"rmse_before", g.rmse_before / c.unit.si},
+                             {"rmse_after", g.rmse_after / c.unit.si},
+                             {"noise_floor", json_number(g.noise_floor / c.unit.si)}});
+  }
+  if (!e.channels.empty()) {
+    const ChannelGain& g = e.channels.front();
+    const FieldUnit& unit = evidence.channels[g.channel].unit;
+    j["rmse_before"] = g.rmse_before / unit.si;
+    j["rmse_after"] = g.rmse_after / unit.si;
+    j["rmse_noise_floor"] = json_number(g.noise_floor / unit.si);
+    j["rmse_unit"] = unit.name;
+  }
+  j["rivals"] = nlohmann::json::array();
+  for (const auto& [key, worse] : e.rivals)
+    j["rivals"].push_back({{"effect", key}, {"worse_by", worse}});
+  return j;
+}
+
+}  // namespace
+
+std::string Diagnosis::headline() const {
+  switch (verdict) {
+    case Verdict::kBadData:
+      return fmt::format(
+          "Bad data: {}{}", bad_channel_sentence(bad.front()),
+          bad.size() > 1 ? fmt::format(" And {} more channel(s).", bad.size() - 1) : "");
+    case Verdict::kNone:
+      return "Nothing is missing: what is left is noise, as far as these logs can tell.";
+    case Verdict::kUnknown:
+      if (unexplained && unexplained->few_places)
+        return fmt::format("Something happened too seldom to prove a law: {}.",
+                           unexplained->sentence);
+      return fmt::format("Something is missing that is not in the catalogue{}.",
+                         unexplained ? ": " + unexplained->sentence : "");
+    case Verdict::kMissing:
+      break;
+  }
+  std::vector<std::string> parts;
+  for (const DiagnosedEffect& e : effects) {
+    std::string part = title_of(e);
+    if (!e.rivals.empty()) {
+      std::vector<std::string> rivals;
+      for (const auto& [key, worse] : e.rivals) rivals.push_back(key);
+      part += fmt::format(" (or {})", fmt::join(rivals, ", "));
+    }
+    parts.push_back(part);
+  }
+  return fmt::format("Missing: {}.", fmt::join(parts, "; "));
+}
+
+std::string Diagnosis::table() const {
+  std::string out = headline() + "\n\n";
+  if (verdict == Verdict::kBadData) {
+    for (std::size_t i = 1; i < bad.size(); ++i)  // the headline has the first
+      out += fmt::format("  {}\n", bad_channel_sentence(bad[i]));
+    return out;
+  }
+  for (const DiagnosedEffect& e : effects) {
+    out += fmt::format("  {:32s} {:>3.0f} % sure   stage {}\n", e.key(),
+                       std::floor(100.0 * e.probability), e.stage);
+    for (const ParameterEstimate& p : e.parameters)
+      out += fmt::format("      {}\n", with_interval(p));
+    for (std::size_t i = 0; i < std::min<std::size_t>(4, e.evidence.size()); ++i) {
+      out += fmt::format("      {}\n", e.evidence[i]);
+    }
+    if (e.absorbed > 0.05) {
+      out += fmt::format("      {:.0f} % of it would be swallowed by refitting what is learned\n",
+                         100.0 * e.absorbed);
+    }
+  }
+  if (!indistinguishable.empty()) {
+    out += "\n  Cannot be told apart on these logs:\n";
+    for (std::size_t i = 0; i < indistinguishable.size(); ++i) {
+      out += fmt::format("      {}\n", fmt::join(indistinguishable[i], "  or  "));
+      if (i < experiments.size()) out += fmt::format("        {}\n", experiments[i].sentence());
+    }
+  }
+  if (unexplained && verdict != Verdict::kUnknown)  // else the headline has it
+    out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
+  if (effects.empty() && !ranking.empty()) {
+    out += "  Nearest candidates (gain in nats beyond their price; the gate is at ";
+    out += fmt::format("{:.1f}):\n", search.threshold);
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, ranking.size()); ++i) {
+      out += fmt::format("      {:32s} {:8.1f}\n", ranking[i].first, ranking[i].second);
+    }
+  }
+  out += fmt::format("\n  Chance of this evidence if nothing were missing: {}{:.2g}\n",
+                     p_value <= 1.01 / 301.0 ? "below " : "", p_value);
+  for (const std::string& note : notes) out += fmt::format("  note: {}\n", note);
+  return out;
+}
+
+std::string Diagnosis::json() const {
+  nlohmann::json j = {
+      {"verdict", verdict_name(verdict)}, {"p_value", p_value}, {"headline", headline()}};
+  j["effects"] = nlohmann::json::array();
+  for (const DiagnosedEffect& e : effects) {
+    if (verdict == Verdict::kMissing && e.probability >= 0.5)
+      j["effects"].push_back(json_of(e, evidence));
+  }
+  // named only as one of a set: never more than half sure of one of them
+  if (verdict == Verdict::kMissing) {
+    for (const DiagnosedEffect& e : effects) {
+      if (e.probability >= 0.5) continue;
+      nlohmann::json one = json_of(e, evidence);
+      j["one_of_a_set"].push_back(one);
+    }
+  }
+  j["indistinguishable"] = indistinguishable;
+  nlohmann::json experiment_list = nlohmann::json::array();
+  for (const Experiment& e : experiments) {
+    nlohmann::json one = {{"reason", e.reason}, {"motion", e.motion}};
+    if (e.nats_per_minute > 0.0) {
+      one["nats_per_minute"] = e.nats_per_minute;
+      one["nats_per_minute_of_these_logs"] = e.nats_here;
+    }
+    experiment_list.push_back(std::move(one));
+  }
+  j["experiment"] = experiment_list.empty() ? nlohmann::json(nullptr) : experiment_list.front();
+  j["experiments"] = std::move(experiment_list);
+  j["unexplained"] = nullptr;
+  if (unexplained) {
+    const Unexplained& u = *unexplained;
+    j["unexplained"] = {{"stage", u.stage},           {"at", u.at},
+                        {"depends_on", u.depends_on}, {"share", u.share},
+                        {"rmse", u.rmse / u.unit.si}, {"unit", u.unit.name},
+                        {"sentence", u.sentence}};
+  }
+  j["bad_data"] = nlohmann::json::array();
+  for (const BadChannel& b : bad) {
+    j["bad_data"].push_back({{"channel", b.channel},
+                             {"kind", bad_data_word(b.kind)},
+                             {"from_s", b.from_s},
+                             {"to_s", b.to_s},
+                             {"share", b.share},
+                             {"evidence", b.evidence},
+                             {"remedy", b.remedy}});
+  }
+  j["ranking"] = nlohmann::json::array();
+  for (const auto& [key, gain] : ranking) j["ranking"].push_back({{"effect", key}, {"gain", gain}});
+  j["gate"] = {{"threshold", search.threshold}};
+  j["notes"] = notes;
+  j["seconds"] = seconds;
+  return j.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace sparflow

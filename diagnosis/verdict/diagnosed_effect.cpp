@@ -1,0 +1,115 @@
+#include "diagnosis/verdict/diagnosed_effect.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/selection/search_leaders.h"
+
+namespace sparflow {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd& residual) {
+  const EvidenceChannel& c = evidence.channels[channel];
+  double squares = 0.0, n = 0.0;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(c.log[b]) >= evidence.suspects) continue;
+    const Index length = c.blocks[b].last - c.blocks[b].first;
+    squares += residual.segment(c.blocks[b].first, length).squaredNorm();
+    n += static_cast<double>(length);
+  }
+  return n > 0.0 ? std::sqrt(squares / n) : 0.0;
+}
+
+EffectFit fit_without(const Diagnosis& d, std::size_t index) {
+  std::vector<EffectDesign> others;
+  others.reserve(d.search.found.size());
+  std::vector<AppliedEffect> acting;
+  acting.reserve(d.search.found.size());
+  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+    if (i == index) continue;
+    const FoundEffect& f = d.search.found[i];
+    others.push_back(f.design);
+    acting.push_back({f.design.effect.effect, f.design.effect.at, f.values, {}, {}});
+  }
+  // without it, others may lead a pump
+  std::optional<Evidence> led;
+  if (d.search.led && index < d.search.found.size()) led = d.evidence.led_by(acting);
+  if (led) others = remade(*led, others);
+  std::vector<const EffectDesign*> pointers;
+  pointers.reserve(others.size());
+  for (const EffectDesign& o : others) pointers.push_back(&o);
+  FitControl control;
+  control.keep_residuals = true;
+  return fit_effects(led ? *led : d.evidence, pointers, nullptr, control);
+}
+
+double same_within(const FoundEffect& found, double same_nats) {
+  const double form = form_share(*found.design.effect.effect);
+  return std::max(same_nats, form * form * found.gain);
+}
+
+DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
+                                const SearchOptions& options) {
+  const FoundEffect& f = d.search.found[index];
+  const Machine& machine = *d.evidence.series[0].machine;
+  const EffectInfo& info = f.design.effect.effect->info();
+  DiagnosedEffect e;
+  e.effect = f.design.effect;
+  e.id = info.id;
+  const std::string key = effect_key(info, machine, e.effect.at);
+  e.at = key.size() > info.id.size() ? key.substr(info.id.size() + 1) : "";
+  e.stage = effect_stage_name(info.stage);
+  e.applied = {e.effect.effect, e.effect.at, f.values, f.lower95, f.upper95};
+  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+    const EffectParameter& p = info.parameters[k];
+    e.parameters.push_back(
+        {p.name, p.unit, p.meaning, f.values[k] / p.si, f.lower95[k] / p.si, f.upper95[k] / p.si});
+  }
+  e.p_value = f.p_value;
+  e.gain = f.gain;
+  e.held_out_gain = f.held_out;
+  e.held_out_error = f.held_out_error;
+  e.absorbed = f.absorbed;
+  double odds = 0.0;
+  const double same = same_within(f, options.same_nats);
+  for (const auto& [rival, worse] : f.alternatives) {
+    odds += std::exp(-std::max(0.0, worse) * options.same_nats / same);
+    if (worse < same)
+      e.rivals.emplace_back(effect_key(rival.effect->info(), machine, rival.at), worse);
+  }
+  e.probability = (1.0 - f.p_value) / (1.0 + odds);
+
+  const EffectFit without = fit_without(d, index);
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!f.design.touches(c)) continue;
+    e.channels.push_back({c, suspect_rms(d.evidence, c, without.residual[c]),
+                          suspect_rms(d.evidence, c, d.search.final.residual[c]),
+                          d.evidence.channels[c].noise_floor});
+  }
+  std::sort(e.channels.begin(), e.channels.end(), [](const ChannelGain& a, const ChannelGain& b) {
+    return a.rmse_before / a.rmse_after > b.rmse_before / b.rmse_after;
+  });
+  for (const ChannelGain& g : e.channels) {
+    const EvidenceChannel& c = d.evidence.channels[g.channel];
+    if (g.rmse_before < 1.02 * g.rmse_after) continue;
+    e.evidence.push_back(fmt::format(
+        "{}: error {} -> {} {}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
+        plain_number(g.rmse_after / c.unit.si, 3), c.unit.name,
+        std::isfinite(g.noise_floor)
+            ? fmt::format(" (sensor noise {})", plain_number(g.noise_floor / c.unit.si, 2))
+            : ""));
+  }
+  e.evidence.push_back(
+      fmt::format("estimated on some motions, it predicts the others better: in {:.0f} % of the "
+                  "parts left out, "
+                  "by {:.1f} standard errors",
+                  100.0 * f.held_out_share, e.held_out_gain / std::max(e.held_out_error, 1e-300)));
+  return e;
+}
+
+}  // namespace sparflow
