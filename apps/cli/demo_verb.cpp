@@ -9,8 +9,8 @@
 #include "identification/learning/fit.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
-#include "optimizer/motion_table.h"
 #include "problems/bundled.h"
+#include "problems/motion_table.h"
 #include "problems/problem_file.h"
 
 namespace sparflow::cli {

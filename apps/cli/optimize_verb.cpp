@@ -7,7 +7,7 @@
 #include "models/math/error.h"
 #include "optimizer/driven_grid_path.h"
 #include "optimizer/energy_bound_time.h"
-#include "optimizer/motion_table.h"
+#include "problems/motion_table.h"
 
 namespace sparflow::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "optimizer/motion_table.h"
+#include "problems/motion_table.h"
 
 #include <fmt/format.h>
 
