@@ -9,8 +9,8 @@
 #include "bench/haste_case.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
-#include "optimizer/child_processes.h"
-#include "optimizer/strategies_statistics.h"
+#include "optimizer/baselines/strategies_statistics.h"
+#include "optimizer/solve/child_processes.h"
 
 namespace sparflow::bench {
 namespace {

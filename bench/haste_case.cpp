@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "bench/planned_seeds.h"
-#include "optimizer/child_processes.h"
-#include "optimizer/driven_grid_path.h"
-#include "optimizer/energy_bound_time.h"
-#include "optimizer/strategies.h"
+#include "optimizer/baselines/strategies.h"
+#include "optimizer/bounds/energy_bound_time.h"
+#include "optimizer/grid/driven_grid_path.h"
+#include "optimizer/solve/child_processes.h"
 
 namespace sparflow::bench {
 namespace {

@@ -16,7 +16,7 @@
 #include "bench/planned_seeds.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
-#include "optimizer/energy_grid.h"
+#include "optimizer/grid/energy_grid.h"
 #include "problems/time_parametrise.h"
 
 namespace {

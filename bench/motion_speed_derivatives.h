@@ -2,7 +2,7 @@
 /// The crane's law at a knot with derivatives made in other ways than by hand, to measure what those by hand are worth.
 #include <memory>
 
-#include "optimizer/crane_knot_model.h"
+#include "optimizer/crane/crane_knot_model.h"
 
 namespace sparflow::bench {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "planners/seed_paths.h"
 
 namespace sparflow::bench {

@@ -8,7 +8,7 @@
 #include "bench/problem_set_report.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
-#include "optimizer/child_processes.h"
+#include "optimizer/solve/child_processes.h"
 
 namespace sparflow::bench {
 namespace {

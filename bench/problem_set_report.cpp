@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "optimizer/strategies_statistics.h"
+#include "optimizer/baselines/strategies_statistics.h"
 
 namespace sparflow::bench {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "bench/planned_seeds.h"
-#include "optimizer/child_processes.h"
-#include "optimizer/driven_grid_path.h"
-#include "optimizer/energy_bound_time.h"
+#include "optimizer/bounds/energy_bound_time.h"
+#include "optimizer/grid/driven_grid_path.h"
+#include "optimizer/solve/child_processes.h"
 
 namespace sparflow::bench {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "bench/reach_tasks.h"
-#include "optimizer/strategies.h"
+#include "optimizer/baselines/strategies.h"
 
 namespace sparflow::bench {
 
@@ -13,7 +13,7 @@ struct ReachFigures {
   double bound = 0.0;       ///< [J] certified, of motions in the optimum's time; 0 = none
   double slow_bound = 0.0;  ///< [J] of any motion of any duration
   double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
-  /// [J] the grid's cheapest path driven in the optimum's time (optimizer/driven_grid_path.h); 0 = none keeps all limits
+  /// [J] the grid's cheapest path driven in the optimum's time (optimizer/grid/driven_grid_path.h); 0 = none keeps all limits
   double grid_path = 0.0;
   std::string named;  ///< what is said of an infeasible one
   std::string

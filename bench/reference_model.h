@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "models/hydraulics/gp_kernel.h"
-#include "optimizer/transcription.h"
+#include "optimizer/transcription/transcription.h"
 
 namespace sparflow::bench {
 

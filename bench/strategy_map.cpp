@@ -13,8 +13,8 @@
 #include "bench/strategy_map_picture.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
-#include "optimizer/child_processes.h"
-#include "optimizer/pareto.h"
+#include "optimizer/baselines/pareto.h"
+#include "optimizer/solve/child_processes.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "optimizer/strategies_statistics.h"
+#include "optimizer/baselines/strategies_statistics.h"
 
 namespace sparflow {
 namespace {

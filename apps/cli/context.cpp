@@ -17,8 +17,8 @@
 #include "models/files/model_file.h"
 #include "models/machine/machine_check.h"
 #include "models/math/error.h"
-#include "optimizer/exact_energy.h"
-#include "optimizer/transcription.h"
+#include "optimizer/crane/exact_energy.h"
+#include "optimizer/transcription/transcription.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"
 

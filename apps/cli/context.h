@@ -12,7 +12,7 @@
 
 #include "identification/log/log.h"
 #include "models/chain/crane_model.h"
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "planners/seed_paths.h"
 
 namespace sparflow::cli {

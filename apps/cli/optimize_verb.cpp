@@ -5,8 +5,8 @@
 #include "apps/cli/context.h"
 #include "apps/report/motion_page.h"
 #include "models/math/error.h"
-#include "optimizer/driven_grid_path.h"
-#include "optimizer/energy_bound_time.h"
+#include "optimizer/bounds/energy_bound_time.h"
+#include "optimizer/grid/driven_grid_path.h"
 #include "problems/motion_table.h"
 
 namespace sparflow::cli {

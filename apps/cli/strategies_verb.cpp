@@ -5,7 +5,7 @@
 #include "apps/cli/context.h"
 #include "apps/report/strategies_page.h"
 #include "models/math/error.h"
-#include "optimizer/child_processes.h"
+#include "optimizer/solve/child_processes.h"
 #include "problems/problem_file.h"
 
 namespace sparflow::cli {

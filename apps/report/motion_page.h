@@ -1,7 +1,7 @@
 #pragma once
 /// Pages about a motion.
 #include "apps/report/page.h"
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 
 namespace sparflow {
 

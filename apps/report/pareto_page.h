@@ -1,7 +1,7 @@
 #pragma once
 /// Energy against time, for people and for machines.
 #include "apps/report/page.h"
-#include "optimizer/pareto.h"
+#include "optimizer/baselines/pareto.h"
 
 namespace sparflow {
 

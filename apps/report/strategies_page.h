@@ -1,7 +1,7 @@
 #pragma once
 /// Sequential against simultaneous against energy-optimal, for people and for machines.
 #include "apps/report/page.h"
-#include "optimizer/strategies_summary.h"
+#include "optimizer/baselines/strategies_summary.h"
 
 namespace sparflow {
 

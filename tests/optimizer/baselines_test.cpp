@@ -1,5 +1,5 @@
 // Motions to compare with: their geometry in closed form, their limits, and that none is cheaper than the optimum.
-#include "optimizer/baselines.h"
+#include "optimizer/baselines/baselines.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
 #include "models/math/linear_algebra.h"
-#include "optimizer/strategies.h"
+#include "optimizer/baselines/strategies.h"
 #include "problems/bundled.h"
 #include "problems/motion_limits.h"
 #include "problems/problem_file.h"

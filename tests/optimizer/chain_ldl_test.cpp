@@ -7,9 +7,9 @@
 #include <random>
 #include <string>
 
-#include "optimizer/crane_knot_model.h"
+#include "optimizer/crane/crane_knot_model.h"
 #include "optimizer/nlp/ipopt_solver.h"
-#include "optimizer/transcription.h"
+#include "optimizer/transcription/transcription.h"
 #include "tests/optimizer/knot_support.h"
 #include "tests/optimizer/synthetic_model.h"
 

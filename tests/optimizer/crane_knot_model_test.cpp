@@ -1,6 +1,6 @@
 // Exact derivatives of power, limits and goal in joint space against finite differences, for every bundled
 // machine: all linkage types, telescopes, moving masses, several pumps, negative dx/dq, no hydraulics.
-#include "optimizer/crane_knot_model.h"
+#include "optimizer/crane/crane_knot_model.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "models/files/machine_file.h"
 #include "optimizer/nlp/derivative_check.h"
-#include "optimizer/transcription.h"
+#include "optimizer/transcription/transcription.h"
 #include "problems/bundled.h"
 #include "tests/optimizer/knot_support.h"
 #include "tests/optimizer/synthetic_model.h"

@@ -6,10 +6,10 @@
 
 #include "models/effects/effective_machine.h"
 #include "models/math/error.h"
-#include "optimizer/crane_knot_model.h"
-#include "optimizer/exact_energy.h"
+#include "optimizer/crane/crane_knot_model.h"
+#include "optimizer/crane/exact_energy.h"
 #include "optimizer/nlp/derivative_check.h"
-#include "optimizer/transcription.h"
+#include "optimizer/transcription/transcription.h"
 #include "tests/optimizer/applied_effects.h"
 #include "tests/optimizer/knot_support.h"
 #include "tests/optimizer/synthetic_model.h"

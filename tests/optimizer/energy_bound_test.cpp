@@ -1,5 +1,5 @@
 // The lower bound is one: against closed forms, random motions, the inequality it rests on, and searches of the goal.
-#include "optimizer/energy_bound.h"
+#include "optimizer/bounds/energy_bound.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,11 +10,11 @@
 #include "models/effects/effective_machine.h"
 #include "models/files/machine_file.h"
 #include "models/machine/linkage.h"
-#include "optimizer/energy_bound_goal.h"
-#include "optimizer/energy_bound_potential.h"
-#include "optimizer/energy_grid.h"
-#include "optimizer/energy_grid_timing.h"
-#include "optimizer/exact_energy.h"
+#include "optimizer/bounds/energy_bound_goal.h"
+#include "optimizer/bounds/energy_bound_potential.h"
+#include "optimizer/crane/exact_energy.h"
+#include "optimizer/grid/energy_grid.h"
+#include "optimizer/grid/energy_grid_timing.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "tests/optimizer/applied_effects.h"

@@ -1,5 +1,5 @@
 // Bounds at a given time and of the time itself: the inequality behind them, closed forms, and motions that keep all limits.
-#include "optimizer/energy_bound_time.h"
+#include "optimizer/bounds/energy_bound_time.h"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
-#include "optimizer/energy_bound_time_guide.h"
-#include "optimizer/energy_grid.h"
-#include "optimizer/exact_energy.h"
+#include "optimizer/bounds/energy_bound_time_guide.h"
+#include "optimizer/crane/exact_energy.h"
+#include "optimizer/grid/energy_grid.h"
 #include "problems/bundled.h"
 #include "problems/motion_limits.h"
 #include "problems/problem_file.h"

@@ -1,5 +1,5 @@
 // Grid paths against closed forms, the exact law's verdict and the limits.
-#include "optimizer/energy_grid.h"
+#include "optimizer/grid/energy_grid.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
-#include "optimizer/driven_grid_path.h"
-#include "optimizer/exact_energy.h"
-#include "optimizer/sequential_modes.h"
+#include "optimizer/crane/exact_energy.h"
+#include "optimizer/grid/driven_grid_path.h"
+#include "optimizer/phases/sequential_modes.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "tests/optimizer/synthetic_model.h"

@@ -8,7 +8,7 @@
 #include "models/files/machine_file.h"
 #include "models/machine/kinematics.h"
 #include "models/math/units.h"
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

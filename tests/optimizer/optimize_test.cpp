@@ -1,6 +1,6 @@
 // The whole optimisation on machines whose pressures are known: cheaper than where it started, limits kept
 // between knots, and honest when it cannot be done.
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
-#include "optimizer/child_processes.h"
+#include "optimizer/solve/child_processes.h"
 #include "problems/bundled.h"
 #include "problems/motion_table.h"
 #include "problems/problem_file.h"

@@ -1,12 +1,12 @@
 // The tip line of best redundancy: its geometry, its sum against the exact law, an answer known beforehand, refusals.
-#include "optimizer/path_redundancy.h"
+#include "optimizer/baselines/path_redundancy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "models/machine/kinematics.h"
-#include "optimizer/baselines.h"
-#include "optimizer/self_motion.h"
+#include "optimizer/baselines/baselines.h"
+#include "optimizer/baselines/self_motion.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

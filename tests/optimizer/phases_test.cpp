@@ -1,4 +1,4 @@
-#include "optimizer/phases.h"
+#include "optimizer/phases/phases.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Quantiles and the signed-rank test against closed forms and published tables.
-#include "optimizer/strategies_statistics.h"
+#include "optimizer/baselines/strategies_statistics.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "optimizer/strategies_summary.h"
+#include "optimizer/baselines/strategies_summary.h"
 
 namespace sparflow {
 namespace {

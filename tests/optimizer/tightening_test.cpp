@@ -1,5 +1,5 @@
 // What is done about limits that are broken between knots: each by its own share, or more knots where a link touches.
-#include "optimizer/tightening.h"
+#include "optimizer/phases/tightening.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "optimizer/transcription.h"
+#include "optimizer/transcription/transcription.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "models/files/machine_file.h"
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

@@ -1,7 +1,7 @@
 // Points the tip passes on the way: read, planned, kept.
 #include <gtest/gtest.h>
 
-#include "optimizer/optimize.h"
+#include "optimizer/solve/optimize.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "problems/time_parametrise.h"

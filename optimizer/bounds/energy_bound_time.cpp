@@ -1,0 +1,333 @@
+#include "optimizer/bounds/energy_bound_time.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include "models/effects/effective_machine.h"
+#include "models/math/linear_algebra.h"
+#include "optimizer/bounds/energy_bound_goal.h"
+#include "optimizer/bounds/energy_bound_time_guide.h"
+#include "optimizer/grid/energy_grid.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+
+/// A grid with its forces, on which potentials for different shares are built.
+struct TimedGrid {
+  Lattice lattice;
+  LatticeForces forces;
+};
+
+class TimedSearch {
+ public:
+  TimedSearch(const CraneModel& model, const MotionProblem& problem,
+              const TimedBoundOptions& options, double energy_weight, double duration)
+      : problem_(problem),
+        options_(options),
+        energy_weight_(energy_weight),
+        duration_(duration),
+        loaded_(effective_machine(model.machine, model.effects)),
+        n_(problem.start.size()) {
+    const Lattice coarse = bound_lattice(problem, uniform(n_ <= 3 ? 12 : 8));
+    weights_ = std::make_unique<TimedWeights>(
+        model, problem, *loaded_, lattice_forces(*loaded_, coarse, problem.payload).range);
+  }
+
+  bool possible() const { return weights_->possible(); }
+
+  /// @param moves by joint: net way to the goal [rad] or [m], to know which directions need a share of the time
+  TimedBound run(const VectorXd& moves, double price) {
+    shares_.energy_weight = energy_weight_;
+    shares_.share = Eigen::MatrixX2d::Zero(n_, 2);
+    active_ = Eigen::MatrixX2d::Zero(n_, 2);
+    for (Eigen::Index j = 0; j < n_; ++j) {
+      const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
+      const double small = 0.02 * (r.hi - r.lo);
+      active_(j, 0) = moves[j] > -small ? 1.0 : 0.0;
+      active_(j, 1) = moves[j] < small ? 1.0 : 0.0;
+    }
+    base_ = active_;
+    const TimedGrid rough = grid(uniform(n_ <= 3 ? 12 : 6));
+    VectorXd x = VectorXd::Zero(n_ + 1);
+    x[n_] = std::log(price);
+    set(x);
+    const EnergyPotential first(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
+    const std::vector<int> few =
+        balanced_cells(first.losses(), rough.lattice, static_cast<double>(options_.search_nodes));
+    const TimedGrid small = grid(few);
+    x = best_shares(small, x, options_.evaluations, std::log(4.0));
+    TimedBound bound;
+    bound.value = -1.0;
+    for (const Found& found :
+         along_the_way(small, x)) {  // the small grid's best need not be the fine one's
+      base_ = found.base;
+      set(found.x);
+      const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
+      TimedBound one = certified(
+          grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
+      if (one.value > bound.value) bound = std::move(one);
+    }
+    return bound;
+  }
+
+ private:
+  std::vector<int> uniform(int cells) const {
+    return std::vector<int>(static_cast<std::size_t>(n_), cells);
+  }
+  TimedGrid grid(const std::vector<int>& cells) const {
+    TimedGrid g;
+    g.lattice = bound_lattice(problem_, cells);
+    g.forces = lattice_forces(*loaded_, g.lattice, problem_.payload);
+    return g;
+  }
+
+  struct Found {
+    Eigen::MatrixX2d base;  ///< what the shares of x stand beside
+    VectorXd x;
+  };
+
+  /// Shares that change along the way: searched on from those of dynamic programming and, where those are not better to
+  /// begin with, from constant ones too. @param x constant shares and the price
+  std::vector<Found> along_the_way(const TimedGrid& g, const VectorXd& x) {
+    const double constant = objective(g, x), price = shares_.price;
+    constexpr double kHaste = 0.01;  // with less the slow bound is as good
+    if (energy_weight_ > 0.0 && price * duration_ < kHaste * constant) return {{base_, x}};
+    TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
+    double guide_price = price;
+    if (energy_weight_ > 0.0) {  // the price at which the guide's own bound is the largest
+      double best = guide.solve(price) - price * duration_;
+      for (const double factor : {1.6, 1.0 / 1.6}) {
+        const double before = best;
+        constexpr int kMost = 4;  // on so coarse a grid the shortest time may be longer than this
+        for (int k = 0; k < kMost; ++k) {
+          const double next = guide_price * factor, value = guide.solve(next) - next * duration_;
+          if (!(value > best)) break;
+          best = value;
+          guide_price = next;
+        }
+        if (best > before) break;
+      }
+    }
+    guide.solve(guide_price);
+    const TimeShares found = guide.shares(shares_);
+    const Eigen::MatrixX2d constant_base = base_;
+    constexpr double kStep = 0.7;
+    constexpr int kTimes = 3;
+    const auto searched = [&](const Eigen::MatrixX2d& base, const VectorXd& from) -> Found {
+      base_ = base;
+      return {base, best_shares(g, from, kTimes * options_.evaluations, kStep)};
+    };
+    std::vector<Found> all;
+    bool better = false;
+    VectorXd y(n_ + 1 + 2 * n_ * n_);
+    if (found.share.maxCoeff() > 0.0) {
+      y << VectorXd::Zero(n_), std::log(guide_price), found.tilt.reshaped();
+      base_ = found.share;
+      better = objective(g, y) > constant;
+      all.push_back(searched(found.share, y));
+    }
+    y << x, VectorXd::Zero(2 * n_ * n_);
+    if (!better) all.push_back(searched(constant_base, y));
+    return all;
+  }
+
+  int guide_cells() const { return n_ == 1 ? 60 : n_ == 2 ? 40 : n_ == 3 ? 10 : 5; }
+
+  /// x = logarithms of the shares (beside base_) and of the price, and the tilts column by column, if any.
+  void set(const VectorXd& x) {
+    shares_.price = energy_weight_ > 0.0 ? std::exp(x[n_]) : 1.0;
+    const double top = x.head(n_).maxCoeff();
+    constexpr double kLeastLog = -6.0;  // of a share: less is none
+    shares_.share =
+        (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * base_;
+    shares_.tilt.resize(0, 0);
+    if (x.size() > n_ + 1) shares_.tilt = x.tail(2 * n_ * n_).reshaped(2 * n_, n_);
+    weights_->set_shares(shares_);
+  }
+
+  /// Entries of x that mean something.
+  std::vector<Eigen::Index> free_entries(const VectorXd& x) const {
+    std::vector<Eigen::Index> free;
+    free.reserve(static_cast<std::size_t>(x.size()));
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const Eigen::Index row = (i - n_ - 1) % (2 * n_);  // of a tilt: 2 j + direction
+      if (i == n_ ? energy_weight_ > 0.0 : i < n_ || base_(row / 2, row % 2) > 0.0)
+        free.push_back(i);
+    }
+    return free;
+  }
+
+  double objective(const TimedGrid& g, const VectorXd& x) {
+    set(x);
+    const EnergyPotential potential(*loaded_, problem_, *weights_, g.lattice, g.forces);
+    constexpr double kRough = 5e-3, kRoughTip = 0.02;
+    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kRough, kRoughTip);
+    return value_of(least.lower, shares_.price);
+  }
+
+  /// The bound from the least potential over the goal when no gain exceeds `price`. Near the ends of a motion speeds are
+  /// small and so are gains: at most ramp_gain t. What the constant price charges too much there is given back.
+  double value_of(double least, double price) const {
+    constexpr double kBetweenNodes = 1.02;
+    price *= 1.0 + kPriceTolerance;
+    const double ramp = kBetweenNodes * weights_->ramp_gain();
+    const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until a motion can gain the price
+    if (energy_weight_ > 0.0) {
+      return least - price * std::max(duration_ - time, 0.5 * duration_);
+    }
+    // all of a short motion may be ramps: then least <= ramp T^2 / 4
+    const double cruise = least / price;
+    return time <= cruise ? cruise + time : 2.0 * std::sqrt(cruise * time);
+  }
+
+  /// Compass search along the coordinates and, since the objective has ridges across them, along turned axes in turn; the
+  /// step is halved when neither helps.
+  VectorXd best_shares(const TimedGrid& g, VectorXd x, int evaluations, double step) {
+    const std::vector<Eigen::Index> free = free_entries(x);
+    const auto count = static_cast<Eigen::Index>(free.size());
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    double best = objective(g, x);
+    int used = 1, idle = 0;
+    for (int round = 0; used < evaluations && step > std::log(1.02); ++round) {
+      Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(count, count);
+      if (round % 2 == 1) {
+        for (double& entry : axes.reshaped()) entry = normal(random);
+        axes = span_of(axes);  // orthonormal
+      }
+      bool any = false;
+      for (Eigen::Index k = count; k-- > 0;) {
+        for (const double sign : {1.0, -1.0}) {
+          bool better = false;
+          while (used < evaluations) {
+            VectorXd y = x;
+            y(free) += sign * step * axes.col(k);
+            const double value = objective(g, y);
+            ++used;
+            if (!(value > best)) break;
+            best = value;
+            x = y;
+            any = better = true;
+          }
+          if (better) break;
+        }
+      }
+      idle = any ? 0 : idle + 1;
+      if (idle < 2) continue;
+      step *= 0.5;
+      idle = 0;
+    }
+    return x;
+  }
+
+  TimedBound certified(const TimedGrid& g) {
+    TimedBound bound;
+    EnergyPotential potential(*loaded_, problem_, *weights_, g.lattice, g.forces);
+    for (const VectorXd& lines : g.lattice.lines) {
+      bound.lines.push_back(static_cast<int>(lines.size()));
+    }
+    constexpr double kAccuracy = 2e-4;
+    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kAccuracy);
+    bound.valid = least.reachable;
+    if (!least.reachable) bound.message = "no posture within the limits puts the tip at its goal";
+    // The inequality, tested where the grid did not look: if it fails by a little, a price that covers it is charged, or
+    // the potential is scaled (the gain is convex and zero at zero), whichever costs less.
+    const double price = shares_.price, gain = std::max(price, largest_gain(potential));
+    bound.checked_scale = price / gain;
+    const double charged = value_of(least.lower, gain);
+    const double scaled = value_of(least.lower * bound.checked_scale, price);
+    bound.value = energy_weight_ > 0.0 ? std::max({0.0, charged, scaled}) : charged;
+    bound.price_W = energy_weight_ > 0.0 ? price : 0.0;
+    bound.shares = shares_.share.rowwise().maxCoeff();
+    return bound;
+  }
+
+  double largest_gain(const EnergyPotential& potential) {
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> share(0.0, 1.0);
+    VectorXd q(n_);
+    Eigen::MatrixX2d price;
+    double worst = 0.0;
+    constexpr int kSamples = 4000;
+    for (int i = 0; i < kSamples; ++i) {
+      for (Eigen::Index j = 0; j < n_; ++j) {
+        const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
+        q[j] = r.lo + (r.hi - r.lo) * share(random);
+      }
+      worst = std::max(worst, weights_->largest_gain(q, potential.gradient(q)));
+      weights_->at(q, price);  // ramp_gain() sees this posture, too
+    }
+    return worst;
+  }
+
+  const MotionProblem& problem_;
+  const TimedBoundOptions& options_;
+  double energy_weight_, duration_;
+  std::shared_ptr<const Machine> loaded_;
+  Eigen::Index n_;
+  std::unique_ptr<TimedWeights> weights_;
+  TimeShares shares_;
+  Eigen::MatrixX2d active_, base_;
+};
+
+TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem,
+                           const TimedBoundOptions& options, double energy_weight,
+                           double duration) {
+  const auto begin = std::chrono::steady_clock::now();
+  TimedBound bound;
+  bound.message = no_bound_reason(model, problem, options.most_joints);
+  if (!bound.message.empty()) return bound;
+  TimedSearch search(model, problem, options, energy_weight, duration);
+  if (!search.possible()) {
+    bound.message = "no bound: a joint's cylinders are fed by different pumps";
+    return bound;
+  }
+  // A motion that is cheap at this duration tells the directions and the size of the price.
+  MotionProblem open = problem;
+  open.tip_line.reset();
+  EnergyGrid grid(model, open, {8000, options.most_joints});
+  const GridPath path =
+      energy_weight > 0.0 ? grid.path_for_duration(duration) : grid.cheapest_path(1e6);
+  VectorXd moves = VectorXd::Zero(problem.start.size());
+  double price = 1e3;
+  if (path.found) {
+    moves = (path.corners.bottomRows(1) - path.corners.topRows(1)).transpose();
+    price = std::max({price, path.price_W, 0.1 * path.energy_J / duration});
+  }
+  bound = search.run(moves, price);
+  bound.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return bound;
+}
+
+}  // namespace
+
+TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
+                           const TimedBoundOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  TimedBound bound = bound_with_time(model, problem, options, 1.0, duration);
+  if (!bound.valid) return bound;
+  EnergyBoundOptions unlimited;
+  unlimited.nodes = options.nodes;
+  unlimited.most_joints = options.most_joints;
+  const EnergyBound slow = energy_bound(model, problem, unlimited);
+  if (slow.valid && slow.lower_bound_J > bound.value) {  // time is no matter at this duration
+    bound.value = slow.lower_bound_J;
+    bound.price_W = 0.0;
+    bound.shares.setZero();
+    bound.lines = slow.lines;
+    bound.checked_scale = slow.checked_scale;
+  }
+  bound.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return bound;
+}
+
+TimedBound least_duration(const CraneModel& model, const MotionProblem& problem,
+                          const TimedBoundOptions& options) {
+  return bound_with_time(model, problem, options, 0.0, 1.0);
+}
+
+}  // namespace sparflow

@@ -1,0 +1,298 @@
+#include "optimizer/crane/exact_energy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "models/effects/effective_machine.h"
+#include "models/math/units.h"
+#include "optimizer/crane/crane_knot_model.h"
+#include "optimizer/crane/instants.h"
+#include "problems/clearance.h"
+
+namespace sparflow {
+namespace {
+
+bool outside_data(const GpParameters& p, double flow, double force) {
+  return flow < p.flow_min || flow > p.flow_max || force < p.force_min || force > p.force_max;
+}
+
+}  // namespace
+
+MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
+                          int refine) {
+  const std::size_t cylinders = model.cylinders.size();
+  MotionEnergy energy;
+  energy.pump.assign(model.pumps.size(), 0.0);
+  energy.throttling.assign(cylinders, 0.0);
+  energy.useful.assign(cylinders, 0.0);
+  energy.share_moving.assign(cylinders + 1, 0.0);
+  if (motion.size() < 2) return energy;
+  Chain chain(model);
+  double moving_time = 0.0, outside_time = 0.0;
+  for_each_instant(
+      motion, refine,
+      [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
+          double step) {
+        const MachineState& state =
+            chain.evaluate(q.data(), qd.data(), payload, true, kRestSpeed, qdd.data());
+        energy.total += step * state.power;
+        for (std::size_t p = 0; p < state.pumps.size(); ++p) {
+          energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
+        }
+        std::size_t moving = 0;
+        for (std::size_t i = 0; i < cylinders; ++i) {
+          const CylinderState& c = state.cylinders[i];
+          if (!c.moving) continue;
+          ++moving;
+          energy.throttling[i] += step * state.throttling(model.machine, static_cast<int>(i));
+          energy.useful[i] += step * c.pressure * c.flow;
+          energy.largest_pressure_std = std::max(energy.largest_pressure_std, c.pressure_std);
+          const GaussianProcess& process =
+              c.speed > 0.0 ? model.cylinders[i].extend : model.cylinders[i].retract;
+          moving_time += step;
+          if (!process.empty() && outside_data(process.parameters(), c.flow, c.total_force))
+            outside_time += step;
+        }
+        energy.share_moving[moving] += step;
+      });
+  for (double& share : energy.share_moving) share /= motion.duration();
+  energy.moving_share_outside_data = moving_time > 0.0 ? outside_time / moving_time : 0.0;
+  const Eigen::Index last = motion.size() - 1;
+  energy.potential_difference =
+      potential_energy(chain.machine(), motion.q.row(last).transpose(), payload) -
+      potential_energy(chain.machine(), motion.q.row(0).transpose(), payload);
+  return energy;
+}
+
+double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,
+                          int refine) {
+  if (motion.size() < 2) return 0.0;
+  Chain chain(model);
+  double total = 0.0;
+  for_each_instant(
+      motion, refine,
+      [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
+          double step) {
+        total += step *
+                 chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data()).power;
+      });
+  return total;
+}
+
+namespace {
+
+/// Collects the worst instant of each limit, named by what is limited and of which part. Words are put together once
+/// only: it is asked at every instant of every check.
+class LimitBook {
+ public:
+  /// @param over value - limit in the limit's own direction  @param scale what an overshoot is relative to
+  void see(const char* what, const std::string& part, double value, double limit, double over,
+           double scale, const char* unit, double time) {
+    const double excess = over / scale;
+    if (++next_ >= entries_.size()) next_ = 0;  // limits come in the same order every time
+    if (next_ < entries_.size() && !entries_[next_].is(what, part)) {
+      next_ = 0;
+      while (next_ < entries_.size() && !entries_[next_].is(what, part)) ++next_;
+    }
+    if (next_ == entries_.size()) {
+      entries_.push_back({what, part, {what + part, value, limit, unit, time, excess}});
+      return;
+    }
+    LimitCheck& check = entries_[next_].check;
+    if (excess <= check.excess) return;
+    check.value = value;
+    check.limit = limit;
+    check.unit = unit;
+    check.time = time;
+    check.excess = excess;
+  }
+  void range(const char* what, const std::string& part, double value, const Range& r, double scale,
+             const char* unit, double time) {
+    const bool high = value - r.hi > r.lo - value;
+    see(what, part, value, high ? r.hi : r.lo, std::max(value - r.hi, r.lo - value), scale, unit,
+        time);
+  }
+  std::vector<LimitCheck> sorted() const {
+    std::vector<LimitCheck> checks;
+    checks.reserve(entries_.size());
+    for (const Entry& e : entries_) checks.push_back(e.check);
+    std::sort(checks.begin(), checks.end(),
+              [](const LimitCheck& a, const LimitCheck& b) { return a.excess > b.excess; });
+    return checks;
+  }
+
+ private:
+  struct Entry {
+    std::string what, part;
+    LimitCheck check;
+    bool is(const char* other_what, const std::string& other_part) const {
+      return part == other_part && what == other_what;
+    }
+  };
+  std::vector<Entry> entries_;
+  std::size_t next_ = 0;
+};
+
+void check_ends(const MotionProblem& problem, const Machine& machine, const Trajectory& motion,
+                LimitBook& book) {
+  const Eigen::Index last = motion.size() - 1;
+  const Eigen::VectorXd first_q = motion.q.row(0), last_q = motion.q.row(last);
+  const double start_error = (first_q - problem.start).cwiseAbs().maxCoeff();
+  book.see("distance from the start posture", "", start_error, 0.0, start_error - 1e-9, 1.0,
+           "rad or m", motion.t[0]);
+  if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
+    const double error = (tip_position<double>(machine, last_q) - goal->tip).norm();
+    book.see("distance of the tip from its goal", "", error, 0.0, error - 1e-5, 1.0, "m",
+             motion.t[last]);
+  } else {
+    const double error = (last_q - std::get<JointGoal>(problem.goal).q).cwiseAbs().maxCoeff();
+    book.see("distance from the goal posture", "", error, 0.0, error - 1e-6, 1.0, "rad or m",
+             motion.t[last]);
+  }
+  // the nearest knots, in order: waypoints are passed at knots
+  Eigen::Index from = 0;
+  for (std::size_t w = 0; w < problem.waypoints.size(); ++w) {
+    Eigen::Index best = from;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = from; k <= last; ++k) {
+      const Eigen::VectorXd q = motion.q.row(k).transpose();
+      const double distance = (tip_position<double>(machine, q) - problem.waypoints[w]).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      best = k;
+    }
+    book.see("distance of the tip from waypoint ", std::to_string(w + 1), nearest, 0.0,
+             nearest - 1e-5, 1.0, "m", motion.t[best]);
+    from = best;
+  }
+  const double speed =
+      std::max(motion.qd.row(0).cwiseAbs().maxCoeff(), motion.qd.row(last).cwiseAbs().maxCoeff());
+  book.see("speed at start and end", "", speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s",
+           motion.t[last]);
+}
+
+}  // namespace
+
+std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProblem& problem,
+                                     const Trajectory& motion, int refine) {
+  const Machine& machine = model.machine;
+  LimitBook book;
+  const Trajectory fine = motion.refined(refine);
+  Chain chain(model);
+  std::unique_ptr<ClearanceModel> clearance;
+  if (!problem.obstacles.empty()) clearance = std::make_unique<ClearanceModel>(problem);
+  Eigen::Vector3d line_start = Eigen::Vector3d::Zero(), line_direction = Eigen::Vector3d::Zero();
+  if (problem.tip_line) {
+    const auto* goal = std::get_if<TipGoal>(&problem.goal);
+    line_start = tip_position<double>(machine, problem.start);
+    const Eigen::Vector3d end =
+        goal ? goal->tip : tip_position<double>(machine, std::get<JointGoal>(problem.goal).q);
+    line_direction = (end - line_start).normalized();
+  }
+  const double trusted = problem.limits.pressure_std;
+  const auto width = [](const Range& r) { return std::max(r.hi - r.lo, 1e-12); };
+  Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols()), qdd(fine.q.cols());
+  for (Eigen::Index k = 0; k < fine.size(); ++k) {
+    q = fine.q.row(k);
+    qd = fine.qd.row(k);
+    qdd = fine.qdd.row(k);
+    const double t = fine.t[k];
+    for (int j = 0; j < machine.joint_count(); ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      const bool turns = machine.joints[i].type == JointType::kRevolute;
+      const std::string& name = machine.joints[i].name;
+      const MotionLimits& l = problem.limits;
+      book.range("position of joint ", name, q[j], l.position[i], width(l.position[i]),
+                 turns ? "rad" : "m", t);
+      book.range("velocity of joint ", name, qd[j], l.velocity[i], width(l.velocity[i]),
+                 turns ? "rad/s" : "m/s", t);
+      book.range("acceleration of joint ", name, fine.qdd(k, j), l.acceleration[i],
+                 width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
+    }
+    const MachineState& state =
+        chain.evaluate(q.data(), qd.data(), problem.payload, trusted > 0.0, kRestSpeed, qdd.data());
+    using units::kBar;
+    using units::kLitrePerMinute;
+    for (int c = 0; c < machine.cylinder_count(); ++c) {
+      const auto i = static_cast<std::size_t>(c);
+      const double deviation = state.cylinders[i].pressure_std;
+      if (trusted > 0.0 && machine.cylinders[i].hydraulic())
+        book.see("standard deviation of the pressure of ", machine.cylinders[i].name,
+                 deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t);
+      const Valve* valve = machine.valve_of_cylinder(c);
+      if (valve == nullptr) continue;
+      const double full =
+          state.cylinders[i].speed > 0.0 ? valve->max_flow_extend : valve->max_flow_retract;
+      const double limit = problem.limits.valve_fraction * full;
+      if (limit <= 0.0) continue;
+      const double flow = state.cylinders[i].flow;
+      book.see("flow through valve ", machine.cylinders[i].name, flow / kLitrePerMinute,
+               limit / kLitrePerMinute, flow - limit, limit, "l/min", t);
+    }
+    for (int p = 0; p < machine.pump_count(); ++p) {
+      const auto i = static_cast<std::size_t>(p);
+      const double flow_limit =
+          effect_flow_limit(machine, model.effects, p, problem.limits.pump_max_flow[i]);
+      const double pressure_limit = problem.limits.pump_max_pressure[i];
+      const PumpState& s = state.pumps[i];
+      if (flow_limit > 0.0) {
+        book.see("flow of pump ", machine.pumps[i].name, s.flow / kLitrePerMinute,
+                 flow_limit / kLitrePerMinute, s.flow - flow_limit, flow_limit, "l/min", t);
+      }
+      if (pressure_limit > 0.0 && machine.pumps[i].type == PumpType::kLoadSensing) {
+        book.see("pressure of pump ", machine.pumps[i].name, s.pressure / kBar,
+                 pressure_limit / kBar, s.pressure - pressure_limit, pressure_limit, "bar", t);
+      }
+    }
+    if (clearance) {
+      const double distance = clearance->nearest(q.data()).distance;
+      book.see("clearance beyond the required distance", "", distance, 0.0, -distance, 1.0, "m", t);
+    }
+    if (problem.tip_line) {
+      Eigen::Vector3d off = tip_position<double>(machine, q) - line_start;
+      off -= line_direction * line_direction.dot(off);
+      book.see("distance of the tip from its line", "", off.norm(), problem.tip_line->tolerance,
+               off.norm() - problem.tip_line->tolerance, problem.tip_line->tolerance, "m", t);
+    }
+  }
+  check_ends(problem, machine, motion, book);
+  return book.sorted();
+}
+
+double command_effort(const CraneModel& model, const MotionProblem& problem,
+                      const Trajectory& motion, int refine) {
+  const std::vector<FullSpeed> full = full_speeds(model.machine, problem.limits);
+  double effort = 0.0;
+  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+    const double step = (motion.t[k + 1] - motion.t[k]) / refine;
+    for (int part = 0; part < refine; ++part) {
+      const double dt = (part + 0.5) * step;
+      for (int c = 0; c < model.machine.cylinder_count(); ++c) {
+        const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
+        const double qdd = motion.qdd(k, j), qd = motion.qd(k, j);
+        const double q = motion.q(k, j) + dt * (qd + 0.5 * dt * qdd);
+        const double speed = linkage_rates(model.machine, c, q).d1 * (qd + dt * qdd);
+        const double u = full[static_cast<std::size_t>(c)].command(speed);
+        effort += step * u * u;
+      }
+    }
+  }
+  return effort;
+}
+
+double exact_cost(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion,
+                  double energy, int refine) {
+  const ObjectiveWeights& w = problem.objective;
+  double cost =
+      w.energy * (energy + problem.idle_power * motion.duration()) + w.time * motion.duration();
+  if (w.commands > 0.0) cost += w.commands * command_effort(model, problem, motion, refine);
+  return cost;
+}
+
+double worst_excess(const std::vector<LimitCheck>& checks) {
+  return checks.empty() ? 0.0 : std::max(0.0, checks.front().excess);
+}
+
+}  // namespace sparflow

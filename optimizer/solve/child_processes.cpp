@@ -1,0 +1,192 @@
+#include "optimizer/solve/child_processes.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <exception>
+
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+struct Child {
+  int index = -1;
+  pid_t pid = -1;
+  int pipe = -1;
+  std::string received;
+};
+
+void write_all(int fd, const std::string& bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n = ::write(fd, bytes.data() + done, bytes.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    done += static_cast<std::size_t>(n);
+  }
+}
+
+/// First byte: 1 = a result follows, 0 = an exception's text follows.
+std::string run_here(const std::function<std::string(int)>& work, int index) {
+  try {
+    return "\1" + work(index);
+  } catch (const std::exception& e) {
+    return std::string(1, '\0') + e.what();
+  }
+}
+
+ChildResult decode(const std::string& message, const std::string& if_empty) {
+  ChildResult result;
+  if (message.empty()) {
+    result.error = if_empty;
+  } else if (message[0] == '\1') {
+    result.ok = true;
+    result.bytes = message.substr(1);
+  } else {
+    result.error = message.substr(1);
+  }
+  return result;
+}
+
+Child start_child(const std::function<std::string(int)>& work, int index,
+                  const std::vector<Child>& others) {
+  int ends[2];
+  SPARFLOW_CHECK(::pipe(ends) == 0, "no pipe for a child process");
+  const pid_t parent = ::getpid();
+  const pid_t pid = ::fork();
+  SPARFLOW_CHECK(pid >= 0, "no child process");
+  if (pid == 0) {
+    // whoever asked is gone, killed or interrupted: nobody waits for the answer
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(1);
+    ::close(ends[0]);
+    for (const Child& other : others) ::close(other.pipe);
+    write_all(ends[1], run_here(work, index));
+    ::close(ends[1]);
+    ::_exit(0);  // no destructors, no flushing of streams that belong to the parent
+  }
+  ::close(ends[1]);
+  return {index, pid, ends[0], {}};
+}
+
+std::string fate(pid_t pid) {
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFSIGNALED(status)) return fmt::format("the solve was ended by signal {}", WTERMSIG(status));
+  return "the solve ended without a result";
+}
+
+}  // namespace
+
+std::vector<ChildResult> run_in_children(int count, int at_once,
+                                         const std::function<std::string(int)>& work,
+                                         const std::function<void(int, int)>& on_done) {
+  std::vector<ChildResult> results(static_cast<std::size_t>(count));
+  if (at_once <= 1 || count == 1) {
+    for (int i = 0; i < count; ++i) {
+      results[static_cast<std::size_t>(i)] = decode(run_here(work, i), "");
+      if (on_done) on_done(i, i + 1);
+    }
+    return results;
+  }
+  std::vector<Child> children;
+  int next = 0, finished = 0;
+  while (finished < count) {
+    while (next < count && static_cast<int>(children.size()) < at_once) {
+      children.push_back(start_child(work, next++, children));
+    }
+    std::vector<pollfd> polls;
+    polls.reserve(children.size());
+    for (const Child& child : children) polls.push_back({child.pipe, POLLIN, 0});
+    if (::poll(polls.data(), polls.size(), -1) < 0) continue;
+    for (std::size_t i = polls.size(); i-- > 0;) {
+      if (polls[i].revents == 0) continue;
+      char buffer[65536];
+      const ssize_t n = ::read(children[i].pipe, buffer, sizeof buffer);
+      if (n < 0 && errno == EINTR) continue;
+      if (n > 0) {
+        children[i].received.append(buffer, static_cast<std::size_t>(n));
+        continue;
+      }
+      ::close(children[i].pipe);
+      const std::string end = fate(children[i].pid);
+      results[static_cast<std::size_t>(children[i].index)] = decode(children[i].received, end);
+      const int index = children[i].index;
+      children.erase(children.begin() + static_cast<std::ptrdiff_t>(i));
+      ++finished;
+      if (on_done) on_done(index, finished);
+    }
+  }
+  return results;
+}
+
+int usable_processors() {
+  cpu_set_t set;
+  if (::sched_getaffinity(0, sizeof set, &set) != 0) return 1;
+  return std::max(1, CPU_COUNT(&set));
+}
+
+Packer& Packer::number(double value) {
+  bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  return *this;
+}
+
+Packer& Packer::text(const std::string& value) {
+  number(static_cast<double>(value.size()));
+  bytes_ += value;
+  return *this;
+}
+
+Packer& Packer::numbers(const double* values, std::size_t count) {
+  number(static_cast<double>(count));
+  bytes_.append(reinterpret_cast<const char*>(values), count * sizeof(double));
+  return *this;
+}
+
+void Unpacker::take(void* out, std::size_t size) {
+  SPARFLOW_CHECK(at_ + size <= bytes_->size(), "a child process sent too little");
+  if (size > 0) std::memcpy(out, bytes_->data() + at_, size);
+  at_ += size;
+}
+
+double Unpacker::number() {
+  double value = 0.0;
+  take(&value, sizeof value);
+  return value;
+}
+
+std::string Unpacker::text() {
+  std::string value(static_cast<std::size_t>(number()), '\0');
+  take(value.data(), value.size());
+  return value;
+}
+
+std::vector<double> Unpacker::numbers() {
+  std::vector<double> values(static_cast<std::size_t>(number()));
+  take(values.data(), values.size() * sizeof(double));
+  return values;
+}
+
+Packer& Packer::matrix(const Eigen::MatrixXd& value) {
+  number(static_cast<double>(value.rows())).number(static_cast<double>(value.cols()));
+  return numbers(value.data(), static_cast<std::size_t>(value.size()));
+}
+
+Eigen::MatrixXd Unpacker::matrix() {
+  const auto rows = static_cast<Eigen::Index>(number());
+  const auto cols = static_cast<Eigen::Index>(number());
+  const std::vector<double> values = numbers();
+  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
+}
+
+}  // namespace sparflow

@@ -1,0 +1,439 @@
+#include "optimizer/solve/optimize.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "models/math/error.h"
+#include "optimizer/grid/energy_grid.h"
+#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/optimize_outcome.h"
+#include "optimizer/solve/start_pack.h"
+
+namespace sparflow {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+bool time_is_everything(const MotionProblem& problem) {
+  return problem.objective.energy == 0.0 && problem.objective.time > 0.0;
+}
+
+bool same_plan(const PhasePlan& a, const PhasePlan& b) {
+  return a.count() == b.count() && a.modes.cols() == b.modes.cols() &&
+         (a.modes.array() == b.modes.array()).all();
+}
+
+/// Up to so many times the shortest motion cylinders must move together somewhere: taking turns needs about twice its time.
+constexpr double kHurried = 2.0;
+
+/// Where time is short, the sequences tried are also those of motions so many times slower.
+constexpr double kSlower[] = {1.25, 1.6};
+
+constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
+
+/// Everything that is solved for one problem in one window of time.
+class Search {
+ public:
+  Search(const CraneModel& model, const MotionProblem& problem,
+         const std::vector<SeedMotion>& seeds, const TimeWindow& time,
+         const OptimizeOptions& options)
+      : model_(model),
+        problem_(problem),
+        seeds_(seeds),
+        time_(time),
+        options_(options),
+        coarse_(options) {
+    if (options.modes && options.free_phases && options.search_intervals > 0)
+      coarse_.intervals = std::min(options.intervals, options.search_intervals);
+    coarse_.phase_iterations = options.phase_iterations / 2;
+    // beside obstacles a solve takes ten times longer, and the seeds differ more than their neighbours do
+    searched_ = problem.obstacles.empty() ? options.searched_starts : 1;
+  }
+
+  OptimizeResult run() {
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<ModeCandidate> one_by_one = sequences(time_.guess);
+    if (hurried()) {
+      for (const double slower : kSlower) {
+        for (ModeCandidate& c : sequences(slower * time_.guess)) {
+          c.name = fmt::format("squeezed {:g} times: {}", slower, c.name);
+          c.guess = with_duration(c.guess, time_.guess);
+          one_by_one.push_back(std::move(c));
+        }
+      }
+    }
+    const std::size_t given = seeds_.size();
+    expected_ = static_cast<int>(given + one_by_one.size());
+    solve(
+        static_cast<int>(given + one_by_one.size()),
+        [&](int i) {
+          const auto k = static_cast<std::size_t>(i);
+          OptimizeOptions options = coarse_;
+          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
+          return k < given
+                     ? optimize_from(model_, problem_, seeds_[k], time_, options)
+                     : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
+        },
+        [&](int i) {
+          const auto k = static_cast<std::size_t>(i);
+          return k < given ? seeds_[k].name : one_by_one[k - given].name;
+        });
+    if (options_.modes && options_.free_phases) {
+      if (ranking(result_, options_.limit_tolerance).empty()) rescue();
+      search_sequences();
+      refine();
+    }
+    conclude();
+    result_.solve_s = seconds_since(begin);
+    return std::move(result_);
+  }
+
+ private:
+  bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+
+  /// Too little time for taking turns: what is cheap then is a slower motion's sequence with its phases overlapping,
+  /// which neither the seeds (all joints at once) nor the grid at this time shows. Beside obstacles the ways round are
+  /// what differs, and a solve takes ten times longer.
+  bool hurried() const {
+    const double shortest = shortest_seed(seeds_);
+    return problem_.objective.energy > 0.0 && problem_.obstacles.empty() &&
+           time_.lower == time_.upper && time_.guess < kHurried * shortest;
+  }
+
+  /// One by one in so long a time, and the cheapest ways a search over the whole joint space knows.
+  std::vector<ModeCandidate> sequences(double duration) const {
+    std::vector<ModeCandidate> found;
+    if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
+        problem_.waypoints.empty()) {
+      const Eigen::VectorXd times =
+          Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, duration);
+      std::vector<Eigen::VectorXd> ends;
+      ends.reserve(seeds_.size());
+      for (const SeedMotion& s : seeds_) {
+        ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+      }
+      found = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
+    }
+    for (ModeCandidate& c : grid_candidates(duration)) found.push_back(std::move(c));
+    return found;
+  }
+
+  /// @param wanted [s] longer than the window allows: the path is to be driven faster by whoever asked
+  std::vector<ModeCandidate> grid_candidates(double wanted) const {
+    std::vector<ModeCandidate> found;
+    const EnergyGridOptions size{options_.grid_nodes};
+    if (options_.grid_starts <= 0 || !options_.modes || problem_.tip_line ||
+        !problem_.waypoints.empty() || model_.machine.joint_count() > size.most_joints)
+      return found;
+    const auto search = [&](const MotionProblem& problem, int most) {
+      EnergyGrid grid(model_, problem, size);
+      std::vector<GridPath> paths;
+      if (problem.objective.energy > 0.0) {
+        paths = grid.paths_for_duration(wanted, most);
+      } else if (time_is_everything(problem)) {
+        constexpr double kTimeIsEverything = 1e7;  // [W]
+        paths.push_back(grid.cheapest_path(kTimeIsEverything));
+      }
+      for (const GridPath& path : paths) {
+        if (!path.found) continue;
+        double duration = std::max(wanted, path.duration_s);
+        if (wanted <= time_.upper) duration = std::clamp(duration, time_.lower, time_.upper);
+        found.push_back(grid_path_candidate(model_, problem, path, duration, coarse_.intervals));
+      }
+    };
+    search(problem_, options_.grid_starts);
+    if (!problem_.obstacles.empty()) {
+      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      MotionProblem wider = problem_;
+      wider.clearance += kRoomForTheRows;
+      search(wider, options_.grid_starts);
+    }
+    return found;
+  }
+
+  void solve(int count, const std::function<StartResult(int)>& start,
+             const std::function<std::string(int)>& name) {
+    const auto done = [&](int index, int finished) {
+      if (options_.progress)
+        options_.progress(static_cast<int>(result_.starts.size()) + finished, expected_,
+                          name(index));
+    };
+    const std::vector<ChildResult> children = run_in_children(
+        count, options_.processes, [&](int i) { return pack_start(start(i)); }, done);
+    for (int i = 0; i < count; ++i) {
+      const ChildResult& child = children[static_cast<std::size_t>(i)];
+      StartResult r;
+      if (child.ok) {
+        r = unpack_start(child.bytes);
+      } else {
+        r.seed = name(i);
+        r.message = child.error;
+        r.duration = time_.guess;
+      }
+      for (std::size_t k = 0; k < result_.starts.size() && r.same_as < 0; ++k) {
+        if (same_motion(problem_, r.motion, result_.starts[k].motion))
+          r.same_as = static_cast<int>(k);
+      }
+      result_.starts.push_back(std::move(r));
+    }
+  }
+
+  /// No start kept all limits: the shortest motion there is tells whether the time is the reason. Where it is not, that
+  /// motion driven slower is a start like any other.
+  void rescue() {
+    if (interrupted() || time_is_everything(problem_)) return;
+    const OptimizeResult shortest = shortest_motion(model_, problem_, seeds_, options_);
+    if (shortest.best_start < 0) return;
+    result_.shortest_duration = shortest.duration;
+    if (shortest.duration > time_.upper) return;
+    const StartResult& fast = shortest.starts[static_cast<std::size_t>(shortest.best_start)];
+    const TimeWindow time{std::max(time_.guess, shortest.duration), time_.lower, time_.upper};
+    const Trajectory slow = with_duration(fast.motion, time.guess);
+    PhasePlan plan = fast.plan;
+    if (plan.count() > 0) plan.durations *= time.guess / plan.total();
+    const std::string name = "the shortest motion, slower";
+    expected_ = static_cast<int>(result_.starts.size()) + 2;
+    solve(
+        2,
+        [&](int i) {
+          return i == 0 || plan.count() == 0
+                     ? optimize_from(model_, problem_, {name, slow, shortest.duration, false}, time,
+                                     coarse_)
+                     : optimize_with_phases(model_, problem_, name + ", its phases", plan, slow,
+                                            time, true, coarse_);
+        },
+        [&](int) { return name; });
+  }
+
+  /// From the best few motions on: neighbouring mode sequences, as long as one of them is cheaper.
+  void search_sequences() {
+    std::vector<PhasePlan> tried;
+    const auto known = [&](const PhasePlan& plan) {
+      return std::any_of(tried.begin(), tried.end(),
+                         [&](const PhasePlan& t) { return same_plan(t, plan); });
+    };
+    for (const StartResult& s : result_.starts) {
+      if (s.plan.count() > 0 && !known(s.plan)) tried.push_back(s.plan);
+    }
+    for (int round = 0; round < options_.sequence_rounds && !interrupted(); ++round) {
+      struct Job {
+        int from;
+        PhasePlan plan;
+      };
+      std::vector<Job> jobs;
+      int searched = 0;
+      const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+      if (ranked.empty()) return;
+      const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+      for (const int i : ranked) {
+        const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
+        if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
+        if (searched++ == searched_) break;
+        for (PhasePlan& plan : neighbours(s.plan)) {
+          if (known(plan)) continue;
+          tried.push_back(plan);
+          jobs.push_back({i, std::move(plan)});
+        }
+      }
+      if (jobs.empty()) return;
+      expected_ = static_cast<int>(result_.starts.size() + jobs.size());
+      const std::vector<StartResult> from = result_.starts;
+      solve(
+          static_cast<int>(jobs.size()),
+          [&](int i) {
+            const Job& job = jobs[static_cast<std::size_t>(i)];
+            const StartResult& s = from[static_cast<std::size_t>(job.from)];
+            const TimeWindow time{s.duration, time_.lower, time_.upper};
+            return optimize_with_phases(model_, problem_,
+                                        "sequence " + plan_text(model_.machine, job.plan), job.plan,
+                                        s.motion, time, true, coarse_);
+          },
+          [&](int i) { return "sequence " + std::to_string(i + 1); });
+      const std::vector<int> now = ranking(result_, options_.limit_tolerance);
+      constexpr double kWorthAnotherRound = 1e-3;  // relative
+      if (now.empty() || result_.starts[static_cast<std::size_t>(now.front())].cost >
+                             (1.0 - kWorthAnotherRound) * best_before)
+        return;
+    }
+  }
+
+  /// What the trapezoid misses on this mesh, the softness of the maximum (known to lie within it) apart.
+  double mesh_error(const StartResult& s) const {
+    const ObjectiveWeights& w = problem_.objective;
+    if (s.energy_exact <= 0.0 || w.energy <= 0.0 || w.commands > 0.0) return 0.0;
+    const double excess = s.energy_smooth - s.energy_exact;
+    double volume = 0.0;  // [m^3]
+    for (int c = 0; c < model_.machine.cylinder_count(); ++c) {
+      const Cylinder& cylinder = model_.machine.cylinders[static_cast<std::size_t>(c)];
+      for (Eigen::Index k = 0; k + 1 < s.motion.size() && cylinder.hydraulic(); ++k) {
+        const double way =
+            linkage_rates(model_.machine, c, s.motion.q(k + 1, cylinder.joint)).value -
+            linkage_rates(model_.machine, c, s.motion.q(k, cylinder.joint)).value;
+        volume += way > 0.0 ? way * cylinder.area_piston() : -way * cylinder.area_rod();
+      }
+    }
+    const double softness =
+        options_.pressure_in_modes * std::log(1.0 + model_.machine.cylinder_count()) * volume;
+    return std::max(0.0, std::max(excess - softness, -excess)) / s.energy_exact;
+  }
+
+  /// The best motions again on the answer's mesh, finer until the trapezoid's error does not matter.
+  void refine() {
+    std::vector<int> best = ranking(result_, options_.limit_tolerance);
+    std::vector<int> chosen;
+    for (const int i : best) {
+      const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
+      const double least = result_.starts[static_cast<std::size_t>(best.front())].cost;
+      if (s.plan.count() > 0 && s.same_as < 0 && s.cost < 1.005 * least) chosen.push_back(i);
+      if (static_cast<int>(chosen.size()) == searched_) break;
+    }
+    for (int intervals = options_.intervals, round = 0;
+         !chosen.empty() && round < 4 && !interrupted(); intervals *= 2, ++round) {
+      OptimizeOptions fine = options_;
+      fine.intervals = intervals;
+      expected_ = static_cast<int>(result_.starts.size() + chosen.size());
+      const std::vector<StartResult> from = result_.starts;
+      const std::size_t first = result_.starts.size();
+      const auto source = [&](int i) -> const StartResult& {
+        return from[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])];
+      };
+      const auto name = [&](int i) {
+        const std::string& seed = source(i).seed;
+        return seed.starts_with("finer: ") ? seed : "finer: " + seed;
+      };
+      solve(
+          static_cast<int>(chosen.size()),
+          [&](int i) {
+            const StartResult& s = source(i);
+            const TimeWindow time{s.duration, time_.lower, time_.upper};
+            return optimize_with_phases(model_, problem_, name(i), s.plan, s.motion, time, false,
+                                        fine);
+          },
+          name);
+      // the coarse motion is kept as what the finer one is compared with, not as an answer of its own
+      std::size_t winner = first;
+      for (std::size_t i = first; i < result_.starts.size(); ++i) {
+        if (result_.starts[i].usable(options_.limit_tolerance) &&
+            result_.starts[i].cost < result_.starts[winner].cost)
+          winner = i;
+      }
+      if (!result_.starts[winner].usable(options_.limit_tolerance)) return;
+      result_.mesh_error = mesh_error(result_.starts[winner]);
+      if (result_.mesh_error <= options_.mesh_error) return;
+      chosen = {static_cast<int>(winner)};
+    }
+  }
+
+  void conclude() {
+    const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+    const bool stopped =
+        std::any_of(result_.starts.begin(), result_.starts.end(),
+                    [](const StartResult& r) { return r.status == NlpStatus::kInterrupted; });
+    if (!ranked.empty()) {
+      result_.best_start = ranked.front();
+      const StartResult& best = result_.starts[static_cast<std::size_t>(result_.best_start)];
+      result_.status = stopped ? OptimizeStatus::kInterrupted : OptimizeStatus::kOptimal;
+      result_.motion = best.motion;
+      result_.duration = best.motion.duration();
+      result_.energy_smooth = best.energy_smooth;
+      result_.energy = exact_energy(model_, best.motion, problem_.payload, options_.refine);
+      result_.checks = check_limits(model_, problem_, best.motion, options_.refine);
+      result_.message = fmt::format("{}: {:.1f} kJ in {:.2f} s", problem_.name,
+                                    result_.energy.total / 1e3, result_.duration);
+      set_baselines(model_, problem_, seeds_, options_.refine, result_);
+      return;
+    }
+    result_.duration = time_.guess;
+    set_baselines(model_, problem_, seeds_, options_.refine, result_);
+    if (const StartResult* nearest = nearest_start(result_))
+      result_.checks = check_limits(model_, problem_, nearest->motion, options_.refine);
+    if (stopped) {
+      result_.status = OptimizeStatus::kInterrupted;
+      result_.message = problem_.name + ": interrupted before any motion was found";
+    } else {
+      say_why_infeasible(problem_, seeds_, time_.guess, result_);
+    }
+  }
+
+  const CraneModel& model_;
+  const MotionProblem& problem_;
+  const std::vector<SeedMotion>& seeds_;
+  TimeWindow time_;
+  const OptimizeOptions& options_;
+  OptimizeOptions coarse_;
+  OptimizeResult result_;
+  int expected_ = 0, searched_ = 1;
+};
+
+}  // namespace
+
+OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, const TimeWindow& time,
+                           const OptimizeOptions& options) {
+  return Search(model, problem, seeds, time, options).run();
+}
+
+OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
+                               const std::vector<SeedMotion>& seeds,
+                               const OptimizeOptions& options) {
+  MotionProblem hurried = problem;
+  hurried.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
+  const double shortest = shortest_seed(seeds);
+  const double guess = shortest > 0.0 ? 1.1 * shortest : std::max(problem.duration.min, 1.0);
+  hurried.duration = {0.0, 20.0 * guess};
+  OptimizeOptions direct = options;
+  direct.schedule.clear();
+  direct.sequential_starts = 0;
+  direct.sequence_rounds = 0;
+  direct.progress = {};
+  return optimize_in(model, hurried, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
+}
+
+OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
+                           const std::vector<SeedMotion>& seeds, double duration,
+                           const OptimizeOptions& options) {
+  return optimize_in(model, problem, seeds, TimeWindow::fixed(duration), options);
+}
+
+OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
+                        const std::vector<SeedMotion>& seeds, const OptimizeOptions& options) {
+  SPARFLOW_CHECK(!seeds.empty(), "optimisation starts from at least one seed");
+  const std::vector<std::string> missing = model.missing();
+  if (!missing.empty()) {
+    throw InputError({problem.file, 0, 0}, "model",
+                     fmt::format("the model has no working pressure for {}; fit it on a log in "
+                                 "which that movement occurs",
+                                 fmt::join(missing, ", ")));
+  }
+  if (problem.duration.fixed())
+    return optimize_at(model, problem, seeds, problem.duration.min, options);
+
+  // Free or bounded time is a variable of every start; where the search begins still matters, so two beginnings.
+  const auto begin = std::chrono::steady_clock::now();
+  const double shortest = shortest_seed(seeds);
+  const double lo = std::max(problem.duration.min, 0.05 * shortest);
+  const double hi = std::min(problem.duration.max, std::max(6.0 * shortest, 2.0 * lo));
+  OptimizeResult best;
+  int durations = 0;
+  for (const double times_shortest : {1.3, 3.0}) {
+    if (durations > 0 && options.interrupted && options.interrupted()) break;
+    const TimeWindow window{std::clamp(times_shortest * shortest, lo, hi), lo, hi};
+    OptimizeResult r = optimize_in(model, problem, seeds, window, options);
+    ++durations;
+    const auto cost = [](const OptimizeResult& o) {
+      return o.best_start < 0 ? std::numeric_limits<double>::infinity()
+                              : o.starts[static_cast<std::size_t>(o.best_start)].cost;
+    };
+    if (durations == 1 || cost(r) < cost(best)) best = std::move(r);
+  }
+  best.evaluated_durations = durations;
+  best.solve_s = seconds_since(begin);
+  return best;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,135 @@
+#include "optimizer/solve/optimize_outcome.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace sparflow {
+
+bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
+  if (a.size() < 2 || b.size() < 2) return false;
+  if (std::abs(a.duration() - b.duration()) > 1e-3 * a.duration()) return false;
+  const Eigen::MatrixXd other = resampled(b, a.t).q;
+  for (Eigen::Index j = 0; j < a.q.cols(); ++j) {
+    const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
+    if ((a.q.col(j) - other.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
+  }
+  return true;
+}
+
+double shortest_seed(const std::vector<SeedMotion>& seeds) {
+  double shortest = 0.0;
+  for (const SeedMotion& s : seeds) {
+    if (s.shortest_duration > 0.0 && (shortest == 0.0 || s.shortest_duration < shortest))
+      shortest = s.shortest_duration;
+  }
+  return shortest;
+}
+
+std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
+  std::vector<int> kept;
+  for (std::size_t i = 0; i < result.starts.size(); ++i) {
+    if (result.starts[i].usable(limit_tolerance)) kept.push_back(static_cast<int>(i));
+  }
+  std::stable_sort(kept.begin(), kept.end(), [&](int x, int y) {
+    return result.starts[static_cast<std::size_t>(x)].cost <
+           result.starts[static_cast<std::size_t>(y)].cost;
+  });
+  return kept;
+}
+
+void set_baselines(const CraneModel& model, const MotionProblem& problem,
+                   const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
+  result.best_seed_energy = result.straight_line_energy = result.nearest_line_energy = 0.0;
+  constexpr double kSeedTolerance =
+      1e-3;  // time scaling of a seed on its own mesh: see time_parametrise
+  bool first_line = true;
+  for (const SeedMotion& s : seeds) {
+    const bool nearest = s.straight_line && first_line;
+    if (s.straight_line) first_line = false;
+    const Trajectory timed = with_duration(s.motion, result.duration);
+    if (worst_excess(check_limits(model, problem, timed, refine)) > kSeedTolerance) continue;
+    const double energy = exact_total_energy(model, timed, problem.payload, refine);
+    if (result.best_seed_energy == 0.0 || energy < result.best_seed_energy) {
+      result.best_seed_energy = energy;
+      result.best_seed_name = s.name;
+    }
+    if (nearest) result.nearest_line_energy = energy;
+    if (s.straight_line &&
+        (result.straight_line_energy == 0.0 || energy < result.straight_line_energy)) {
+      result.straight_line_energy = energy;
+      result.straight_line_name = s.name;
+    }
+  }
+}
+
+const StartResult* nearest_start(const OptimizeResult& result) {
+  const StartResult* nearest = nullptr;
+  for (const StartResult& s : result.starts) {
+    if (s.motion.size() > 1 && (nearest == nullptr || s.excess < nearest->excess)) nearest = &s;
+  }
+  return nearest;
+}
+
+const char* to_string(OptimizeStatus status) {
+  switch (status) {
+    case OptimizeStatus::kOptimal:
+      return "optimal";
+    case OptimizeStatus::kInfeasible:
+      return "infeasible";
+    case OptimizeStatus::kFailed:
+      return "failed";
+    case OptimizeStatus::kInterrupted:
+      return "interrupted";
+  }
+  return "failed";
+}
+
+namespace {
+
+/// How many times longer the motion would have to take for this limit to hold: what makes a velocity, an
+/// acceleration and a flow comparable. Lengths do not mend with time.
+double stretch_asked(const LimitCheck& c) {
+  if (c.excess <= 0.0 || c.limit == 0.0) return 1.0 + std::max(c.excess, 0.0);
+  const double ratio = std::abs(c.value / c.limit);
+  if (c.what.starts_with("acceleration of")) return std::sqrt(ratio);
+  // between equals the flow, which is why the accelerations of a shortened path are too high
+  return c.what.starts_with("flow") ? 1.01 * ratio : ratio;
+}
+
+}  // namespace
+
+const LimitCheck& worst_limit(const std::vector<LimitCheck>& checks) {
+  return *std::max_element(
+      checks.begin(), checks.end(),
+      [](const LimitCheck& x, const LimitCheck& y) { return stretch_asked(x) < stretch_asked(y); });
+}
+
+std::string limit_text(const LimitCheck& check) {
+  return fmt::format("{} at t={:.2f} s, {:.4g} against a limit of {:.4g} {}", check.what,
+                     check.time, check.value, check.limit, check.unit);
+}
+
+void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
+                        double duration, OptimizeResult& result) {
+  std::string worst;
+  if (!result.checks.empty()) {
+    worst = fmt::format(" Worst: {}.", limit_text(worst_limit(result.checks)));
+  } else if (!result.starts.empty()) {
+    worst = " The solver says: " + result.starts.front().message + ".";
+  }
+  const double shortest = shortest_seed(seeds);
+  std::string remedy;
+  if (result.shortest_duration > duration) {
+    remedy = fmt::format(" The shortest motion found takes {:.2f} s; {:g} s was asked for.",
+                         result.shortest_duration, duration);
+  } else if (shortest > duration) {
+    remedy = fmt::format(" A seed path keeps all limits in {:.1f} s; {} s was asked for.", shortest,
+                         duration);
+  }
+  result.status = OptimizeStatus::kInfeasible;
+  result.message = fmt::format("{}: infeasible.{}{}", problem.name, worst, remedy);
+}
+
+}  // namespace sparflow

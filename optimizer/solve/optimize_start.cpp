@@ -1,0 +1,439 @@
+/// One start: smooth stages, modes, tightening.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "optimizer/phases/tightening.h"
+#include "optimizer/solve/optimize.h"
+#include "optimizer/solve/optimize_outcome.h"
+
+namespace sparflow {
+namespace {
+
+class Start {
+ public:
+  Start(const CraneModel& model, const MotionProblem& problem, const TimeWindow& time,
+        const OptimizeOptions& options)
+      : model_(model), problem_(problem), time_(time), options_(options) {
+    uniform_mesh();
+    tightening_.position.assign(model.machine.joints.size(), 0.0);
+  }
+
+  StartResult run(const ModeCandidate& candidate) {
+    result_.seed = candidate.name;
+    keep_clear_ends(candidate.guess);
+    offer(candidate.guess, false);
+    hold(candidate.modes, candidate.guess, true);
+    return finished();
+  }
+
+  StartResult run(const std::string& name, const PhasePlan& plan, const Trajectory& guess,
+                  bool overlaps) {
+    result_.seed = name;
+    keep_clear_ends(guess);
+    offer(guess, false);
+    hold_plan(plan, guess, overlaps);
+    return finished();
+  }
+
+  StartResult run(const SeedMotion& seed) {
+    result_.seed = seed.name;
+    const Trajectory timed = with_duration(seed.motion, time_.guess);
+    result_.seed_feasible = worst_excess(verdict(timed).checks) <= 1e-3;
+    if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
+    keep_clear_ends(timed);
+    if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
+    // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
+    if (options_.modes) hold_modes(resampled(timed, mesh_.times));
+    Trajectory motion = timed;
+    const std::size_t stages = problem_.waypoints.empty() ? options_.schedule.size() : 0;
+    for (std::size_t stage = 0; stage < stages; ++stage) {
+      uniform_mesh();
+      const bool last = stage + 1 == options_.schedule.size();
+      const bool rough = options_.modes || !last;
+      const NlpResult solved =
+          solve(motion, options_.schedule[stage], rough ? 1e-2 : options_.tolerance);
+      note_status(solved);
+      if (solved.status == NlpStatus::kInterrupted) return finished();
+      if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
+      motion = transcription_->trajectory(solved.x);
+      if (options_.modes || last) {
+        keep_limits(motion, options_.schedule[stage], !options_.modes);
+      }
+      if (options_.modes) hold_modes(motion);
+    }
+    return finished();
+  }
+
+ private:
+  /// A solve may converge and its motion break a limit all the same: one that had no row yet, or one that no drawing in
+  /// keeps between the knots. Then it is the limit that is named, not the convergence.
+  StartResult finished() {
+    const bool converged =
+        result_.status == NlpStatus::kOptimal || result_.status == NlpStatus::kAcceptable;
+    if (converged && result_.motion.size() > 1 && result_.excess > options_.limit_tolerance) {
+      result_.status = NlpStatus::kInfeasible;
+      result_.message =
+          "its motion breaks a limit: " + limit_text(worst_limit(verdict(result_.motion).checks));
+    }
+    return std::move(result_);
+  }
+
+  static bool usable(const NlpResult& r) {
+    return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
+  }
+
+  /// One phase of one mode over the whole time.
+  void uniform_mesh() {
+    mesh_ = PhaseMesh{};
+    mesh_.times.setLinSpaced(options_.intervals + 1, 0.0, time_.guess);
+  }
+
+  NlpResult solve(const Trajectory& from, const Smoothing& smoothing, double tolerance) {
+    const ModeTable& modes = mesh_.modes;
+    TranscriptionSpec spec;
+    spec.t = mesh_.times;
+    for (std::size_t w = 0; w < mesh_.waypoint_knots.size(); ++w) {
+      spec.waypoints.push_back(
+          {mesh_.waypoint_knots[w],
+           std::make_shared<TipAtGoal>(model_.machine, problem_.waypoints[w])});
+    }
+    if (!mesh_.of_interval.empty()) {
+      PhaseTimes& phases = spec.phases;
+      phases.of_interval = mesh_.of_interval;
+      phases.lower.setConstant(phases.count(), shortest_phase());
+      phases.upper.setConstant(phases.count(), time_.upper);
+      phases.total_lower = time_.lower;
+      phases.total_upper = time_.upper;
+      phases.price =
+          1e-3 * (problem_.objective.energy * problem_.idle_power + problem_.objective.time);
+    }
+    CraneKnotOptions knot;
+    knot.smoothing = smoothing;
+    knot.energy_weight = problem_.objective.energy;
+    knot.command_weight = problem_.objective.commands;
+    knot.modes = modes;
+    knot.flow_share = tightening_.flow;
+    knot.valve_share = tightening_.valve;
+    knot.pressure_share = tightening_.pressure;
+    knot.tip_line_share = tightening_.line;
+    knot.trust_share = tightening_.trust;
+    knot.extra_clearance = tightening_.clearance;
+    knot.limit_pressure = tightening_.limit_pressure;
+    knot.clear_postures = clear_postures_;
+    if (!problem_.obstacles.empty()) knot.near_postures = from.q;
+    spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
+    if (options_.knot_wrapper) spec.knot = options_.knot_wrapper(knot, spec.knot);
+    set_bounds(spec);
+    if (modes.rows() > 0) apply_modes(model_, modes, spec.bounds);
+    spec.acceleration_weight.resize(model_.machine.joint_count());
+    for (int j = 0; j < model_.machine.joint_count(); ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      spec.joint_names.push_back(model_.machine.joints[i].name);
+      const Range& a = problem_.limits.acceleration[i];
+      const double full = std::max({std::abs(a.lo), std::abs(a.hi), 1e-6});
+      // default: full acceleration all the time costs one watt, which only decides between equals
+      spec.acceleration_weight[j] = problem_.objective.smoothness
+                                        ? *problem_.objective.smoothness * 1e-3
+                                        : 1e-3 / (full * full);
+    }
+    transcription_ = std::make_unique<Transcription>(std::move(spec));
+    transcription_->set_start(from);
+    NlpOptions nlp;
+    nlp.tolerance = tolerance;
+    nlp.max_iterations = modes.rows() > 0 ? options_.phase_iterations : options_.smooth_iterations;
+    nlp.max_seconds = options_.max_seconds;
+    nlp.more = options_.ipopt;
+    if (modes.rows() > 0 || result_.iterations > 0) nlp.mu_init = 1e-3;
+    nlp.on_iteration = [this](const NlpIteration&) {
+      return !(options_.interrupted && options_.interrupted());
+    };
+    NlpResult solved = solve_with_ipopt(*transcription_, nlp);
+    result_.iterations += solved.iterations;
+    result_.solve_s += solved.solve_s;
+    result_.callbacks_s += solved.callbacks_s;
+    result_.linear_solver_s += solved.linear_solver_s;
+    StageRecord record;
+    record.what = modes.rows() > 0 ? "modes"
+                                   : fmt::format("smooth, {:g} mm/s, {:g} bar",
+                                                 1e3 * smoothing.speed, smoothing.pressure / 1e5);
+    if (tightenings_used_ > 0)
+      record.what += fmt::format(", limits drawn in ({})", tightenings_used_);
+    record.status = solved.status;
+    record.iterations = solved.iterations;
+    record.solve_s = solved.solve_s;
+    if (usable(solved)) {
+      const Trajectory motion = transcription_->trajectory(solved.x);
+      record.energy_exact = verdict(motion).energy;
+      record.excess = worst_excess(verdict(motion).checks);
+    }
+    result_.stages.push_back(std::move(record));
+    return solved;
+  }
+
+  void set_bounds(TranscriptionSpec& spec) const {
+    const int n = model_.machine.joint_count();
+    Eigen::VectorXd lo[3], hi[3];
+    const std::vector<Range>* ranges[3] = {&problem_.limits.position, &problem_.limits.velocity,
+                                           &problem_.limits.acceleration};
+    for (int d = 0; d < 3; ++d) {
+      lo[d].resize(n);
+      hi[d].resize(n);
+      for (int j = 0; j < n; ++j) {
+        const Range& r = (*ranges[d])[static_cast<std::size_t>(j)];
+        const double inset = d == 0 ? tightening_.position[static_cast<std::size_t>(j)] : 0.0;
+        lo[d][j] = r.lo + inset;
+        hi[d][j] = r.hi - inset;
+      }
+    }
+    spec.bounds = TranscriptionBounds::uniform(static_cast<int>(mesh_.times.size()) - 1, lo[0],
+                                               hi[0], lo[1], hi[1], lo[2], hi[2]);
+    spec.bounds.rest_to_rest(problem_.start);
+    if (const auto* goal = std::get_if<TipGoal>(&problem_.goal)) {
+      spec.terminal = std::make_shared<TipAtGoal>(model_.machine, goal->tip);
+    } else {
+      spec.bounds.fix_q(static_cast<int>(mesh_.times.size()) - 1,
+                        std::get<JointGoal>(problem_.goal).q);
+    }
+  }
+
+  /// What the exact law says of a motion, between its knots too.
+  struct Verdict {
+    Trajectory motion;
+    std::vector<LimitCheck> checks;
+    double energy = 0.0;  // [J]
+  };
+  /// Asked twice of the same motion more often than not; the last answer is kept.
+  const Verdict& verdict(const Trajectory& motion) {
+    const Trajectory& known = verdict_.motion;
+    const bool same = known.t.size() == motion.t.size() && known.t == motion.t &&
+                      known.q == motion.q && known.qd == motion.qd &&
+                      known.qdd.rows() == motion.qdd.rows() && known.qdd == motion.qdd;
+    if (!same) {
+      verdict_.checks = check_limits(model_, problem_, motion, options_.refine);
+      verdict_.energy = exact_total_energy(model_, motion, problem_.payload, options_.refine);
+      verdict_.motion = motion;
+    }
+    return verdict_;
+  }
+
+  /// Keeps a motion if it is better than what there is: limits first, then exact energy. @return its limits
+  std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
+    const std::vector<LimitCheck> checks = verdict(motion).checks;
+    const double excess = worst_excess(checks);
+    const double energy = verdict(motion).energy;
+    const double cost = exact_cost(model_, problem_, motion, energy, options_.refine);
+    const bool kept = excess <= options_.limit_tolerance;
+    const bool first = result_.motion.size() < 2;
+    const bool had_kept = !first && result_.excess <= options_.limit_tolerance;
+    if (!first && !(kept && (!had_kept || cost < result_.cost)) &&
+        !(!kept && !had_kept && excess < result_.excess)) {
+      return checks;
+    }
+    result_.motion = motion;
+    result_.excess = excess;
+    result_.energy_exact = energy;
+    result_.cost = cost;
+    result_.duration = motion.duration();
+    result_.modes_held = modes_held;
+    result_.plan = PhasePlan{};
+    if (modes_held && !mesh_.of_interval.empty()) {
+      result_.plan = plan_;
+      result_.plan.durations = durations_of(mesh_, motion.t);
+    }
+    // of the law last solved for; before the first solve there is none
+    result_.energy_smooth =
+        transcription_ ? 1e3 * transcription_->model_cost(transcription_->variables(motion)) /
+                             problem_energy_weight()
+                       : energy;
+    return checks;
+  }
+
+  /// Keeps a motion if it is better than what there is; while it breaks limits between knots, solves again with
+  /// those drawn in.
+  void keep_limits(Trajectory motion, const Smoothing& smoothing, bool solve_again = true) {
+    for (int attempt = 0;; ++attempt) {
+      const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0);
+      if (!solve_again || attempt == options_.tightenings) return;
+      if (split_where_it_touches(problem_, motion, options_.refine, 4 * options_.intervals,
+                                 mesh_)) {
+        motion = resampled(motion, mesh_.times);
+      } else if (!tightening_.draw_in(problem_, checks, options_.limit_tolerance)) {
+        return;
+      }
+      ++tightenings_used_;
+      const NlpResult solved = solve(motion, smoothing, options_.tolerance);
+      if (!usable(solved)) return;
+      motion = transcription_->trajectory(solved.x);
+    }
+  }
+
+  double problem_energy_weight() const {
+    return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
+  }
+
+  /// Start and end posture of a motion, where the exact distance calls them clear.
+  void keep_clear_ends(const Trajectory& motion) {
+    if (problem_.obstacles.empty()) return;
+    ClearanceModel clearance(problem_);
+    const Eigen::MatrixXd& q = motion.q;
+    Eigen::VectorXd posture;
+    clear_postures_.resize(0, q.cols());
+    for (const Eigen::Index k : {Eigen::Index{0}, q.rows() - 1}) {
+      posture = q.row(k);
+      if (!clearance.clear(posture.data())) continue;
+      clear_postures_.conservativeResize(clear_postures_.rows() + 1, q.cols());
+      clear_postures_.row(clear_postures_.rows() - 1) = q.row(k);
+    }
+  }
+
+  /// The outcome reported is that of the solve behind the motion, or of the last one while there is none.
+  void note_status(const NlpResult& solved) {
+    if (result_.status == NlpStatus::kOptimal && result_.modes_held) return;
+    result_.status = solved.status;
+    result_.message = solved.message;
+    if (!solved.solved() && !solved.max_violation_at.empty()) {
+      result_.message += fmt::format(" (worst: {})", solved.max_violation_at);
+    }
+  }
+
+  /// Holds the modes a motion shows and makes the best of them; the start's motion is the best of all.
+  void hold_modes(const Trajectory& shown) {
+    hold(modes_of(model_, problem_, shown, options_.mode_options), shown, true);
+  }
+
+  void hold(const ModeTable& modes, const Trajectory& shown, bool overlaps) {
+    // a guess may be on a mesh of its own; modes without one are on equal intervals
+    const Trajectory from =
+        shown.size() == modes.rows() + 1
+            ? shown
+            : resampled(shown, Eigen::VectorXd::LinSpaced(modes.rows() + 1, shown.t[0],
+                                                          shown.t[shown.size() - 1]));
+    // beside obstacles free times at once would drive a rough start through them
+    const bool hemmed =
+        !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();
+    if (options_.free_phases && !hemmed &&
+        hold_plan(plan_of(modes, from.t, waypoint_times(from)), from, overlaps))
+      return;
+    if (!problem_.waypoints.empty()) return;  // only phases know when one is passed
+    if (time_.lower < time_.upper) return;    // only phases know what to do with free time
+    mesh_ = PhaseMesh{};
+    mesh_.times = from.t;
+    mesh_.modes = modes;
+    const NlpResult solved = solve(from, exact_law(), options_.tolerance);
+    note_status(solved);
+    if (!usable(solved)) return;
+    keep_limits(transcription_->trajectory(solved.x), exact_law());
+    if (options_.free_phases && hemmed && result_.excess <= options_.limit_tolerance)
+      hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
+  }
+
+  /// When the tip comes nearest to each waypoint, one after the other. [s]
+  std::vector<double> waypoint_times(const Trajectory& motion) const {
+    std::vector<double> times;
+    Eigen::Index from = 1;
+    const auto count = static_cast<Eigen::Index>(problem_.waypoints.size());
+    for (Eigen::Index w = 0; w < count; ++w) {
+      const Eigen::Index until = motion.size() - 1 - (count - w);
+      Eigen::Index best = from;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (Eigen::Index k = from; k <= until; ++k) {
+        const Eigen::VectorXd q = motion.q.row(k).transpose();
+        const double distance = (tip_position<double>(model_.machine, q) -
+                                 problem_.waypoints[static_cast<std::size_t>(w)])
+                                    .norm();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        best = k;
+      }
+      times.push_back(motion.t[best]);
+      from = best + 1;
+    }
+    return times;
+  }
+
+  /// The law without blends: only the maximum keeps a little softness.
+  Smoothing exact_law() const {
+    Smoothing exact = options_.schedule.empty() ? Smoothing{} : options_.schedule.back();
+    exact.pressure = options_.pressure_in_modes;
+    return exact;
+  }
+
+  /// [s] no valve opens and closes in less, and the problem needs some lower bound
+  double shortest_phase() const { return std::min(0.02, 2e-3 * time_.guess); }
+
+  /// Phases of free durations; phases that shrink to nothing are dropped and the rest is solved again.
+  bool hold_plan(const PhasePlan& wanted, const Trajectory& from, bool overlaps) {
+    PhasePlan plan = wanted;
+    if (overlaps) plan = with_overlaps(plan, options_.overlap);
+    Trajectory guess = from;
+    bool any = false;
+    for (int round = 0; round < 3; ++round) {
+      plan_ = plan;
+      mesh_ = mesh_of(plan, options_.intervals, options_.phase_intervals);
+      const NlpResult solved =
+          solve(resampled(guess, mesh_.times), exact_law(), options_.tolerance);
+      note_status(solved);
+      if (!usable(solved)) return any;
+      const Trajectory motion = transcription_->trajectory(solved.x);
+      PhasePlan found = plan;
+      found.durations = durations_of(mesh_, motion.t);
+      const PhasePlan kept = without_short(found, 1.5 * shortest_phase());
+      const bool last = kept.count() == found.count() || round == 2;
+      keep_limits(motion, exact_law(), last);
+      any = true;
+      if (last) return true;
+      plan = kept;
+      guess = motion;
+    }
+    return any;
+  }
+
+  const CraneModel& model_;
+  const MotionProblem& problem_;
+  TimeWindow time_;
+  const OptimizeOptions& options_;
+  PhaseMesh mesh_;  // of the next solve; no phases: all times fixed
+  PhasePlan plan_;  // behind the mesh
+  Tightening tightening_;
+  int tightenings_used_ = 0;
+  Eigen::MatrixXd clear_postures_;
+  std::unique_ptr<Transcription> transcription_;
+  StartResult result_;
+  Verdict verdict_;
+};
+
+}  // namespace
+
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const OptimizeOptions& options) {
+  return optimize_with_modes(model, problem, candidate,
+                             TimeWindow::fixed(candidate.guess.duration()), options);
+}
+
+StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& problem,
+                                const ModeCandidate& candidate, const TimeWindow& time,
+                                const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(candidate);
+}
+
+StartResult optimize_with_phases(const CraneModel& model, const MotionProblem& problem,
+                                 const std::string& name, const PhasePlan& plan,
+                                 const Trajectory& guess, const TimeWindow& time, bool overlaps,
+                                 const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(name, plan, guess, overlaps);
+}
+
+StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
+                          const SeedMotion& seed, double duration, const OptimizeOptions& options) {
+  return optimize_from(model, problem, seed, TimeWindow::fixed(duration), options);
+}
+
+StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,
+                          const SeedMotion& seed, const TimeWindow& time,
+                          const OptimizeOptions& options) {
+  return Start(model, problem, time, options).run(seed);
+}
+
+}  // namespace sparflow

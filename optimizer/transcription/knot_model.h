@@ -1,0 +1,65 @@
+#pragma once
+/// What the transcription needs to know about one instant of a motion: its power and its path constraints,
+/// each with exact dense derivative blocks. Implemented by the crane (optimizer/crane/crane_knot_model.h)
+/// and by the reference problem (bench/).
+#include <Eigen/Dense>
+#include <string>
+
+namespace sparflow {
+
+/// z = [q; qd] (2 n values) or, when uses_acceleration(), [q; qd; qdd] (3 n values).
+/// An object is a mutable workspace over an immutable model: one a thread. No call allocates.
+/// The transcription calls cost then path, and cost_derivatives then path_jacobian, at the same z in turn: a model
+/// may remember the last z and share its kinematics.
+class KnotModel {
+ public:
+  virtual ~KnotModel() = default;
+  virtual int joint_count() const = 0;
+  virtual bool uses_acceleration() const { return false; }
+  int size() const { return joint_count() * (uses_acceleration() ? 3 : 2); }
+
+  /// Called before every evaluation: the knot, and the interval (knot - 1 or knot) in whose name it happens.
+  /// A model whose law changes from interval to interval (modes) looks here.
+  virtual void begin_node(int /*knot*/, int /*interval*/) {}
+  /// Whether the law differs on the two sides of this knot: it is then evaluated once for each.
+  virtual bool split_at(int /*knot*/) const { return false; }
+
+  /// Cost rate at z (power, in the problem's scaled unit).
+  virtual double cost(const double* z) = 0;
+  /// Cost rate, gradient [size] and full symmetric Hessian [size x size, column-major].
+  virtual double cost_derivatives(const double* z, double* gradient, double* hessian) = 0;
+
+  /// Path constraints lower <= g(z) <= upper, the same at every knot.
+  virtual int path_count() const { return 0; }
+  virtual void path_bounds(double* /*lower*/, double* /*upper*/) const {}
+  /// Whether row `row` depends on the velocities (rows that do not get a narrower Jacobian block).
+  virtual bool path_uses_velocity(int /*row*/) const { return true; }
+  /// Whether row `row` depends on the accelerations. Rows that do are imposed at both ends of every
+  /// interval with that interval's qdd, the others once a knot.
+  virtual bool path_uses_acceleration(int /*row*/) const { return uses_acceleration(); }
+  /// Words for messages, e.g. "flow of pump main".
+  virtual std::string path_name(int row) const { return "path row " + std::to_string(row); }
+  virtual void path(const double* /*z*/, double* /*g*/) {}
+  /// Values and Jacobian [path_count x size, row-major].
+  virtual void path_jacobian(const double* /*z*/, double* /*g*/, double* /*jacobian*/) {}
+  /// Adds sum_row multiplier[row] * Hessian of row to `hessian` [size x size, column-major].
+  virtual void add_path_hessian(const double* /*z*/, const double* /*multiplier*/,
+                                double* /*hessian*/) {}
+};
+
+/// Equality or range constraints on the last configuration (tip at the goal, or none).
+class TerminalModel {
+ public:
+  virtual ~TerminalModel() = default;
+  virtual int count() const = 0;
+  virtual void bounds(double* lower, double* upper) const = 0;
+  virtual void value(const double* q, double* g) = 0;
+  /// [count x n, row-major]
+  virtual void jacobian(const double* q, double* jacobian) = 0;
+  /// Adds sum_row multiplier[row] * Hessian to `hessian` [n x n, column-major].
+  virtual void add_hessian(const double* q, const double* multiplier, double* hessian) = 0;
+  /// Words for messages, e.g. "x of the tip at the goal".
+  virtual std::string name(int row) const { return "goal row " + std::to_string(row); }
+};
+
+}  // namespace sparflow

@@ -1,0 +1,227 @@
+#pragma once
+/// Direct transcription of a motion with piecewise constant acceleration into a sparse NLP.
+///   variables   x = [q_0 .. q_N, qd_0 .. qd_N, qdd_0 .. qdd_{N-1}], n values each
+///   minimise    sum_k h_k/2 (c(z_k) + c(z_{k+1})) + sum_k,i w_i qdd_{k,i}^2 [h_k]
+///   subject to  q_{k+1}  = q_k + h_k/2 (qd_k + qd_{k+1})      (exact, not an approximation)
+///               qd_{k+1} = qd_k + h_k qdd_k                   (exact)
+///               terminal(q_N), path(z_k), bounds on every single variable
+/// The cost integral alone is approximate (trapezoid). A model that uses the acceleration sees each interval at
+/// both its ends with the interval's own qdd, because qdd jumps at the knots.
+/// With free times, x ends in tau_0 .. tau_{P-1}: the intervals of phase p keep their shares of tau_p, and
+///   h_k = share_k tau_p,   total_lower <= sum tau <= total_upper,   price sum tau is added to the objective.
+/// Source: Betts (2010), Practical Methods for Optimal Control, ch. 4; equations and layout: docs/transcription.md.
+#include <memory>
+#include <vector>
+
+#include "models/machine/trajectory.h"
+#include "optimizer/nlp/nlp_problem.h"
+#include "optimizer/transcription/knot_model.h"
+
+namespace sparflow {
+
+/// One row an instant (q, qd: N+1 rows; qdd: N rows), one column a joint. Equal bounds fix a value, so a joint is
+/// frozen over a phase by zeros, a sign is imposed by one zero.
+struct TranscriptionBounds {
+  Eigen::MatrixXd q_lower, q_upper;      ///< [rad] or [m]
+  Eigen::MatrixXd qd_lower, qd_upper;    ///< [rad/s] or [m/s]
+  Eigen::MatrixXd qdd_lower, qdd_upper;  ///< [rad/s^2] or [m/s^2]
+
+  /// The same bounds at every instant; vectors [n].
+  static TranscriptionBounds uniform(int intervals, const Eigen::VectorXd& q_lower,
+                                     const Eigen::VectorXd& q_upper,
+                                     const Eigen::VectorXd& qd_lower,
+                                     const Eigen::VectorXd& qd_upper,
+                                     const Eigen::VectorXd& qdd_lower,
+                                     const Eigen::VectorXd& qdd_upper);
+  void fix_q(int knot, const Eigen::VectorXd& q);
+  void fix_qd(int knot, const Eigen::VectorXd& qd);
+  /// From rest at q_start to rest.
+  void rest_to_rest(const Eigen::VectorXd& q_start);
+};
+
+/// Free durations of groups of intervals ("phases"), so that when a mode ends is itself optimised, and with it, if
+/// the total is free, how long the motion takes.
+struct PhaseTimes {
+  /// [N] phase of every interval, 0, .., 0, 1, .., P-1; empty: all times are fixed as `t` has them.
+  std::vector<int> of_interval;
+  Eigen::VectorXd lower, upper;   ///< [P] s, lower > 0
+  double total_lower = 0.0;       ///< [s]
+  double total_upper = kNoBound;  ///< [s]
+  double price = 0.0;             ///< cost of a second (idle power), in the cost's own unit
+  int count() const { return of_interval.empty() ? 0 : of_interval.back() + 1; }
+};
+
+/// A configuration constraint at one knot on the way.
+struct Waypoint {
+  int knot = 0;
+  std::shared_ptr<TerminalModel> model;
+};
+
+struct TranscriptionSpec {
+  Eigen::VectorXd
+      t;  ///< [s] the N+1 knots, increasing, any spacing; with free times where they start from
+  std::shared_ptr<KnotModel> knot;
+  std::shared_ptr<TerminalModel> terminal;  ///< null = the end posture is ruled by the bounds alone
+  std::vector<Waypoint> waypoints;
+  PhaseTimes phases;
+  TranscriptionBounds bounds;
+  Eigen::VectorXd acceleration_weight;  ///< [n] w_i >= 0, empty = none
+  /// true: w_i qdd^2 h, an integral over time, independent of the mesh; false: a plain sum.
+  bool acceleration_weight_times_step = true;
+  std::vector<std::string> joint_names;  ///< for messages; empty = joint 0, 1, ...
+};
+
+/// Multipliers by meaning rather than by row, so that they survive a change of bounds (which may drop rows).
+struct TranscriptionMultipliers {
+  Eigen::MatrixXd q_defect;      ///< [N x n] of q_{k+1} - q_k - h/2 (qd_k + qd_{k+1}) = 0
+  Eigen::MatrixXd qd_defect;     ///< [N x n] of qd_{k+1} - qd_k - h qdd_k = 0
+  Eigen::VectorXd terminal;      ///< [rows of the terminal model, then of the waypoints]
+  Eigen::MatrixXd path;          ///< [nodes x path rows], zero where a row is not imposed
+  Eigen::VectorXd lower, upper;  ///< of the bounds, laid out as x
+  double total_time = 0.0;       ///< of total_lower <= sum tau <= total_upper
+};
+
+class Transcription final : public NlpProblem {
+ public:
+  /// Checks shapes. The models are used as workspaces by every later call.
+  explicit Transcription(TranscriptionSpec spec);
+
+  int joint_count() const { return n_; }
+  int interval_count() const { return intervals_; }
+  const TranscriptionSpec& spec() const { return spec_; }
+
+  // Where a value stands in x.
+  int q_index(int knot, int joint) const { return knot * n_ + joint; }
+  int qd_index(int knot, int joint) const { return (knots_ + knot) * n_ + joint; }
+  int qdd_index(int interval, int joint) const { return (2 * knots_ + interval) * n_ + joint; }
+  int tau_index(int phase) const { return (2 * knots_ + intervals_) * n_ + phase; }
+
+  /// Start values; before the first call they are the middle of the bounds (0 where a side is open).
+  void set_start(const Eigen::VectorXd& x);
+  /// Start from a motion, sampled at this mesh (with free times a motion of as many knots is taken as it is, its
+  /// phases' durations with it): q and qd from the motion (held at rest beyond its ends), qdd such
+  /// that the velocity defects vanish. Values outside their bounds are clipped.
+  void set_start(const Trajectory& motion);
+  /// Multipliers for a warm start; their shapes must be this transcription's.
+  void set_start_multipliers(const TranscriptionMultipliers& multipliers);
+  void clear_start_multipliers() { start_multipliers_.reset(); }
+
+  Eigen::VectorXd variables(const Trajectory& motion) const;
+  Trajectory trajectory(const Eigen::VectorXd& x) const;
+  TranscriptionMultipliers multipliers(const NlpMultipliers& rows) const;
+  /// Integral of the model's cost alone, without the acceleration term and the price of time.
+  double model_cost(const Eigen::VectorXd& x);
+
+  NlpSize size() const override;
+  void bounds(Out x_lower, Out x_upper, Out g_lower, Out g_upper) const override;
+  void start(Out x) const override;
+  const NlpMultipliers* start_multipliers() const override;
+  double objective(In x) override;
+  void gradient(In x, Out gradient) override;
+  void constraints(In x, Out g) override;
+  void jacobian_structure(OutIndex row, OutIndex column) const override;
+  void jacobian(In x, Out value) override;
+  void hessian_structure(OutIndex row, OutIndex column) const override;
+  void hessian(In x, double objective_factor, In multiplier, Out value) override;
+  std::string variable_name(int index) const override;
+  std::string constraint_name(int index) const override;
+
+ private:
+  /// One evaluation of the model: a knot, one side of a knot at which the law changes, or (with
+  /// acceleration) one end of an interval.
+  struct Node {
+    int knot = 0;
+    int interval = -1;  ///< whose qdd; -1 = the model does not use it
+    int before = -1;    ///< interval on the left whose half step is in the weight; -1 = none
+    int after = -1;     ///< the same on the right
+    int first_row = 0;  ///< in g, of this node's path rows
+    int law = 0;        ///< interval in whose name the model is evaluated
+    /// false: only rows that use the acceleration (the others are another node's)
+    bool all_rows = true;
+  };
+  struct Defect {
+    int interval, joint;
+    bool velocity;  ///< of qd, else of q
+  };
+
+  /// A terminal model at its knot, with its rows in g and its places in the derivatives.
+  struct Point {
+    int knot = 0;
+    TerminalModel* model = nullptr;
+    int count = 0, row = 0, jacobian = 0;
+    std::vector<int> hessian;  // [lower triangle of q, column by column]
+  };
+
+  Eigen::VectorXd variables_on_mesh(const Trajectory& motion) const;
+  void check_phases() const;
+  int phase(int interval) const {
+    return spec_.phases.of_interval[static_cast<std::size_t>(interval)];
+  }
+  /// h_k at x. [s]
+  double step(const double* x, int interval) const {
+    return phase_count_ == 0 ? step_[interval] : x[tau_index(phase(interval))] * share_[interval];
+  }
+  /// Weight of a node in the trapezoid at x. [s]
+  double weight(const Node& node, const double* x) const;
+  void time_gradient(const double* x, Out gradient) const;
+  void time_hessian(const double* x, double objective_factor, const double* multiplier,
+                    Out value) const;
+  void make_nodes();
+  void make_points();
+  void make_defects();
+  void make_jacobian();
+  void make_hessian();
+  int global_index(const Node& node, int local) const;
+  const std::vector<int>& rows_of(const Node& node) const;
+  void gather(const Node& node, const double* x, double* z) const;
+  double acceleration_factor(const double* x, int interval, int joint) const;
+  double acceleration_cost(const double* x) const;
+  void update_values(const double* x);
+  void update_derivatives(const double* x);
+  std::string joint_name(int joint) const;
+
+  TranscriptionSpec spec_;
+  int n_, knots_, intervals_, phase_count_, z_size_, terminal_count_ = 0, path_count_;
+  bool with_acceleration_;
+  Eigen::VectorXd step_;   ///< [s] h_k of spec_.t
+  Eigen::VectorXd share_;  ///< [N] h_k / tau of its phase, with free times
+  std::vector<Point> points_;
+  std::vector<Node> nodes_;
+  std::vector<Defect> defects_;  ///< in row order; rows between fixed variables are left out
+  int terminal_row_ = 0, total_time_row_ = -1, row_count_ = 0;
+  std::vector<int> all_rows_, acceleration_rows_;
+
+  // Structure, and the values that never change.
+  std::vector<int> jacobian_row_, jacobian_column_, hessian_row_, hessian_column_;
+  Eigen::VectorXd jacobian_constant_;
+  std::vector<std::vector<int>> row_columns_;   ///< per path row: the local indices it depends on
+  int first_path_jacobian_ = 0;                 ///< first value of the path blocks, node by node
+  std::vector<int> node_hessian_;               ///< [node x lower triangle of z, column by column]
+  std::vector<int> acceleration_hessian_;       ///< [N x n] diagonal of qdd
+  std::vector<int> time_node_hessian_;          ///< [node x sides x z] tau against z
+  std::vector<int> time_defect_hessian_;        ///< [defect x 2 or 1] tau against qd, qdd
+  std::vector<int> time_acceleration_hessian_;  ///< [N x n] tau against qdd
+
+  Eigen::VectorXd start_;
+  std::unique_ptr<NlpMultipliers> start_multipliers_;
+
+  // Workspace: what is known, and at which x.
+  Eigen::VectorXd value_x_, derivative_x_;
+  double cost_ = 0.0;
+  Eigen::VectorXd cost_gradient_;
+  std::vector<double> node_cost_, node_cost_gradient_;  ///< [node], [node x z], with free times
+  std::vector<double> node_cost_hessian_;               ///< [node x z x z]
+  std::vector<double> path_value_;                      ///< [node x path rows]
+  std::vector<double> path_jacobian_;                   ///< [node x path rows x z]
+  Eigen::VectorXd z_, path_multiplier_, terminal_jacobian_value_;
+  std::vector<double> block_, terminal_block_;
+};
+
+/// Position and velocity of a motion at any instants; at rest in its first and last posture outside its time.
+/// Accelerations are those that make qd piecewise linear between the instants.
+Trajectory resampled(const Trajectory& motion, const Eigen::VectorXd& t);
+
+/// The same path driven uniformly faster or slower, beginning at the same instant.
+Trajectory with_duration(const Trajectory& motion, double duration);
+
+}  // namespace sparflow
