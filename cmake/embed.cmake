@@ -5,7 +5,7 @@ set(SPARFLOW_PAGE_ASSETS uplot/uPlot.iife.min.js uplot/uPlot.min.css uplot/LICEN
 
 if(CMAKE_SCRIPT_MODE_FILE)
   string(REPLACE "," ";" FILES "${FILES}")
-  set(CODE "#include \"apps/report/assets.h\"\nnamespace sparflow {\nstd::string_view page_asset(std::string_view name) {\n")
+  set(CODE "#include \"apps/report/page/assets.h\"\nnamespace sparflow {\nstd::string_view page_asset(std::string_view name) {\n")
   foreach(NAME ${FILES})
     file(READ "${ASSETS}/${NAME}" TEXT)
     string(FIND "${TEXT}" ")_asset_\"" CLASH)

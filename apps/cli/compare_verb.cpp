@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "apps/cli/context.h"
-#include "apps/report/compare_page.h"
+#include "apps/report/model_pages/compare_page.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "apps/cli/context.h"
-#include "apps/report/compare_page.h"
-#include "apps/report/motion_page.h"
+#include "apps/report/model_pages/compare_page.h"
+#include "apps/report/motion_pages/motion_page.h"
 #include "identification/learning/fit.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"

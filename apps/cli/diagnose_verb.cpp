@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "apps/cli/diagnosis_inputs.h"
-#include "apps/report/diagnose_page.h"
+#include "apps/report/model_pages/diagnose_page.h"
 #include "diagnosis/extension/extend.h"
 #include "models/math/error.h"
 

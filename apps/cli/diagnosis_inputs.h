@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "apps/cli/context.h"
-#include "apps/report/page.h"
+#include "apps/report/page/page.h"
 #include "diagnosis/extension/extend.h"
 
 namespace sparflow::cli {

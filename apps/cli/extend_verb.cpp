@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "apps/cli/diagnosis_inputs.h"
-#include "apps/report/improve_page.h"
+#include "apps/report/model_pages/improve_page.h"
 #include "diagnosis/extension/extend.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"

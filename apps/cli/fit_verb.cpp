@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/context.h"
-#include "apps/report/compare_page.h"
+#include "apps/report/model_pages/compare_page.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "apps/cli/context.h"
-#include "apps/report/motion_page.h"
+#include "apps/report/motion_pages/motion_page.h"
 #include "models/math/error.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/grid/driven_grid_path.h"

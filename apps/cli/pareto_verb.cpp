@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "apps/cli/context.h"
-#include "apps/report/pareto_page.h"
+#include "apps/report/motion_pages/pareto_page.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {

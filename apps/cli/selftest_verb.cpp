@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "apps/cli/diagnosis_inputs.h"
-#include "apps/report/selftest_page.h"
+#include "apps/report/model_pages/selftest_page.h"
 #include "diagnosis/selftest/selftest.h"
 #include "models/math/error.h"
 

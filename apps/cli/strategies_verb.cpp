@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "apps/cli/context.h"
-#include "apps/report/strategies_page.h"
+#include "apps/report/motion_pages/strategies_page.h"
 #include "models/math/error.h"
 #include "optimizer/solve/child_processes.h"
 #include "problems/problem_file.h"

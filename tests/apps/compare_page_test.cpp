@@ -1,4 +1,4 @@
-#include "apps/report/compare_page.h"
+#include "apps/report/model_pages/compare_page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/report/compare_charts.h"
-#include "apps/report/score_judgement.h"
+#include "apps/report/model_pages/compare_charts.h"
+#include "apps/report/model_pages/score_judgement.h"
 #include "models/math/error.h"
 #include "models/math/units.h"
 #include "tests/apps/browser_check.h"

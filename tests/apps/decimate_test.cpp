@@ -1,4 +1,4 @@
-#include "apps/report/decimate.h"
+#include "apps/report/charts/decimate.h"
 
 #include <gtest/gtest.h>
 

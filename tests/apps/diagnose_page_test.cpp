@@ -1,5 +1,5 @@
 // Pages of diagnose and improve, on a diagnosis put together by hand: what is drawn must not depend on the search.
-#include "apps/report/diagnose_page.h"
+#include "apps/report/model_pages/diagnose_page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/report/diagnose_charts.h"
-#include "apps/report/effect_text.h"
-#include "apps/report/improve_page.h"
+#include "apps/report/model_pages/diagnose_charts.h"
+#include "apps/report/model_pages/effect_text.h"
+#include "apps/report/model_pages/improve_page.h"
 #include "models/math/error.h"
 #include "tests/apps/browser_check.h"
 #include "tests/identification/arm_log.h"

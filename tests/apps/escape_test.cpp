@@ -1,11 +1,11 @@
-#include "apps/report/escape.h"
+#include "apps/report/page/escape.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "apps/report/chart_json.h"
+#include "apps/report/charts/chart_json.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "apps/report/motion_page.h"
+#include "apps/report/motion_pages/motion_page.h"
 
 namespace sparflow {
 namespace {

@@ -1,4 +1,4 @@
-#include "apps/report/obstacle_drawing.h"
+#include "apps/report/charts/obstacle_drawing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "apps/report/page.h"
+#include "apps/report/page/page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/report/assets.h"
+#include "apps/report/page/assets.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
 #include "tests/apps/browser_check.h"

@@ -1,6 +1,6 @@
 #pragma once
 /// A page with every kind of figure, filled with made-up but realistic data.
-#include "apps/report/page.h"
+#include "apps/report/page/page.h"
 
 namespace sparflow::test_support {
 

@@ -1,5 +1,5 @@
 // The page of selftest, on a result put together by hand.
-#include "apps/report/selftest_page.h"
+#include "apps/report/model_pages/selftest_page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Pages of strategies and pareto, on results put together by hand, opened in a browser.
-#include "apps/report/strategies_page.h"
+#include "apps/report/motion_pages/strategies_page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "apps/report/pareto_page.h"
+#include "apps/report/motion_pages/pareto_page.h"
 #include "models/math/error.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"

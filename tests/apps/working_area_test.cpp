@@ -1,4 +1,4 @@
-#include "apps/report/working_area.h"
+#include "apps/report/charts/working_area.h"
 
 #include <gtest/gtest.h>
 

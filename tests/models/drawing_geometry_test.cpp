@@ -1,4 +1,4 @@
-#include "models/drawing_geometry.h"
+#include "apps/report/charts/drawing_geometry.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,81 @@
+#include "apps/report/charts/obstacle_drawing.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sparflow {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Half-spaces have no end; drawings show at most this much of one [m].
+constexpr double kFarAway = 100.0;
+
+std::vector<Vector2d> cut(const Box& box, const DrawingPlane& plane) {
+  // Corners numbered by bits: an edge joins two that differ in one bit.
+  Vector3d corners[8];
+  double height[8];
+  for (int c = 0; c < 8; ++c) {
+    const Vector3d sign((c & 1) != 0 ? 0.5 : -0.5, (c & 2) != 0 ? 0.5 : -0.5,
+                        (c & 4) != 0 ? 0.5 : -0.5);
+    corners[c] = box.center + box.rotation * box.size.cwiseProduct(sign);
+    height[c] = plane.normal().dot(corners[c] - plane.origin);
+  }
+  std::vector<Vector2d> points;
+  for (int c = 0; c < 8; ++c) {
+    for (const int bit : {1, 2, 4}) {
+      const int d = c | bit;
+      if (d == c || height[c] == height[d] || height[c] * height[d] > 0.0) continue;
+      const double share = height[c] / (height[c] - height[d]);
+      points.push_back(plane.project(corners[c] + share * (corners[d] - corners[c])));
+    }
+  }
+  if (points.empty()) return points;
+  // The cut is convex: going round its middle gives its outline.
+  Vector2d middle = Vector2d::Zero();
+  for (const Vector2d& p : points) middle += p / static_cast<double>(points.size());
+  std::sort(points.begin(), points.end(), [&](const Vector2d& a, const Vector2d& b) {
+    return std::atan2(a.y() - middle.y(), a.x() - middle.x()) <
+           std::atan2(b.y() - middle.y(), b.x() - middle.x());
+  });
+  return points;
+}
+
+std::vector<Vector2d> cut(const HalfSpace& solid, const DrawingPlane& plane) {
+  const Vector2d normal(solid.normal.dot(plane.horizontal), solid.normal.dot(plane.up));
+  const double length = normal.norm();
+  if (length < 1e-9) return {};  // parallel to the drawing
+  const Vector2d out = normal / length, along(-out.y(), out.x());
+  // The border's point nearest to the plane's origin.
+  const Vector2d at = out * (solid.normal.dot(solid.point - plane.origin) / length);
+  return {at - kFarAway * along, at + kFarAway * along, at + kFarAway * (along - out),
+          at - kFarAway * (along + out)};
+}
+
+}  // namespace
+
+std::vector<DrawingObstacle> cut_obstacles(const std::vector<Obstacle>& obstacles,
+                                           const DrawingPlane& plane) {
+  std::vector<DrawingObstacle> shapes;
+  for (const Obstacle& obstacle : obstacles) {
+    DrawingObstacle shape;
+    shape.name = obstacle.name;
+    if (const auto* box = std::get_if<Box>(&obstacle.shape)) {
+      shape.points = cut(*box, plane);
+    } else if (const auto* solid = std::get_if<HalfSpace>(&obstacle.shape)) {
+      shape.points = cut(*solid, plane);
+    } else {
+      const auto& sphere = std::get<Sphere>(obstacle.shape);
+      const double off = plane.normal().dot(sphere.center - plane.origin);
+      if (std::abs(off) < sphere.radius) {
+        shape.points = {plane.project(sphere.center)};
+        shape.radius = std::sqrt(sphere.radius * sphere.radius - off * off);
+      }
+    }
+    if (!shape.points.empty()) shapes.push_back(std::move(shape));
+  }
+  return shapes;
+}
+
+}  // namespace sparflow

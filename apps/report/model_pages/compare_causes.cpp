@@ -1,0 +1,172 @@
+#include "apps/report/model_pages/compare_causes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/report/model_pages/compare_charts.h"
+#include "models/math/nan.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+void add_bad_data(Page& page, const CompareResult& result) {
+  if (result.bad_data.empty()) return;
+  Table table;
+  table.title = "Bad data";
+  table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
+  for (const BadChannelOfLog& b : result.bad_data)
+    table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
+  table.note = "No model explains these; repair or leave them out before anything is learned.";
+  page.table(std::move(table));
+}
+
+/// Own and inherited error as a share of what varies, so that kN and bar stand side by side. Squares, for those of
+/// causes that have nothing to do with each other add up, and RMS errors do not.
+void add_stages(Page& page, const CompareResult& result) {
+  const std::vector<StageSplit>& stages = result.fault.stages;
+  if (stages.empty()) return;
+  page.paragraph(result.fault.sentence);
+  BarChart chart;
+  chart.title = "Own and inherited error of each stage";
+  chart.note =
+      "Mean squared error as a share of the measured quantity's variance: at 100 a constant would "
+      "do as well. Own: with what the stage before gives taken as measured, beyond the sensor's "
+      "noise. Inherited: what the error of the stage before changes. What varies little has much "
+      "noise in it; that is no fault.";
+  chart.value_axis = {"squared error", "%"};
+  const auto n = static_cast<Index>(stages.size());
+  BarSeries own{"own", VectorXd(n)}, inherited{"inherited", VectorXd(n)};
+  BarSeries noise{"sensor noise", VectorXd(n)};
+  for (Index i = 0; i < n; ++i) {
+    const StageSplit& s = stages[static_cast<std::size_t>(i)];
+    chart.categories.push_back(s.words);
+    const auto share = [&s](double rms) {
+      return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
+    };
+    // where a law makes up for what it inherits, what is left of both is what there is to see
+    const double own_error = s.makes_up() ? s.error : s.own;
+    noise.values[i] = share(std::min(s.noise, own_error));
+    own.values[i] = share(own_error) - noise.values[i];
+    inherited.values[i] = s.makes_up() ? 0.0 : share(s.inherited);
+  }
+  chart.series = {std::move(own), std::move(inherited), std::move(noise)};
+  page.plot(std::move(chart));
+  Table table;
+  table.title = "Where the error arises";
+  table.columns = {{"stage"},        {"error", "", 3}, {"own", "", 3}, {"inherited", "", 3},
+                   {"noise", "", 2}, {"unit"}};
+  for (const StageSplit& s : stages)
+    table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
+  table.note =
+      "RMS. Where own and inherited errors are related, their squares do not add up; where they "
+      "cancel, the law was learned with the wrong force and makes up for it (drawn: what is left).";
+  table.highlighted_row = result.fault.fault;
+  page.table(std::move(table));
+}
+
+void add_tests(Page& page, const CompareResult& result) {
+  constexpr std::size_t kMost = 12;
+  const ResidualTests& tests = result.tests;
+  if (tests.tests.empty()) return;
+  if (tests.smallest_p() > kAlarm) {
+    page.paragraph(fmt::format(
+        "Nothing in the error repeats: {} tests of bias and of dependence on signals, over {} "
+        "blocks of motion, found nothing that noise of the same colour would not show.",
+        tests.tested, tests.blocks));
+    return;
+  }
+  Table table;
+  table.title = "What repeats in the error";
+  table.columns = {
+      {"finding"}, {"of the error", "%", 2}, {"p", "", 2}, {"independent samples", "", 3}};
+  BarChart chart;
+  chart.title = "Share of the error that repeats";
+  chart.width = FigureWidth::kHalf;
+  chart.value_axis = {"of the squared error", "%"};
+  std::vector<double> shares;
+  for (const ResidualTest& t : tests.tests) {
+    if (t.p_value > kAlarm || table.rows.size() == kMost) continue;
+    table.rows.push_back(
+        {capitalised(t.sentence), 100.0 * t.share_explained, t.p_value, t.effective_samples});
+    chart.categories.push_back(quantity_words(t.stage, t.at) +
+                               (t.regime.empty() ? "" : " " + t.regime) + ": " +
+                               (t.depends_on.empty() ? "offset" : t.depends_on));
+    shares.push_back(100.0 * t.share_explained);
+  }
+  table.note = fmt::format(
+      "Signs of whole blocks of motion are flipped at random ({} blocks, {} tests together): the "
+      "chance that noise alone, however coloured, brings even one line here is {:.0f} %.",
+      tests.blocks, tests.tested, 100.0 * kAlarm);
+  chart.series = {
+      {"explained", Eigen::Map<VectorXd>(shares.data(), static_cast<Index>(shares.size()))}};
+  page.plot(std::move(chart));
+  page.table(std::move(table));
+}
+
+/// The stage at fault, or the first, by regime; the others are in the machine-readable result.
+void add_regimes(Page& page, const CompareResult& result) {
+  if (result.regimes.empty()) return;
+  std::string stage = result.regimes.front().stage, at = result.regimes.front().at;
+  if (result.fault.fault >= 0) {
+    stage = result.fault.stages[static_cast<std::size_t>(result.fault.fault)].stage;
+    at = result.fault.stages[static_cast<std::size_t>(result.fault.fault)].at;
+  }
+  Table table;
+  table.title = "Error by regime: " + quantity_words(stage, at);
+  table.columns = {{"regime"},        {"RMSE", "", 3}, {"95 % interval"}, {"bias", "", 3},
+                   {"95 % interval"}, {"unit"},        {"blocks", "", 3}};
+  BarChart chart;
+  chart.title = "Error by regime: " + quantity_words(stage, at);
+  chart.width = FigureWidth::kHalf;
+  std::vector<double> values;
+  const auto interval = [](const Range& r) {
+    return std::isfinite(r.lo)
+               ? fmt::format("{} to {}", display_number(r.lo, 3), display_number(r.hi, 3))
+               : std::string("too few motions");
+  };
+  for (const RegimeError& e : result.regimes) {
+    if (e.stage != stage || e.at != at) continue;
+    const std::string words = (e.regime.empty() ? "" : e.regime + ", ") + e.factor + ": " + e.level;
+    table.rows.push_back({words, e.rmse, interval(e.rmse_ci95), e.bias, interval(e.bias_ci95),
+                          e.unit, static_cast<double>(e.blocks)});
+    chart.categories.push_back(words);
+    chart.value_axis = {"RMS error", e.unit};
+    values.push_back(e.rmse);
+  }
+  if (values.empty()) return;
+  chart.series = {{"RMSE", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size()))}};
+  table.note =
+      "Intervals by bootstrap of whole blocks of motion. All quantities are in the "
+      "machine-readable result.";
+  page.plot(std::move(chart));
+  page.table(std::move(table));
+}
+
+void add_segments(Page& page, const CompareResult& result) {
+  if (result.segments.empty()) return;
+  Table table;
+  table.title = "Worst motions";
+  table.columns = {{"motion"}, {"RMSE", "", 3}, {"unit"}};
+  for (const WorstSegment& w : result.segments)
+    table.rows.push_back({capitalised(w.sentence), w.rmse, w.unit});
+  page.table(std::move(table));
+}
+
+}  // namespace
+
+void add_causes(Page& page, const CompareResult& result, const std::string& heading_prefix) {
+  if (result.fault.stages.empty() && result.tests.tests.empty() && result.bad_data.empty()) return;
+  page.section(heading_prefix + "Where the error arises");
+  add_bad_data(page, result);
+  add_stages(page, result);
+  add_tests(page, result);
+  add_regimes(page, result);
+  add_segments(page, result);
+}
+
+}  // namespace sparflow

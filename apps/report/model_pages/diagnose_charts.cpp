@@ -1,0 +1,356 @@
+#include "apps/report/model_pages/diagnose_charts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "apps/report/model_pages/compare_charts.h"
+#include "apps/report/model_pages/effect_text.h"
+#include "models/math/nan.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double kStretchSeconds = 30.0;  // of a log, as much as the eye can compare
+constexpr std::size_t kMostRanked = 10, kFewestRanked = 3;
+constexpr std::size_t kMostChannels = 2;  // of an effect that shows in several
+
+bool suspect_row(const Evidence& evidence, const EvidenceChannel& channel, std::size_t block) {
+  return static_cast<std::size_t>(channel.log[block]) < evidence.suspects;
+}
+
+/// The kind of signal that shows this effect best.
+std::string shows_against(const Effect& effect) {
+  static const std::map<std::string, std::string> known = {
+      {"coulomb_friction", "speed"},
+      {"viscous_friction", "speed"},
+      {"stribeck_friction", "speed"},
+      {"load_friction", "speed"},
+      {"pad_friction", "speed"},
+      {"presliding", "speed"},
+      {"end_cushion", "length"},
+      {"unmodelled_mass", "angle"},
+      {"payload_error", "angle"},
+      {"base_tilt", "angle"},
+      {"angle_offset", "angle"},
+      {"structural_flex", "load"},
+      {"force_offset", "load"},
+      {"pressure_offset", "load"},
+      {"inertia", "acceleration"},
+      {"return_back_pressure", "all_return_flow"},
+      {"line_loss", "flow"},
+      {"flow_dependent_margin", "pump_flow"},
+      {"flow_saturation", "pump_flow"},
+      {"torque_limit", "pump_flow"},
+      {"oil_temperature", "oil"},
+      {"counterbalance", "load"},
+      {"valve_deadband", "command"},
+      {"leakage", "load"},
+      {"valve_lag", "command_slope"},
+      {"pump_lag", "pressure_slope"},
+      {"compressibility", "command_slope"},
+      {"sensor_delay", "acceleration"}};
+  const auto at = known.find(effect.info().id);
+  return at == known.end() ? "" : at->second;
+}
+
+/// The telling signal: the kind made for this effect where it tells at least half of what the best one does.
+const TellingSignal* choose(const std::vector<TellingSignal>& signals, const VectorXd& residual,
+                            const std::string& preferred) {
+  const TellingSignal* best = nullptr;
+  const TellingSignal* own = nullptr;
+  double most = -1.0, most_own = -1.0;
+  for (const TellingSignal& s : signals) {
+    const double share = share_explained(s.values, residual);
+    if (share > most) most = share, best = &s;
+    if (s.id == preferred && share > most_own) most_own = share, own = &s;
+  }
+  return own != nullptr && most_own >= 0.5 * most ? own : best;
+}
+
+FieldUnit shown_unit(const EvidenceChannel& channel, double largest) {
+  if (channel.unit.name == "N" && largest >= 1e4) return {"kN", 1e3};
+  return channel.unit;
+}
+
+double largest_of(const VectorXd& x) {
+  return x.size() == 0 ? 0.0 : x.array().isFinite().select(x.array().abs(), 0.0).maxCoeff();
+}
+
+Quantity axis_of(const EvidenceChannel& channel, const std::string& unit) {
+  return {channel.kind == EvidenceKind::kForce  ? "force"
+          : channel.kind == EvidenceKind::kFlow ? "rod speed"
+                                                : "pressure",
+          unit};
+}
+
+/// Rows of a stretch of one log, blocks apart.
+LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string& effect) {
+  const EvidenceChannel& channel = *p.channel;
+  // best stretch over all suspect logs: each log's rows in time order
+  std::vector<Index> rows;
+  std::size_t best_log = 0;
+  double most = -1.0;
+  for (std::size_t log = 0; log < d.evidence.suspects; ++log) {
+    std::vector<Index> own;
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (channel.log[b] != static_cast<int>(log)) continue;
+      for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) own.push_back(r);
+    }
+    if (own.size() < 2) continue;
+    const auto n = static_cast<Index>(own.size());
+    VectorXd time(n), gain(n);
+    for (Index i = 0; i < n; ++i) {
+      const Index r = own[static_cast<std::size_t>(i)];
+      time[i] = d.evidence.series[log].time[channel.sample[static_cast<std::size_t>(r)]];
+      gain[i] = p.without[r] * p.without[r] - p.with[r] * p.with[r];
+    }
+    const Stretch at = best_stretch(time, gain, kStretchSeconds);
+    const double sum = gain.segment(at.first, at.last - at.first).sum();
+    if (!rows.empty() && sum <= most) continue;
+    most = sum;
+    best_log = log;
+    rows.assign(own.begin() + at.first, own.begin() + at.last);
+  }
+  LineChart chart;
+  chart.title = capitalised(channel.text);
+  if (rows.empty()) return chart;
+  const MachineSeries& log = d.evidence.series[best_log];
+  std::vector<double> time, measured, without, with;
+  const double gap = 3.0 * d.evidence.stride * log.step;
+  for (const Index r : rows) {
+    const double t = log.time[channel.sample[static_cast<std::size_t>(r)]];
+    if (!time.empty() && t - time.back() > gap) {  // rest in between is not evidence
+      time.push_back(time.back() + 0.5 * (t - time.back()));
+      for (auto* column : {&measured, &without, &with}) column->push_back(kNaN);
+    }
+    time.push_back(t);
+    measured.push_back(p.measured[r]);
+    without.push_back(p.measured[r] - p.without[r]);
+    with.push_back(p.measured[r] - p.with[r]);
+  }
+  const auto n = static_cast<Index>(time.size());
+  const auto column = [n](const std::vector<double>& v) {
+    return VectorXd(Eigen::Map<const VectorXd>(v.data(), n));
+  };
+  const FieldUnit unit = shown_unit(channel, largest_of(column(measured)));
+  chart.x = column(time);
+  chart.y_axis = axis_of(channel, unit.name);
+  chart.series.push_back({"measured", column(measured) / unit.si, LineStyle::kMeasured, 0, {}, {}});
+  chart.series.push_back(
+      {"model without " + effect, column(without) / unit.si, LineStyle::kPlain, 1, {}, {}});
+  chart.series.push_back(
+      {"model with " + effect, column(with) / unit.si, LineStyle::kPredicted, 2, {}, {}});
+  chart.note =
+      fmt::format("The {:.0f} s in which the effect shows most. Gaps: nothing is compared there.",
+                  kStretchSeconds);
+  return chart;
+}
+
+ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const TellingSignal& signal,
+                       bool both) {
+  const EvidenceChannel& channel = *p.channel;
+  const FieldUnit unit = shown_unit(channel, largest_of(p.without));
+  ScatterChart chart;
+  chart.title = fmt::format("What is left of the {}, against {}", channel.text, signal.words);
+  chart.x_axis = {signal.words, signal.unit};
+  chart.y_axis = {"measured \u2212 model", unit.name};
+  chart.trend = true;
+  std::vector<double> x, without, with;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if (!suspect_row(d.evidence, channel, b)) continue;
+    for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
+      x.push_back(signal.values[r]);
+      without.push_back(p.without[r] / unit.si);
+      with.push_back(p.with[r] / unit.si);
+    }
+  }
+  const auto n = static_cast<Index>(x.size());
+  const auto column = [n](const std::vector<double>& v) {
+    return VectorXd(Eigen::Map<const VectorXd>(v.data(), n));
+  };
+  if (both) chart.groups.push_back({"without the effect", column(x), column(without)});
+  chart.groups.push_back({both ? "with it" : "left over", column(x), column(with)});
+  chart.note = fmt::format("Lines: median in bins. {} explains {:.0f} % of what is left{}.",
+                           capitalised(signal.words),
+                           100.0 * share_explained(column(x), column(both ? without : with)),
+                           both ? fmt::format(" without the effect, {:.0f} % with it",
+                                              100.0 * share_explained(column(x), column(with)))
+                                : "");
+  return chart;
+}
+
+/// What is left over time, in the longest block: a swing is seen there and against no signal.
+LineChart left_over_time(const Diagnosis& d, const ChannelPicture& p) {
+  const EvidenceChannel& channel = *p.channel;
+  std::size_t longest = 0;
+  Index rows = 0;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    const Index n = channel.blocks[b].last - channel.blocks[b].first;
+    if (suspect_row(d.evidence, channel, b) && n > rows) rows = n, longest = b;
+  }
+  LineChart chart;
+  chart.title = fmt::format("What is left of the {}, over time", channel.text);
+  if (rows == 0) return chart;
+  const MachineSeries& log = d.evidence.series[static_cast<std::size_t>(channel.log[longest])];
+  const FieldUnit unit = shown_unit(channel, largest_of(p.with));
+  chart.x.resize(rows);
+  for (Index i = 0; i < rows; ++i) {
+    const auto row = static_cast<std::size_t>(channel.blocks[longest].first + i);
+    chart.x[i] = log.time[channel.sample[row]];
+  }
+  chart.y_axis = {"measured \u2212 model", unit.name};
+  chart.series.push_back({"left over",
+                          p.with.segment(channel.blocks[longest].first, rows) / unit.si,
+                          LineStyle::kPredicted,
+                          0,
+                          {},
+                          {}});
+  chart.note = "One motion, the longest without a gap.";
+  return chart;
+}
+
+}  // namespace
+
+void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
+  const DiagnosedEffect& e = d.effects[effect];
+  std::vector<std::size_t> channels;
+  for (const ChannelGain& g : e.channels) channels.push_back(g.channel);
+  if (channels.size() > kMostChannels) channels.resize(kMostChannels);
+  for (std::size_t n = 0; n < channels.size(); ++n) {
+    const ChannelPicture p = channel_picture(d, static_cast<int>(effect), channels[n]);
+    LineChart over_time = curves(d, p, e.key());
+    const std::vector<TellingSignal> signals = telling_signals(d.evidence, *p.channel);
+    const TellingSignal* signal = choose(signals, p.without, shows_against(*e.effect.effect));
+    if (n > 0) over_time.width = FigureWidth::kHalf;
+    page.plot(std::move(over_time));
+    if (signal == nullptr) continue;
+    ScatterChart chart = residuals(d, p, *signal, true);
+    if (n > 0) chart.width = FigureWidth::kHalf;
+    page.plot(std::move(chart));
+  }
+}
+
+void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, const std::string& at,
+                   bool swings) {
+  constexpr double kTells = 0.03;  // of the residual: less is no picture of anything
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = d.evidence.channels[c];
+    if (channel.at != at || evidence_stage(channel.kind) != stage) continue;
+    const ChannelPicture p = channel_picture(d, -1, c);
+    if (swings) page.plot(left_over_time(d, p));
+    const std::vector<TellingSignal> signals = telling_signals(d.evidence, channel);
+    std::vector<std::pair<double, const TellingSignal*>> ranked;
+    ranked.reserve(signals.size());
+    for (const TellingSignal& s : signals)
+      ranked.emplace_back(share_explained(s.values, p.with), &s);
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, ranked.size()); ++i) {
+      if (swings && ranked[i].first < kTells) continue;
+      ScatterChart chart = residuals(d, p, *ranked[i].second, false);
+      chart.width = FigureWidth::kHalf;
+      page.plot(std::move(chart));
+    }
+  }
+}
+
+void add_noise(Page& page, const Diagnosis& d) {
+  constexpr std::size_t kMostPictures = 4;
+  struct Left {
+    std::size_t channel;
+    double share;  // of the residual's variance that its strongest signal explains
+    TellingSignal signal;
+  };
+  std::vector<Left> left;
+  Table table;
+  table.title = "What is left of each quantity";
+  table.columns = {{"quantity"}, {"left, RMS", "", 3}, {"sensor noise", "", 3},
+                   {"unit"},     {"strongest signal"}, {"it explains", "%", 2}};
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = d.evidence.channels[c];
+    if (channel.rows() == 0) continue;
+    const ChannelPicture p = channel_picture(d, -1, c);
+    Left best{c, -1.0, {}};
+    for (TellingSignal& s : telling_signals(d.evidence, channel)) {
+      // the error of a speed goes with the noise of that speed, whatever the model
+      const bool same_sensor = s.id == "speed" || s.id == "acceleration" || s.id.ends_with("flow");
+      if (channel.kind == EvidenceKind::kFlow && same_sensor) continue;
+      const double share = share_explained(s.values, p.with);
+      if (share > best.share) best = {c, share, std::move(s)};
+    }
+    const double rms = std::sqrt(p.with.squaredNorm() / static_cast<double>(p.with.size()));
+    const auto [shown, unit] = readable_error(rms, channel.unit);
+    const double scale = rms > 0.0 ? shown / rms : 1.0 / channel.unit.si;
+    table.rows.push_back({channel.text, shown,
+                          std::isfinite(channel.noise_floor) ? channel.noise_floor * scale : kNaN,
+                          unit, best.signal.words, 100.0 * std::max(0.0, best.share)});
+    if (best.share >= 0.0) left.push_back(std::move(best));
+  }
+  if (table.rows.empty()) return;
+  page.section("What is left");
+  table.note =
+      "Error of the model with the smooth laws these logs allow, filtered as the evidence is. "
+      "Strongest signal: the one "
+      "that explains most of it in bins; some per cent are chance.";
+  page.table(std::move(table));
+  std::stable_sort(left.begin(), left.end(),
+                   [](const Left& a, const Left& b) { return a.share > b.share; });
+  for (std::size_t i = 0; i < std::min(kMostPictures, left.size()); ++i) {
+    ScatterChart chart =
+        residuals(d, channel_picture(d, -1, left[i].channel), left[i].signal, false);
+    chart.width = FigureWidth::kHalf;
+    page.plot(std::move(chart));
+  }
+}
+
+LineChart bad_channel_chart(const BadChannel& bad) {
+  LineChart chart;
+  chart.title = fmt::format("{} in {}", bad.channel, bad.file);
+  chart.y_axis = {bad.channel, bad.unit};
+  chart.x = bad.time;
+  chart.series.push_back({"as logged", bad.values, LineStyle::kPlain, 0, {}, {}});
+  std::string word = bad_data_word(bad.kind);
+  std::replace(word.begin(), word.end(), '_', ' ');
+  const double thinnest = bad.time.size() > 1  // one sample would not be seen
+                              ? 0.002 * (bad.time[bad.time.size() - 1] - bad.time[0])
+                              : 0.0;
+  for (const auto& [from, to] : bad.stretches) {
+    const double more = std::max(0.0, 0.5 * (thinnest - (to - from)));
+    chart.spans.push_back({from - more, to + more, chart.spans.empty() ? word : ""});
+  }
+  chart.note = fmt::format("Shaded: where it is {}.", word);
+  return chart;
+}
+
+void add_ranking(Page& page, const Diagnosis& d) {
+  if (d.ranking.empty()) return;
+  BarChart chart;
+  chart.title = "How much each single effect explains";
+  chart.value_axis = {"gain in log likelihood", "nats"};
+  std::vector<double> values;
+  for (const auto& [key, gain] : d.ranking) {
+    if (values.size() == kMostRanked) break;
+    if (gain <= 0.0 && values.size() >= kFewestRanked) break;
+    chart.categories.push_back(key);
+    values.push_back(gain);
+  }
+  if (d.search.threshold > 0.0) {
+    chart.categories.push_back("chance, at 5 %");
+    values.push_back(d.search.threshold);
+  }
+  chart.series.push_back(
+      {"gain", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size()))});
+  chart.note =
+      "Each candidate alone in the model, less half a log of the sample size for each parameter. "
+      "One that stands for another (friction of one kind for another kind) gains as well until "
+      "the right one is in. The last bar: what the best of all candidates reaches on data with "
+      "nothing missing in one case of twenty.";
+  page.plot(std::move(chart));
+}
+
+}  // namespace sparflow

@@ -1,0 +1,245 @@
+#include "apps/report/model_pages/diagnose_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/report/model_pages/compare_charts.h"
+#include "apps/report/model_pages/diagnose_charts.h"
+#include "apps/report/model_pages/effect_text.h"
+#include "apps/report/model_pages/improve_page.h"
+#include "models/files/model_file.h"
+#include "models/math/nan.h"
+
+namespace sparflow {
+namespace {
+
+constexpr std::size_t kMostBadPictures = 4;  // the worst; the table has all
+
+Tone tone_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kNone:
+      return Tone::kGood;
+    case Verdict::kMissing:
+    case Verdict::kUnknown:
+      return Tone::kWarning;
+    case Verdict::kBadData:
+      return Tone::kBad;
+  }
+  return Tone::kNeutral;
+}
+
+std::string joined(const std::vector<std::string>& words, const char* between) {
+  std::string text;
+  for (const std::string& w : words) text += (text.empty() ? "" : between) + w;
+  return text;
+}
+
+std::string sentence(std::string text) {
+  if (!text.empty() && !text.ends_with('.')) text += ".";
+  return capitalised(std::move(text));
+}
+
+std::string title_of(const Machine& machine, const DiagnosedEffect& e) {
+  return effect_title(e.effect.effect->info(), machine, e.effect.at);
+}
+
+std::string channel_words(const Diagnosis& d, const ChannelGain& g) {
+  return d.evidence.channels[g.channel].text;
+}
+
+/// "force of boom 4.1 -> 0.62 kN on motions left out (noise 0.55)"
+std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
+  const FieldUnit& unit = d.evidence.channels[g.channel].unit;
+  const auto [before, name] = readable_error(g.rmse_before, unit);
+  const double scale = before / g.rmse_before;
+  std::string text =
+      fmt::format("{} {} \u2192 {} {}", channel_words(d, g), display_number(before, 3),
+                  display_number(g.rmse_after * scale, 3), name);
+  if (std::isfinite(g.noise_floor))
+    text += fmt::format(", sensor noise {}", display_number(g.noise_floor * scale, 2));
+  return text;
+}
+
+void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
+  std::string text;
+  for (const DiagnosedEffect& e : d.effects) {
+    text += fmt::format("{}: {}", capitalised(title_of(machine, e)), parameters_text(e.parameters));
+    if (!e.channels.empty())
+      text += fmt::format("; error of the {}", gain_text(d, e.channels.front()));
+    text += ". ";
+  }
+  for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline has the first
+    if (i > 0) text += sentence(bad_channel_sentence(d.bad[i])) + " ";
+  }
+  if (d.verdict == Verdict::kUnknown)
+    text +=
+        "Nothing is to be added to the model before its cause is known: see below what it goes "
+        "with.";
+  if (d.verdict == Verdict::kNone) {
+    text += fmt::format("What the model leaves is what chance leaves (p = {:.2g}). ", d.p_value);
+  } else if (d.verdict == Verdict::kMissing) {
+    text +=
+        fmt::format("Chance of such evidence with nothing missing: {}.",
+                    d.p_value < 0.005 ? "below 0.5 %" : fmt::format("{:.1f} %", 100 * d.p_value));
+  }
+  page.verdict(tone_of(d.verdict), sentence(d.headline()), text);
+}
+
+void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
+  if (d.effects.empty()) return;
+  page.section("What is missing");
+  Table table;
+  table.title = "Effects, most probable first";
+  table.columns = {{"effect"},
+                   {"stage"},
+                   {"parameters, 95 % interval"},
+                   {"probability", "%", 3},
+                   {"gain", "nats", 3},
+                   {"motions left out", "standard errors", 2},
+                   {"absorbed", "%", 2}};
+  for (const DiagnosedEffect& e : d.effects) {
+    table.rows.push_back({title_of(machine, e), e.stage, parameters_text(e.parameters),
+                          std::round(100.0 * e.probability), e.gain,
+                          e.held_out_error > 0.0 ? e.held_out_gain / e.held_out_error : kNaN,
+                          std::round(100.0 * e.absorbed)});
+  }
+  table.note =
+      "Probability: that it is this effect, not chance nor a rival. Gain: logarithm of how much "
+      "more probable these logs are with it than without. Motions left out: estimated on some "
+      "motions, how much better it predicts the others, in standard errors of that. Absorbed: the "
+      "share that a model fitted anew on these logs would swallow.";
+  page.table(std::move(table));
+
+  Table errors;
+  errors.title = "Error on these logs, without and with it";
+  errors.columns = {
+      {"effect"}, {"quantity"}, {"without it", "", 3}, {"with it", "", 3}, {"sensor noise", "", 3},
+      {"unit"}};
+  for (const DiagnosedEffect& e : d.effects) {
+    for (const ChannelGain& g : e.channels) {
+      const FieldUnit& unit = d.evidence.channels[g.channel].unit;
+      const auto [before, name] = readable_error(g.rmse_before, unit);
+      const double scale = g.rmse_before > 0.0 ? before / g.rmse_before : 1.0 / unit.si;
+      errors.rows.push_back({e.key(), channel_words(d, g), before, g.rmse_after * scale,
+                             std::isfinite(g.noise_floor) ? g.noise_floor * scale : kNaN, name});
+    }
+  }
+  errors.note = "RMS, all other effects found are in the model in both columns.";
+  if (!errors.rows.empty()) page.table(std::move(errors));
+}
+
+void add_proofs(Page& page, const Machine& machine, const Diagnosis& d) {
+  for (std::size_t i = 0; i < d.effects.size(); ++i) {
+    const DiagnosedEffect& e = d.effects[i];
+    page.section(capitalised(title_of(machine, e)));
+    const EffectInfo& info = e.effect.effect->info();
+    page.paragraph(fmt::format("Law: {}. {}", info.equation, info.citation));
+    for (const std::string& s : e.evidence) page.paragraph(sentence(s));
+    add_effect_pictures(page, d, i);
+    if (e.rivals.empty()) continue;
+    std::string rivals;
+    for (const auto& [key, worse] : e.rivals)
+      rivals += fmt::format("{}{} ({:.1f} nats worse)", rivals.empty() ? "" : ", ", key, worse);
+    page.paragraph("Rivals that could stand in its place: " + rivals + ".");
+  }
+}
+
+void add_sets(Page& page, const Diagnosis& d) {
+  if (d.indistinguishable.empty()) return;
+  page.section("What these logs cannot tell apart");
+  for (std::size_t i = 0; i < d.indistinguishable.size(); ++i) {
+    page.paragraph("One of: " + joined(d.indistinguishable[i], ", ") +
+                   ". These logs fit all of them equally well.");
+    if (i >= d.experiments.size()) continue;
+    const Experiment& e = d.experiments[i];
+    page.paragraph(capitalised(sentence(e.sentence())));
+    if (!(e.nats_per_minute > 0.0)) continue;
+    page.paragraph(fmt::format(
+        "A minute of that motion is worth {:.2g} nats of likelihood, the wrong ones of the set "
+        "would lose as much; a minute of the logs at hand {:.2g}. Told apart means 4.",
+        e.nats_per_minute, e.nats_here));
+  }
+}
+
+void add_unexplained(Page& page, const Diagnosis& d) {
+  if (!d.unexplained) return;
+  const Unexplained& u = *d.unexplained;
+  page.section(u.few_places ? "What happened too seldom to prove a law"
+                            : "What nothing in the catalogue explains");
+  page.paragraph(sentence(u.sentence));
+  if (u.rmse > 0.0 && u.unit.si > 0.0) {
+    const auto [rmse, name] = readable_error(u.rmse, u.unit);
+    std::string text =
+        fmt::format("At the {} stage of {}: {} {} RMS are left", u.stage,
+                    u.at.empty() ? "the machine" : u.at, display_number(rmse, 3), name);
+    if (std::isfinite(u.noise_floor))
+      text += fmt::format(", the sensors' noise is {}",
+                          display_number(u.noise_floor * rmse / u.rmse, 2));
+    page.paragraph(text + ".");
+  }
+  if (!u.depends_on.empty() && !u.few_places)
+    page.paragraph("It depends on: " + joined(u.depends_on, ", ") + ", strongest first.");
+  const bool swings =
+      std::any_of(u.depends_on.begin(), u.depends_on.end(),
+                  [](const std::string& s) { return s.find("Hz") != std::string::npos; });
+  add_left_over(page, d, u.stage, u.at, swings);
+}
+
+void add_bad_data(Page& page, const Diagnosis& d) {
+  if (d.bad.empty()) return;
+  page.section("Bad data");
+  Table table;
+  table.title = "Channels that no physics explains";
+  table.columns = {
+      {"channel"},  {"kind"},      {"from", "s", 4}, {"to", "s", 4}, {"of the log", "%", 2},
+      {"evidence"}, {"what to do"}};
+  for (const BadChannel& b : d.bad) {
+    table.rows.push_back({b.channel, std::string(bad_data_word(b.kind)), b.from_s, b.to_s,
+                          100.0 * b.share, b.evidence, b.remedy});
+  }
+  page.table(std::move(table));
+  for (std::size_t i = 0; i < std::min(kMostBadPictures, d.bad.size()); ++i) {
+    if (d.bad[i].time.size() > 1) page.plot(bad_channel_chart(d.bad[i]));
+  }
+}
+
+}  // namespace
+
+Page diagnose_page(const CraneModel& model, const Diagnosis& d, const ExtendResult* tested) {
+  const Machine& machine = model.machine;
+  Page page("Diagnosis: " + machine.name);
+  Eigen::Index samples = 0;
+  for (std::size_t i = 0; i < d.evidence.suspects; ++i) samples += d.evidence.series[i].samples();
+  page.subtitle(fmt::format(
+      "{} samples in {} log{}{}", samples, d.evidence.suspects, d.evidence.suspects == 1 ? "" : "s",
+      d.evidence.has_reference()
+          ? fmt::format(", {} of reference", d.evidence.series.size() - d.evidence.suspects)
+          : ", no reference"));
+  set_verdict(page, machine, d);
+  add_bad_data(page, d);
+  add_effects(page, machine, d);
+  add_sets(page, d);
+  add_proofs(page, machine, d);
+  add_unexplained(page, d);
+  if (d.verdict == Verdict::kNone) add_noise(page, d);
+  if (!d.ranking.empty()) {
+    page.section("Ranking");
+    add_ranking(page, d);
+  }
+  if (tested != nullptr) add_steps(page, *tested, "Test logs: ");
+  if (!d.notes.empty()) {
+    page.section("Notes");
+    for (const std::string& note : d.notes) page.paragraph(sentence(note));
+  }
+  page.provenance("program", std::string("sparflow ") + program_version());
+  page.provenance("machine", machine.name);
+  for (const DataSource& s : model.data) {
+    page.provenance("model's " + s.use + " log",
+                    fmt::format("{}, {} rows, sha256 {}", s.file, s.rows, s.sha256.substr(0, 16)));
+  }
+  return page;
+}
+
+}  // namespace sparflow

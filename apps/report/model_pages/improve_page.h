@@ -1,0 +1,15 @@
+#pragma once
+/// Pages about extending a model.
+#include "apps/report/page/page.h"
+#include "diagnosis/extension/extend.h"
+
+namespace sparflow {
+
+/// Appends the steps: error falling step by step above the sensors' noise, parameters, curves before and after.
+/// @param heading_prefix put before each section's heading, e.g. "Test logs: "
+void add_steps(Page& page, const ExtendResult& result, const std::string& heading_prefix = "");
+
+/// A page of its own, of `extend` or `improve`.
+Page improve_page(const ExtendResult& result);
+
+}  // namespace sparflow

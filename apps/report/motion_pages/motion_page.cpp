@@ -1,0 +1,346 @@
+#include "apps/report/motion_pages/motion_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/report/charts/obstacle_drawing.h"
+#include "models/files/model_file.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+
+LineSeries curve(std::string name, VectorXd y, int color = -1,
+                 LineStyle style = LineStyle::kPlain) {
+  LineSeries series;
+  series.name = std::move(name);
+  series.y = std::move(y);
+  series.color = color;
+  series.style = style;
+  return series;
+}
+
+/// Curves of a motion under the exact law, in the field's units.
+struct Curves {
+  VectorXd t;
+  Eigen::MatrixXd flow, pressure;  // by cylinder [l/min], [bar]
+  Eigen::MatrixXd pump_pressure;   // by pump [bar]
+  Eigen::MatrixXd pump_flow;       // by pump [l/min]
+  VectorXd power;                  // [kW]
+};
+
+Curves curves_of(const CraneModel& model, const Trajectory& motion, double payload) {
+  const Trajectory fine = motion.refined(4);
+  const Eigen::Index rows = fine.size();
+  const auto cylinders = static_cast<Eigen::Index>(model.cylinders.size());
+  const auto pumps = static_cast<Eigen::Index>(model.pumps.size());
+  Curves c;
+  c.t = fine.t;
+  c.flow.resize(rows, cylinders);
+  c.pressure.resize(rows, cylinders);
+  c.pump_pressure.resize(rows, pumps);
+  c.pump_flow.resize(rows, pumps);
+  c.power.resize(rows);
+  Chain chain(model);
+  VectorXd q, qd, qdd;
+  for (Eigen::Index k = 0; k < rows; ++k) {
+    q = fine.q.row(k);
+    qd = fine.qd.row(k);
+    qdd = fine.qdd.row(k);
+    const MachineState& s =
+        chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
+    for (Eigen::Index i = 0; i < cylinders; ++i) {
+      const CylinderState& cylinder = s.cylinders[static_cast<std::size_t>(i)];
+      c.flow(k, i) = cylinder.flow / units::kLitrePerMinute;
+      c.pressure(k, i) = cylinder.moving ? cylinder.pressure / units::kBar : std::nan("");
+    }
+    for (Eigen::Index p = 0; p < pumps; ++p) {
+      c.pump_pressure(k, p) = s.pumps[static_cast<std::size_t>(p)].pressure / units::kBar;
+      c.pump_flow(k, p) = s.pumps[static_cast<std::size_t>(p)].flow / units::kLitrePerMinute;
+    }
+    c.power[k] = s.power / 1e3;
+  }
+  return c;
+}
+
+std::vector<Eigen::Vector2d> tip_path(const Machine& machine, const Trajectory& motion) {
+  std::vector<Eigen::Vector2d> points;
+  for (const DrawingFrame& frame : drawing_frames(machine, motion, 80)) points.push_back(frame.tip);
+  return points;
+}
+
+/// Height of the ground where the problem has one; base frames stand at all heights, so none is assumed.
+std::optional<double> ground_of(const MotionProblem& problem) {
+  for (const Obstacle& o : problem.obstacles) {
+    const auto* half = std::get_if<HalfSpace>(&o.shape);
+    if (half != nullptr && half->normal.z() > 0.99) return half->point.z();
+  }
+  return std::nullopt;
+}
+
+void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
+               const OptimizeResult& result, const Trajectory* baseline,
+               const std::string& baseline_name) {
+  CraneDrawing drawing;
+  drawing.title = "The motion";
+  drawing.note =
+      "Move the slider to drive the crane; the stronger the picture, the later the instant. Solid: "
+      "the tip's way" +
+      (baseline != nullptr ? "; dashed: its way along " + baseline_name : std::string()) + ".";
+  drawing.group = "motion";
+  const DrawingPlane plane = drawing_plane(machine, problem.start);
+  drawing.x_axis = {plane.horizontal_name, "m"};
+  drawing.z_axis = {plane.vertical_name, "m"};
+  drawing.frames = drawing_frames(machine, result.motion, 90);
+  drawing.obstacles = cut_obstacles(problem.obstacles, plane);
+  if (baseline != nullptr) drawing.paths.push_back({baseline_name, tip_path(machine, *baseline)});
+  if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
+    drawing.goal = drawing_plane(machine, result.motion.q.row(result.motion.size() - 1).transpose())
+                       .project(goal->tip);
+  }
+  drawing.ground = ground_of(problem);
+  drawing.payload = problem.payload > 0.0;
+  page.plot(std::move(drawing));
+}
+
+void add_curves(Page& page, const CraneModel& model, const MotionProblem& problem,
+                const OptimizeResult& result) {
+  const Machine& machine = model.machine;
+  const Curves c = curves_of(model, result.motion, problem.payload);
+  const auto chart = [&](const std::string& title, const std::string& label,
+                         const std::string& unit) {
+    LineChart out;
+    out.title = title;
+    out.group = "motion";
+    out.width = FigureWidth::kHalf;
+    out.y_axis = {label, unit};
+    out.x = c.t;
+    return out;
+  };
+  LineChart speed = chart("Joint speeds", "share of the limit", "%");
+  const Trajectory fine = result.motion.refined(4);
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const Range& r = problem.limits.velocity[static_cast<std::size_t>(j)];
+    const double full = std::max(std::abs(r.lo), std::abs(r.hi));
+    speed.series.push_back(
+        curve(machine.joints[static_cast<std::size_t>(j)].name, 100.0 * fine.qd.col(j) / full));
+  }
+  LineChart flow = chart("Flows", "flow", "l/min");
+  LineChart pressure = chart("Pressures", "pressure", "bar");
+  pressure.note =
+      "Working pressure of each moving cylinder, and the pump's above them: the gap is what each "
+      "valve throttles away.";
+  // pumps first: where one cylinder moves alone, its curve lies on its pump's
+  for (int p = 0; p < machine.pump_count(); ++p) {
+    const auto i = static_cast<std::size_t>(p);
+    const std::string name = "pump " + machine.pumps[i].name;
+    flow.series.push_back(curve(name, c.pump_flow.col(p), machine.cylinder_count() + p));
+    const double limit = problem.limits.pump_max_flow[i] / units::kLitrePerMinute;
+    if (limit > 0.0)
+      flow.series.push_back(
+          curve(name + " limit", VectorXd::Constant(c.t.size(), limit), -1, LineStyle::kLimit));
+    pressure.series.push_back(curve(name, c.pump_pressure.col(p), machine.cylinder_count() + p));
+  }
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    const std::string& name = machine.cylinders[static_cast<std::size_t>(i)].name;
+    if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
+    flow.series.push_back(curve(name, c.flow.col(i), i));
+    pressure.series.push_back(curve(name, c.pressure.col(i), i));
+  }
+  LineChart power = chart("Power", "pump power", "kW");
+  power.series.push_back(curve("power", c.power));
+  page.plot(std::move(speed));
+  page.plot(std::move(flow));
+  page.plot(std::move(pressure));
+  page.plot(std::move(power));
+}
+
+void add_losses(Page& page, const CraneModel& model, const MotionProblem& problem,
+                const OptimizeResult& result, const Trajectory* baseline,
+                const std::string& baseline_name) {
+  BarChart bars;
+  bars.title = "Where the energy goes";
+  bars.value_axis = {"energy", "kJ"};
+  bars.note =
+      "Useful: working pressure times flow. Throttled: what the valve takes because another "
+      "cylinder, the margin or standby sets the pump's pressure.";
+  std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
+  if (baseline != nullptr)
+    motions.push_back({baseline_name, exact_energy(model, *baseline, problem.payload)});
+  for (const auto& [name, energy] : motions) {
+    for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+      if (!model.machine.cylinders[i].hydraulic()) continue;
+      bars.categories.push_back(name + ": " + model.machine.cylinders[i].name);
+    }
+  }
+  BarSeries useful{"useful", VectorXd(bars.categories.size())},
+      lost{"throttled", VectorXd(bars.categories.size())};
+  Eigen::Index k = 0;
+  for (const auto& [name, energy] : motions) {
+    for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+      if (!model.machine.cylinders[i].hydraulic()) continue;
+      useful.values[k] = energy.useful[i] / 1e3;
+      lost.values[k++] = energy.throttling[i] / 1e3;
+    }
+  }
+  bars.series = {useful, lost};
+  page.plot(std::move(bars));
+}
+
+/// What is left to a limit [%]; in words where the figure would only show the solver's last digits.
+TableCell margin_cell(const LimitCheck& c) {
+  constexpr double kTouching = 1e-4;  // of the limit's scale
+  const bool end_condition =
+      c.what.find("start") != std::string::npos || c.what.find("goal") != std::string::npos;
+  if (std::abs(c.excess) <= kTouching) return end_condition ? "met" : "at the limit";
+  return -100.0 * c.excess;
+}
+
+std::string in_words(NlpStatus status) {
+  std::string words = to_string(status);
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
+}
+
+void add_tables(Page& page, const OptimizeResult& result) {
+  Table limits;
+  limits.title = "Limits at their worst, 16 times between the knots";
+  if (result.motion.size() < 2) {
+    const auto nearest = std::min_element(result.starts.begin(), result.starts.end(),
+                                          [](const StartResult& a, const StartResult& b) {
+                                            return (a.motion.size() > 1 ? a.excess : INFINITY) <
+                                                   (b.motion.size() > 1 ? b.excess : INFINITY);
+                                          });
+    limits.title = "Limits of the motion that came nearest (from " + nearest->seed + ")";
+  }
+  limits.columns = {{"limit"}, {"value", "", 5}, {"allowed", "", 5},
+                    {"unit"},  {"at", "s", 4},   {"margin", "%", 3}};
+  for (const LimitCheck& c : result.checks) {
+    constexpr double kRounding = 1e-9;  // of any unit here: the solver's last digits say nothing
+    const double value = std::abs(c.value) < kRounding ? 0.0 : c.value;
+    limits.rows.push_back({c.what, value, c.limit, c.unit, c.time, margin_cell(c)});
+  }
+  if (!result.checks.empty()) page.table(std::move(limits));
+  Table starts;
+  starts.title = "Starts";
+  starts.columns = {{"from"},
+                    {"outcome"},
+                    {"duration", "s", 4},
+                    {"start itself", "kJ"},
+                    {"optimised", "kJ"},
+                    {"iterations", "", 5},
+                    {"solver", "s", 3},
+                    {"note"}};
+  starts.note =
+      "Exact energies. \"Start itself\" is the seed driven in the same time; blank where it breaks "
+      "a limit at that time.";
+  if (result.motion.size() < 2) {
+    starts.note +=
+        " A defect is a step from one instant to the next that the joint cannot make with the "
+        "speeds and accelerations it is allowed: too little time, or the way is blocked.";
+  }
+  for (std::size_t i = 0; i < result.starts.size(); ++i) {
+    const StartResult& s = result.starts[i];
+    const bool usable = s.motion.size() > 1 && s.excess <= 1e-4;
+    std::string note = usable ? "" : s.message;
+    if (s.same_as >= 0)
+      note = "same motion as " + result.starts[static_cast<std::size_t>(s.same_as)].seed;
+    starts.rows.push_back({s.seed, usable ? std::string("kept all limits") : in_words(s.status),
+                           s.duration, s.seed_feasible ? s.seed_energy / 1e3 : std::nan(""),
+                           usable ? s.energy_exact / 1e3 : std::nan(""),
+                           static_cast<double>(s.iterations), s.solve_s, note});
+  }
+  starts.highlighted_row = result.best_start;
+  page.table(std::move(starts));
+}
+
+std::string seconds_text(double s) { return fmt::format("{:.2f}", s); }
+
+}  // namespace
+
+void add_motion(Page& page, const CraneModel& model, const MotionProblem& problem,
+                const OptimizeResult& result, const Trajectory* baseline,
+                const std::string& baseline_name) {
+  page.section("Motion: " + problem.name);
+  if (result.motion.size() < 2) {
+    page.paragraph("No motion was found; " + std::string(result.starts.empty()
+                                                             ? "no path to start from either."
+                                                             : "below, how far every start came."));
+    if (!result.starts.empty()) add_tables(page, result);
+    return;
+  }
+  const std::string beside =
+      result.nearest_line_energy > 0.0
+          ? fmt::format("straight line, nearest end: {:.1f} kJ", result.nearest_line_energy / 1e3)
+      : result.best_seed_energy > 0.0
+          ? fmt::format("best seed, {}: {:.1f} kJ", result.best_seed_name,
+                        result.best_seed_energy / 1e3)
+          : std::string();
+  double lost = 0.0;
+  for (const double t : result.energy.throttling) lost += t;
+  page.tiles(
+      {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law", beside,
+        Tone::kGood},
+       {seconds_text(result.duration), "s", "duration"},
+       {fmt::format("{:.1f}", lost / 1e3), "kJ", "lost in valves",
+        fmt::format("{:.0f} % of the energy", 100.0 * lost / std::max(1.0, result.energy.total))},
+       {fmt::format("{:+.1f}", result.energy.potential_difference / 1e3), "kJ",
+        "potential energy gained", "end posture against start"}});
+  if (result.energy.impossible()) {
+    page.paragraph(
+        "Warning: the pump gives less energy than machine and load gain. The pressures here are "
+        "extrapolated to "
+        "loads they were never learned at; fit the model with such loads.");
+  }
+  if (result.energy.moving_share_outside_data > 0.02) {
+    page.paragraph(
+        fmt::format("{:.0f} % of the cylinders' moving time lies outside the flows and forces the "
+                    "model was learned on; "
+                    "the least certain pressure on the way has a standard deviation of {:.1f} bar.",
+                    100.0 * result.energy.moving_share_outside_data,
+                    result.energy.largest_pressure_std / units::kBar));
+  }
+  add_crane(page, model.machine, problem, result, baseline, baseline_name);
+  add_curves(page, model, problem, result);
+  add_losses(page, model, problem, result, baseline, baseline_name);
+  add_tables(page, result);
+}
+
+Page motion_page(const CraneModel& model, const MotionProblem& problem,
+                 const OptimizeResult& result, const Trajectory* baseline,
+                 const std::string& baseline_name) {
+  Page page("Energy-optimal motion: " + problem.name);
+  if (result.status == OptimizeStatus::kOptimal) {
+    const std::string against = against_seeds(result);
+    page.verdict(
+        Tone::kGood,
+        fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,
+                    against.empty() ? "" : ": ", against),
+        "All limits are kept at 16 times the knots' density. Energies are those of the exact, "
+        "unsmoothed law. " +
+            only_strokes_count(model));
+  } else {
+    // "lift: infeasible. Worst: ..." under its own headline
+    const std::string prefix = problem.name + ": infeasible. ";
+    std::string why = result.message;
+    if (why.rfind(prefix, 0) == 0) why.erase(0, prefix.size());
+    const std::string in = result.duration > 0.0 ? fmt::format(" in {:g} s", result.duration) : "";
+    page.verdict(Tone::kBad,
+                 result.status == OptimizeStatus::kInfeasible
+                     ? fmt::format("Infeasible: no motion found that keeps all limits{}", in)
+                     : std::string(to_string(result.status)),
+                 why);
+  }
+  add_motion(page, model, problem, result, baseline, baseline_name);
+  page.provenance("program", std::string("sparflow ") + program_version());
+  page.provenance("machine", model.machine.name);
+  for (const DataSource& d : model.data)
+    page.provenance(d.use + " log", d.file + ", sha256 " + d.sha256.substr(0, 16));
+  return page;
+}
+
+}  // namespace sparflow

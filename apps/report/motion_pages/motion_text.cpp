@@ -1,0 +1,222 @@
+/// The terminal's and the machine's view of a motion.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/report/motion_pages/motion_page.h"
+#include "models/math/units.h"
+
+namespace sparflow {
+namespace {
+
+nlohmann::json start_json(const StartResult& s) {
+  nlohmann::json stages = nlohmann::json::array();
+  for (const StageRecord& g : s.stages) {
+    stages.push_back({{"what", g.what},
+                      {"status", to_string(g.status)},
+                      {"iterations", g.iterations},
+                      {"solve_s", g.solve_s},
+                      {"energy_exact_J", g.energy_exact},
+                      {"excess", g.excess}});
+  }
+  nlohmann::json out = {{"seed", s.seed},
+                        {"status", to_string(s.status)},
+                        {"message", s.message},
+                        {"duration_s", s.duration},
+                        {"energy_J", s.energy_smooth},
+                        {"energy_exact_J", s.energy_exact},
+                        {"constraint_violation", s.excess},
+                        {"iterations", s.iterations},
+                        {"solve_s", s.solve_s},
+                        {"callbacks_s", s.callbacks_s},
+                        {"linear_solver_s", s.linear_solver_s},
+                        {"modes_held", s.modes_held},
+                        {"stages", stages}};
+  if (s.motion.size() < 2) {
+    for (const char* key : {"energy_J", "energy_exact_J", "constraint_violation"})
+      out[key] = nullptr;
+  }
+  if (s.seed_feasible) out["seed_energy_exact_J"] = s.seed_energy;
+  if (s.same_as >= 0) out["same_as"] = s.same_as;
+  return out;
+}
+
+}  // namespace
+
+std::string against_seeds(const OptimizeResult& r) {
+  std::vector<std::string> parts;
+  const auto add = [&](const std::string& what, double energy) {
+    if (energy <= 0.0) return;
+    const double saved = 100.0 * (1.0 - r.energy.total / energy);
+    if (std::abs(saved) < 0.05) {  // "0.0 % less" would be nothing to be proud of
+      parts.push_back(fmt::format("as much as {} ({:.1f} kJ)", what, energy / 1e3));
+      return;
+    }
+    parts.push_back(fmt::format("{:.{}f} % {} than {} ({:.1f} kJ)", std::abs(saved),
+                                std::abs(saved) < 9.95 ? 1 : 0, saved >= 0.0 ? "less" : "more",
+                                what, energy / 1e3));
+  };
+  add("the straight joint line to the nearest end posture", r.nearest_line_energy);
+  if (r.straight_line_energy != r.nearest_line_energy)
+    add("the cheapest straight line", r.straight_line_energy);
+  if (r.best_seed_energy != r.straight_line_energy)
+    add("the best seed, " + r.best_seed_name, r.best_seed_energy);
+  return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
+}
+
+std::string only_strokes_count(const CraneModel& model) {
+  const std::vector<Pump>& pumps = model.machine.pumps;
+  const bool constant =
+      !pumps.empty() && std::all_of(pumps.begin(), pumps.end(), [](const Pump& p) {
+        return p.type == PumpType::kConstantPressure;
+      });
+  return constant ? "At constant supply pressure the energy is pressure times the oil drawn: only "
+                    "which strokes are "
+                    "made counts, not when."
+                  : "";
+}
+
+std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
+                          const OptimizeResult& r) {
+  nlohmann::json out = {
+      {"problem", problem.name},
+      {"status", r.status == OptimizeStatus::kInterrupted ? "failed" : to_string(r.status)},
+      {"message", r.message},
+      {"duration_s", r.duration},
+      {"solve_s", r.solve_s}};
+  if (r.shortest_duration > 0.0) out["shortest_duration_s"] = r.shortest_duration;
+  int iterations = 0;
+  for (const StartResult& s : r.starts) iterations += s.iterations;
+  out["iterations"] = iterations;
+  out["starts"] = nlohmann::json::array();
+  for (const StartResult& s : r.starts) out["starts"].push_back(start_json(s));
+  if (r.motion.size() > 1) {
+    out["energy_J"] = r.energy_smooth;
+    out["energy_exact_J"] = r.energy.total;
+    out["seed"] = r.starts[static_cast<std::size_t>(r.best_start)].seed;
+    out["constraint_violation"] = worst_excess(r.checks);
+    out["potential_energy_difference_J"] = r.energy.potential_difference;
+    out["largest_pressure_std_bar"] = r.energy.largest_pressure_std / units::kBar;
+    out["moving_share_outside_data"] = r.energy.moving_share_outside_data;
+    out["share_of_time_moving"] = r.energy.share_moving;
+    for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+      out["throttling_J"][model.machine.cylinders[i].name] = r.energy.throttling[i];
+      out["useful_J"][model.machine.cylinders[i].name] = r.energy.useful[i];
+    }
+    for (std::size_t p = 0; p < model.pumps.size(); ++p)
+      out["pump_J"][model.machine.pumps[p].name] = r.energy.pump[p];
+    out["mesh_error"] = r.mesh_error;
+    if (r.lower_bound > 0.0) {
+      out["lower_bound_J"] = r.lower_bound;
+      out["lower_bound_time_s"] =
+          r.lower_bound_time > 0.0 ? nlohmann::json(r.lower_bound_time) : nlohmann::json();
+      out["gap"] = r.energy.total / r.lower_bound - 1.0;
+    }
+    if (r.grid_path_energy > 0.0) out["grid_path_energy_exact_J"] = r.grid_path_energy;
+    if (r.unlimited_energy > 0.0) out["unlimited_time_J"] = r.unlimited_energy;
+    out["best_seed_energy_exact_J"] =
+        r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_energy) : nlohmann::json();
+    out["best_seed"] =
+        r.best_seed_energy > 0.0 ? nlohmann::json(r.best_seed_name) : nlohmann::json();
+    out["nearest_line_energy_exact_J"] =
+        r.nearest_line_energy > 0.0 ? nlohmann::json(r.nearest_line_energy) : nlohmann::json();
+    out["straight_line_energy_exact_J"] =
+        r.straight_line_energy > 0.0 ? nlohmann::json(r.straight_line_energy) : nlohmann::json();
+    out["limits"] = nlohmann::json::array();
+    for (const LimitCheck& c : r.checks) {
+      out["limits"].push_back({{"what", c.what},
+                               {"value", c.value},
+                               {"limit", c.limit},
+                               {"unit", c.unit},
+                               {"t_s", c.time},
+                               {"excess", c.excess}});
+    }
+  }
+  return out.dump(2) + "\n";
+}
+
+std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
+                           const OptimizeResult& r) {
+  std::string text;
+  const auto add = [&](const std::string& line) { text += line + "\n"; };
+  if (r.motion.size() < 2) {
+    const bool said = r.message.find(to_string(r.status)) != std::string::npos;
+    add(said ? r.message : fmt::format("{}: {}", to_string(r.status), r.message));
+    for (const StartResult& s : r.starts) add(fmt::format("  {:<34} {}", s.seed, s.message));
+    return text;
+  }
+  add(fmt::format("{}: {}", to_string(r.status), problem.name));
+  add(fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}", r.energy.total / 1e3,
+                  r.duration, r.starts[static_cast<std::size_t>(r.best_start)].seed));
+  const auto against = [&](const char* what, double energy, const std::string& name) {
+    if (energy > 0.0)
+      add(fmt::format(
+          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %{}{}", what, energy / 1e3,
+          r.energy.total <= energy ? "saves" : "takes more, as energy is not all it counts:",
+          100.0 * std::abs(1.0 - r.energy.total / energy), name.empty() ? "" : "; ", name));
+    else
+      add(fmt::format("  {:<20}         -      breaks a limit in this time", what));
+  };
+  against("straight, nearest", r.nearest_line_energy, "");
+  against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
+  against("best seed path", r.best_seed_energy, r.best_seed_name);
+  if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
+  if (r.unlimited_energy > 0.0) {
+    add(fmt::format("  at unlimited time    {:9.2f} kJ   the cheapest slow path of a joint grid",
+                    r.unlimited_energy / 1e3));
+  }
+  if (r.lower_bound > 0.0) {
+    const std::string which =
+        r.lower_bound_time > 0.0
+            ? fmt::format("no motion of {:.2f} s or less takes less", r.lower_bound_time)
+            : "no motion takes less, whatever its time";
+    add(fmt::format("  lower bound          {:9.2f} kJ   {}: {:.1f} % below this one",
+                    r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total)));
+  } else if (!r.bound_note.empty()) {
+    add("  lower bound               none   " + r.bound_note);
+  }
+  add(fmt::format("  potential energy     {:+9.2f} kJ   end against start",
+                  r.energy.potential_difference / 1e3));
+  add(fmt::format("  {:<14} {:>12} {:>14}", "cylinder", "useful [kJ]", "throttled [kJ]"));
+  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+    add(fmt::format("  {:<14} {:>12.2f} {:>14.2f}", model.machine.cylinders[i].name,
+                    r.energy.useful[i] / 1e3, r.energy.throttling[i] / 1e3));
+  }
+  const LimitCheck& c = r.checks.front();
+  const double margin = -100.0 * c.excess;
+  for (const LimitCheck& k : r.checks) {
+    if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
+      continue;
+    add(fmt::format(
+        "  limits               {} at 16x the knots; nearest: {} {:.4g} of {:.4g} {} at {:.2f} s",
+        margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time));
+    break;
+  }
+  if (r.energy.moving_share_outside_data > 0.02) {
+    add(fmt::format(
+        "  note                 {:.0f} % of the moving time lies outside the data; least certain "
+        "pressure +-{:.1f} bar",
+        100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
+  }
+  if (const std::string why = only_strokes_count(model); !why.empty())
+    add("  note                 " + why);
+  if (r.energy.impossible()) {
+    add("  WARNING              the pump gives less energy than machine and load gain: pressures "
+        "here are\n"
+        "                       extrapolated to loads they were never learned at; fit with such "
+        "loads");
+  }
+  int usable = 0, distinct = 0;
+  for (const StartResult& s : r.starts) {
+    usable += s.motion.size() > 1 && s.excess <= 1e-4;
+    distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
+  }
+  add(fmt::format(
+      "  starts               {} tried, {} kept all limits, {} different motions; {:.1f} s",
+      r.starts.size(), usable, distinct, r.solve_s));
+  return text;
+}
+
+}  // namespace sparflow
