@@ -1,5 +1,5 @@
 // The file of best known energies: what a later run may change in it.
-#include "bench/best_known.h"
+#include "studies/best_known.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

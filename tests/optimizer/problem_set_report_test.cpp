@@ -1,5 +1,5 @@
 // What the problem set counts: a reach that cannot be done is named only when a limit is.
-#include "bench/problem_set_report.h"
+#include "studies/problem_set_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,11 +6,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "bench/haste_case.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
 #include "optimizer/baselines/strategies_statistics.h"
 #include "optimizer/solve/child_processes.h"
+#include "studies/haste_case.h"
 
 namespace sparflow::bench {
 namespace {

@@ -2,7 +2,7 @@
 /// What the problem set prints: a line a reach, then what came out in all.
 #include <vector>
 
-#include "bench/reach_figures.h"
+#include "studies/reach_figures.h"
 
 namespace sparflow::bench {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/reach_figures.h"
+#include "studies/reach_figures.h"
 
 namespace sparflow::bench {
 

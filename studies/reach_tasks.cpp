@@ -1,4 +1,4 @@
-#include "bench/reach_tasks.h"
+#include "studies/reach_tasks.h"
 
 #include <fmt/format.h>
 

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "bench/reach_tasks.h"
 #include "optimizer/baselines/strategies.h"
+#include "studies/reach_tasks.h"
 
 namespace sparflow::bench {
 

@@ -1,4 +1,4 @@
-#include "bench/problem_set_report.h"
+#include "studies/problem_set_report.h"
 
 #include <fmt/format.h>
 

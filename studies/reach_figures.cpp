@@ -1,4 +1,4 @@
-#include "bench/reach_figures.h"
+#include "studies/reach_figures.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/simple_ways.h"
+#include "studies/simple_ways.h"
 
 namespace sparflow::bench {
 

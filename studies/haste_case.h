@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/reach_tasks.h"
+#include "studies/reach_tasks.h"
 
 namespace sparflow::bench {
 

@@ -1,7 +1,7 @@
 /// The blind test of diagnosis: logs with a hidden effect from simulator/hidden_effects (which shares no law with the
 /// catalogue), one line a run, then the table beside what is asked.
 ///   build/bench/blind_test --runs 40 --seed 1000 [--rows none,clear,small,outside,pairs,fault] [--way both] [--json F]
-/// --ways bic,gp,correlation judges the simple ways (bench/simple_ways.h) instead, on the same logs.
+/// --ways bic,gp,correlation judges the simple ways (studies/simple_ways.h) instead, on the same logs.
 /// Thresholds were chosen on seeds below 1000 only.
 #include <fmt/format.h>
 
@@ -13,9 +13,9 @@
 #include <mutex>
 #include <thread>
 
-#include "bench/blind_table.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
+#include "studies/blind_table.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "bench/simple_ways.h"
+#include "studies/simple_ways.h"
 
 #include <algorithm>
 #include <cmath>

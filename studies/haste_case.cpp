@@ -1,4 +1,4 @@
-#include "bench/haste_case.h"
+#include "studies/haste_case.h"
 
 #include <fmt/format.h>
 

@@ -4,11 +4,11 @@
 
 #include <fstream>
 
-#include "bench/best_known.h"
-#include "bench/problem_set_report.h"
 #include "bench/program_options.h"
 #include "models/math/error.h"
 #include "optimizer/solve/child_processes.h"
+#include "studies/best_known.h"
+#include "studies/problem_set_report.h"
 
 namespace sparflow::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/strategy_map_picture.h"
+#include "studies/strategy_map_picture.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "bench/blind_case.h"
+#include "studies/blind_case.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "bench/blind_table.h"
+#include "studies/blind_table.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <functional>
 #include <map>
 
-#include "bench/share.h"
+#include "studies/share.h"
 
 namespace sparflow::bench {
 namespace {

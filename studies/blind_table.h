@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/blind_case.h"
+#include "studies/blind_case.h"
 
 namespace sparflow::bench {
 

@@ -10,13 +10,13 @@
 
 #include "bench/planned_seeds.h"
 #include "bench/program_options.h"
-#include "bench/strategy_map_picture.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "optimizer/baselines/pareto.h"
 #include "optimizer/solve/child_processes.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
+#include "studies/strategy_map_picture.h"
 
 namespace sparflow {
 namespace {

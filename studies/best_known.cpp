@@ -1,4 +1,4 @@
-#include "bench/best_known.h"
+#include "studies/best_known.h"
 
 #include <algorithm>
 #include <cmath>
