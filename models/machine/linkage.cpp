@@ -65,7 +65,7 @@ Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosi
 }  // namespace
 
 /// For turning joints in closed form: the template's many numbers with three derivatives each took a fifth of an
-/// optimised reach. tests/models/linkage_test.cpp compares the two.
+/// optimised reach. tests/models/machine/linkage_test.cpp compares the two.
 Taylor3 linkage_rates(const Machine& machine, int cylinder, double q) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   const Joint& joint = machine.joints[static_cast<std::size_t>(c.joint)];

@@ -1,0 +1,356 @@
+#include "diagnosis/evidence/evidence.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+#include <set>
+
+#include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/selection/search_candidates.h"
+#include "models/effects/registry.h"
+#include "tests/diagnosis/hidden_case.h"
+#include "tests/identification/arm_log.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing_support::arm_log;
+using testing_support::arm_log_with_friction;
+using testing_support::arm_machine;
+using testing_support::arm_model;
+using testing_support::hidden_case;
+using testing_support::HiddenCase;
+using testing_support::remove_channel;
+
+// ------------------------------------------------------------------------------------- matched filters
+
+constexpr double kMass = 95.0;  // [kg]
+constexpr double kGain = 0.18;  // [m/s] at full command
+
+Machine carriage() {
+  return parse_machine(R"(name: carriage
+joints:
+  - {name: axis, type: prismatic, parent: base, origin: {xyz: [0, 0, 0]}, axis: [1, 0, 0], position: [-1, 20],
+     velocity: [-1, 1], acceleration: [-9, 9]}
+tip: {joint: axis, xyz: [0, 0, 0]}
+links:
+  - {name: carriage, joint: axis, mass: 95, cog: [0, 0, 0], inertia: 0}
+cylinders:
+  - {name: axis, joint: axis, bore: 0.1, rod: 0.05, linkage: {type: direct}}
+pumps:
+  - {name: main, feeds: [axis], max_flow_lpm: 90, max_pressure_bar: 250, standby_bar: 20}
+valves:
+  - {cylinder: axis, max_flow_lpm: {extend: 60, retract: 60}}
+)",
+                       "carriage.yaml", "");
+}
+
+/// Forward all the time, with ripples up to what the filter nearly swallows; exact, without noise.
+/// @param force_scale the measured force is that many times what the carriage needs
+Log rippling_log(double force_scale, double rate) {
+  const double amplitude[] = {0.02, 0.02, 0.012}, hz[] = {0.7, 1.9, 3.1};
+  std::string text = "t_s,q_axis_m,u_axis,force_axis_N\n";
+  for (int k = 0; k < static_cast<int>(40.0 * rate); ++k) {
+    const double t = k / rate;
+    double q = 0.12 * t, v = 0.12, a = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double w = 2.0 * std::numbers::pi * hz[i];
+      q -= amplitude[i] / w * std::cos(w * t + i);
+      v += amplitude[i] * std::sin(w * t + i);
+      a += amplitude[i] * w * std::cos(w * t + i);
+    }
+    text +=
+        fmt::format("{:.4f},{:.10f},{:.10f},{:.8f}\n", t, q, v / kGain, force_scale * kMass * a);
+  }
+  return log_from_text("ripples.csv", text, carriage());
+}
+
+class MatchedFilters : public testing::TestWithParam<std::pair<double, double>> {};
+
+TEST_P(MatchedFilters, InertiaComesOutAsItWasPutIn) {
+  const auto [window, rate] = GetParam();
+  const CraneModel model = CraneModel::untrained(carriage());
+  SignalOptions options;
+  options.smoothing.window_s = window;
+  const MachineSignals signals = make_signals(model.machine, rippling_log(1.3, rate), options);
+  const Evidence e = collect_evidence(model, {signals});
+  const EvidenceChannel* force = e.find(EvidenceKind::kForce, 0);
+  ASSERT_NE(force, nullptr);
+  const MatrixXd inertia = e.columns(parse_effect("inertia", model.machine), {}, *force);
+  ASSERT_EQ(inertia.cols(), 1);
+  const double scale = inertia.col(0).dot(force->y) / inertia.col(0).squaredNorm();
+  // The kernel g has g'' = h exactly on the grid of samples; what is left is the difference between a second
+  // difference and a second derivative, (w dt)^2 / 12: 0.1 % at 3.1 Hz and 50 Hz.
+  EXPECT_NEAR(scale, 1.3, 0.01 * 1.3);
+  // a test that can fail: unfiltered force against the filtered acceleration is off by far more
+  const CylinderSignals& c = signals.cylinders[0];
+  double top = 0.0, bottom = 0.0;
+  for (const Index k : force->sample) {
+    top += c.force[k] * kMass * c.acceleration[k];
+    bottom += std::pow(kMass * c.acceleration[k], 2);
+  }
+  EXPECT_GT(std::abs(top / bottom / 1.3 - 1.0), 0.03);
+}
+
+TEST_P(MatchedFilters, CommandsAgainstSpeeds) {
+  const auto [window, rate] = GetParam();
+  const CraneModel model = CraneModel::untrained(carriage());
+  SignalOptions options;
+  options.smoothing.window_s = window;
+  const Evidence e =
+      collect_evidence(model, {make_signals(model.machine, rippling_log(1.0, rate), options)});
+  const EvidenceChannel* flow = e.find(EvidenceKind::kFlow, 0);
+  ASSERT_NE(flow, nullptr);
+  ASSERT_EQ(flow->baseline.cols(), 1) << "it never retracts, so that side has no column";
+  const VectorXd u = flow->baseline.col(0);
+  const double gain = u.dot(flow->y) / u.squaredNorm();
+  EXPECT_NEAR(gain, kGain, 0.01 * kGain);
+  // ripples of 0.04 m/s are followed to within 2 % of themselves: no lag is seen where there is none
+  EXPECT_LT((flow->y - gain * u).norm() / std::sqrt(static_cast<double>(u.size())), 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(WindowsAndRates, MatchedFilters,
+                         testing::Values(std::pair{0.3, 50.0}, std::pair{0.4, 50.0},
+                                         std::pair{0.2, 100.0}));
+
+// ------------------------------------------------------------------------------------ channels and blocks
+
+const Machine& arm() {
+  static const Machine machine = testing_support::drawn_machine("loader_crane");
+  return machine;
+}
+const HiddenCase& plain_case() {
+  static const HiddenCase c = hidden_case(arm(), {}, 3, 60.0);
+  return c;
+}
+CraneModel crane_model() {
+  CraneModel model = CraneModel::untrained(arm());
+  for (auto& c : model.cylinders) c.margin = 15e5;
+  return model;
+}
+Evidence evidence_of(const CraneModel& model, const std::vector<Log>& suspects,
+                     const std::vector<Log>& references = {}) {
+  std::vector<MachineSignals> s, r;
+  for (const Log& log : suspects) s.push_back(make_signals(model.machine, log));
+  for (const Log& log : references) r.push_back(make_signals(model.machine, log));
+  return collect_evidence(model, s, r);
+}
+
+TEST(Evidence, EachMeasuredQuantityHasItsChannel) {
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train});
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_NE(e.find(EvidenceKind::kForce, i), nullptr);
+    ASSERT_NE(e.find(EvidenceKind::kFlow, i), nullptr);
+    EXPECT_EQ(e.find(EvidenceKind::kForce, i)->at,
+              arm().cylinders[static_cast<std::size_t>(i)].name);
+  }
+  ASSERT_NE(e.find(EvidenceKind::kPump, 0), nullptr);
+  EXPECT_EQ(e.find(EvidenceKind::kPump, 1), nullptr);
+  EXPECT_THAT(e.notes, IsEmpty());
+  EXPECT_FALSE(e.has_reference());
+  std::set<std::string> texts;
+  for (const EvidenceChannel& c : e.channels) {
+    EXPECT_TRUE(texts.insert(c.text).second) << c.text << " twice";
+    EXPECT_TRUE(c.y.allFinite()) << c.text;
+    EXPECT_TRUE(c.baseline.allFinite()) << c.text;
+    EXPECT_EQ(c.baseline.rows(), c.rows());
+    EXPECT_EQ(static_cast<Index>(c.sample.size()), c.rows());
+    EXPECT_EQ(c.log.size(), c.blocks.size());
+    // forces: no learned law stands in the way
+    EXPECT_EQ(c.baseline.cols() == 0, c.kind == EvidenceKind::kForce) << c.text;
+  }
+}
+
+TEST(Evidence, BlocksAreEvenStretchesOfMotionInOrder) {
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train}, {plain_case().reference});
+  for (const EvidenceChannel& c : e.channels) {
+    Index next = 0;
+    for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+      EXPECT_EQ(c.blocks[b].first, next) << "every row in one block";
+      next = c.blocks[b].last;
+      const MachineSeries& s = e.series[static_cast<std::size_t>(c.log[b])];
+      for (Index i = c.blocks[b].first; i < c.blocks[b].last; ++i) {
+        const Index k = c.sample[static_cast<std::size_t>(i)];
+        ASSERT_LT(k, s.samples());
+        if (i > c.blocks[b].first) {
+          ASSERT_EQ(k - c.sample[static_cast<std::size_t>(i - 1)], e.stride);
+        }
+      }
+      const double seconds =
+          static_cast<double>(c.blocks[b].last - c.blocks[b].first) * e.stride * s.step;
+      EXPECT_LE(seconds, 8.0 + e.stride * s.step) << c.text;
+    }
+    EXPECT_EQ(next, c.rows());
+  }
+}
+
+TEST(Evidence, RowsAreAboutIndependentOfTheSamplingRate) {
+  // a third of the filter's window between rows
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train});
+  EXPECT_NEAR(e.stride * e.series[0].step, e.window / 3.0, e.series[0].step);
+}
+
+TEST(Evidence, ReferenceRowsFeelNoEffect) {
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train}, {plain_case().reference});
+  ASSERT_TRUE(e.has_reference());
+  int acting = 0;
+  for (const EffectAt& effect : candidates(arm())) {
+    // nonlinear parameters at the first value of their grids
+    std::vector<double> shape;
+    bool whole = true;
+    int k = 0;
+    for (const EffectParameter& p : effect.effect->info().parameters) {
+      if (p.linear) continue;
+      const std::vector<double> grid = effect.effect->grid(e.series[0], effect.at, k++);
+      whole = whole && !grid.empty();
+      if (whole) shape.push_back(grid.front());
+    }
+    if (!whole) continue;
+    for (const EvidenceChannel& c : e.channels) {
+      const MatrixXd columns = e.columns(effect, shape, c);
+      if (columns.size() == 0) continue;
+      ++acting;
+      EXPECT_TRUE(columns.allFinite());
+      double suspect = 0.0, reference = 0.0;
+      for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+        const double size =
+            columns.middleRows(c.blocks[b].first, c.blocks[b].last - c.blocks[b].first).norm();
+        (c.log[b] == 0 ? suspect : reference) += size;
+      }
+      EXPECT_EQ(reference, 0.0) << effect.effect->info().id << " in " << c.text;
+      EXPECT_GT(suspect, 0.0);
+    }
+  }
+  EXPECT_GT(acting, 60) << "places where some effect of the catalogue shows";
+}
+
+TEST(Evidence, ATiltsColumnIsTheChordUpToItsAngle) {
+  const CraneModel model = crane_model();
+  const Evidence e = evidence_of(model, {plain_case().train});
+  const EffectAt tilt = parse_effect("base_tilt", arm());
+  const double angle = 0.1;
+  const std::vector<double> up = {angle}, down = {-angle};
+  int rows = 0;
+  for (int i = 0; i < 2; ++i) {
+    const EvidenceChannel* c = e.find(EvidenceKind::kForce, i);
+    ASSERT_NE(c, nullptr);
+    // Gravity turns in the arm's plane: F(a) + F(-a) - 2 F(0) = 2 F(0) (cos a - 1), which a tangent says is zero.
+    const VectorXd both = angle * (e.columns(tilt, {}, *c, up) - e.columns(tilt, {}, *c, down));
+    const VectorXd& force = e.series[0].cylinders[static_cast<std::size_t>(i)].static_force;
+    for (Index r = 0; r < c->rows(); ++r) {
+      const double expected =
+          2.0 * force[c->sample[static_cast<std::size_t>(r)]] * (std::cos(angle) - 1.0);
+      EXPECT_NEAR(both[r], expected, 0.05 * std::abs(expected) + 20.0);  // the filter's share, N
+      ++rows;
+    }
+  }
+  EXPECT_GT(rows, 200);
+}
+
+/// The load's candidate where the log tells of `payload`.
+SearchCandidate load_candidate(const std::function<double(Index)>& payload) {
+  const CraneModel model = crane_model();
+  Evidence e = evidence_of(model, {plain_case().train});
+  VectorXd& told = e.series[0].payload;
+  for (Index k = 0; k < told.size(); ++k) told[k] = payload(k);
+  return search_candidates(e, {parse_effect("payload_error", arm())}).at(0);
+}
+
+TEST(Candidates, AScaleInErrorIsPaidForWhereItSaysSomethingOfItsOwn) {
+  const auto sizes = [](const EffectDesign& d) {
+    VectorXd size = VectorXd::Zero(d.linear);
+    for (const MatrixXd& c : d.columns) {
+      if (c.cols() > 0) size += c.colwise().norm().transpose();
+    }
+    return size;
+  };
+  for (const double steady : {0.0, 500.0}) {  // the mass says it already
+    const SearchCandidate one = load_candidate([&](Index) { return steady; });
+    ASSERT_EQ(one.designs.size(), 1U) << steady;
+    EXPECT_GT(sizes(one.designs[0])[0], 0.0);
+    EXPECT_EQ(sizes(one.designs[0])[1], 0.0);
+    EXPECT_EQ(one.optional_penalty, 0.0);
+  }
+  const SearchCandidate two =
+      load_candidate([](Index k) { return (k / 500) % 2 == 0 ? 500.0 : 800.0; });
+  ASSERT_EQ(two.designs.size(), 2U);
+  EXPECT_EQ(two.linear, 1);
+  EXPECT_EQ(sizes(two.designs[0])[1], 0.0);
+  EXPECT_GT(sizes(two.designs[1])[1], 0.0);
+  EXPECT_DOUBLE_EQ(two.price(two.designs[0]), two.penalty);
+  EXPECT_DOUBLE_EQ(two.price(two.designs[1]), 2.0 * two.penalty) << "two parameters for one";
+}
+
+TEST(Evidence, WhatTheModelKnowsIsTakenOff) {
+  CraneModel model = arm_model();
+  const Log log = arm_log_with_friction(5e3);
+  const double before = evidence_of(model, {log}).find(EvidenceKind::kForce, 0)->y.norm();
+  model.effects = {{find_effect("coulomb_friction"), 0, {5e3}, {}, {}}};
+  const double after = evidence_of(model, {log}).find(EvidenceKind::kForce, 0)->y.norm();
+  EXPECT_LT(after, 0.2 * before);
+}
+
+TEST(Evidence, NoiseFloorIsThatOfTheSensors) {
+  // the arm's law is exact: what is left of the force is the pressure sensors' noise through the filter
+  const CraneModel model = arm_model();
+  const Evidence e = evidence_of(model, {arm_log(0.8)});
+  const EvidenceChannel* force = e.find(EvidenceKind::kForce, 0);
+  const double rms = force->y.norm() / std::sqrt(static_cast<double>(force->rows()));
+  // some 300 independent rows: 4 %; smoothing of the pose adds a little
+  EXPECT_NEAR(force->noise_floor, rms, 0.15 * rms);
+}
+
+// ---------------------------------------------------------------------------------------- missing columns
+
+TEST(Evidence, SaysWhatCannotBeJudgedAndWhy) {
+  const CraneModel model = arm_model();
+  Log log = arm_log(0.8);
+  remove_channel(log, "pB_arm");
+  Evidence e = evidence_of(model, {log});
+  EXPECT_EQ(e.find(EvidenceKind::kForce, 0), nullptr);
+  EXPECT_THAT(e.notes, Contains(HasSubstr("force effects cannot be judged")));
+  EXPECT_NE(e.find(EvidenceKind::kFlow, 0), nullptr) << "the rest is";
+
+  log = arm_log(0.8);
+  remove_channel(log, "u_arm");
+  e = evidence_of(model, {log});
+  EXPECT_EQ(e.find(EvidenceKind::kFlow, 0), nullptr);
+  EXPECT_THAT(e.notes, Contains(HasSubstr("arm: no command is logged")));
+  EXPECT_EQ(e.find(EvidenceKind::kPump, 0), nullptr) << "what it is asked for is not known";
+  EXPECT_NE(e.find(EvidenceKind::kForce, 0), nullptr);
+
+  log = arm_log(0.8);
+  remove_channel(log, "p_main");
+  e = evidence_of(model, {log});
+  EXPECT_THAT(e.notes, Contains(HasSubstr("pump main")));
+  EXPECT_THAT(e.notes, Not(Contains(HasSubstr("arm:"))));
+}
+
+TEST(Evidence, PositionsAloneGiveNothingToJudgeAndNoCrash) {
+  const CraneModel model = arm_model();
+  Log log = arm_log(0.8);
+  for (const char* name : {"u_arm", "pA_arm", "pB_arm", "p_main", "payload"})
+    remove_channel(log, name);
+  const Evidence e = evidence_of(model, {log});
+  EXPECT_THAT(e.channels, IsEmpty());
+  EXPECT_GE(e.notes.size(), 3u);
+  const EffectFit fit = fit_effects(e, {});
+  EXPECT_EQ(fit.total(), 0.0);
+}
+
+}  // namespace
+}  // namespace sparflow

@@ -1,0 +1,152 @@
+#include "diagnosis/evidence/noise_model.h"
+
+#include <gtest/gtest.h>
+
+#include "models/math/linear_algebra.h"
+#include "tests/diagnosis/evidence_support.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing_support::blocks_of;
+using testing_support::dense_covariance;
+using testing_support::draw;
+
+NoiseModel model_of(double phi1, double phi2, double variance, double offset_variance) {
+  NoiseModel m;
+  m.phi1 = phi1;
+  m.phi2 = phi2;
+  m.variance = variance;
+  m.offset_variance = offset_variance;
+  return m;
+}
+
+const std::vector<NoiseModel>& laws() {
+  static const std::vector<NoiseModel> all = {
+      model_of(0.0, 0.0, 2.0, 0.0),   // white
+      model_of(0.9, 0.0, 1.0, 0.0),   // slow
+      model_of(0.9, -0.2, 0.5, 4.0),  // friction-like, motions differ
+      model_of(1.2, -0.8, 1.0, 0.0),  // swings
+      model_of(0.2, 0.6, 3.0, 10.0)};
+  return all;
+}
+
+TEST(NoiseModel, EstimatesWhatItWasDrawnFrom) {
+  std::mt19937_64 random(1);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(60, 250));
+  for (const NoiseModel& truth : laws()) {
+    VectorXd offsets;
+    const VectorXd y = draw(truth, blocks, random, &offsets);
+    const NoiseModel m = NoiseModel::estimate(y, blocks);
+    // 15 000 rows: the coefficients' standard deviation is at most 1/sqrt(15000) = 0.008; taking the blocks' means
+    // out costs a bias of a few over a block's 250 rows
+    EXPECT_NEAR(m.phi1, truth.phi1, 0.05) << truth.phi1 << " " << truth.phi2;
+    EXPECT_NEAR(m.phi2, truth.phi2, 0.05) << truth.phi1 << " " << truth.phi2;
+    // relative deviation sqrt(2/15000) = 1.2 %, and what the coefficients' errors add
+    EXPECT_NEAR(m.variance, truth.variance, 0.06 * truth.variance);
+    // against the offsets that were drawn, so that their own chance does not count. A block's mean also has the
+    // autoregression's share: variance / (1 - phi1 - phi2)^2 / 250, and its product with the offset
+    const double gain = 1.0 - truth.phi1 - truth.phi2;
+    const double of_mean = truth.variance / (gain * gain) / 250.0;
+    const double drawn = offsets.squaredNorm() / 60.0;
+    EXPECT_NEAR(m.offset_variance, drawn,
+                3.0 * (std::sqrt(2.0 / 60.0) * of_mean + 2.0 * std::sqrt(drawn * of_mean / 60.0)) +
+                    0.05 * drawn)
+        << truth.phi1 << " " << truth.phi2;
+  }
+}
+
+TEST(NoiseModel, DeviationIsThatOfOneValue) {
+  const std::vector<NoiseBlock> blocks = blocks_of({5});
+  for (const NoiseModel& m : laws())
+    EXPECT_NEAR(m.deviation(), std::sqrt(dense_covariance(m, blocks)(2, 2)), 1e-12 * m.deviation());
+}
+
+TEST(NoiseModel, WhiteningIsTheInverseRootOfTheCovariance) {
+  const std::vector<NoiseBlock> blocks = blocks_of({1, 2, 3, 17, 40});
+  const Index n = testing_support::rows_of(blocks);
+  for (const NoiseModel& m : laws()) {
+    MatrixXd w = MatrixXd::Identity(n, n);
+    const double log_determinant = m.whiten(blocks, w);
+    const MatrixXd covariance = dense_covariance(m, blocks);
+    const MatrixXd unit = w * covariance * w.transpose() / m.variance;
+    // rounding of sums of 40 products of size 10
+    EXPECT_LT((unit - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-11);
+    const double dense = -0.5 * Cholesky(covariance / m.variance).log_det();
+    EXPECT_NEAR(log_determinant, dense, 1e-10 * static_cast<double>(n));
+  }
+}
+
+TEST(NoiseModel, LikelihoodIsTheDenseOne) {
+  std::mt19937_64 random(2);
+  const std::vector<NoiseBlock> blocks = blocks_of({30, 1, 25, 2});
+  for (const NoiseModel& m : laws()) {
+    const VectorXd y = draw(m, blocks, random);
+    MatrixXd whitened = y;
+    const double fast = m.whiten(blocks, whitened) - 0.5 * whitened.squaredNorm() / m.variance -
+                        0.5 * static_cast<double>(y.size()) * std::log(m.variance);
+    const MatrixXd covariance = dense_covariance(m, blocks);
+    const double dense =
+        -0.5 * Cholesky(covariance).log_det() - 0.5 * y.dot(Cholesky(covariance).solve(y));
+    EXPECT_NEAR(fast, dense, 1e-9 * std::abs(dense));
+  }
+}
+
+TEST(NoiseModel, WhitenedRowsAreWhiteAndOfUnitSize) {
+  std::mt19937_64 random(3);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 200));
+  for (const NoiseModel& truth : laws()) {
+    MatrixXd y = draw(truth, blocks, random);
+    const NoiseModel m = NoiseModel::estimate(y.col(0), blocks);
+    m.whiten(blocks, y);
+    y /= std::sqrt(m.variance);
+    EXPECT_NEAR(y.squaredNorm() / 8000.0, 1.0, 0.03);
+    for (const Index lag : {1, 2, 3, 5}) {
+      double sum = 0.0;
+      for (const NoiseBlock& b : blocks) {
+        for (Index t = b.first + lag; t < b.last; ++t) sum += y(t, 0) * y(t - lag, 0);
+      }
+      // deviation of a correlation of 8000 rows: 0.011; four of them
+      EXPECT_LT(std::abs(sum / 8000.0), 0.045) << "lag " << lag;
+    }
+  }
+}
+
+TEST(NoiseModel, ConstantInsideBlocksIsCheapOnceBlocksHaveOffsets) {
+  // what makes a mass on a level boom no proof: a constant of each motion costs next to nothing
+  const std::vector<NoiseBlock> blocks = blocks_of({100, 100, 100, 100});
+  MatrixXd without = MatrixXd::Ones(400, 1), with = without;
+  model_of(0.5, 0.0, 1.0, 0.0).whiten(blocks, without);
+  model_of(0.5, 0.0, 1.0, 25.0).whiten(blocks, with);
+  // 1' Sigma^-1 1 = s / (1 + ratio s), s = 400 (1 - 0.5)^2 / 4 a block: four blocks give at most 4 / ratio
+  EXPECT_LT(with.squaredNorm(), 4.0 / 25.0);
+  EXPECT_GT(without.squaredNorm(), 90.0);
+}
+
+TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
+  std::mt19937_64 random(4);
+  const std::vector<NoiseBlock> three = blocks_of({50, 50, 50});
+  EXPECT_EQ(NoiseModel::estimate(draw(laws()[2], three, random), three).offset_variance, 0.0);
+  const std::vector<NoiseBlock> five = blocks_of({50, 50, 50, 50, 50});
+  EXPECT_EQ(NoiseModel::estimate(draw(laws()[2], five, random), five, false).offset_variance, 0.0);
+  EXPECT_GT(NoiseModel::estimate(VectorXd::Zero(250), five).variance, 0.0);
+  EXPECT_GT(NoiseModel::estimate(VectorXd::Zero(0), {}).variance, 0.0);
+  const NoiseModel constant = NoiseModel::estimate(VectorXd::Constant(250, 3.0), five);
+  EXPECT_TRUE(std::isfinite(constant.deviation()));
+}
+
+TEST(NoiseModel, ARampStaysStationary) {
+  // a drift through the log must not become an autoregression that explodes
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(8, 60));
+  const NoiseModel m = NoiseModel::estimate(VectorXd::LinSpaced(480, -1.0, 1.0), blocks, false);
+  EXPECT_TRUE(std::isfinite(m.deviation()));
+  MatrixXd y = VectorXd::LinSpaced(480, -1.0, 1.0);
+  EXPECT_TRUE(std::isfinite(m.whiten(blocks, y)));
+  EXPECT_TRUE(y.allFinite());
+}
+
+}  // namespace
+}  // namespace sparflow

@@ -1,0 +1,227 @@
+// Effects of the flow stage: what their columns recover from a log made by another formula.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "models/effects/hydraulics.h"
+#include "tests/models/effects/effect_series.h"
+
+namespace sparflow::test_support {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+class FlowEffects : public ::testing::Test {
+ protected:
+  Machine machine = two_direct_cylinders();
+  MachineSeries log = two_cylinder_series(machine);
+
+  MatrixXd gains_and(const MatrixXd& columns, std::size_t cylinder) const {
+    MatrixXd x(log.samples(), 2 + columns.cols());
+    const VectorXd& u = log.cylinders[cylinder].command;
+    x << u.cwiseMax(0.0), u.cwiseMin(0.0), columns;
+    return x;
+  }
+  MatrixXd columns(const std::string& id, int cylinder, int at,
+                   const std::vector<double>& shape = {}) const {
+    MatrixXd c;
+    EXPECT_TRUE(effect_named(id).columns(log, EvidenceKind::kFlow, cylinder, at, shape, c)) << id;
+    return c;
+  }
+  double residual(const MatrixXd& x, const VectorXd& y) const {
+    return (y - x * scaled_least_squares(x, y)).norm() / y.norm();
+  }
+};
+
+// u0 differs by direction; the gain is refitted, so that both ways to write the law are one.
+TEST_F(FlowEffects, DeadBandIsRecoveredByDirectionAndForBothGains) {
+  const double extend = 0.071, retract = 0.126;
+  for (const bool full_flow : {false, true}) {
+    CylinderSeries& c = log.cylinders[0];
+    VectorXd straight = c.command;
+    for (Index k = 0; k < log.samples(); ++k) {
+      const double u = c.command[k], u0 = u > 0.0 ? extend : retract;
+      const double g = (u > 0.0 ? 0.15 : 0.12) / (full_flow ? 1.0 - u0 : 1.0);
+      c.speed[k] = g * std::max(0.0, std::abs(u) - u0) * (u > 0.0 ? 1.0 : -1.0);
+      straight[k] = u * (u > 0.0 ? 0.15 : 0.12);
+    }
+    const MatrixXd lack = columns("valve_deadband", 0, 0, {full_flow ? 1.0 : 0.0});
+    // free gains: both agree. 1 %: the knee is found to 1e-4, the samples inside it are few
+    const VectorXd free = scaled_least_squares(gains_and(lack, 0), c.speed);
+    if (!full_flow) {
+      EXPECT_NEAR(free[2], extend, 0.01 * extend);
+      EXPECT_NEAR(free[3], retract, 0.01 * retract);
+    }
+    // gains pinned by a reference without dead band: the form decides
+    const VectorXd pinned = scaled_least_squares(lack, c.speed - straight);
+    EXPECT_NEAR(pinned[0], extend, 0.01 * extend) << full_flow;
+    EXPECT_NEAR(pinned[1], retract, 0.01 * retract) << full_flow;
+  }
+}
+
+TEST_F(FlowEffects, WithoutDeadBandNoneIsFound) {
+  const VectorXd b = scaled_least_squares(gains_and(columns("valve_deadband", 0, 0, {0.0}), 0),
+                                          log.cylinders[0].speed);
+  EXPECT_NEAR(b[2], 0.0, 1e-4);  // the search for the knee ends at 1e-4
+  EXPECT_NEAR(b[3], 0.0, 1e-4);
+}
+
+// The lag is made by small explicit steps, the effect's by the exact exponential.
+TEST_F(FlowEffects, LagAndDelayAreToldApartAndMeasured) {
+  CylinderSeries& c = log.cylinders[0];
+  const VectorXd flow = c.speed;
+  const double tau = 0.21;
+  for (const auto& [first, last] : log.runs) {
+    double y = flow[first];
+    for (Index k = first + 1; k < last; ++k) {
+      for (int i = 0; i < 200; ++i) y += (flow[k] - y) / tau * log.step / 200.0;
+      c.speed[k] = y;
+    }
+  }
+  const VectorXd right =
+      scaled_least_squares(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
+  EXPECT_NEAR(right[2], 1.0, 0.01);  // Euler at a thousandth of tau
+  const double exact = residual(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
+  for (const std::vector<double>& wrong :
+       {std::vector<double>{0.16, 0.0}, {0.27, 0.0}, {0.16, 1.0}, {0.21, 1.0}}) {
+    EXPECT_LT(3.0 * exact, residual(gains_and(columns("valve_lag", 0, 0, wrong), 0), c.speed));
+  }
+}
+
+// A valve that is late is late with what its dead band leaves of the command, not with the command.
+TEST_F(FlowEffects, LagActsBehindTheDeadBandThatTheModelKnows) {
+  CylinderSeries& c = log.cylinders[0];
+  VectorXd opening = c.command;
+  const std::vector<double> band{0.1, 0.15, 0.0};
+  effect_named("valve_deadband").shape_opening(0, 0, band, opening);
+  const double tau = 0.21;
+  const Valve& valve = *machine.valve_of_cylinder(0);
+  for (const auto& [first, last] : log.runs) {
+    double y = 0.0;
+    for (Index k = first; k < last; ++k) {
+      const double u = opening[k];
+      const double flow = u > 0.0 ? u * valve.max_flow_extend / machine.cylinders[0].area_piston()
+                                  : u * valve.max_flow_retract / machine.cylinders[0].area_rod();
+      if (k == first) y = flow;
+      for (int i = 0; i < 200 && k > first; ++i) y += (flow - y) / tau * log.step / 200.0;
+      c.speed[k] = y;
+    }
+  }
+  const auto error_and_share = [&](const VectorXd& behind) {
+    c.opening = behind;
+    MatrixXd x(log.samples(), 3);
+    x << opening.cwiseMax(0.0), opening.cwiseMin(0.0), columns("valve_lag", 0, 0, {tau, 0.0});
+    return std::pair{residual(x, c.speed), scaled_least_squares(x, c.speed)[2]};
+  };
+  const auto [exact, share] = error_and_share(opening);
+  const auto [of_command, other_share] = error_and_share({});
+  EXPECT_NEAR(share, 1.0, 0.01);       // Euler at a thousandth of tau
+  EXPECT_LT(3.0 * exact, of_command);  // late with what the dead band takes away as well
+}
+
+TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
+  const double limit = 1.3e-3;
+  std::vector<VectorXd> straight;
+  for (std::size_t i = 0; i < 2; ++i) straight.push_back(log.cylinders[i].speed);
+  const VectorXd asked = pump_flow(log, 0);
+  const VectorXd served = (limit / asked.array()).min(1.0).matrix();
+  for (std::size_t i = 0; i < 2; ++i) {
+    log.cylinders[i].speed = straight[i].cwiseProduct(served);
+    log.cylinders[i].flow = log.cylinders[i].flow.cwiseProduct(served);
+  }
+  ASSERT_GT((served.array() < 1.0).count(), 100);
+  for (int i = 0; i < 2; ++i) {
+    const VectorXd b = scaled_least_squares(
+        gains_and(columns("flow_saturation", i, 0, {limit}), static_cast<std::size_t>(i)),
+        log.cylinders[static_cast<std::size_t>(i)].speed);
+    EXPECT_NEAR(b[2], 1.0, 0.02);  // gains and share settle in turns to about 1 %
+  }
+  const std::vector<double> grid = effect_named("flow_saturation").grid(log, 0, 0);
+  ASSERT_FALSE(grid.empty());
+  EXPECT_LT(grid.front(), limit);
+  EXPECT_GT(grid.back(), limit);
+  const double values[] = {1.0, limit};
+  EXPECT_EQ(effect_named("flow_saturation").flow_limit(machine, 0, 0, values), limit);
+}
+
+// 0.5 l/min at 100 bar of load pressure lets a 100 mm piston sink by 0.5e-3/60/A.
+TEST_F(FlowEffects, LeakLetsTheLoadSink) {
+  CylinderSeries& c = log.cylinders[0];
+  const double a = machine.cylinders[0].area_piston(), b = machine.cylinders[0].area_rod();
+  c.command.setZero();
+  c.force.setConstant(100e5 * a);
+  c.force.tail(800).setConstant(-100e5 * b);
+  const MatrixXd col = columns("leakage", 0, 0, {1.0});
+  const double k = effect_named("leakage").info().parameters[0].si * 0.5;
+  EXPECT_NEAR(col(0, 0) * k, -0.5e-3 / 60.0 / a, 1e-12);
+  EXPECT_NEAR(col(1999, 0) * k, 0.5e-3 / 60.0 / b, 1e-12);
+  // past the spool it leaks only while that is closed
+  c.direction.setZero();
+  c.direction.head(1000).setConstant(1);
+  const MatrixXd closed = columns("leakage", 0, 0, {0.0});
+  EXPECT_EQ(closed(0, 0), 0.0);
+  EXPECT_EQ(closed(1999, 0), col(1999, 0));
+}
+
+// A chamber of 1.0 m + 5 % of 2 m at 1 GPa: 10 bar/s take 1.1 mm/s.
+TEST_F(FlowEffects, CompressedOilIsMissing) {
+  CylinderSeries& c = log.cylinders[0];
+  c.direction.setConstant(1);
+  c.length.setConstant(1.0);
+  c.pressure_a = 10e5 * log.time;
+  const MatrixXd col = columns("compressibility", 0, 0, {0.0});
+  EXPECT_NEAR(col(500, 0) * 1e-9, -1.1e-3, 1e-9);
+  EXPECT_EQ(col(log.runs.back().first, 0), 0.0) << "nothing is known across a gap";
+  c.direction.setConstant(-1);
+  c.pressure_b = -10e5 * log.time;
+  EXPECT_NEAR(columns("compressibility", 0, 0, {0.0})(500, 0) * 1e-9, -1.1e-3, 1e-9);
+}
+
+// 50 bar more in a chamber of 1.1 m at 1 GPa are 5.5 mm, at once or late; also as the chamber takes over.
+TEST_F(FlowEffects, AJumpOfPressureMovesTheRodAsFarHoweverLate) {
+  CylinderSeries& c = log.cylinders[0];
+  c.length.setConstant(1.0);
+  c.pressure_a = VectorXd::Constant(log.samples(), 20e5);
+  c.pressure_b = VectorXd::Constant(log.samples(), 90e5);
+  c.pressure_a.segment(300, log.samples() - 300).setConstant(70e5);
+  // what is measured counts, not what a filter made of it
+  c.measured_a = c.pressure_a;
+  c.measured_b = c.pressure_b;
+  c.pressure_a.setZero();
+  c.direction.setConstant(-1);
+  c.direction.tail(log.samples() - 300).setConstant(1);
+  for (const double tau : {0.0, 0.2}) {
+    const MatrixXd col = columns("compressibility", 0, 0, {tau});
+    EXPECT_EQ(col(299, 0), 0.0);
+    // a lag sampled every 20 ms moves the sum by less than 1e-3
+    EXPECT_NEAR(col.topRows(900).sum() * log.step * 1e-9, -5.5e-3, 6e-6) << tau;
+  }
+  EXPECT_LT(columns("compressibility", 0, 0, {0.2}).col(0).cwiseAbs().maxCoeff(),
+            0.2 * columns("compressibility", 0, 0, {0.0}).col(0).cwiseAbs().maxCoeff());
+}
+
+TEST_F(FlowEffects, SitWhereThereIsOilAndSayNothingWithoutACommand) {
+  for (const char* id : {"valve_deadband", "valve_lag", "leakage", "compressibility"}) {
+    EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{0, 1})) << id;
+    MatrixXd c;
+    EXPECT_FALSE(effect_named(id).columns(log, EvidenceKind::kForce, 0, 0,
+                                          std::vector<double>{0.1, 0.0}, c));
+    EXPECT_FALSE(
+        effect_named(id).columns(log, EvidenceKind::kFlow, 1, 0, std::vector<double>{0.1, 0.0}, c));
+  }
+  Machine dry = machine;
+  dry.cylinders[0].bore = 0.0;
+  EXPECT_EQ(effect_named("valve_lag").places(dry), (std::vector<int>{1}));
+  log.cylinders[0].command.resize(0);
+  MatrixXd c;
+  for (const char* id : {"valve_deadband", "valve_lag", "flow_saturation"}) {
+    EXPECT_FALSE(
+        effect_named(id).columns(log, EvidenceKind::kFlow, 0, 0, std::vector<double>{0.1, 0.0}, c))
+        << id;
+  }
+}
+
+}  // namespace
+}  // namespace sparflow::test_support

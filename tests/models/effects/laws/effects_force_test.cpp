@@ -1,0 +1,536 @@
+/// Effects of force and sensors: laws against hand cases, Jets against numeric derivatives over the registry,
+/// columns against the laws, and what an effect must not do.
+#include <gtest/gtest.h>
+
+#include "models/effects/builtin.h"
+#include "models/effects/effect_text.h"
+#include "models/machine/inertial_torque.h"
+#include "models/math/error.h"
+#include "tests/models/effects/effects_support.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using test_support::instant_at;
+using test_support::log_of;
+using test_support::numeric_derivative;
+using test_support::Random;
+using test_support::stacked;
+
+const Effect& effect(const std::string& id) {
+  const Effect* found = find_effect(id);
+  SPARFLOW_CHECK(found != nullptr, id);
+  return *found;
+}
+
+std::vector<double> typical(const EffectInfo& info) {
+  std::vector<double> p;
+  for (const EffectParameter& parameter : info.parameters) {
+    p.push_back(parameter.typical != 0.0 ? parameter.typical : 0.5 * parameter.upper);
+  }
+  return p;
+}
+
+VectorXd added(const Effect& e, const Instant<double>& s, int at, std::vector<double> p) {
+  VectorXd out = VectorXd::Zero(s.machine->cylinder_count());
+  e.add_force(s, at, p, {out.data(), static_cast<std::size_t>(out.size())});
+  return out;
+}
+
+/// Every joint swings with its own period, so that poses, speeds and accelerations vary independently.
+VectorXd swinging(const Machine& machine, double t) {
+  const Index n = machine.joint_count();
+  VectorXd q(n), qd(n), qdd(n);
+  for (Index j = 0; j < n; ++j) {
+    const Range& r = machine.joints[static_cast<std::size_t>(j)].position;
+    const double a = 0.3 * (r.hi - r.lo), w = 0.5 + 0.13 * static_cast<double>(j);
+    q[j] = 0.5 * (r.lo + r.hi) + a * std::sin(w * t + 0.4 + static_cast<double>(j));
+    qd[j] = a * w * std::cos(w * t + 0.4 + static_cast<double>(j));
+    qdd[j] = -a * w * w * std::sin(w * t + 0.4 + static_cast<double>(j));
+  }
+  return stacked(q, qd, qdd);
+}
+
+MachineSeries swinging_log(const Machine& machine, double payload = 300.0) {
+  return log_of(
+      machine, [&](double t) { return swinging(machine, t); }, 8.0, 0.05, payload);
+}
+
+/// The static force of a machine with an effect's masses, gravity or angles.
+VectorXd changed_force(const Machine& machine, const Effect& e, int at, std::vector<double> p,
+                       const VectorXd& q, double payload) {
+  Machine changed = machine;
+  e.change_machine(changed, at, p);
+  return static_force<double>(changed, q, payload);
+}
+
+// --- hand cases --------------------------------------------------------------------------------------------
+
+struct OneCylinder : ::testing::Test {
+  Machine machine = test_support::loader_crane();
+  Instant<double> s = make_instant(machine);
+  OneCylinder() {
+    s.side = {1, -1, 0};
+    s.speed = {0.02, -0.05, 0.0};
+    s.static_force = {120e3, -30e3, 500.0};
+  }
+};
+
+TEST_F(OneCylinder, FrictionsFollowTheirClosedForms) {
+  EXPECT_DOUBLE_EQ(added(effect("viscous_friction"), s, 1, {1e5})[1], -5e3);
+  EXPECT_DOUBLE_EQ(added(effect("load_friction"), s, 0, {0.05})[0], 6e3);
+  EXPECT_DOUBLE_EQ(added(effect("load_friction"), s, 1, {0.05})[1], -1.5e3);
+  EXPECT_DOUBLE_EQ(added(effect("stribeck_friction"), s, 0, {8e3, 0.01})[0], 8e3 * std::exp(-2.0));
+  EXPECT_DOUBLE_EQ(added(effect("stribeck_friction"), s, 1, {8e3, 0.01})[1], -8e3 * std::exp(-5.0));
+  EXPECT_DOUBLE_EQ(added(effect("presliding"), s, 1, {8e3, 2e-3})[1], -8e3);
+  EXPECT_DOUBLE_EQ(added(effect("force_offset"), s, 2, {700.0})[2], 700.0);
+  for (const char* id : {"load_friction", "stribeck_friction", "presliding"}) {
+    EXPECT_EQ(added(effect(id), s, 2, {1.0, 1.0})[2], 0.0) << id << " at rest";
+  }
+}
+
+TEST_F(OneCylinder, FrictionTakesPowerAndNeverGivesIt) {
+  for (const char* id : {"coulomb_friction", "viscous_friction", "stribeck_friction",
+                         "load_friction", "presliding"}) {
+    const Effect& e = effect(id);
+    for (int at : {0, 1}) {
+      const auto i = static_cast<std::size_t>(at);
+      EXPECT_GT(added(e, s, at, typical(e.info()))[at] * s.speed[i], 0.0) << id;
+    }
+  }
+}
+
+TEST_F(OneCylinder, CushionStandsWhereStrokeOrJointEndsFirst) {
+  Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
+  const auto length = [&](double q) { return cylinder_length(machine, 0, q); };
+  const bool rises = length(joint.position.hi) > length(joint.position.lo);
+  const double longest = length(rises ? joint.position.hi : joint.position.lo);
+  const auto force_at = [&](double x) {
+    s.length[0] = x;
+    return added(effect("end_cushion"), s, 0, {20e3, 0.1, 0.0})[0];
+  };
+  machine.cylinders[0].stroke.reset();
+  EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
+  machine.cylinders[0].length_at_zero_stroke = 0.0;
+  machine.cylinders[0].stroke = longest + 0.2;  // never driven out
+  EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
+  machine.cylinders[0].stroke = longest - 0.05;  // ends before the joint does
+  EXPECT_NEAR(force_at(longest - 0.05), 20e3, 1e-6);
+  // a joint that takes the cylinder past its longest is no stop
+  machine.cylinders[0].stroke.reset();
+  double dead = joint.position.lo;
+  for (double q = -M_PI; q < M_PI; q += 0.01) {
+    if (length(q) > length(dead)) dead = q;
+  }
+  joint.position = {dead - 0.5, dead + 0.5};
+  EXPECT_EQ(force_at(length(dead)), 0.0);
+}
+
+TEST_F(OneCylinder, CushionActsTowardsItsStopOnly) {
+  machine.cylinders[0].length_at_zero_stroke = 1.5;
+  machine.cylinders[0].stroke = 1.0;
+  Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
+  joint.position = {0.0, 0.0};  // the stroke alone
+  const Effect& e = effect("end_cushion");
+  const auto force = [&](double length, int side, double ends) {
+    s.length[0] = length;
+    s.side[0] = side;
+    return added(e, s, 0, {20e3, 0.1, ends})[0];
+  };
+  EXPECT_NEAR(force(2.45, 1, 0.0), 5e3, 1e-6);  // half way into the zone: a quarter
+  EXPECT_NEAR(force(2.5, 1, 0.0), 20e3, 1e-6);
+  EXPECT_NEAR(force(1.55, -1, 0.0), -5e3, 1e-6);
+  EXPECT_EQ(force(2.45, -1, 0.0), 0.0);  // away from the stop
+  EXPECT_EQ(force(2.39, 1, 0.0), 0.0);   // before the zone
+  EXPECT_EQ(force(2.45, 1, -1.0), 0.0);  // the other end's cushion
+  EXPECT_NEAR(force(2.45, 1, 1.0), 5e3, 1e-6);
+}
+
+TEST(PadFriction, IsTheBeamsMomentByHand) {
+  // jib level, extension 2 m, nothing but a payload of 100 kg at the tip: moment about the joint's frame at zero
+  // travel 100 g 2 m; 1 m further back 100 g 3 m
+  Machine machine = test_support::loader_crane();
+  machine.links.clear();
+  const VectorXd x =
+      stacked(Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0, 0, 0.1), Eigen::Vector3d::Zero());
+  const Instant<double> s = instant_at(machine, x, 100.0);
+  const Effect& e = effect("pad_friction");
+  // the rounded corner of |moment| is off by less than its 10 N m
+  EXPECT_NEAR(added(e, s, 2, {0.1, 0.0})[2], 0.1 * 100 * 9.81 * 2, 0.1 * 10);
+  EXPECT_NEAR(added(e, s, 2, {0.1, 1.0})[2], 0.1 * 100 * 9.81 * 3, 0.1 * 10);
+  EXPECT_EQ(e.places(machine), std::vector<int>{2});
+  EXPECT_TRUE(e.places(test_support::knuckle_crane()).empty());
+}
+
+TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
+  const Machine machine = test_support::loader_crane();
+  const VectorXd x = stacked(Eigen::Vector3d(0.4, -0.8, 2), Eigen::Vector3d::Constant(0.1),
+                             Eigen::Vector3d::Zero());
+  const Instant<double> s = instant_at(machine, x, 500.0);
+  const double kappa = 2e-7;
+  const double sag = kappa * s.static_torque[0];
+  ASSERT_GT(sag, 0.0);  // the boom's torque lifts, so the load pulls it down
+  VectorXd q = x.head(3);
+  q[0] -= sag;
+  const VectorXd torque = static_torque<double>(machine, q, 500.0);
+  const VectorXd force = static_force<double>(machine, q, 500.0);
+  const Effect& e = effect("structural_flex");
+  const VectorXd bends = added(e, s, -1, {kappa, 0.0, 0.0});
+  const VectorXd gives_way = added(e, s, -1, {kappa, 0.0, 1.0});
+  for (Index i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double scale = 1e-9 * (1.0 + std::abs(force[i]));  // the same numbers in another order
+    EXPECT_NEAR(bends[i], torque[i] / s.rate[k] - s.static_force[k], scale);
+    EXPECT_NEAR(gives_way[i], force[i] - s.static_force[k], scale);
+  }
+}
+
+TEST(MachineEffects, AreTheMachineTheyDescribe) {
+  const Machine machine = test_support::swing_crane();
+  Random random(4);
+  const VectorXd q = test_support::usable_state(machine, random).head(4);
+  const double payload = 200.0;
+  const VectorXd force = static_force<double>(machine, q, payload);
+  const auto near = [](const VectorXd& a, const VectorXd& b) {
+    return (a - b).norm() < 1e-9 * (1.0 + b.norm());
+  };
+  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {37.0, 0.02}, q, payload),
+                   static_force<double>(machine, q, 1.02 * payload + 37.0)));
+  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {0.0, 0.02}, q, payload),
+                   static_force<double>(machine, q, 1.02 * payload)));
+  VectorXd turned = q;
+  turned[2] += 0.02;
+  EXPECT_TRUE(near(changed_force(machine, effect("angle_offset"), 2, {0.02}, q, payload),
+                   static_force<double>(machine, turned, payload)));
+  // the boom is the first joint to luff: a tilt of the base is an angle of the boom but for the linkage
+  const Machine crane = test_support::loader_crane();
+  const VectorXd pose = Eigen::Vector3d(0.3, -0.7, 1.0);
+  VectorXd raised = pose;
+  raised[0] += 0.03;
+  Machine tilted = crane;
+  effect("base_tilt").change_machine(tilted, -1, std::vector<double>{0.03});
+  EXPECT_TRUE(near(static_torque<double>(tilted, pose, payload),
+                   static_torque<double>(crane, raised, payload)));
+  EXPECT_FALSE(near(force, static_force<double>(machine, turned, payload)));
+}
+
+TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
+  const Machine machine = test_support::loader_crane();
+  const MachineSeries log = swinging_log(machine);
+  const Effect& e = effect("angle_offset");
+  MatrixXd column;
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kFlow, 0, 0, {}, column));
+  const double offset = 1e-5;
+  for (Index k = 0; k < log.samples(); k += 20) {
+    // computed speed rate(q) qd minus the true one, rate(q + offset) qd
+    const double q = log.q(k, 0), qd = log.qd(k, 0);
+    const double wrong = linkage_rates(machine, 0, q).d1 * qd,
+                 right = linkage_rates(machine, 0, q + offset).d1 * qd;
+    EXPECT_NEAR(column(k, 0) * offset, wrong - right, 1e-3 * std::abs(wrong - right) + 1e-12);
+  }
+  EXPECT_FALSE(e.columns(log, EvidenceKind::kFlow, 1, 0, {}, column));
+}
+
+// --- over the registry ---------------------------------------------------------------------------------------
+
+TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
+  for (const Machine& machine : test_support::effect_machines()) {
+    Random random(21);
+    const VectorXd x = test_support::usable_state(machine, random);
+    const double payload = 400.0;
+    const Instant<Jet> jets = test_support::jets_at(machine, x, payload);
+    const Index n = x.size();
+    for (const auto& e : effect_catalogue()) {
+      const EffectInfo& info = e->info();
+      if (info.stage != EffectStage::kForce || e->changes_machine()) continue;
+      std::vector<double> p = typical(info);
+      if (info.id == "end_cushion") p[1] = 5.0;  // a zone in which every pose lies
+      for (const int at : e->places(machine)) {
+        SCOPED_TRACE(machine.name + " " + info.id + " " + std::to_string(at));
+        std::vector<Jet> out(machine.cylinders.size(), Jet(0.0));
+        e->add_force(jets, at, p, out);
+        const VectorXd plain_out = added(*e, instant_at(machine, x, payload), at, p);
+        for (std::size_t i = 0; i < out.size(); ++i) {
+          const auto c = static_cast<Index>(i);
+          double scale = 1.0 + std::abs(plain_out[c]);
+          for (int a = 0; a < n; ++a) scale += std::abs(out[i].gradient(a));
+          EXPECT_NEAR(out[i].value, plain_out[c], 1e-11 * scale);  // the same formulas
+          const VectorXd direction = VectorXd::LinSpaced(n, 0.3, -0.8);
+          double slope = 0.0, curvature = 0.0;
+          for (int a = 0; a < n; ++a) {
+            slope += out[i].gradient(a) * direction[a];
+            for (int b = 0; b < n; ++b)
+              curvature += out[i].hessian(a, b) * direction[a] * direction[b];
+          }
+          // along one line through all joint states: first derivative of values, second of Jet slopes
+          const auto value = [&](double t) {
+            return added(*e, instant_at(machine, x + t * direction, payload), at, p)[c];
+          };
+          const auto jet_slope = [&](double t) {
+            std::vector<Jet> moved(machine.cylinders.size(), Jet(0.0));
+            e->add_force(test_support::jets_at(machine, x + t * direction, payload), at, p, moved);
+            double sum = 0.0;
+            for (int a = 0; a < n; ++a) sum += moved[i].gradient(a) * direction[a];
+            return sum;
+          };
+          // linkages vary over some 0.1 rad: a step of 4e-3 and three levels leave 1e-7
+          EXPECT_NEAR(slope, numeric_derivative(value, 0.0, 4e-3), 1e-6 * scale);
+          EXPECT_NEAR(curvature, numeric_derivative(jet_slope, 0.0, 4e-3),
+                      1e-6 * (scale + std::abs(curvature)));
+        }
+      }
+    }
+  }
+}
+
+TEST(ForceEffects, ZeroParametersChangeNothing) {
+  for (const Machine& machine : test_support::effect_machines()) {
+    Random random(5);
+    const VectorXd x = test_support::usable_state(machine, random);
+    const Instant<double> s = instant_at(machine, x, 250.0);
+    const VectorXd force = static_force<double>(machine, x.head(machine.joint_count()), 250.0);
+    for (const auto& e : effect_catalogue()) {
+      if (e->info().stage != EffectStage::kForce) continue;
+      std::vector<double> p = typical(e->info());
+      for (std::size_t k = 0; k < p.size(); ++k) {
+        if (e->info().parameters[k].linear) p[k] = 0.0;
+      }
+      for (const int at : e->places(machine)) {
+        EXPECT_EQ(added(*e, s, at, p).norm(), 0.0) << e->info().id;
+        if (!e->changes_machine()) continue;
+        const VectorXd same =
+            changed_force(machine, *e, at, p, x.head(machine.joint_count()), 250.0);
+        EXPECT_LT((same - force).norm(), 1e-9 * (1.0 + force.norm())) << e->info().id;
+      }
+    }
+  }
+}
+
+/// columns times parameters is the law, at sizes where the law is nearly linear.
+TEST(ForceEffects, ColumnsAreTheLaw) {
+  for (const Machine& machine : {test_support::loader_crane(), test_support::swing_crane()}) {
+    const MachineSeries log = swinging_log(machine);
+    for (const auto& e : effect_catalogue()) {
+      const EffectInfo& info = e->info();
+      if (info.stage != EffectStage::kForce || info.id == "presliding") continue;
+      if (!e->definition().empty()) continue;
+      std::vector<double> p, shape;
+      for (const EffectParameter& parameter : info.parameters) {
+        const double value = parameter.typical;
+        if (!parameter.linear) shape.push_back(value);
+        p.push_back(parameter.linear ? 0.1 * value : value);
+      }
+      Index linear = static_cast<Index>(p.size() - shape.size());
+      for (const int at : e->places(machine)) {
+        for (int i = 0; i < machine.cylinder_count(); ++i) {
+          SCOPED_TRACE(machine.name + " " + info.id + " " + std::to_string(at));
+          MatrixXd columns;
+          const bool shows = e->columns(log, EvidenceKind::kForce, i, at, shape, columns);
+          double worst = 0.0, largest = 0.0;
+          for (Index k = 0; k < log.samples(); k += 7) {
+            const VectorXd q = log.q.row(k).transpose();
+            const VectorXd x = stacked(q, log.qd.row(k).transpose(), log.qdd.row(k).transpose());
+            const VectorXd law =
+                e->changes_machine()
+                    ? VectorXd(changed_force(machine, *e, at, p, q, log.payload[k]) -
+                               static_force<double>(machine, q, log.payload[k]))
+                    : added(*e, instant_at(machine, x, log.payload[k]), at, p);
+            double sum = 0.0;
+            for (Index c = 0; shows && c < linear; ++c)
+              sum += columns(k, c) * p[static_cast<std::size_t>(c)];
+            worst = std::max(worst, std::abs(sum - law[i]));
+            largest = std::max(largest, std::abs(law[i]));
+          }
+          // columns of angles are chords over one or two degrees, the law here a tenth of that
+          EXPECT_LE(worst, 0.05 * largest + 1e-6);
+        }
+      }
+    }
+  }
+}
+
+// --- memory and sensors ----------------------------------------------------------------------------------------
+
+TEST(Presliding, ReversalBuildsUpOverItsDistance) {
+  const Machine machine = test_support::loader_crane();
+  // extension out for 1 s at 0.1 m/s, then back
+  const MachineSeries log = log_of(
+      machine,
+      [](double t) {
+        const double q = t < 1.0 ? 2.0 + 0.1 * t : 2.1 - 0.1 * (t - 1.0);
+        return stacked(Eigen::Vector3d(0.3, -1, q), Eigen::Vector3d(0, 0, t < 1 ? 0.1 : -0.1),
+                       Eigen::Vector3d::Zero());
+      },
+      2.0, 0.01, 0.0);
+  MatrixXd column;
+  const double distance = 4e-3;
+  ASSERT_TRUE(effect("presliding")
+                  .columns(log, EvidenceKind::kForce, 2, 2, std::vector<double>{distance}, column));
+  EXPECT_NEAR(column(99, 0), 1.0, 1e-9);  // 25 distances after the start
+  for (int k = 1; k < 8; ++k) {           // exact: dz/dx = (sign - z)/distance from z = 1
+    EXPECT_NEAR(column(100 + k, 0), -1.0 + 2.0 * std::exp(-1e-3 * k / distance), 1e-6);
+  }
+  EXPECT_NEAR(column(200, 0), -1.0, 1e-9);
+}
+
+TEST(PressureOffset, ShowsInForceChambersAndPump) {
+  const Machine machine = test_support::loader_crane();
+  MachineSeries log = swinging_log(machine);
+  const Index n = log.samples();
+  log.pumps[0].leader.setZero(n);
+  const Effect& e = effect("pressure_offset");
+  const std::vector<double> a{1.0}, b{-1.0};
+  MatrixXd column;
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, 0, 0, a, column));
+  EXPECT_DOUBLE_EQ(column(3, 0), machine.cylinders[0].area_piston());
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, 0, 0, b, column));
+  EXPECT_DOUBLE_EQ(column(3, 0), -machine.cylinders[0].area_rod());
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kSupplyExtend, 0, 0, a, column));
+  EXPECT_EQ(column(3, 0), 1.0);
+  // the chamber whose sensor is right: nothing, but by way of the force (Evidence::columns)
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, a, column));
+  EXPECT_EQ(column(3, 0), 0.0);
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, b, column));
+  EXPECT_EQ(column(3, 0), 1.0);
+  ASSERT_TRUE(e.columns(log, EvidenceKind::kPump, 0, 0, a, column));
+  for (Index k = 0; k < n; k += 5) {  // the demand follows the wrong reading while it extends
+    EXPECT_EQ(column(k, 0), log.cylinders[0].direction[k] > 0 ? -1.0 : 0.0);
+  }
+  EXPECT_FALSE(e.columns(log, EvidenceKind::kForce, 1, 0, a, column));
+}
+
+/// Positions read late by d: what is left between the true force and that of the logged pose gives d back.
+TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
+  const Machine machine = test_support::loader_crane();
+  for (const double delay : {0.02, 0.1, 0.2}) {
+    const auto late = [&](double t) { return swinging(machine, t - delay); };
+    const MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
+    for (int i = 0; i < 2; ++i) {
+      MatrixXd column;
+      const std::vector<double> positions{delay, 1.0};
+      ASSERT_TRUE(
+          effect("sensor_delay").columns(log, EvidenceKind::kForce, i, -1, positions, column));
+      double xy = 0.0, xx = 0.0;
+      for (Index k = 0; k < log.samples(); ++k) {
+        if (!std::isfinite(column(k, 0))) continue;
+        const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
+                                 .static_force[static_cast<std::size_t>(i)];
+        const double left = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
+        xy += column(k, 0) * left;
+        xx += column(k, 0) * column(k, 0);
+      }
+      EXPECT_NEAR(xy / xx, 1.0, 0.05);  // the share of the shift that is seen
+    }
+  }
+}
+
+/// One joint's position read late: every cylinder's force is that of a pose with this joint elsewhere, and only its own
+/// cylinder's speed is old.
+TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
+  const Machine machine = test_support::loader_crane();
+  const Index joints = machine.joint_count();
+  const Index joint = 1;
+  const double delay = 0.1;
+  const auto late = [&](double t) {
+    VectorXd x = swinging(machine, t);
+    const VectorXd before = swinging(machine, t - delay);
+    for (const Index k : {joint, joints + joint, 2 * joints + joint}) x[k] = before[k];
+    return x;
+  };
+  MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
+  StaticForce statics(machine);
+  for (CylinderSeries& c : log.cylinders) c.static_slope.resize(log.samples(), joints);
+  for (Index k = 0; k < log.samples(); ++k) {
+    const VectorXd q = log.q.row(k);
+    statics.update(q.data(), 300.0, 1);
+    for (std::size_t i = 0; i < log.cylinders.size(); ++i)
+      log.cylinders[i].static_slope.row(k) = statics.force_jacobian().row(static_cast<Index>(i));
+  }
+  const Effect& e = effect("sensor_delay");
+  const std::vector<double> all{delay, 1.0}, one{delay, 2.0 + static_cast<double>(joint)};
+  for (int i = 0; i < 2; ++i) {
+    double left = 0.0, by_one = 0.0, by_all = 0.0;
+    MatrixXd alone, together;
+    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, one, alone));
+    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, all, together));
+    for (Index k = 0; k + 10 < log.samples(); ++k) {  // what was not recorded yet is not known
+      const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
+                               .static_force[static_cast<std::size_t>(i)];
+      const double y = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
+      left += y * y;
+      by_one += std::pow(y - alone(k, 0), 2);
+      by_all += std::pow(y - together(k, 0), 2);
+    }
+    EXPECT_LT(by_one, 0.01 * left) << i;  // to first order in an angle of some hundredths
+    EXPECT_GT(by_all, 0.1 * left) << i;
+    MatrixXd speed;
+    const bool own = machine.cylinders[static_cast<std::size_t>(i)].joint == joint;
+    EXPECT_EQ(e.columns(log, EvidenceKind::kFlow, i, -1, one, speed), own);
+  }
+  const std::vector<double> grid = e.grid(log, -1, 1);
+  EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
+}
+
+/// Where the command stays as it is nothing can be late: two noisy speeds say nothing there but their noise.
+TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
+  const Machine machine = test_support::loader_crane();
+  MachineSeries log = log_of(
+      machine, [&](double t) { return swinging(machine, t); }, 10.0, 0.02, 300.0);
+  CylinderSeries& c = log.cylinders[0];
+  c.command.setZero(log.samples());
+  c.command.tail(250).setConstant(0.5);  // thrown at 5 s
+  MatrixXd column;
+  ASSERT_TRUE(effect("sensor_delay")
+                  .columns(log, EvidenceKind::kFlow, 0, -1, std::vector<double>{0.1, 1.0}, column));
+  EXPECT_EQ(column.topRows(220).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(column.bottomRows(220).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_GT(column.middleRows(250, 20).cwiseAbs().minCoeff(), 0.0);
+}
+
+// --- words -------------------------------------------------------------------------------------------------------
+
+TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
+  for (const auto& e : effect_catalogue()) {
+    const EffectInfo& info = e->info();
+    SCOPED_TRACE(info.id);
+    EXPECT_FALSE(info.title.empty() || info.equation.empty() || info.citation.empty());
+    EXPECT_FALSE(info.separated_by.empty() || info.in_motion.empty() || info.signals.empty());
+    EXPECT_FALSE(e->shows_in().empty());
+    bool shapes = false;
+    for (const EffectParameter& p : info.parameters) {
+      EXPECT_LT(p.lower, p.upper) << p.name;
+      EXPECT_GE(p.typical, p.lower) << p.name;
+      EXPECT_LE(p.typical, p.upper) << p.name;
+      EXPECT_FALSE(p.meaning.empty()) << p.name;
+      EXPECT_FALSE(p.linear && shapes) << "linear parameters come first";
+      shapes = shapes || !p.linear;
+    }
+    EXPECT_NE(effect_table().find(effect_signature(info)), std::string::npos);
+    const std::string entry = effect_entry(*e);
+    for (const EffectParameter& p : info.parameters) {
+      EXPECT_NE(entry.find(p.name + ": "), std::string::npos);
+    }
+    for (const char* heading : {"equation", "needs", "shows in", "separated by", "source"}) {
+      EXPECT_NE(entry.find(heading), std::string::npos) << heading;
+    }
+  }
+}
+
+TEST(Catalogue, SpeaksOfBadDataAndOfTypingErrors) {
+  EXPECT_NE(effect_table().find("sensor_fault:<channel>"), std::string::npos);
+  EXPECT_NE(effect_entry(std::string("sensor_fault:pA_boom")).find("bad data"), std::string::npos);
+  EXPECT_NE(effect_entry(std::string("coulomb_friction:boom")).find("Coulomb"), std::string::npos);
+  try {
+    effect_entry(std::string("colomb_friction"));
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("coulomb_friction"), std::string::npos);
+  }
+  EXPECT_NE(effects_json().find("\"sensor_fault\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sparflow

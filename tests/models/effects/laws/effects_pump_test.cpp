@@ -1,0 +1,288 @@
+// Effects of pressures and pumps: each law against a closed form, its derivatives, and what its columns recover.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "models/effects/hydraulics.h"
+#include "tests/models/effects/effect_series.h"
+
+namespace sparflow::test_support {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using units::kBar;
+using units::kBarPerLpm;
+using units::kBarPerLpm2;
+using units::kLitrePerMinute;
+
+class PumpEffects : public ::testing::Test {
+ protected:
+  Machine machine = two_direct_cylinders();
+  MachineSeries log = two_cylinder_series(machine);
+  double a = machine.cylinders[0].area_piston(), b = machine.cylinders[0].area_rod();
+
+  std::vector<double> pressure(const std::string& id, const Instant<double>& s,
+                               const std::vector<double>& p, int at = -1) const {
+    std::vector<double> out(2, 0.0);
+    effect_named(id).add_pressure(s, at, p, out);
+    return out;
+  }
+  std::vector<double> rise(const std::string& id, const Instant<double>& s,
+                           const std::vector<double>& p) const {
+    std::vector<double> out(2, 0.0);
+    effect_named(id).add_return(s, -1, p, out);
+    return out;
+  }
+  std::vector<double> demand(const std::string& id, const Instant<double>& s,
+                             const std::vector<double>& p, int at) const {
+    std::vector<double> out(2, 0.0);
+    effect_named(id).add_demand(s, at, p, out);
+    return out;
+  }
+};
+
+TEST_F(PumpEffects, TankLineRaisesEveryReturnChamberThatMoves) {
+  Instant<double> s = two_cylinder_instant<double>(machine);
+  const double k = 1e-3 * kBarPerLpm2;
+  const double total = 0.1 * b + 0.08 * a;
+  const std::vector<double> out = rise("return_back_pressure", s, {k});
+  EXPECT_NEAR(out[0], k * total * total, 1e-6);
+  EXPECT_NEAR(out[1], k * total * total, 1e-6);
+  s.side[1] = 0;
+  EXPECT_EQ(rise("return_back_pressure", s, {k})[1], 0.0) << "push rests";
+  EXPECT_EQ(pressure("return_back_pressure", s, {k})[0], 0.0) << "what reaches the supply the "
+                                                                 "learned pressure says";
+}
+
+TEST_F(PumpEffects, TankLineIsRecoveredFromTheOthersFlow) {
+  const double k = 8e-4 * kBarPerLpm2;
+  MatrixXd c;
+  ASSERT_TRUE(
+      effect_named("return_back_pressure").columns(log, EvidenceKind::kReturnExtend, 0, -1, {}, c));
+  const VectorXd& own = log.cylinders[0].return_flow;
+  const VectorXd all = own + log.cylinders[1].return_flow;
+  const VectorXd y =
+      (3e5 + 1e9 * own.array() + 2e11 * own.array().square() + k * all.array().square()).matrix();
+  MatrixXd x(y.size(), 4);
+  x << VectorXd::Ones(y.size()), own, own.cwiseAbs2(), c;
+  EXPECT_NEAR(scaled_least_squares(x, y)[3] / k, 1.0, 1e-9);  // the same law, no noise: rounding
+}
+
+TEST_F(PumpEffects, LineLossIsAskedOfThePumpOrReadAsForce) {
+  const Instant<double> s = two_cylinder_instant<double>(machine);
+  const double k = 2e-3 * kBarPerLpm2, k1 = 0.1 * kBarPerLpm;
+  const double q = 0.1 * a, loss = k * q * q + k1 * q;
+  EXPECT_NEAR(demand("line_loss", s, {k, k1, 0.0}, 0)[0], loss, 1e-6);
+  EXPECT_EQ(demand("line_loss", s, {k, k1, 1.0}, 0)[0], 0.0);
+  std::vector<double> force(2, 0.0);
+  const double at_valve[] = {k, k1, 1.0};
+  effect_named("line_loss").add_force(s, 0, at_valve, force);
+  EXPECT_NEAR(force[0], a * loss, 1e-6);
+  MatrixXd c;
+  const double at_cylinder[] = {0.0};
+  ASSERT_TRUE(effect_named("line_loss").columns(log, EvidenceKind::kPump, 0, 1, at_cylinder, c));
+  for (Index i = 0; i < log.samples(); ++i) {
+    const double flow = log.pumps[0].leader[i] == 1 ? log.cylinders[1].flow[i] : 0.0;
+    ASSERT_NEAR(c(i, 0), flow * flow, 1e-15);
+    ASSERT_NEAR(c(i, 1), flow, 1e-15);
+  }
+}
+
+// Pilot ratio 4, setting 200 bar: opening balance p_load + R p + (A_supply/A_hold) p = p_set.
+TEST_F(PumpEffects, CounterbalanceOpensAtItsBalance) {
+  Instant<double> s = two_cylinder_instant<double>(machine);
+  const double ratio = 4.0, set = 200 * kBar, phi = b / a;  // push retracts: supply rod side
+  const double slope = 1.0 / (ratio + phi), load = 10e3 / a;
+  const double p = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
+  EXPECT_NEAR(load + ratio * p + phi * p, set, 1e-3);
+  // continuous through zero load, gone where the load alone asks for more
+  s.force[1] = 1e-6;
+  const double below = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
+  s.force[1] = -1e-6;
+  EXPECT_NEAR(pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1], below, 1.0);
+  EXPECT_EQ(pressure("counterbalance", s, {slope * set, slope, 1.0}, 1)[1], 0.0)
+      << "the valve of the other side";
+  s.force[1] = -100e3;
+  EXPECT_EQ(pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1], 0.0);
+  MatrixXd c;
+  const double lowers[] = {-1.0}, lifts[] = {1.0};
+  EXPECT_FALSE(
+      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lifts, c));
+  ASSERT_TRUE(
+      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lowers, c));
+  for (Index i = 0; i < log.samples(); ++i) {
+    const bool there = log.cylinders[1].direction[i] < 0;
+    ASSERT_EQ(c(i, 0), there ? 1.0 : 0.0);
+    ASSERT_NEAR(c(i, 1), there ? -log.cylinders[1].force[i] / a : 0.0, 1e-9);
+  }
+}
+
+TEST_F(PumpEffects, ColdOilCostsMoreAndTheReferenceTemperatureNothing) {
+  Instant<double> s = two_cylinder_instant<double>(machine);
+  // slopes of losses of 4 and 6 bar
+  const std::vector<double> p = {0.03 * 4 * kBar, 0.03 * 6 * kBar, 0.03};
+  const double excess = std::exp(0.03 * 15.0) - 1.0;
+  EXPECT_NEAR(demand("oil_temperature", s, p, -1)[0], 6 * kBar * excess * 0.1 * a / 1.2e-3, 1e-6);
+  EXPECT_NEAR(rise("oil_temperature", s, p)[0], 4 * kBar * excess * 0.1 * b / (1.2e-3 * b / a),
+              1e-6);
+  s.oil = 40.0;
+  EXPECT_EQ(demand("oil_temperature", s, p, -1)[0], 0.0);
+  log.oil.resize(0);
+  MatrixXd c;
+  const double beta[] = {0.03};
+  EXPECT_FALSE(effect_named("oil_temperature").columns(log, EvidenceKind::kPump, 0, -1, beta, c));
+}
+
+TEST_F(PumpEffects, OilTemperatureIsRecoveredFromTheReturnChamber) {
+  MatrixXd c;
+  const double beta[] = {0.03};
+  ASSERT_TRUE(
+      effect_named("oil_temperature").columns(log, EvidenceKind::kReturnExtend, 0, -1, beta, c));
+  const VectorXd& own = log.cylinders[0].return_flow;
+  const double full = 1.2e-3 * b / a;
+  const VectorXd y =
+      (5e5 + 8 * kBar / full * own.array() * (-0.03 * (log.oil.array() - 40.0)).exp()).matrix();
+  MatrixXd x(y.size(), 3);
+  x << VectorXd::Ones(y.size()), own, c.col(0);
+  EXPECT_NEAR(scaled_least_squares(x, y)[2] / kBar, 8.0 * 0.03, 1e-6);
+}
+
+TEST_F(PumpEffects, MarginGrowsWithTheWholeFlowButNotBelowStandby) {
+  const Instant<double> s = two_cylinder_instant<double>(machine);
+  const double k = 7e-4 * kBarPerLpm2, q = s.pump_flow[0];
+  const std::vector<double> out = demand("flow_dependent_margin", s, {k}, 0);
+  EXPECT_NEAR(out[0], k * q * q, 1e-6);
+  EXPECT_NEAR(out[1], k * q * q, 1e-6);
+  MatrixXd c;
+  ASSERT_TRUE(effect_named("flow_dependent_margin").columns(log, EvidenceKind::kPump, 0, 0, {}, c));
+  const VectorXd flow = pump_flow(log, 0);
+  for (Index i = 0; i < log.samples(); ++i) {
+    ASSERT_NEAR(c(i, 0), log.pumps[0].leader[i] < 0 ? 0.0 : flow[i] * flow[i], 1e-15);
+  }
+}
+
+TEST_F(PumpEffects, PowerIsCutAtItsLimit) {
+  const Instant<double> s = two_cylinder_instant<double>(machine);
+  const double asked = 85e5 * s.pump_flow[0];
+  std::vector<double> out(1, 0.0);
+  const double half[] = {1.0, 0.5 * asked}, twice[] = {1.0, 2.0 * asked};
+  effect_named("torque_limit").add_pump(s, 0, half, out);
+  EXPECT_NEAR((85e5 + out[0]) * s.pump_flow[0], 0.5 * asked, 1e-6 * asked);
+  out[0] = 0.0;
+  effect_named("torque_limit").add_pump(s, 0, twice, out);
+  EXPECT_EQ(out[0], 0.0);
+}
+
+TEST_F(PumpEffects, PowerLimitIsRecoveredAndItsGridCoversTheLog) {
+  const VectorXd flow = pump_flow(log, 0);
+  const double power = 0.6 * log.pumps[0].demand.cwiseProduct(flow).maxCoeff();
+  VectorXd cut = VectorXd::Zero(log.samples());
+  for (Index i = 0; i < log.samples(); ++i) {
+    cut[i] = std::min(0.0, flow[i] > 0.0 ? power / flow[i] - log.pumps[0].demand[i] : 0.0);
+  }
+  MatrixXd c;
+  const double shape[] = {power};
+  ASSERT_TRUE(effect_named("torque_limit").columns(log, EvidenceKind::kPump, 0, 0, shape, c));
+  EXPECT_NEAR(scaled_least_squares(c, cut)[0], 1.0, 0.02);  // the demand is averaged over 0.3 s
+  const std::vector<double> grid = effect_named("torque_limit").grid(log, 0, 0);
+  ASSERT_FALSE(grid.empty());
+  EXPECT_LT(grid.front(), power);
+  EXPECT_GT(grid.back(), power);
+}
+
+TEST_F(PumpEffects, PumpEffectsSitOnLoadSensingPumpsOnly) {
+  for (const char* id : {"flow_dependent_margin", "torque_limit"}) {
+    EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{0}));
+    Machine constant = machine;
+    constant.pumps[0].type = PumpType::kConstantPressure;
+    EXPECT_TRUE(effect_named(id).places(constant).empty()) << id;
+  }
+  Machine dry = machine;
+  for (Cylinder& c : dry.cylinders) c.bore = 0.0;
+  for (const char* id : {"return_back_pressure", "oil_temperature"}) {
+    EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{-1}));
+    EXPECT_TRUE(effect_named(id).places(dry).empty()) << id;
+  }
+}
+
+// Speeds and forces as functions of two variables; jets against central differences, for every law and branch.
+TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
+  struct Case {
+    std::string id;
+    int at;
+    std::vector<double> p;
+  };
+  const std::vector<Case> cases = {
+      {"return_back_pressure", -1, {1e-3 * kBarPerLpm2}},
+      {"line_loss", 0, {2e-3 * kBarPerLpm2, 0.1 * kBarPerLpm, 0.0}},
+      {"line_loss", 0, {2e-3 * kBarPerLpm2, 0.1 * kBarPerLpm, 1.0}},
+      {"counterbalance", 1, {40 * kBar, 0.2, -1.0}},
+      {"oil_temperature", -1, {0.12 * kBar, 0.18 * kBar, 0.03}},
+      {"flow_dependent_margin", 0, {7e-4 * kBarPerLpm2}},
+      {"torque_limit", 0, {1.0, 3e3}},
+  };
+  const auto instant = [&]<class T>(const T& x, const T& y) {
+    Instant<T> s = two_cylinder_instant<T>(machine);
+    s.speed[0] = 0.1 * (1.0 + x);
+    s.force[0] = 50e3 * (1.0 + x * y);
+    s.force[1] = 10e3 * (1.0 + y);
+    s.flow[0] = s.speed[0] * a;
+    s.return_flow[0] = s.speed[0] * b;
+    s.pump_flow[0] = s.flow[0] + s.flow[1];
+    s.pump_pressure[0] = 85e5 * (1.0 + 0.5 * y);
+    return s;
+  };
+  for (const Case& law : cases) {
+    const Effect& effect = effect_named(law.id);
+    const auto sum = [&]<class T>(const T& x, const T& y) {
+      const Instant<T> s = instant(x, y);
+      std::vector<T> force(2, T(0.0)), pressure(2, T(0.0)), asked(2, T(0.0)), pump(1, T(0.0)),
+          back(2, T(0.0));
+      effect.add_force(s, law.at, law.p, force);
+      effect.add_pressure(s, law.at, law.p, pressure);
+      effect.add_return(s, law.at, law.p, back);
+      effect.add_demand(s, law.at, law.p, asked);
+      effect.add_pump(s, law.at, law.p, pump);
+      return T(1e-5 * (force[0] + pressure[0] + 2.0 * pressure[1] + back[0] + 2.0 * back[1] +
+                       asked[0] + 3.0 * asked[1] + pump[0]));
+    };
+    const double x = 0.1, y = 0.2;
+    const Jet j = sum(Jet::variable(x, 0, 2), Jet::variable(y, 1, 2));
+    EXPECT_NE(j.value, 0.0) << law.id;
+    EXPECT_NEAR(j.value, sum(x, y), 1e-12 * std::abs(j.value)) << law.id;
+    const auto dx = [&](double v) { return sum(v, y); };
+    const auto dy = [&](double v) { return sum(x, v); };
+    const double size = std::abs(j.value) + std::abs(j.gradient(0)) + std::abs(j.gradient(1)) +
+                        std::abs(j.hessian(0, 0));
+    EXPECT_NEAR(j.gradient(0), numeric_derivative(dx, x), kDerivativeTolerance * size) << law.id;
+    EXPECT_NEAR(j.gradient(1), numeric_derivative(dy, y), kDerivativeTolerance * size) << law.id;
+    const auto jx = [&](double v) {
+      return sum(Jet::variable(v, 0, 2), Jet::variable(y, 1, 2)).gradient(0);
+    };
+    const auto jy = [&](double v) {
+      return sum(Jet::variable(x, 0, 2), Jet::variable(v, 1, 2)).gradient(0);
+    };
+    EXPECT_NEAR(j.hessian(0, 0), numeric_derivative(jx, x), kDerivativeTolerance * size) << law.id;
+    EXPECT_NEAR(j.hessian(1, 0), numeric_derivative(jy, y), kDerivativeTolerance * size) << law.id;
+
+    // nothing of the effect changes nothing: every linear parameter zero
+    std::vector<double> none = law.p;
+    const auto& parameters = effect.info().parameters;
+    for (std::size_t i = 0; i < none.size(); ++i) {
+      if (parameters[i].linear) none[i] = 0.0;
+    }
+    std::vector<double> out(2, 0.0);
+    const Instant<double> s = instant(x, y);
+    effect.add_force(s, law.at, none, out);
+    effect.add_pressure(s, law.at, none, out);
+    effect.add_return(s, law.at, none, out);
+    effect.add_demand(s, law.at, none, out);
+    effect.add_pump(s, law.at, none, out);
+    EXPECT_EQ(std::abs(out[0]) + std::abs(out[1]), 0.0) << law.id;
+  }
+}
+
+}  // namespace
+}  // namespace sparflow::test_support
