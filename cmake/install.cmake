@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 
 set(EXPORTED sparflow_ompl sparflow_matio sparflow_urdf)
 set(INSTALLED_ROOMS)
-foreach(ROOM models identification problems planners nlp optimizer report)
+foreach(ROOM models identification diagnosis problems planners nlp optimizer report)
   if(TARGET sparflow_${ROOM})
     list(APPEND INSTALLED_ROOMS ${ROOM})
     list(APPEND EXPORTED sparflow_${ROOM})
@@ -29,7 +29,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/sparflowConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/sparflowConfig.cmake
               ${CMAKE_BINARY_DIR}/sparflowConfigVersion.cmake DESTINATION ${PACKAGE_DIR})
 
-foreach(ROOM models identification problems planners optimizer)
+foreach(ROOM models identification diagnosis problems planners optimizer)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/${ROOM} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow
           FILES_MATCHING PATTERN "*.h")
 endforeach()

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "diagnosis/verdict/diagnose.h"
+#include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
 namespace {

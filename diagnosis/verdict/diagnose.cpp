@@ -140,13 +140,6 @@ std::vector<EffectAt> rivals_of(const FoundEffect& found, double same_nats) {
 
 }  // namespace
 
-std::string plain_number(double value, int digits) {
-  if (!std::isfinite(value)) return "-";
-  if (value == 0.0) return "0";
-  const int before = static_cast<int>(std::floor(std::log10(std::abs(value)))) + 1;
-  return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 9));
-}
-
 const char* verdict_name(Verdict verdict) {
   switch (verdict) {
     case Verdict::kMissing:

@@ -90,9 +90,6 @@ struct Diagnosis {
   ~Diagnosis();
 };
 
-/// With at least `digits` figures and never an exponent: 12170, 0.0123.
-std::string plain_number(double value, int digits);
-
 /// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
 /// cause is not in the catalogue.
 inline constexpr double kLargestLeftoverShare = 0.05;

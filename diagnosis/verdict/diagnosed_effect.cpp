@@ -7,6 +7,7 @@
 
 #include "diagnosis/regression/effect_proof.h"
 #include "diagnosis/selection/search_leaders.h"
+#include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
 

@@ -7,6 +7,7 @@
 
 #include "diagnosis/residual/incident.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "identification/comparison/report_numbers.h"
 #include "models/effects/hydraulics.h"
 
 namespace sparflow {
