@@ -3,7 +3,7 @@
 #include <map>
 #include <vector>
 
-#include "cli_fixture.h"
+#include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {

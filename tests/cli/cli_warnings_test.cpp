@@ -5,7 +5,7 @@
 #include <csignal>
 #include <thread>
 
-#include "cli_fixture.h"
+#include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {

@@ -3,7 +3,7 @@
 #include <sstream>
 #include <vector>
 
-#include "cli_fixture.h"
+#include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {

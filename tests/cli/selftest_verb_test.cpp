@@ -1,5 +1,5 @@
 // selftest as a stranger meets it.
-#include "cli_fixture.h"
+#include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {

@@ -1,5 +1,5 @@
 // strategies and pareto as a stranger runs them: keys, files, and what they refuse.
-#include "cli_fixture.h"
+#include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {

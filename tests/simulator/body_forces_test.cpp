@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "hidden_log_support.h"
 #include "models/machine/static_force.h"
+#include "tests/simulator/hidden_log_support.h"
 
 namespace sparflow::simulator {
 namespace {

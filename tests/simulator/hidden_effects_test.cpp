@@ -2,7 +2,7 @@
 #include <map>
 #include <set>
 
-#include "hidden_log_support.h"
+#include "tests/simulator/hidden_log_support.h"
 
 namespace sparflow::simulator {
 namespace {

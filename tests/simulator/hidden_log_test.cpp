@@ -3,9 +3,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "hidden_log_support.h"
 #include "models/math/error.h"
 #include "simulator/hidden_effects/random_machine.h"
+#include "tests/simulator/hidden_log_support.h"
 
 namespace sparflow::simulator {
 namespace {

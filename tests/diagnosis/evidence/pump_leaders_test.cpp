@@ -6,14 +6,14 @@
 
 #include <algorithm>
 
-#include "arm_log.h"
 #include "diagnosis/evidence/evidence.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/selection/effect_search.h"
 #include "diagnosis/verdict/diagnose.h"
-#include "hidden_case.h"
 #include "identification/signals/series.h"
 #include "models/effects/registry.h"
+#include "tests/diagnosis/hidden_case.h"
+#include "tests/identification/arm_log.h"
 
 namespace sparflow {
 namespace {

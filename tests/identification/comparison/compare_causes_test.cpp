@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "arm_log.h"
 #include "identification/comparison/compare.h"
+#include "tests/identification/arm_log.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {

@@ -5,9 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "arm_log.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
+#include "tests/identification/arm_log.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow {

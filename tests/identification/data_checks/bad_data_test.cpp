@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <random>
 
-#include "arm_log.h"
 #include "models/files/machine_file.h"
+#include "tests/identification/arm_log.h"
 
 namespace sparflow {
 namespace {

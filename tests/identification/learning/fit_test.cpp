@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <random>
 
-#include "arm_log.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
+#include "tests/identification/arm_log.h"
 
 namespace sparflow {
 namespace {

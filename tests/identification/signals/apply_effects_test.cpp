@@ -4,13 +4,13 @@
 
 #include <gtest/gtest.h>
 
-#include "arm_log.h"
 #include "diagnosis/evidence/evidence.h"
 #include "identification/learning/fit.h"
 #include "identification/signals/series.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/memory.h"
 #include "models/effects/registry.h"
+#include "tests/identification/arm_log.h"
 
 namespace sparflow {
 namespace {

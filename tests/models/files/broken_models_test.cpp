@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "broken_model_support.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
+#include "tests/models/files/broken_model_support.h"
 
 namespace sparflow {
 namespace {

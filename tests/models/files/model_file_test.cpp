@@ -8,11 +8,11 @@
 #include <filesystem>
 #include <limits>
 
-#include "broken_model_support.h"
 #include "models/effects/formula/user_effect.h"
 #include "models/effects/registry.h"
 #include "models/effects/user_effect_scope.h"
 #include "models/math/error.h"
+#include "tests/models/files/broken_model_support.h"
 
 namespace sparflow {
 namespace {
