@@ -2,7 +2,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(EXPORTED sparflow_ompl sparflow_matio sparflow_urdf)
+set(EXPORTED sparflow_ompl sparflow_matio sparflow_nlopt sparflow_urdf)
 set(INSTALLED_ROOMS)
 foreach(ROOM models identification diagnosis problems planners nlp optimizer report)
   if(TARGET sparflow_${ROOM})
@@ -10,7 +10,7 @@ foreach(ROOM models identification diagnosis problems planners nlp optimizer rep
     list(APPEND EXPORTED sparflow_${ROOM})
   endif()
 endforeach()
-foreach(WRAPPER ompl matio urdf)
+foreach(WRAPPER ompl matio nlopt urdf)
   set_target_properties(sparflow_${WRAPPER} PROPERTIES EXPORT_NAME ${WRAPPER})
 endforeach()
 install(TARGETS ${EXPORTED} EXPORT sparflow ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -29,13 +29,15 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/sparflowConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/sparflowConfig.cmake
               ${CMAKE_BINARY_DIR}/sparflowConfigVersion.cmake DESTINATION ${PACKAGE_DIR})
 
-foreach(ROOM models identification diagnosis problems planners optimizer)
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/${ROOM} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow
-          FILES_MATCHING PATTERN "*.h")
+# public headers alone; the others are internal (docs/arrows.txt)
+foreach(ROOM models identification diagnosis problems planners optimizer apps/report)
+  file(STRINGS ${CMAKE_SOURCE_DIR}/${ROOM}/public_headers.txt HEADERS REGEX "^[^#]")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${ROOM}/public_headers.txt)
+  foreach(HEADER ${HEADERS})
+    get_filename_component(FOLDER ${HEADER} DIRECTORY)
+    install(FILES ${CMAKE_SOURCE_DIR}/${HEADER} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow/${FOLDER})
+  endforeach()
 endforeach()
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/apps/report
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow/apps FILES_MATCHING PATTERN "*.h"
-        PATTERN assets EXCLUDE)
 foreach(DATA machines models reaches logs effects)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/problems/${DATA} DESTINATION ${CMAKE_INSTALL_DATADIR}/sparflow)
 endforeach()

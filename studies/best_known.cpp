@@ -13,7 +13,7 @@ using nlohmann::json;
 
 namespace {
 
-/// What found an entry, and with which model.
+/// Writes into an entry which program found it with which model.
 void put_mark(json& entry, const json& model) {
   entry["model"] = model;
   entry["program"] = std::string("sparflow ") + program_version();
@@ -70,9 +70,9 @@ void write_best_known(const std::string& path, const std::vector<ReachTask>& tas
                                                     best->duration) <= 1e-9 * best->duration;
     double bound = figures[i].bound, shortest = figures[i].comparison.shortest;
     if (same_time) bound = std::max(bound, entry.value("lower_bound_J", 0.0));
-    constexpr double kNews = 1e-6;  // relative: rounding is none
+    constexpr double kLeastGain = 1e-6;  // [-] relative improvement; a smaller one is rounding
     const double known_shortest = known_energy ? entry.value("shortest_s", shortest) : shortest;
-    if (shortest > (1.0 - kNews) * known_shortest) shortest = known_shortest;
+    if (shortest > (1.0 - kLeastGain) * known_shortest) shortest = known_shortest;
     if (known_energy && best->energy.total >= entry["energy_J"].get<double>()) {
       if (same_time && bound > 0.0) entry["lower_bound_J"] = bound;
       entry["shortest_s"] = shortest;

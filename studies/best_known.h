@@ -1,5 +1,5 @@
 #pragma once
-/// What a run of the problem set leaves on disk.
+/// Files that a run of the problem set writes.
 #include <string>
 #include <vector>
 
@@ -7,13 +7,13 @@
 
 namespace sparflow::bench {
 
-/// Energies and times of all ways, and the bounds, by problem: ReachSettings::optima reads them back.
+/// Writes energies and times of all strategies and the bounds, by problem; ReachSettings::optima reads them back.
 void write_optima(const std::string& path, const std::vector<ReachTask>& tasks,
                   const std::vector<ReachFigures>& figures);
 
-/// Best known energies: what the file has, or what was found now where that is less. Where it is not, a larger bound found
-/// now for the same time and a shorter shortest time are kept all the same. Each entry names the model (file and SHA-256 of
-/// its bytes) and the program that found it; what was found with another model is forgotten.
+/// Updates the best known energies: an entry is replaced by a lower energy; otherwise only a larger bound for the same
+/// duration and a shorter shortest time are taken over. Each entry names the model (file and SHA-256 of its bytes) and
+/// the program that found it; entries found with another model are dropped.
 void write_best_known(const std::string& path, const std::vector<ReachTask>& tasks,
                       const std::vector<ReachFigures>& figures);
 

@@ -17,6 +17,7 @@
 #include "simulator/hidden_effects/hidden_effect.h"
 #include "simulator/hidden_effects/random_machine.h"
 #include "simulator/hidden_effects/visibility.h"
+#include "studies/stable_hash.h"
 
 namespace sparflow::bench {
 namespace {
@@ -26,11 +27,12 @@ using simulator::GeneratedCase;
 using simulator::HiddenEffect;
 using simulator::HiddenParameter;
 using simulator::HiddenTruth;
-/// Learning again moves errors by some tenths of a percent.
+/// [-] Fitting again changes errors by some tenths of a percent.
 constexpr double kRefitMoves = 1.005;
-/// And what grows by less than this many standard errors between motions is chance.
+/// [-] An increase by less than this many standard errors between motions counts as chance.
 constexpr double kStandardErrors = 2.0;
-/// What a log cannot show is hidden in another crane; after so many other effects are drawn; after so many it stays.
+/// An effect that a log cannot show is hidden in another crane. After kCranesForIds cranes other effects are drawn;
+/// after kMostCranes the last case is kept.
 constexpr std::uint64_t kCranesForIds = 8, kMostCranes = 40;
 constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
 
@@ -48,7 +50,7 @@ std::string key_of(const std::string& id, const std::string& at) {
   return at.empty() ? id : id + ":" + at;
 }
 
-/// Ids that can be hidden on this machine.
+/// Ids of the effects that can be hidden in this machine.
 std::vector<std::string> ids_for(const Machine& machine, bool outside, const std::string& only) {
   std::vector<std::string> ids;
   for (const std::string& id : outside ? simulator::outside_ids() : simulator::catalogue_ids()) {
@@ -59,9 +61,9 @@ std::vector<std::string> ids_for(const Machine& machine, bool outside, const std
   return ids;
 }
 
-/// @param shown by effect, in words
+/// Draws machine, effects and motions of a case. @param shown set to one line for each effect with its visibility
 CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
-  std::mt19937_64 random(asked.seed * 7919 + std::hash<std::string>()(asked.row) % 1000);
+  std::mt19937_64 random(asked.seed * 7919 + stable_hash(asked.row) % 1000);
   CaseRequest request;
   request.log.seconds = asked.seconds;
   request.log.noise_factor = asked.noise;
@@ -72,7 +74,7 @@ CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
   request.log.channels.oil = asked.leave_out != "oil";
   request.log.channels.pumps = asked.leave_out != "pump";
   const double size = asked.row == "small" ? 1.0 / 3.0 : 1.0;
-  std::vector<HiddenEffect> wanted;  // drawn once: what a log cannot show comes on another crane
+  std::vector<HiddenEffect> wanted;  // kept for the next crane when a log cannot show them
   for (std::uint64_t attempt = 0;; ++attempt) {
     request.log.machine = draw_machine(asked.seed + 100000 * attempt);
     request.log.crane_seed = asked.seed + 100000 * attempt;
@@ -84,7 +86,7 @@ CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
     const std::vector<std::string> ids =
         ids_for(request.log.machine, asked.row == "outside", asked.only);
     if (ids.empty() && attempt < kMostCranes) continue;
-    if (ids.empty()) throw UsageError("no machine can have " + asked.only);
+    if (ids.empty()) throw UsageError("no machine has a place for " + asked.only);
     const bool anew = attempt % kCranesForIds == 0;
     if (anew || wanted.empty()) {
       wanted = {{ids[random() % ids.size()], "", size, -1}};
@@ -104,18 +106,18 @@ CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
     shown.clear();
     for (std::size_t k = 0; k < seen.size(); ++k) {
       shown += fmt::format(
-          "   {} shows most in the {}: {:.2g} times the noise for {:.3g} s, {:.0f} % swallowed\n",
-          wanted[k].id, seen[k].channel, seen[k].size, seen[k].seconds, 100.0 * seen[k].swallowed);
+          "   {} shows most in the {}: {:.2g} times the noise for {:.3g} s, {:.0f} % absorbed\n",
+          wanted[k].id, seen[k].channel, seen[k].size, seen[k].seconds, 100.0 * seen[k].absorbed);
     }
     if (attempt >= kMostCranes || std::all_of(seen.begin(), seen.end(), simulator::visible))
       return request;
   }
 }
 
-/// A case as a user has it: logs read from text, a model fitted.
+/// A case as a user has it: logs that are read from text, and a fitted model.
 struct Crane {
   std::vector<HiddenTruth> truth;
-  std::string shown;  // what the generator measured of it
+  std::string shown;  // visibility of the effects, for the details
   std::vector<Log> train, references, tests;
   CraneModel model;
   double rows = 0.0;
@@ -164,8 +166,8 @@ std::vector<EffectAt> true_effects(const Crane& crane) {
   return out;
 }
 
-/// Told what is hidden, nothing judged: what extending alone does.
-Diagnosis told_diagnosis(const Crane& crane) {
+/// Diagnosis that names the true effects, to test extend() alone.
+Diagnosis diagnosis_of_the_truth(const Crane& crane) {
   Diagnosis d;
   for (const EffectAt& e : true_effects(crane))
     d.effects.push_back(named_effect(e, crane.model.machine));
@@ -173,8 +175,8 @@ Diagnosis told_diagnosis(const Crane& crane) {
   return d;
 }
 
-/// A simple way's answer in the form of a diagnosis.
-Diagnosis simple_diagnosis(const std::string& judge, const Crane& crane) {
+/// The answer of a baseline method in the form of a diagnosis.
+Diagnosis baseline_diagnosis(const std::string& judge, const Crane& crane) {
   const RawEvidence evidence(crane.model, crane.train, crane.references);
   const SimpleAnswer answer =
       judge == "bic" ? evidence.iid_bic() : evidence.strongest_correlation();
@@ -189,7 +191,7 @@ Diagnosis simple_diagnosis(const std::string& judge, const Crane& crane) {
   return d;
 }
 
-/// Parameters of named effects against the hidden law's nearest text-book values.
+/// Compares the parameters of named effects with the text-book equivalents of the hidden law.
 void judge_parameters(const Diagnosis& d, const std::vector<HiddenTruth>& truth, BlindRun& run) {
   for (const HiddenTruth& t : truth) {
     for (const DiagnosedEffect& e : d.effects) {
@@ -226,7 +228,7 @@ void judge_answer(const Diagnosis& d, const std::vector<HiddenTruth>& hidden, Bl
   if (d.verdict == Verdict::kUnknown && d.unexplained)
     run.answer += "unknown: " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
-  if (d.leftover_share > 0.0) run.answer += fmt::format(" (left {:.2f})", d.leftover_share);
+  if (d.unmodelled_share > 0.0) run.answer += fmt::format(" (left {:.2f})", d.unmodelled_share);
   for (const DiagnosedEffect& e : d.effects) {
     for (const auto& [rival, worse] : e.rivals) run.answer += fmt::format(" ~{}", rival);
   }
@@ -259,8 +261,8 @@ double energy_error(const CompareResult& result) {
   return measured > 0.0 ? wrong / measured : kNotJudged;
 }
 
-/// Errors on the test log that moved, largest change first; of pressures also where both models were learned.
-std::string moved_errors(const CompareResult& before, const CompareResult& after) {
+/// Lists the errors on the test log that changed, largest change first; of pressures also the share outside the data.
+std::string changed_errors(const CompareResult& before, const CompareResult& after) {
   std::vector<std::pair<double, std::string>> lines;
   for (const StageScore& b : before.scores) {
     const StageScore* a = after.find(b.stage, b.at, b.regime);
@@ -288,7 +290,7 @@ std::vector<std::string> stages_of(const std::vector<ExtendStep>& steps) {
   return out;
 }
 
-/// Adds what was named, and what is true, and judges both on the test log.
+/// Extends the model by the named effects, and by the true ones, and judges both on the test log.
 void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
   std::vector<EffectAt> named;
   if (d.verdict == Verdict::kMissing) {
@@ -301,7 +303,7 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     if (effects.empty()) return {};
     try {
       return extend(crane.model, effects, crane.train, crane.tests, options);
-    } catch (const InputError&) {  // the logs do not show it
+    } catch (const InputError&) {  // The logs do not show the effect.
       return {};
     }
   };
@@ -319,7 +321,7 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     for (const HarmedError& h : change.harmed) run.worse_by += "; " + h.sentence;
     run.energy_before = energy_error(before);
     run.energy_after = energy_error(after);
-    run.details += moved_errors(before, after);
+    run.details += changed_errors(before, after);
   }
   if (truth.empty()) return;
   if (run.exact) {
@@ -359,13 +361,13 @@ BlindRun run_blind(const BlindCase& asked) {
     if (asked.judge == "ours") {
       d = diagnose(crane.model, crane.train, crane.references);
     } else if (asked.judge == "gp") {
-      run.swallowed = swallowed_by_refit(crane.model, crane.references, crane.train);
-      for (const auto& s : run.swallowed)
+      run.absorbed = absorbed_by_refit(crane.model, crane.references, crane.train);
+      for (const auto& s : run.absorbed)
         run.answer += fmt::format("{} error {:+.0f} % ", s.stage, -100.0 * s.share);
     } else if (asked.judge == "truth") {
-      d = told_diagnosis(crane);
+      d = diagnosis_of_the_truth(crane);
     } else {
-      d = simple_diagnosis(asked.judge, crane);
+      d = baseline_diagnosis(asked.judge, crane);
     }
     run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     judge_answer(d, crane.truth, run);

@@ -28,7 +28,7 @@ double median_of(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-/// Limits of a median: order statistics, by the normal approximation of the binomial.
+/// 95 % limits of a median, by order statistics with the normal approximation of the binomial distribution.
 std::string median_limits(std::vector<double> v, double scale) {
   if (v.size() < 6) return "";
   std::sort(v.begin(), v.end());
@@ -113,7 +113,7 @@ void add_parameters(const Runs& runs, Table& table) {
               0.98);
 }
 
-/// Geometric mean of RMS with what was named (nothing, when nothing was) / RMS with the true ids known.
+/// Adds the geometric mean of the RMS with the named effects (if any) over the RMS with the true effects.
 void add_held_out(const Runs& runs, Table& table) {
   double sum = 0.0, squares = 0.0, n = 0.0;
   for (const BlindRun& r : runs) {
@@ -132,9 +132,9 @@ void add_held_out(const Runs& runs, Table& table) {
                1.05);
 }
 
-/// Ratio of sums over runs, so that runs without an error to begin with do not count. What is asked is asked of all
-/// runs; the two ways in stand below, because they begin with different errors: a model from a reference lacks the
-/// effect, one that was learned with it contains a part of it already.
+/// Adds the energy error after over that before, as a ratio of sums, so that runs without an initial error do not count.
+/// The requirement holds for all runs together. Runs with and without reference also have lines of their own, because
+/// their initial errors differ: a model learned from a log with the effect contains a part of it already.
 void add_energy(const Runs& runs, Table& table) {
   enum { kAll, kReference, kAlone };
   for (const int part : {kAll, kReference, kAlone}) {
@@ -234,7 +234,7 @@ std::string coverage_text(const Runs& runs) {
       errors[r.parameters[k]].push_back(r.errors[k]);
     }
   }
-  std::string text = "intervals that held the truth, and median error, by parameter\n";
+  std::string text = "95 % intervals that contain the true value, and median error, by parameter\n";
   for (const auto& [name, count] : by) {
     text += fmt::format("  {:40s} {:3d} of {:3d}   {:5.1f} %\n", name, count[0], count[1],
                         100.0 * median_of(errors[name]));
@@ -242,13 +242,13 @@ std::string coverage_text(const Runs& runs) {
   return by.empty() ? "" : text;
 }
 
-std::string swallowed_text(const Runs& runs) {
+std::string absorbed_text(const Runs& runs) {
   std::map<std::string, std::vector<double>> shares;
   for (const BlindRun& r : runs) {
-    for (const auto& s : r.swallowed) shares[s.stage].push_back(s.share);
+    for (const auto& s : r.absorbed) shares[s.stage].push_back(s.share);
   }
   std::string text =
-      "learning again instead of a cause: share of the added error that is gone, median\n";
+      "fitting again instead of diagnosing: share of the added error that is absorbed, median\n";
   for (const auto& [stage, all] : shares) {
     text +=
         fmt::format("  {:44s} {:5.1f} %  ({} runs)\n", stage, 100.0 * median_of(all), all.size());

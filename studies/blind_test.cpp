@@ -1,8 +1,8 @@
-/// The blind test of diagnosis: logs with a hidden effect from simulator/hidden_effects (which shares no law with the
-/// catalogue), one line a run, then the table beside what is asked.
+/// The blind test of diagnosis on logs with a hidden effect from simulator/hidden_effects, which shares no law with the
+/// catalogue. Prints one line for each run, then the table with the required values.
 ///   build/bench/blind_test --runs 40 --seed 1000 [--rows none,clear,small,outside,pairs,fault] [--way both] [--json F]
-/// --ways bic,gp,correlation judges the simple ways (studies/simple_ways.h) instead, on the same logs.
-/// Thresholds were chosen on seeds below 1000 only.
+/// --ways bic,gp,correlation tests the baseline methods (studies/baseline_methods.h) instead, on the same logs.
+/// Seeds on which thresholds were chosen: docs/blind_test.md.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -32,10 +32,10 @@ struct Options {
   bool verbose = false, no_time = false;
 };
 
-/// Even seeds with the reference, odd ones from the training log alone.
+/// Lists the cases; with --way both, every other seed has a reference log.
 std::vector<BlindCase> cases_of(const Options& options) {
   std::vector<BlindCase> cases;
-  // all rows of a seed together: what is done when it is stopped is a table already
+  // All rows of a seed are neighbours, so that an interrupted test still gives a table.
   for (int i = 0; i < std::max(options.runs, options.none); ++i) {
     for (const std::string& row : options.rows) {
       if (i >= options.runs && row != "none") continue;
@@ -46,7 +46,7 @@ std::vector<BlindCase> cases_of(const Options& options) {
         one.reference = options.way == "reference" || (options.way == "both" && i % 2 == 0);
         const int step = options.way == "both" ? i : 2 * i + (one.reference ? 0 : 1);
         one.seed = options.seed + static_cast<std::uint64_t>(step);
-        if (judge == "gp" && !one.reference) continue;  // no model before the effect to compare
+        if (judge == "gp" && !one.reference) continue;  // gp needs a model from before the effect.
         cases.push_back(std::move(one));
       }
     }
@@ -54,11 +54,11 @@ std::vector<BlindCase> cases_of(const Options& options) {
   return cases;
 }
 
-/// Set by Ctrl-C: runs under way are finished, the table of what is done is printed.
+/// Set by Ctrl-C: the current runs are finished, then the table of all finished runs is printed.
 volatile std::sig_atomic_t stopped = 0;
 
-/// All cases on `jobs` threads; lines are printed in the order of the cases as they get ready.
-/// @return those that were done
+/// Runs all cases on `jobs` threads and prints their lines in the order of the cases.
+/// @return the finished runs
 std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options& options) {
   std::vector<BlindRun> runs(cases.size());
   std::vector<bool> done(cases.size(), false);
@@ -98,7 +98,7 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
     std::fflush(stdout);
     const double passed =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    fmt::print(stderr, "\r{} of {} runs, {:.0f} s, some {:.0f} s left ", i + 1, cases.size(),
+    fmt::print(stderr, "\r{} of {} runs, {:.0f} s, about {:.0f} s left ", i + 1, cases.size(),
                passed,
                passed * static_cast<double>(cases.size() - i - 1) / static_cast<double>(i + 1));
   }
@@ -111,27 +111,27 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
 int run(int argc, char** argv) {
   bench::ProgramOptions app("Blind test of diagnosis on simulated logs with a hidden effect");
   Options options;
-  app.add("--runs", options.runs, "of each row, with a reference and without in turn");
-  app.add("--none", options.none, "so many of row none, where more are wanted");
+  app.add("--runs", options.runs, "runs of each row, with and without a reference in turn");
+  app.add("--none", options.none, "runs of row none, if more than --runs");
   app.add("--seed", options.seed, "first seed");
   app.add("--seconds", options.how.seconds, "length of a log [s]");
   app.add("--noise", options.how.noise, "sensor noise, 1 = 0.8 bar");
   app.add("--rows", options.rows, "none, clear, small, outside, pairs, fault");
   app.add("--way", options.way, "reference, alone or both").one_of({"reference", "alone", "both"});
   app.add("--ways", options.ways,
-          "who judges: ours, and for comparison truth (told the ids: extend alone), bic, gp, "
+          "method: ours, and for comparison truth (is given the ids, tests extend alone), bic, gp, "
           "correlation (docs/blind_test.md)")
       .one_of({"ours", "truth", "bic", "gp", "correlation"});
-  app.add("--only", options.how.only, "this effect alone");
-  app.add("--missing", options.how.leave_out, "columns that no log has")
+  app.add("--only", options.how.only, "id of the only effect to hide");
+  app.add("--missing", options.how.leave_out, "columns to leave out of the logs")
       .one_of({"rod", "payload", "commands", "oil", "pump"});
-  app.add("--jobs", options.jobs, "runs at the same time").range(1, 64);
-  app.add("--json", options.json, "all runs and the table as JSON");
-  app.add("--write", options.how.folder, "keep every case's logs and machine in this folder");
+  app.add("--jobs", options.jobs, "runs in parallel").range(1, 64);
+  app.add("--json", options.json, "file for all runs and the table (JSON)");
+  app.add("--write", options.how.folder, "folder for the logs and machine of every case");
   bool no_extend = false;
-  app.flag("--no-extend", no_extend, "diagnose only: quicker, without the test log's rows");
-  app.flag("--no-time", options.no_time, "without timing a diagnosis alone");
-  app.flag("-v,--verbose", options.verbose, "the whole diagnosis of each run");
+  app.flag("--no-extend", no_extend, "diagnose only: faster, without the measures on the test log");
+  app.flag("--no-time", options.no_time, "do not time a diagnosis at the end");
+  app.flag("-v,--verbose", options.verbose, "print the whole diagnosis of each run");
   if (const auto code = app.parse(argc, argv)) return *code;
   options.how.extend = !no_extend;
 
@@ -148,12 +148,12 @@ int run(int argc, char** argv) {
       if (r.asked.judge == judge && r.left_out.empty()) own.push_back(r);
     }
     if (judge == "gp") {
-      fmt::print("\n{}", swallowed_text(own));
+      fmt::print("\n{}", absorbed_text(own));
       continue;
     }
     double seconds = std::numeric_limits<double>::quiet_NaN();
     if (judge == "ours" && !options.no_time &&
-        stopped == 0) {  // alone on the machine; the middle one of three
+        stopped == 0) {  // median of three, with nothing else running
       std::vector<double> times;
       for (std::uint64_t k = 0; k < 3; ++k)
         times.push_back(time_of_diagnosis(options.seed + 2 * k));

@@ -20,13 +20,13 @@ Machine chosen_machine(const std::string& name, std::uint64_t seed) {
   std::vector<Machine> drawings;
   for (const char* file : {"loader_crane", "hmf_2020_k4", "swing_crane_two_pumps", "excavator"})
     drawings.push_back(load_machine(bundled_file(fmt::format("machines/{}.yaml", file))));
-  // the loader crane most often: its logs are the ones that can be looked at
+  // The loader crane is in the list twice, because example logs of it exist.
   drawings.push_back(drawings.front());
   drawings[1].pumps.front().type = PumpType::kLoadSensing;
   return random_machine(drawings, seed);
 }
 
-/// "id", "id:at", "id=size", "id:at=size", "id:at=size/law"
+/// Parses "id", "id:at", "id=size", "id:at=size" or "id:at=size/law". @throws UsageError
 HiddenEffect parse_effect(std::string text, double size) {
   HiddenEffect effect;
   effect.size = size;
@@ -66,23 +66,23 @@ int run(int argc, char** argv) {
   bool list = false;
   CaseRequest request;
   app.add("--machine", machine, "machine file, or random");
-  app.add("--effects", effects, "id[:at][=size][/law],...; none: nothing hidden");
-  app.add("--size", size, "1 = clear, 0.333 = small");
-  app.add("--seed", seed, "crane, machine and motions");
-  app.add("--seconds", request.log.seconds, "of reference and training log [s]");
-  app.add("--test-seconds", request.test_seconds, "of the test log [s]");
-  app.add("--noise", request.log.noise_factor, "1 = 0.8 bar");
-  app.add("--rate", request.log.rate, "[Hz] 5..200");
-  app.add("--without", without, "commands, pB, pump, payload, oil");
-  app.flag("--strokes", request.log.channels.strokes, "x_<cylinder>_m in place of q");
-  app.flag("--list", list, "the table of effects and their laws");
+  app.add("--effects", effects, "id[:at][=size][/law],...; absent: nothing is hidden");
+  app.add("--size", size, "size of the effects; 1 = clear, 0.333 = small");
+  app.add("--seed", seed, "random seed of crane, machine and motions");
+  app.add("--seconds", request.log.seconds, "duration of reference and training log [s]");
+  app.add("--test-seconds", request.test_seconds, "duration of the test log [s]");
+  app.add("--noise", request.log.noise_factor, "sensor noise, 1 = 0.8 bar");
+  app.add("--rate", request.log.rate, "rows per second [Hz], 5..200");
+  app.add("--without", without, "columns to leave out: commands, pB, pump, payload, oil");
+  app.flag("--strokes", request.log.channels.strokes, "log strokes x_<cylinder>_m instead of joint positions");
+  app.flag("--list", list, "print the table of effects and their laws");
   app.add("-o,--out", folder, "case folder");
   if (const auto code = app.parse(argc, argv)) return *code;
   if (list) {
     print_catalogue();
     return 0;
   }
-  if (folder.empty()) throw UsageError("-o DIR: where the case goes");
+  if (folder.empty()) throw UsageError("give -o DIR, the folder for the case");
   for (const std::string& channel : without) {
     LogChannels& has = request.log.channels;
     bool* column = channel == "commands"  ? &has.commands
@@ -109,7 +109,7 @@ int run(int argc, char** argv) {
   }
   for (const Visibility& v : visibility(case_logs(request).train, false)) {
     fmt::print("  shows most in the {}: {:.2g} times its noise for {:.3g} s{}\n", v.channel, v.size,
-               v.seconds, visible(v) ? "" : "; too little for the blind test");
+               v.seconds, visible(v) ? "" : "; not visible enough for the blind test");
   }
   fmt::print("{}: {}, {} + {} + {} rows\n", folder, request.log.machine.name, logs.reference.rows(),
              logs.train.rows(), logs.test.rows());

@@ -1,5 +1,5 @@
-/// The bundled reaches and random ones, solved: what is feasible, what is named, what it costs against baselines and
-/// against what is known. build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
+/// Solves the bundled reaches or random ones: which are feasible, which limits are named, and how the energies compare
+/// with baselines, bounds and best known energies. build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
 #include <fmt/format.h>
 
 #include <fstream>
@@ -14,29 +14,29 @@ namespace sparflow::bench {
 namespace {
 
 int run(int argc, char** argv) {
-  ProgramOptions app("The problem set and random reaches");
+  ProgramOptions app("Solves the problem set or random reaches");
   int random_count = 0, processes = 2;
   std::uint64_t seed = 1;
   std::string only, write, optima, keep;
   ReachSettings settings;
   app.add("--random", random_count, "random reaches instead of the bundled ones");
-  app.add("--seed", seed, "of the first random reach");
+  app.add("--seed", seed, "seed of the first random reach");
   app.add("--only", only, "bundled reaches whose name contains this");
-  app.add("--write", write, "best known energies (JSON): kept where they are better");
-  app.add("--write-optima", keep, "energies, times and bounds of this run (JSON)");
+  app.add("--write", write, "file of best known energies (JSON), updated where a lower one is found");
+  app.add("--write-optima", keep, "file for energies, times and bounds of this run (JSON)");
   app.add(
       "--optima", optima,
-      "a file of --write-optima: only the bounds are computed again; with --no-bound --no-grid its "
-      "own are printed");
-  app.add("--intervals", settings.intervals, "of the mesh");
-  app.add("--paths", settings.paths, "seed paths at most");
-  app.flag("!--no-bound", settings.bound, "leave out the certified lower bound");
+      "file of --write-optima: only the bounds are computed again; with --no-bound --no-grid those of "
+      "the file are printed");
+  app.add("--intervals", settings.intervals, "mesh intervals");
+  app.add("--paths", settings.paths, "largest number of seed paths");
+  app.flag("!--no-bound", settings.bound, "leave out the estimated lower bound");
   app.flag("!--no-grid", settings.grid, "leave out the grid's cheapest path at unlimited time");
   app.flag("!--no-timed-bound", settings.timed,
            "leave out the bound of motions in the reach's own time");
   app.add("--faster-than", settings.faster_than,
           "only reaches with less time than this many times the shortest; 0: all");
-  app.add("--processes", processes, "at the same time");
+  app.add("--processes", processes, "reaches in parallel");
   if (const auto code = app.parse(argc, argv)) return *code;
   if (!optima.empty()) {
     std::ifstream in(optima);
@@ -44,7 +44,7 @@ int run(int argc, char** argv) {
     if (!settings.optima.is_object())
       throw InputError({optima}, "", "not a file of --write-optima");
   }
-  ModelShelf models;
+  ModelCache models;
   const std::vector<ReachTask> tasks =
       random_count > 0 ? random_tasks(random_count, seed, models) : bundled_tasks(only, models);
   const int count = static_cast<int>(tasks.size());
@@ -68,7 +68,7 @@ int run(int argc, char** argv) {
       figures.back() = unpack_figures(r.bytes);
     } else {
       figures.back().named.clear();
-      fmt::print(stderr, "a solve ended: {}\n", r.error);
+      fmt::print(stderr, "a solve failed: {}\n", r.error);
     }
   }
   print_summary(tasks, figures);

@@ -10,22 +10,22 @@
 namespace sparflow::bench {
 namespace {
 
-/// A bound is tight where the cheapest path of the grid, driven slowly, lies this close above the bound of any motion: the
-/// lattice then is fine enough, whatever the optimiser found.
+/// [-] A bound counts as tight where the cheapest path of the grid, driven slowly, lies at most this far above the bound
+/// of any motion; the lattice is then fine enough, independent of the optimiser.
 constexpr double kTight = 0.015;
 
-/// It is tight at its own time where dynamic programming's path, driven as it is in that very time, lies this close above it:
-/// the path is stepwise, so twice what is asked of the optimum.
+/// [-] It counts as tight at its own time where the path of dynamic programming, driven in that time, lies at most this
+/// far above it; twice kWithin, because the path has steps.
 constexpr double kTightOwn = 0.04;
 
-constexpr double kWithin = 0.02;  // what is asked of a gap
+constexpr double kWithin = 0.02;  // [-] required gap
 
 using Excess = std::vector<double>;  // relative
 
 struct Count {
   int feasible = 0, solved = 0, infeasible = 0, named = 0, above_baseline = 0, wrongly_solved = 0;
   int below_bound = 0;
-  // excess over the certified bound, from 3 times the shortest time on and below it
+  // excess over the estimated bound, from 3 times the shortest time on and below it
   std::vector<double> bound_slow, bound_fast;
   std::vector<double> bound_tight;            // of bound_slow, where the bound is tight
   std::vector<double> gap_twice, gap_thrice;  // over the slow path, from 2 and 3 times on
@@ -44,7 +44,7 @@ std::ptrdiff_t within(const std::vector<double>& excess) {
   return std::count_if(excess.begin(), excess.end(), [](double x) { return x <= kWithin; });
 }
 
-/// What is said of one that cannot be done, counted and in words.
+/// Counts an infeasible reach and describes it.
 std::string add_infeasible(const ReachTask& task, const ReachFigures& f, Count& c) {
   const bool solved = f.optimum() != nullptr;
   ++c.infeasible;
@@ -56,8 +56,8 @@ std::string add_infeasible(const ReachTask& task, const ReachFigures& f, Count& 
                                        : f.named);
 }
 
-/// How the other ways stand to the optimum, counted and in words.
-std::string against_ways(const ReachFigures& f, const StrategyOutcome& best, Count& c) {
+/// Counts and describes the excess of the other strategies over the optimum.
+std::string against_strategies(const ReachFigures& f, const StrategyOutcome& best, Count& c) {
   std::string text;
   for (const StrategyOutcome& o : f.comparison.row("equal")->outcomes) {
     if (!o.found() || o.kind == kOptimal || o.kind == kMinimumTime) continue;
@@ -71,7 +71,7 @@ std::string against_ways(const ReachFigures& f, const StrategyOutcome& best, Cou
   return text;
 }
 
-/// How the optimum stands to its bounds, counted and in words.
+/// Counts and describes the excess of the optimum over its bounds.
 std::string against_bounds(const ReachTask& task, const ReachFigures& f,
                            const StrategyOutcome& best, Count& c) {
   std::string text;
@@ -79,21 +79,21 @@ std::string against_bounds(const ReachTask& task, const ReachFigures& f,
     const double excess = best.energy.total / f.bound - 1.0;
     if (excess < 0.0) ++c.below_bound;
     const bool slow = best.duration >= 3.0 * f.comparison.shortest;
-    if (!task.hemmed_in()) (slow ? c.bound_slow : c.bound_fast).push_back(excess);
-    if (!task.hemmed_in() && slow && tight(f)) c.bound_tight.push_back(excess);
+    if (!task.is_restricted()) (slow ? c.bound_slow : c.bound_fast).push_back(excess);
+    if (!task.is_restricted() && slow && tight(f)) c.bound_tight.push_back(excess);
     text += fmt::format("  bound {:+.1f} %", 100.0 * excess);
   }
   if (f.unlimited > 0.0) {
     const double gap = best.energy.total / f.unlimited - 1.0;
     const double ratio = best.duration / f.comparison.shortest;
-    if (!task.hemmed_in() && ratio >= 2.0) c.gap_twice.push_back(gap);
-    if (!task.hemmed_in() && ratio >= 3.0) c.gap_thrice.push_back(gap);
+    if (!task.is_restricted() && ratio >= 2.0) c.gap_twice.push_back(gap);
+    if (!task.is_restricted() && ratio >= 3.0) c.gap_thrice.push_back(gap);
     text += fmt::format("  unlimited time {:.2f} kJ", f.unlimited / 1e3);
   }
   return text;
 }
 
-/// A reach, counted and in a line.
+/// Counts a reach and describes it in one line.
 std::string add_reach(const ReachTask& task, const ReachFigures& f, Count& c) {
   c.seconds.push_back(f.comparison.solve_s);
   if (!task.meant_feasible) return add_infeasible(task, f, c);
@@ -101,7 +101,7 @@ std::string add_reach(const ReachTask& task, const ReachFigures& f, Count& c) {
   const StrategyOutcome* best = f.optimum();
   if (best == nullptr) return fmt::format("{:44} not solved: {}\n", task.problem.name, f.named);
   ++c.solved;
-  const std::string others = against_ways(f, *best, c) + against_bounds(task, f, *best, c);
+  const std::string others = against_strategies(f, *best, c) + against_bounds(task, f, *best, c);
   return fmt::format("{:44} {:8.2f} kJ {:6.2f} s ({:.2f} x shortest){}\n", task.problem.name,
                      best->energy.total / 1e3, best->duration,
                      best->duration / f.comparison.shortest, others);
@@ -124,9 +124,9 @@ void print_counts(const Count& c) {
   fmt::print("optimum above a baseline: {} times\n", c.above_baseline);
   print_spread("sequential over the optimum", c.sequential);
   print_spread("simultaneous (best end) over the optimum", c.line);
-  fmt::print("optimum below its certified bound: {} times\n", c.below_bound);
-  print_spread("optimum over the certified bound, from 3 times the shortest time on", c.bound_slow);
-  print_spread("optimum over the certified bound, in less time", c.bound_fast);
+  fmt::print("optimum below its estimated bound: {} times\n", c.below_bound);
+  print_spread("optimum over the estimated bound, from 3 times the shortest time on", c.bound_slow);
+  print_spread("optimum over the estimated bound, in less time", c.bound_fast);
   if (!c.bound_slow.empty()) {
     fmt::print(
         "within 2 % of it from 3 times the shortest time on: {} of {}; where the bound is tight: "
@@ -170,7 +170,7 @@ void print_gap_by_time(const std::vector<ReachTask>& tasks,
       const ReachFigures& f = figures[i];
       const StrategyOutcome* best = f.optimum();
       if (!tasks[i].meant_feasible || best == nullptr || !(f.unlimited > 0.0)) continue;
-      if (tasks[i].hemmed_in()) continue;
+      if (tasks[i].is_restricted()) continue;
       const double ratio = best->duration / f.comparison.shortest;
       if (ratio < (k == 0 ? 0.0 : kFrom[k]) || ratio >= kFrom[k + 1]) continue;
       slow.push_back(best->energy.total / f.unlimited - 1.0);

@@ -10,7 +10,7 @@
 namespace sparflow::bench {
 namespace {
 
-/// What --write-optima wrote of a problem: energies and times without the motions.
+/// Reads what --write-optima wrote about a problem: energies and times without the motions.
 StrategyComparison earlier_comparison(const nlohmann::json& entry) {
   StrategyComparison c;
   if (!entry.contains("energies_J")) return c;
@@ -23,7 +23,7 @@ StrategyComparison earlier_comparison(const nlohmann::json& entry) {
     o.kind = kind;
     o.duration = entry.at("duration_s").get<double>();
     o.energy.total = energy.get<double>();
-    o.motion.t = Eigen::Vector2d(0.0, o.duration);  // found
+    o.motion.t = Eigen::Vector2d(0.0, o.duration);  // Two instants mark the outcome as found.
     row.outcomes.push_back(std::move(o));
   }
   c.rows.push_back(std::move(row));
@@ -35,12 +35,12 @@ void compare(const ReachTask& task, const ReachSettings& settings, ReachFigures&
   const std::vector<SeedMotion> seeds =
       planned_seeds(task.problem, settings.paths, settings.intervals, 1, &planned);
   f.named = planned.message;
-  // every other failure of the planner is a limit, a reach or an obstacle
+  // Every other failure of the planner names a limit, a reach or an obstacle.
   if (planned.status != SeedStatus::kFound && planned.status != SeedStatus::kNoPath)
     f.worst = planned.message;
   if (seeds.empty()) return;
   if (settings.faster_than > 0.0 && task.meant_feasible) {
-    // a first guess of the shortest time, with room for what it is too long by
+    // A first estimate of the shortest time, with a margin because it is too long.
     constexpr double kRoom = 1.02;
     OptimizeOptions quick;
     quick.processes = 1;

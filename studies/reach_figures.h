@@ -1,5 +1,5 @@
 #pragma once
-/// One reach solved by every way of docs/strategies.md in equal time, with its bounds.
+/// One reach solved by every strategy of docs/strategies.md in equal time, with its bounds.
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -10,14 +10,13 @@ namespace sparflow::bench {
 
 struct ReachFigures {
   StrategyComparison comparison;
-  double bound = 0.0;       ///< [J] certified, of motions in the optimum's time; 0 = none
-  double slow_bound = 0.0;  ///< [J] of any motion of any duration
-  double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not asked
+  double bound = 0.0;       ///< [J] estimated bound of motions in the optimum's time; 0 = none
+  double slow_bound = 0.0;  ///< [J] estimated bound of motions of any duration
+  double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not computed
   /// [J] the grid's cheapest path driven in the optimum's time (optimizer/grid/driven_grid_path.h); 0 = none keeps all limits
   double grid_path = 0.0;
-  std::string named;  ///< what is said of an infeasible one
-  std::string
-      worst;  ///< the constraint that it names; empty when it only says that nothing was found
+  std::string named;  ///< message of an infeasible reach
+  std::string worst;  ///< the constraint that the message names, empty when it names none
   bool left_out = false;  ///< by ReachSettings::faster_than
   /// The optimum in equal time; null when there is none.
   const StrategyOutcome* optimum() const {
@@ -30,14 +29,15 @@ struct ReachFigures {
 struct ReachSettings {
   int intervals = 100, paths = 4;
   bool grid = true, bound = true, timed = true;
-  double faster_than = 0.0;  ///< times the shortest time: slower reaches are left out; 0 = none is
+  double faster_than = 0.0;  ///< [-] reaches slower than this multiple of the shortest time are left out; 0 = none
   nlohmann::json optima =
-      nlohmann::json::object();  ///< by problem: of an earlier run, not solved again
+      nlohmann::json::object();  ///< results of an earlier run by problem, which are not solved again
 };
 
+/// Solves one reach.
 ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings);
 
-/// Through the pipe of a child process.
+/// Serialise figures for the pipe of a child process.
 std::string pack_figures(const ReachFigures& f);
 ReachFigures unpack_figures(const std::string& bytes);
 

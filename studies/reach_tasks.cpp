@@ -18,7 +18,7 @@
 namespace sparflow::bench {
 namespace {
 
-/// A reach between two random postures, or one made infeasible on purpose (every tenth).
+/// Draws a reach between two random postures, or one that is infeasible on purpose (every tenth).
 ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -36,7 +36,7 @@ ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::u
     Eigen::VectorXd q(n);
     for (Eigen::Index j = 0; j < n; ++j) {
       const Range& r = p.limits.position[static_cast<std::size_t>(j)];
-      q[j] = r.lo + (0.05 + 0.9 * unit(random)) * (r.hi - r.lo);  // off the ends of the range
+      q[j] = r.lo + (0.05 + 0.9 * unit(random)) * (r.hi - r.lo);  // away from the ends of the range
     }
     return q;
   };
@@ -48,7 +48,7 @@ ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::u
   Eigen::MatrixXd line(2, n);
   line << p.start.transpose(), end.transpose();
   const double reach = time_parametrise(p, line, 0.0).shortest;
-  // time enough: what the straight line to the posture behind the goal needs, up to four times that
+  // The duration is 1.02 to 4 times that of the straight line to the posture at the goal, so the reach is feasible.
   const double duration = std::max(1.0, reach * (1.02 + 3.0 * unit(random) * unit(random)));
   p.duration = {duration, duration};
   if (seed % 10 == 0) {
@@ -69,7 +69,7 @@ ReachTask random_task(const MotionProblem& base, const CraneModel& model, std::u
 
 }  // namespace
 
-const ModelShelf::Entry& ModelShelf::entry(const std::string& file) {
+const ModelCache::Entry& ModelCache::entry(const std::string& file) {
   for (const Entry& e : entries_) {
     if (e.file == file) return e;
   }
@@ -82,7 +82,7 @@ const ModelShelf::Entry& ModelShelf::entry(const std::string& file) {
   return entries_.back();
 }
 
-std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models) {
+std::vector<ReachTask> bundled_tasks(const std::string& only, ModelCache& models) {
   std::vector<ReachTask> tasks;
   for (const std::string& file : bundled_files("reaches", ".yaml")) {
     if (file.find(only) == std::string::npos) continue;
@@ -95,7 +95,7 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models
     task.model = &models.at(model_file);
     task.mark = models.mark_of(model_file);
     task.problem = load_problem(file, &task.model->machine);
-    // the infeasible ones say so in their first line
+    // Infeasible reaches say so in the first line of their file.
     std::ifstream in(file);
     std::string first;
     std::getline(in, first);
@@ -106,7 +106,7 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models
   return tasks;
 }
 
-std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelShelf& models) {
+std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelCache& models) {
   std::vector<ReachTask> tasks;
   tasks.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {

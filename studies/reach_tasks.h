@@ -1,5 +1,5 @@
 #pragma once
-/// Reaches a study solves: the bundled ones, and random ones that nobody chose.
+/// Reaches that the studies solve: the bundled ones and random ones.
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace sparflow::bench {
 
-/// Which model a figure was found with.
+/// Identifies the model with which a figure was found.
 struct ModelMark {
   std::string file;    ///< name without folder
   std::string sha256;  ///< of the file's bytes
@@ -21,13 +21,13 @@ struct ReachTask {
   const CraneModel* model = nullptr;
   ModelMark mark;
   bool meant_feasible = true;
-  std::string why_not;  ///< of one made infeasible on purpose
-  /// Obstacles or a tip line, which lower bounds leave out.
-  bool hemmed_in() const { return !problem.obstacles.empty() || problem.tip_line.has_value(); }
+  std::string why_not;  ///< reason why a reach was made infeasible on purpose
+  /// Whether there are obstacles or a tip line, which lower bounds leave out.
+  bool is_restricted() const { return !problem.obstacles.empty() || problem.tip_line.has_value(); }
 };
 
-/// Models by file, each read once. Tasks refer to them: it must outlive what was made with it.
-class ModelShelf {
+/// Models by file, each read once. It must outlive the tasks, which refer to its models.
+class ModelCache {
  public:
   const CraneModel& at(const std::string& file) { return *entry(file).model; }
   ModelMark mark_of(const std::string& file) { return entry(file).mark; }
@@ -42,12 +42,12 @@ class ModelShelf {
   std::vector<Entry> entries_;
 };
 
-/// The bundled reaches whose name contains `only` and that have a bundled model.
-std::vector<ReachTask> bundled_tasks(const std::string& only, ModelShelf& models);
+/// Lists the bundled reaches whose name contains `only` and that have a bundled model.
+std::vector<ReachTask> bundled_tasks(const std::string& only, ModelCache& models);
 
-/// Reaches `seed` .. `seed + count - 1`: start and end posture drawn over nine tenths of every joint's range, up to 300 kg, the
-/// goal is where the end posture puts the tip, the time 1.02 to 4 times what the straight joint line needs. Every tenth is
-/// made infeasible on purpose. Two of three on the loader crane, whose redundancy makes it the hardest.
-std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelShelf& models);
+/// Draws reaches `seed` .. `seed + count - 1`: start and end posture over nine tenths of every joint's range, payload up
+/// to 300 kg, the goal at the tip of the end posture, duration 1.02 to 4 times that of the straight joint line. Every
+/// tenth is made infeasible on purpose. Two of three are on the loader crane, which is hardest because it is redundant.
+std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelCache& models);
 
 }  // namespace sparflow::bench

@@ -1,11 +1,11 @@
 #pragma once
-/// A share and how sure it is.
+/// Confidence limits of a share.
 #include <cmath>
 #include <utility>
 
 namespace sparflow::bench {
 
-/// 95 % limits of a share of `hits` in `runs`. E. B. Wilson (1927), J. Am. Stat. Assoc. 22, 209-212.
+/// 95 % limits [-] of a share of `hits` in `runs`. Source: E. B. Wilson (1927), J. Am. Stat. Assoc. 22, 209-212.
 inline std::pair<double, double> share_limits(int hits, int runs) {
   const double z = 1.959964, n = runs, p = hits / n;
   const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);

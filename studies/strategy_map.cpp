@@ -1,5 +1,4 @@
-/// Where one cylinder after another is cheaper than all at once, and what the optimum does instead: over time, load,
-/// pose and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
+/// Compares sequential, simultaneous and optimal motions over duration, payload, reach and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
 /// summary.txt and strategy_map.svg.
 #include <fmt/format.h>
 
@@ -26,7 +25,7 @@ struct Pose {
   std::vector<double> payloads;  // [kg]
 };
 
-/// Light, medium and near what the pump's pressure allows there.
+/// Reaches with payloads: light, medium and near the limit of the pump pressure.
 const std::vector<Pose>& poses() {
   static const std::vector<Pose> all = {
       {"loader_crane_lift", {0, 500, 1000}},       {"loader_crane_lower", {0, 600, 1000}},
@@ -37,7 +36,7 @@ const std::vector<Pose>& poses() {
   return all;
 }
 
-/// Everything of a curve but its motions, through the pipe.
+/// Serialises a curve without its motions for the pipe of a child process.
 std::string pack_curve(const ParetoCurve& curve) {
   Packer p;
   p.number(curve.shortest).number(curve.sequential_limit).number(curve.simultaneous_limit);
@@ -72,19 +71,19 @@ MapCurve unpack_curve(const std::string& bytes) {
 
 int run(int argc, char** argv) {
   bench::ProgramOptions app(
-      "The map: sequential, simultaneous or optimal, over time, load, pose, idle power");
+      "Map of sequential, simultaneous and optimal motions over duration, payload, reach and idle power");
   std::string folder = ".", only;
   int intervals = 80, points = 9, processes = 2, rounds = 1;
   bool ends_only = false;
   double longest = 6.0;
   app.add("-o,--out", folder, "folder for the tables and the picture");
   app.add("--only", only, "reaches whose name contains this");
-  app.add("--intervals", intervals, "of the mesh").range(20, 1000);
-  app.add("--points", points, "durations a curve");
-  app.add("--longest", longest, "times the shortest");
-  app.add("--rounds", rounds, "of the search over mode sequences");
-  app.flag("--two-loads", ends_only, "the lightest and the heaviest load alone");
-  app.add("--processes", processes, "at the same time");
+  app.add("--intervals", intervals, "mesh intervals").range(20, 1000);
+  app.add("--points", points, "number of durations of each curve");
+  app.add("--longest", longest, "longest duration, as a multiple of the shortest");
+  app.add("--rounds", rounds, "rounds of the search over mode sequences");
+  app.flag("--two-loads", ends_only, "only the lightest and the heaviest payload");
+  app.add("--processes", processes, "curves in parallel");
   if (const auto code = app.parse(argc, argv)) return *code;
   struct Task {
     std::string reach;
@@ -103,7 +102,7 @@ int run(int argc, char** argv) {
     const Task& task = tasks[static_cast<std::size_t>(index)];
     const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
     MotionProblem problem = load_problem(file);
-    // problems from before there were bundled models name none
+    // Older problems name no model.
     const CraneModel model = load_model(
         problem.model_path.empty() ? bundled_file("models/loader_crane.json") : problem.model_path);
     problem = load_problem(file, &model.machine);
@@ -117,7 +116,7 @@ int run(int argc, char** argv) {
     optimize.processes = 1;
     optimize.search_intervals = std::min(40, intervals);
     optimize.sequence_rounds = rounds;
-    optimize.mesh_error = 1e-3;  // one mesh: differences of interest are larger
+    optimize.mesh_error = 1e-3;  // A single mesh suffices, because the differences of interest are larger.
     options.strategies.smooth_seeds = 1;
     options.strategies.baselines.intervals = intervals;
     options.strategies.baselines.polished_orders = 1;

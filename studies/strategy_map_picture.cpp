@@ -41,7 +41,7 @@ double overlap(const MapPoint& p) {
   return idle < 1.0 ? share / (1.0 - idle) : 0.0;
 }
 
-/// Ratios to the shortest time at which the picture has columns: [from, to).
+/// Limits of the picture's columns, as multiples of the shortest time: [from, to).
 const std::vector<double>& columns() {
   static const std::vector<double> edges = {1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.5};
   return edges;
@@ -60,7 +60,7 @@ const MapPoint* point_in(const MapCurve& curve, double from, double to) {
   return best;
 }
 
-/// Blue where the sequential way is cheaper, orange where the simultaneous one is; white at no difference.
+/// Colour of a cell: blue where the sequential motion is cheaper, orange where the simultaneous one is, white if equal.
 std::string colour(double share) {
   const double a = std::clamp(std::abs(share) / 0.3, 0.0, 1.0);
   const auto mix = [&](int full) { return static_cast<int>(std::lround(255 + (full - 255) * a)); };
@@ -94,7 +94,7 @@ std::string row_label(const MapCurve& c) {
   return fmt::format("{}, {:g} kg", name, c.payload);
 }
 
-/// Time over the shortest at which the sequential way first keeps the limits.
+/// Smallest duration, as a multiple of the shortest time, at which a sequential motion keeps the limits.
 double first_sequential(const MapCurve& c) {
   for (const MapPoint& p : c.points) {
     if (std::isfinite(p.sequential)) return p.duration / c.shortest;
@@ -164,17 +164,17 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
       "\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
       width, height);
   svg += text_at(kLeft, 20, "Sequential against simultaneous in equal time", "start", 13);
-  svg += text_at(kLeft, 36, "energy of one by one over energy of the joint line - 1 [%]", "start");
-  svg += text_at(second, 20, "What the optimum does", "start", 13);
-  svg += text_at(second, 36, "share of its moving time with two or more cylinders [%]", "start");
-  svg += text_at(third, 20, "Each in its own best time", "start", 13);
-  svg += text_at(third, 36, "the same, idling included [%]", "start");
+  svg += text_at(kLeft, 36, "energy of the sequential motion over that of the joint line - 1 [%]", "start");
+  svg += text_at(second, 20, "Moving cylinders in the optimum", "start", 13);
+  svg += text_at(second, 36, "share of its moving time with two or more cylinders moving [%]", "start");
+  svg += text_at(third, 20, "Each at its own best duration", "start", 13);
+  svg += text_at(third, 36, "the same as left, idle energy included [%]", "start");
   for (std::size_t k = 0; k < n; ++k) {
     const std::string label = fmt::format("{:g}", columns()[k]);
     const double x = kCell * static_cast<double>(k);
     svg += text_at(kLeft + x, kTop - 8, label) + text_at(second + x, kTop - 8, label);
   }
-  svg += text_at(kLeft - 8, kTop - 8, "time over the shortest:", "end");
+  svg += text_at(kLeft - 8, kTop - 8, "duration over the shortest:", "end");
   for (std::size_t k = 0; k < idle_powers.size(); ++k) {
     svg += text_at(third + kCell * (static_cast<double>(k) + 0.5), kTop - 8,
                    fmt::format("{:g} kW", idle_powers[k] / 1e3));
@@ -216,13 +216,13 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
     y += kRow;
   }
   svg += text_at(kLeft, y + 24,
-                 "Blue: one cylinder after another is cheaper. Orange: all joints at once are. "
+                 "Blue: the sequential motion takes less. Orange: the simultaneous motion takes less. "
                  "Columns begin at the figure above their left edge.",
                  "start");
   svg +=
       text_at(kLeft, y + 42,
-              "only sim: in so short a time no one-by-one motion keeps the limits; neither: only "
-              "the optimum's overlap does.",
+              "only sim: no sequential motion of this duration keeps the limits; neither: only the "
+              "optimum with its overlaps does.",
               "start");
   return svg + "</svg>\n";
 }
@@ -264,11 +264,11 @@ std::string map_summary(const std::vector<MapCurve>& curves,
   first.erase(std::remove_if(first.begin(), first.end(), [](double v) { return std::isnan(v); }),
               first.end());
   text += fmt::format(
-      "one by one is possible from {:.2f} times the shortest time on (median; "
+      "sequential motions are possible from {:.2f} times the shortest time on (median; "
       "{:.2f} .. {:.2f})\n",
       quantile(first, 0.5), quantile(first, 0.0), quantile(first, 1.0));
   text += fmt::format(
-      "longest time against the one-by-one limit at unlimited time: {:+.2f} % "
+      "optimum of the longest duration against the sequential limit at unlimited time: {:+.2f} % "
       "(median), {:+.2f} .. {:+.2f}\n",
       100.0 * quantile(limit, 0.5), 100.0 * quantile(limit, 0.0), 100.0 * quantile(limit, 1.0));
   for (const double idle : idle_powers) {

@@ -17,8 +17,8 @@ struct CompareArguments {
   Outputs outputs;
 };
 
-/// A machine alone predicts forces and flows from geometry; nothing is learned that could predict a pressure.
-void keep_statics(CompareResult& result) {
+/// Removes what a machine file alone cannot predict: it gives forces and flows by geometry, pressures are learned.
+void keep_geometric_stages(CompareResult& result) {
   const auto learned = [](const auto& item) {
     return item.stage != "force" && item.stage != "flow_sensor";
   };
@@ -28,13 +28,13 @@ void keep_statics(CompareResult& result) {
   result.energy.clear();
 }
 
-/// A table's energy needs some to be a share of: without any, the reason stands among the notes.
-void note_energies_without_work(CompareResult& result) {
+/// Replaces energies whose relative error is undefined, because the pump delivered nothing, by a note.
+void note_undefined_energies(CompareResult& result) {
   for (const EnergyScore& e : result.energy) {
     if (std::isfinite(e.relative_error)) continue;
     result.notes.push_back(fmt::format(
-        "energy of pump {}: \u2013 %, nothing was delivered in the {:.1f} s compared, no "
-        "cylinder is driven in them",
+        "energy of pump {}: \u2013 %, the pump delivered nothing in the {:.1f} s compared, "
+        "because no cylinder is driven in them",
         e.pump, e.duration));
   }
   std::erase_if(result.energy,
@@ -51,16 +51,16 @@ int run(const CompareArguments& a) {
   if (a.model.empty() == a.machine.empty()) {
     throw UsageError(
         "compare: give either --model MODEL.json, or --machine FILE to compare static forces "
-        "alone");
+        "only");
   }
-  const CraneModel model = a.model.empty() ? CraneModel::untrained(load_machine_aloud(a.machine))
-                                           : load_model_aloud(a.model);
+  const CraneModel model = a.model.empty() ? CraneModel::untrained(load_machine_with_warnings(a.machine))
+                                           : load_model_with_warnings(a.model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
   CompareResult result = compare(model, logs);
-  if (a.model.empty()) keep_statics(result);
+  if (a.model.empty()) keep_geometric_stages(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
-  note_energies_without_work(result);
+  note_undefined_energies(result);
   fmt::print("{}\n", compare_table(result));
   return kDone;
 }
@@ -70,10 +70,10 @@ int run(const CompareArguments& a) {
 void add_compare_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<CompareArguments>();
   CLI::App* verb =
-      app.add_subcommand("compare", "model against measurements, every stage; where it fails");
+      app.add_subcommand("compare", "compare a model with measurements at every stage and show where it fails");
   verb->add_option("--model", a->model, "fitted model")->type_name("MODEL.json");
   verb->add_option("--machine,-m", a->machine,
-                   "machine file instead of a model: static forces alone")
+                   "machine file instead of a model: static forces only")
       ->type_name("FILE");
   verb->add_option("--log,-l", a->logs, "logs to compare with (CSV or MAT)")
       ->required()

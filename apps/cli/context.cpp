@@ -25,9 +25,9 @@
 namespace sparflow::cli {
 namespace {
 
-constexpr std::chrono::seconds kTellEvery{10};
-/// Shared with the child processes: a Ctrl-C reaches all of them at a terminal, this process alone when another
-/// program sends it; either way this process counts and the children look here.
+constexpr std::chrono::seconds kPrintPeriod{10};
+/// In memory shared with the child processes. A Ctrl-C at a terminal reaches all of them, one sent by another program
+/// reaches this process only; therefore only this process counts, and the children read the count.
 std::atomic<int>* interrupt_count = nullptr;
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 volatile std::sig_atomic_t finish_first = 0;
@@ -48,7 +48,7 @@ void catch_interrupts() {
   main_process = ::getpid();
   void* shared = ::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
                         MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  SPARFLOW_CHECK(shared != MAP_FAILED, "no memory for one number");
+  SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of interrupts");
   interrupt_count = new (shared) std::atomic<int>(0);
   std::signal(SIGINT, on_interrupt);
 }
@@ -58,14 +58,14 @@ bool interrupted() { return interrupt_count->load() > 0; }
 void warn(const std::string& sentence) { fmt::print(stderr, "warning: {}\n", sentence); }
 void note(const std::string& sentence) { fmt::print(stderr, "{}\n", sentence); }
 
-Machine load_machine_aloud(const std::string& path) {
+Machine load_machine_with_warnings(const std::string& path) {
   std::vector<std::string> warnings;
   Machine machine = load_machine(path, &warnings);
   for (const std::string& w : warnings) warn(w);
   return machine;
 }
 
-CraneModel load_model_aloud(const std::string& path) {
+CraneModel load_model_with_warnings(const std::string& path) {
   CraneModel model = load_model(path);
   MachinePlaces places;
   places.file = path;
@@ -74,16 +74,16 @@ CraneModel load_model_aloud(const std::string& path) {
 }
 
 void Outputs::add_to(CLI::App& verb, bool with_report) {
-  verb.add_option("--json", json, "write the machine-readable result to FILE")->type_name("FILE");
+  verb.add_option("--json", json, "write the result to FILE as JSON")->type_name("FILE");
   if (with_report) {
-    verb.add_option("--report", report, "write a self-contained page to FILE.html")
+    verb.add_option("--report", report, "write a page with figures to FILE.html; it needs no network")
         ->type_name("FILE.html");
   }
 }
 
 void OwnEffects::add_to(CLI::App& verb) {
   verb.add_option("--effects", files,
-                  "effects of your own (YAML), beside the catalogue; may be repeated")
+                  "effects of your own (YAML), added to the catalogue; may be repeated")
       ->type_name("FILE.yaml")
       ->allow_extra_args(false);
 }
@@ -101,7 +101,7 @@ void OwnEffects::load_into(CraneModel& model) const {
     const auto known = std::find(model.user_effects.begin(), model.user_effects.end(), e);
     if (known == model.user_effects.end()) model.user_effects.push_back(e);
     if (!e->places(model.machine).empty()) continue;
-    warn(fmt::format("{} cannot sit anywhere on {}: it is not looked for", e->info().id,
+    warn(fmt::format("{} has no place on {}, so diagnosis does not consider it", e->info().id,
                      model.machine.name));
   }
 }
@@ -117,7 +117,7 @@ void check_writable(const std::string& path) {
   if (!fs::is_directory(folder, error)) {
     throw InputError(
         {path, 0, 0}, "",
-        fmt::format("cannot write: there is no folder {}; make it first", folder.string()));
+        fmt::format("cannot write: there is no folder {}; create it first", folder.string()));
   }
   if (::access(folder.c_str(), W_OK) != 0) {
     throw InputError({path, 0, 0}, "",
@@ -147,7 +147,7 @@ void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& 
     if (outputs[i].path.empty()) continue;
     for (std::size_t j = 0; j < i; ++j) {
       if (outputs[j].path.empty() || !same_file(outputs[i].path, outputs[j].path)) continue;
-      throw UsageError(fmt::format("{}: {} and {} name one file, {}; give each its own", verb,
+      throw UsageError(fmt::format("{}: {} and {} name the same file, {}; give each a file of its own", verb,
                                    outputs[j].option, outputs[i].option, outputs[i].path));
     }
     for (const NamedFile& input : inputs) {
@@ -166,12 +166,12 @@ void Outputs::check() const {
 Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(2) == 1) {
   if (terminal_) return;
   fmt::print(stderr, "{} ...\n", what_);
-  teller_ = std::jthread([this](const std::stop_token& stop) { tell_now_and_then(stop); });
+  printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
 }
 
-void Progress::tell_now_and_then(const std::stop_token& stop) {
+void Progress::print_periodically(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (!ended_.wait_for(lock, stop, kTellEvery, [&] { return stop.stop_requested(); })) {
+  while (!ended_.wait_for(lock, stop, kPrintPeriod, [&] { return stop.stop_requested(); })) {
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     fmt::print(stderr, "{}: {:.0f} s, {:.0f} %{}{}\n", what_, seconds, 100.0 * share_,
@@ -216,26 +216,26 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
                                        const std::string& model_path) {
   ProblemAndModel both;
   if (!model_path.empty()) {
-    both.model = load_model_aloud(model_path);
+    both.model = load_model_with_warnings(model_path);
     both.problem = load_problem(problem_path, &both.model.machine);
     try {
       const std::string own = load_problem(problem_path).machine.name;
       if (own != both.model.machine.name) {
         warn(fmt::format(
-            "the problem's machine is {}, the model was fitted for {}: the model's machine is used",
+            "the problem names machine {}, but the model was fitted for {}; the model's machine is used",
             own, both.model.machine.name));
       }
     } catch (const InputError&) {
-      // a problem need not name a machine of its own when the model carries one
+      // A problem needs no machine of its own when the model file has one.
     }
     return both;
   }
   both.problem = load_problem(problem_path);
   if (both.problem.model_path.empty()) {
     throw UsageError(
-        "no model: give --model MODEL.json, or name one in the problem file (key `model`)");
+        "no model: give --model MODEL.json, or name a model in the problem file (key `model`)");
   }
-  both.model = load_model_aloud(both.problem.model_path);
+  both.model = load_model_with_warnings(both.problem.model_path);
   both.problem = load_problem(problem_path, &both.model.machine);
   return both;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// What all verbs share: output conventions, progress, interruption, and the door to the seeds.
+/// What all verbs share: result files, warnings and progress on stderr, interruption by Ctrl-C, seed paths.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <condition_variable>
@@ -17,7 +17,7 @@
 
 namespace sparflow::cli {
 
-/// Exit codes of the contract.
+/// Exit codes that docs/commands.md promises.
 enum ExitCode {
   kDone = 0,
   kInternal = 1,
@@ -34,12 +34,12 @@ struct NamedFile {
   std::string path;    ///< empty: not given
 };
 
-/// Options that every verb with a result offers.
+/// The options --json and --report of every verb that has a result.
 struct Outputs {
   std::string json;
   std::string report;
   void add_to(CLI::App& verb, bool with_report = true);
-  /// Checks before any long work that the files can be written where they are asked for.
+  /// Checks, before any long work, that these files can be written. @throws InputError
   void check() const;
   std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
 };
@@ -48,29 +48,29 @@ struct Outputs {
 struct OwnEffects {
   std::vector<std::string> files;
   void add_to(CLI::App& verb);
-  /// Puts them into the catalogue. @param machine their joints and units are checked against it; may be null
+  /// Registers them in the catalogue. @param machine against which their joints and units are checked; may be null
   /// @throws InputError
   std::vector<const Effect*> load(const Machine* machine) const;
-  /// The same; from then on the model carries them.
+  /// Registers them and adds them to the model, whose file then stores them. @throws InputError
   void load_into(CraneModel& model) const;
 };
 
-/// Before long work: the folder of `path` exists and can be written.
+/// Checks, before any long work, that the folder of `path` exists and can be written. @throws InputError
 void check_writable(const std::string& path);
 
-/// No two outputs are one file, and none overwrites an input. Links and ./ are seen through.
+/// Checks that no two outputs are the same file and that none overwrites an input; links and ./ are resolved.
 /// @throws UsageError
 void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& outputs,
                          const std::vector<NamedFile>& inputs);
 
-/// True when both names lead to one file, whether it exists already or not.
+/// True when both names refer to the same file, whether it exists already or not.
 bool same_file(const std::string& a, const std::string& b);
 
 /// Every path of a repeatable option.
 std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths);
 
-/// One line on stderr that is rewritten on a terminal. Where stderr is none (a file, a job's log), a plain line
-/// at the beginning and one every ten seconds, also while nothing new is reported: the work is alive.
+/// Progress on stderr. On a terminal it rewrites one line; elsewhere (a file, a job's log) it prints a plain line at
+/// the beginning and one every ten seconds, also while nothing new is reported, to show that the work goes on.
 class Progress {
  public:
   explicit Progress(std::string what);
@@ -80,7 +80,7 @@ class Progress {
   void operator()(double share, const std::string& what);
 
  private:
-  void tell_now_and_then(const std::stop_token& stop);
+  void print_periodically(const std::stop_token& stop);
 
   std::string what_;
   bool terminal_ = false;
@@ -91,29 +91,32 @@ class Progress {
   double share_ = 0.0;
   std::string doing_;
   std::condition_variable_any ended_;
-  std::jthread teller_;  ///< last: ends before what it uses
+  std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
 };
 
-/// From now on Ctrl-C ends the program with exit code 130.
+/// Lets Ctrl-C end the program with exit code 130 from now on.
 void catch_interrupts();
-/// From now on the first Ctrl-C only makes interrupted() true: finish with the best so far. The second ends the program.
+/// Lets the first Ctrl-C only set interrupted() from now on, so that the verb finishes with the best result so far;
+/// the second ends the program.
 void finish_on_interrupt();
 /// True once Ctrl-C was pressed, in child processes too.
 bool interrupted();
 
-/// A sentence on stderr, "warning: ...".
+/// Prints "warning: " and the sentence on stderr.
 void warn(const std::string& sentence);
+/// Prints the sentence on stderr.
 void note(const std::string& sentence);
 
-/// A machine file read, with what is unusual about the machine said on stderr.
-Machine load_machine_aloud(const std::string& path);
-/// The same for a model and the machine it carries.
-CraneModel load_model_aloud(const std::string& path);
+/// Reads a machine file and prints warnings about unusual values on stderr. @throws InputError
+Machine load_machine_with_warnings(const std::string& path);
+/// Reads a model file and prints the same warnings about its machine. @throws InputError
+CraneModel load_model_with_warnings(const std::string& path);
 
+/// Reads the logs and prints their warnings on stderr. @param mapping path of a mapping file, or empty
 std::vector<Log> load_logs(const std::vector<std::string>& paths, const Machine& machine,
                            const std::string& mapping);
 
-/// Problem and model together: the model's own machine rules when there is a model.
+/// A motion problem with its model. The machine in the model file replaces the one that the problem file names.
 struct ProblemAndModel {
   MotionProblem problem;
   CraneModel model;
@@ -121,19 +124,19 @@ struct ProblemAndModel {
 ProblemAndModel load_problem_and_model(const std::string& problem_path,
                                        const std::string& model_path);
 
-/// OMPL paths, each timed as a motion.
+/// Seed paths of OMPL and the motions made of them by time parametrisation.
 struct Seeds {
   SeedResult paths;
-  std::vector<SeedMotion> motions;   ///< those that could be timed
-  std::vector<std::string> refused;  ///< why the others could not
+  std::vector<SeedMotion> motions;   ///< the paths that the limits allow to be driven
+  std::vector<std::string> refused;  ///< why the other paths cannot be driven
 };
 Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int intervals);
 
-/// What a motion is drawn beside: the straight joint line that costs least at this duration, or the best seed where
-/// no straight line keeps the limits; null when no seed does.
+/// The seed that a page draws beside the optimum: the cheapest straight joint line at this duration, or the cheapest
+/// seed where no straight line keeps the limits; null when no seed does.
 const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result);
 
-// One function a verb; each adds its subcommand and sets its callback's exit code through `code`.
+// Each of these adds the subcommand of one verb, whose callback writes its exit code to `code`.
 void add_fit_verb(CLI::App& app, int& code);
 void add_compare_verb(CLI::App& app, int& code);
 void add_diagnose_verb(CLI::App& app, int& code);

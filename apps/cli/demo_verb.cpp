@@ -23,14 +23,14 @@ int run(const std::string& folder) {
   };
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) throw InputError({folder, 0, 0}, "", "cannot make this folder: " + error.message());
+  if (error) throw InputError({folder, 0, 0}, "", "cannot create this folder: " + error.message());
   const auto in = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
   check_writable(in("index.html"));
 
   fmt::print(
       "Sparflow demo: from a measured log to an energy-optimal motion, on a simulated 21 t.m "
       "loader crane.\n\n");
-  const Machine machine = load_machine_aloud(bundled_file("machines/loader_crane.yaml"));
+  const Machine machine = load_machine_with_warnings(bundled_file("machines/loader_crane.yaml"));
   const std::vector<Log> train =
       load_logs({bundled_file("logs/loader_crane_train.csv")}, machine, "");
   const std::vector<Log> test =
@@ -45,7 +45,7 @@ int run(const std::string& folder) {
   save_model(fitted.model, in("model.json"));
   fmt::print("   {}\n\n", fitted.brief());
 
-  fmt::print("2. Compare with a log the model has never seen ({}, {} rows)\n{}\n", test[0].file,
+  fmt::print("2. Compare with a test log ({}, {} rows)\n{}\n", test[0].file,
              test[0].samples(), compare_table(*fitted.test));
 
   const MotionProblem problem =
@@ -73,13 +73,13 @@ int run(const std::string& folder) {
 
   Page page("Sparflow demo");
   page.subtitle(
-      "One loader crane: its pressures learned from a log, compared with another log, and one "
-      "reach made energy-optimal.");
+      "One loader crane: pressure models identified from a log and compared with a test log, and the "
+      "energy-optimal motion of one reach.");
   const std::string against = against_seeds(result);
   page.verdict(Tone::kGood,
                fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
                            against.empty() ? "" : ": ", against),
-               fmt::format("Learned from {} rows; energy on a log never seen predicted to {:.2f} "
+               fmt::format("Learned from {} rows; the energy of the test log is predicted within {:.2f} "
                            "%. Energies are those of the exact law.",
                            train[0].samples(),
                            100.0 * std::abs(fitted.test->energy.front().relative_error)));
@@ -106,7 +106,7 @@ int run(const std::string& folder) {
 void add_demo_verb(CLI::App& app, int& code) {
   auto out = std::make_shared<std::string>("sparflow-demo");
   CLI::App* verb = app.add_subcommand(
-      "demo", "the whole story on bundled inputs: fit, compare, optimise, one page");
+      "demo", "run fit, compare and optimize on bundled inputs and write one page");
   verb->add_option("--out", *out, "folder for the page, the model and the motion")
       ->type_name("DIR")
       ->capture_default_str();

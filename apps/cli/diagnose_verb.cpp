@@ -16,7 +16,8 @@ struct DiagnoseArguments {
   bool skip_data_checks = false;
 };
 
-/// The error on test logs with the effects found in the model, one by one; nothing when none was found.
+/// Adds the effects found to the model, one after the other, and judges each step on the test logs.
+/// @return nothing when there are no test logs or no effect is at least 50 % probable
 std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
                                            const Diagnosis& diagnosis) {
   std::vector<EffectAt> found;
@@ -33,7 +34,7 @@ std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
 
 int run(const DiagnoseArguments& a) {
   const DiagnosisFiles files = a.inputs.read();
-  say_what_is_reference(files);
+  note_what_is_reference(files);
   DiagnoseOptions options;
   options.candidates = files.candidates;
   options.check_data = !a.skip_data_checks;
@@ -56,7 +57,7 @@ int run(const DiagnoseArguments& a) {
   }
   fmt::print("{}", result.table());
   if (tested)
-    fmt::print("\non the test logs, with these effects in the model:\n{}", tested->table());
+    fmt::print("\nOn the test logs, with these effects in the model:\n{}", tested->table());
   return kDone;
 }
 
@@ -66,15 +67,16 @@ void add_diagnose_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<DiagnoseArguments>();
   CLI::App* verb = app.add_subcommand(
       "diagnose",
-      "which physical effect is missing, ranked, with evidence; or nothing, or unknown");
+      "find which physical effect the model lacks, with evidence; or none, unknown or bad data");
   a->inputs.add_model(*verb);
-  a->inputs.add_logs(*verb, "logs in which something may be missing (CSV or MAT)");
+  a->inputs.add_logs(*verb, "logs to diagnose (CSV or MAT)");
   a->inputs.add_references(
-      *verb, "logs of the same machine without it: what is learned is taken from them");
-  a->inputs.add_tests(*verb, "logs to judge the effects found on, not used to find them");
-  a->inputs.add_candidates(*verb, "effects to choose from");
+      *verb, "reference logs of the same machine, recorded before the effect; pressure models are learned "
+      "from them");
+  a->inputs.add_tests(*verb, "test logs: the effects found are judged on them, the search does not use them");
+  a->inputs.add_candidates(*verb, "candidate effects");
   verb->add_flag("--skip-data-checks", a->skip_data_checks,
-                 "do not look for stuck, jumping or noisy channels first");
+                 "skip the search for stuck, jumping or noisy channels");
   a->inputs.add_rest(*verb);
   verb->footer(
       "Examples:\n"

@@ -11,7 +11,7 @@
 namespace sparflow::cli {
 namespace {
 
-/// A log is only one of: diagnosed, reference, test. @throws UsageError
+/// Checks that each log is diagnosed, a reference or a test log, and only one of these. @throws UsageError
 void refuse_shared_logs(const std::string& verb, const DiagnosisFiles& files) {
   const auto refuse = [&](const std::vector<Log>& some, const std::vector<Log>& others,
                           const char* one, const char* other) {
@@ -63,7 +63,7 @@ void DiagnosisInputs::add_candidates(CLI::App& app, const std::string& what) {
   app.add_option(
          "--candidates", candidates_,
          what +
-             ", as in `sparflow effects`, without :AT at all its places; else the whole catalogue")
+             " (ids as in `sparflow effects`; without :AT at all places); absent: the whole catalogue")
       ->type_name("EFFECT[:AT]...");
 }
 
@@ -74,7 +74,7 @@ void DiagnosisInputs::add_output(CLI::App& app) {
 }
 
 void DiagnosisInputs::add_threads(CLI::App& app) {
-  app.add_option("--threads", threads_, "threads for learning, 0 = one a processor")
+  app.add_option("--threads", threads_, "threads for learning; 0: one for each processor")
       ->check(CLI::Range(0, 256));
 }
 
@@ -101,13 +101,13 @@ DiagnosisFiles DiagnosisInputs::read() const {
   if (!output_.empty()) check_writable(output_);
   outputs_.check();
   DiagnosisFiles files;
-  files.model = load_model_aloud(model_);
+  files.model = load_model_with_warnings(model_);
   own_.load_into(files.model);
   const Machine& machine = files.model.machine;
   for (const std::string& c : candidates_) {
     const Effect* everywhere = c.find(':') == std::string::npos ? find_effect(c) : nullptr;
     if (everywhere == nullptr || everywhere->places(machine).empty()) {
-      files.candidates.push_back(parse_effect(c, machine));  // which names what is wrong with it
+      files.candidates.push_back(parse_effect(c, machine));  // its InputError names the mistake
       continue;
     }
     for (const int at : everywhere->places(machine)) files.candidates.push_back({everywhere, at});
@@ -119,7 +119,7 @@ DiagnosisFiles DiagnosisInputs::read() const {
   return files;
 }
 
-void say_what_is_reference(const DiagnosisFiles& files) {
+void note_what_is_reference(const DiagnosisFiles& files) {
   if (!files.references.empty()) return;
   const auto seen = [&](const Log& log) {
     return std::any_of(files.model.data.begin(), files.model.data.end(), [&](const DataSource& d) {
@@ -129,8 +129,8 @@ void say_what_is_reference(const DiagnosisFiles& files) {
   const auto unseen = std::find_if_not(files.logs.begin(), files.logs.end(), seen);
   if (unseen == files.logs.end()) return;
   note(
-      fmt::format("{}: the model was not fitted on this log; without --reference the model counts "
-                  "as the reference for forces only, pressures and flows are learned anew",
+      fmt::format("{}: the model was not fitted on this log; without --reference the model serves "
+                  "as reference for forces only, and pressures and flows are learned again",
                   unseen->file));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What diagnose, selftest, extend and improve share: a fitted model, logs in their parts, effects to choose from.
+/// Inputs that diagnose, selftest, extend and improve share: a fitted model, logs by purpose, candidate effects.
 #include <string>
 #include <vector>
 
@@ -9,22 +9,22 @@
 
 namespace sparflow::cli {
 
-/// Everything read.
+/// The contents of all input files.
 struct DiagnosisFiles {
-  CraneModel model;  ///< knows the user's effects
+  CraneModel model;  ///< with the user's own effects registered
   std::vector<Log> logs, references, tests;
   std::vector<EffectAt> candidates;  ///< empty: the whole catalogue
 
-  /// Names the logs at the end of a page.
+  /// Lists the logs with their hashes in the footer of a page.
   void write_provenance(Page& page) const;
 };
 
-/// The options of one such verb and the files they name.
+/// The command-line options of one of these verbs and the files that they name.
 class DiagnosisInputs {
  public:
   explicit DiagnosisInputs(std::string verb) : verb_(std::move(verb)) {}
 
-  // Each adds one option; what it does for the verb is said in its own words.
+  // Each adds one option; `what` is its help text, since the verbs use the same option for different purposes.
   void add_model(CLI::App& app);
   void add_logs(CLI::App& app, const std::string& what);
   void add_references(CLI::App& app, const std::string& what);
@@ -32,15 +32,15 @@ class DiagnosisInputs {
   void add_candidates(CLI::App& app, const std::string& what);
   void add_output(CLI::App& app);
   void add_threads(CLI::App& app);
-  /// --mapping, --effects, --json, --report; last.
+  /// Adds --mapping, --effects, --json and --report, which --help lists last.
   void add_rest(CLI::App& app);
 
-  /// Checks before anything is read: outputs can be written and overwrite no input. Then reads all.
-  /// @throws UsageError when a log is given twice for different purposes
+  /// Checks that the outputs can be written and overwrite no input, then reads all inputs.
+  /// @throws UsageError when a log is given for two purposes  @throws InputError
   DiagnosisFiles read() const;
 
   const Outputs& outputs() const { return outputs_; }
-  const std::string& output() const { return output_; }  ///< model to write
+  const std::string& output() const { return output_; }  ///< path of the model to write
   int threads() const { return threads_; }
 
  private:
@@ -51,13 +51,14 @@ class DiagnosisInputs {
   Outputs outputs_;
 };
 
-/// Without references: says on stderr what a model that was not fitted on one of the logs can be a reference for.
-void say_what_is_reference(const DiagnosisFiles& files);
+/// Notes on stderr, when there is no reference log and the model was not fitted on one of the logs, that the model
+/// then serves as reference for forces only.
+void note_what_is_reference(const DiagnosisFiles& files);
 
-/// What extend and improve end with: the model, the files asked for, the table on stdout.
+/// Writes the results of extend and improve: the model, the files asked for, the table on stdout.
 void write_extended(const DiagnosisInputs& inputs, const ExtendResult& result);
 
-/// "2025-03-14", today, for a model's record.
+/// Today's date (UTC) as "2025-03-14", for the history in the model file.
 std::string today();
 
 }  // namespace sparflow::cli

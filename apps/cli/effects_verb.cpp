@@ -31,8 +31,8 @@ void add_effects_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<EffectsArguments>();
   CLI::App* verb = app.add_subcommand(
       "effects",
-      "the catalogue of physical effects: equation, parameters, what it is confused with");
-  verb->add_option("effect", a->effect, "id of one effect for its whole entry")
+      "list the catalogue of physical effects: equation, parameters, rivals");
+  verb->add_option("effect", a->effect, "id of one effect, to print its whole entry")
       ->type_name("EFFECT");
   a->own.add_to(*verb);
   a->outputs.add_to(*verb, false);

@@ -61,8 +61,8 @@ bool measured(const std::vector<Log>& logs, Role role) {
   });
 }
 
-/// What the logs of a fit that learned nothing lack, in words; empty when something was learned, or when the
-/// machine has nothing to learn.
+/// Names what the logs lack when nothing could be learned from them; empty when something was learned, or when the
+/// machine has no hydraulic cylinder.
 std::string why_nothing_learned(const FitResult& r, const std::vector<Log>& logs) {
   const auto identified = [](const std::optional<LearnedPump>& p) {
     return p && (p->standby_identified ||
@@ -85,20 +85,21 @@ std::string why_nothing_learned(const FitResult& r, const std::vector<Log>& logs
       });
   if (!moves) missing.emplace_back("motion (no cylinder is driven faster than 2 mm/s)");
   if (missing.empty()) {
-    return fmt::format("the logs hold too few samples of each motion ({} in all)", r.train.samples);
+    return fmt::format("the logs have too few samples of each motion ({} in all)", r.train.samples);
   }
   return fmt::format("the logs lack {}", fmt::join(missing, ", "));
 }
 
-/// Wrong usage before any work: outputs that overwrite something, a test log that was learned from.
+/// Checks, before any work, that no output overwrites a file in use and that no test log is learned from.
+/// @throws UsageError, InputError
 void check_files(const FitArguments& a) {
   for (const std::string& test : a.tests) {
     for (const std::string& log : a.logs) {
       if (!same_file(test, log)) continue;
       throw UsageError(
-          fmt::format("fit: {} is given with --log and with --test; a model is judged on what it "
-                      "was not learned from, so give it once (without --test every fourth block of "
-                      "motion is held out)",
+          fmt::format("fit: {} is given with --log and with --test; a model is judged on data that "
+                      "it was not learned from, so give the log once (without --test every fourth "
+                      "block of motion is held out)",
                       log));
     }
   }
@@ -116,8 +117,8 @@ void check_files(const FitArguments& a) {
 
 int run(const FitArguments& a) {
   check_files(a);
-  const Machine machine = load_machine_aloud(a.machine);
-  a.own.load(&machine);  // refused before the work, not after it
+  const Machine machine = load_machine_with_warnings(a.machine);
+  a.own.load(&machine);  // before the fit, so that a wrong file is found at once
   const std::vector<Log> logs = load_logs(a.logs, machine, a.mapping);
   const std::vector<Log> tests = load_logs(a.tests, machine, a.mapping);
   FitOptions options;
@@ -131,12 +132,12 @@ int run(const FitArguments& a) {
   if (!lacking.empty()) {
     for (const std::string& n : result.notes) note("  " + n);
     throw InputError({a.logs.size() == 1 ? a.logs.front() : "", 0, 0}, "fit",
-                     fmt::format("nothing was learned, no model is written: {}; record each "
-                                 "cylinder moving both ways at several speeds and loads",
+                     fmt::format("nothing was learned, so no model is written: {}; record each "
+                                 "cylinder moving in both directions at several speeds and loads",
                                  lacking));
   }
   if (result.processes.empty()) {
-    note(fmt::format("{} has no hydraulic cylinder: nothing to learn, forces alone are compared",
+    note(fmt::format("{} has no hydraulic cylinder: there is nothing to learn, only forces are compared",
                      machine.name));
   }
   a.own.load_into(result.model);
@@ -152,21 +153,21 @@ int run(const FitArguments& a) {
 void add_fit_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<FitArguments>();
   CLI::App* verb =
-      app.add_subcommand("fit", "learn pressures, margins, standby and valve gains from logs");
+      app.add_subcommand("fit", "identify pressure models, margins, standby and valve gains from logs");
   verb->add_option("--machine,-m", a->machine, "machine file (YAML)")
       ->required()
       ->type_name("FILE");
   verb->add_option("--log,-l", a->logs, "logs to learn from (CSV or MAT)")
       ->required()
       ->type_name("FILE...");
-  verb->add_option("--test,-t", a->tests, "logs to judge the model on, never learned from")
+  verb->add_option("--test,-t", a->tests, "logs to judge the model on; nothing is learned from them")
       ->type_name("FILE...");
   verb->add_option("--output,-o", a->output, "model to write (JSON)")
       ->required()
       ->type_name("MODEL.json");
   verb->add_option("--mapping", a->mapping, "mapping file for logs with other column names (YAML)")
       ->type_name("FILE");
-  verb->add_option("--threads", a->threads, "threads for learning, 0 = one a processor")
+  verb->add_option("--threads", a->threads, "threads for learning; 0: one for each processor")
       ->check(CLI::Range(0, 256));
   a->own.add_to(*verb);
   a->outputs.add_to(*verb);

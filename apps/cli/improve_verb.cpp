@@ -11,7 +11,7 @@ struct ImproveArguments {
 
 int run(const ImproveArguments& a) {
   const DiagnosisFiles files = a.inputs.read();
-  say_what_is_reference(files);
+  note_what_is_reference(files);
   ExtendOptions options;
   options.fit.threads = a.inputs.threads();
   options.max_steps = a.max_steps;
@@ -31,19 +31,19 @@ int run(const ImproveArguments& a) {
 void add_improve_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<ImproveArguments>();
   CLI::App* verb = app.add_subcommand(
-      "improve", "diagnose and extend until nothing is missing; the error falls step by step");
+      "improve", "repeat diagnose and extend until no effect is missing; report the error after each step");
   a->inputs.add_model(*verb);
   a->inputs.add_logs(*verb, "logs to diagnose and learn from (CSV or MAT)");
   a->inputs.add_references(*verb,
-                           "logs of the same machine without what is missing: what the model has "
-                           "learned then stays as it is");
+                           "reference logs of the same machine, recorded before the effect; the pressure "
+                           "models learned from them stay as they are");
   a->inputs.add_tests(*verb,
-                      "logs to judge the error on; without them motions of --log are held out");
+                      "logs to judge the error on; absent: motions of --log are held out");
   a->inputs.add_output(*verb);
-  verb->add_option("--max-steps", a->max_steps, "effects to add at most")
+  verb->add_option("--max-steps", a->max_steps, "largest number of effects to add")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
-  a->inputs.add_candidates(*verb, "effects to choose from");
+  a->inputs.add_candidates(*verb, "candidate effects");
   a->inputs.add_threads(*verb);
   a->inputs.add_rest(*verb);
   verb->footer(

@@ -10,7 +10,8 @@ int main(int argc, char** argv) {
   using namespace sparflow;
   cli::catch_interrupts();
   CLI::App app{
-      "Sparflow learns a hydraulic machine's pressures from its logs and computes energy-optimal "
+      "Sparflow identifies the working pressures of a hydraulic machine from its logs and computes "
+      "energy-optimal "
       "motions.\n"
       "Begin with `sparflow demo`; every verb has --help.",
       "sparflow"};

@@ -44,8 +44,8 @@ OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
   return result;
 }
 
-/// What dynamic programming alone comes to, the bound of any motion, and the one of motions in the problem's time where
-/// that says more.
+/// Sets the energies found by dynamic programming alone, and the larger of two estimated lower bounds: that of any
+/// motion and that of motions within the problem's largest duration.
 void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
   const DrivenGridPath path = driven_grid_path(model, problem, result.duration);
   result.grid_path_energy = path.energy;
@@ -54,7 +54,7 @@ void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
   result.bound_note = bound.message;
   if (!bound.valid) return;
   result.lower_bound = bound.lower_bound_J;
-  // Half a percent above what any motion needs, haste costs nothing that could be shown.
+  // Within half a percent of the bound of any motion, the limited time can raise the energy by no more than that.
   const double time = problem.duration.max;
   if (!std::isfinite(time) || result.energy.total < 1.005 * bound.lower_bound_J) return;
   const TimedBound timed = energy_bound_at(model, problem, time);
@@ -91,7 +91,7 @@ int run(const OptimizeArguments& a) {
     };
     if (a.from.empty()) {
       seeds = make_seeds(problem, seed_options, options.intervals);
-    } else {  // warm: nothing but the motion that is known
+    } else {  // warm start: from the given motion only
       seeds.motions.push_back({"previous motion", load_motion(a.from, model.machine), 0.0, false});
       seeds.motions.back().shortest_duration = seeds.motions.back().motion.duration();
       options.sequential_starts = options.grid_starts = options.smooth_starts = 0;
@@ -127,35 +127,35 @@ int run(const OptimizeArguments& a) {
 
 void add_optimize_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<OptimizeArguments>();
-  CLI::App* verb = app.add_subcommand("optimize", "energy-optimal motion from start to goal");
+  CLI::App* verb = app.add_subcommand("optimize", "compute the energy-optimal motion from start to goal");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML)")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--model", a->model, "fitted model; absent: the one the problem names")
+  verb->add_option("--model", a->model, "fitted model; absent: the one that the problem names")
       ->type_name("MODEL.json");
   verb->add_option("--output,-o", a->output, "motion to write (CSV)")->type_name("MOTION.csv");
-  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+  verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  verb->add_option("--seconds", a->seeds.seconds, "time for the path search")
+  verb->add_option("--seconds", a->seeds.seconds, "time for the path search [s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
       ->capture_default_str();
   verb->add_option("--intervals", a->intervals,
-                   "intervals of the mesh; absent: the problem's knots, or 100")
+                   "mesh intervals; absent: as the problem's knots, or 100")
       ->check(CLI::Range(10, 5000));
-  verb->add_option("--processes", a->processes, "starts solved at once; absent: 2")
+  verb->add_option("--processes", a->processes, "starts solved in parallel; absent: 2")
       ->check(CLI::Range(1, 256));
   verb->add_flag("--smooth-only", a->smooth_only,
-                 "the single smooth NLP without modes (for comparison)");
+                 "solve the single smooth NLP without modes (for comparison)");
   verb->add_flag(
       "--bound", a->bound,
-      "also what dynamic programming on a joint grid comes to, the energy at unlimited time and a "
-      "lower bound: no motion takes less (docs/energy_bound.md)");
+      "also report the energy found by dynamic programming on a joint grid, the energy at unlimited "
+      "time and an estimated lower bound (docs/energy_bound.md)");
   verb->add_option("--from", a->from,
-                   "start from this motion (CSV of an earlier run, for another goal or payload) "
-                   "and from nothing else")
+                   "start from this motion only (CSV of an earlier run, for another goal or "
+                   "payload)")
       ->type_name("MOTION.csv")
       ->check(CLI::ExistingFile);
   a->outputs.add_to(*verb);

@@ -77,32 +77,32 @@ int run(const ParetoArguments& a) {
 
 void add_pareto_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<ParetoArguments>();
-  CLI::App* verb = app.add_subcommand("pareto", "least energy against time");
+  CLI::App* verb = app.add_subcommand("pareto", "compute the least energy as a function of the duration");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML); its duration is not used")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--model", a->model, "fitted model; absent: the one the problem names")
+  verb->add_option("--model", a->model, "fitted model; absent: the one that the problem names")
       ->type_name("MODEL.json");
   verb->add_option("--output,-o", a->output, "curve to write (CSV)")->type_name("CURVE.csv");
-  verb->add_option("--points", a->points, "durations, besides those that look for the shortest")
+  verb->add_option("--points", a->points, "number of durations, besides those that search for the shortest")
       ->check(CLI::Range(3, 200))
       ->capture_default_str();
-  verb->add_option("--longest", a->longest, "longest duration, times the shortest")
+  verb->add_option("--longest", a->longest, "longest duration, as a multiple of the shortest")
       ->check(CLI::Range(1.2, 100.0))
       ->capture_default_str();
-  verb->add_option("--idle", a->idle_kw, "engine powers for which the best time is named")
+  verb->add_option("--idle", a->idle_kw, "idle powers for which the best duration is reported")
       ->type_name("KW")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+  verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
       ->capture_default_str();
   verb->add_option("--intervals", a->intervals,
-                   "intervals of the mesh; absent: the problem's knots, or 100")
+                   "mesh intervals; absent: as the problem's knots, or 100")
       ->check(CLI::Range(10, 5000));
-  verb->add_option("--processes", a->processes, "starts solved at once; absent: 2")
+  verb->add_option("--processes", a->processes, "starts solved in parallel; absent: 2")
       ->check(CLI::Range(1, 256));
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });

@@ -50,7 +50,7 @@ int run(const PlanArguments& a) {
                          {"paths", nlohmann::json::array()}};
   fmt::print("{}: {}\n", problem.name, seeds.paths.message);
   if (!seeds.motions.empty())
-    fmt::print("  {:<18} {:>9} {:>22}  end posture\n", "path", "waypoints", "shortest duration");
+    fmt::print("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints", "shortest duration");
   for (std::size_t i = 0; i < seeds.paths.paths.size(); ++i) {
     const SeedPath& path = seeds.paths.paths[i];
     const std::string name = fmt::format("{} {}", path.planner, i + 1);
@@ -89,16 +89,16 @@ int run(const PlanArguments& a) {
 void add_plan_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<PlanArguments>();
   CLI::App* verb =
-      app.add_subcommand("plan", "collision-free paths from start to goal (OMPL), no energy yet");
+      app.add_subcommand("plan", "find collision-free paths from start to goal (OMPL); energy is not considered");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML)")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--output,-o", a->output, "waypoints of all paths (CSV)")
+  verb->add_option("--output,-o", a->output, "file for the waypoints of all paths (CSV)")
       ->type_name("PATHS.csv");
-  verb->add_option("--paths", a->seeds.count, "paths wanted at most")
+  verb->add_option("--paths", a->seeds.count, "largest number of paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  verb->add_option("--seconds", a->seeds.seconds, "time for the search")
+  verb->add_option("--seconds", a->seeds.seconds, "time for the search [s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed")->capture_default_str();

@@ -39,12 +39,13 @@ int run(const SelftestArguments& a) {
 void add_selftest_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<SelftestArguments>();
   CLI::App* verb = app.add_subcommand(
-      "selftest", "what this log could reveal: every effect injected into it, power and confusion");
+      "selftest",
+      "find what these logs could reveal: inject every effect; report power and indistinguishable sets");
   a->inputs.add_model(*verb);
   a->inputs.add_logs(*verb, "logs whose motions are judged (CSV or MAT)");
-  a->inputs.add_references(*verb, "logs of the same machine that would serve as reference");
+  a->inputs.add_references(*verb, "reference logs of the same machine");
   a->inputs.add_candidates(*verb, "effects to inject");
-  verb->add_option("--check", a->check, "how many effects are really injected and searched for")
+  verb->add_option("--check", a->check, "number of effects for which the whole search is run on injected data")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   a->inputs.add_rest(*verb);
@@ -53,7 +54,7 @@ void add_selftest_verb(CLI::App& app, int& code) {
       "  sparflow selftest --model crane.json --log today.csv\n"
       "  sparflow selftest --model crane.json --log today.csv --reference new_machine.csv "
       "--report power.html\n"
-      "What these logs cannot tell apart is listed with the motion that would.");
+      "Each indistinguishable set is listed with a motion that would decide between its effects.");
   verb->callback([a, &code] { code = run(*a); });
 }
 

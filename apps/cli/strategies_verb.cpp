@@ -23,7 +23,8 @@ struct StrategiesArguments {
   Outputs outputs;
 };
 
-/// Files as they are, folders' .yaml files by name; in a folder, without --model, those that name a model.
+/// Replaces each folder by its .yaml files in the order of their names. Without --model, files of a folder that name
+/// no model are left out. @throws InputError for a folder without such files
 std::vector<std::string> problem_files(const std::vector<std::string>& given, bool with_model) {
   namespace fs = std::filesystem;
   std::vector<std::string> files;
@@ -44,14 +45,14 @@ std::vector<std::string> problem_files(const std::vector<std::string>& given, bo
       if (with_model || !load_problem(file).model_path.empty()) {
         files.push_back(file);
       } else {
-        note(fmt::format("{}: names no model, left out", file));
+        note(fmt::format("{} is left out: it names no model", file));
       }
     }
   }
   return files;
 }
 
-/// "equal", "own", "equal,own", "1.1,1.5,3" or any mixture.
+/// Parses "equal", "own", "equal,own", "1.1,1.5,3" or any mixture of them. @throws UsageError
 void read_times(const std::string& text, StrategyOptions& options) {
   options.equal_time = options.own_time = false;
   std::size_t at = 0;
@@ -68,8 +69,8 @@ void read_times(const std::string& text, StrategyOptions& options) {
       const double factor = std::strtod(word.c_str(), &end);
       if (word.empty() || *end != '\0' || !(factor >= 1.0) || factor > 1000.0) {
         throw UsageError(fmt::format(
-            "strategies: --time has \"{}\"; give equal, own, or factors of the shortest time "
-            "from 1 on, apart by commas (1.1,1.5,3)",
+            "strategies: --time has \"{}\"; expected equal, own, or factors from 1 on of the "
+            "shortest time, separated by commas (1.1,1.5,3)",
             word));
       }
       options.factors.push_back(factor);
@@ -95,8 +96,8 @@ int run(const StrategiesArguments& a) {
     const double idle = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : tasks.back().problem.idle_power;
     if (options.own_time && idle <= 0.0) {
       warn(
-          fmt::format("{}: without idle power slower is always cheaper, so each way's own best "
-                      "time is its shortest; give --idle KW for another answer",
+          fmt::format("{}: no idle power is given, so time costs nothing and the best time of each "
+                      "strategy is its shortest; give --idle KW to weigh time",
                       tasks.back().problem.name));
     }
     const std::vector<std::string> missing = tasks.back().model.missing();
@@ -176,32 +177,32 @@ int run(const StrategiesArguments& a) {
 void add_strategies_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<StrategiesArguments>();
   CLI::App* verb = app.add_subcommand(
-      "strategies", "one cylinder after another, all at once, or the energy-optimal motion");
+      "strategies", "compare sequential, simultaneous and energy-optimal motions");
   verb->add_option("--problem,-p", a->problems, "motion problems (YAML), or folders of them")
       ->required()
       ->type_name("FILE|DIR");
-  verb->add_option("--model", a->model, "fitted model; absent: the one each problem names")
+  verb->add_option("--model", a->model, "fitted model; absent: the one that each problem names")
       ->type_name("MODEL.json");
   verb->add_option("--time", a->time,
-                   "equal (the problem's duration), own (each way's best, with idling), or factors "
-                   "of the shortest time: 1.1,1.5,3; apart by commas")
+                   "equal (the problem's duration), own (the best time of each strategy, with idle "
+                   "power), or factors of the shortest time, separated by commas: 1.1,1.5,3")
       ->type_name("WHEN")
       ->capture_default_str();
-  verb->add_option("--idle", a->idle_kw, "engine power while time passes; absent: the problem's")
+  verb->add_option("--idle", a->idle_kw, "idle power; absent: that of the problem")
       ->type_name("KW")
       ->check(CLI::Range(0.0, 1000.0));
-  verb->add_option("--paths", a->seeds.count, "seed paths at most")
+  verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  verb->add_option("--orders", a->orders, "orders of cylinders whose segments are optimised")
+  verb->add_option("--orders", a->orders, "number of orders of the cylinders whose segments are optimised")
       ->check(CLI::Range(0, 120))
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
       ->capture_default_str();
   verb->add_option("--intervals", a->intervals,
-                   "intervals of the mesh; absent: the problem's knots, or 100")
+                   "mesh intervals; absent: as the problem's knots, or 100")
       ->check(CLI::Range(10, 5000));
-  verb->add_option("--processes", a->processes, "problems solved at once; absent: all processors")
+  verb->add_option("--processes", a->processes, "problems solved in parallel; absent: as many as there are processors")
       ->check(CLI::Range(1, 256));
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });

@@ -17,28 +17,28 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kFewest = 60;
-/// Of one branch; fewer say nothing about a law with four or five coefficients.
+/// Least samples of one branch: fewer do not determine a law with four or five coefficients.
 constexpr Index kFewestOfOne = 30;
-/// Samples are alike over a filter's width: more than this make the fit slower, not better.
+/// Samples within the filter's width are correlated, so that more than this make the fit slower, not better.
 constexpr Index kMostFitted = 3000;
-constexpr double kStrays = 0.02;   ///< prior share of samples that follow neither law
-constexpr double kSharpest = 0.3;  ///< [bar] no law is believed to hold better than sensors do
+constexpr double kOutliers = 0.02;  ///< prior share of samples that follow neither law
+constexpr double kSharpest = 0.3;  ///< [bar] least standard deviation of a law, that of the sensors
 constexpr double kSure = 0.95;     ///< least posterior probability of a member
-/// A member of one branch lies this many standard deviations above the other law; nearer is the kink.
+/// A member of one branch lies this many standard deviations above the other law; nearer is their intersection.
 constexpr double kClear = 3.0;
-/// The supply takes all of a load (slope 1) where the return line rules, 1/(1 + R A_hold/A_supply) < 0.6 of it
-/// where a counterbalance valve of pilot ratio R > 1 does.
+/// The supply pressure carries all of a load (slope 1) where the return line sets the pressures, and a share of
+/// 1/(1 + R A_hold/A_supply) < 0.6 where a counterbalance valve of pilot ratio R > 1 does.
 constexpr double kSteepest = 0.75;
-constexpr Index kGuard = 2;          ///< samples dropped either side of a switch
-constexpr double kAlikeRows = 10.0;  ///< neighbouring samples that tell no more than one
-/// [nats] by which laws of their own must explain two states of a machine better than common ones.
+constexpr Index kGuard = 2;          ///< samples dropped on both sides of a change of branch
+constexpr double kAlikeRows = 10.0;  ///< neighbouring samples that count as one independent sample
+/// [nats] least gain of separate laws for two states of a machine over common laws.
 constexpr double kApart = 10.0;
 
-/// Rows of all logs; pressures [bar], regressors near one.
+/// Rows of all logs; pressures are in bar, and regressors are scaled to the order of one.
 struct Rows {
   VectorXd p_return, p_supply;
   MatrixXd line, valve;                      ///< regressors of f and g
-  VectorXd load;                             ///< [bar] force as pressure of the supply chamber
+  VectorXd load;                             ///< [bar] force divided by the supply area
   std::vector<std::pair<int, Index>> where;  ///< log and sample
   Index count() const { return p_return.size(); }
 };
@@ -50,7 +50,7 @@ bool usable(const BranchData& d, Index k) {
          (d.q_return_total.size() == 0 || std::isfinite(d.q_return_total[k]));
 }
 
-/// What the oil's temperature spans, if it is known everywhere and changes: a return line's pressure follows it.
+/// [degC] range of the oil temperature if it is known everywhere and changes: return pressure depends on it.
 std::optional<Range> oil_range(const std::vector<BranchData>& logs,
                                const std::vector<std::pair<int, Index>>& where) {
   constexpr double kChanges = 2.0;  // [degC]
@@ -104,7 +104,7 @@ Rows gather(const std::vector<BranchData>& logs) {
     }
     r.valve.row(i).segment(1, 2) << qs, qs * qs;
   }
-  // force = A_supply p_supply - A_return p_return, times the side: areas and sign from the data
+  // force = +-(A_supply p_supply - A_return p_return): areas and sign are estimated from the data
   MatrixXd pressures(n, 2);
   pressures << r.p_supply, r.p_return;
   const VectorXd areas = least_squares(pressures, force);
@@ -123,7 +123,7 @@ struct Law {
   void fit(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
     const double total = weight.sum();
     MatrixXd normal = weighted_gram(x, weight);
-    // regressors are near one: this holds what the samples do not show at zero and changes nothing else
+    // a ridge that is small beside the regressors: it holds coefficients that the samples do not determine at zero
     normal.diagonal().array() += 1e-6 * total + 1e-12;
     coefficients = solve_symmetric(normal, x.transpose() * weight.cwiseProduct(y));
     const VectorXd r = y - x * coefficients;
@@ -139,10 +139,10 @@ double spread(const VectorXd& v) { return std::max(10.0, quantile(v, 0.99) - qua
 
 struct Mixture {
   Law line, valve;
-  double range_return = 0.0, range_supply = 0.0;  ///< [bar] of the pressure a law leaves free
+  double range_return = 0.0, range_supply = 0.0;  ///< [bar] of the pressure that a law does not set
   double likelihood = -std::numeric_limits<double>::infinity();
 
-  /// Posterior weights of both laws, and the log likelihood. [rows]
+  /// Computes the posterior weights of both laws [rows] and the log-likelihood.
   void expect(const Rows& r, VectorXd& on_line, VectorXd& on_valve) {
     const Index n = r.count();
     const VectorXd e1 = line.share > 0.0 ? VectorXd(r.p_return - r.line * line.coefficients)
@@ -152,20 +152,20 @@ struct Mixture {
     on_line.resize(n);
     on_valve.resize(n);
     likelihood = 0.0;
-    const double stray = kStrays / (range_return * range_supply);
+    const double outlier = kOutliers / (range_return * range_supply);
     for (Index i = 0; i < n; ++i) {
       const double z1 = e1[i] / line.deviation, z2 = e2[i] / valve.deviation;
       const double a = line.share * density(z1) / line.deviation * above(z2) / range_supply;
       const double b = valve.share * density(z2) / valve.deviation * above(z1) / range_return;
-      const double sum = a + b + stray;
+      const double sum = a + b + outlier;
       on_line[i] = a / sum;
       on_valve[i] = b / sum;
       likelihood += std::log(sum);
     }
   }
 
-  /// Expectation maximisation from a first assignment.
-  void settle(const Rows& r, VectorXd on_line, VectorXd on_valve) {
+  /// Expectation maximisation from initial weights [rows].
+  void maximise(const Rows& r, VectorXd on_line, VectorXd on_valve) {
     double before = -std::numeric_limits<double>::infinity();
     constexpr int kMostSteps = 60;
     for (int step = 0; step < kMostSteps; ++step) {
@@ -174,7 +174,7 @@ struct Mixture {
                          static_cast<double>(std::max(r.count(), kMostFitted));
       if (on_line.sum() > few) line.fit(r.line, r.p_return, on_line);
       if (on_valve.sum() > few) valve.fit(r.valve, r.p_supply, on_valve);
-      // a "valve" whose supply takes all of the load is the return line again
+      // a "valve" whose supply pressure carries all of the load is the return line again
       if (valve.share > 0.0 && slope(r, on_valve) > kSteepest) {
         likelihood = -std::numeric_limits<double>::infinity();
         return;
@@ -183,18 +183,18 @@ struct Mixture {
       if (likelihood - before < 1e-4 * static_cast<double>(r.count()) && step > 4) break;
       before = likelihood;
     }
-    // each law's coefficients cost; samples are alike over about ten
+    // penalty of each law's coefficients (Schwarz), for a tenth of the samples as independent ones
     const double cost = 0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / kAlikeRows));
     if (line.share > 0.0) likelihood -= cost * static_cast<double>(line.coefficients.size() + 1);
     if (valve.share > 0.0) likelihood -= cost * static_cast<double>(valve.coefficients.size() + 1);
   }
 
-  /// Share of the load that the supply takes where the valve rules.
+  /// Share of the load that the supply pressure carries by the valve's law.
   double slope(const Rows& r, const VectorXd& weight) const {
     const double mean_load = weight.dot(r.load) / weight.sum();
     const VectorXd d = r.load.array() - mean_load;
     const double variance = weight.dot(d.cwiseAbs2());
-    if (variance < weight.sum()) return 0.0;  // load varies by less than 1 bar: not known
+    if (variance < weight.sum()) return 0.0;  // the load varies by less than 1 bar: not known
     const VectorXd by_load = r.valve.rightCols(2) * valve.coefficients.tail(2);
     return weight.dot(d.cwiseProduct(by_load)) / variance;
   }
@@ -229,7 +229,7 @@ Rows of_logs(const Rows& all, int first, int last) {
   return chosen(all, keep);
 }
 
-/// @param range_return, range_supply [bar] of all samples, so that likelihoods of parts of them compare
+/// @param range_return, range_supply [bar] of all samples, so that likelihoods of subsets are comparable
 Mixture most_likely(const Rows& r, double range_return, double range_supply) {
   const Index n = r.count();
   const VectorXd none = VectorXd::Zero(n), every = VectorXd::Ones(n);
@@ -237,17 +237,17 @@ Mixture most_likely(const Rows& r, double range_return, double range_supply) {
   fresh.range_return = range_return;
   fresh.range_supply = range_supply;
   Mixture best = fresh;
-  best.settle(r, every, none);
+  best.maximise(r, every, none);
   const auto consider = [&](const VectorXd& on_line, const VectorXd& on_valve) {
     Mixture m = fresh;
-    m.settle(r, on_line, on_valve);
+    m.maximise(r, on_line, on_valve);
     if (m.likelihood > best.likelihood) best = m;
   };
   Mixture valve_alone = fresh;
-  valve_alone.settle(r, none, every);
+  valve_alone.maximise(r, none, every);
   if (valve_alone.likelihood > best.likelihood) best = valve_alone;
   if (valve_alone.valve.share >
-      0.0) {  // strays above it may be a return line under high back pressure
+      0.0) {  // outliers above it may be a return line under high return pressure
     const VectorXd e = r.p_supply - r.valve * valve_alone.valve.coefficients;
     const VectorXd high = (e.array() > kClear * valve_alone.valve.deviation).cast<double>();
     consider(high, every - high);
@@ -260,7 +260,7 @@ Mixture most_likely(const Rows& r, double range_return, double range_supply) {
   return best;
 }
 
-/// Appends one label a row: 1 return line, 2 valve, 0 not sure.
+/// Appends a label for each row: 1 return line, 2 counterbalance valve, 0 undecided.
 void label_rows(const Rows& rows, Mixture& laws, std::vector<int>& label) {
   VectorXd on_line, on_valve;
   laws.expect(rows, on_line, on_valve);
@@ -309,7 +309,7 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
     }
   }
   if (!apart) label_rows(rows, laws, label);
-  // hysteresis: near a switch the filter mixes both
+  // near a change of branch the filter mixes both laws
   for (std::size_t i = 0; i < label.size(); ++i) {
     const auto& [log, sample] = rows.where[i];
     bool steady = label[i] != 0;

@@ -12,24 +12,24 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr double kShortestBlock_s = 0.3;
-/// Longer motions are cut: blocks are what is held out and resampled.
+/// Longer motions are cut, because blocks are the units that are held out and resampled.
 constexpr double kLongestBlock_s = 8.0;
 
-/// A chamber falls no further than its anti-cavitation valve lets it: below a level the law of flow and force ends.
+/// The lower limit of a chamber's pressure by its anti-cavitation valve; below it the law of flow and force ends.
 struct CavitationFloor {
-  VectorXd law;        ///< of the baseline's columns; empty: no such level is reached
-  double level = 0.0;  ///< [Pa]
+  VectorXd law;        ///< coefficients of the baseline's columns; empty: the limit is not reached
+  double level = 0.0;  ///< [Pa] the limit
 
-  /// By how much the valve holds the pressure above the law. [rows, Pa]
+  /// Pressure by which the valve exceeds the law. [rows, Pa]
   VectorXd held(const Eigen::MatrixXd& baseline) const {
     return (level - (baseline * law).array()).cwiseMax(0.0);
   }
 };
 
-/// max(law, level) by alternating assignment, where that leaves much less than the law alone.
+/// Fits max(law, level) by alternating assignment; empty where that is not much better than the law alone.
 CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y) {
   constexpr Index kFewestOfPiece = 20;
-  constexpr double kMuchLess = 0.8;  // of the sum of squares
+  constexpr double kMuchLess = 0.8;  // largest ratio of the sums of squares with and without limit
   constexpr int kTurns = 25;
   CavitationFloor best;
   if (y.size() < 3 * kFewestOfPiece) return best;
@@ -56,7 +56,7 @@ CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd
   return best;
 }
 
-/// The law's end joins a supply channel's baseline; learned from the references, where there are any.
+/// Adds a column for the limit to a supply channel's baseline; it is learned from the references if there are any.
 CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects) {
   std::vector<Index> rows;
   for (const bool references : {true, false}) {
@@ -108,7 +108,7 @@ void ChannelBuilder::block(std::size_t log, Index first, Index last, const Vecto
                            const Eigen::MatrixXd& base, Index stride) {
   NoiseBlock b{static_cast<Index>(y_.size()), 0};
   for (Index k = first; k < last; k += stride) {
-    if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a hole ends the block
+    if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a missing value ends the block
       b.last = static_cast<Index>(y_.size());
       close(log, b);
       b.first = b.last;

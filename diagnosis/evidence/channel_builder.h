@@ -1,27 +1,27 @@
 #pragma once
-/// One channel of evidence from stretches of logs. Used by evidence.cpp only.
+/// Builds one evidence channel from stretches of logs. Used by evidence.cpp only.
 #include <vector>
 
 #include "diagnosis/evidence/evidence.h"
 
 namespace sparflow {
 
-/// [m^3/s], [N] units of a supply channel's baseline, in which its columns are near one.
+/// [m^3/s], [N] scales of flow and force in a baseline, so that its columns are of order one.
 inline constexpr double kBaselineFlow = 1e-3, kBaselineForce = 1e5;
-inline constexpr Eigen::Index kFewestRows = 30;  ///< of a channel
+inline constexpr Eigen::Index kFewestRows = 30;  ///< a channel with fewer rows is dropped
 
-/// Cuts the true stretches of a mask, shortened by `margin` samples at both ends, into blocks.
+/// Cuts the stretches in which a mask is true, shortened by `margin` samples at both ends, into blocks.
 class ChannelBuilder {
  public:
   /// @param evidence with series and stride; must outlive this
   explicit ChannelBuilder(const Evidence& evidence) : evidence_(evidence) {}
 
-  EvidenceChannel channel;  ///< kind, place, unit, noise: the caller's
+  EvidenceChannel channel;  ///< the caller sets kind, place, unit and noise floor
 
-  /// @param values of one log [samples]  @param base columns of learned laws [samples x columns]
+  /// @param values residual in one log [samples, SI]  @param base baseline columns [samples x columns]
   void add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
            const Eigen::VectorXd& values, const Eigen::MatrixXd& base, Eigen::Index margin);
-  /// Appends the channel. @return false: too little to judge by, and nothing is appended
+  /// Appends the channel. @return false when there are too few rows or blocks; nothing is appended then
   bool finish(std::vector<EvidenceChannel>& out);
 
  private:
@@ -34,8 +34,8 @@ class ChannelBuilder {
   std::vector<Eigen::VectorXd> rows_;  // baseline
 };
 
-/// Slope of a supply channel's baseline in the measured force: columns are 1, Q, Q^2, F, Q F in the units above. Where
-/// an anti-cavitation valve ends the law, that end joins the baseline first.
+/// Sets the derivative of a supply channel's baseline by the measured force; its columns are 1, Q, Q^2, F, Q F in the
+/// scales above. Where an anti-cavitation valve limits the pressure from below, a column for that limit is added first.
 void set_force_slope(EvidenceChannel& channel, std::size_t suspects);
 
 }  // namespace sparflow

@@ -7,8 +7,8 @@
 
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
+#include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/low_pass.h"
-#include "identification/signals/pump_leaders.h"
 #include "identification/signals/series.h"
 #include "models/effects/hydraulics.h"
 #include "models/math/nan.h"
@@ -19,10 +19,10 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-/// Rows a third of the filter's width apart are nearly independent: keeping more costs time and tells nothing.
+/// Rows a third of the filter's width apart are nearly independent; more rows would cost time and add no information.
 constexpr double kRowsAWindow = 3.0;
 
-/// White noise of a raw channel from third differences (robust, so that motion does not count).
+/// Standard deviation of a raw channel's white noise from third differences (robust, so that motion does not count).
 double raw_noise(const VectorXd& x) {
   std::vector<double> d;
   for (Index i = 3; i < x.size(); ++i) {
@@ -32,6 +32,24 @@ double raw_noise(const VectorXd& x) {
   if (d.size() < 20) return kNaN;
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
 }
+
+/// Noise floor of a channel over several logs: the mean of those in which it is measured.
+class MeanNoise {
+ public:
+  /// @param gain of the channel's filter on white noise
+  void add(const VectorXd& raw, double gain) {
+    const double noise = raw_noise(raw);
+    if (!std::isfinite(noise)) return;
+    sum_ += noise * gain;
+    ++logs_;
+  }
+  /// NaN where no log measures it.
+  double value() const { return logs_ > 0 ? sum_ / logs_ : kNaN; }
+
+ private:
+  double sum_ = 0.0;
+  int logs_ = 0;
+};
 
 std::vector<BranchSplit> branches_of(const Evidence& e,
                                      const std::vector<const MachineSignals*>& signals,
@@ -115,7 +133,7 @@ VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x)
   return convolved(x, kernel, series[log].runs);
 }
 
-bool bends(const Effect& effect) {
+bool is_nonlinear_in_parameter(const Effect& effect) {
   return effect.changes_machine() && effect.info().place == EffectPlace::kMachine &&
          effect.info().parameters.size() == 1;
 }
@@ -124,7 +142,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
                                   const EvidenceChannel& channel,
                                   std::span<const double> about) const {
   const bool chord = !about.empty() && about[0] != 0.0 && channel.kind == EvidenceKind::kForce &&
-                     bends(*effect.effect);
+                     is_nonlinear_in_parameter(*effect.effect);
   const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
   if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
   Eigen::MatrixXd result;
@@ -137,7 +155,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
                           channel.index) /
             about[0];
     }
-    Eigen::MatrixXd through_force;  // of a sensor: what its error does by way of the measured force
+    Eigen::MatrixXd through_force;  // effect of a sensor's error through the measured force
     if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
         !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,
                                 through_force)) {
@@ -146,7 +164,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     if (!effect.effect->columns_filtered()) {
       for (Index c = 0; c < raw.cols(); ++c) {
         raw.col(c) = filter(log, channel.kind, raw.col(c).unaryExpr([](double v) {
-          return std::isfinite(v) ? v : 0.0;  // the rows themselves were chosen where y is known
+          return std::isfinite(v) ? v : 0.0;  // all rows are samples in which y is known
         }));
       }
     }
@@ -229,8 +247,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     {  // force
       ChannelBuilder b(e);
       b.channel.kind = EvidenceKind::kForce;
-      double noise = 0.0;
-      int logs = 0;
+      MeanNoise noise;
       for (std::size_t log = 0; log < signals.size(); ++log) {
         const CylinderSignals& c = signals[log]->cylinders[at];
         if (!c.has_force()) continue;
@@ -244,13 +261,12 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         }
         b.add(log, c.moving && signals[log]->usable, y, Eigen::MatrixXd(y.size(), 0),
               margin_of(log));
-        const double raw = raw_noise(c.force);
-        if (log < e.suspects && std::isfinite(raw)) noise += raw * gain_force[log], ++logs;
+        if (log < e.suspects) noise.add(c.force, gain_force[log]);
       }
       b.channel.index = i;
       b.channel.at = name;
       b.channel.unit = {"N", 1.0};
-      b.channel.noise_floor = logs > 0 ? noise / logs : kNaN;
+      b.channel.noise_floor = noise.value();
       b.channel.text = evidence_text(b.channel.kind, name);
       if (!b.finish(e.channels)) {
         e.notes.push_back(fmt::format(
@@ -287,7 +303,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
             fmt::format("{}: no command is logged, valve effects cannot be judged", name));
       }
     }
-    // pressures: return line or counterbalance valve, by direction
+    // pressures, by direction: return channel where the return line sets them, else supply channel
     std::vector<BranchSplit> splits[2];
     for (const int side : {1, -1}) splits[side > 0 ? 0 : 1] = branches_of(e, signals, at, side);
     for (const int side : {1, -1}) {
@@ -297,7 +313,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
                       : (side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract);
         ChannelBuilder b(e);
         b.channel.kind = kind;
-        double noise = kNaN;
+        MeanNoise noise;
         for (std::size_t log = 0; log < signals.size(); ++log) {
           const CylinderSignals& c = signals[log]->cylinders[at];
           const CylinderSeries& s = e.series[log].cylinders[at];
@@ -317,12 +333,12 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
             base.col(4) = (steady_force(s) / f0).cwiseProduct(q / q0);
           }
           b.add(log, returning ? split.return_line : split.counterbalance, y, base, margin_of(log));
-          if (log < e.suspects) noise = raw_noise(raw) * gain_pressure[log];
+          if (log < e.suspects) noise.add(raw, gain_pressure[log]);
         }
         b.channel.index = i;
         b.channel.at = name;
         b.channel.unit = {"bar", 1e5};
-        b.channel.noise_floor = noise;
+        b.channel.noise_floor = noise.value();
         b.channel.text = evidence_text(kind, name);
         if (b.finish(e.channels) && !returning) set_force_slope(e.channels.back(), e.suspects);
       }
@@ -332,7 +348,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     const auto at = static_cast<std::size_t>(p);
     ChannelBuilder b(e);
     b.channel.kind = EvidenceKind::kPump;
-    double noise = kNaN;
+    MeanNoise noise;
     for (std::size_t log = 0; log < signals.size(); ++log) {
       const PumpSignals& s = signals[log]->pumps[at];
       const PumpSeries& series = e.series[log].pumps[at];
@@ -342,12 +358,12 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
                    s.pressure - series.demand - e.known(log, EvidenceKind::kPump, p));
       b.add(log, signals[log]->usable && !signals[log]->edge, y, e.margins(log, p), 0);
       if (log < e.suspects) b.channel.raw.push_back(s.pressure - series.demand);
-      if (log < e.suspects) noise = raw_noise(s.pressure) * gain_pressure[log];
+      if (log < e.suspects) noise.add(s.pressure, gain_pressure[log]);
     }
     b.channel.index = p;
     b.channel.at = machine.pumps[at].name;
     b.channel.unit = {"bar", 1e5};
-    b.channel.noise_floor = noise;
+    b.channel.noise_floor = noise.value();
     b.channel.text = evidence_text(b.channel.kind, b.channel.at);
     if (!b.finish(e.channels)) {
       e.notes.push_back(fmt::format(

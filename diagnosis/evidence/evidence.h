@@ -1,12 +1,12 @@
 #pragma once
-/// What a model leaves unexplained in logs, arranged for finding the missing effect: one channel for each measured
-/// quantity against what comes before it as measured, so that an effect shows at its own stage.
-/// Suspect logs and, where there are any, reference logs of the same machine without the effect stand in the same
-/// channel: the reference then pins what is learned (the baseline), the effect acts in the suspect logs only.
+/// The residuals of a model in logs, arranged for finding a missing effect. There is one evidence channel for each
+/// measured quantity; its model input is the measured output of the stage before, so that an effect shows at its own
+/// stage only. Suspect logs (those to be diagnosed) and reference logs of the same machine without the effect share a
+/// channel: references determine what is learned (the baseline), and the effect acts in suspect logs only.
 ///
-/// Filters. A force is compared with an acceleration that a differentiating filter made: both must have passed the
-/// same low-pass. The kernel g with g'' = h (h the filter's second-derivative kernel) does that for the force, the
-/// kernel with g' = h for a command against a speed, the smoothing kernel itself for pressures.
+/// Filters. A force is compared with an acceleration from a differentiating filter, so both must pass the same
+/// low-pass. For the force that is the kernel g with g'' = h (h: the filter's second-derivative kernel), for a command
+/// compared with a speed the kernel with g' = h, and for pressures the smoothing kernel itself.
 #include <optional>
 #include <span>
 #include <string>
@@ -21,91 +21,96 @@ namespace sparflow {
 
 struct EvidenceChannel {
   EvidenceKind kind = EvidenceKind::kForce;
-  int index = 0;                     ///< cylinder, of kPump the pump
-  std::string at;                    ///< its name
-  std::string text;                  ///< "force of boom"
-  FieldUnit unit;                    ///< to show it in
-  Eigen::VectorXd y;                 ///< [rows] measured - model, SI
-  Eigen::MatrixXd baseline;          ///< [rows x columns] what may always explain y (learned laws)
+  int index = 0;      ///< cylinder, or pump for kPump
+  std::string at;     ///< name of that cylinder or pump
+  std::string text;   ///< "force of boom"
+  FieldUnit unit;     ///< unit of reports
+  Eigen::VectorXd y;  ///< [rows] residual: measured - model, SI
+  Eigen::MatrixXd
+      baseline;  ///< [rows x columns] regressors of what is learned, fitted with every effect
   std::vector<NoiseBlock> blocks;    ///< stretches of motion
   std::vector<int> log;              ///< [blocks] index into Evidence::series
-  std::vector<Eigen::Index> sample;  ///< [rows] in that log
-  /// Of forces and pumps, by suspect log: y before the filter [samples]; oscillations are looked for there.
+  std::vector<Eigen::Index> sample;  ///< [rows] sample index in that log
+  /// Force and pump channels, by suspect log: y before the filter [samples, SI], in which oscillations are searched.
   std::vector<Eigen::VectorXd> raw;
-  /// Of supply channels: what one newton of measured force adds to y by the baseline [rows, Pa/N]. A sensor that
-  /// reads wrong shifts the force too, and with it the baseline's answer.
+  /// Supply channels: change of the baseline with the measured force [rows, Pa/N]. An error of a pressure sensor also
+  /// changes the measured force and thereby the baseline.
   Eigen::VectorXd force_slope;
-  double largest_force = 0.0;  ///< [N] of force channels: largest static force
-  double noise_floor = 0.0;    ///< standard deviation of the sensors' noise in y; NaN = not known
+  double largest_force = 0.0;  ///< [N] largest static force; force channels only
+  double noise_floor =
+      0.0;  ///< [SI] standard deviation of the sensors' noise in y; NaN = not known
 
   Eigen::Index rows() const { return y.size(); }
 };
 
-/// Whether an effect turns the whole machine, so that its force bends in its only parameter; weights are exact either
-/// way. A joint's offset bends, too, but shows in flows by its slope alone: there both stay with the usual size.
-bool bends(const Effect& effect);
+/// Whether an effect rotates the whole machine, so that its force is nonlinear in its only parameter. A joint's offset
+/// is nonlinear too, but is excluded: flows show its derivative alone, so it keeps the linearisation at its usual size.
+bool is_nonlinear_in_parameter(const Effect& effect);
 
 struct Evidence {
   std::vector<MachineSeries> series;  ///< suspect logs first, then references
-  std::size_t suspects = 0;           ///< how many are suspect
+  std::size_t suspects = 0;           ///< number of suspect logs
   std::vector<EvidenceChannel> channels;
-  std::vector<std::string> notes;  ///< what cannot be judged, and why; whole sentences
+  std::vector<std::string> notes;  ///< which effects cannot be judged, and why; whole sentences
   int stride = 1;                  ///< samples between rows
-  double window = 0.0;             ///< [s] of the filter
+  double window = 0.0;             ///< [s] width of the filter
 
   bool has_reference() const { return series.size() > suspects; }
   const EvidenceChannel* find(EvidenceKind kind, int index) const;
 
-  /// What one unit of an effect's linear parameters adds to a channel, filtered like y; zero in reference logs.
-  /// @param about linear parameters up to which a force that bends (an angle's) is the chord; empty: its usual size
-  /// @return [rows x linear parameters]; no columns when it does not act there
+  /// Signature: what one SI unit of each linear parameter adds to a channel, filtered like y; zero in reference logs.
+  /// @param shape nonlinear parameters [SI]
+  /// @param about linear parameters [SI] at which a force that is nonlinear in them (an angle) is linearised by its
+  ///        secant from zero; empty: at their usual size
+  /// @return [rows x linear parameters]; no columns when the effect does not act there
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
                           const EvidenceChannel& channel, std::span<const double> about = {}) const;
 
-  /// The same evidence with pumps led as the model's effects and these, in suspect logs, make them: a loss of a line
-  /// can let another cylinder lead, which its columns, made at the leader without it, do not know. Rows stay.
-  /// @param found values are those in whose neighbourhood columns are to hold
-  /// @return nothing when the leaders are these already
+  /// The same evidence with the load-sensing leaders that follow from the model's effects and, in suspect logs, from
+  /// `found`. A line loss can make another cylinder the leader, which signatures built with the former leaders do not
+  /// contain. Rows stay the same.
+  /// @param found effects with the values near which the signatures are to hold
+  /// @return nothing when the leaders do not change
   std::optional<Evidence> led_by(std::span<const AppliedEffect> found) const;
 
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
                                    const std::vector<MachineSignals>&,
                                    const std::vector<AppliedEffect>*, bool);
-  struct Kernels {  // of one log: low-passes for forces, speeds and pressures, centred, odd length
+  struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
   };
   std::vector<Kernels> kernels_;
   std::vector<AppliedEffect> known_,
-      known_in_references_;  // the model's effects, in either kind of log
+      known_in_references_;  // effects of the model that act in suspect logs, in reference logs
   Eigen::VectorXd filter(std::size_t log, EvidenceKind kind, const Eigen::VectorXd& x) const;
   const std::vector<AppliedEffect>& known_in(std::size_t log) const {
     return log < suspects ? known_ : known_in_references_;
   }
-  /// What the model's own effects already explain. [samples]
+  /// Sum of what the effects of the model add. [samples, SI]
   Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
-  /// One margin for each leader, and one for standby. [samples x feeds + 1]
+  /// Baseline of a pump: one margin for each cylinder as leader, and standby. [samples x (cylinders fed + 1)]
   Eigen::MatrixXd margins(std::size_t log, int pump) const;
 };
 
-/// Without columns of learned laws that never act in these rows.
+/// The baseline without columns that are zero in all rows.
 Eigen::MatrixXd acting_columns(const Eigen::MatrixXd& baseline);
 
-/// @param model its effects are in every channel's model part; its margins start the pump's demand
-/// @param in_references effects that the references have; null: the model's
-/// @param whole_motions rows up to the ends of each motion, of quantities as measured: for signals whose own window is
-/// so sharp (sharpest_window) that it rounds nothing off
+/// @param model its effects are part of every channel's model; its margins give the first estimate of pump demand
+/// @param in_references effects that act in the references; null: those of the model
+/// @param whole_motions uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
+///        (sharpest_window) that it distorts nothing
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                           const std::vector<MachineSignals>& references = {},
                           const std::vector<AppliedEffect>* in_references = nullptr,
                           bool whole_motions = false);
 
-/// Effects of the model that the machine had already when the references were recorded: all but those that a step of
-/// the model's record added from other logs.
+/// Effects of the model that acted when the references were recorded: all except those which a step of the model's
+/// record added from other logs.
 std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
                                                  const std::vector<MachineSignals>& references);
 
-/// "force of boom", "return pressure of jib while extending"
+/// "force of boom", "return pressure of jib extending"
 std::string evidence_text(EvidenceKind kind, const std::string& at);
 /// The stage's name in reports: force, flow, pressure, pump.
 const char* evidence_stage(EvidenceKind kind);

@@ -6,7 +6,7 @@
 namespace sparflow {
 namespace {
 
-/// Reflection coefficients this close to one would declare any slow effect to be noise.
+/// Reflection coefficients nearer to one would explain any slow effect as noise.
 constexpr double kLargestReflection = 0.97;
 
 struct Reflection {
@@ -14,7 +14,7 @@ struct Reflection {
 };
 
 Reflection reflections(const NoiseModel& m) {
-  // Levinson backwards: k2 = phi2, k1 = phi1 / (1 - phi2)
+  // inverse Levinson recursion: k2 = phi2, k1 = phi1 / (1 - phi2)
   return {m.phi1 / (1.0 - m.phi2), m.phi2};
 }
 
@@ -44,7 +44,7 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
       const double sd = m.deviation();
       const double shrink = tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0)) : 0.0;
       const double mean = shrink * means[static_cast<Eigen::Index>(b)];
-      const auto lost = shrink / std::max(1.0, n);  // a mean taken out takes variance out
+      const auto lost = shrink / std::max(1.0, n);  // subtracting a mean reduces the variance
       for (Eigen::Index t = first; t < last; ++t) {
         const double r0 = residual[t] - mean;
         c0 += r0 * r0 * (1.0 + lost);
@@ -68,7 +68,7 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
     m.variance = std::max(e1 * (1.0 - k2 * k2), 1e-300);
     m.offset_variance = 0.0;
     if (!offsets || blocks.size() < 4) return m;
-    // variance of a block's mean by the autoregression alone: spectral density at zero over n
+    // variance of a block's mean by the autoregression alone: spectral density at zero frequency / n
     const double gain = 1.0 - m.phi1 - m.phi2;
     const double at_zero = m.variance / (gain * gain);
     double sum = 0.0, weight = 0.0;

@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Draws of noise that gains are averaged over; each is used with both signs of the signature, so that the term linear
-/// in it cancels.
+/// Number of noise draws over which gains are averaged. Each is used with both signs of the signature, so that the term
+/// linear in the signature cancels.
 constexpr int kDraws = 2;
 
 /// Upper tail of the central chi-square, by its closed recursion over the degrees of freedom.
@@ -22,7 +22,7 @@ double central_tail(double x, int freedom) {
   if (x <= 0.0) return 1.0;
   const bool even = freedom % 2 == 0;
   double tail = even ? std::exp(-0.5 * x) : std::erfc(std::sqrt(0.5 * x));
-  // density-like term that each two further degrees add
+  // term that every two further degrees of freedom add
   double term = even ? std::exp(-0.5 * x) * 0.5 * x
                      : std::exp(-0.5 * x) * std::sqrt(2.0 * x / std::numbers::pi);
   for (int k = even ? 2 : 1; k < freedom; k += 2) {
@@ -32,11 +32,11 @@ double central_tail(double x, int freedom) {
   return std::min(1.0, tail);
 }
 
-/// min 1/2 b'Nb - g'b with the design's bounds, by coordinate steps in units of each parameter's curvature.
+/// min 1/2 b'Nb - g'b inside the design's bounds, by coordinate descent scaled by each parameter's curvature.
 VectorXd inside_bounds(const MatrixXd& n, const VectorXd& g, const EffectDesign& design) {
   const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
-  h.diagonal().array() += 1e-9;  // decides only what no data decide
+  h.diagonal().array() += 1e-9;  // only matters where the data do not determine b
   const VectorXd gs = scale.cwiseProduct(g);
   VectorXd b = solve_symmetric(h, gs), lower(g.size()), upper(g.size());
   for (Index i = 0; i < g.size(); ++i) {
@@ -59,7 +59,7 @@ VectorXd inside_bounds(const MatrixXd& n, const VectorXd& g, const EffectDesign&
 
 double chance_above(double x, int freedom, double lambda) {
   const double half = 0.5 * lambda;
-  if (half > 600.0) {  // far beyond any threshold: normal
+  if (half > 600.0) {  // far beyond any threshold: normal approximation
     const double mean = freedom + lambda, deviation = std::sqrt(2.0 * (freedom + 2.0 * lambda));
     return 0.5 * std::erfc((x - mean) / deviation / std::numbers::sqrt2);
   }

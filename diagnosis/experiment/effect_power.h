@@ -1,7 +1,7 @@
 #pragma once
-/// What evidence would say about an effect that were there, without simulating a search: likelihood gains of
-/// signatures under a channel's noise, the chance that a gain passes a threshold, and what of an effect another could
-/// not take over. All noise parameters count as unknown: a signature that looks like noise gains little.
+/// Statistical power for an effect on given evidence, without simulating a search: the gain of its signature under a
+/// channel's noise, the probability that a gain passes a threshold, and the part of an effect that another cannot
+/// explain. Noise parameters are estimated with every gain, so a signature that resembles noise gains little.
 #include <random>
 #include <vector>
 
@@ -9,42 +9,43 @@
 
 namespace sparflow {
 
-/// Chance that chi-square with `freedom` degrees and noncentrality `lambda` exceeds x.
+/// Probability that chi-square with `freedom` degrees of freedom and noncentrality `lambda` exceeds x.
 /// Source: Johnson, Kotz, Balakrishnan (1995), Continuous Univariate Distributions 2, ch. 29 (Poisson mixture).
 double chance_above(double x, int freedom, double lambda);
 /// The noncentrality at which half a chi-square exceeds `nats` with probability `power`.
 double noncentrality_for(double nats, double power, int freedom);
 
-/// Noise as a model says it: an autoregression with random offsets of the blocks. [rows]
+/// Random draw from a noise model: an autoregression with random offsets of the blocks. [rows]
 Eigen::VectorXd draw_noise(const NoiseModel& noise, const std::vector<NoiseBlock>& blocks,
                            Eigen::Index rows, std::mt19937_64& random);
 
-/// Columns of a design as a regression sees them. By channel; no columns where it does not act.
+/// Columns of a design orthogonal to the baseline, by channel; no columns where the effect does not act.
 struct ProjectedDesign {
   const EffectDesign* design = nullptr;
-  std::vector<Eigen::MatrixXd> white;  ///< baseline taken out, independent rows of unit variance
-  std::vector<Eigen::MatrixXd> plain;  ///< baseline taken out [unit of the channel / SI]
-  Eigen::MatrixXd gram;                ///< of the white columns, all channels together
+  std::vector<Eigen::MatrixXd> white;  ///< whitened: independent rows of unit variance
+  std::vector<Eigen::MatrixXd> plain;  ///< [SI of the channel / SI of the parameter]
+  Eigen::MatrixXd gram;                ///< Gram matrix of the white columns of all channels
 };
 
-/// What an effect adds to the evidence, by channel; no rows where it does not act.
+/// What an effect adds to the evidence, orthogonal to the baseline, by channel; no rows where it does not act.
 struct Signature {
-  std::vector<Eigen::VectorXd> white, plain;
-  double squares() const;  ///< of the white rows: twice the gain [nats] when the noise is known
+  std::vector<Eigen::VectorXd> white, plain;  ///< as in ProjectedDesign
+  double squares() const;  ///< sum of squares of `white`: twice the gain [nats] for known noise
 };
+/// @param theta linear parameters [SI]
 Signature signature(const ProjectedDesign& design, const Eigen::VectorXd& theta);
-/// What of `effect` the columns of `rival` leave, refitted inside their bounds on all channels they show in; counted,
-/// as the search counts rivals, where the effect itself shows.
+/// The part of `effect` that `rival` cannot explain after its linear parameters are fitted inside their bounds. As in
+/// the search, it is taken over the channels in which the effect acts.
 Signature left_by(const Signature& effect, const ProjectedDesign& rival);
 
-/// Gains on evidence with known noise.
+/// Expected gains of signatures on given evidence, by Monte Carlo over its noise models.
 class PowerStudy {
  public:
-  /// @param evidence must outlive this  @param fit gives the channels' noise
+  /// @param evidence must outlive this  @param fit with the noise models of the channels
   PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned seed);
 
   ProjectedDesign project(const EffectDesign& design) const;
-  /// Mean gain [nats] of adding `times` the signature to a model without it, the noise estimated anew both times.
+  /// Mean gain [nats] of `times` the signature; the noise model is estimated without and with it.
   double gain(const Signature& s, double times = 1.0) const;
 
  private:

@@ -11,13 +11,13 @@
 namespace sparflow {
 namespace {
 
-/// Longer motions are what an operator is asked for; a minute shows what they are worth.
+/// [s] Motions are synthesised for a minute; the operator is asked for a multiple of it.
 constexpr double kMinute = 60.0;
 constexpr double kFallbackLoad = 500.0;  ///< [kg] when the logs carry none
 
-/// Less than what tells effects apart in a quarter of an hour is no advice.
+/// [nats/min] least gain of an advised motion: with less, effects stay indistinguishable for a quarter of an hour.
 constexpr double kLeastNats = 0.3;
-/// Nor is a motion hardly better than those that were recorded.
+/// [-] least ratio of that gain to the one of the recorded motions.
 constexpr double kBetterThanHere = 1.5;
 
 /// The found effect on this evidence; no columns where it does not act.
@@ -32,7 +32,7 @@ EffectDesign design_of(const Evidence& evidence, const AppliedEffect& found,
   return make_design(evidence, {found.effect, found.at}, std::move(shape));
 }
 
-/// By rival: what it would lose on this evidence if the found effect were true. [nats]
+/// By rival: gain of the found effect over it on this evidence if the found effect is the true one. [nats]
 std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
                                 const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
   std::vector<double> nats(rivals.size(), 0.0);
@@ -42,7 +42,7 @@ std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
   const PowerStudy study(evidence, fit, 1);
   const Signature truth = signature(study.project(design), theta);
   for (std::size_t r = 0; r < rivals.size(); ++r) {
-    nats[r] = study.gain(truth);  // a rival without action here explains nothing
+    nats[r] = study.gain(truth);  // for a rival that does not act on this evidence
     for (const SearchCandidate& c : search_candidates(evidence, {rivals[r]})) {
       for (const EffectDesign& d : c.designs)
         nats[r] = std::min(nats[r], study.gain(left_by(truth, study.project(d))));
@@ -51,7 +51,7 @@ std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
   return nats;
 }
 
-/// The noise of the same channels in the user's logs; a channel that is not measured there is dropped.
+/// The noise models of the same channels in the user's logs; channels that are not measured there are dropped.
 EffectFit noise_of(Evidence& motion, const Evidence& evidence, const EffectFit& fit) {
   EffectFit out;
   std::vector<EvidenceChannel> kept;
@@ -77,12 +77,12 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
   for (std::size_t k = 0; k < evidence.suspects; ++k) {
     const MachineSeries& s = evidence.series[k];
     for (const double p : s.payload)
-      if (p > heaviest) heaviest = p;  // NaN never is
+      if (p > heaviest) heaviest = p;  // false for NaN
     minutes += s.step * static_cast<double>(s.samples()) / 60.0;
   }
   if (heaviest < 50.0) heaviest = kFallbackLoad;
   const std::vector<MotionRecipe> menu = motion_menu(model.machine, heaviest);
-  CraneModel plain = model;  // judged by what the effects do beyond the machine file
+  CraneModel plain = model;  // the machine of the file, without effects
   plain.effects.clear();
   SignalOptions options;
   options.smoothing.window_s = evidence.window;
@@ -96,7 +96,7 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
                                synthesise_motion(plain, menu[m], evidence.series[0].step, kMinute),
                                options)});
     } catch (const std::domain_error&) {
-      continue;  // leads through poses the machine cannot take
+      continue;  // the motion has poses that the machine cannot take
     }
     const EffectFit noise = noise_of(motion, evidence, fit);
     if (!motion.channels.empty()) nats[m] = separations(motion, noise, found, rivals);
@@ -106,7 +106,7 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
   const auto worth = [&](std::size_t m, std::size_t r) {
     return nats[m][r] >= kLeastNats && nats[m][r] >= kBetterThanHere * here[r];
   };
-  // rivals that no motion separates are left aside, the best motion is that for the hardest of the others
+  // rivals that no motion distinguishes are left out; the best motion is that with the largest least gain of the others
   std::vector<std::size_t> open;
   for (std::size_t r = 0; r < rivals.size(); ++r) {
     for (std::size_t m = 0; m < menu.size(); ++m) {
@@ -134,10 +134,10 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
 }
 
 std::string Experiment::sentence() const {
-  if (!(nats_per_minute > 0.0)) return fmt::format("to tell them apart, record: {}", motion);
-  // odds of e^4 = 55 are what the search itself takes for told apart
-  constexpr double kTold = 4.0;
-  const double minutes = std::max(1.0, std::ceil(kTold / nats_per_minute));
+  if (!(nats_per_minute > 0.0)) return fmt::format("to distinguish them, record: {}", motion);
+  // as SearchOptions::same_nats: odds of e^4 = 55
+  constexpr double kSeparationNats = 4.0;
+  const double minutes = std::max(1.0, std::ceil(kSeparationNats / nats_per_minute));
   return fmt::format("record {:.0f} minute{} of: {} ({})", minutes, minutes > 1.0 ? "s" : "",
                      motion, reason);
 }
@@ -151,8 +151,8 @@ Experiment next_experiment(const CraneModel& model, const Evidence& evidence, co
   std::vector<std::string> apart;
   for (const EffectAt& e : motion.words.empty() ? rivals : motion.apart)
     apart.push_back(name(*e.effect, e.at));
-  const std::string reason =
-      fmt::format("tells {} from {}", name(*found.effect, found.at), fmt::join(apart, ", "));
+  const std::string reason = fmt::format("distinguishes {} from {}", name(*found.effect, found.at),
+                                         fmt::join(apart, ", "));
   if (motion.words.empty()) return {reason, found.effect->info().separated_by, 0.0, 0.0};
   return {reason, motion.words, motion.nats_per_minute, motion.nats_here};
 }

@@ -1,7 +1,7 @@
 #pragma once
-/// The motion that would tell an effect from others that explain the same logs: a menu of motions an operator can
-/// drive, each synthesised on the machine inside its limits, the effect put on it at the size that was found, and
-/// what its rivals, refitted, could not take over, measured in the noise of the user's own channels.
+/// Experiment design: the motion that best distinguishes an effect from its rivals. Each of a list of motions that an
+/// operator can drive is synthesised on the machine inside its limits, with the effect at its estimated size. The gain
+/// of the part that the refitted rivals cannot explain is computed with the noise of the user's own channels.
 #include <string>
 #include <vector>
 
@@ -9,58 +9,58 @@
 
 namespace sparflow {
 
-/// One leg of a motion: joints go together, rest to rest.
+/// One leg of a motion: some joints move together from rest to rest.
 struct MotionLeg {
   std::vector<int> joints;  ///< empty: a pause
-  double to = 0.5;          ///< where to, as share of each joint's range
-  double speed = 0.5;       ///< mean speed, as share of what joint, valve and pump allow
+  double to = 0.5;          ///< 0..1 end position, as share of each joint's range
+  double speed = 0.5;       ///< 0..1 mean speed, as share of the limit by joint, valve and pump
   double pause = 1.0;       ///< [s] at rest afterwards
   double payload = 0.0;     ///< [kg]
 };
 
 struct MotionRecipe {
-  std::string words;            ///< what to record, as one says it to an operator
-  std::vector<MotionLeg> legs;  ///< repeated in turn until a minute is full
-  bool steps = false;           ///< speeds change as fast as the joints can, else smoothly
-  bool warms_up = false;        ///< the oil goes from 20 to 60 degC meanwhile
+  std::string words;            ///< what to record, as an instruction to an operator
+  std::vector<MotionLeg> legs;  ///< repeated in turn until the duration is reached
+  bool steps = false;           ///< trapezoidal speed with short ramps, else a half cosine
+  bool warms_up = false;        ///< the oil warms from 20 to 60 degC
 };
 
-/// Motions worth recording on this machine; joints the two effects sit at come first.
-/// @param heaviest [kg] the larger of two loads
+/// Motions that may be worth recording on this machine.
+/// @param heaviest [kg] the larger of two payloads
 std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest);
 
-/// A log of the recipe: joint positions, commands, both chamber pressures, pump pressures, payload and oil temperature
-/// of the model's machine, quasi-static and without noise.
+/// A synthetic log of the recipe: joint positions, commands, chamber pressures, pump pressures, payload and oil
+/// temperature of the model's machine, quasi-static and without noise.
 /// @param step [s]  @param duration [s]
 Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
                       double duration = 60.0);
 
 struct BetterMotion {
-  std::string words;             ///< empty: no motion of the menu tells them apart
-  double nats_per_minute = 0.0;  ///< likelihood that the best of the rivals would lose
+  std::string words;             ///< empty: no motion of the list distinguishes them
+  double nats_per_minute = 0.0;  ///< gain of the effect over the best of its rivals
   double nats_here = 0.0;        ///< the same on the user's own logs, per minute
   std::vector<EffectAt>
-      apart;  ///< the rivals it tells the effect from: all, or those that any motion does
+      apart;  ///< rivals that it distinguishes from the effect: all, or those that any motion does
 };
 
-/// @param fit gives the noise of the evidence's channels; what is not measured there is not counted on either
-/// @param found with its values  @param rivals that explain the evidence as well
+/// @param fit with the noise models of the evidence's channels; quantities not measured there are left out
+/// @param found effect with its values  @param rivals effects that explain the evidence as well
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
                            const AppliedEffect& found, const std::vector<EffectAt>& rivals);
 
-/// What to record next so that one set of effects is told apart.
+/// What to record next to decide between the effects of an indistinguishable set.
 struct Experiment {
-  std::string reason;  ///< which effects it would tell apart
+  std::string reason;  ///< which effects it would distinguish
   std::string motion;  ///< what to record, in words: joint, direction, speeds, load
-  /// Likelihood the wrong ones would lose in a minute of it, and in a minute of the logs at hand [nats]; 0 = no motion
-  /// of the menu was found to tell them apart and `motion` is the catalogue's general word on the effect.
+  /// Gain of the effect over its rivals in a minute of that motion, and in a minute of the present logs [nats]; 0 = no
+  /// motion of the list distinguishes them, and `motion` is the catalogue's general advice for the effect.
   double nats_per_minute = 0.0, nats_here = 0.0;
 
-  std::string sentence() const;  ///< with how many minutes of it, without a full stop
+  std::string sentence() const;  ///< with the number of minutes, without a full stop
 };
 
-/// What to record next to tell a found effect from its rivals; where no motion of the menu does, the catalogue's
-/// general word on the effect.
+/// What to record next to distinguish a found effect from its rivals; where no motion of the list does, the catalogue's
+/// general advice for the effect.
 Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
                            const AppliedEffect& found, const std::vector<EffectAt>& rivals);
 

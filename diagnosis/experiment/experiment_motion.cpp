@@ -1,4 +1,4 @@
-// The menu of motions, and a log of each on the machine.
+// The list of motions, and a synthetic log of each on the machine.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,18 +15,19 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kLow = 0.2, kHigh = 0.8;  ///< of a joint's range: clear of its ends
-constexpr double kFlowShare = 0.9;         ///< of pump and valves: nothing saturates
-/// A return line of the size that cranes have: what it is hardly matters, the logs' own laws are not copied.
+constexpr double kLow = 0.2, kHigh = 0.8;  ///< shares of a joint's range, clear of its ends
+constexpr double kFlowShare = 0.9;         ///< share of pump and valve flow, so that none saturates
+/// [Pa] Return pressure at rest, of the order of cranes; its value has little influence on the comparison.
 constexpr double kReturnPressure = 4.0 * units::kBar;
 constexpr double kReturnLoss = 3.0 * units::kBar / (1e-3 * 1e-3);  ///< [Pa/(m^3/s)^2]
-constexpr double kLeastSupply = 15.0 * units::kBar;  ///< a load that helps still asks for this
+constexpr double kLeastSupply =
+    15.0 * units::kBar;  ///< [Pa] supply pressure with an overrunning load
 
 double middle(const Joint& j, double share) {
   return j.position.lo + share * (j.position.hi - j.position.lo);
 }
 
-/// Progress along a leg, 0..1: a half cosine, or a trapezoid that speeds up in `rise` of the time.
+/// Progress along a leg, 0..1: a half cosine, or a trapezoidal speed with ramps of `rise` of the time.
 double progress(double t, bool steps, double rise) {
   t = std::clamp(t, 0.0, 1.0);
   if (!steps) return 0.5 * (1.0 - std::cos(std::numbers::pi * t));
@@ -36,7 +37,7 @@ double progress(double t, bool steps, double rise) {
   return top * (t - 0.5 * rise);
 }
 
-/// Flow of a cylinder's section at full command. [m^3/s]
+/// Flow of a cylinder's valve at full command. [m^3/s]
 double full_flow(const CraneModel& model, int cylinder, bool extend) {
   const CylinderModel& c = model.cylinders[static_cast<std::size_t>(cylinder)];
   const double learned = extend ? c.valve_gain_extend : c.valve_gain_retract;
@@ -47,7 +48,7 @@ double full_flow(const CraneModel& model, int cylinder, bool extend) {
   return 1e-3;  // 60 l/min
 }
 
-/// Mean joint speed that limits, valve and pump allow when this joint moves with `count` others. [rad/s, m/s]
+/// Mean joint speed that limits, valve and pump allow when `count` joints move together. [rad/s, m/s]
 double fastest(const CraneModel& model, int joint, std::size_t count) {
   const Machine& m = model.machine;
   const auto at = static_cast<std::size_t>(joint);
@@ -116,7 +117,7 @@ std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
     menu.push_back({fmt::format("{} alone, out and back at three speeds: slow, half, full", name),
                     up_and_down(own, {0.1, 0.4, 1.0}, {0.0}), false, false});
     menu.push_back({at_two_loads(name), up_and_down(own, {0.25}, {0.0, heaviest}), false, false});
-    menu.push_back({fmt::format("{} alone, out and back with the lever thrown at once and held, "
+    menu.push_back({fmt::format("{} alone, out and back with a sudden command that is held, "
                                 "rests of two seconds between",
                                 name),
                     {{own, kHigh, 0.8, 2.0, 0.0}, {own, kLow, 0.8, 2.0, 0.0}},
@@ -254,7 +255,7 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
       const double flow = supply_area * std::abs(v), back = return_area * std::abs(v);
       if (moves)
         u[i] = (extends ? 1.0 : -1.0) * flow / full_flow(model, static_cast<int>(c), extends);
-      // return line sets the return chamber, unless the load helps so much that a valve must hold it
+      // the return line sets the return pressure unless a valve must hold an overrunning load
       double p_return = kReturnPressure + kReturnLoss * back * back;
       const double load = extends ? force(i, at) : -force(i, at);  // against the motion
       double p_supply = (load + p_return * return_area) / supply_area;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "diagnosis/extension/extend_workshop.h"
+#include "diagnosis/extension/refit_context.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -15,15 +15,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How often `improve` may try what it then does not keep: each time costs a diagnosis.
+/// How many steps `improve` may reject before it stops, because each may need another diagnosis.
 constexpr std::size_t kMostRejected = 8;
 
-ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std::string& date) {
+ModelStep record_of(const ExtendStep& step, const RefitContext& context, const std::string& date) {
   ModelStep record;
   record.added = step.added;
   record.removed = step.removed;
   record.date = date;
-  record.data = workshop.data();
+  record.data = context.data();
   const AppliedEffect& e = step.effect;
   for (std::size_t p = 0; step.removed.empty() && p < e.values.size(); ++p) {
     const EffectParameter& parameter = e.effect->info().parameters[p];
@@ -40,7 +40,7 @@ ModelStep record_of(const ExtendStep& step, const Workshop& workshop, const std:
   return record;
 }
 
-/// Where an effect acts, as scores call it; empty: everywhere in its stage.
+/// Name of the place of an effect in scores; empty: everywhere in its stage.
 std::string place_name(const Machine& machine, const EffectAt& e) {
   const auto i = static_cast<std::size_t>(e.at);
   if (e.at < 0) return "";
@@ -49,17 +49,17 @@ std::string place_name(const Machine& machine, const EffectAt& e) {
   return "";
 }
 
-void set_errors(const Workshop& workshop, const Machine& machine, const EffectAt& e,
+void set_errors(const RefitContext& context, const Machine& machine, const EffectAt& e,
                 const CompareResult& before, const CompareResult& after, ExtendStep& step) {
   step.stage = effect_stage_name(e.effect->info().stage);
   step.before = before;
   step.after = after;
-  step.judged_on = workshop.judged_on();
+  step.judged_on = context.judged_on();
   step.change = error_change(machine, before, after, step.stage, place_name(machine, e));
 }
 
 /// Adds one effect to `current`. @return the step and the model with it, which the caller may keep or not
-std::pair<ExtendStep, Judged> one_step(const Workshop& workshop, const Judged& current,
+std::pair<ExtendStep, Judged> one_step(const RefitContext& context, const Judged& current,
                                        const EffectAt& add, Others others,
                                        std::vector<std::string>& notes,
                                        const SearchProgress& progress) {
@@ -67,19 +67,19 @@ std::pair<ExtendStep, Judged> one_step(const Workshop& workshop, const Judged& c
   const EffectInfo& info = add.effect->info();
   std::vector<EffectAt> effects = places_of(current.model.effects);
   effects.push_back(add);
-  Judged next = workshop.with(current, effects, others, progress, &notes);
+  Judged next = context.with(current, effects, others, progress, &notes);
   ExtendStep step;
   step.added = effect_key(info, machine, add.at);
   step.title = effect_title(info, machine, add.at);
   step.effect = next.model.effects.back();
   step.others_kept = others == Others::kKept;
-  set_errors(workshop, machine, add, current.error, next.error, step);
+  set_errors(context, machine, add, current.error, next.error, step);
   return {std::move(step), std::move(next)};
 }
 
-void keep(ExtendStep step, Judged next, const Workshop& workshop, const std::string& date,
+void keep(ExtendStep step, Judged next, const RefitContext& context, const std::string& date,
           Judged& current, ExtendResult& result) {
-  next.model.steps.push_back(record_of(step, workshop, date));
+  next.model.steps.push_back(record_of(step, context, date));
   current = std::move(next);
   result.steps.push_back(std::move(step));
 }
@@ -103,9 +103,9 @@ std::string percent_text(double ratio) {
                       : fmt::format("{:.1f} % larger", 100.0 * (ratio - 1.0));
 }
 
-/// Title of an effect of the model that was known before and is not any more beside the one that came last: what the
-/// one takes, the other gives. Empty: none. In numbers, a parameter whose interval was smaller than its value and is now
-/// larger, and twenty times what it was (strangers widen each other's by a few times at most).
+/// Title of an effect of the model from which the last one is indistinguishable; empty: none. Such an effect has a
+/// parameter whose interval was smaller than its value and is now larger, and twenty times as wide as before (effects
+/// that are distinguishable widen each other's intervals by a few times at most).
 std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
   constexpr double kBlurred = 20.0;
   const auto half = [](const AppliedEffect& e, std::size_t k) {
@@ -124,16 +124,17 @@ std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
   return {};
 }
 
-/// What speaks against a step, as the end of a sentence that begins with it.
+/// Why a step is not kept, as part of a sentence about it.
 std::string against(const ExtendStep& step) {
   if (!step.same_as.empty())
-    return fmt::format("these logs cannot tell it from {}, which is in the model", step.same_as);
+    return fmt::format("on these logs it is indistinguishable from {}, which is in the model",
+                       step.same_as);
   if (step.change.own > 1.0) {
-    return fmt::format("where it acts the error on the {} is {} with it", step.judged_on,
+    return fmt::format("with it, the error on the {} is {} where it acts", step.judged_on,
                        percent_text(step.change.own));
   }
   if (step.change.harmed.empty()) {
-    return fmt::format("the error on the {} is {} on the whole with it", step.judged_on,
+    return fmt::format("with it, the overall error on the {} is {}", step.judged_on,
                        percent_text(step.change.overall));
   }
   std::vector<std::string> harm;
@@ -141,7 +142,7 @@ std::string against(const ExtendStep& step) {
   return fmt::format("on the {} {}", step.judged_on, fmt::join(harm, ", "));
 }
 
-/// A diagnosis together with the model it speaks of: its evidence refers to that model's machine.
+/// A diagnosis together with its model, because its evidence refers to that model's machine.
 std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
                                                const std::vector<Log>& logs,
                                                const std::vector<Log>& references,
@@ -157,7 +158,7 @@ std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
   return {kept, &kept->diagnosis};
 }
 
-/// How many times smaller an effect makes the error of the channel where it does most, all others in.
+/// Factor by which an effect reduces the error of the channel that it improves most, beside all others.
 double times_smaller(const DiagnosedEffect& e) {
   double most = 1.0;
   for (const ChannelGain& c : e.channels)
@@ -165,9 +166,9 @@ double times_smaller(const DiagnosedEffect& e) {
   return most;
 }
 
-/// What a diagnosis asks for, that which takes most of an error away first: a likelihood counts what is sharp for
-/// more than what is large. Where logs cannot tell several effects apart, the one that explains them best stands
-/// for all.
+/// The effects of a diagnosis that the model does not have, in the order of the factor by which they reduce an error,
+/// because the gain weights precise channels more than large errors. Of an indistinguishable set only the effect with
+/// the largest gain is in it.
 std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel& model) {
   std::vector<const DiagnosedEffect*> out;
   if (d.verdict == Verdict::kBadData || d.verdict == Verdict::kNone) return out;
@@ -186,39 +187,41 @@ std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel&
 std::string stands_for(const DiagnosedEffect& e) {
   std::string rivals;
   for (const auto& [key, worse] : e.rivals) rivals += (rivals.empty() ? "" : ", ") + key;
-  return fmt::format("{} stands for a set that these logs cannot tell apart: {} would do as well",
+  return fmt::format("{} is one of an indistinguishable set: {} explains these logs as well",
                      e.key(), rivals);
 }
 
-/// Why a diagnosis leads no further.
+/// Why no effect is added after a diagnosis, as a phrase.
 std::string why_stopped(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::kNone:
       return "nothing more is missing that these logs could show";
     case Verdict::kUnknown:
       if (d.unexplained && d.unexplained->few_places)
-        return "something happened too seldom to prove a law: " + d.unexplained->sentence;
-      return "what is left is not in the catalogue" +
+        return "an isolated event remains, on which no law can be tested: " +
+               d.unexplained->sentence;
+      return "unmodelled structure remains in the residual that is not in the catalogue" +
              (d.unexplained ? ": " + d.unexplained->sentence : std::string());
     case Verdict::kBadData:
       return "data is bad: " +
              (d.bad.empty() ? std::string() : bad_channel_sentence(d.bad.front()));
     case Verdict::kMissing:
-      return "what the diagnosis names is in the model already";
+      return "the effects that the diagnosis names are in the model already";
   }
   return {};
 }
 
-/// What explains the same evidence within what the search calls a rival.
-void add_look_alikes(const Diagnosis& d, const EffectAt& effect, std::vector<EffectAt>& aside) {
+/// Adds the rivals of an effect to those set aside.
+void add_indistinguishable(const Diagnosis& d, const EffectAt& effect,
+                           std::vector<EffectAt>& aside) {
   for (const FoundEffect& f : d.search.found) {
     if (!(f.design.effect == effect)) continue;
     for (const auto& [rival, worse] : f.alternatives) aside.push_back(rival);
   }
 }
 
-/// Whether other effects of the valve act behind this one (a lag behind a dead band): they look different once it is in
-/// the model, and what came beside it in the same diagnosis may only have stood for them.
+/// Whether an effect changes the valve opening on which other effects of the valve act (a lag after a dead band). Their
+/// signatures change once it is in the model, so the logs must be diagnosed again before another effect is added.
 bool shapes_opening(const AppliedEffect& e) {
   const Eigen::VectorXd small = Eigen::Vector2d(1e-3, -1e-3);
   Eigen::VectorXd opening = small;
@@ -226,7 +229,7 @@ bool shapes_opening(const AppliedEffect& e) {
   return opening != small;
 }
 
-/// Those that were not kept in the end, and why, once each, as part of why it stopped.
+/// Appends each effect that was not kept in the end, and why, to `stopped_because`.
 void name_rejected(ExtendResult& result) {
   std::erase_if(result.rejected, [&](const ExtendStep& r) {
     return std::any_of(result.steps.begin(), result.steps.end(),
@@ -247,7 +250,7 @@ void name_rejected(ExtendResult& result) {
     result.stopped_because += fmt::format("; {} was tried and not kept: {}", r.title, against(r));
 }
 
-/// Effects to choose from: all that were asked for, or the catalogue, without those set aside.
+/// Candidate effects: those in the options or the whole catalogue, without those set aside and those of the model.
 std::vector<EffectAt> choices(const ExtendOptions& options, const CraneModel& model,
                               const std::vector<EffectAt>& aside) {
   std::vector<EffectAt> out =
@@ -286,11 +289,11 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
   for (const EffectAt& e : add) {
     if (std::any_of(all.begin(), all.end(), [&](const EffectAt& o) { return o == e; })) {
       throw InputError({}, effect_key(e.effect->info(), model.machine, e.at),
-                       "the model has this effect already; take it back first to learn it anew");
+                       "the model has this effect already; remove it first to estimate it again");
     }
     all.push_back(e);
   }
-  const Workshop workshop(model, logs, options.references, tests, options);
+  const RefitContext context(model, logs, options.references, tests, options);
   const double parts = static_cast<double>(add.size()) + 1.0;
   const auto part = [&](std::size_t i) {
     return [&progress, i, parts](double share, const std::string& what) {
@@ -298,18 +301,18 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
     };
   };
   ExtendResult result;
-  Judged current = workshop.as_it_is(model, result.notes, part(0));
+  Judged current = context.as_it_is(model, result.notes, part(0));
   for (std::size_t i = 0; i < add.size(); ++i) {
     std::vector<std::string> notes;
     auto [step, next] =
-        one_step(workshop, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
+        one_step(context, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
     add_notes(std::move(notes), result);
     if (step.change.worse()) {
       result.notes.push_back(
-          fmt::format("{} is in the model as asked, but the data speak against it: {}", step.title,
+          fmt::format("{} is in the model as asked, but the data contradict it: {}", step.title,
                       against(step)));
     }
-    keep(std::move(step), std::move(next), workshop, options.date, current, result);
+    keep(std::move(step), std::move(next), context, options.date, current, result);
   }
   result.stopped_because = "all effects asked for were added";
   finish(std::move(current), start, result);
@@ -329,30 +332,30 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
     for (const AppliedEffect& e : model.effects)
       has += (has.empty() ? "" : ", ") + e.key(model.machine);
     throw InputError({}, key,
-                     has.empty() ? "the model has no effects to take back"
+                     has.empty() ? "the model has no effects to remove"
                                  : "the model does not have this effect; it has " + has);
   }
   const AppliedEffect was = model.effects[static_cast<std::size_t>(at - rest.begin())];
   rest.erase(at);
-  const Workshop workshop(model, logs, options.references, tests, options);
+  const RefitContext context(model, logs, options.references, tests, options);
   const auto part = [&](double first) {
     return [&progress, first](double share, const std::string& what) {
       if (progress) progress(first + 0.5 * share, what);
     };
   };
   ExtendResult result;
-  const Judged current = workshop.as_it_is(model, result.notes, part(0.0));
+  const Judged current = context.as_it_is(model, result.notes, part(0.0));
   std::vector<std::string> notes;
-  Judged next = workshop.with(current, rest, Others::kEstimatedAnew, part(0.5), &notes);
+  Judged next = context.with(current, rest, Others::kEstimatedAnew, part(0.5), &notes);
   add_notes(std::move(notes), result);
   ExtendStep step;
   step.removed = key;
-  step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " taken back";
+  step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " removed";
   step.effect = was;
-  set_errors(workshop, model.machine, effect, current.error, next.error, step);
+  set_errors(context, model.machine, effect, current.error, next.error, step);
   Judged kept = current;
-  keep(std::move(step), std::move(next), workshop, options.date, kept, result);
-  result.stopped_because = "the effect was taken back as asked";
+  keep(std::move(step), std::move(next), context, options.date, kept, result);
+  result.stopped_because = "the effect was removed as asked";
   finish(std::move(kept), start, result);
   return result;
 }
@@ -361,8 +364,8 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
                      const std::vector<Log>& references, const std::vector<Log>& tests,
                      const ExtendOptions& options, const SearchProgress& progress) {
   const auto start = Clock::now();
-  const Workshop workshop(model, logs, references, tests, options);
-  // nobody knows how many rounds there will be: each fills half of what is left
+  const RefitContext context(model, logs, references, tests, options);
+  // the number of rounds is unknown, so each advances by a share of the remaining progress
   double done = 0.0;
   const auto round = [&](double width) {
     return [&progress, &done, width](double share, const std::string& what) {
@@ -370,15 +373,15 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
     };
   };
   ExtendResult result;
-  Judged current = workshop.as_it_is(model, result.notes, round(0.05));
+  Judged current = context.as_it_is(model, result.notes, round(0.05));
   done = 0.05;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
-  std::vector<EffectAt> aside;  // not kept since the last step that was
+  std::vector<EffectAt> aside;  // effects not kept since the last step that was kept
   std::size_t tried = 0;
   DiagnoseOptions diagnose_options = options.diagnose;
   while (result.stopped_because.empty()) {
     diagnose_options.candidates = choices(options, current.model, aside);
-    if (diagnose_options.candidates.empty()) {  // which would mean all
+    if (diagnose_options.candidates.empty()) {  // an empty list would mean the whole catalogue
       result.stopped_because = "no other effect is left to try";
       break;
     }
@@ -397,20 +400,20 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       }
       std::vector<std::string> notes;
       auto [step, next] =
-          one_step(workshop, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
+          one_step(context, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
       if (step.change.worse() && !current.model.effects.empty()) {
         notes.clear();
         std::tie(step, next) =
-            one_step(workshop, current, e->effect, Others::kKept, notes, round(0.15));
+            one_step(context, current, e->effect, Others::kKept, notes, round(0.15));
       }
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
       step.same_as = blurred_by_last(current.model, next.model);
       if (step.change.worse() || !step.same_as.empty()) {
         aside.push_back(e->effect);
-        // what it does is there and harms elsewhere: another that only looks like it must not come in its place
+        // it helps where it acts but harms elsewhere: its rivals would do the same and are set aside, too
         if (step.change.own < 1.0 && step.same_as.empty())
-          add_look_alikes(*diagnosis, e->effect, aside);
+          add_indistinguishable(*diagnosis, e->effect, aside);
         ++tried;
         result.rejected.push_back(std::move(step));
         continue;
@@ -418,11 +421,11 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       aside.clear();
       if (!e->rivals.empty()) notes.push_back(stands_for(*e));
       add_notes(std::move(notes), result);
-      keep(std::move(step), std::move(next), workshop, options.date, current, result);
+      keep(std::move(step), std::move(next), context, options.date, current, result);
       if (shapes_opening(current.model.effects.back())) break;
     }
     if (tried > kMostRejected && result.stopped_because.empty())
-      result.stopped_because = "what is found does not hold on data that took no part";
+      result.stopped_because = "the effects found do not improve data that took no part";
   }
   name_rejected(result);
   finish(std::move(current), start, result);

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A unit of the field that keeps the number short: kN from ten kN on.
+/// Value and unit in which the number is short: kN from 10 kN on.
 std::pair<double, std::string> readable(double value, const FieldUnit& unit) {
   if (unit.name == "N" && std::abs(value) >= 1e4) return {value / 1e3, "kN"};
   return {value / unit.si, unit.name};
@@ -24,7 +24,7 @@ std::string signed_percent(double ratio) {
   return std::isfinite(ratio) ? fmt::format("{:+.1f} %", 100.0 * (ratio - 1.0)) : "-";
 }
 
-/// "force 4100 N (3850 .. 4350)", one a parameter
+/// "force 4100 N (3850 .. 4350)" for each parameter, separated by commas
 std::string parameters_text(const AppliedEffect& e) {
   std::string text;
   const auto& parameters = e.effect->info().parameters;
@@ -44,13 +44,13 @@ std::string parameters_text(const AppliedEffect& e) {
   return text;
 }
 
-/// A pressure error that says more of what the training logs lacked than of the physics.
+/// Whether a pressure error comes mostly from extrapolation beyond the training logs.
 bool mostly_extrapolated(const StageScore& s) {
   return s.extrapolated_percent >= 5.0 && s.extrapolated_error_percent > 50.0 &&
          s.extrapolated_error_percent > 1.25 * s.extrapolated_percent;
 }
 
-/// Rows of one step: the scores that moved by more than a refit moves them, the largest change first.
+/// Rows of one step: the scores that changed by more than 1 %, the largest change first.
 std::string step_table(const ExtendStep& step) {
   constexpr double kMoved = 0.01;
   struct Row {
@@ -88,9 +88,8 @@ std::string step_table(const ExtendStep& step) {
   }
   if (beyond > 0) {
     text +=
-        "   * most of this error lies at flows or loads the pressures were never learned at: it "
-        "says "
-        "little of the effect\n";
+        "   * most of this error is extrapolation of the pressure models to other flows or loads "
+        "and says little about the effect\n";
   }
   const auto rest = still + static_cast<long>(rows.size() - std::min(kMost, rows.size()));
   if (rest > 0) text += fmt::format("   {} other errors moved less\n", rest);
@@ -190,10 +189,11 @@ std::string ExtendResult::table() const {
     text += fmt::format("{}. {}\n   {}\n", ++number_of, s.title, parameters_text(s.effect));
     if (s.others_kept)
       text +=
-          "   the effects before it keep their values: estimated anew together they fitted less\n";
+          "   the effects before it keep their values, because a joint estimate increased the "
+          "error\n";
     text += fmt::format("   RMS error on the {}:\n{}", s.judged_on, step_table(s));
   }
-  if (steps.size() > 1) {  // estimated together: each step moved those before it
+  if (steps.size() > 1) {  // a joint estimate changes the values of former steps
     text += "in the model now:\n";
     for (const AppliedEffect& e : model.effects)
       text += fmt::format("   {:<28}{}\n", e.key(model.machine), parameters_text(e));

@@ -30,10 +30,10 @@ Bounds bounds_of(const std::vector<const EffectDesign*>& designs, Index count) {
   return b;
 }
 
-/// min 1/2 x'Nx - g'x inside a box: unconstrained, or by cyclic coordinate steps from the clamped point.
+/// min 1/2 x'Nx - g'x inside bounds: the unconstrained solution or, outside them, cyclic coordinate descent.
 VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* at_bound) {
   const Index m = g.size();
-  // parameters of very different size: work in units of their curvature
+  // scaled by curvature, because parameters differ by many orders of magnitude
   VectorXd scale(m);
   for (Index i = 0; i < m; ++i) scale[i] = n(i, i) > 0.0 ? 1.0 / std::sqrt(n(i, i)) : 0.0;
   MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
@@ -60,13 +60,13 @@ VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* 
   return scale.cwiseProduct(x);
 }
 
-/// Standard deviation of a channel's sensors; where it is not known, what rounding leaves of the measurement.
+/// Noise floor of a channel; where it is not known, the rounding error of the measurement. [SI]
 double noise_or_rounding(const EvidenceChannel& channel) {
   if (channel.noise_floor > 0.0) return channel.noise_floor;
   return 1e-9 * channel.y.cwiseAbs().maxCoeff() + 1e-300;
 }
 
-/// Column `k` of every channel in units of the sensors' noise, less what the columns before it say already.
+/// Column `k` of all channels in units of the noise floor, orthogonal to the columns before it.
 VectorXd own_part(const Evidence& evidence, const EffectDesign& design, Index k) {
   Index rows = 0;
   for (const MatrixXd& c : design.columns) rows += c.cols() > 0 ? c.rows() : 0;
@@ -90,23 +90,23 @@ VectorXd own_part(const Evidence& evidence, const EffectDesign& design, Index k)
   return stacked.col(k);
 }
 
-/// A parameter that nothing feels even at its bound (the mass of a point on the joint's own axis, beside its moment)
-/// would follow rounding to that bound; one that only says again what those before it say (a scale in error where the
-/// load never changes) would share their value in no way that means anything.
-void drop_unfelt(const Evidence& evidence, EffectDesign& design) {
-  constexpr double kUnfelt = 0.05;  // of the sensors' noise
+/// Sets a linear parameter's columns to zero where it has no own effect even at its bound: it changes no measurement
+/// (a point mass on the joint's own axis, beside its moment) or is collinear with the parameters before it (a scale
+/// error where the load never changes). Its estimate would be determined by rounding alone.
+void drop_negligible(const Evidence& evidence, EffectDesign& design) {
+  constexpr double kNegligible = 0.05;  // of the sensors' noise
   if (!design.acts()) return;
   for (Index k = 0; k < design.linear; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const double most = std::max(std::abs(design.lower[at]), std::abs(design.upper[at]));
-    if (!(own_part(evidence, design, k).cwiseAbs().maxCoeff() * most < kUnfelt)) continue;
+    if (!(own_part(evidence, design, k).cwiseAbs().maxCoeff() * most < kNegligible)) continue;
     for (MatrixXd& c : design.columns) {
       if (c.cols() > 0) c.col(k).setZero();
     }
   }
 }
 
-/// @param k among the linear parameters
+/// @param k index among the linear parameters
 bool is_optional(const EffectDesign& design, Index k) {
   for (const EffectParameter& p : design.effect.effect->info().parameters) {
     if (p.linear && k-- == 0) return p.optional;
@@ -144,7 +144,7 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   }
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c, about));
-  drop_unfelt(evidence, d);
+  drop_negligible(evidence, d);
   if (!optional) return without_optional(std::move(d));
   for (Index k = 0; k < d.linear; ++k) {
     if (!is_optional(d, k)) continue;
@@ -198,7 +198,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
   }
   const auto active = [&](std::size_t c) { return control.active.empty() || control.active[c]; };
 
-  // stacked columns of a channel, and which parameters they belong to
+  // the columns of all designs in each channel, and the parameters that they belong to
   std::vector<MatrixXd> columns(channels);
   std::vector<std::vector<Index>> owner(channels);
   for (std::size_t c = 0; c < channels; ++c) {
@@ -224,7 +224,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
     for (std::size_t c = 0; c < channels; ++c) {
       if (!active(c)) continue;
       const EvidenceChannel& channel = evidence.channels[c];
-      if (first_pass) {  // white noise of the size of what is there
+      if (first_pass) {  // white noise with the variance of y
         fit.noise[c] = NoiseModel{};
         fit.noise[c].variance =
             std::max(channel.y.squaredNorm() / static_cast<double>(channel.rows()), 1e-300);
@@ -252,7 +252,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         const VectorXd r = w.rows.col(m) - w.rows.leftCols(m) * theta;
         const auto rows = static_cast<double>(channel.rows());
         const double v = std::max(r.squaredNorm() / rows, 1e-300);
-        // AR parameters and offset ratio as estimated; the scale at its maximum
+        // profile likelihood: AR parameters and offset ratio as estimated, scale at its maximum
         fit.log_likelihood[c] =
             w.log_determinant - 0.5 * rows * (std::log(2.0 * std::numbers::pi * v) + 1.0);
       }
@@ -263,7 +263,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         if (m > 0) r -= columns[c] * theta;
         if (beta.size() > 0) r -= channel.baseline * beta;
         if (!last) {
-          // the better of what it was and what its moments say, so that no pass makes the fit worse
+          // the more likely of the former model and the moment estimate, so that no pass makes the fit worse
           const NoiseModel& before = fit.noise[c];
           const NoiseModel next = NoiseModel::estimate(r, channel.blocks);
           const bool better = first_pass || next.log_likelihood(r, channel.blocks) >
@@ -303,7 +303,7 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
       const MatrixXd robust = product(product(bread, filling), bread);
       fit.covariance = bread;
       for (Index i = 0; i < count;
-           ++i) {  // the wider of the two, correlations of the model-based one
+           ++i) {  // the larger variance of both, with the correlations of the model-based one
         const double f = std::sqrt(std::max(1.0, robust(i, i) / bread(i, i)));
         fit.covariance.row(i) *= f;
         fit.covariance.col(i) *= f;

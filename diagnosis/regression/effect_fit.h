@@ -1,6 +1,6 @@
 #pragma once
-/// Generalised least squares of effects on evidence: effects' linear parameters, learned baselines and each
-/// channel's noise together, by profile likelihood. The one regression behind gate, ranking, intervals, power.
+/// Generalised least squares of effects on evidence: linear parameters of the effects, baselines and noise models of
+/// all channels are estimated together by profile likelihood. Null distribution, ranking, intervals and power use it.
 #include <string>
 #include <vector>
 
@@ -8,55 +8,56 @@
 
 namespace sparflow {
 
-/// An effect at a place with its nonlinear parameters, and what it adds to each channel.
+/// An effect at a place with given nonlinear parameters, and its signature in each channel.
 struct EffectDesign {
   EffectAt effect;
-  std::vector<double> shape;             ///< [SI]
+  std::vector<double> shape;             ///< [SI] nonlinear parameters
   std::vector<Eigen::MatrixXd> columns;  ///< [channels]: [rows x linear], or no columns
   std::vector<double> lower, upper;      ///< [SI] bounds of the linear parameters
-  int linear = 0;
-  bool optional = false;  ///< an optional parameter acts too
+  int linear = 0;                        ///< number of linear parameters
+  bool optional = false;                 ///< whether an optional parameter has a column
 
   bool acts() const;
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 
-/// @param about as Evidence::columns has it  @param optional whether its optional parameters are to act
+/// @param shape nonlinear parameters [SI]  @param about see Evidence::columns
+/// @param optional whether the optional parameters get columns
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
                          std::vector<double> shape, std::span<const double> about = {},
                          bool optional = true);
 
-/// The same without its optional parameters.
+/// The same design with the columns of its optional parameters set to zero.
 EffectDesign without_optional(EffectDesign design);
 
 struct EffectFit {
-  Eigen::VectorXd theta;               ///< [SI] linear parameters of all designs in turn
-  Eigen::MatrixXd covariance;          ///< of theta, robust against dependence inside blocks
-  std::vector<NoiseModel> noise;       ///< by channel
-  std::vector<double> log_likelihood;  ///< by channel
+  Eigen::VectorXd theta;          ///< [SI] linear parameters of all designs, in their order
+  Eigen::MatrixXd covariance;     ///< covariance of theta, robust against dependence inside blocks
+  std::vector<NoiseModel> noise;  ///< by channel
+  std::vector<double> log_likelihood;  ///< [nats] by channel
   std::vector<Eigen::VectorXd>
-      residual;           ///< by channel [rows]; empty where the fit was not asked for it
-  bool at_bound = false;  ///< a parameter rests on its bound
+      residual;           ///< by channel [rows, SI]; empty unless FitControl::keep_residuals
+  bool at_bound = false;  ///< a parameter lies on its bound
 
-  double total() const;
+  double total() const;  ///< [nats] log-likelihood of all channels
 };
 
 struct FitControl {
   int noise_passes = 3;
   bool keep_residuals = false;
   bool covariance = false;
-  /// Ordinary least squares: every row counts the same. Where the model itself is wrong by more than noise, a fit that
-  /// trusts differences between neighbouring rows (as autoregressive noise does) follows the error's shape.
+  /// Ordinary least squares, in which every row has the same weight. Where model errors exceed the noise, a fit with
+  /// autoregressive noise follows differences of neighbouring rows, that is the shape of the model error.
   bool ordinary = false;
-  /// By channel; a channel that is not active keeps likelihood and noise of `start`. Empty = all.
+  /// By channel; a channel that is not active keeps log-likelihood and noise of `start`. Empty = all are active.
   std::vector<bool> active;
 };
 
-/// @param start noise to start from; may be null
+/// @param start fit whose noise models are the initial guess; may be null
 EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                       const EffectFit* start = nullptr, const FitControl& control = {});
 
-/// Rows whitened by a noise model with unit variance, baseline projected out: [designs' columns, y].
+/// [columns, y] whitened by a noise model and orthogonal to the whitened baseline. [rows x (columns + 1)]
 Eigen::MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
                               const Eigen::MatrixXd& columns, double* log_determinant = nullptr,
                               Eigen::MatrixXd* baseline_coefficients = nullptr);

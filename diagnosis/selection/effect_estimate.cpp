@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/effect_intervals.h"
+#include "diagnosis/selection/leader_updates.h"
 #include "diagnosis/selection/search_candidates.h"
-#include "diagnosis/selection/search_leaders.h"
 #include "identification/signals/series.h"
 #include "models/math/error.h"
 
@@ -18,11 +18,11 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-/// The chord converges by the share of the non-linearity each time: a tenth for angles of a few degrees.
+/// Linearisations: the error falls by the share of the nonlinearity each time, a tenth for angles of a few degrees.
 constexpr int kChords = 3;
-constexpr int kTurns = 5;             // of who leads the pumps with these values
-constexpr int kSections = 10;         // of the golden section: a bracket shrinks to 1 %
-constexpr double kMuchSharper = 0.5;  // a window that is hardly shorter changes nothing
+constexpr int kTurns = 5;             // updates of the load-sensing leaders
+constexpr int kSections = 10;         // golden sections, which reduce a bracket to 1 %
+constexpr double kMuchSharper = 0.5;  // largest ratio of window widths for which it is worthwhile
 constexpr int kSweeps = 2;            // over all nonlinear parameters
 
 std::vector<double> shape_of(const AppliedEffect& e) {
@@ -34,7 +34,7 @@ std::vector<double> shape_of(const AppliedEffect& e) {
   return shape;
 }
 
-/// The nonlinear parameters' descriptions, in order.
+/// Descriptions of the nonlinear parameters, in their order.
 std::vector<const EffectParameter*> shape_parameters(const Effect& effect) {
   std::vector<const EffectParameter*> out;
   for (const EffectParameter& p : effect.info().parameters) {
@@ -43,7 +43,7 @@ std::vector<const EffectParameter*> shape_parameters(const Effect& effect) {
   return out;
 }
 
-/// Rows outside the masks; a block that loses rows in its middle becomes two.
+/// The channel without the rows in the masks; a block that loses rows in its middle becomes two.
 EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& leave_out) {
   EvidenceChannel out = all;
   out.blocks.clear();
@@ -135,7 +135,7 @@ class Estimator {
   }
 
  private:
-  /// Positions so finely measured that a shorter window than the search's will do, in every log.
+  /// Whether positions are measured so finely in every log that a much shorter window than the search's suffices.
   bool can_sharpen(const std::vector<MachineSignals>& logs) const {
     return std::all_of(logs.begin(), logs.end(), [&](const MachineSignals& s) {
       return sharp_window(s) < kMuchSharper * s.window;
@@ -152,7 +152,7 @@ class Estimator {
 
   Evidence collect(const CraneModel& model) const {
     Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, sharp_);
-    // a lag stays behind the dead band that was known before, also while both are estimated
+    // a lag keeps the valve openings of the dead band known before, also while both are estimated
     for (MachineSeries& s : evidence.series) set_openings(known_, s);
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
@@ -190,10 +190,10 @@ class Estimator {
   }
   double likelihood() const {
     FitControl control;
-    control.active = active_;  // the others say nothing about these effects
+    control.active = active_;  // the effects do not act in the others
     return fit_effects(evidence_, pointers(), nullptr, control).total();
   }
-  /// As diagnosis does it: what it prints and what a model gets are one figure.
+  /// The same intervals as in a diagnosis, so that its report and the model have the same values.
   std::vector<FoundEffect> with_intervals() const {
     std::vector<FoundEffect> found(designs_.size());
     for (std::size_t d = 0; d < designs_.size(); ++d) found[d].design = designs_[d];
@@ -226,7 +226,7 @@ class Estimator {
     return l;
   }
 
-  /// Between the grid's neighbours of where it stands; of an effect already known, the effect's own grid.
+  /// Interval for nonlinear parameter `s` of design `d`, between the neighbours of its value on the effect's grid.
   std::pair<double, double> bracket(std::size_t d, std::size_t s) const {
     const EffectAt& e = designs_[d].effect;
     const EffectParameter& p = *shape_parameters(*e.effect)[s];
@@ -236,7 +236,7 @@ class Estimator {
       if (v < x - 1e-9 * std::abs(x)) lo = std::max(lo, v);
       if (v > x + 1e-9 * std::abs(x)) hi = std::min(hi, v);
     }
-    // beyond the grid's ends: as far as half and twice the value
+    // never beyond half and twice the value, which limits it beyond the ends of the grid
     return {std::max(lo, x > 0.0 ? 0.5 * x : lo), std::min(hi, x > 0.0 ? 2.0 * x : hi)};
   }
 
@@ -244,7 +244,7 @@ class Estimator {
     const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
     const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect);
     for (std::size_t s = 0; s < designs_[d].shape.size(); ++s) {
-      if (choices[s]) continue;  // the grid has all there are
+      if (choices[s]) continue;  // the grid contains all variants
       auto [a, b] = bracket(d, s);
       if (!(b > a)) continue;
       const double start = designs_[d].shape[s], at_start = likelihood();
@@ -268,7 +268,7 @@ class Estimator {
     }
   }
 
-  /// @param machine also those that are another machine
+  /// @param machine whether to include effects that change the machine
   static std::vector<AppliedEffect> applied(const std::vector<FoundEffect>& found,
                                             bool machine = true) {
     std::vector<AppliedEffect> out;
@@ -280,7 +280,8 @@ class Estimator {
     return out;
   }
 
-  /// Data = measured - exact law + its linearisation, for effects that are another machine.
+  /// Sets y = measured - exact law + its linearisation, for effects that change the machine.
+  /// @return false when the rows of the changed machine differ
   bool correct_linearisation(const std::vector<FoundEffect>& found) {
     CraneModel exact = base_;
     for (const FoundEffect& f : found) {
@@ -293,7 +294,7 @@ class Estimator {
     if (left.channels.size() != evidence_.channels.size()) return false;
     for (std::size_t c = 0; c < left.channels.size(); ++c) {
       EvidenceChannel& channel = left.channels[c];
-      // a pose that the changed machine cannot take drops out of the rows: the linearised fit stands
+      // rows differ when the changed machine cannot take a pose; the linearised fit is then kept
       if (channel.sample != evidence_.channels[c].sample) return false;
       for (std::size_t d = 0; d < designs_.size(); ++d) {
         if (!designs_[d].effect.effect->changes_machine() || !designs_[d].touches(c)) continue;
@@ -320,7 +321,7 @@ class Estimator {
         const double span = parameter.upper - parameter.lower, v = e.values[p];
         if (v > parameter.lower + 1e-6 * span && v < parameter.upper - 1e-6 * span) continue;
         out.notes.push_back(fmt::format(
-            "{} of {} rests on the bound of what is plausible, {:.4g} {}: another effect may act, "
+            "{} of {} lies on the bound of its plausible range, {:.4g} {}: another effect may act, "
             "or it does not act at all",
             parameter.name, e.key(base_.machine), v / parameter.si, parameter.unit));
       }
@@ -328,9 +329,9 @@ class Estimator {
   }
 
   CraneModel base_;
-  std::vector<AppliedEffect> known_;  ///< the model's, wanted or not
+  std::vector<AppliedEffect> known_;  ///< all effects of the model
   std::vector<MachineSignals> suspects_, references_;
-  bool sharp_ = false;  // all logs through a shorter window than the search's, rows up to the ends
+  bool sharp_ = false;  // shorter windows than the search's, with rows up to the ends of motions
   const std::vector<Mask>& leave_out_;
   std::vector<AppliedEffect> in_references_;
   Evidence evidence_;

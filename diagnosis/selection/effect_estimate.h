@@ -1,9 +1,9 @@
 #pragma once
-/// Parameters of all effects of a model at once, from logs. Linear ones by the regression of effect_fit.h; the others
-/// over their grid, then by golden section on the profile likelihood. Effects that are another machine (masses,
-/// angles) are not quite linear: the regression is repeated with its error of linearisation added to the data.
-/// Values and intervals are those of effect_intervals.h. Diagnosis and extension both end here, so that they print
-/// the same figures for the same effects on the same logs.
+/// Estimates the parameters of all effects of a model together, from logs. Linear parameters come from the regression
+/// of effect_fit.h; nonlinear ones from their grid, then from a golden-section search on the profile likelihood.
+/// Effects that change the machine (masses, angles) are not quite linear: the regression is repeated with the
+/// linearisation error added to the data. Values and intervals are those of effect_intervals.h. Diagnosis and extension
+/// both use this estimate, so that they report the same values for the same effects on the same logs.
 #include <string>
 #include <vector>
 
@@ -13,18 +13,18 @@ namespace sparflow {
 
 struct EffectEstimate {
   std::vector<AppliedEffect> effects;  ///< in the order of `wanted`, with 95 % intervals
-  std::vector<std::string> notes;      ///< parameters on their bounds; whole sentences
+  std::vector<std::string> notes;      ///< which parameters lie on their bounds; whole sentences
   double log_likelihood = 0.0;         ///< [nats]
 };
 
-/// @param model its margins start the pumps' demand; its effects are starting values of those that are wanted, and
-///        stay as they are otherwise
+/// @param model its margins give the first estimate of pump demand; its effects are initial values of those in `wanted`
+///        and are kept as they are otherwise
 /// @param wanted every effect to be estimated, once each
-/// @param suspects logs with the effects  @param references of the same machine without them; may be empty
-/// @param leave_out one mask a suspect log: samples that take no part; empty = none
-/// @param in_references effects that the references have, none of them wanted; null: those of the model that are not
-///        wanted
-/// @throws InputError when the logs do not hold what one of the effects shows in
+/// @param suspects logs with the effects  @param references logs of the same machine without them; may be empty
+/// @param leave_out for each suspect log, a mask of samples that take no part; empty = none
+/// @param in_references effects that act in the references, none of them in `wanted`; null: those of the model that are
+///        not in `wanted`
+/// @throws InputError when one of the effects does not act on any channel of the logs
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 const std::vector<MachineSignals>& suspects,
                                 const std::vector<MachineSignals>& references = {},

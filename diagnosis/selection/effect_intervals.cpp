@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "models/math/linear_algebra.h"
 
 namespace sparflow {
@@ -27,7 +27,8 @@ std::vector<const EffectDesign*> pointers(const std::vector<EffectDesign>& desig
   return out;
 }
 
-/// Where every row counts the same, less of it than a law of this kind must have: part of another effect.
+/// Whether ordinary least squares puts a linear parameter on a positive lower bound: the effect is then weaker than any
+/// of its kind and rather a part of another effect.
 bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
   for (Index k = 0; k < design.linear; ++k) {
     const double lo = design.lower[static_cast<std::size_t>(k)];
@@ -37,8 +38,8 @@ bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
   return false;
 }
 
-/// Whether the joint 95 % region of the linear parameters holds zero: of two that say nearly the same (a laminar and a
-/// turbulent part) either may be nothing beside the other, and yet not both.
+/// Joint significance test (Wald): whether the joint 95 % region of the linear parameters contains zero. Of two nearly
+/// collinear parameters (a laminar and a turbulent part) each alone may be zero, and yet not both.
 bool holds_nothing(const VectorXd& theta, const Eigen::MatrixXd& covariance) {
   constexpr double kChiSquare95[] = {3.841, 5.991, 7.815, 9.488, 11.070};  // 1 .. 5 parameters
   const VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -51,7 +52,7 @@ bool holds_nothing(const VectorXd& theta, const Eigen::MatrixXd& covariance) {
   return scaled.dot(correlation.solve(scaled)) <= kChiSquare95[n - 1];
 }
 
-/// Whether a nonlinear parameter without which the effect is a plainer one may be zero.
+/// Whether zero is inside the interval of a nonlinear parameter that distinguishes the effect from a plainer one.
 bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
                     const std::vector<double>& half) {
   if (effect.info().refines.empty()) return false;
@@ -92,9 +93,9 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     for (std::size_t k = 0; k < shape_sd.size(); ++k) shape_sd[k] = choices[k] ? 0.0 : shape_sd[k];
     std::vector<double> half = parameter_values(effect, sd.head(linear), shape_sd);
     for (double& h : half) h *= kTwoSided95;
-    f.could_be_nothing = holds_nothing(fit.theta.segment(plain, linear),
-                                       sloped.covariance.block(at, at, linear, linear)) ||
-                         may_be_plainer(effect, f.values, half);
+    f.not_significant = holds_nothing(fit.theta.segment(plain, linear),
+                                      sloped.covariance.block(at, at, linear, linear)) ||
+                        may_be_plainer(effect, f.values, half);
     f.lower95 = f.upper95 = f.values;
     for (std::size_t k = 0; k < half.size(); ++k) {
       const double whole =

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/selection/acceptance_tests.h"
 #include "diagnosis/selection/effect_intervals.h"
+#include "diagnosis/selection/leader_updates.h"
 #include "diagnosis/selection/search_choice.h"
-#include "diagnosis/selection/search_leaders.h"
 #include "diagnosis/selection/search_moves.h"
-#include "diagnosis/selection/search_proofs.h"
 #include "diagnosis/selection/search_state.h"
 
 namespace sparflow {
@@ -19,7 +19,7 @@ namespace {
 
 class Search {
  public:
-  /// @param follows whether to stop, with `led` set, where what is found changes who leads a pump
+  /// @param follows whether to stop, with `led` set, when a found effect changes the load-sensing leader
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
          const SearchOptions& options, const SearchProgress& progress, bool follows)
       : search_(evidence, effects, options, progress), random_(options.seed), follows_(follows) {}
@@ -35,7 +35,7 @@ class Search {
       bool reshaped = false;
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(search_, found, i, current) || reshaped;
-      settle_angles(found, current);
+      relinearise_angles(found, current);
       prune(search_, found, current);
       while (merge(search_, found, current)) prune(search_, found, current);
       if (reshaped) {
@@ -43,7 +43,7 @@ class Search {
       }
       finish(found, current);
       estimate_intervals(search_.evidence, found);
-      if (!drop_unproven(found, current, result)) break;
+      if (!drop_failing(found, current, result)) break;
     }
     estimate_intervals(search_.evidence, found);
     result.final = current;
@@ -52,7 +52,7 @@ class Search {
   }
 
  private:
-  /// Adds the best candidate while it passes the gate and its proofs.
+  /// Adds the best candidate while one passes the threshold and the acceptance tests.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (int step = 0; static_cast<int>(found.size()) < search_.options.max_effects &&
                        step < 3 * search_.options.max_effects;) {
@@ -65,20 +65,21 @@ class Search {
         for (const CandidateScore& s : scores)
           result.ranking.emplace_back(search_.candidates[s.candidate].effect, s.gain);
       }
-      std::vector<GateCandidate> gated;
+      std::vector<NullCandidate> null_candidates;
       for (const SearchCandidate& c : search_.candidates)
-        gated.push_back({&c.designs, c.penalty, c.optional_penalty});
-      const NullGate gate = make_null_gate(search_.evidence, gated, base, current,
-                                           search_.options.simulations, random_);
+        null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
+      const NullDistribution null = simulate_null_distribution(
+          search_.evidence, null_candidates, base, current, search_.options.simulations, random_);
       const double level =
           found.empty() ? search_.options.false_alarm : 0.5 * search_.options.false_alarm;
-      const CandidateScore best = chosen(search_, scores, gate, level, base);
-      const double p = gate.p_value(best.gain, best.candidate);
-      if (tracing()) trace_scores(search_, step, scores, gate);
+      const CandidateScore best = chosen(search_, scores, null, level, base);
+      const double p = null.p_value(best.gain, best.candidate);
+      if (tracing()) trace_scores(search_, step, scores, null);
       ++step;
       if (found.empty() && result.threshold == 0.0) {
-        result.threshold = gate.threshold(level);
+        result.threshold = null.threshold(level);
         result.p_value = p;
+        result.simulations = search_.options.simulations;
       }
       if (p >= level || best.gain < search_.options.least_gain) {
         if (found.empty() && best.gain > kSurelySomething * search_.options.least_gain)
@@ -90,13 +91,13 @@ class Search {
       f.p_value = p;
       found.push_back(std::move(f));
       EffectFit next = search_.fit(designs_of(found));
-      whole_share(found, next, best.gain);
+      fix_share_at_one(found, next, best.gain);
       if (follows_ && (result.led = led_by_found(search_, found, next))) return;
       search_.judge(found, found.size() - 1, next);
       if (tracing()) trace_found(search_, found, next);
       found.back().gain = best.gain;
       std::string why = why_not_named(found.back(), search_.options);
-      if (why.empty()) why = only_mends(found, found.size() - 1, next);
+      if (why.empty()) why = compensates_model_form(found, found.size() - 1, next);
       if (!why.empty()) {
         result.notes.push_back(fmt::format("{} fits best but is not named: {}",
                                            search_.key(found.back().design.effect), why));
@@ -113,15 +114,15 @@ class Search {
     }
   }
 
-  /// A tilt of three degrees takes a thousandth off every weight, which its slope at rest does not know: what is left
-  /// would be named as a mass or another angle. Chords up to what was found.
-  void settle_angles(std::vector<FoundEffect>& found, EffectFit& fit) const {
+  /// Linearises angles by the secant up to the value found. A tilt of three degrees reduces every weight by a
+  /// thousandth, which a linearisation at zero does not contain; the error would be named as a mass or another angle.
+  void relinearise_angles(std::vector<FoundEffect>& found, EffectFit& fit) const {
     bool any = false;
     Eigen::Index first = 0;
     for (FoundEffect& f : found) {
       const double about = fit.theta[first];
       first += f.design.linear;
-      if (!bends(*f.design.effect.effect)) continue;
+      if (!is_nonlinear_in_parameter(*f.design.effect.effect)) continue;
       f.design = make_design(search_.evidence, f.design.effect, f.design.shape, {&about, 1},
                              f.design.optional);
       any = true;
@@ -129,12 +130,13 @@ class Search {
     if (any) fit = search_.fit(designs_of(found), &fit);
   }
 
-  /// A short lag shows by the product of its share and its time alone, a limit that is hardly reached by share and
-  /// excess: where the share rests on its bound, the whole share with another time or limit says nearly the same and is
-  /// plausible.
-  void whole_share(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
-    constexpr double kSame = 3.0, kSameShare = 0.05;  // [nats]; of the gain
-    constexpr double kReaches[] = {1.05, 1.2, 2.0};  // times; a limit beyond all flows says nothing
+  /// Fixes a share at one where the log does not determine it. Only the product of share and time of a short lag is
+  /// observable, and likewise share and excess of a limit that is hardly reached. Where the share lies on its bound, a
+  /// share of one with another time or limit explains nearly the same and is plausible.
+  void fix_share_at_one(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
+    constexpr double kSame = 3.0, kSameShare = 0.05;  // largest loss [nats]; as share of the gain
+    constexpr double kReaches[] = {1.05, 1.2,
+                                   2.0};  // factors; a limit beyond all flows has no effect
     constexpr int kHalvings = 9;
     EffectDesign& design = found.back().design;
     const EffectParameter& share = design.effect.effect->info().parameters.front();
@@ -171,8 +173,8 @@ class Search {
     EffectFit whole = search_.fit(designs_of(found));
     const double least = fit.total() - std::max(kSame, kSameShare * gain);
     if (tracing()) {
-      fmt::print(stderr, "  whole share at [{:.4g}]: {:.1f} nats\n", fmt::join(design.shape, " "),
-                 whole.total() - fit.total());
+      fmt::print(stderr, "  share fixed at one with [{:.4g}]: {:.1f} nats\n",
+                 fmt::join(design.shape, " "), whole.total() - fit.total());
     }
     if (whole.total() > least && !rests_on_bound(design, whole.theta.tail(1))) {
       fit = std::move(whole);
@@ -181,11 +183,11 @@ class Search {
     }
   }
 
-  /// What the form of a law is wrong by leaves that share, squared, of the effect's own gain to whatever else acts in
-  /// the same place; and what grows with another power than the law's leaves room for a smaller effect beside it.
-  /// @param fit of all found  @return why found[index] is no more than that; empty: it is more
-  std::string only_mends(const std::vector<FoundEffect>& found, std::size_t index,
-                         const EffectFit& fit) const {
+  /// Whether found[index] compensates model-form error of a larger effect in the same channel. A form error of a share
+  /// s leaves s^2 of that effect's gain to others, and its law with another exponent may explain what a smaller effect
+  /// does. @param fit of all found  @return the reason, as part of a sentence; empty when it does not
+  std::string compensates_model_form(const std::vector<FoundEffect>& found, std::size_t index,
+                                     const EffectFit& fit) const {
     const FoundEffect& one = found[index];
     const auto meets = [&](const EffectDesign& other) { return search_.meet(other, one.design); };
     std::vector<EffectDesign> powers;
@@ -199,7 +201,7 @@ class Search {
       const double form = form_share(*other.design.effect.effect);
       if (one.gain <= form * form * other.gain) {
         return fmt::format(
-            "its gain of {:.0f} nats is what the form of {}, worth {:.0f}, may leave over",
+            "its gain of {:.0f} nats compensates model-form error of {}, whose gain is {:.0f}",
             one.gain, search_.key(other.design.effect), other.gain);
       }
       EffectDesign power = other_power(other.design, theta);
@@ -219,24 +221,24 @@ class Search {
       fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n",
                  search_.key(one.design.effect), fmt::join(names, ", "), gain);
     if (gain > search_.options.least_gain) return {};
-    return fmt::format("a slightly different power in the law of {} does the same",
+    return fmt::format("a slightly different exponent in the law of {} explains the same",
                        fmt::join(names, ", "));
   }
 
-  /// What the later ones turned into a remnant. @return whether any was dropped
-  bool drop_unproven(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
+  /// Drops an effect that fails an acceptance test since later effects were found. @return whether one was dropped
+  bool drop_failing(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
       std::string why = why_not_named(found[i], search_.options);
-      if (why.empty()) why = only_mends(found, i, current);
-      // of an effect of its own, motions left out may have shown what ordinary least squares leaves open
+      if (why.empty()) why = compensates_model_form(found, i, current);
+      // for an effect that refines no other, a clear gain on motions left out outweighs the joint significance test
       const bool refinement = !found[i].design.effect.effect->info().refines.empty();
       const bool proven = !refinement && found[i].held_out > 2.0 * found[i].held_out_error;
-      if (why.empty() && found[i].could_be_nothing && !proven) {
-        why = "the interval of a parameter without which it is nothing holds zero";
+      if (why.empty() && found[i].not_significant && !proven) {
+        why = "it fails the joint significance test: its 95 % region contains zero";
       }
       if (why.empty()) continue;
       result.notes.push_back(
-          fmt::format("{} is taken back: {}", search_.key(found[i].design.effect), why));
+          fmt::format("{} is removed again: {}", search_.key(found[i].design.effect), why));
       if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
       for (std::size_t c = 0; c < search_.candidates.size(); ++c) {
         if (search_.candidates[c].effect == found[i].design.effect) search_.refused[c] = true;
@@ -248,13 +250,13 @@ class Search {
     return false;
   }
 
-  /// Swap moves and indistinguishable alternatives, then intervals.
+  /// Swap moves and indistinguishable sets, then the statistics of the acceptance tests.
   void finish(std::vector<FoundEffect>& found, EffectFit& current) {
     for (int round = 0; round < 2; ++round) {
       bool swapped = false;
       for (std::size_t i = 0; i < found.size(); ++i) {
         search_.report(found.size(),
-                       "telling " + search_.key(found[i].design.effect) + " from its rivals");
+                       "comparing " + search_.key(found[i].design.effect) + " with its rivals");
         swapped = rivals(search_, found, i, current) || swapped;
       }
       if (!swapped) break;
@@ -271,17 +273,18 @@ class Search {
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options, const SearchProgress& progress) {
-  constexpr int kTurns = 3;  // of finding who leads; what is found then was found with that
+  constexpr int kTurns =
+      3;  // searches, each with the load-sensing leaders that the last one implies
   SearchResult result, first;
   std::optional<Evidence> led;
   for (int turn = 0; turn <= kTurns; ++turn) {
     result = Search(led ? *led : evidence, candidates, options, progress, turn < kTurns).run();
     if (turn == 0) first = result;
     if (!result.led) break;
-    if (tracing()) fmt::print(stderr, "  others lead the pump with what was found\n");
+    if (tracing()) fmt::print(stderr, "  the found effects change the load-sensing leader\n");
     led = std::move(result.led);
   }
-  // what was to lead did not stand its proofs: then those lead who lead without it
+  // no effect that changes the leader passed the acceptance tests: search again with the former leaders
   if (led && !adds_demand(*led, result.found)) {
     led.reset();
     result = Search(evidence, candidates, options, progress, false).run();
@@ -291,6 +294,7 @@ SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt
     result.ranking = std::move(first.ranking);
     result.p_value = first.p_value;
     result.threshold = first.threshold;
+    result.simulations = first.simulations;
     result.led = std::move(led);
   }
   return result;

@@ -1,7 +1,7 @@
 #pragma once
-/// Searches the catalogue for what explains the evidence: forward selection by profile likelihood, a gate with
-/// controlled false alarm, held-out proof, drop and swap moves, indistinguishable sets. docs/diagnose.md has the
-/// method and what each number was measured to be worth.
+/// Searches the catalogue for the effects that explain the evidence: forward selection by profile likelihood, a
+/// threshold of the gain with a controlled false-alarm rate, acceptance tests, drop and swap moves, indistinguishable
+/// sets. docs/diagnose.md describes the method.
 #include <functional>
 #include <optional>
 #include <string>
@@ -13,64 +13,64 @@
 namespace sparflow {
 
 struct SearchOptions {
-  double false_alarm = 0.05;  ///< of the whole search on logs with nothing missing
+  double false_alarm = 0.05;  ///< 0..1 rate of the whole search on logs with nothing missing
   int max_effects = 8;
-  int simulations = 300;  ///< of the null, for the gate
-  /// An effect smaller than this share of its channel's noise is not worth a name, however significant.
+  int simulations = 300;  ///< number of draws of the null distribution of the largest gain
+  /// [-] an effect smaller than this multiple of its channel's noise is not named, however significant it is.
   double smallest_effect = 0.15;
-  /// A further effect smaller than this many times what the others' laws may be wrong by (EffectAction::over_form)
-  /// only mends their form.
+  /// [-] a further effect smaller than this multiple of the other effects' model-form error (EffectAction::over_form)
+  /// compensates that error and is not named.
   double smallest_over_form = 1.5;
-  double largest_absorbed =
-      0.9;  ///< an effect that learned laws imitate to more than this share is not named
-  /// [nats] beyond its price that an effect must gain, whatever the gate allows: the gate simulates the noise's law,
-  /// and what that law misses is worth some nats in long logs. Effects that are there gain tens.
+  double largest_absorbed = 0.9;  ///< 0..1 an effect with a larger absorbed share is not named
+  /// [nats] least penalised gain of an effect, even where the threshold is lower: the null distribution simulates the
+  /// noise model, and the error of that model makes gains of a few nats in long logs. Present effects gain tens.
   double least_gain = 10.0;
-  double same_nats = 4.0;  ///< effects whose likelihoods differ by less cannot be told apart
-  int folds = 5;
-  unsigned seed = 1;
+  double same_nats = 4.0;  ///< [nats] effects whose gains differ by less are indistinguishable
+  int folds = 5;           ///< of the cross-validation over motions
+  unsigned seed = 1;       ///< of the null distribution
 };
 
-/// One effect judged missing.
+/// An effect that the search names as missing.
 struct FoundEffect {
   EffectDesign design;
   double gain =
-      0.0;  ///< [nats] penalised log likelihood with all found - the same without this one
-  double p_value = 1.0;   ///< of the gate it passed
-  double size = 0.0;      ///< largest over channels: its size where it acts / the channel's noise
-  double absorbed = 0.0;  ///< share of its action that the learned baselines imitate
-  double absorbed_where_seen = 1.0;  ///< the same in the channel in which most of it is left
+      0.0;  ///< [nats] penalised log-likelihood of all found effects less that without this one
+  double p_value = 1.0;              ///< by the null distribution of the step that added it
+  double size = 0.0;                 ///< [-] EffectAction::size
+  double absorbed = 0.0;             ///< 0..1 absorbed share over all channels
+  double absorbed_where_seen = 1.0;  ///< 0..1 EffectAction::absorbed_where_seen
   double held_out = 0.0,
-         held_out_error = 0.0;  ///< [nats] over motions left out, and standard error
-  double held_out_share = 0.0;  ///< of the parts left out in turn that it improved
-  double over_form =
-      1e9;  ///< its size / what the other effects' laws may be wrong by where it acts
-  /// The joint 95 % region (sampling error alone) of its linear parameters holds zero, or, where the effect refines a
-  /// plainer one, the interval of a nonlinear parameter does: the plainer effect, or none, would do.
-  bool could_be_nothing = false;
-  bool at_bound = false;  ///< a parameter rests on the edge of what is plausible
+         held_out_error = 0.0;  ///< [nats] gain on motions left out, and its standard error
+  double held_out_share = 0.0;  ///< 0..1 share of the folds whose error it reduces
+  double over_form = 1e9;       ///< [-] EffectAction::over_form
+  /// Fails the joint significance test: the joint 95 % region (sampling error alone) of its linear parameters contains
+  /// zero or, where it refines a plainer effect, the interval of a nonlinear parameter does.
+  bool not_significant = false;
+  bool at_bound = false;                         ///< a parameter lies on its bound
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
-  /// Others that could stand in its place, best first, with how much worse they are. [nats]
+  /// Other effects that could replace it, best first, with how much smaller their gain is. [nats]
   std::vector<std::pair<EffectAt, double>> alternatives;
 };
 
 struct SearchResult {
   std::vector<FoundEffect> found;  ///< in the order found
-  /// Beyond the gate, but only with parameters that no machine has: something is there, and not this.
+  /// Effects beyond the threshold whose parameters lie on their bounds: the evidence is significant, the cause unknown.
   std::vector<FoundEffect> unnamed;
-  /// Nothing passed the gate, but this gains far too much for noise: it shows in one place (incident.h).
+  /// When nothing passed the threshold, an effect that gains too much for noise: an isolated event (isolated_event.h).
   std::optional<EffectDesign> once;
-  EffectFit null, final;  ///< without and with them
-  /// The evidence that `found` and `final` belong to, where what was found changes who leads a pump
-  /// (Evidence::led_by); else nothing: the one given.
+  EffectFit null, final;  ///< fits without any effect and with all found ones
+  /// The evidence that `found` and `final` belong to, where the found effects change the load-sensing leader
+  /// (Evidence::led_by); empty where they belong to the evidence given.
   std::optional<Evidence> led;
-  double p_value = 1.0;    ///< of the first gate
-  double threshold = 0.0;  ///< [nats] of the first gate
-  /// Best penalised gain of every candidate in the first step.
+  double p_value = 1.0;    ///< of the best candidate in the first step
+  double threshold = 0.0;  ///< [nats] of the penalised gain in the first step
+  int simulations = 0;     ///< of the null distribution: no p-value is below 1 / (simulations + 1)
+  /// Best penalised gain of every candidate in the first step, best first. [nats]
   std::vector<std::pair<EffectAt, double>> ranking;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;  ///< which effects were not named, and why; whole sentences
 };
 
+/// Called with the share done (0..1) and a phrase for what is being done.
 using SearchProgress = std::function<void(double share, const std::string& what)>;
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,

@@ -16,7 +16,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
-  // limits depend on what a log reaches: the longest suspect log decides
+  // grids of limits depend on the range of a log; that of the longest suspect log is taken
   std::size_t longest = 0;
   for (std::size_t k = 1; k < evidence.suspects; ++k) {
     if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
@@ -39,7 +39,8 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
   return points;
 }
 
-/// A mass on the first link acts by its moment alone: one of its two columns.
+/// Largest number of linear parameters with independent columns. A mass on the first link, for example, acts by its
+/// moment alone, so one of its two columns is not independent.
 int independent_columns(const std::vector<EffectDesign>& designs) {
   Index linear = 1;
   for (const EffectDesign& d : designs) {

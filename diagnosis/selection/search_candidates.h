@@ -1,5 +1,5 @@
 #pragma once
-/// The effects a search chooses among on given evidence: each over its grid, with its price.
+/// The effects that a search chooses from on given evidence: the designs over each one's grid, and its penalty.
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
@@ -9,19 +9,19 @@ namespace sparflow {
 struct SearchCandidate {
   EffectAt effect;
   std::vector<EffectDesign>
-      designs;           ///< one a point of its grid that acts on this evidence, and again with
-                         ///< optional parameters where those say something of their own
-  int linear = 1;        ///< linear parameters with independent columns, without optional ones
-  double penalty = 0.0;  ///< [nats] its gain must exceed
-  double optional_penalty = 0.0;  ///< [nats] and this besides for its optional parameters
+      designs;           ///< one for each grid point that acts on this evidence, and another with
+                         ///< the optional parameters where their columns are independent
+  int linear = 1;        ///< number of linear parameters with independent columns, not optional
+  double penalty = 0.0;  ///< [nats] subtracted from its gain
+  double optional_penalty = 0.0;  ///< [nats] further penalty of its optional parameters
 
   double price(const EffectDesign& design) const {
     return penalty + (design.optional ? optional_penalty : 0.0);
   }
 };
 
-/// Candidates that act somewhere in the evidence, in the order given; the others are left out.
-/// Penalty: Schwarz (1978), half a log of the rows for each parameter that does something.
+/// The candidates that act on some channel of the evidence, in the order given.
+/// Penalty: Schwarz (1978), half the logarithm of the number of rows for each parameter with an independent column.
 std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
                                                const std::vector<EffectAt>& effects);
 

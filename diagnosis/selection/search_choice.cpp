@@ -9,17 +9,18 @@
 namespace sparflow {
 namespace {
 
-/// That of `rivals` which is most of all better than `best` where every row counts the same, or `best`.
-const CandidateScore* ordinarily_best(const SearchState& search,
-                                      const std::vector<const EffectDesign*>& base,
-                                      const std::vector<const CandidateScore*>& rivals,
-                                      const EffectDesign& best) {
-  const OrdinaryResidual one = search.scores.ordinary(base, best);
+/// The rival with the largest significant advantage over `best` by least-squares comparison; null if there is none.
+const CandidateScore* best_by_least_squares(const SearchState& search,
+                                            const std::vector<const EffectDesign*>& base,
+                                            const std::vector<const CandidateScore*>& rivals,
+                                            const EffectDesign& best) {
+  const LeastSquaresResidual one = search.scores.least_squares(base, best);
   std::vector<double> advantage(rivals.size());
   parallel(rivals.size(), [&](std::size_t i) {
     const EffectDesign& d = search.design_of(*rivals[i]);
     if (search.meet(d, best))
-      advantage[i] = ordinary_advantage(search.evidence, search.scores.ordinary(base, d), one);
+      advantage[i] =
+          least_squares_advantage(search.evidence, search.scores.least_squares(base, d), one);
   });
   const auto most = std::max_element(advantage.begin(), advantage.end());
   return most == advantage.end() || *most <= 0.0
@@ -27,8 +28,7 @@ const CandidateScore* ordinarily_best(const SearchState& search,
              : rivals[static_cast<std::size_t>(most - advantage.begin())];
 }
 
-/// The same candidate with those nonlinear parameters of its grid that leave significantly less where every row
-/// counts the same, if any do.
+/// The same candidate at that point of its grid which the least-squares comparison prefers significantly, if any.
 CandidateScore shaped(const SearchState& search, const std::vector<const EffectDesign*>& base,
                       const CandidateScore& score) {
   std::vector<CandidateScore> others;
@@ -38,28 +38,31 @@ CandidateScore shaped(const SearchState& search, const std::vector<const EffectD
   std::vector<const CandidateScore*> pointers;
   pointers.reserve(others.size());
   for (const CandidateScore& o : others) pointers.push_back(&o);
-  const CandidateScore* better = ordinarily_best(search, base, pointers, search.design_of(score));
+  const CandidateScore* better =
+      best_by_least_squares(search, base, pointers, search.design_of(score));
   return better == nullptr ? score : *better;
 }
 
 }  // namespace
 
-bool ordinarily_better(const SearchState& search, const std::vector<const EffectDesign*>& base,
-                       const EffectDesign& one, const EffectDesign& other) {
-  return ordinary_advantage(search.evidence, search.scores.ordinary(base, one),
-                            search.scores.ordinary(base, other)) > 0.0;
+bool better_by_least_squares(const SearchState& search,
+                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
+                             const EffectDesign& other) {
+  return least_squares_advantage(search.evidence, search.scores.least_squares(base, one),
+                                 search.scores.least_squares(base, other)) > 0.0;
 }
 
 CandidateScore chosen(const SearchState& search, const std::vector<CandidateScore>& scores,
-                      const NullGate& gate, double level,
+                      const NullDistribution& null, double level,
                       const std::vector<const EffectDesign*>& base) {
   std::vector<const CandidateScore*> passing;
   for (const CandidateScore& s : scores) {
-    if (gate.p_value(s.gain, s.candidate) < level) passing.push_back(&s);
+    if (null.p_value(s.gain, s.candidate) < level) passing.push_back(&s);
   }
   if (passing.empty()) return scores.front();
   const CandidateScore* first = passing.front();
-  const CandidateScore* larger = ordinarily_best(search, base, passing, search.design_of(*first));
+  const CandidateScore* larger =
+      best_by_least_squares(search, base, passing, search.design_of(*first));
   if (larger != nullptr) {
     if (tracing())
       fmt::print(stderr, "  {} leaves less than {}\n",
@@ -72,7 +75,7 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
     const EffectAt& e = search.candidates[s->candidate].effect;
     if (e.at != best.at || e.effect->info().id != best.effect->info().refines) continue;
     if (s->gain > 0.5 * first->gain ||
-        !ordinarily_better(search, base, search.design_of(*first), search.design_of(*s))) {
+        !better_by_least_squares(search, base, search.design_of(*first), search.design_of(*s))) {
       return shaped(search, base, *s);
     }
   }

@@ -4,16 +4,16 @@
 
 #include <algorithm>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/selection/acceptance_tests.h"
 #include "diagnosis/selection/search_choice.h"
-#include "diagnosis/selection/search_proofs.h"
 
 namespace sparflow {
 namespace {
 
 bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
                std::size_t j, EffectFit& current) {
-  constexpr double kBeforeRefined = 0.9;  // of the pair's gain, at the grid's parameters
+  constexpr double kBeforeRefined = 0.9;  // least share of the pair's gain at grid points
   std::vector<FoundEffect> trial = found;
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(j));
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(i));
@@ -122,7 +122,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
   f.gain = own;
   const CandidateScore* challenger = nullptr;
   if (!scores.empty() && scores.front().gain > own + 1.0 &&
-      !ordinarily_better(search, others, f.design, search.design_of(scores.front()))) {
+      !better_by_least_squares(search, others, f.design, search.design_of(scores.front()))) {
     challenger = &scores.front();
   }
   if (challenger != nullptr) {
@@ -135,7 +135,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
     search.judge(trial, i, fit);
     if (why_not_named(trial[i], search.options).empty() && fit.total() > current.total()) {
       if (tracing())
-        fmt::print(stderr, "  {} takes the place of {}\n", search.key(rival.design.effect),
+        fmt::print(stderr, "  {} replaces {}\n", search.key(rival.design.effect),
                    search.key(f.design.effect));
       found = std::move(trial);
       current = fit;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "models/math/parallel.h"
 
 namespace sparflow {
@@ -18,7 +18,7 @@ std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
 
 }  // namespace
 
-/// Channels a design touches, and all that share a parameter with them.
+/// The channels in which a design acts, and all that share a parameter with them through other designs.
 std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>& designs,
                                           const EffectDesign& d) const {
   std::vector<bool> active(evidence_.channels.size());
@@ -39,8 +39,9 @@ std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>
   return active;
 }
 
-/// Noise that was fitted without an effect may hold the effect for noise: what is slow (oil that warms, a wrong mass)
-/// then stays offsets of motions. The likelihood has both maxima; from white noise the effect comes first.
+/// Whether a noise model that was fitted without an effect may contain that effect: a slow effect (oil that warms, a
+/// wrong mass) can be explained as offsets of motions. The likelihood then has two maxima, and a fit that starts from
+/// white noise finds the one with the effect.
 bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) const {
   constexpr double kOffsets = 0.2,
                    kSlow = 0.85;  // share of the variance; correlation of neighbours
@@ -54,7 +55,6 @@ bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) con
   return false;
 }
 
-/// Log likelihood with the design - of `current`, which has `base` (or base and a little more: swaps).
 double SearchScores::gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
                           const EffectFit& current, const std::vector<bool>& also,
                           bool only_there) const {
@@ -73,7 +73,7 @@ double SearchScores::gain(const std::vector<const EffectDesign*>& base, const Ef
   const auto gained = [&](const EffectFit& fit) {
     double sum = 0.0;
     for (std::size_t k = 0; k < c.active.size(); ++k) {
-      // a rival must explain the same evidence, not other evidence as much
+      // with only_there, a rival must explain the same evidence
       if (only_there ? also[k] : c.active[k])
         sum += fit.log_likelihood[k] - current.log_likelihood[k];
     }
@@ -132,12 +132,11 @@ double SearchScores::gain_instead(const EffectDesign& design, const EffectDesign
   return gain(others, design, without, touched_by(place), true);
 }
 
-OrdinaryResidual SearchScores::ordinary(const std::vector<const EffectDesign*>& base,
-                                        const EffectDesign& design) const {
-  return ordinary_residual(evidence_, base, design, connected(base, design));
+LeastSquaresResidual SearchScores::least_squares(const std::vector<const EffectDesign*>& base,
+                                                 const EffectDesign& design) const {
+  return least_squares_residual(evidence_, base, design, connected(base, design));
 }
 
-/// Nonlinear parameters between grid points, by golden section in each in turn.
 EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
                                    const CandidateScore& score, const EffectFit& current) const {
   const SearchCandidate& candidate = candidates_[score.candidate];

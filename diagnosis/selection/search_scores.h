@@ -1,17 +1,17 @@
 #pragma once
-/// Likelihood gains of candidates beside or in the place of effects already found. Used by effect_search.cpp only.
+/// Gains of candidates that are added to the effects already found or replace one of them. Used by the search only.
 #include <vector>
 
-#include "diagnosis/regression/ordinary_check.h"
+#include "diagnosis/regression/least_squares_comparison.h"
 #include "diagnosis/selection/search_candidates.h"
 
 namespace sparflow {
 
-/// One candidate's best design.
+/// The best design of one candidate.
 struct CandidateScore {
   std::size_t candidate = 0;
   std::size_t design = 0;
-  double gain = -1e300;  ///< [nats] less the price of its parameters
+  double gain = -1e300;  ///< [nats] penalised
 };
 
 class SearchScores {
@@ -20,33 +20,34 @@ class SearchScores {
   SearchScores(const Evidence& evidence, const std::vector<SearchCandidate>& candidates)
       : evidence_(evidence), candidates_(candidates) {}
 
-  /// Every candidate beside `base`, best first. @param skip by candidate  @param current fit of `base`
+  /// Every candidate added to `base`, best first.
+  /// @param current fit of `base`  @param skip by candidate: whether to leave it out
   std::vector<CandidateScore> beside(const std::vector<const EffectDesign*>& base,
                                      const EffectFit& current, const std::vector<bool>& skip) const;
 
-  /// Candidates that meet `place` in a channel, in its place beside `others`, best first; all are counted where
-  /// `place` shows: a rival must explain the same evidence, not other evidence as much.
+  /// Candidates that share a channel with `place` and replace it beside `others`, best first. Gains are summed over the
+  /// channels in which `place` acts, because a rival must explain the same evidence.
   /// @param without fit of `others`
   std::vector<CandidateScore> instead_of(const EffectDesign& place,
                                          const std::vector<const EffectDesign*>& others,
                                          const EffectFit& without,
                                          const std::vector<bool>& skip) const;
 
-  /// Gain of one design in the place of `place` (itself, for its own), counted as in `instead_of`. [nats]
+  /// Gain of one design that replaces `place` (or is `place`), summed as in `instead_of`, without penalty. [nats]
   double gain_instead(const EffectDesign& design, const EffectDesign& place,
                       const std::vector<const EffectDesign*>& others,
                       const EffectFit& without) const;
 
-  /// What ordinary least squares leaves with `design` beside `base`.
-  OrdinaryResidual ordinary(const std::vector<const EffectDesign*>& base,
-                            const EffectDesign& design) const;
+  /// Residual by ordinary least squares with `design` added to `base`.
+  LeastSquaresResidual least_squares(const std::vector<const EffectDesign*>& base,
+                                     const EffectDesign& design) const;
 
-  /// Nonlinear parameters between grid points, by golden section in each in turn.
+  /// The design with its nonlinear parameters refined between grid points, by a golden-section search in each in turn.
   EffectDesign refined(const std::vector<const EffectDesign*>& base, const CandidateScore& score,
                        const EffectFit& current) const;
 
-  /// Log likelihood with `d` beside `base` - that of `current`, which has `base`. [nats]
-  /// @param also channels to fit besides those that d and base meet in @param only_there count these alone
+  /// Log-likelihood with `d` added to `base`, less that of `current`, the fit of `base`. [nats]
+  /// @param also channels to fit besides those that d and base share  @param only_there sums over `also` alone
   double gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
               const EffectFit& current, const std::vector<bool>& also = {},
               bool only_there = false) const;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "diagnosis/selection/search_proofs.h"
+#include "diagnosis/selection/acceptance_tests.h"
 
 namespace sparflow {
 
@@ -61,7 +61,7 @@ EffectFit SearchState::fit(const std::vector<const EffectDesign*>& designs,
   FitControl c;
   c.keep_residuals = true;
   c.noise_passes =
-      12;  // to the end: what is left of the way would be taken for another effect's gain
+      12;  // to convergence: later progress would otherwise count as another effect's gain
   c.covariance = true;
   return fit_effects(evidence, designs, start, c);
 }
@@ -81,9 +81,9 @@ bool tracing() {
 }
 
 void trace_scores(const SearchState& search, int step, const std::vector<CandidateScore>& scores,
-                  const NullGate& gate) {
+                  const NullDistribution& null) {
   fmt::print(stderr, "step {} threshold {:.1f}\n", step,
-             gate.threshold(search.options.false_alarm));
+             null.threshold(search.options.false_alarm));
   for (std::size_t i = 0; i < std::min<std::size_t>(8, scores.size()); ++i) {
     const SearchCandidate& c = search.candidates[scores[i].candidate];
     fmt::print(stderr, "   {:28s} gain {:9.1f} shape [{:.4g}]\n", search.key(c.effect),

@@ -7,17 +7,17 @@
 #include <cmath>
 #include <set>
 
-#include "diagnosis/regression/null_gate.h"
+#include "diagnosis/regression/null_distribution.h"
 #include "diagnosis/selftest/selftest_study.h"
 #include "models/math/error.h"
 
 namespace sparflow {
 namespace {
 
-/// Residual so far above the sensors' own noise is no noise: something is missing already.
+/// Ratio of residual to noise floor above which an effect is probably missing already.
 constexpr double kSuspiciousNoise = 3.0;
 
-/// An effect without action in these logs: signals missing, or a motion that never provokes it.
+/// Result for an effect that acts on no channel of these logs: signals are missing, or no motion excites it.
 InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
                               const EffectAt& effect) {
   const EffectInfo& info = effect.effect->info();
@@ -41,39 +41,41 @@ InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
   const bool no_oil = std::all_of(evidence.series.begin(), evidence.series.end(),
                                   [](const MachineSeries& s) { return s.oil.size() == 0; });
   out.reason = oil && no_oil ? "not measured: it needs the oil temperature"
-               : measured    ? "no motion of these logs provokes it"
+               : measured    ? "no motion of these logs excites it"
                           : fmt::format("not measured: it needs {}", fmt::join(info.signals, ", "));
   return out;
 }
 
-/// Effects to inject: stage by stage in turn, clearly predicted ones only, seen before unseen, drawn at random.
+/// Indices of effects to inject, drawn at random from those with a clear prediction: the stages in turn, those that
+/// should be named first.
 std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects, int count,
                                      unsigned seed) {
   std::mt19937_64 random(seed);
-  std::vector<std::vector<std::size_t>> piles;
+  std::vector<std::vector<std::size_t>> groups;
   for (const bool seen : {true, false}) {
     for (const char* stage : {"force", "flow", "pressure", "pump", "sensor"}) {
-      piles.emplace_back();
+      groups.emplace_back();
       for (std::size_t i = 0; i < effects.size(); ++i) {
         const InjectedEffect& e = effects[i];
         const bool clear =
             seen ? e.power > 0.97 && e.times95 < 0.8 : e.power < 0.03 && !e.typical.empty();
-        if (e.stage == stage && clear) piles.back().push_back(i);
+        if (e.stage == stage && clear) groups.back().push_back(i);
       }
-      std::shuffle(piles.back().begin(), piles.back().end(), random);
+      std::shuffle(groups.back().begin(), groups.back().end(), random);
     }
   }
   std::vector<std::size_t> out;
-  const auto take = [&](std::size_t pile) {
-    if (static_cast<int>(out.size()) >= count || piles[pile].empty()) return false;
-    out.push_back(piles[pile].back());
-    piles[pile].pop_back();
+  const auto take = [&](std::size_t group) {
+    if (static_cast<int>(out.size()) >= count || groups[group].empty()) return false;
+    out.push_back(groups[group].back());
+    groups[group].pop_back();
     return true;
   };
   for (bool any = true; any;) {
     any = false;
     for (std::size_t p = 0; p < 5; ++p) any = take(p) || any;
-    for (std::size_t p = 5; p < 10 && count > 3; ++p) {  // one that should stay unseen a round
+    for (std::size_t p = 5; p < 10 && count > 3;
+         ++p) {  // in each round one that should not be named
       if (!take(p)) continue;
       any = true;
       break;
@@ -92,7 +94,7 @@ std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>&
     sets.insert(std::move(keys));
   }
   std::vector<std::vector<std::string>> out;
-  for (const auto& s : sets) {  // a set inside another says nothing new
+  for (const auto& s : sets) {  // subsets of another set are left out
     const bool inside = std::any_of(sets.begin(), sets.end(), [&](const auto& other) {
       return other.size() > s.size() &&
              std::includes(other.begin(), other.end(), s.begin(), s.end());
@@ -102,7 +104,7 @@ std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>&
   return out;
 }
 
-/// For a set, the motion that tells the effect it was found for, at its typical size, from the others.
+/// For each set, the motion that distinguishes one of its effects at the typical size from the others.
 std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evidence,
                                     const EffectFit& fit,
                                     const std::vector<InjectedEffect>& effects,
@@ -113,7 +115,7 @@ std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evi
   };
   std::vector<Experiment> out;
   for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
-    // all others are its rivals; of the other members that need not hold
+    // the effect that has all others as rivals, which need not hold for every member
     const auto whole = std::find_if(sets[k].begin(), sets[k].end(), [&](const std::string& key) {
       return named(key)->confused_with.size() + 1 == sets[k].size();
     });
@@ -142,7 +144,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     if (progress) progress(share, what);
   };
   Selftest out;
-  report(0.02, "arranging the evidence");
+  report(0.02, "collecting the evidence");
   std::vector<MachineSignals> suspects, pinned;
   for (const Log& log : logs) {
     suspects.push_back(make_signals(model.machine, log, options.signals));
@@ -174,11 +176,11 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     const double ratio = fit.noise[c].deviation() / channel.noise_floor;
     if (!(ratio > kSuspiciousNoise)) continue;
     out.notes.push_back(fmt::format(
-        "{}: what the model leaves is {:.0f} times the sensors' noise and counts as noise here; "
-        "`diagnose` may find its cause, then more can be seen",
+        "{}: the residual is {:.0f} times the noise floor and counts as noise here; `diagnose` may "
+        "find its cause, and more effects can then be named",
         channel.text, ratio));
   }
-  report(0.1, "making the effects' signatures");
+  report(0.1, "signatures of the effects");
   std::vector<SearchCandidate> all = search_candidates(evidence, wanted);
   for (const EffectAt& w : wanted) {
     const bool acts = std::any_of(all.begin(), all.end(), [&](const SearchCandidate& c) {
@@ -186,17 +188,18 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     });
     if (!acts) out.effects.push_back(without_action(evidence, model.machine, w));
   }
-  report(0.3, "the gate on these motions");
-  std::vector<GateCandidate> gated;
-  gated.reserve(all.size());
-  for (const SearchCandidate& c : all) gated.push_back({&c.designs, c.penalty, c.optional_penalty});
+  report(0.3, "null distribution of the largest gain");
+  std::vector<NullCandidate> null_candidates;
+  null_candidates.reserve(all.size());
+  for (const SearchCandidate& c : all)
+    null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
   std::mt19937_64 random(options.search.seed);
-  const NullGate gate =
-      make_null_gate(evidence, gated, {}, fit, options.search.simulations, random);
-  out.threshold = gate.threshold(options.search.false_alarm);
-  report(0.5, "power and confusion");
+  const NullDistribution null = simulate_null_distribution(evidence, null_candidates, {}, fit,
+                                                           options.search.simulations, random);
+  out.threshold = null.threshold(options.search.false_alarm);
+  report(0.5, "power and rivals");
   SelftestStudy study(model, evidence, references.empty() ? nullptr : &alone, fit, std::move(all),
-                      gate, options.search);
+                      null, options.search);
   const std::vector<InjectedEffect> seen = study.run();
 
   const std::vector<std::size_t> drawn = draw_checks(seen, options.check, options.search.seed);
@@ -213,7 +216,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     out.checks.push_back(std::move(check));
   }
   out.sets = sets_of(seen);
-  report(0.97, "motions that would tell effects apart");
+  report(0.97, "motions that would distinguish the effects");
   out.experiments = motions_for(model, evidence, fit, seen, out.sets);
   out.effects.insert(out.effects.end(), seen.begin(), seen.end());
   const auto place = [&](const InjectedEffect& e) {

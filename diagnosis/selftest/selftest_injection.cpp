@@ -21,7 +21,8 @@ InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
     injected.channels.push_back(std::move(channel));
   }
   SearchOptions few = options;
-  few.max_effects = 3;  // a refinement is named after the plainer effect that it contains
+  few.max_effects =
+      3;  // the search may need three steps to replace a plainer effect by its refinement
   const SearchResult result = search_effects(injected, candidates, few);
 
   InjectionCheck check;

@@ -67,7 +67,7 @@ std::string Selftest::headline() const {
 std::string Selftest::table() const {
   std::string out = headline() + "\n\n";
   out += fmt::format("  {:28s} {:>8s} {:>8s} {:>8s}  {}\n", "effect", "power", "from", "absorbed",
-                     "cannot be told from");
+                     "indistinguishable from");
   std::map<std::string, std::vector<std::string>> never;  // by reason
   for (const InjectedEffect& e : effects) {
     if (e.visibility != Visibility::kNever) {
@@ -77,12 +77,12 @@ std::string Selftest::table() const {
     }
   }
   out +=
-      "  power: chance to be named at its typical size. from: size named with 80 % power, in "
+      "  power: probability to be named at its typical size. from: size with 80 % power, in "
       "typical sizes.\n";
   if (!never.empty()) out += "\n  Not from these logs:\n";
   for (const auto& [reason, keys] : never)
     out += fmt::format("    {}\n      {}\n", reason, fmt::join(keys, ", "));
-  if (!sets.empty()) out += "\n  Cannot be told apart on these motions:\n";
+  if (!sets.empty()) out += "\n  Indistinguishable on these motions:\n";
   for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
     out += fmt::format("    {}\n", fmt::join(sets[k], "  or  "));
     if (k < experiments.size()) out += fmt::format("      {}\n", experiments[k].sentence());

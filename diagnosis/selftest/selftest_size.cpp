@@ -52,22 +52,22 @@ EffectSize size_effect(const SearchCandidate& candidate) {
   }
   if (!share || shapes.empty()) return out;
 
-  // the same variant of the law at every size
+  // only grid points with the same variant of the law
   const std::vector<double>& variant = candidate.designs[out.typical].shape;
   for (std::size_t d = 0; d < candidate.designs.size(); ++d) {
     const std::vector<double>& shape = candidate.designs[d].shape;
     if (std::equal(shape.begin() + 1, shape.end(), variant.begin() + 1))
-      out.rungs.push_back({d, shape[0], 0.0});
+      out.levels.push_back({d, shape[0], 0.0});
   }
-  const auto action = [&](const Rung& r) { return whole_action(candidate.designs[r.design]); };
-  std::sort(out.rungs.begin(), out.rungs.end(),
-            [&](const Rung& a, const Rung& b) { return action(a) < action(b); });
-  // a limit's grid depends on what the log reaches, and so does what is typical: its middle
+  const auto action = [&](const SizeLevel& r) { return whole_action(candidate.designs[r.design]); };
+  std::sort(out.levels.begin(), out.levels.end(),
+            [&](const SizeLevel& a, const SizeLevel& b) { return action(a) < action(b); });
+  // the grid of a limit depends on the range of the log, and so does its typical value: the middle of the grid
   const std::vector<double>& own = shapes[0]->grid;
   const bool by_log = std::find(own.begin(), own.end(), variant[0]) == own.end();
-  if (by_log) out.typical = out.rungs[out.rungs.size() / 2].design;
+  if (by_log) out.typical = out.levels[out.levels.size() / 2].design;
   const EffectDesign& typical = candidate.designs[out.typical];
-  for (Rung& r : out.rungs) {
+  for (SizeLevel& r : out.levels) {
     r.times = by_log ? std::sqrt(action(r) / whole_action(typical)) : r.value / typical.shape[0];
   }
   return out;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/effect_proof.h"
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/effect_intervals.h"
 #include "models/math/parallel.h"
 
@@ -32,8 +32,8 @@ EffectFit noise_only(const EffectFit& fit, const VectorXd& theta) {
   return out;
 }
 
-/// Whether so few motions show it that leaving some out would not prove it: the rule of the held-out gain on the
-/// expected gains of the folds, noise aside.
+/// Whether too few motions excite an effect for the acceptance test on motions left out: that test's rule, applied to
+/// the expected gains of the folds without noise.
 bool in_too_few_motions(const Evidence& evidence, const Signature& s, int folds) {
   VectorXd gains = VectorXd::Zero(folds);
   for (std::size_t c = 0; c < s.white.size(); ++c) {
@@ -58,15 +58,15 @@ bool behind_learned_law(EffectStage stage) {
 
 SelftestStudy::SelftestStudy(const CraneModel& model, const Evidence& evidence,
                              const Evidence* alone, const EffectFit& fit,
-                             std::vector<SearchCandidate> candidates, NullGate gate,
+                             std::vector<SearchCandidate> candidates, NullDistribution null,
                              const SearchOptions& options)
     : machine_(model.machine),
       evidence_(evidence),
       alone_(alone),
       fit_(fit),
       options_(options),
-      gate_(std::move(gate)),
-      threshold_(std::max(gate_.threshold(options.false_alarm), options.least_gain)),
+      null_(std::move(null)),
+      threshold_(std::max(null_.threshold(options.false_alarm), options.least_gain)),
       power_(evidence, fit, options.seed),
       candidates_(std::move(candidates)),
       sizes_(candidates_.size()),
@@ -88,22 +88,22 @@ Signature SelftestStudy::typical_signature(std::size_t i) const {
 }
 
 double SelftestStudy::price(std::size_t i) const {
-  return gate_.scale[i] * (threshold_ + candidates_[i].penalty);
+  return null_.scale[i] * (threshold_ + candidates_[i].penalty);
 }
 
-/// Chance that a gain of that mean passes the gate.
+/// Probability that a gain with this mean passes the threshold.
 double SelftestStudy::chance(std::size_t i, double gain) const {
   const SearchCandidate& c = candidates_[i];
   return chance_above(2.0 * price(i), c.linear, 2.0 * gain);
 }
 
-/// Least number of times the typical size with that mean gain, and parameter values there.
+/// Least multiple of the typical size with this mean gain, and the parameter values there [SI].
 std::pair<double, std::vector<double>> SelftestStudy::times_for(std::size_t i,
                                                                 const Signature& typical,
                                                                 double gain) const {
   const EffectSize& s = sizes_[i];
   const SearchCandidate& c = candidates_[i];
-  if (s.rungs.empty()) {
+  if (s.levels.empty()) {
     double lo = std::log(1e-4), hi = std::log(s.largest);
     if (power_.gain(typical, s.largest) < gain) return {kInfinity, {}};
     for (int k = 0; k < 22; ++k) {  // to 3e-6 of the range of logarithms
@@ -113,22 +113,22 @@ std::pair<double, std::vector<double>> SelftestStudy::times_for(std::size_t i,
     const double times = std::exp(hi);
     return {times, parameter_values(*c.effect.effect, times * s.theta, c.designs[s.typical].shape)};
   }
-  // by rungs of its grid, from the weakest to the strongest, interpolated between two
+  // from the weakest to the strongest grid point, interpolated between two
   double before_gain = 0.0, before_value = 0.0, before_times = 0.0;
-  for (std::size_t k = 0; k < s.rungs.size(); ++k) {
-    const Rung& rung = s.rungs[k];
-    const double g = power_.gain(signature(projected_[i][rung.design], s.theta));
+  for (std::size_t k = 0; k < s.levels.size(); ++k) {
+    const SizeLevel& level = s.levels[k];
+    const double g = power_.gain(signature(projected_[i][level.design], s.theta));
     if (g < gain) {
-      before_gain = g, before_value = rung.value, before_times = rung.times;
+      before_gain = g, before_value = level.value, before_times = level.times;
       continue;
     }
-    std::vector<double> shape = c.designs[rung.design].shape;
-    double times = rung.times;
+    std::vector<double> shape = c.designs[level.design].shape;
+    double times = level.times;
     if (k > 0 && g > before_gain) {
       const double t =
           (std::sqrt(gain) - std::sqrt(before_gain)) / (std::sqrt(g) - std::sqrt(before_gain));
-      shape[0] = before_value + t * (rung.value - before_value);
-      times = before_times + t * (rung.times - before_times);
+      shape[0] = before_value + t * (level.value - before_value);
+      times = before_times + t * (level.times - before_times);
     }
     return {times, parameter_values(*c.effect.effect, s.theta, shape)};
   }
@@ -170,13 +170,14 @@ void SelftestStudy::see(std::size_t i) {
   const Signature typical = typical_signature(i);
   out.gain = power_.gain(typical);
   if (behind_learned_law(info.stage) && out.absorbed > options_.largest_absorbed) {
-    out.reason = fmt::format("learned laws imitate {:.0f} % of it; {}", 100.0 * out.absorbed,
-                             evidence_.has_reference() ? "the references pin too little"
-                                                       : "give a log without it as --reference");
+    out.reason = fmt::format("the absorbed share is {:.0f} %; {}", 100.0 * out.absorbed,
+                             evidence_.has_reference()
+                                 ? "the reference logs have too few of its flows and loads"
+                                 : "give a log without it as --reference");
     return;
   }
   if (in_too_few_motions(evidence_, typical, options_.folds)) {
-    out.reason = "too few motions show it: repeat what provokes it";
+    out.reason = "too few motions excite it: repeat them";
     return;
   }
   const double nats = price(i);
@@ -185,13 +186,13 @@ void SelftestStudy::see(std::size_t i) {
   out.times80 = t80;
   out.times95 = t95;
   std::vector<double> values = v80;
-  // the estimate of its size must also pass what is worth a name; its relative error is that of a known noise
+  // the estimated size must also exceed the smallest that is named; its relative error is that for known noise
   const double squares = typical.squares();
   const double deviation = squares > 0.0 ? 1.0 / std::sqrt(squares) : kInfinity;
   const auto large_enough = [&](double quantile) {
     return options_.smallest_effect / std::max(out.size, 1e-12) + quantile * deviation;
   };
-  if (s.rungs.empty()) {
+  if (s.levels.empty()) {
     if (large_enough(0.84) > out.times80) {
       out.times80 = large_enough(0.84);
       values = parameter_values(*c.effect.effect, out.times80 * s.theta, design.shape);
@@ -215,18 +216,18 @@ void SelftestStudy::see(std::size_t i) {
     out.reason = "below the noise at any plausible size: stronger or more motions are needed";
 }
 
-/// Rivals, at the typical size or at the smallest that would be seen, whichever is larger.
+/// Finds the rivals at the typical size or at the smallest that would be named, whichever is larger.
 void SelftestStudy::confuse(std::size_t i) {
   InjectedEffect& out = result_[i];
   if (out.visibility == Visibility::kNever) return;
   Signature s = typical_signature(i);
-  if (sizes_[i].rungs.empty() && out.times80 > 1.0)
+  if (sizes_[i].levels.empty() && out.times80 > 1.0)
     s = signature(projected_[i][sizes_[i].typical], out.times80 * sizes_[i].theta);
   const double squares = s.squares();
   for (std::size_t k = 0; k < candidates_.size(); ++k) {
     if (k == i) continue;
     const EffectInfo& rival = candidates_[k].effect.effect->info();
-    // a rival that would be refused is none
+    // an effect that fails the acceptance tests is no rival
     if (behind_learned_law(rival.stage) && result_[k].absorbed > options_.largest_absorbed)
       continue;
     Confusion worst{effect_key(rival, machine_, candidates_[k].effect.at), kInfinity, 0.0};
@@ -242,7 +243,7 @@ void SelftestStudy::confuse(std::size_t i) {
       worst.share = share;
       left = std::move(here);
     }
-    if (worst.share < 0.2) continue;  // four nats of a gain that passes any gate are more than that
+    if (worst.share < 0.2) continue;  // the rest of a significant gain then exceeds same_nats
     worst.nats = std::min(power_.gain(left), 0.5 * left.squares());
     if (worst.nats < options_.same_nats) out.confused_with.push_back(std::move(worst));
   }

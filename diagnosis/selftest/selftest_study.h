@@ -4,23 +4,24 @@
 #include <vector>
 
 #include "diagnosis/experiment/effect_power.h"
-#include "diagnosis/regression/null_gate.h"
+#include "diagnosis/regression/null_distribution.h"
 #include "diagnosis/selftest/selftest.h"
 #include "diagnosis/selftest/selftest_size.h"
 
 namespace sparflow {
 
-/// Learned laws stand between the effect and the logs: what they imitate is not named.
+/// Whether effects of a stage are tested for their absorbed share: pressure models and margins are learned there.
 bool behind_learned_law(EffectStage stage);
 
 class SelftestStudy {
  public:
   /// @param alone the same evidence without references; null when there are none
-  /// @param fit of nothing: the channels' noise  @param gate of these candidates, in their order
+  /// @param fit without effects, with the channels' noise models
+  /// @param null distribution of the largest gain of these candidates, in their order
   /// All references and pointers must outlive this.
   SelftestStudy(const CraneModel& model, const Evidence& evidence, const Evidence* alone,
-                const EffectFit& fit, std::vector<SearchCandidate> candidates, NullGate gate,
-                const SearchOptions& options);
+                const EffectFit& fit, std::vector<SearchCandidate> candidates,
+                NullDistribution null, const SearchOptions& options);
 
   std::vector<InjectedEffect> run();
   const EffectSize& size(std::size_t i) const { return sizes_[i]; }
@@ -28,7 +29,7 @@ class SelftestStudy {
 
  private:
   Signature typical_signature(std::size_t i) const;
-  /// [nats] a gain must reach before its price: the gate's threshold, calibrated for this candidate.
+  /// [nats] threshold of the gain without penalty, scaled for this candidate.
   double price(std::size_t i) const;
   double chance(std::size_t i, double gain) const;
   std::pair<double, std::vector<double>> times_for(std::size_t i, const Signature& typical,
@@ -42,7 +43,7 @@ class SelftestStudy {
   const Evidence* alone_;
   const EffectFit& fit_;
   const SearchOptions& options_;
-  NullGate gate_;
+  NullDistribution null_;
   double threshold_;
   PowerStudy power_;
   std::vector<SearchCandidate> candidates_;

@@ -7,11 +7,11 @@
 #include <cmath>
 
 #include "diagnosis/experiment/experiment.h"
-#include "diagnosis/regression/effect_proof.h"
-#include "diagnosis/residual/unexplained.h"
+#include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
-#include "diagnosis/verdict/diagnosed_riddles.h"
+#include "diagnosis/verdict/unmodelled_structure.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 
@@ -21,7 +21,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// What another power of the laws of what was found explains (a cushion that grows with x^2.5) is no riddle.
+/// Fit in which the laws of the found effects may have another exponent (a cushion with x^2.5): what that explains is
+/// model-form error and no unmodelled structure.
 EffectFit fit_with_other_powers(const Diagnosis& d) {
   std::vector<EffectDesign> powers;
   powers.reserve(d.search.found.size());
@@ -42,12 +43,12 @@ EffectFit fit_with_other_powers(const Diagnosis& d) {
   return fit_effects(d.evidence, designs, &d.search.final, control);
 }
 
-/// Whether the model and what was found follow a pump's steps down to what they leave elsewhere: then it is the pump
-/// that is late or at its limit, no sensor that jumps.
+/// Whether model and found effects explain the jumps of a pump pressure as well as the rest of it. The pump is then
+/// late or at its limit, and the sensor is not faulty.
 bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& bad,
                    std::size_t log) {
-  constexpr double kAlike = 3.0;  // standard deviations of the rest
-  // a jump that is shorter than the filter is hardly seen behind it
+  constexpr double kAlike = 3.0;  // largest RMS inside the jumps, in robust standard deviations
+  // a jump that is shorter than the filter is hardly visible after it
   const bool brief = std::any_of(bad.stretches.begin(), bad.stretches.end(), [&](const auto& jump) {
     return jump.second - jump.first < d.evidence.window;
   });
@@ -74,9 +75,9 @@ bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& b
   return false;
 }
 
-/// Takes out the jumps that are physics.
-void keep_what_is_no_physics(const Diagnosis& d, const std::vector<std::size_t>& log_of,
-                             std::vector<BadChannel>& bad) {
+/// Removes the channels whose jumps known physics explains.
+void keep_sensor_faults(const Diagnosis& d, const std::vector<std::size_t>& log_of,
+                        std::vector<BadChannel>& bad) {
   const EffectFit fit = fit_without(d, d.search.found.size());
   std::vector<BadChannel> kept;
   kept.reserve(bad.size());
@@ -86,36 +87,38 @@ void keep_what_is_no_physics(const Diagnosis& d, const std::vector<std::size_t>&
   bad = std::move(kept);
 }
 
-/// Effects beside others that are none: a large error stays where they show best, and they are no name for it.
-void drop_trifles(Diagnosis& d, const SearchOptions& options) {
+/// Drops minor effects when other effects remain; their error becomes `unexplained`.
+void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
   std::vector<DiagnosedEffect> all;
   all.reserve(d.search.found.size());
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     all.push_back(describe_effect(d, i, options));
-  const auto trifles = std::count_if(all.begin(), all.end(),
-                                     [&](const DiagnosedEffect& e) { return is_a_trifle(d, e); });
-  if (trifles == 0 || trifles == std::ssize(all)) return;
+  const auto minor = std::count_if(all.begin(), all.end(),
+                                   [&](const DiagnosedEffect& e) { return is_minor_effect(d, e); });
+  if (minor == 0 || minor == std::ssize(all)) return;
   std::vector<FoundEffect> kept;
   kept.reserve(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     const DiagnosedEffect& e = all[i];
-    if (!is_a_trifle(d, e)) {
+    if (!is_minor_effect(d, e)) {
       kept.push_back(std::move(d.search.found[i]));
       continue;
     }
     d.notes.push_back(
-        fmt::format("{} is not named: with it {:.0f} % of the error of the {} stay unexplained",
+        fmt::format("{} is a minor effect and not named: with it, {:.0f} % of the squared error "
+                    "of the {} remain unexplained",
                     e.key(), 100.0 * (1.0 - explained_share(d, e)),
                     d.evidence.channels[e.channels.front().channel].text));
-    if (!d.unexplained) d.unexplained = describe_trifle(d.evidence, e);
+    if (!d.unexplained) d.unexplained = describe_minor_effect(d.evidence, e);
   }
   d.search.found = std::move(kept);
   d.search.final = fit_without(d, d.search.found.size());
 }
 
-/// Values as a model that is extended with the effects gets them: all together, where the search added one by one.
-void settle_values(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                   const std::vector<MachineSignals>& references, std::vector<FoundEffect>& found) {
+/// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets.
+void set_joint_estimates(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                         const std::vector<MachineSignals>& references,
+                         std::vector<FoundEffect>& found) {
   std::vector<EffectAt> wanted;
   wanted.reserve(found.size());
   for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
@@ -129,7 +132,7 @@ void settle_values(const CraneModel& model, const std::vector<MachineSignals>& s
   }
 }
 
-/// Those that explain the same evidence as well.
+/// The rivals that form an indistinguishable set with a found effect.
 std::vector<EffectAt> rivals_of(const FoundEffect& found, double same_nats) {
   std::vector<EffectAt> rivals;
   for (const auto& [rival, worse] : found.alternatives) {
@@ -159,7 +162,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
                            const DiagnoseOptions& options, const SearchProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   Diagnosis d;
-  if (progress) progress(0.02, "arranging the evidence");
+  if (progress) progress(0.02, "collecting the evidence");
   const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
   d.evidence = collect_evidence(model, suspects, references, &in_references);
   d.notes = d.evidence.notes;
@@ -179,37 +182,39 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   for (const auto& [effect, gain] : d.search.ranking) {
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
-  if (progress) progress(0.92, "looking at what is left");
-  const std::vector<Leftover> left = find_leftovers(d.evidence, fit_with_other_powers(d));
-  std::vector<Leftover> riddles;
+  if (progress) progress(0.92, "searching for unmodelled structure in the residual");
+  const std::vector<ResidualStructure> left =
+      find_residual_structure(d.evidence, fit_with_other_powers(d));
+  std::vector<ResidualStructure> unmodelled;
   bool in_touched = false;
-  for (const Leftover& l : left) {
+  for (const ResidualStructure& l : left) {
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
-    const double share = leftover_share(d, l);
-    if (touched) d.leftover_share = std::max(d.leftover_share, share);
-    if (share < (l.event ? kLargestEventShare : kLargestLeftoverShare)) continue;
+    const double share = unmodelled_share(d, l);
+    if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
+    if (share < (l.event ? kLargestEventShare : kLargestUnmodelledShare)) continue;
     if (!d.unexplained || (touched && !in_touched))
-      d.unexplained = describe_leftover(d.evidence, l);
+      d.unexplained = describe_residual_structure(d.evidence, l);
     in_touched = in_touched || touched;
-    riddles.push_back(l);
+    unmodelled.push_back(l);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     d.unexplained = describe_unnamed(d);
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
-    d.unexplained = describe_incident(d);
-  drop_trifles(d, options.search);
-  if (!d.search.found.empty()) settle_values(model, suspects, references, d.search.found);
+    d.unexplained = describe_isolated_event(d);
+  drop_minor_effects(d, options.search);
+  if (!d.search.found.empty()) set_joint_estimates(model, suspects, references, d.search.found);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe_effect(d, i, options.search));
-  // One effect proven where nothing is left over is a finding, whatever else goes on elsewhere.
+  // One effect without unmodelled structure at its place is enough for a verdict of a missing effect.
   const bool unknown =
-      (!riddles.empty() || !d.effects.empty()) &&
+      (!unmodelled.empty() || !d.effects.empty()) &&
       std::all_of(d.effects.begin(), d.effects.end(), [&](const DiagnosedEffect& e) {
-        return is_doubtful(d.evidence, e, riddles) || is_a_trifle(d, e);
+        return is_doubtful(d.evidence, e, unmodelled) || is_minor_effect(d, e);
       });
-  if (unknown && !d.unexplained) d.unexplained = describe_trifle(d.evidence, d.effects.front());
+  if (unknown && !d.unexplained)
+    d.unexplained = describe_minor_effect(d.evidence, d.effects.front());
   d.verdict = unknown              ? Verdict::kUnknown
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown
@@ -217,7 +222,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   for (std::size_t i = 0; i < d.effects.size(); ++i) {
     const DiagnosedEffect& e = d.effects[i];
     if (e.rivals.empty()) continue;
-    if (progress) progress(0.95, "motions that would tell effects apart");
+    if (progress) progress(0.95, "motions that would distinguish the effects");
     std::vector<std::string> set = {e.key()};
     for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
     d.indistinguishable.push_back(std::move(set));
@@ -225,7 +230,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
         next_experiment(model, d.evidence, d.search.final, e.applied,
                         rivals_of(d.search.found[i], options.search.same_nats)));
   }
-  // Found in the order of what they explain: that order stays; one of a set that is not even half sure goes last.
+  // They stay in the order in which they were found, except that those of a probability below one half come last.
   std::stable_partition(d.effects.begin(), d.effects.end(),
                         [](const DiagnosedEffect& e) { return e.probability >= 0.5; });
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -240,7 +245,7 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
     throw InputError({}, "logs", "no log to diagnose: give at least one with --log");
   std::vector<MachineSignals> suspects, pinned;
   std::vector<BadChannel> bad;
-  std::vector<std::size_t> log_of;  // each bad channel's
+  std::vector<std::size_t> log_of;  // log of each bad channel
   for (const Log& log : logs) {
     suspects.push_back(make_signals(model.machine, log, options.signals));
     if (!options.check_data) continue;
@@ -250,13 +255,13 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
   }
   for (const Log& log : references)
     pinned.push_back(make_signals(model.machine, log, options.signals));
-  // Steps that no other channel shares may be a sensor's or a late pump's: where known physics explains the
-  // channel down to its noise, they were physics. Other faults leave nothing to explain.
+  // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
+  // them, so the diagnosis runs first; with any other fault the data cannot be diagnosed.
   const bool surely_bad = std::any_of(
       bad.begin(), bad.end(), [](const BadChannel& b) { return b.kind != BadDataKind::kJumping; });
   if (!surely_bad) {
     Diagnosis d = diagnose_signals(model, suspects, pinned, options, progress);
-    if (!bad.empty()) keep_what_is_no_physics(d, log_of, bad);
+    if (!bad.empty()) keep_sensor_faults(d, log_of, bad);
     if (!bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
     d.bad = std::move(bad);
     return d;

@@ -1,6 +1,7 @@
 #pragma once
-/// Which physical effect is missing: evidence from logs, a search with controlled false alarm, a verdict with its
-/// proofs. docs/diagnose.md tells the method; effect_search.h is the search, unexplained.h what is left over.
+/// Diagnoses which physical effect a model lacks: evidence from logs, a search with a controlled false-alarm rate, and
+/// a verdict with its evidence. docs/diagnose.md describes the method; effect_search.h has the search, residual_model.h
+/// the search for unmodelled structure in the residual.
 #include <functional>
 #include <optional>
 #include <string>
@@ -15,13 +16,13 @@ namespace sparflow {
 enum class Verdict { kMissing, kNone, kUnknown, kBadData };
 const char* verdict_name(Verdict verdict);  ///< "missing" "none" "unknown" "bad_data"
 
-/// A parameter as users read it.
+/// A parameter as reports show it, with its 95 % interval.
 struct ParameterEstimate {
   std::string name, unit, meaning;
   double value = 0.0, lower95 = 0.0, upper95 = 0.0;  ///< in `unit`
 };
 
-/// Error of one evidence channel without and with one effect, all others in.
+/// Error of one evidence channel without and with one effect; all other found effects are included in both.
 struct ChannelGain {
   std::size_t channel = 0;                                        ///< index into Evidence::channels
   double rmse_before = 0.0, rmse_after = 0.0, noise_floor = 0.0;  ///< SI; floor NaN = not known
@@ -30,58 +31,60 @@ struct ChannelGain {
 struct DiagnosedEffect {
   EffectAt effect;
   std::string id, at, stage;  ///< at "" for the whole machine
-  double probability = 0.0;   ///< that it is this effect and not chance or one of its rivals
+  double probability = 0.0;   ///< 0..1 that it is this effect and neither chance nor a rival
   std::vector<ParameterEstimate> parameters;
   AppliedEffect applied;              ///< the same in SI, ready for a model
-  std::vector<ChannelGain> channels;  ///< most improved first
-  double p_value = 1.0;               ///< of the gate
-  double gain = 0.0;                  ///< [nats] of log likelihood
+  std::vector<ChannelGain> channels;  ///< largest improvement first
+  double p_value = 1.0;               ///< by the null distribution of the largest gain
+  double gain = 0.0;                  ///< [nats] penalised
   double held_out_gain = 0.0,
-         held_out_error = 0.0;  ///< [nats] and standard error, over motions left out
-  double absorbed = 0.0;        ///< share that a refitted model would swallow
-  /// Rivals that explain the same data as well, with how much worse they are [nats], best first.
+         held_out_error = 0.0;  ///< [nats] gain on motions left out, and its standard error
+  double absorbed = 0.0;        ///< 0..1 absorbed share
+  /// Keys of rivals, best first, with how much smaller their gain is [nats].
   std::vector<std::pair<std::string, double>> rivals;
   std::vector<std::string> evidence;  ///< whole sentences
 
   std::string key() const { return at.empty() ? id : id + ":" + at; }
 };
 
-/// What neither model nor catalogue explains.
+/// A part of the residual that neither model nor catalogue explains.
 struct Unexplained {
   std::string stage, at;
   std::vector<std::string>
-      depends_on;      ///< signals, strongest first; "time, 1.13 Hz" for something periodic
-  double share = 0.0;  ///< of what can be explained at that place, not by the catalogue
+      depends_on;      ///< signals, strongest first; "time, 1.13 Hz" for a periodic one
+  double share = 0.0;  ///< 0..1 of the residual's variance at that place
   double rmse = 0.0, noise_floor = 0.0;  ///< SI
   FieldUnit unit;
-  std::string sentence;  ///< where it is largest, in words
+  std::string sentence;  ///< where and how large it is
   bool few_places =
-      false;  ///< an effect would explain it, but it happened in one place or few (incident.h)
+      false;  ///< whether it is an isolated event, which an effect would explain (isolated_event.h)
 };
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
-  double p_value = 1.0;                  ///< that nothing is missing
+  double p_value = 1.0;                  ///< of the best candidate if nothing is missing
   std::vector<DiagnosedEffect> effects;  ///< most probable first; all found, see `named`
   std::vector<std::vector<std::string>> indistinguishable;
   std::vector<Experiment> experiments;  ///< one for each of these sets
   std::optional<Unexplained> unexplained;
-  /// Largest share of what can be explained in a channel of a found effect that the catalogue does not explain.
-  double leftover_share = 0.0;
+  /// Largest unmodelled share (unmodelled_structure.h) of the channels in which a found effect acts. 0..1
+  double unmodelled_share = 0.0;
   std::vector<BadChannel> bad;
   std::vector<std::pair<std::string, double>>
       ranking;  ///< first step: key, penalised gain [nats], best first
   std::vector<std::string> notes;
   double seconds = 0.0;
 
-  Evidence evidence;    ///< what pages draw
+  Evidence evidence;    ///< for the charts of pages
   SearchResult search;  ///< raw numbers; `final.residual` belongs to `evidence.channels`
 
   std::string headline() const;  ///< one sentence
-  std::string table() const;     ///< one screen for a terminal
-  std::string json() const;      ///< keys of the contract and more
+  /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
+  std::string p_value_text() const;
+  std::string table() const;  ///< one screen for a terminal
+  std::string json() const;   ///< keys of the contract and more
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // Defaulted in diagnose.cpp, so that they are compiled only once.
   Diagnosis();
   Diagnosis(const Diagnosis&);
   Diagnosis(Diagnosis&&) noexcept;
@@ -90,28 +93,28 @@ struct Diagnosis {
   ~Diagnosis();
 };
 
-/// More than this share of what can be explained in a channel explained by signals and not by the catalogue: the
-/// cause is not in the catalogue.
-inline constexpr double kLargestLeftoverShare = 0.05;
-/// The same of an event beside an effect: what the effect's form leaves is largest where it acts most, too.
+/// 0..1 unmodelled share of a channel (unmodelled_structure.h) above which a cause is not in the catalogue.
+inline constexpr double kLargestUnmodelledShare = 0.05;
+/// 0..1 the same for an isolated event. It is larger because the model-form error of an effect is also concentrated
+/// where the effect acts most.
 inline constexpr double kLargestEventShare = 0.25;
 
 struct DiagnoseOptions {
   SignalOptions signals;
   SearchOptions search;
   bool check_data = true;
-  /// Candidates; empty = the whole catalogue on this machine.
+  /// Candidate effects; empty = the whole catalogue on this machine.
   std::vector<EffectAt> candidates;
 };
 
 /// @param model its effects count as known
-/// @param logs with what may be missing  @param references of the same machine without it; may be empty
+/// @param logs suspect logs  @param references logs of the same machine without the missing effect; may be empty
 /// @throws InputError when there is no log
 Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
                    const std::vector<Log>& references = {}, const DiagnoseOptions& options = {},
                    const SearchProgress& progress = {});
 
-/// The same on signals already made, without looking for bad channels.
+/// The same on signals already made, without a check for bad channels.
 Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                            const std::vector<MachineSignals>& references,
                            const DiagnoseOptions& options = {},

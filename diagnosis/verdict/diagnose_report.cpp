@@ -73,12 +73,12 @@ std::string Diagnosis::headline() const {
           "Bad data: {}{}", bad_channel_sentence(bad.front()),
           bad.size() > 1 ? fmt::format(" And {} more channel(s).", bad.size() - 1) : "");
     case Verdict::kNone:
-      return "Nothing is missing: what is left is noise, as far as these logs can tell.";
+      return "Nothing is missing: the residual is noise, as far as these logs can show.";
     case Verdict::kUnknown:
       if (unexplained && unexplained->few_places)
-        return fmt::format("Something happened too seldom to prove a law: {}.",
+        return fmt::format("Isolated event, on which no law can be tested: {}.",
                            unexplained->sentence);
-      return fmt::format("Something is missing that is not in the catalogue{}.",
+      return fmt::format("Unmodelled structure in the residual, not in the catalogue{}.",
                          unexplained ? ": " + unexplained->sentence : "");
     case Verdict::kMissing:
       break;
@@ -112,12 +112,13 @@ std::string Diagnosis::table() const {
       out += fmt::format("      {}\n", e.evidence[i]);
     }
     if (e.absorbed > 0.05) {
-      out += fmt::format("      {:.0f} % of it would be swallowed by refitting what is learned\n",
-                         100.0 * e.absorbed);
+      out += fmt::format(
+          "      absorbed share {:.0f} %: learning the pressure models again would take it over\n",
+          100.0 * e.absorbed);
     }
   }
   if (!indistinguishable.empty()) {
-    out += "\n  Cannot be told apart on these logs:\n";
+    out += "\n  Indistinguishable on these logs:\n";
     for (std::size_t i = 0; i < indistinguishable.size(); ++i) {
       out += fmt::format("      {}\n", fmt::join(indistinguishable[i], "  or  "));
       if (i < experiments.size()) out += fmt::format("        {}\n", experiments[i].sentence());
@@ -126,16 +127,22 @@ std::string Diagnosis::table() const {
   if (unexplained && verdict != Verdict::kUnknown)  // else the headline has it
     out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
   if (effects.empty() && !ranking.empty()) {
-    out += "  Nearest candidates (gain in nats beyond their price; the gate is at ";
+    out += "  Best candidates (penalised gain in nats; its threshold is ";
     out += fmt::format("{:.1f}):\n", search.threshold);
     for (std::size_t i = 0; i < std::min<std::size_t>(3, ranking.size()); ++i) {
       out += fmt::format("      {:32s} {:8.1f}\n", ranking[i].first, ranking[i].second);
     }
   }
-  out += fmt::format("\n  Chance of this evidence if nothing were missing: {}{:.2g}\n",
-                     p_value <= 1.01 / 301.0 ? "below " : "", p_value);
+  out +=
+      fmt::format("\n  Probability of this evidence if nothing were missing: {}\n", p_value_text());
   for (const std::string& note : notes) out += fmt::format("  note: {}\n", note);
   return out;
+}
+
+std::string Diagnosis::p_value_text() const {
+  // The smallest value that so many simulations can give bounds the true one from above.
+  const bool at_resolution = p_value * (search.simulations + 1.0) < 1.5;
+  return fmt::format("{}{:.2g}", at_resolution ? "below " : "", p_value);
 }
 
 std::string Diagnosis::json() const {
@@ -146,7 +153,7 @@ std::string Diagnosis::json() const {
     if (verdict == Verdict::kMissing && e.probability >= 0.5)
       j["effects"].push_back(json_of(e, evidence));
   }
-  // named only as one of a set: never more than half sure of one of them
+  // members of an indistinguishable set, none of which has a probability of one half
   if (verdict == Verdict::kMissing) {
     for (const DiagnosedEffect& e : effects) {
       if (e.probability >= 0.5) continue;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/effect_proof.h"
-#include "diagnosis/selection/search_leaders.h"
+#include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/selection/leader_updates.h"
 #include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
@@ -37,7 +37,7 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
     others.push_back(f.design);
     acting.push_back({f.design.effect.effect, f.design.effect.at, f.values, {}, {}});
   }
-  // without it, others may lead a pump
+  // without this effect, the load-sensing leader may be another
   std::optional<Evidence> led;
   if (d.search.led && index < d.search.found.size()) led = d.evidence.led_by(acting);
   if (led) others = remade(*led, others);

@@ -18,7 +18,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Sums over all logs of one quantity.
+/// Scores one quantity over all logs.
 StageScore score(const std::vector<LogComparison>& logs, const std::string& stage,
                  const std::string& at, const std::string& regime) {
   StageScore out;
@@ -72,11 +72,11 @@ StageScore score(const std::vector<LogComparison>& logs, const std::string& stag
   return out;
 }
 
-/// Where a process was asked for what it has not seen, an error says nothing about its law.
+/// Notes pressures with large errors outside the training data, where an error says nothing about the law.
 void extrapolation_notes(const CraneModel& model, const std::vector<StageScore>& scores,
                          std::set<std::string>& notes) {
   for (const StageScore& s : scores) {
-    // Worth a word where it happens often and does harm.
+    // A note is given where extrapolation is frequent and its error is above average.
     if (!(s.extrapolated_percent >= 5.0)) continue;
     if (!(s.extrapolated_error_percent > 1.25 * s.extrapolated_percent)) continue;
     const bool extend = s.regime == "extend";
@@ -114,10 +114,10 @@ std::string regime_words(const ComparedSeries& s, std::size_t regime) {
   const std::string& name = s.regimes[regime];
   if (s.stage != "pump") return s.at + (name == "extend" ? " extending" : " retracting");
   if (regime == 0) return "pump " + s.at + (name == "standby" ? " at standby" : "");
-  return fmt::format("pump {} led by {}", s.at, name);
+  return fmt::format("pump {} (leader {})", s.at, name);
 }
 
-/// Shares are among quantities that can be added up: forces of cylinders of different size cannot.
+/// A pool holds quantities whose squared errors may be added; forces of cylinders of different size may not.
 void set_pool(ErrorGroup& group) {
   group.pool = group.stage == "force" ? "force " + group.at : group.stage;
   const std::string what = group.stage == "flow_sensor" ? "flow sensor" : group.stage;
@@ -125,7 +125,7 @@ void set_pool(ErrorGroup& group) {
                                             : fmt::format("the {} error", what);
 }
 
-/// The compared samples of one regime over all logs with every signal that all of them have.
+/// Collects the compared samples of one regime over all logs, with every signal that all of them have.
 ErrorGroup gather(const Machine& machine, const std::vector<LogComparison>& logs,
                   const ComparedSeries& like, std::size_t regime) {
   ErrorGroup group;
@@ -183,7 +183,7 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
   for (const LogComparison& log : result.logs) {
     for (const ComparedSeries& s : log.series) {
       if (!seen.insert({s.stage, s.at}).second) continue;
-      // Pools are ordered by how much of what varies they fail to explain.
+      // Pools are ordered by the share of the variation that the model does not explain.
       const StageScore whole = score(result.logs, s.stage, s.at, "");
       for (std::size_t r = 0; r < s.regimes.size(); ++r) {
         ErrorGroup group = gather(machine, result.logs, s, r);
@@ -197,7 +197,7 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
   return groups;
 }
 
-/// Quantities whose prediction is off to one side nearly always, as regions without bounds: no place explains that.
+/// @return quantities with a bias of one sign nearly everywhere, as regions without bounds
 std::vector<WorstRegion> biased_everywhere(const std::vector<ComparedPart>& parts,
                                            const ResidualTests& tests) {
   constexpr double kShare = 0.5;     // of the squared error that is the mean's
@@ -219,7 +219,7 @@ std::vector<WorstRegion> biased_everywhere(const std::vector<ComparedPart>& part
       w.share_of_error = w.share_of_samples = 1.0;
       const bool kilo = t.unit == "N" && std::abs(t.size) >= 1e3;
       w.sentence = fmt::format(
-          "the {} is predicted {:.3g} {} too {} everywhere: {:.0f} % of its error is this one "
+          "the {} is predicted {:.3g} {} too {} everywhere: {:.0f} % of its squared error is this "
           "offset (RMSE {:.3g} {})",
           part.words, std::abs(t.size) / (kilo ? 1e3 : 1.0), kilo ? "kN" : t.unit,
           t.size > 0.0 ? "high" : "low", 100.0 * t.share_explained, w.rmse / (kilo ? 1e3 : 1.0),

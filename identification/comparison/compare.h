@@ -1,13 +1,13 @@
 #pragma once
-/// A model against measurements, stage by stage: each stage is fed with what comes before it as measured or
-/// computed from the measured pose, so that an error is seen where it arises.
+/// Compares a model with measurements stage by stage: the inputs of each stage are measured or computed from the measured
+/// pose, so that an error appears at the stage where it arises.
 ///   force     static force by virtual work            against  pA A_A - pB A_B, or the log's force
 ///   flow      valve gain * |u|                        against  area * dx/dt
 ///   flow_sensor  area * dx/dt                         against  the log's flow
-///   pressure  p(Q, F), Q from speed, F static         against  the chamber the direction selects
+///   pressure  p(Q, F), Q from speed, F static         against  the pressure of the supply chamber
 ///   pump      max of demands and standby, from the same  against  the pump's pressure
 ///   energy    the integral of pump pressure * flow, Q from speed in both
-/// What a log does not measure is not compared, and a note says so. docs/fit_and_compare.md has the equations.
+/// Stages without measurement are not compared, and a note says so. docs/fit_and_compare.md has the equations.
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,26 +22,26 @@
 
 namespace sparflow {
 
-/// A unit of the field: SI value = number * si.
+/// A unit for display: SI value = number * si.
 struct FieldUnit {
   std::string name;
   double si = 1.0;
 };
 
-/// One compared quantity over one log, SI, [samples]; NaN where it is not compared.
+/// One compared quantity over one log; SI, [samples], NaN where it is not compared.
 struct ComparedSeries {
   std::string stage;  ///< force, flow, flow_sensor, pressure, pump
   std::string at;     ///< cylinder or pump
-  FieldUnit unit;     ///< to show it in
+  FieldUnit unit;     ///< unit for display
   Eigen::VectorXd measured, predicted;
   /// Predicted standard deviation of one measurement, noise included; empty where the model has none.
   Eigen::VectorXd deviation;
-  /// Outside the flows and loads the process was learned from; empty for other stages.
+  /// Samples outside the flows and loads of the pressure model's training data; empty for other stages.
   Mask extrapolated;
   /// Regime of each compared sample: index into `regimes`.
   Eigen::VectorXi regime;
   std::vector<std::string>
-      regimes;  ///< {"extend", "retract"}; a pump's leading cylinders and "standby"
+      regimes;  ///< {"extend", "retract"}; of a pump "standby" and its load-sensing leaders
 
   Eigen::VectorXd residual() const { return predicted - measured; }
 };
@@ -56,25 +56,25 @@ struct StageScore {
   double fit_percent = 0.0;  ///< 100 (1 - |e| / |measured - mean|); NaN when nothing varies
   double within_95_percent =
       0.0;  ///< share of samples inside the predicted 95 % interval; NaN if none
-  /// Of a pressure: share of samples outside the flows and loads it was learned from, and their share of the
-  /// squared error; NaN for other stages.
+  /// Of a pressure: share of samples outside the flows and loads of its training data, and their share of the squared
+  /// error; NaN for other stages.
   double extrapolated_percent = 0.0;
   double extrapolated_error_percent = 0.0;
   long n = 0;
 };
 
-/// Energy a pump delivered over all logs, flow from measured speed in both. [J]
+/// Energy that a pump delivered over all logs, with the flow from measured speed in both. [J]
 struct EnergyScore {
   std::string pump;
   double measured = 0.0;
   double predicted = 0.0;
   double relative_error = 0.0;  ///< (predicted - measured) / measured
-  /// The whole chain from commands alone (flow by valve gains); absent where commands or gains are missing.
+  /// Prediction of the whole chain from commands alone (flow by valve gains); absent without commands or gains.
   std::optional<double> from_commands;
   double duration = 0.0;  ///< [s] of samples counted
 };
 
-/// One log with all its curves: what a page draws.
+/// One log with all its compared series, for the charts.
 struct LogComparison {
   MachineSignals signals;
   std::vector<ComparedSeries> series;
@@ -84,7 +84,7 @@ struct CompareOptions {
   SignalOptions signals;
   RegionOptions regions;
   bool find_regions = true;
-  /// Residual tests, stage at fault, errors by regime, worst segments; only together with regions.
+  /// Residual tests, stage at fault, errors by regime, worst segments; requires `find_regions`.
   bool find_causes = true;
   ResidualTestOptions tests;
 };
@@ -100,18 +100,18 @@ struct CompareResult {
   std::vector<StageScore> scores;  ///< in the order of the stages, then of the machine
   std::vector<EnergyScore> energy;
   std::vector<WorstRegion> worst;
-  ResidualTests tests;                    ///< what of the error repeats, false alarms controlled
-  StageAtFault fault;                     ///< where it arises
-  std::vector<RegimeError> regimes;       ///< in which regimes, with 95 % intervals
-  std::vector<WorstSegment> segments;     ///< in which motions
-  std::vector<BadChannelOfLog> bad_data;  ///< only from `compare`, which has the logs
+  ResidualTests tests;                    ///< systematic errors, with controlled false alarms
+  StageAtFault fault;                     ///< stage in which the error arises
+  std::vector<RegimeError> regimes;       ///< errors by regime, with 95 % intervals
+  std::vector<WorstSegment> segments;     ///< motions with the largest errors
+  std::vector<BadChannelOfLog> bad_data;  ///< filled by `compare` only, which has the logs
   std::vector<std::string> notes;         ///< what was not compared, and why; whole sentences
   std::vector<LogComparison> logs;
 
   const StageScore* find(const std::string& stage, const std::string& at,
                          const std::string& regime = "") const;
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // The .cpp file defines these, so that they are compiled once.
   CompareResult();
   CompareResult(const CompareResult&);
   CompareResult(CompareResult&&) noexcept;
@@ -123,20 +123,20 @@ struct CompareResult {
 CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
                       const CompareOptions& options = {});
 
-/// The same on signals already made.
-/// @param only one mask a log: samples that count; empty = all
+/// Compares with signals that exist already.
+/// @param only [logs] mask of the samples that count; empty = all
 CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignals> signals,
                               const std::vector<Mask>& only, const CompareOptions& options = {});
 
-/// Signals that a residual of this series may depend on, for searching and for plots: pose, speed, load,
-/// payload, temperature and the log's columns without a meaning. Those a log does not have are left out.
+/// @return signals on which a residual of this series may depend, for the search and for charts: pose, speed, load,
+///   payload, temperature and the log's columns without a known meaning, as far as the log has them
 std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
                                          const ComparedSeries& series);
 
-/// The scores as they are kept in a model file. @param data "train", "test" or "held out"
+/// @param data "train", "test" or "held out"  @return the scores in the form of the model file
 std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data);
 
-/// p below which a residual test is an alarm.
+/// Significance level: a residual test with a smaller p-value is an alarm.
 inline constexpr double kAlarm = 0.05;
 
 /// Machine-readable result; keys as in docs/fit_and_compare.md.

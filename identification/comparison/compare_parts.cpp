@@ -26,7 +26,7 @@ std::string part_words(const ComparedSeries& s, const std::string& regime) {
   return s.stage + " of " + s.at + side;
 }
 
-/// Block of every sample of a log, -1 = none.
+/// @return [samples] block of every sample of a log, -1 = none
 Eigen::VectorXi block_of_sample(const std::vector<CompareBlock>& blocks, std::size_t log,
                                 Index samples) {
   Eigen::VectorXi out = Eigen::VectorXi::Constant(samples, -1);
@@ -40,7 +40,7 @@ Eigen::VectorXi block_of_sample(const std::vector<CompareBlock>& blocks, std::si
 std::vector<RegimeSignal> signals_of(const Machine& machine, const MachineSignals& log,
                                      const ComparedSeries& series) {
   std::vector<RegimeSignal> out = regime_signals(machine, log, series);
-  if (series.stage == "force") {  // friction: one value each way
+  if (series.stage == "force") {  // Coulomb friction depends on the direction only
     const VectorXd direction =
         series.regime.cast<double>().unaryExpr([](double r) { return r == 0.0 ? 1.0 : -1.0; });
     out.push_back({"direction", "direction of motion", "", 1.0, direction});

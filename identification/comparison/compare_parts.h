@@ -1,7 +1,6 @@
 #pragma once
-/// What a comparison left over, laid out for statistics: the errors of one quantity over all logs with the
-/// block of motion each belongs to. Neighbouring errors are alike, so everything that claims confidence counts blocks,
-/// not samples.
+/// The errors of a comparison arranged for statistics: the errors of one quantity over all logs with the block of motion
+/// to which each belongs. Neighbouring errors are correlated, so confidence statements count blocks, not samples.
 #include <string>
 #include <vector>
 
@@ -19,11 +18,11 @@ struct CompareBlock {
   SampleRange samples;
 };
 
-/// Motions of all logs in order of time; long ones are cut into equal parts. Rests belong to none.
-/// @param longest [s]; longer than errors of one motion stay alike
+/// @param longest [s] longer motions are cut into equal parts; it exceeds the correlation time of errors in a motion
+/// @return the motions of all logs in order of time; rests belong to no block
 std::vector<CompareBlock> compare_blocks(const CompareResult& result, double longest = 8.0);
 
-/// One compared quantity, one value a compared sample inside a block, over all logs.
+/// One compared quantity over all logs, with one entry for each compared sample inside a block.
 struct ComparedPart {
   std::string stage, at;
   std::string regime;     ///< "extend", "retract", or "" for stages judged as a whole (force, pump)
@@ -33,9 +32,9 @@ struct ComparedPart {
   Eigen::VectorXd error;  ///< predicted - measured, SI
   Eigen::VectorXd measured;          ///< SI
   std::vector<int> block;            ///< index into the blocks
-  std::vector<Eigen::Index> sample;  ///< in its log
+  std::vector<Eigen::Index> sample;  ///< index into its log
   std::vector<RegimeSignal>
-      signals;  ///< those that all logs have; a force's direction (+1, -1) too
+      signals;  ///< those that all logs have; for a force also its direction (+1, -1)
 };
 
 std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareResult& result,
@@ -43,7 +42,7 @@ std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareRes
 
 /// 95 % interval of a ratio of sums over blocks, sum(numerator) / sum(denominator), by the percentile bootstrap of whole
 /// blocks (Efron & Tibshirani 1993, ch. 13). NaN with fewer than 5 blocks. Deterministic.
-/// @param root the root of the ratio instead, as for an RMSE
+/// @param root true for the root of the ratio, as for an RMSE
 Range block_interval(const Eigen::VectorXd& numerator, const Eigen::VectorXd& denominator,
                      bool root);
 

@@ -12,21 +12,21 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Totals of a pool, to which shares refer.
+/// Totals of a pool, the denominators of all shares.
 struct Pool {
   double error = 0.0;
   double samples = 0.0;
 };
 
-/// A signal cut at its quantiles.
+/// A signal divided into bins at its quantiles.
 struct BinnedSignal {
   const RegimeSignal* signal = nullptr;
   std::vector<double> edges;  ///< bins + 1, SI
-  std::vector<int> bin;       ///< a sample's bin, -1 = none
+  std::vector<int> bin;       ///< [samples] bin, -1 = none
   int bins() const { return static_cast<int>(edges.size()) - 1; }
 };
 
-/// Quantile bins; equal values never lie in two bins. No bins for a signal that does not vary.
+/// Divides a signal at its quantiles; equal values lie in one bin. A signal that does not vary gets no bins.
 BinnedSignal binned(const RegimeSignal& signal, int bins) {
   BinnedSignal out;
   out.signal = &signal;
@@ -67,7 +67,7 @@ double score_of(double error_share, double sample_share) {
   return e * std::log(e / s) + rest;
 }
 
-/// Scores (error, samples) against the pool; 0 when the region is too small or too ordinary.
+/// @return score of a region with these totals; 0 when it is below the thresholds of the options
 double judged(double error, double samples, const Pool& pool, const RegionOptions& options) {
   if (samples < options.least_share * pool.samples || pool.error <= 0.0) return 0.0;
   const double e = error / pool.error, s = samples / pool.samples;
@@ -75,7 +75,7 @@ double judged(double error, double samples, const Pool& pool, const RegionOption
   return score_of(e, s);
 }
 
-/// Sums over [0, i) x [0, j): any rectangle of bins is then four look-ups.
+/// Sums over [0, i) x [0, j), so that the sum of any rectangle of bins takes four look-ups.
 struct Table {
   MatrixXd error, samples;
   Table(const ErrorGroup& group, const BinnedSignal& a, const BinnedSignal* b) {
@@ -98,7 +98,7 @@ struct Table {
   }
 };
 
-/// Best interval (b null) or rectangle of bins.
+/// @return interval (b null) or rectangle of bins with the highest score
 Candidate scan(const ErrorGroup& group, const BinnedSignal& a, const BinnedSignal* b,
                const Pool& pool, const RegionOptions& options) {
   const Table table(group, a, b);
@@ -106,7 +106,7 @@ Candidate scan(const ErrorGroup& group, const BinnedSignal& a, const BinnedSigna
   Candidate best;
   for (int i0 = 0; i0 < a.bins(); ++i0) {
     for (int i1 = i0 + 1; i1 <= a.bins(); ++i1) {
-      if (i1 - i0 == a.bins()) continue;  // the whole range says nothing
+      if (i1 - i0 == a.bins()) continue;  // the whole range restricts nothing
       for (int j0 = 0; j0 < columns; ++j0) {
         for (int j1 = j0 + 1; j1 <= columns; ++j1) {
           if (b != nullptr && j1 - j0 == columns) continue;
@@ -138,13 +138,13 @@ Candidate best_of(const ErrorGroup& group, const std::vector<BinnedSignal>& sign
   }
   Candidate best = whole;
   if (one.score > options.gain_per_signal * best.score) best = one;
-  // Two signals against one, or against none, pay for each.
+  // Each additional signal must raise the score by the factor of the options.
   const int more = best.first == nullptr ? 2 : 1;
   if (two.score > std::pow(options.gain_per_signal, more) * best.score) best = two;
   return best;
 }
 
-/// Digits so that the two ends of an interval can be told apart.
+/// Formats an interval with enough digits to distinguish its ends.
 std::string interval(const RegionBound& bound) {
   const double width = bound.hi - bound.lo;
   const int digits =

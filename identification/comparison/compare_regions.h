@@ -1,11 +1,11 @@
 #pragma once
-/// Where a model fails, in plain words: the region of one or two signals that holds the most error for the
-/// fewest samples. Deterministic.
+/// Finds where a model is worst: the region of one or two signals that holds the most error for the fewest samples.
+/// Deterministic.
 ///
 /// A region's score is the likelihood ratio of M. Kulldorff, "A spatial scan statistic", Commun. Statist.
 /// 26 (1997), with squared error in place of counts: with E the region's share of the squared error and S its
-/// share of the samples, score = E ln(E/S) + (1-E) ln((1-E)/(1-S)), nats. It is zero when error lies
-/// there as everywhere, and prefers neither tiny regions nor large ones. All intervals between the
+/// share of the samples, score = E ln(E/S) + (1-E) ln((1-E)/(1-S)), nats. It is zero when the error is
+/// spread evenly, and prefers neither tiny regions nor large ones. All intervals between the
 /// quantiles of each signal, and all rectangles of two signals, are tried.
 #include <Eigen/Dense>
 #include <string>
@@ -13,26 +13,26 @@
 
 namespace sparflow {
 
-/// A signal that may explain where the error is. NaN: the sample lies in no interval of it.
+/// A signal on which the error may depend. A sample with NaN lies in none of its intervals.
 struct RegimeSignal {
-  std::string key;         ///< for scripts, unit in it: "q_boom_deg"
+  std::string key;         ///< for scripts, with its unit: "q_boom_deg"
   std::string words;       ///< for sentences: "boom angle"
-  std::string unit;        ///< of the field: "deg"; "" for pure numbers
+  std::string unit;        ///< for display: "deg"; "" for pure numbers
   double scale = 1.0;      ///< SI value of one `unit`
   Eigen::VectorXd values;  ///< SI
 };
 
-/// The samples of one regime: a cylinder in one direction, a pump while one cylinder leads.
+/// The samples of one regime: a cylinder in one direction, a pump with one load-sensing leader.
 struct ErrorGroup {
   std::string stage, at;
-  std::string regime;      ///< "extend", "retract", a leading cylinder, "standby"
+  std::string regime;      ///< "extend", "retract", a load-sensing leader, "standby"
   std::string words;       ///< "boom retracting"
   std::string pool;        ///< shares are taken among the groups of one pool
   std::string pool_words;  ///< "the pressure error"
   std::string unit;
   double scale = 1.0;                 ///< SI value of one `unit`
-  double severity = 1.0;              ///< of the pool's error, to order pools of different units
-  Eigen::VectorXd squared_error;      ///< SI squared, one a sample
+  double severity = 1.0;              ///< unexplained share of the pool, to order different units
+  Eigen::VectorXd squared_error;      ///< [samples] SI squared
   std::vector<RegimeSignal> signals;  ///< as long as squared_error
 };
 
@@ -43,7 +43,7 @@ struct RegionBound {
 
 struct WorstRegion {
   std::string stage, at, regime;
-  std::vector<RegionBound> where;  ///< none: the whole regime
+  std::vector<RegionBound> where;  ///< empty = the whole regime
   double rmse = 0.0;               ///< in `unit`
   std::string unit;
   double share_of_error = 0.0;    ///< of the pool's squared error, 0..1
@@ -56,18 +56,18 @@ struct WorstRegion {
 
 struct RegionOptions {
   int bins = 10;                 ///< quantiles of each signal between which intervals are tried
-  double least_share = 0.02;     ///< of the pool's samples; less is an anecdote
-  double least_severity = 0.02;  ///< a pool that is explained to 98 % has nothing worth naming
-  double least_error = 0.10;     ///< of the pool's squared error
+  double least_share = 0.02;     ///< of the pool's samples, for a region
+  double least_severity = 0.02;  ///< pools of which less is unexplained are not searched
+  double least_error = 0.10;     ///< of the pool's squared error, for a region
   /// A region's RMSE is at least this many times the pool's: it holds twice its share of the squared error.
   /// Pure noise stays below 1.3 in the smallest region of a log of 10 000 samples, all regions tried.
   double contrast = 1.41;
-  /// A further signal must raise the score by this factor, so that words stay few.
+  /// A further signal must raise the score by this factor, so that descriptions stay short.
   double gain_per_signal = 1.25;
   int most = 6;  ///< regions reported
 };
 
-/// At most one region a group, the worst first. None where the error is spread evenly.
+/// @return at most one region for each group, the worst first; none where the error is spread evenly
 std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,
                                        const RegionOptions& options = {});
 

@@ -1,4 +1,4 @@
-// The result of a comparison as JSON and as a table, and the signals a residual is searched over.
+// Writes the result of a comparison as JSON and as a table, and lists the signals on which a residual may depend.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ void add_cylinder(const Machine& machine, const MachineSignals& signals, int ind
   }
 }
 
-/// A column without a meaning, in the units of the field where its own is SI.
+/// A column without a known meaning, with display units where its own unit is SI.
 RegimeSignal candidate_signal(const CandidateSignal& c) {
   if (c.unit == "Pa") return {c.name + "_bar", c.name, "bar", units::kBar, c.values};
   if (c.unit == "m^3/s")
@@ -52,7 +52,7 @@ RegimeSignal candidate_signal(const CandidateSignal& c) {
   return {c.name, c.name, c.unit, 1.0, c.values};
 }
 
-/// Lines of at most about 110 characters; the ones that follow are indented by four.
+/// Wraps text into indented lines of at most about 110 characters.
 std::string wrapped(const std::string& text) {
   constexpr std::size_t kWidth = 110;
   std::string out, line = " ";
@@ -70,7 +70,7 @@ std::string wrapped(const std::string& text) {
   return out + line + "\n";
 }
 
-/// Flow of a pump's other cylinders, the sign of motions that overlap.
+/// @return [samples] flow to the pump's other cylinders, positive in simultaneous motions
 VectorXd other_flow(const Machine& machine, const MachineSignals& signals, int pump, int cylinder) {
   VectorXd sum = VectorXd::Zero(signals.samples());
   if (pump < 0) return sum;
@@ -85,7 +85,7 @@ Json range_json(const Range& r) {
   return {r.lo, r.hi};
 }
 
-/// Everything beyond the scores: what repeats, where it arises, in which regimes and motions, bad channels.
+/// Adds residual tests, stage at fault, errors by regime, worst motions and bad channels.
 void causes_json(const CompareResult& result, Json& root) {
   Json& tests = root["residual_tests"];
   tests = {{"blocks", result.tests.blocks},
@@ -172,14 +172,15 @@ std::string duration_text(double seconds) {
                          : fmt::format("{:.1f} min", seconds / 60.0);
 }
 
-std::string repeats_text(const CompareResult& result) {
+std::string systematic_errors_text(const CompareResult& result) {
   constexpr std::size_t kMost = 6;
   const ResidualTests& tests = result.tests;
   if (tests.tests.empty()) return "";
-  std::string text = "\nwhat repeats in the error";
+  std::string text = "\nsystematic errors";
   text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
                       tests.tested, tests.blocks, 100.0 * kAlarm);
-  if (tests.smallest_p() > kAlarm) return text + "  nothing: no bias, no signal it depends on\n";
+  if (tests.smallest_p() > kAlarm)
+    return text + "  none: no significant bias, no significant dependence on a signal\n";
   std::size_t shown = 0, alarms = 0;
   for (const ResidualTest& t : tests.tests) {
     if (t.p_value > kAlarm) continue;
@@ -305,16 +306,16 @@ std::string compare_table(const CompareResult& result) {
   }
   text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
   if (!result.bad_data.empty())
-    text += "\nbad data: repair this before anything is learned from it\n";
+    text += "\nbad data: repair or leave out before learning from these logs\n";
   for (const BadChannelOfLog& b : result.bad_data)
     text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
   if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);
-  if (!result.worst.empty()) text += "\nwhere it fails most\n";
+  if (!result.worst.empty()) text += "\nregions with the largest errors\n";
   for (const WorstRegion& w : result.worst) text += wrapped(w.stage + ": " + w.sentence);
-  if (!result.segments.empty()) text += "\nwhen it fails most\n";
+  if (!result.segments.empty()) text += "\nmotions with the largest errors\n";
   for (const WorstSegment& w : result.segments) text += wrapped(w.stage + ": " + w.sentence);
-  text += repeats_text(result);
-  if (!result.notes.empty()) text += "\nnot compared, or with care\n";
+  text += systematic_errors_text(result);
+  if (!result.notes.empty()) text += "\nnotes\n";
   for (const std::string& note : result.notes) text += wrapped(note);
   return text;
 }

@@ -11,10 +11,10 @@
 
 namespace sparflow {
 
-/// Everything the pressure stages say of one log, in one pass of the chain.
+/// Results of the pressure and pump stages of one log, filled in one pass of the chain.
 struct ChainPass {
   std::vector<ComparedSeries> pressure, pump;        ///< by cylinder, by pump
-  std::vector<bool> pressure_missing, pump_missing;  ///< a process that was needed is not learned
+  std::vector<bool> pressure_missing, pump_missing;  ///< a required pressure model is not learned
 };
 
 namespace {
@@ -126,7 +126,7 @@ bool Comparison::speeds_from_commands(Index k, const Pump& pump, std::vector<dou
     if (gain <= 0.0 || !cylinder.hydraulic()) return false;
     speed[i] = gain * c.command[k] / (extend ? cylinder.area_piston() : cylinder.area_rod());
     speed[i] += or_zero(c.flow_effect, k);
-    if ((speed[i] > 0.0) != extend) speed[i] = 0.0;  // inside a dead band
+    if ((speed[i] > 0.0) != extend) speed[i] = 0.0;  // the command is inside the dead band
   }
   return true;
 }
@@ -210,7 +210,9 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
     }
     if (pass.pressure_missing[i]) {
       notes.insert(
-          fmt::format("pressure of {}: compared only where its process is learned", cylinder.name));
+          fmt::format("pressure of {}: compared only in the direction whose pressure model is "
+                      "learned",
+                      cylinder.name));
     }
     if (c.has_pressure()) out.push_back(std::move(pass.pressure[i]));
   }
@@ -222,7 +224,7 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
     }
     if (pass.pump_missing[p]) {
       notes.insert(fmt::format(
-          "pump {}: compared only where the processes of all cylinders it serves are learned",
+          "pump {}: compared only where the pressure models of all active cylinders are learned",
           machine_.pumps[p].name));
     }
     out.push_back(std::move(pass.pump[p]));

@@ -10,16 +10,17 @@ namespace sparflow {
 
 struct ChainPass;
 
-/// One log against one model.
+/// Compares one log with one model.
 class Comparison {
  public:
   Comparison(const CraneModel& model, const MachineSignals& signals, const Mask* only)
       : model_(model), machine_(model.machine), signals_(signals), only_(only) {}
 
-  /// All quantities that this log can judge. @param notes gets what it cannot
+  /// @param notes gets the quantities that cannot be compared and why
+  /// @return the series of all quantities that this log measures
   std::vector<ComparedSeries> series(std::set<std::string>& notes) const;
 
-  /// Adds this log's energy to the scores (one a pump).
+  /// Adds this log's energy to the scores [pumps].
   void energy(std::vector<EnergyScore>& scores) const;
 
  private:
@@ -34,7 +35,8 @@ class Comparison {
   void flow(std::size_t i, std::vector<ComparedSeries>& out, std::set<std::string>& notes) const;
   void pressures(std::vector<ComparedSeries>& out, std::set<std::string>& notes) const;
   void judge_sample(Eigen::Index k, const MachineState& state, ChainPass& pass) const;
-  /// Signed speeds with flow from the command by the valve gains [m/s]. @return false where that cannot be told
+  /// @param speed gets signed speeds [m/s] with the flow that the valve gains give for the commands
+  /// @return false where a command or a valve gain is missing
   bool speeds_from_commands(Eigen::Index k, const Pump& pump, std::vector<double>& speed) const;
   void pump_sample(Eigen::Index k, std::size_t p, const PumpState& state, ChainPass& pass) const;
 

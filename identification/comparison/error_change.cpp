@@ -14,25 +14,25 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Refitting around something else moves centres and length-scales, and with them errors near the sensor's noise by
-/// some percent. A tenth more is a loss that anybody would see.
+/// Least growth of an RMS error that counts as harm. Refitting alone moves centres and length-scales, which changes errors
+/// near the sensor noise by some percent.
 constexpr double kLargeChange = 1.1;
-/// With fewer of them no noise can be told. A handful of samples, all that a test log may hold of what was learned, moves
-/// by more than a tenth of its own.
+/// With fewer blocks the noise cannot be estimated: the RMS of the few samples that a test log may have within the training
+/// range varies by more than a tenth.
 constexpr int kFewestBlocks = 4;
-/// What stands for motions where there are too few. [s]
+/// Length of the pieces that replace motions where these are too few. [s]
 constexpr double kPiece = 1.0;
 constexpr double kStandardErrors = 2.0;
-/// Everything together, noise included, may move by this much when it is learned again.
+/// Factor by which refitting alone may change the overall error.
 constexpr double kRefitMoves = 1.02;
-/// Of what a change takes away where it acts, the share it may bring in at another place where it acts.
+/// Largest increase of squared error where a change acts, as a share of its decrease at other such places.
 constexpr double kLargestLoss = 0.25;
 /// A change acts on a quantity when it moves its prediction by this share of the error.
 constexpr double kActs = 0.02;
-/// A relative error of energy that moves by less does not matter to anybody: flows are measured to some percent.
+/// Smaller changes of the relative energy error are irrelevant, because flows are known to some percent only.
 constexpr double kEnergyMoves = 2e-3;
 
-/// Sums of one value a block of motion, before and after.
+/// [blocks] sums of a value before and after the change.
 struct BlockSums {
   VectorXd before, after, weight;
   explicit BlockSums(std::size_t blocks)
@@ -40,7 +40,8 @@ struct BlockSums {
 
   double used() const { return static_cast<double>((weight.array() > 0.0).count()); }
 
-  /// Whether sum(after) / sum(weight) - sum(before) / sum(weight) is more than chance between blocks.
+  /// @return whether sum(after) / sum(weight) exceeds sum(before) / sum(weight) significantly, by the variation between
+  ///   blocks
   bool grew() const {
     const double all = weight.sum();
     if (!(all > 0.0)) return false;
@@ -54,13 +55,13 @@ struct BlockSums {
   }
 };
 
-/// Motions, and what takes their place where a quantity is seen in too few of them.
+/// Motions, and the pieces that replace them where too few motions show a quantity.
 struct Blocks {
   std::vector<CompareBlock> motions, pieces;
   explicit Blocks(const CompareResult& result)
       : motions(compare_blocks(result)), pieces(compare_blocks(result, kPiece)) {}
 
-  /// @param sums_over callable: BlockSums of a list of blocks
+  /// @param sums_over callable that returns the BlockSums of a list of blocks
   template <class F>
   BlockSums enough(const F& sums_over) const {
     BlockSums sums = sums_over(motions);
@@ -68,7 +69,7 @@ struct Blocks {
   }
 };
 
-/// Block of motion of every sample of a log, -1 = rest.
+/// @return [samples] block of motion of every sample of a log, -1 = rest
 Eigen::VectorXi blocks_of(const std::vector<CompareBlock>& blocks, std::size_t log, Index samples) {
   Eigen::VectorXi out = Eigen::VectorXi::Constant(samples, -1);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -78,7 +79,7 @@ Eigen::VectorXi blocks_of(const std::vector<CompareBlock>& blocks, std::size_t l
   return out;
 }
 
-/// Calls visit(before, after, log, block numbers) for each quantity of both.
+/// Calls visit(before, after, log, block numbers) for each quantity that both results have.
 template <class F>
 void for_each_pair(const CompareResult& before, const CompareResult& after,
                    const std::vector<CompareBlock>& blocks, const F& visit) {
@@ -99,7 +100,7 @@ bool counts(const ComparedSeries& s, const std::string& regime, Index k, bool ev
   return everywhere || s.extrapolated.size() == 0 || !s.extrapolated[k];
 }
 
-/// @param everywhere also where a pressure was not learned
+/// @param everywhere also outside the training range of a pressure model
 BlockSums squared_errors(const CompareResult& before, const CompareResult& after,
                          const std::vector<CompareBlock>& blocks, const StageScore& of,
                          bool everywhere = false) {
@@ -120,8 +121,8 @@ BlockSums squared_errors(const CompareResult& before, const CompareResult& after
   return sums;
 }
 
-/// Energy error of each block, with the sign that makes the whole's error positive; weight: measured energy. Errors of
-/// motions that cancel each other are no accuracy, but they are what the whole is made of.
+/// Energy error of each block, with the sign that makes the total error positive; weight: measured energy. The total is
+/// tested, in which errors of single motions may cancel.
 BlockSums energy_errors(const CompareResult& before, const CompareResult& after,
                         const std::vector<CompareBlock>& blocks, const Pump& pump) {
   BlockSums sums(blocks.size());
@@ -149,7 +150,7 @@ BlockSums energy_errors(const CompareResult& before, const CompareResult& after,
   return sums;
 }
 
-/// Whether the change moved this quantity's prediction by a share of its error that matters.
+/// @return whether the change moved this quantity's prediction by at least kActs of its error
 bool acts_on(const CompareResult& before, const CompareResult& after,
              const std::vector<CompareBlock>& blocks, const StageScore& of) {
   double moved = 0.0, error = 0.0;
@@ -197,13 +198,13 @@ void add_harmed_energy(const Machine& machine, const CompareResult& before,
   }
 }
 
-/// Standard error of log(overall): what each block adds to it, to first order.
+/// Standard error of log(overall) from each block's contribution to it, to first order.
 class OverallNoise {
  public:
   explicit OverallNoise(std::size_t blocks)
       : added_(VectorXd::Zero(static_cast<Index>(blocks))), weight_(added_) {}
 
-  /// @param n samples of the quantity, as its score counts them
+  /// @param n number of samples in the quantity's score
   void add(const BlockSums& sums, double n) {
     const double both = sums.before.sum() + sums.after.sum(), counted = sums.weight.sum();
     if (!(both > 0.0) || !(counted > 0.0)) return;
@@ -249,10 +250,10 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
   double all = 0.0, all_n = 0.0;
   struct Pool {
     double before = 0.0, after = 0.0, n = 0.0;
-    double won = 0.0, lost = 0.0;  // squared error taken away and brought in, by quantity
+    double won = 0.0, lost = 0.0;  // decrease and increase of squared error, summed over quantities
     std::vector<HarmedError> harmed;
   };
-  std::map<std::string, Pool> own;  // by stage, whose quantities have one unit
+  std::map<std::string, Pool> own;  // by stage, since its quantities have one unit
   for (const StageScore& b : before.scores) {
     const StageScore* a = after.find(b.stage, b.at, b.regime);
     if (a == nullptr || a->n == 0 || b.n == 0 || !(b.rmse > 0.0) || !(a->rmse > 0.0)) continue;
@@ -280,7 +281,7 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
     if (is > kLargeChange * was && sums.grew())
       (is_own ? own[b.stage].harmed : out.harmed).push_back(harm(b, was, is));
   }
-  // where it acts on several quantities, one may give a little for what the others win
+  // Where the change acts on several quantities, a small increase of one is accepted for a large decrease of others.
   for (auto& [name, pool] : own) {
     if (pool.lost <= kLargestLoss * pool.won) continue;
     out.harmed.insert(out.harmed.end(), pool.harmed.begin(), pool.harmed.end());

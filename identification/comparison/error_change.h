@@ -1,6 +1,6 @@
 #pragma once
-/// What a change of a model did to its errors on data that took no part: whether they fell where the change acts, and
-/// whether any other error, or that of the energy, grew by more than chance between motions.
+/// Compares the errors of a model before and after a change, on test data: whether they fell where the change acts, and
+/// whether any other error, or that of the energy, grew significantly given the variation between motions.
 #include <string>
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace sparflow {
 
-/// An error that a change made larger beyond its noise.
+/// An error that a change increased significantly.
 struct HarmedError {
   std::string stage, at, regime;     ///< as in StageScore; energy of a pump: stage "energy"
   double before = 0.0, after = 0.0;  ///< RMS error, SI; of the energy: relative error
@@ -17,34 +17,35 @@ struct HarmedError {
 
 /// RMS error after / before. 1 = nothing changed, below 1 = better.
 struct ErrorChange {
-  /// Geometric mean over everything compared, weighted with the number of samples.
+  /// Geometric mean over all compared quantities, weighted with the number of samples.
   double overall = 1.0;
-  /// Of all quantities together that the change acts on; of several stages their geometric mean; without any, as
-  /// overall.
+  /// The same for the quantities on which the change acts, pooled by stage; equals `overall` if there are none.
   double own = 1.0;
   std::vector<HarmedError> harmed;
-  /// Standard error of log(overall), from block of motion to block of motion.
+  /// Standard error of log(overall), from the variation between blocks of motion.
   double overall_deviation = 0.0;
 
-  /// Not better where it acts, or worse elsewhere, or worse on the whole by more than learning again moves.
+  /// @return true when the error where the change acts grew, another error is harmed, or the overall error grew by more
+  ///   than refitting alone may change it
   bool worse() const;
 };
 
+/// An error is harmed when the mean paired difference of squared errors exceeds two standard errors over the blocks of
+/// motion and the RMS error grows by a tenth (the energy's by 0.2 % of the energy). A quantity in fewer than four blocks
+/// is tested on pieces of one second instead; with fewer than four of those it is not tested. Where a change acts on
+/// several quantities, those that grew count as harmed only if their increase of squared error exceeds a quarter of the
+/// decrease of the others. Pressures count within the training range of both models, because extrapolation errors say
+/// nothing about a law.
 /// @param before, after on the same samples
-/// @param stage where the change acts: force, flow, pressure, pump; else (a sensor) wherever a prediction moved
-/// @param at its cylinder or pump; empty (a joint, the whole machine): wherever a prediction of the stage moved
-///
-/// Where a change acts on several quantities, one of them counts as harmed when all such take back more than a quarter
-/// of the squared error that the others win.
-/// Noise: both models' squared errors in each block of motion, paired; the mean difference must exceed two standard
-/// errors over the blocks, and the RMS error grow by a tenth (the energy's by 0.2 % of the energy). Where fewer than four
-/// blocks show a quantity, pieces of one second take their place; what fewer than four of those show is left to chance.
-/// Pressures count where both models were learned: outside, an error says nothing about a law.
+/// @param stage where the change acts: force, flow, pressure, pump; any other value (a sensor) means every quantity whose
+///   prediction changed
+/// @param at its cylinder or pump; empty (a joint, the whole machine) means every place where a prediction of the stage
+///   changed
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::string& stage,
                          const std::string& at = "");
 
-/// Of several changes together, each of which acts in its own stage.
+/// The same for several changes together, each of which acts in its own stage.
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::vector<std::string>& stages,
                          const std::string& at = "");

@@ -1,5 +1,5 @@
 #pragma once
-/// Numbers as the reports of identification and diagnosis print them.
+/// Formats numbers for the reports of identification and diagnosis.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,13 +9,13 @@
 
 namespace sparflow {
 
-/// Three digits or more: 0.12, 1.23, 12.3, 123, 1234.
+/// Fixed notation with two decimals below 10, one below 100 and none above: 0.12, 1.23, 12.3, 123, 1234.
 inline std::string short_number(double value) {
   const double size = std::abs(value);
   return fmt::format("{:.{}f}", value, size >= 100.0 ? 0 : size >= 10.0 ? 1 : 2);
 }
 
-/// With at least `digits` figures and never an exponent: 12170, 0.0123.
+/// Fixed notation with at least `digits` significant digits: 12170, 0.0123; "-" for NaN and infinity.
 inline std::string plain_number(double value, int digits) {
   if (!std::isfinite(value)) return "-";
   if (value == 0.0) return "0";
@@ -23,7 +23,7 @@ inline std::string plain_number(double value, int digits) {
   return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 9));
 }
 
-/// Null where there is no number: JSON knows no NaN.
+/// @return null for NaN and infinity, which JSON cannot represent
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }

@@ -21,8 +21,8 @@ VectorXd block_sums(const VectorXd& values, const std::vector<int>& block, int b
   return out;
 }
 
-/// A signal and its square, centred, orthogonal and of unit variance; 0 where the signal is missing. Fewer columns
-/// where it takes fewer values.
+/// @return [samples x 0..2] the signal and its square, centred, orthogonal and of unit variance; 0 where the signal is
+///   missing. A constant signal gives no column, one with two values a single one.
 MatrixXd features(const VectorXd& signal) {
   const auto known = signal.array().isFinite();
   const double n = known.cast<double>().sum();
@@ -42,13 +42,13 @@ MatrixXd features(const VectorXd& signal) {
   VectorXd square = centred(out.col(0).cwiseAbs2());
   square -= out.col(0) * (out.col(0).dot(square) / n);
   const double left = std::sqrt(square.squaredNorm() / n);
-  if (left > 1e-3) out.col(columns++) = square / left;  // two values have no curvature
+  if (left > 1e-3) out.col(columns++) = square / left;  // a signal with two values has no square
   return out.leftCols(columns);
 }
 
 std::string three_digits(double value) { return fmt::format("{:.3g}", value); }
 
-/// 1 - R^2's complement: share of the squared error (mean taken out) in the span of orthogonal features.
+/// @return R^2: share of the squared error (mean removed) in the span of orthogonal features
 double explained(const MatrixXd& f, const VectorXd& error) {
   double sum = 0.0;
   for (Index c = 0; c < f.cols(); ++c) {
@@ -66,16 +66,16 @@ std::string sentence_of(const ResidualTest& t, const ComparedPart& part,
                                      ? fmt::format(", 95 % interval {} .. {}",
                                                    three_digits(t.ci95.lo), three_digits(t.ci95.hi))
                                      : std::string();
-    return fmt::format("{} is predicted {} {} too {} on average (p {:.2g}{})", part.words,
+    return fmt::format("the {} is predicted {} {} too {} on average (p {:.2g}{})", part.words,
                        three_digits(std::abs(t.size)), t.unit, t.size > 0.0 ? "high" : "low",
                        t.p_value, interval);
   }
-  return fmt::format("the error of the {} depends on {}, by {} {} RMS ({:.0f} % of it, p {:.2g})",
-                     part.words, signal, three_digits(t.size), t.unit, 100.0 * t.share_explained,
-                     t.p_value);
+  return fmt::format(
+      "the error of the {} depends on {}, by {} {} RMS ({:.0f} % of its square, p {:.2g})",
+      part.words, signal, three_digits(t.size), t.unit, 100.0 * t.share_explained, t.p_value);
 }
 
-/// A hypothesis and its columns of block sums.
+/// A tested hypothesis with its columns in the matrix of block sums.
 struct Hypothesis {
   ResidualTest test;
   const ComparedPart* part;
@@ -97,7 +97,7 @@ MatrixXd max_t_sign_flip(const MatrixXd& sums, int flips, unsigned seed) {
   for (Index i = 0; i < sign.size(); ++i) sign.data()[i] = (random() >> 16) & 1u ? 1.0 : -1.0;
   const VectorXd largest = (sign * scaled).cwiseAbs().rowwise().maxCoeff();
   for (Index t = 0; t < tests; ++t) {
-    constexpr double kRounding = 1e-9;  // sums in another order
+    constexpr double kRounding = 1e-9;  // the sums are formed in another order
     const auto above = (largest.array() >= out(t, 0) - kRounding).cast<double>().sum();
     out(t, 1) = scale[t] > 0.0 ? (1.0 + above) / (1.0 + flips) : 1.0;
   }

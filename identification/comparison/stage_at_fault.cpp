@@ -16,7 +16,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// What the errors of the stages before change in one series; NaN where the measured inputs are not known.
+/// The inherited error of a series: the change of its prediction that the errors of the stages before cause. NaN where the
+/// measured inputs are unknown.
 class Inheritance {
  public:
   Inheritance(const CraneModel& model, const LogComparison& log)
@@ -46,7 +47,6 @@ class Inheritance {
     if (c.force_smooth.size() == 0 || c.direction[k] == 0) return kNaN;
     const GaussianProcess& p = process(cylinder, c.direction[k]);
     if (p.empty()) return kNaN;
-    // Far outside its data a process says little: a measured force there splits nothing.
     return p.mean(c.flow[k], predicted_force(c)[k]) - p.mean(c.flow[k], c.force_smooth[k]);
   }
 
@@ -75,7 +75,7 @@ class Inheritance {
   const MachineSignals& signals_;
 };
 
-/// Measured minus smoothed: what the sensor adds; NaN for speeds, which are smoothed already.
+/// Measured minus smoothed signal, as an estimate of the sensor noise; NaN for flows, whose speed is smoothed already.
 double roughness(const Machine& machine, const MachineSignals& signals, const ComparedSeries& s,
                  Index k) {
   if (s.stage == "pump") {
@@ -120,7 +120,7 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
       unit = s.unit;
       for (Index k = 0; k < s.measured.size(); ++k) {
         if (!std::isfinite(s.measured[k])) continue;
-        // outside what a process was learned from neither of its two answers means anything
+        // Outside the training data neither of the two predictions is reliable.
         if (s.extrapolated.size() > 0 && s.extrapolated[k]) continue;
         if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) continue;
         const double e = s.predicted[k] - s.measured[k], from_before = before.at(s, k);
@@ -144,12 +144,12 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
   out.inherited = std::sqrt(inherited / n) / unit.si;
   out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
   if (!rough.empty()) {
-    // the smoothed signal keeps a part of the noise: what is taken off is a little low
+    // The smoothed signal keeps a part of the noise, so the difference is too small by about this factor.
     constexpr double kAllowance = 1.1;
     const Eigen::Map<const VectorXd> r(rough.data(), static_cast<Index>(rough.size()));
     out.noise = kAllowance * robust_std(r) / unit.si;
   }
-  // A law learned with wrong inputs makes up for them: what right inputs then do to it is not its fault.
+  // A law that was learned with wrong inputs compensates their error; its error with right inputs is then not its own.
   const double at_fault = std::min(out.own, out.error);
   const double beyond = std::sqrt(std::max(0.0, at_fault * at_fault - out.noise * out.noise));
   out.severity = out.spread > 0.0 ? beyond / out.spread : 0.0;
@@ -160,13 +160,13 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
 std::string describe(const StageAtFault& found) {
   if (found.stages.empty()) return "";
   if (found.fault < 0)
-    return "No stage stands out: with measured inputs every stage is as good as its sensor.";
+    return "No stage stands out: with measured inputs the error of every stage is near its noise.";
   const StageSplit& f = found.stages[static_cast<std::size_t>(found.fault)];
   std::string text =
       fmt::format("The error arises in the {}: {} RMS of its own", f.words, amount(f.own, f.unit));
   if (f.inherited > 0.25 * f.own)
     text += fmt::format(" and {} inherited", amount(f.inherited, f.unit));
-  // what it does further down: the worst heir
+  // The following stage that inherits the largest error is named with it.
   const StageSplit* heir = nullptr;
   for (const StageSplit& s : found.stages) {
     const bool next = (f.stage == "force" && s.stage == "pressure" && s.at == f.at) ||
@@ -179,18 +179,19 @@ std::string describe(const StageAtFault& found) {
     text += fmt::format("; the {} inherits {} of it, its own error is {}", heir->words,
                         amount(heir->inherited, heir->unit), amount(heir->own, heir->unit));
   }
-  // a law that was learned with the wrong input and hides it
-  const StageSplit* hides = nullptr;
+  // A pressure model that was learned with the wrong force compensates its error; the reader is told so.
+  const StageSplit* compensates = nullptr;
   for (const StageSplit& s : found.stages) {
     const bool next = f.stage == "force" && s.stage == "pressure" && s.at == f.at;
-    if (next && s.makes_up() && (hides == nullptr || s.own > hides->own)) hides = &s;
+    if (next && s.makes_up() && (compensates == nullptr || s.own > compensates->own))
+      compensates = &s;
   }
-  if (hides != nullptr) {
+  if (compensates != nullptr) {
     text += fmt::format(
-        "; the {} was learned with it and makes up for it: {} along the chain, {} once the force "
-        "is "
-        "right",
-        hides->words, amount(hides->error, hides->unit), amount(hides->own, hides->unit));
+        "; the {} was learned with it and compensates it: its error is {} with the predicted force "
+        "and {} with the measured one",
+        compensates->words, amount(compensates->error, compensates->unit),
+        amount(compensates->own, compensates->unit));
   }
   return text + ".";
 }

@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// "boom extending, jib retracting": what moves in at least a tenth of the block's samples.
+/// @return e.g. "boom extending, jib retracting", for motions in at least a tenth of the block's samples
 std::string motions(const Machine& machine, const MachineSignals& signals, SampleRange range) {
   constexpr double kLeast = 0.1;
   std::string out;
@@ -35,7 +35,7 @@ std::string motions(const Machine& machine, const MachineSignals& signals, Sampl
     if (way.empty()) continue;
     out += (out.empty() ? "" : ", ") + machine.cylinders[i].name + way;
   }
-  return out.empty() ? "hardly anything" : out;
+  return out.empty() ? "hardly any motion" : out;
 }
 
 std::string size_text(double value, const std::string& unit) {
@@ -43,7 +43,7 @@ std::string size_text(double value, const std::string& unit) {
                          : fmt::format("{:.3g} {}", value, unit);
 }
 
-/// The level of every sample under one factor; "" = not judged.
+/// The level of a factor at every sample; "" = unknown.
 struct Factor {
   std::string name;
   std::vector<std::string> level;
@@ -62,7 +62,7 @@ Factor terciles(const std::string& name, const VectorXd& values,
   if (n == 0) return f;
   const double lo = quantile(known, 1.0 / 3.0), hi = quantile(known, 2.0 / 3.0);
   const double span = known.maxCoeff() - known.minCoeff();
-  // three levels of nothing are none
+  // A signal that hardly varies has no levels.
   if (!(span > 1e-6 * known.cwiseAbs().maxCoeff()) || !(hi > lo)) return f;
   for (Index k = 0; k < values.size(); ++k) {
     if (!std::isfinite(values[k])) continue;
@@ -71,7 +71,7 @@ Factor terciles(const std::string& name, const VectorXd& values,
   return f;
 }
 
-/// Each value where there are few, else terciles.
+/// @return a factor with a level for each value where there are few values, else for each tercile
 Factor values_or_terciles(const std::string& name, const VectorXd& values) {
   constexpr std::size_t kMostValues = 5;
   std::set<double> seen;
@@ -96,7 +96,7 @@ const RegimeSignal* signal_of(const ComparedPart& part, const std::string& prefi
   return nullptr;
 }
 
-/// One or several functions at the same time.
+/// @return the factor "one or several cylinders active at a time"
 Factor functions_moving(const CompareResult& result, const ComparedPart& part,
                         const std::vector<CompareBlock>& blocks) {
   Factor f{"functions", {}, {"one", "several"}};
@@ -110,7 +110,7 @@ Factor functions_moving(const CompareResult& result, const ComparedPart& part,
   return f;
 }
 
-/// The regime of a pump's or a force's samples: who leads, which way.
+/// @return the factor of the regime: the load-sensing leader of a pump, the direction of other quantities
 Factor regime_factor(const CompareResult& result, const ComparedPart& part,
                      const std::vector<CompareBlock>& blocks) {
   Factor f{part.stage == "pump" ? "leader" : "direction", {}, {}};
@@ -173,7 +173,7 @@ RegimeError error_at(const ComparedPart& part, const Factor& factor, const std::
 std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareResult& result,
                                          const std::vector<ComparedPart>& parts,
                                          const std::vector<CompareBlock>& blocks, int most) {
-  constexpr double kContrast = 1.5;  // of its share: block sums of coloured noise differ by less
+  constexpr double kContrast = 1.5;  // least error share over sample share, above coloured noise
   std::vector<WorstSegment> out;
   for (const ComparedPart& part : parts) {
     VectorXd count = VectorXd::Zero(static_cast<Index>(blocks.size())), sum = count,

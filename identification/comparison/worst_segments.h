@@ -1,5 +1,5 @@
 #pragma once
-/// When it fails: the motions with the most error; and in which regimes, with confidence.
+/// Finds the motions with the largest errors, and the errors by regime with confidence intervals.
 #include <string>
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace sparflow {
 
-/// One motion (or a part of a long one) and what it adds to a quantity's error.
+/// One motion (or a part of a long one) and its contribution to a quantity's error.
 struct WorstSegment {
   std::string stage, at, regime;
   std::string file;
@@ -21,13 +21,13 @@ struct WorstSegment {
   std::string sentence;
 };
 
-/// Of every quantity the worst segment that holds more than its share, largest excess first.
 /// @param most segments in all
+/// @return for every quantity the segment with the largest excess of error share over sample share, largest first
 std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareResult& result,
                                          const std::vector<ComparedPart>& parts,
                                          const std::vector<CompareBlock>& blocks, int most = 6);
 
-/// The error of one quantity while something holds.
+/// The error of one quantity while a factor has one of its levels.
 struct RegimeError {
   std::string stage, at, regime;
   std::string
@@ -42,8 +42,8 @@ struct RegimeError {
   int blocks = 0;
 };
 
-/// Error by direction, speed (slow, medium, fast: terciles), load (terciles), payload (each value, terciles where there
-/// are more than five), oil temperature (terciles), one or several functions moving, and which cylinder leads the pump.
+/// Errors by direction, speed (slow, medium, fast: terciles), load (terciles), payload and oil temperature (each value,
+/// terciles where there are more than five), one or several cylinders moving, and load-sensing leader.
 std::vector<RegimeError> errors_by_regime(const CompareResult& result,
                                           const std::vector<ComparedPart>& parts,
                                           const std::vector<CompareBlock>& blocks);

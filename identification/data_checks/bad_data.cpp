@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Stroke of a cylinder over its joint's whole range. [m]
+/// @return stroke of a cylinder over its joint's whole range [m]
 double full_stroke(const Machine& machine, int cylinder) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   if (c.stroke) return *c.stroke;
@@ -22,7 +22,7 @@ double full_stroke(const Machine& machine, int cylinder) {
   return std::abs(stroke_at(machine, cylinder, range.hi) - stroke_at(machine, cylinder, range.lo));
 }
 
-/// Positions: what share of the joint's range, and how fast it can go.
+/// Sets scale, largest rate, display unit and thresholds of a position or stroke.
 void describe_position(const CheckContext& context, CheckedChannel& c) {
   const Machine& machine = context.machine;
   const bool stroke = c.channel->role == Role::kStroke;
@@ -34,7 +34,7 @@ void describe_position(const CheckContext& context, CheckedChannel& c) {
   c.family = "position";
   c.scale = stroke ? full_stroke(machine, c.channel->index) : range;
   const double limit = std::max(std::abs(j.velocity.lo), std::abs(j.velocity.hi));
-  // a stroke's largest speed: the joint's by the mean lever
+  // The largest speed of a stroke is that of the joint by the mean lever.
   c.fastest = limit * (range > 0.0 ? c.scale / range : 1.0);
   if (j.type == JointType::kRevolute && !stroke) {
     c.field = units::kDegree;
@@ -74,7 +74,7 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
       c.family = "pressure";
       pressure();
       break;
-    case Role::kReturnPressure:  // often a sensor of another range: no twin
+    case Role::kReturnPressure:  // often a sensor of another range, so it has no peers
       pressure();
       break;
     case Role::kCommand:
@@ -86,7 +86,7 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
     case Role::kOilTemperature:
       c.field_unit = "degC";
       c.least_noise = 1.0;
-      c.least_jump = 3.0;  // litres of oil do not warm by 3 K from one sample to the next
+      c.least_jump = 3.0;  // oil does not warm by 3 K from one sample to the next
       break;
     default:
       c.cylinder = channel.role == Role::kPayload ? -1 : channel.index;
@@ -95,7 +95,7 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
   return c;
 }
 
-/// Affected stretches [s]; short gaps between them are closed, so that a picture can show them.
+/// @return affected stretches [s]; short gaps between them are closed for the chart
 std::vector<std::pair<double, double>> stretches_of(const Log& log, const Mask& affected) {
   const double gap = 0.01 * log.duration();
   std::vector<std::pair<double, double>> out;
@@ -132,21 +132,22 @@ BadChannel report(const CheckContext& context, std::size_t i, Finding found) {
   return bad;
 }
 
-/// A command is judged by the motion: where that channel is bad itself, the command is not accused.
-void blame_position_alone(const CheckContext& context, std::vector<BadChannel>& bad) {
-  std::vector<int> lost;
+/// Removes findings on commands whose cylinder has a faulty position, because commands are judged by the motion.
+void keep_position_only(const CheckContext& context, std::vector<BadChannel>& bad) {
+  std::vector<int> without_position;
   const auto find = [&](const BadChannel& b) -> const CheckedChannel& {
     return *std::find_if(context.channels.begin(), context.channels.end(),
                          [&](const CheckedChannel& c) { return c.channel->signal == b.channel; });
   };
   for (const BadChannel& b : bad) {
     const CheckedChannel& c = find(b);
-    if (c.family == "position") lost.push_back(c.cylinder);
+    if (c.family == "position") without_position.push_back(c.cylinder);
   }
   std::erase_if(bad, [&](const BadChannel& b) {
     const CheckedChannel& c = find(b);
     return c.channel->role == Role::kCommand &&
-           std::find(lost.begin(), lost.end(), c.cylinder) != lost.end();
+           std::find(without_position.begin(), without_position.end(), c.cylinder) !=
+               without_position.end();
   });
 }
 
@@ -189,7 +190,7 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
     context.channels.push_back(describe(context, channel));
     context.noise.push_back(noise_profile(channel.values, log));
   }
-  // The gravest first: a stuck channel is not also judged for its jump into and out of that value.
+  // The first finding of a channel ends its checks: a stuck channel is not reported for the jumps into and out of its value.
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
   const Check checks[] = {check_missing,   check_stuck, check_stuck_command, check_noise,
                           check_saturated, check_wild,  check_jumps};
@@ -201,7 +202,7 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
       break;
     }
   }
-  blame_position_alone(context, out);
+  keep_position_only(context, out);
   std::stable_sort(out.begin(), out.end(),
                    [](const BadChannel& a, const BadChannel& b) { return a.share > b.share; });
   return out;

@@ -14,8 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Median magnitude of the differences of `order` in begin..end-1, scaled to the standard deviation of
-/// white noise: the sum of squared binomial coefficients is C(2 order, order).
+/// @return median magnitude of the differences of `order` in the range, scaled to the standard deviation of white noise
+///   (the sum of squared binomial coefficients is C(2 order, order)); NaN with fewer than ten differences
 double difference_level(const VectorXd& values, SampleRange range, int order) {
   const double scale = order == 3 ? std::sqrt(20.0) : std::sqrt(924.0);
   static constexpr std::array<double, 4> kThird = {-1, 3, -3, 1};
@@ -35,24 +35,24 @@ double difference_level(const VectorXd& values, SampleRange range, int order) {
   return 1.4826 * *middle / scale;
 }
 
-/// Channels of the same family.
-std::vector<std::size_t> twins_of(const CheckContext& context, std::size_t channel) {
-  std::vector<std::size_t> twins;
+/// @return the other channels of the same family
+std::vector<std::size_t> peers_of(const CheckContext& context, std::size_t channel) {
+  std::vector<std::size_t> peers;
   for (std::size_t i = 0; i < context.channels.size(); ++i) {
     if (i != channel && !context.channels[channel].family.empty() &&
         context.channels[i].family == context.channels[channel].family) {
-      twins.push_back(i);
+      peers.push_back(i);
     }
   }
-  return twins;
+  return peers;
 }
 
-/// The upper median of the twins' noise, in this channel's unit; 0 without twins. Of two it is the larger.
-double twins_noise(const CheckContext& context, std::size_t channel,
-                   const std::vector<std::size_t>& twins) {
+/// @return upper median of the peers' noise in this channel's unit (of two peers the larger); 0 without peers
+double noise_of_peers(const CheckContext& context, std::size_t channel,
+                      const std::vector<std::size_t>& peers) {
   std::vector<double> levels;
-  levels.reserve(twins.size());
-  for (const std::size_t i : twins) {
+  levels.reserve(peers.size());
+  for (const std::size_t i : peers) {
     levels.push_back(context.noise[i].typical / context.channels[i].scale);
   }
   if (levels.empty()) return 0.0;
@@ -61,11 +61,12 @@ double twins_noise(const CheckContext& context, std::size_t channel,
   return *middle * context.channels[channel].scale;
 }
 
-/// How much more than usual the liveliest twin is disturbed in this block: then the machine shakes.
-double twins_disturbance(const CheckContext& context, const std::vector<std::size_t>& twins,
-                         Index block) {
+/// @return largest ratio of a peer's noise in this block to its typical noise, at least 1; it is large when the machine
+///   vibrates
+double disturbance_of_peers(const CheckContext& context, const std::vector<std::size_t>& peers,
+                            Index block) {
   double most = 1.0;
-  for (const std::size_t i : twins) {
+  for (const std::size_t i : peers) {
     const NoiseProfile& n = context.noise[i];
     if (n.typical > 0.0 && std::isfinite(n.level[block]))
       most = std::max(most, n.level[block] / n.typical);
@@ -73,8 +74,7 @@ double twins_disturbance(const CheckContext& context, const std::vector<std::siz
   return most;
 }
 
-/// Whether the machine is asked to do something that this channel would show: its cylinder (any, for a pump)
-/// has a direction.
+/// @return [samples] whether the channel's cylinder (for a pump any cylinder) is commanded or moves
 Mask driven(const CheckContext& context, const CheckedChannel& c) {
   Mask out = Mask::Constant(context.log.samples(), false);
   for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
@@ -84,7 +84,7 @@ Mask driven(const CheckContext& context, const CheckedChannel& c) {
   return out;
 }
 
-/// Steps of a channel and how many of them repeat the value, by state of the machine (rest, driven).
+/// Number of steps of a channel and of those that repeat the value, by state of the machine (rest, driven).
 struct Repeats {
   std::array<double, 2> equal = {0, 0}, steps = {0, 0};
   void add(const VectorXd& values, const Mask& state, SampleRange range) {
@@ -97,11 +97,11 @@ struct Repeats {
   }
 };
 
-/// log10 of the chance that `inside` happens by the habits of all the rest.
+/// @return log10 of the probability of the repetitions `inside`, by the frequency of repetitions elsewhere
 double log_chance(const Repeats& all, const Repeats& inside) {
   constexpr double kFewest = 50.0;
   constexpr double kTooCommon =
-      0.7;  // a channel that mostly repeats itself has nothing to be found out by
+      0.7;  // if a channel mostly repeats its value, repetitions are no evidence
   double sum = 0.0;
   for (std::size_t s = 0; s < 2; ++s) {
     const double steps = all.steps[s] - inside.steps[s], equal = all.equal[s] - inside.equal[s];
@@ -112,10 +112,10 @@ double log_chance(const Repeats& all, const Repeats& inside) {
   return sum;
 }
 
-/// Whether the channel's cylinder (any, for a pump) is set going, stopped or turned round near a sample: a chamber
-/// is filled or emptied then, at once.
+/// @return whether the channel's cylinder (for a pump any) starts, stops or reverses near a sample, which fills or empties
+///   a chamber quickly
 bool turns_near(const CheckContext& context, const CheckedChannel& c, Index k) {
-  constexpr double kAnswers = 0.3;  // [s] of a valve
+  constexpr double kAnswers = 0.3;  // [s] response time of a valve
   const auto around = static_cast<Index>(std::ceil(kAnswers / std::max(context.log.step, 1e-9)));
   for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
     if (c.cylinder >= 0 && c.cylinder != static_cast<int>(i)) continue;
@@ -128,8 +128,8 @@ bool turns_near(const CheckContext& context, const CheckedChannel& c, Index k) {
   return false;
 }
 
-/// Whether a stretch at the end of the range was reached and left as pressures are: gently, or by what the machine
-/// did itself just then. A broken sensor knows nothing of that.
+/// @return whether a stretch at the end of the range was entered and left by small steps or by a start, stop or reversal of
+///   the machine; a faulty sensor does so at arbitrary times
 bool reached_by_machine(const CheckContext& context, const CheckedChannel& c,
                         const VectorXd& values, SampleRange s, double gentle) {
   const auto by_machine = [&](Index k) {  // from k - 1 to k
@@ -139,7 +139,8 @@ bool reached_by_machine(const CheckContext& context, const CheckedChannel& c,
   return by_machine(s.begin) && by_machine(s.end);
 }
 
-/// Never changes although its cylinder is driven both ways: the habits of the channel say nothing then.
+/// Finds a channel that never changes although its cylinder moves in both directions; its frequency of repetitions is no
+/// reference then.
 std::optional<Finding> constant_throughout(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& values = c.channel->values;
@@ -188,7 +189,7 @@ VectorXd finite_values(const VectorXd& values) {
 
 NoiseProfile noise_profile(const VectorXd& values, const Log& log) {
   constexpr double kBlock = 1.0;    // [s]
-  constexpr double kFewest = 40.0;  // samples: a median of differences scatters by a fifth
+  constexpr double kFewest = 40.0;  // samples, with which the median scatters by a fifth
   NoiseProfile out;
   const auto size = static_cast<Index>(std::max(kFewest, kBlock / std::max(log.step, 1e-9)));
   for (const SampleRange& run : log.runs) {
@@ -237,30 +238,30 @@ std::optional<Finding> check_missing(const CheckContext& context, std::size_t ch
 
 std::optional<Finding> check_noise(const CheckContext& context, std::size_t channel) {
   constexpr double kWhite = 0.7;     // an oscillation of a quarter of the sampling rate has 0.42
-  constexpr double kLivelier = 1.6;  // than the liveliest twin
+  constexpr double kLivelier = 1.6;  // least ratio to the largest disturbance of a peer
   const CheckedChannel& c = context.channels[channel];
   const NoiseProfile& noise = context.noise[channel];
-  const std::vector<std::size_t> twins = twins_of(context, channel);
-  const double twin_noise = twins_noise(context, channel, twins);
-  // one twin alone can be the quiet one by its make, and a stroke sensor shakes with its own cylinder
+  const std::vector<std::size_t> peers = peers_of(context, channel);
+  const double peer_noise = noise_of_peers(context, channel, peers);
+  // A single peer may be a sensor of a better type, and a stroke sensor vibrates with its own cylinder.
   constexpr double kShaking = 1e-3;  // of the range
-  const bool few = twins.size() < 2;
-  const double caution = twins.size() == 1 ? 2.0 : 1.0;
+  const bool few = peers.size() < 2;
+  const double caution = peers.size() == 1 ? 2.0 : 1.0;
   const double least =
       few && c.family == "position" ? std::max(c.least_noise, kShaking * c.scale) : c.least_noise;
-  const bool has_twins = twin_noise > 0.0;
-  const double reference = has_twins ? twin_noise : noise.quiet;
-  // Over many blocks the level is known well: less than the ratio of one block will do.
+  const bool has_peers = peer_noise > 0.0;
+  const double reference = has_peers ? peer_noise : noise.quiet;
+  // The level over many blocks is known better than that of one block, so a smaller ratio suffices.
   constexpr double kThroughout = 0.83, kThroughoutBlock = 0.5;
   const double ratio = context.options.noise_ratio * caution;
-  const bool throughout = has_twins && noise.typical > kThroughout * ratio * twin_noise;
-  // A burst, far above the channel's own quiet blocks (their lower quartile is 0.87 of the median).
-  constexpr double kOwn = 1.33, kBurstTwins = 0.67;
+  const bool throughout = has_peers && noise.typical > kThroughout * ratio * peer_noise;
+  // A burst is far above the channel's own quiet blocks (their lower quartile is 0.87 of the median).
+  constexpr double kOwn = 1.33, kBurstPeers = 0.67;
   const auto noisy = [&](double level) {
-    if (!has_twins) return level > ratio * noise.quiet;
-    if (level > (throughout ? kThroughoutBlock : 1.0) * ratio * twin_noise) return true;
+    if (!has_peers) return level > ratio * noise.quiet;
+    if (level > (throughout ? kThroughoutBlock : 1.0) * ratio * peer_noise) return true;
     return noise.quiet > 0.0 && level > kOwn * ratio * noise.quiet &&
-           level > kBurstTwins * ratio * twin_noise;
+           level > kBurstPeers * ratio * peer_noise;
   };
   Finding found;
   found.kind = BadDataKind::kNoisy;
@@ -270,7 +271,8 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
     const double level = noise.level[b];
     if (!(level > least && noisy(level))) continue;
     if (!(noise.whiteness[b] > kWhite)) continue;
-    if (reference > 0.0 && level / reference < kLivelier * twins_disturbance(context, twins, b)) {
+    if (reference > 0.0 &&
+        level / reference < kLivelier * disturbance_of_peers(context, peers, b)) {
       continue;
     }
     const SampleRange& block = noise.blocks[static_cast<std::size_t>(b)];
@@ -283,12 +285,12 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
   if (seconds < context.options.noise_bursts_s || blocks < 2.0) return {};
   const double level = std::sqrt(squares / blocks);
   found.evidence =
-      twin_noise > 0.0
+      peer_noise > 0.0
           ? fmt::format(
-                "its noise there is {} (standard deviation), that of its {} fellow {} "
+                "its noise there is {} (standard deviation), that of the {} other {} "
                 "channel{} is {:.3g} times smaller",
-                in_field(c, level), twins.size(), c.family, twins.size() == 1 ? "" : "s",
-                level / twin_noise)
+                in_field(c, level), peers.size(), c.family, peers.size() == 1 ? "" : "s",
+                level / peer_noise)
           : fmt::format("its noise there is {} (standard deviation), elsewhere in the log {}",
                         in_field(c, level), in_field(c, noise.quiet));
   found.remedy = "Check the sensor, its cable, shield and supply, and record again";
@@ -320,12 +322,12 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
   for (const SampleRange& s : stretches) {
     const double seconds = context.log.time[s.end - 1] - context.log.time[s.begin];
     if (seconds < context.options.stuck_s) continue;
-    // with few stretches the usual length is that of the fault itself
+    // With few stretches the usual length would be that of the fault itself.
     if (stretches.size() >= 10 && static_cast<double>(s.size()) < 3.0 * usual) continue;
     Repeats inside;
     inside.add(values, state, s);
     if (log_chance(all, inside) > limit) continue;
-    // a sensor that ends at zero is clipped there but not broken
+    // A sensor whose range ends at zero is clipped there but not faulty.
     const double gentle = 10.0 * context.noise[channel].typical + c.least_jump;
     if (values[s.begin] == 0.0 && reached_by_machine(context, c, values, s, gentle)) continue;
     zero = zero && values[s.begin] == 0.0;
@@ -336,8 +338,8 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
   found.kind = zero ? BadDataKind::kDropOut : BadDataKind::kStuck;
   const double seconds = context.log.time[longest.end - 1] - context.log.time[longest.begin];
   found.evidence = fmt::format(
-      "it stays at exactly {} for {:.1f} s, elsewhere it repeats a value at most {:.0f} samples "
-      "on end in nine stretches of ten",
+      "it stays at exactly {} for {:.1f} s, while nine of ten stretches of equal values last at "
+      "most {:.0f} samples",
       in_field(c, values[longest.begin]), seconds, usual);
   found.remedy = zero ? "Check the sensor's cable and supply, and leave this stretch out"
                       : "Check the sensor and the logger's update, and leave this stretch out";
@@ -345,17 +347,17 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
 }
 
 std::optional<Finding> check_saturated(const CheckContext& context, std::size_t channel) {
-  constexpr double kLively = 0.3;  // more repeats than this elsewhere: equal values mean nothing
-  constexpr Index kShortest = 5;   // [samples] a stretch on the rail
-  constexpr int kFewest = 3;       // stretches
-  constexpr double kTotal = 0.5;   // [s]
+  constexpr double kLively = 0.3;  // with a larger share of repeats elsewhere they are no evidence
+  constexpr Index kShortest = 5;   // [samples] least length of a stretch at the limit
+  constexpr int kFewest = 3;       // least number of stretches
+  constexpr double kTotal = 0.5;   // [s] least total duration
   const CheckedChannel& c = context.channels[channel];
   const Role role = c.channel->role;
   if (role == Role::kCommand || role == Role::kPayload || role == Role::kOilTemperature) return {};
   const VectorXd& values = c.channel->values;
   const VectorXd known = finite_values(values);
   if (known.size() == 0) return {};
-  // without noise a standby or a relief valve looks the same
+  // In a log without noise a standby pressure or a relief valve looks like a limit of the sensor.
   constexpr double kNoiseless = 1e-4;
   const double lively = quantile(finite_values(context.noise[channel].level), 0.75);
   if (lively < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
@@ -363,7 +365,7 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
   const Mask state = driven(context, c);
   for (const SampleRange& run : context.log.runs) all.add(values, state, run);
   for (const double rail : {known.maxCoeff(), known.minCoeff()}) {
-    if (rail == 0.0) continue;  // pressures end at zero by nature
+    if (rail == 0.0) continue;  // zero is a physical limit of pressures
     Finding found;
     found.affected = Mask::Constant(context.log.samples(), false);
     Repeats inside;
@@ -381,7 +383,7 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
     const double equal = all.equal[0] + all.equal[1] - inside.equal[0] - inside.equal[1];
     if (equal > kLively * steps) continue;
     found.kind = BadDataKind::kSaturated;
-    found.evidence = fmt::format("it ends at exactly {} {} times, for {:.1f} s together",
+    found.evidence = fmt::format("it is cut off at exactly {} {} times, for {:.1f} s in total",
                                  in_field(c, rail), count, seconds);
     found.remedy = "Choose a larger measuring range, or leave these stretches out";
     return found;

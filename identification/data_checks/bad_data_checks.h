@@ -8,30 +8,31 @@
 
 namespace sparflow {
 
-/// What a channel can be judged by.
+/// A channel with the scales and limits that the checks use.
 struct CheckedChannel {
   const Channel* channel = nullptr;
   int cylinder = -1;   ///< the cylinder it belongs to, -1 = none
-  std::string family;  ///< channels of one family are twins: "position", "pressure"; "" = has none
-  double scale = 1.0;  ///< values over scale are comparable among twins
+  std::string family;  ///< channels of one family are peers: "position", "pressure"; "" = no peers
+  double scale = 1.0;  ///< values over scale are comparable among peers
   double field = 1.0;  ///< SI value of one `field_unit`
   std::string field_unit;
-  double least_noise = 0.0;  ///< [unit of values] below it noise does no harm
-  double least_jump = 0.0;   ///< [unit of values]
-  /// [unit/s] the fastest that the machine can change it; 0 = no limit is known
+  double least_noise = 0.0;  ///< [unit of values] smaller noise is not reported
+  double least_jump = 0.0;   ///< [unit of values] smaller jumps are not reported
+  /// [unit/s] largest rate of change that the machine allows; 0 = unknown
   double fastest = 0.0;
 };
 
 /// Noise of one channel in blocks of about a second.
 struct NoiseProfile {
   std::vector<SampleRange> blocks;  ///< within runs
-  Eigen::VectorXd level;            ///< [unit] standard deviation of its white part, one a block
-  Eigen::VectorXd whiteness;  ///< sixth over third differences: 1 = white, small = oscillation
-  double typical = 0.0;       ///< median over blocks
-  double quiet = 0.0;         ///< lower quartile over blocks
+  Eigen::VectorXd level;            ///< [unit] [blocks] standard deviation of the white part
+  Eigen::VectorXd
+      whiteness;         ///< [blocks] sixth over third differences: 1 = white, small = oscillation
+  double typical = 0.0;  ///< median over blocks
+  double quiet = 0.0;    ///< lower quartile over blocks
 };
 
-/// From the median magnitude of third differences, which smooth motion does not reach.
+/// Estimates the noise from the median magnitude of third differences, to which smooth motion contributes little.
 NoiseProfile noise_profile(const Eigen::VectorXd& values, const Log& log);
 
 struct CheckContext {
@@ -43,7 +44,7 @@ struct CheckContext {
   std::vector<NoiseProfile> noise;  ///< by channel
 };
 
-/// The channel's samples that are affected, and why.
+/// A fault of one channel with the affected samples.
 struct Finding {
   BadDataKind kind = BadDataKind::kStuck;
   Mask affected;
@@ -59,13 +60,13 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
 std::optional<Finding> check_wild(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_jumps(const CheckContext& context, std::size_t channel);
 
-/// Stretches of one value, longer than one sample, inside runs.
+/// @return the stretches of equal values, longer than one sample, within runs
 std::vector<SampleRange> constant_stretches(const Eigen::VectorXd& values, const Log& log);
 
-/// Without the missing ones.
+/// @return the values that are not missing
 Eigen::VectorXd finite_values(const Eigen::VectorXd& values);
 
-/// "4.1 bar"
+/// @return the value in the channel's usual unit, e.g. "4.1 bar"
 std::string in_field(const CheckedChannel& channel, double value);
 
 }  // namespace sparflow

@@ -1,5 +1,5 @@
-// Jumps that come back, and commands that the machine does not follow: what is found by looking at the other
-// channels of the same moment.
+// Checks that compare a channel with the others at the same time: jumps that return, single wild samples, and commands
+// that the machine does not follow.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,23 +16,23 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Whether another channel answers a step between samples k and k+1: a twin steps too, or a command starts,
-/// ends or steps nearby.
-class Witnesses {
+/// Whether another channel explains a step between samples k and k+1: a peer steps too, or a command starts, ends or steps
+/// nearby.
+class OtherChannels {
  public:
-  Witnesses(const CheckContext& context, std::size_t channel) : context_(context) {
+  OtherChannels(const CheckContext& context, std::size_t channel) : context_(context) {
     const CheckedChannel& c = context.channels[channel];
     for (std::size_t i = 0; i < context.channels.size(); ++i) {
       if (i == channel) continue;
       const CheckedChannel& other = context.channels[i];
       if (other.channel->role == Role::kCommand) commands_.push_back(i);
-      if (!c.family.empty() && other.family == c.family) twins_.push_back(i);
+      if (!c.family.empty() && other.family == c.family) peers_.push_back(i);
     }
   }
 
   bool explain(Index k, double step) const {
-    constexpr Index kNear = 3;      // samples: a sensor's and the logger's own delay
-    constexpr double kPart = 0.05;  // of the step, that a twin must show at least
+    constexpr Index kNear = 3;      // samples, for the delays of sensor and logger
+    constexpr double kPart = 0.05;  // of the step, that a peer must show at least
     const Index n = context_.log.samples();
     for (Index i = std::max<Index>(0, k - kNear); i <= std::min(n - 2, k + kNear); ++i) {
       for (const std::size_t c : commands_) {
@@ -41,7 +41,7 @@ class Witnesses {
         const bool starts = (u[i] == 0.0) != (u[i + 1] == 0.0);
         if (starts || change > context_.channels[c].least_jump) return true;
       }
-      for (const std::size_t t : twins_) {
+      for (const std::size_t t : peers_) {
         const VectorXd& y = context_.channels[t].channel->values;
         const double noise = context_.noise[t].typical;
         if (std::abs(y[i + 1] - y[i]) > std::max(6.0 * noise, kPart * std::abs(step))) return true;
@@ -50,7 +50,7 @@ class Witnesses {
     return false;
   }
 
-  /// A lever on its way out of the valve's dead band makes the pump answer all at once.
+  /// @return whether a command changes: a lever that leaves the valve's dead band makes the pump pressure step
   bool lever_moves(Index k) const {
     constexpr double kLeverMoves = 2e-3;  // [-] from one sample to the next
     return std::any_of(commands_.begin(), commands_.end(), [&](std::size_t c) {
@@ -62,7 +62,7 @@ class Witnesses {
 
  private:
   const CheckContext& context_;
-  std::vector<std::size_t> twins_, commands_;
+  std::vector<std::size_t> peers_, commands_;
 };
 
 struct Step {
@@ -70,7 +70,7 @@ struct Step {
   double size = 0.0;  ///< [unit]
 };
 
-/// Noise of each sample's block, at least the channel's typical.
+/// @return [samples] noise of each sample's block, at least the channel's typical noise
 VectorXd local_noise(const NoiseProfile& noise, Index samples) {
   VectorXd out = VectorXd::Constant(samples, noise.typical);
   for (std::size_t b = 0; b < noise.blocks.size(); ++b) {
@@ -81,7 +81,8 @@ VectorXd local_noise(const NoiseProfile& noise, Index samples) {
   return out;
 }
 
-/// Whether a step is one of three or more in a row, the same way and of like size: a chamber that fills, no sensor.
+/// @return whether a step is one of three or more in a row of the same sign and similar size, as a chamber that fills
+///   causes them
 bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k) {
   constexpr double kLike = 0.5;
   const double size = x[k + 1] - x[k];
@@ -95,13 +96,13 @@ bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k) {
   return false;
 }
 
-/// Steps of one sample that are large for the channel and that nothing else explains.
+/// @return steps between two samples that are large for the channel and that no other channel explains
 std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
   const VectorXd noise = local_noise(context.noise[channel], x.size());
   const bool position = c.family == "position";
-  const Witnesses witnesses(context, channel);
+  const OtherChannels others(context, channel);
   std::vector<Step> out;
   for (const SampleRange& run : context.log.runs) {
     for (Index k = run.begin; k + 1 < run.end; ++k) {
@@ -110,15 +111,15 @@ std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t cha
           std::max(context.options.jump_noise * std::max(noise[k], noise[k + 1]), c.least_jump) +
           1.5 * c.fastest * (context.log.time[k + 1] - context.log.time[k]);
       if (!(std::abs(size) > limit)) continue;
-      // no load and no valve moves a boom by degrees within a sample: positions need no witness
-      if (!position && (is_on_a_ramp(x, run, k) || witnesses.explain(k, size))) continue;
+      // No load or valve moves a joint that far within a sample, so other channels cannot explain steps of positions.
+      if (!position && (is_on_a_ramp(x, run, k) || others.explain(k, size))) continue;
       out.push_back({k, size});
     }
   }
   return out;
 }
 
-/// Smallest step between samples, 0 for a constant channel.
+/// @return smallest nonzero step between samples, 0 for a constant channel
 double resolution(const VectorXd& x) {
   double least = std::numeric_limits<double>::infinity();
   for (Index k = 0; k + 1 < x.size(); ++k) {
@@ -128,28 +129,28 @@ double resolution(const VectorXd& x) {
   return std::isfinite(least) ? least : 0.0;
 }
 
-/// Samples far off both their neighbours, which agree with each other: nothing that has a mass or a volume does that. One
-/// alone may be a knock; many are wild however small they are in the channel's units.
+/// Marks samples far off both their neighbours, which agree with each other; inertia and compressibility exclude such
+/// signals. A single one may be an impact; many are a fault, however small they are in the channel's units.
 Mask wild_samples(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
   const VectorXd noise = local_noise(context.noise[channel], x.size());
-  const Witnesses witnesses(context, channel);
+  const OtherChannels others(context, channel);
   Mask out = Mask::Constant(x.size(), false);
-  const double least = 4.0 * resolution(x);  // a logger's last digit may flicker
+  const double least = 4.0 * resolution(x);  // the last digit of a logger may alternate
   for (const SampleRange& run : context.log.runs) {
     for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
       const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
       if (!(off > std::max(least, context.options.jump_noise * noise[k]))) continue;
       if (std::abs(x[k + 1] - x[k - 1]) > 0.5 * off) continue;
-      if (c.family != "position" && witnesses.explain(k - 1, off)) continue;
+      if (c.family != "position" && others.explain(k - 1, off)) continue;
       out[k] = true;
     }
   }
   return out;
 }
 
-/// Speed that a command usually brings, v = a + b |u| by direction: a dead band and a gain. [m/s]
+/// Usual speed at a command in one direction, v = a + b |u|, with a dead band and a gain. [m/s]
 struct UsualSpeed {
   double a = 0.0, b = 0.0;
   bool known = false;
@@ -172,7 +173,7 @@ UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
   x.col(1) = Eigen::Map<VectorXd>(u.data(), n);
   const VectorXd y = Eigen::Map<VectorXd>(v.data(), n);
   VectorXd weight = VectorXd::Ones(n);
-  for (int pass = 0; pass < 5; ++pass) {  // Huber's weights: what is sought must not bend the line
+  for (int pass = 0; pass < 5; ++pass) {  // Huber's weights limit the influence of the fault
     const Eigen::MatrixXd wx = weight.asDiagonal() * x;
     const Eigen::Vector2d p = solve_symmetric(transposed_product(x, wx), wx.transpose() * y);
     out.a = p[0];
@@ -188,18 +189,19 @@ UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
 }  // namespace
 
 std::optional<Finding> check_jumps(const CheckContext& context, std::size_t channel) {
-  constexpr double kAlike = 0.35;  // how well the way back must match, beyond noise
+  constexpr double kAlike = 0.35;  // largest relative difference of the step back, beyond noise
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
   if (c.least_jump <= 0.0) return {};
-  // A controller may step a command at will, also for one sample across a dead band.
-  constexpr double kPulse = 0.2;        // [s] longest of a command's
-  constexpr double kPulseHeight = 0.3;  // [-] smallest
+  // A controller may step a command arbitrarily, also for one sample across a dead band; only repeated short, high pulses
+  // are faults.
+  constexpr double kPulse = 0.2;        // [s] longest pulse of a command
+  constexpr double kPulseHeight = 0.3;  // [-] smallest pulse of a command
   constexpr int kPulses = 3;
   const bool command = c.channel->role == Role::kCommand;
-  constexpr double kContact = 0.5;  // [s] a bad contact's; pumps stay at a pressure longer
+  constexpr double kContact = 0.5;  // [s] longest loss of contact; pump pressures last longer
   const bool pump = c.channel->role == Role::kPumpPressure;
-  const Witnesses witnesses(context, channel);
+  const OtherChannels others(context, channel);
   const std::vector<Step> steps = unexplained_steps(context, channel);
   const double noise = context.noise[channel].typical;
   Finding found;
@@ -218,7 +220,7 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
       const double left = std::abs(steps[i].size + steps[j].size);
       if (left > kAlike * std::abs(steps[i].size) + 4.0 * noise) continue;
       if (pump && context.log.time[steps[j].at] - context.log.time[steps[i].at] > kContact &&
-          witnesses.lever_moves(steps[i].at)) {
+          others.lever_moves(steps[i].at)) {
         continue;
       }
       const Index first = steps[i].at + 1, length = steps[j].at - steps[i].at;
@@ -235,10 +237,10 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
   found.evidence = fmt::format(
       "it {} {} time{} and comes back, by up to {} from one sample to the next, {}",
       zero ? "falls to zero" : "jumps away", count, count == 1 ? "" : "s", in_field(c, largest),
-      c.fastest > 0.0
-          ? fmt::format("where the machine can do {}", in_field(c, c.fastest * context.log.step))
-          : fmt::format("while nothing else in the log changes (its noise is {})",
-                        in_field(c, noise)));
+      c.fastest > 0.0 ? fmt::format("where the machine can move by {}",
+                                    in_field(c, c.fastest * context.log.step))
+                      : fmt::format("while nothing else in the log changes (its noise is {})",
+                                    in_field(c, noise)));
   found.remedy = "Check the sensor's cable and plug, and leave these samples out";
   return found;
 }
@@ -252,7 +254,7 @@ std::optional<Finding> check_wild(const CheckContext& context, std::size_t chann
   const auto count = static_cast<double>(wild.count());
   if (count < std::max(10.0, kMany * static_cast<double>(wild.size()))) return {};
   if (!(wild && c.channel->values.array() != 0.0).any())
-    return {};  // drop-outs: check_jumps says so
+    return {};  // check_jumps reports these as drop-outs
   Finding found;
   found.kind = BadDataKind::kWild;
   found.affected = wild;
@@ -265,16 +267,16 @@ std::optional<Finding> check_wild(const CheckContext& context, std::size_t chann
 }
 
 std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel) {
-  constexpr double kStretch = 1.5;        // [s] of one value
-  constexpr double kContradiction = 0.8;  // [s] on end in which the cylinder does something else
+  constexpr double kStretch = 1.5;        // [s] least duration of one value
+  constexpr double kContradiction = 0.8;  // [s] least time in which the cylinder does not follow
   constexpr double kFirm = 0.15;          // [-] outside any dead band
-  // Pumps that run short slow a cylinder to half its speed, a compensator that fails lets it run at up to twice.
+  // A saturated pump slows a cylinder to half its speed, a faulty pressure compensator lets it run at up to twice.
   constexpr double kSlow = 0.4, kFast = 2.2;
-  constexpr double kHabit = 0.02;  // of the other samples may be as far off
+  constexpr double kHabit = 0.02;  // largest share of other samples that do not follow either
   const CheckedChannel& c = context.channels[channel];
   if (c.channel->role != Role::kCommand) return {};
   const CylinderSignals& s = context.signals.cylinders[static_cast<std::size_t>(c.cylinder)];
-  if (!s.has_command()) return {};  // zero throughout while it moves: not recorded, and said so
+  if (!s.has_command()) return {};  // make_signals has removed it and noted so
   const VectorXd& u = c.channel->values;
   const VectorXd lengths = finite_values(s.length);
   if (lengths.size() == 0) return {};
@@ -307,7 +309,7 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
     if (bad) found.affected.segment(stretch.begin, stretch.size()).setConstant(true);
   }
   if (!found.affected.any()) return {};
-  // Where the cylinder departs from its commands at other times too, it is the valve or the pump.
+  // If the cylinder often does not follow other commands either, the cause is the valve or the pump.
   double others = 0.0, astray = 0.0;
   for (Index k = 0; k < u.size(); ++k) {
     if (found.affected[k] || !(std::abs(u[k]) > kFirm)) continue;
@@ -317,8 +319,8 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   if (astray > kHabit * others) return {};
   found.kind = BadDataKind::kStuck;
   found.evidence = fmt::format(
-      "it stays at exactly {:.3g} while the cylinder, away from its ends, does something else for "
-      "{:.1f} s; elsewhere it follows",
+      "it stays at exactly {:.3g} while the cylinder, away from its end stops, does not follow it "
+      "for {:.1f} s; elsewhere it follows",
       value, longest);
   found.remedy = "Check where the command is logged, and leave this stretch out";
   return found;

@@ -15,15 +15,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// So many samples show the corner; more only cost time.
+/// Largest number of samples; more would only increase the computing time.
 constexpr Index kEnough = 800;
-/// Each branch must be seen in so many of them.
+/// Least number of samples on each branch.
 constexpr Index kFewest = 15;
-/// Two planes must leave less than this share of what a smooth law leaves, squared.
+/// Largest squared error of two planes as a share of that of a smooth law.
 constexpr double kClearly = 0.7;
 constexpr int kRounds = 20;
 
-/// Scaled: flow by its largest, pressures in Pa.
+/// Samples with the flow scaled by its maximum; load over the supply area and pressure in Pa.
 struct Samples {
   ArrayXd flow, load, pressure;
   Index size() const { return flow.size(); }
@@ -41,7 +41,8 @@ struct Branches {
   }
 };
 
-/// Of the samples for which `on_line` says so, and of the others. @return false when one branch has too few
+/// Fits the static branch to the samples with `on_line` and the valve's to the others.
+/// @return false when one branch has too few samples
 bool fit_branches(const Samples& s, const std::vector<char>& on_line, Branches& out) {
   const auto lines = static_cast<Index>(std::count(on_line.begin(), on_line.end(), 1));
   const Index valves = s.size() - lines;
@@ -75,7 +76,7 @@ double squared_error(const Samples& s, const Branches& b) {
   return sum;
 }
 
-/// Of a quadratic law over flow and load.
+/// @return squared error of a quadratic law of flow and load
 double smooth_error(const Samples& s) {
   MatrixXd x(s.size(), 6);
   const double scale = std::max(1.0, s.load.abs().maxCoeff());

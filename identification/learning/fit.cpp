@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using Progress = std::function<void(double, const std::string&)>;
 
-/// @param signals get the effects of the model learned
+/// Learns a model from the samples that count. @param signals get the contributions of the options' effects
 FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
               std::vector<Mask> counts, const FitOptions& options, const Progress& progress) {
   FitPass pass;
@@ -34,7 +34,7 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
                        [](const PumpSignals& p) { return p.pressure_effect.size() > 0; });
   });
   if (!again) return pass;
-  // effects on a pump's pressure build on its demand, which is only known with its margins: in turns until settled
+  // Effects on a pump's pressure depend on its demand and so on the margins; both are updated alternately until converged.
   constexpr int kTurns = 6;
   constexpr double kSettled = 1e3;  // [Pa]
   for (int turn = 0; turn < kTurns; ++turn) {
@@ -61,7 +61,7 @@ std::vector<MachineSignals> all_signals(const Machine& machine, const std::vecto
   return out;
 }
 
-/// Usable samples away from the runs' ends, where one-sided windows make poor speeds.
+/// @return usable samples away from the runs' ends, where one-sided windows give inaccurate speeds
 std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   std::vector<Mask> out;
   out.reserve(signals.size());
@@ -69,14 +69,15 @@ std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   return out;
 }
 
-/// A figure for data the model has not seen, from whole blocks of motion.
+/// Judges a model that is learned without the held-out blocks of motion on these blocks.
 std::optional<CompareResult> judge_held_out(const Machine& machine,
                                             std::vector<MachineSignals>& signals,
                                             const FitOptions& options,
                                             std::vector<std::string>& notes) {
   const std::vector<Mask> held = held_out_samples(signals, options);
   if (std::none_of(held.begin(), held.end(), [](const Mask& m) { return m.any(); })) {
-    notes.push_back("no held-out figure: the logs hold too few separate motions; give --test logs");
+    notes.push_back(
+        "no error on held-out motions: the logs hold too few separate motions; give --test logs");
     return std::nullopt;
   }
   std::vector<Mask> counts = inside(signals);

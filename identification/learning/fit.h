@@ -1,7 +1,7 @@
 #pragma once
-/// Learns everything of a crane model from logs: a pressure process for each cylinder and direction, each
-/// pump's margins and standby, the valve gains. What the logs do not show is not learned, and the result says
-/// what to record. docs/fit_and_compare.md has the method.
+/// Identifies a crane model from logs: a pressure model for each cylinder and direction, the margins and standby of each
+/// pump, and the valve gains. Parts that the logs do not determine are not learned, and the result says what to record.
+/// docs/fit_and_compare.md describes the method.
 #include <functional>
 #include <optional>
 #include <string>
@@ -16,32 +16,31 @@ namespace sparflow {
 
 struct FitOptions {
   SignalOptions signals;
-  /// Physical effects of the model to be learned, with their values, which stay as they are: processes, margins and
-  /// gains are learned around them.
+  /// Physical effects of the model with fixed parameter values; pressure models, margins and gains are learned with their
+  /// contributions subtracted.
   std::vector<AppliedEffect> effects;
-  /// The same as estimated without the held-out motions, for an honest figure; empty = `effects`.
+  /// The effects as estimated without the held-out motions, for the error on those motions; empty = `effects`.
   std::vector<AppliedEffect> effects_held_out;
   LearnGpOptions gp;
-  LearnPumpOptions
-      pump;  ///< standby of the data sheet and largest pressure come from the machine file
-  /// Without test logs: every so many-th block of motion is held out for an honest figure, then everything is
-  /// fitted again on all data. 0 = do not.
+  LearnPumpOptions pump;  ///< the machine file replaces its data-sheet standby and largest pressure
+  /// Without test logs every n-th block of motion is held out to judge a model that is learned without them; the result
+  /// is learned from all data. 0 = no such judgement.
   int hold_out_every = 4;
   double hold_out_block_s = 8.0;  ///< [s] a longer motion is cut into blocks of about this length
-  /// A process' samples are thinned to what is independent when its residual's integrated autocorrelation
+  /// The samples of a pressure model are thinned to independent ones when the integrated autocorrelation of its residual
   /// reaches this many samples. 0 = never.
   double thin_from = 2.0;
   int threads = 0;  ///< 0 = one for each processor
 };
 
-/// How one process was learned.
+/// How one pressure model was learned.
 struct ProcessFit {
   int cylinder = -1;
   bool extend = true;
-  long offered = 0;              ///< samples driven in this direction
+  long offered = 0;              ///< available samples, driven in this direction
   double autocorrelation = 1.0;  ///< integrated, of the first fit's residual [samples]
-  int step = 1;                  ///< every so many-th sample was used
-  GpReport report;               ///< of the last fit; `failure` says why there is no process
+  int step = 1;                  ///< every step-th sample was used
+  GpReport report;               ///< of the last fit; `failure` says why there is no model
 };
 
 /// One valve section in one direction.
@@ -56,10 +55,10 @@ struct FitResult {
   CompareResult train;
   std::optional<CompareResult> test;  ///< on the test logs
   std::optional<CompareResult>
-      held_out;  ///< without test logs: blocks the model of that figure never saw
+      held_out;  ///< without test logs: on held-out blocks, by a model learned without them
   std::vector<ProcessFit> processes;
   std::vector<std::optional<LearnedPump>> pumps;  ///< by pump; its margins in the order of `feeds`
-  std::vector<ValveFit> valves;                   ///< those learned
+  std::vector<ValveFit> valves;                   ///< only those that could be learned
   std::vector<std::string>
       notes;  ///< what was not learned, why, and what to record; whole sentences
   double seconds = 0.0;
@@ -68,24 +67,25 @@ struct FitResult {
   std::string full() const;   ///< one screen
 };
 
-/// @param progress called with a share 0..1 and what is being done, from one thread at a time; may be empty
+/// @param progress called with a share 0..1 and the current step, from one thread at a time; may be empty
 /// @throws InputError when there is no log
 FitResult fit(const Machine& machine, const std::vector<Log>& logs,
               const std::vector<Log>& test_logs = {}, const FitOptions& options = {},
               const std::function<void(double share, const std::string& what)>& progress = {});
 
-/// Samples held out for the figure of `FitResult::held_out`, one mask a log; all false when fewer than two motions
-/// could be held out.
+/// @return [logs] masks of the samples held out for `FitResult::held_out`; all false when fewer than two blocks of motion
+///   could be held out
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
                                    const FitOptions& options);
 
-/// Blocks of motion in time order: motion segments, the long ones cut into equal parts of about `block_s`.
-/// Whatever is held out is held out by whole blocks, never by rows: neighbouring rows are alike.
+/// Data is held out by whole blocks of motion, because neighbouring rows are correlated.
+/// @return motion segments in order of time, the long ones cut into equal parts of about `block_s`
 std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double block_s);
 
-/// 1 + 2 sum of the autocorrelations up to the first below 0.05: how many samples one independent one is
-/// worth. Source: A. Sokal, "Monte Carlo methods in statistical mechanics" (1997), ch. 3.
-/// @param residual in order  @param position of each in the log; a jump of other than one ends a stretch
+/// Number of correlated samples that carry as much information as one independent sample.
+/// Source: A. Sokal, "Monte Carlo methods in statistical mechanics" (1997), ch. 3.
+/// @param residual in order of time  @param position of each in the log; a step other than one ends a stretch
+/// @return 1 + 2 sum of the autocorrelations up to the first below 0.05
 double integrated_autocorrelation(const Eigen::VectorXd& residual,
                                   const std::vector<Eigen::Index>& position);
 

@@ -1,16 +1,16 @@
 #pragma once
-/// One pass of learning on chosen samples; used by fit.cpp, fit_processes.cpp and fit_supply.cpp only.
+/// One pass of learning on selected samples; used by fit.cpp, fit_processes.cpp and fit_supply.cpp only.
 #include "identification/learning/fit.h"
 
 namespace sparflow {
 
-/// What is learned from: signals of all logs and the samples of each that count.
+/// Signals of all logs and masks of the samples that count.
 struct TrainingData {
   const std::vector<MachineSignals>* signals = nullptr;
   std::vector<Mask> counts;
 };
 
-/// Everything one pass of learning leaves behind.
+/// The result of one pass of learning.
 struct FitPass {
   CraneModel model;
   std::vector<ProcessFit> processes;
@@ -19,14 +19,14 @@ struct FitPass {
   std::vector<std::string> notes;
 };
 
-/// "boom extend"
+/// @return e.g. "boom extend"
 std::string process_name(const Machine& machine, int cylinder, bool extend);
 
-/// Working pressures of every hydraulic cylinder, both ways.
+/// Learns the pressure models of every hydraulic cylinder in both directions.
 void learn_processes(const TrainingData& data, const FitOptions& options, FitPass& pass,
                      const std::function<void(double, const std::string&)>& progress);
 void learn_valves(const TrainingData& data, FitPass& pass);
-/// Margins and standby; needs the processes.
+/// Learns margins and standby; requires the pressure models.
 void learn_pumps(const TrainingData& data, const FitOptions& options, FitPass& pass);
 
 }  // namespace sparflow

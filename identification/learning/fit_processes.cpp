@@ -18,24 +18,24 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Samples of one process in order of time, with places by which stretches can be told.
+/// Samples of one pressure model in order of time, with positions that identify unbroken stretches.
 struct ProcessData {
   GpDataset set;
-  std::vector<Index> position;  ///< running number over all logs, a gap between logs
-  VectorXd measured;            ///< [Pa] as measured, less the effects on the supply itself
-  VectorXd back;                ///< [Pa] what effects add to the return chamber
+  std::vector<Index> position;  ///< running number over all logs, with a gap between logs
+  VectorXd measured;            ///< [Pa] measured, less the effects on the supply chamber
+  VectorXd back;                ///< [Pa] contribution of effects to the return chamber
   bool has_back() const { return (back.array() != 0.0).any(); }
 
-  /// Takes what of it reaches the supply off, by a process learned so far.
-  void take_back_off(const Cylinder& cylinder, int side, const GaussianProcess& process) {
+  /// Subtracts the part of `back` that reaches the supply chamber by the pressure model learned so far.
+  void subtract_back(const Cylinder& cylinder, int side, const GaussianProcess& process) {
     for (Index k = 0; k < back.size(); ++k) {
       const double q = set.flow[k], f = set.force[k];
       set.pressure[k] = measured[k] - supply_rise<double>(process, cylinder, side,
                                                           process.mean(q, f), q, f, back[k]);
     }
   }
-  /// The same before anything is learned: all of it where the load opposes, nothing where it helps.
-  void take_back_off(const Cylinder& cylinder, int side) {
+  /// The same before a pressure model exists: all of it when moving against the load, nothing with the load.
+  void subtract_back(const Cylinder& cylinder, int side) {
     const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
     const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
     for (Index k = 0; k < back.size(); ++k) {
@@ -49,8 +49,8 @@ GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
   return {all.name, all.flow(rows), all.force(rows), all.pressure(rows)};
 }
 
-/// Driven samples: they move, and towards the side of the command. Pressures as logged: a process averages
-/// white noise itself, and a filter would blur the steps at starts and stops.
+/// Collects the samples that move in the direction of the command. Pressures are used as logged, because the Gaussian
+/// process averages white noise itself and a filter would smooth the steps at starts and stops.
 ProcessData process_data(const Machine& machine, const TrainingData& data, int cylinder,
                          bool extend) {
   std::vector<double> flow, force, pressure, back;
@@ -81,13 +81,13 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
   out.measured = out.set.pressure.matrix();
   out.back = Eigen::Map<VectorXd>(back.data(), n);
   if (out.has_back()) {
-    out.take_back_off(machine.cylinders[static_cast<std::size_t>(cylinder)], extend ? 1 : -1);
+    out.subtract_back(machine.cylinders[static_cast<std::size_t>(cylinder)], extend ? 1 : -1);
   }
   return out;
 }
 
-/// Every `step`-th sample, evenly over each unbroken stretch and at least one of it, so that a short motion
-/// under a rare load is not lost.
+/// @return every `step`-th sample, evenly over each unbroken stretch and at least one of each, so that a short motion
+///   under a rare load is represented
 std::vector<Index> thinned(const std::vector<Index>& position, int step) {
   std::vector<Index> rows;
   std::size_t begin = 0;
@@ -103,7 +103,7 @@ std::vector<Index> thinned(const std::vector<Index>& position, int step) {
   return rows;
 }
 
-/// @param samples that it was learned from
+/// Moves a learned pressure model and its report into the pass. @param samples from which it was learned
 void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samples) {
   ProcessFit& fitted = pass.processes[i];
   fitted.report = std::move(learned.report);
@@ -115,14 +115,14 @@ void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samp
   (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
 }
 
-void take_corner_off(const BranchCorner& corner, GpDataset& set) {
+void subtract_corner(const BranchCorner& corner, GpDataset& set) {
   for (Index k = 0; k < set.pressure.size(); ++k)
     set.pressure[k] -= corner_rise(corner, set.flow[k], set.force[k]).value;
 }
 
-/// Learns processes side by side and takes those that could be learned into the model.
-/// @param which of the pass' processes, as many as sets  @param keep_others a process that there is already stays where
-///        this one cannot be learned, and so does its report
+/// Learns pressure models in parallel and moves those that could be learned into the pass.
+/// @param which [sets] indices into the pass' processes  @param keep_others true to keep an existing model and its report
+///   where a new one cannot be learned
 void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& which,
            const LearnGpOptions& options, int threads, bool keep_others, FitPass& pass,
            const std::function<void(int, int, const std::string&)>& progress = {}) {
@@ -140,7 +140,7 @@ void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& w
       continue;
     }
     corners[k] = find_branch_corner(sets[k], cylinder, side);
-    if (corners[k].there()) take_corner_off(corners[k], asked[k]);
+    if (corners[k].there()) subtract_corner(corners[k], asked[k]);
   }
   std::vector<LearnedGp> learned = learn_gps(asked, options, progress, threads);
   for (std::size_t k = 0; k < learned.size(); ++k) {
@@ -162,17 +162,17 @@ VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
   return residual;
 }
 
-/// How many samples one independent sample is worth, as a step; 1 = all are used.
+/// @return thinning step: samples for each independent sample; 1 = all are used
 int thinning_step(double autocorrelation, Index samples, double thin_from) {
   if (thin_from <= 0.0 || autocorrelation < thin_from) return 1;
-  // Enough must remain to see the shape, however alike the samples are.
+  // Enough samples must remain to represent the law, however strong their correlation.
   constexpr double kLeast = 400.0;
   const double most = static_cast<double>(samples) / kLeast;
   return std::max(1, static_cast<int>(std::lround(std::min(autocorrelation, most))));
 }
 
-/// The thinned samples, without what the first fit, on all of them, calls outliers. Few samples cannot be
-/// screened again: a single motion under a rare load would look like one.
+/// @return the thinned samples without the outliers of the first fit on all samples. The few that remain are not screened
+///   again, since a single motion under a rare load would look like an outlier.
 GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int step,
                       double threshold) {
   const double limit = threshold * robust_std(residual);
@@ -183,27 +183,28 @@ GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int ste
   return rows_of(data.set, rows);
 }
 
-/// What effects add to the return chambers reaches the supply by the very processes that are being learned: their
-/// slopes over the load, which tell the branches apart, are there after the first round, their values after the second.
-void take_backs_off(const FitOptions& options, std::vector<ProcessData>& samples, FitPass& pass) {
-  const auto take_off = [&](std::size_t i) {
+/// Subtracts the effects on the return chambers. Their transmission to the supply follows from the pressure models that are
+/// being learned: the slopes over the load, which identify the branch, are known after the first round, the values after
+/// the second.
+void subtract_backs(const FitOptions& options, std::vector<ProcessData>& samples, FitPass& pass) {
+  const auto subtract = [&](std::size_t i) {
     const ProcessFit& fitted = pass.processes[i];
     const auto c = static_cast<std::size_t>(fitted.cylinder);
     const CylinderModel& m = pass.model.cylinders[c];
-    samples[i].take_back_off(pass.model.machine.cylinders[c], fitted.extend ? 1 : -1,
+    samples[i].subtract_back(pass.model.machine.cylinders[c], fitted.extend ? 1 : -1,
                              fitted.extend ? m.extend : m.retract);
   };
   std::vector<GpDataset> again;
   std::vector<std::size_t> which;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!pass.processes[i].report.failure.empty() || !samples[i].has_back()) continue;
-    take_off(i);
+    subtract(i);
     again.push_back(samples[i].set);
     which.push_back(i);
   }
   if (again.empty()) return;
   learn(again, which, options.gp, options.threads, true, pass);
-  for (const std::size_t i : which) take_off(i);
+  for (const std::size_t i : which) subtract(i);
 }
 
 void process_notes(const Machine& machine, FitPass& pass) {
@@ -212,8 +213,8 @@ void process_notes(const Machine& machine, FitPass& pass) {
     const char* what = f.extend ? "extending" : "retracting";
     if (!f.report.failure.empty()) {
       pass.notes.push_back(
-          fmt::format("pressure of {} {}: not learned, the logs hold {} sample(s) of it with a "
-                      "measured pressure; record {} {} "
+          fmt::format("pressure of {} {}: not learned, the logs hold {} sample(s) of this motion "
+                      "with a measured pressure; record {} {} "
                       "at several speeds and loads, with p{}_{}_bar",
                       name, what, f.offered, name, what, f.extend ? "A" : "B", name));
     }
@@ -255,7 +256,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   std::vector<std::size_t> all(sets.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   learn(sets, all, options.gp, options.threads, false, pass, tell(0.0));
-  take_backs_off(options, samples, pass);
+  subtract_backs(options, samples, pass);
 
   std::vector<GpDataset> again;
   std::vector<std::size_t> which;
@@ -276,7 +277,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   }
   LearnGpOptions screened = options.gp;
   screened.outlier_threshold = 0.0;
-  // a first fit is better than none
+  // Where thinned samples cannot be learned, the first fit is kept.
   learn(again, which, screened, options.threads, true, pass, tell(0.5));
   process_notes(machine, pass);
 }

@@ -1,4 +1,4 @@
-// The result of a fit in words.
+// Formats the result of a fit as text.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace sparflow {
 namespace {
 
-/// Root mean square over a stage's scores, weighted by samples; NaN when there is none.
+/// @return root mean square over a stage's scores, weighted by samples; NaN when there is none
 double stage_rmse(const CompareResult& result, const std::string& stage) {
   double sum = 0.0, n = 0.0;
   for (const StageScore& s : result.scores) {
@@ -43,7 +43,7 @@ std::string figures(const CompareResult& result) {
 }
 
 std::string process_lines(const FitResult& r) {
-  if (r.processes.empty()) return "no hydraulic cylinder: no pressure to learn\n";
+  if (r.processes.empty()) return "no hydraulic cylinder: there is no pressure model to learn\n";
   std::string text =
       fmt::format("{:<20}{:>8}{:>6}{:>9}{:>11}{:>11}{:>16}{:>20}\n", "pressure of", "samples",
                   "step", "centres", "RMSE bar", "noise bar", "flow l/min", "load kN");
@@ -102,7 +102,7 @@ std::string supply_lines(const FitResult& r) {
 std::string FitResult::brief() const {
   const auto learned = std::count_if(processes.begin(), processes.end(),
                                      [](const ProcessFit& f) { return f.report.failure.empty(); });
-  std::string text = fmt::format("{} of {} pressure processes learned from {} samples in {:.1f} s",
+  std::string text = fmt::format("{} of {} pressure models identified from {} samples in {:.1f} s",
                                  learned, processes.size(), train.samples, seconds);
   if (test) return text + "; on the test logs: " + figures(*test);
   if (held_out) return text + "; on held-out motions: " + figures(*held_out);

@@ -14,13 +14,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Measured pressure less what effects add after the maximum. [Pa]
+/// @return [Pa] measured pressure less the effects that act on it after the maximum
 VectorXd without_effect(const PumpSignals& pump) {
   if (pump.pressure.size() == 0 || pump.pressure_effect.size() == 0) return pump.pressure;
   return pump.pressure - pump.pressure_effect;
 }
 
-/// Samples at which it is beyond doubt which cylinders demand pressure, with the model's pressures.
+/// Collects the samples in which every cylinder is either driven or not commanded, with the model's working pressures.
 PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int index) {
   const Machine& machine = pass.model.machine;
   const Pump& pump = machine.pumps[static_cast<std::size_t>(index)];

@@ -14,15 +14,17 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 
-/// Of the learned range, the part at its border whose slope tells the branch.
+/// Share of the learned range at its border in which the slope identifies the branch.
 constexpr double kBorder = 0.1;
-/// Loads that span less are alike: between no slope and the static branch's, a corner in their middle leaves a straight line
-/// by an eighth of the span at most, about a sensor's noise; what a kernel finds beyond that is friction. [Pa]
+/// Loads with a smaller span do not determine the law over the load: between slope 0 and the static branch, a corner in the
+/// middle deviates from a straight line by at most an eighth of the span, which is about the sensor noise; any more that a
+/// kernel would fit is friction. [Pa]
 constexpr double kAlike = 8e5;
-/// Anti-cavitation valves keep chambers near the tank's pressure. [Pa]
+/// Largest lowest pressure of a chamber, since anti-cavitation valves keep it near the tank's pressure. [Pa]
 constexpr double kTank = 2e5;
 
-/// Share of a larger load that the supply takes, as that of the branch it shows: all of it, or a valve's.
+/// @return share of an additional load that raises the supply pressure, by the branch that the slope indicates: 1 on the
+///   static branch, else the valve's
 double branch_share(double slope) {
   const double on_static =
       std::clamp((slope - return_rise::kSteepestValve) /
@@ -35,20 +37,20 @@ double supply_area(const Cylinder& cylinder, int side) {
   return side > 0 ? cylinder.area_piston() : cylinder.area_rod();
 }
 
-/// Share of a larger load that the supply takes where samples show no slope.
+/// @return the same share by the level of the pressure above the load, for samples that show no slope
 double share_on_static(const GpDataset& samples, double supply, int side) {
   const ArrayXd excess = samples.pressure - side * samples.force / supply;
   const double above = quantile(excess.matrix(), 0.5);
   return 1.0 / (1.0 + std::exp((above - return_rise::kValveFrom) / return_rise::kValveSpread));
 }
 
-/// Of a larger load, what the supply takes.
+/// Share of an additional load that raises the supply pressure, with its standard deviation.
 struct Share {
   double value = 0.0, deviation = 0.0;
 };
 
-/// What the samples themselves show, beside a parabola over the flow. Friction and dynamics make the errors of a motion
-/// alike, so that many samples are worth few.
+/// Estimates the share by regression of pressure on load, both after removing a parabola over the flow. Friction and
+/// dynamics correlate the errors of a motion, so at most kWorth samples count as independent.
 Share share_in(const GpDataset& samples, double supply, int side) {
   constexpr double kUnknown = 1e3, kExact = 1e-3;
   constexpr double kWorth = 20.0;
@@ -72,7 +74,7 @@ Share share_in(const GpDataset& samples, double supply, int side) {
   return {share, std::max(kExact, std::sqrt(left / (worth * spread)))};
 }
 
-/// Two independent estimates as one.
+/// Combines two independent estimates by inverse-variance weighting.
 Share together(const Share& a, const Share& b) {
   const double of_a = 1.0 / (a.deviation * a.deviation), of_b = 1.0 / (b.deviation * b.deviation);
   return {(of_a * a.value + of_b * b.value) / (of_a + of_b), 1.0 / std::sqrt(of_a + of_b)};
@@ -85,7 +87,7 @@ std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& 
   if (samples.force.size() == 0) return {};
   const double supply = supply_area(cylinder, side);
   if (samples.force.maxCoeff() - samples.force.minCoeff() >= kAlike * supply) return {};
-  constexpr double kSurest = 0.1;  // a force that is wrong by a tenth tilts it as much
+  constexpr double kSurest = 0.1;  // least deviation, as an error of the force by a tenth causes it
   const double usual = share_on_static(samples, supply, side);
   const Share known{usual, std::max(kSurest, std::sqrt(usual * (1.0 - usual)))};
   const Share share = together(known, share_in(samples, supply, side));
@@ -100,7 +102,7 @@ GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads) {
 }
 
 GpParameters for_any_load(GpParameters learned, const AlikeLoads& loads, const GpDataset& samples) {
-  // Longer than any load of a machine: what is learned over the flow does not fade with the force.
+  // The length-scale exceeds any load, so that the learned dependence on the flow holds at every force.
   constexpr double kEndless = 1e9;  // [N]
   learned.length_force = kEndless;
   learned.mean_constant -= (loads.slope - learned.mean_slope) * loads.force;

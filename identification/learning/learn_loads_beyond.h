@@ -1,5 +1,5 @@
 #pragma once
-/// What a learned pressure says beyond the loads it has seen (models/hydraulics/loads_beyond.h), from the same samples.
+/// Learns how a pressure model is extrapolated beyond the loads of its samples (models/hydraulics/loads_beyond.h).
 #include <optional>
 
 #include "identification/learning/gaussian_process/learn_pressure.h"
@@ -7,28 +7,30 @@
 
 namespace sparflow {
 
-/// Loads so alike that samples show little of a slope over them (a slewing cylinder on level ground carries none at all).
-/// Which share of a larger one the supply takes follows from where it stands, near the load on the static branch, which
-/// takes all of it, or far above, where a valve holds it; and from the samples as far as they show one. It lies between 0 and
-/// 1: what is steeper is friction that moves along with the load.
+/// Slope over the load for samples whose loads vary too little to determine it (a slewing cylinder on level ground has no
+/// load at all). The share of an additional load that raises the supply pressure is estimated from the pressure's level:
+/// near the load it is the static branch, which takes all of it; far above it a valve holds the pressure. This estimate is
+/// averaged with the samples' own slope. The share lies between 0 and 1; a steeper slope is friction that is correlated
+/// with the load.
 struct AlikeLoads {
   double force = 0.0;            ///< [N] median
   double slope = 0.0;            ///< [Pa/N] of the supply over the force
-  double slope_deviation = 0.0;  ///< [Pa/N] which of the branches it is is not known for sure
+  double slope_deviation = 0.0;  ///< [Pa/N] standard deviation, as the branch is not certain
 };
 
-/// @param samples of one process  @param side +1 extends, -1 retracts
-/// @return nothing where the loads vary enough for a slope, or without samples
+/// @param samples of one pressure model  @param side +1 extends, -1 retracts
+/// @return nothing where the loads vary enough to learn a slope, or without samples
 std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& cylinder, int side);
 
-/// The samples as they would be under the median load: what a process of the flow alone is learned from.
+/// Corrects the samples to the median load, so that a pressure model of the flow alone can be learned from them.
 GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads);
 
-/// The process learned from those, for any load.
-/// @param samples before they were taken to one load: their range is the process'
+/// Extends a pressure model that was learned at one load to any load.
+/// @param samples before they were corrected to one load; their range becomes the model's
 GpParameters for_any_load(GpParameters learned, const AlikeLoads& loads, const GpDataset& samples);
 
-/// @param parameters of the process learned from `samples`, with their range
+/// Learns the static level and the slopes for loads heavier and lighter than the samples'.
+/// @param parameters of the pressure model learned from `samples`, with their range
 /// @param side +1 extends, -1 retracts
 LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& samples,
                                const Cylinder& cylinder, int side);

@@ -16,8 +16,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
-constexpr double kFinest =
-    100.0;  // [Pa] to which an unknown is searched: a hundredth of sensor resolution
+constexpr double kFinest = 100.0;  // [Pa] resolution of the search, a hundredth of a sensor's
 constexpr int kGrid = 96;
 constexpr int kFewestPumpSamples = 10;
 
@@ -32,7 +31,7 @@ struct PumpLaw {
   double value(const VectorXd& unknown, Index t) const {
     return (offset.row(t).transpose() + unknown).maxCoeff();
   }
-  /// The largest term but `except`.
+  /// @return largest term except one
   double others(const VectorXd& unknown, Index t, Index except) const {
     double largest = kNever;
     for (Index k = 0; k < terms(); ++k) {
@@ -47,7 +46,7 @@ struct PumpLaw {
   }
 };
 
-/// Rows that can be used, with counts of those that cannot.
+/// Selects the usable rows and counts the others in `out`.
 PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, LearnedPump& out) {
   const Index m = s.active.cols();
   PumpLaw law{MatrixXd::Constant(s.pressure.size(), m + 1, kNever), VectorXd(s.pressure.size())};
@@ -77,7 +76,7 @@ PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, Le
   return law;
 }
 
-/// The part of the objective that one unknown moves, the others held.
+/// The objective as a function of one unknown, with the others fixed.
 class OneUnknown {
  public:
   OneUnknown(const PumpLaw& law, const VectorXd& unknown, Index k, double limit) : limit_(limit) {
@@ -92,7 +91,8 @@ class OneUnknown {
       sum += huber_loss(s.pressure - std::max(s.others, s.own + x), limit_);
     return sum;
   }
-  /// [0, where the sample that asks most would be met]; empty when it is active nowhere.
+  /// @return upper end of the search: the margin at which the largest distance to the measured pressure is closed; 0 when
+  ///   the cylinder is never active
   double largest_useful() const {
     double largest = 0.0;
     for (const Sample& s : samples_) largest = std::max(largest, s.pressure - s.own);
@@ -107,10 +107,11 @@ class OneUnknown {
   double limit_;
 };
 
-/// Global on a grid over [0, hi], then finer around the best; the smallest of equal minima.
+/// Minimises over [0, hi] by a grid that is refined around its best point; of equal minima `start`, or else the smallest, is
+/// returned.
 double minimise(const OneUnknown& f, double hi, double start) {
   double best = std::clamp(start, 0.0, hi), best_value = f(best);
-  const double keep = best_value * (1.0 - 1e-12);  // of equals, the present one stays
+  const double keep = best_value * (1.0 - 1e-12);  // an equal value does not replace `start`
   double value_to_beat = keep;
   double lo = 0.0, step = hi / kGrid;
   while (step > 0.0) {
@@ -130,7 +131,7 @@ double minimise(const OneUnknown& f, double hi, double start) {
   return best;
 }
 
-/// Where to begin: a margin no larger than almost all samples of its cylinder allow, since p >= P_i + c_i.
+/// Initial values: margins that almost all samples of the cylinder allow, since p >= P_i + c_i.
 VectorXd initial_unknowns(const PumpLaw& law) {
   const Index m = law.terms() - 1;
   VectorXd unknown = VectorXd::Zero(m + 1);
@@ -152,12 +153,12 @@ VectorXd initial_unknowns(const PumpLaw& law) {
   return unknown;
 }
 
-/// Coordinate descent until no unknown moves. @return true when it came to rest
+/// Coordinate descent until no unknown changes. @return true when it converged
 bool search(const PumpLaw& law, VectorXd& unknown, int& sweeps) {
   double limit = 0.0;
   for (int sweep = 0; sweep < 40; ++sweep) {
     ++sweeps;
-    // The scale is fixed after three sweeps: a moving one could cycle.
+    // The scale is fixed after four sweeps, because with a changing scale the descent could cycle.
     if (sweep < 4) limit = kHuberStds * std::max(robust_std(law.residuals(unknown)), kFinest);
     const VectorXd before = unknown;
     for (Index k = law.terms() - 1; k >= 0; --k) {
@@ -170,16 +171,16 @@ bool search(const PumpLaw& law, VectorXd& unknown, int& sweeps) {
   return false;
 }
 
-struct Lead {
+struct Leader {
   Index term = 0;
-  double gap = 0.0;  // to the runner-up [Pa]
+  double gap = 0.0;  // to the second largest term [Pa]
 };
 
-Lead leader_of(const PumpLaw& law, const VectorXd& unknown, Index t) {
-  Lead lead;
-  const double value = (law.offset.row(t).transpose() + unknown).maxCoeff(&lead.term);
-  lead.gap = value - law.others(unknown, t, lead.term);
-  return lead;
+Leader leader_of(const PumpLaw& law, const VectorXd& unknown, Index t) {
+  Leader leader;
+  const double value = (law.offset.row(t).transpose() + unknown).maxCoeff(&leader.term);
+  leader.gap = value - law.others(unknown, t, leader.term);
+  return leader;
 }
 
 /// Huber's location and its standard error.
@@ -208,8 +209,8 @@ Location location(const VectorXd& values) {
   return l;
 }
 
-/// With the leaders known, each unknown is the location of what its own samples ask. Near ties and outliers
-/// are left out (see the header) where enough samples remain.
+/// With fixed leaders each unknown is Huber's location of p - P_i over the samples in which its term is the largest. Near
+/// ties are left out (see the header) where enough samples remain, outliers always.
 void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
             const LearnPumpOptions& options) {
   const VectorXd residuals = law.residuals(unknown);
@@ -217,11 +218,11 @@ void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
   std::vector<std::vector<double>> clear(static_cast<std::size_t>(law.terms())), all = clear;
   for (Index t = 0; t < law.samples(); ++t) {
     if (std::abs(residuals[t]) > options.outlier_threshold * std) continue;
-    const Lead lead = leader_of(law, unknown, t);
-    const double asked = law.pressure[t] - law.offset(t, lead.term);
-    all[static_cast<std::size_t>(lead.term)].push_back(asked);
-    if (lead.gap > options.tie_gap_stds * std)
-      clear[static_cast<std::size_t>(lead.term)].push_back(asked);
+    const Leader leader = leader_of(law, unknown, t);
+    const double required = law.pressure[t] - law.offset(t, leader.term);
+    all[static_cast<std::size_t>(leader.term)].push_back(required);
+    if (leader.gap > options.tie_gap_stds * std)
+      clear[static_cast<std::size_t>(leader.term)].push_back(required);
   }
   for (Index k = 0; k < law.terms(); ++k) {
     auto& values = clear[static_cast<std::size_t>(k)];
@@ -236,8 +237,8 @@ void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
   }
 }
 
-/// How large c_i can be before the cylinder would lead where the data follow another term: nearly the smallest
-/// distance (the smallest itself hangs on one sample).
+/// @return largest c_i at which the cylinder would not be the leader where the data follow another term: the 2 % quantile
+///   of the distances (the smallest one depends on a single sample)
 double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i) {
   std::vector<double> room;
   for (Index t = 0; t < law.samples(); ++t) {
@@ -329,8 +330,8 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
               ? fmt::format("it is at most {:.1f} bar", margin.upper_bound / 1e5)
               : std::string("nothing bounds it");
       out.warnings.push_back(fmt::format(
-          "{} leads the pump in {} of {} active samples: its margin is not identified, {}; {:.1f} "
-          "bar is assumed; record it moving alone.",
+          "{} is the load-sensing leader in {} of {} active samples: its margin is not identified, "
+          "{}; {:.1f} bar is assumed; record it moving alone.",
           cylinder_name(samples, i), margin.leading, margin.active, bound, unknown[i] / 1e5));
     }
     margin.margin = unknown[i];
@@ -338,7 +339,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   out.standby_leading = leading[static_cast<std::size_t>(m)];
   out.standby_identified = out.standby_leading >= options.min_leading;
   if (!out.standby_identified) {
-    // The pump was never seen idle: the data sheet's value, but not above the lowest pressure seen.
+    // Without samples at standby the data sheet's value is used, but not above the lowest measured pressure.
     const double lowest = quantile(law.pressure, 0.01);
     unknown[m] =
         options.data_sheet_standby > 0.0 ? std::min(options.data_sheet_standby, lowest) : lowest;
@@ -353,7 +354,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   out.robust_std = robust_std(residuals);
   const double limit = options.outlier_threshold * std::max(out.robust_std, kFinest);
   out.outliers = static_cast<int>((residuals.array().abs() > limit).count());
-  if (!out.converged) out.warnings.push_back("The search for margins did not come to rest.");
+  if (!out.converged) out.warnings.push_back("The search for margins did not converge.");
   return out;
 }
 

@@ -34,7 +34,7 @@ RobustFit robust_fit(const MatrixXd& features, const VectorXd& y) {
     const VectorXd before = fit.coefficients;
     fit.coefficients = solve_symmetric(normal, features.transpose() * weight.cwiseProduct(y));
     fit.residuals = y - features * fit.coefficients;
-    // Below a billionth of the signal residuals are rounding, and so would be the weights.
+    // Residuals below a billionth of the signal are rounding errors and must not determine the weights.
     std = std::max(robust_std(fit.residuals), 1e-9 * y.cwiseAbs().maxCoeff());
     if (std <= 0.0) break;
     weight = fit.residuals.unaryExpr([&](double r) { return huber_weight(r, kHuberStds * std); });
@@ -96,10 +96,11 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
     return out;
   }
   out.dead_band = -affine.coefficients[1] / slope;
-  // First order: dead_band = -b/a.
+  // First-order error propagation of dead_band = -b/a.
   const Eigen::Vector2d jacobian(-out.dead_band / slope, -1.0 / slope);
   out.dead_band_standard_error = std::sqrt(jacobian.dot(affine.covariance * jacobian));
-  // Neighbouring samples are alike, so the standard error is too small: a shift must be clear and matter.
+  // Neighbouring samples are correlated and the standard error is too small, so a dead band must be large against it and
+  // reduce the residual.
   if (out.dead_band > 0.01 && out.dead_band > 6.0 * out.dead_band_standard_error &&
       1.0 - out.affine_r2 < 0.8 * (1.0 - out.r2)) {
     out.warnings.push_back(

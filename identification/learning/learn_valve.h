@@ -1,6 +1,6 @@
 #pragma once
 /// Learns a valve section's flow gain, Q = gain |u|, for one cylinder in one direction: robust least squares
-/// through zero. The model has no dead band; the affine fit beside it tells whether the data want one.
+/// through zero. The model has no dead band; an additional affine fit shows whether the data suggest one.
 #include <Eigen/Dense>
 #include <string>
 #include <vector>
@@ -12,16 +12,16 @@ struct LearnedValve {
   double gain_standard_error = 0.0;  ///< [m^3/s]
   double r2 = 0.0;                   ///< [-] of Q about its mean
   double rmse = 0.0;                 ///< [m^3/s]
-  int given = 0, used = 0;           ///< samples; used: finite, command not zero
-  double command_max = 0.0;          ///< [-] largest |u| used: beyond, the gain extrapolates
+  int given = 0, used = 0;           ///< samples; used are finite ones with a command
+  double command_max = 0.0;          ///< [-] largest |u| used; the gain extrapolates beyond
 
   // Diagnostics only: Q = affine_gain (|u| - dead_band).
-  bool affine = false;  ///< whether |u| varies enough to tell
+  bool affine = false;  ///< whether |u| varies enough for the affine fit
   double affine_gain = 0.0, dead_band = 0.0, dead_band_standard_error = 0.0, affine_r2 = 0.0;
   std::vector<std::string> warnings;
 };
 
-/// @param command [-] of either sign; only |u| counts  @param flow [m^3/s] of the same samples, not negative
+/// @param command [-] of either sign; only |u| is used  @param flow [m^3/s] of the same samples, not negative
 /// @throws InputError when fewer than ten samples can be used
 LearnedValve learn_valve(const Eigen::Ref<const Eigen::VectorXd>& command,
                          const Eigen::Ref<const Eigen::VectorXd>& flow);

@@ -19,7 +19,7 @@
 namespace sparflow {
 namespace {
 
-struct UnderstoodColumn {
+struct InterpretedColumn {
   const RawColumn* raw = nullptr;
   ColumnMeaning meaning;
 };
@@ -38,16 +38,16 @@ bool same_place(const ColumnMeaning& a, const ColumnMeaning& b) {
          (a.is_time || a.role != Role::kCandidate);
 }
 
-/// Gives each column its meaning; refuses two columns for one quantity and units that are not known.
-std::vector<UnderstoodColumn> understand(const RawTable& table, const Machine& machine) {
+/// Interprets the name of each column. @throws InputError for two columns of one quantity and for unknown units
+std::vector<InterpretedColumn> interpret(const RawTable& table, const Machine& machine) {
   const FilePlace header = {table.file, table.header_line, 0};
-  std::vector<UnderstoodColumn> columns;
+  std::vector<InterpretedColumn> columns;
   for (const RawColumn& raw : table.columns) {
     columns.push_back({&raw, column_meaning(raw.name, raw.unit, machine)});
   }
-  for (UnderstoodColumn& column : columns) {
+  for (InterpretedColumn& column : columns) {
     if (column.meaning.error.empty()) continue;
-    // "q_boom_raw" beside "q_boom_rad" is another signal, alone it is a unit nobody knows.
+    // "q_boom_raw" beside "q_boom_rad" is another signal; alone it has an unknown unit.
     const bool another = std::any_of(columns.begin(), columns.end(), [&](const auto& other) {
       return other.meaning.error.empty() && same_place(other.meaning, column.meaning);
     });
@@ -70,10 +70,10 @@ std::vector<UnderstoodColumn> understand(const RawTable& table, const Machine& m
   return columns;
 }
 
-/// Names of candidates stay apart from all other signals; a repeated column is left out.
-void settle_signal_names(std::vector<UnderstoodColumn>* columns,
-                         std::vector<std::string>* warnings) {
-  std::vector<UnderstoodColumn> kept;
+/// Makes the names of candidate signals unique; a repeated column is left out.
+void make_names_unique(std::vector<InterpretedColumn>* columns,
+                       std::vector<std::string>* warnings) {
+  std::vector<InterpretedColumn> kept;
   const auto taken = [&](const std::string& signal) {
     return std::any_of(columns->begin(), columns->end(),
                        [&](const auto& c) {
@@ -82,9 +82,9 @@ void settle_signal_names(std::vector<UnderstoodColumn>* columns,
            std::any_of(kept.begin(), kept.end(),
                        [&](const auto& c) { return c.meaning.signal == signal; });
   };
-  for (UnderstoodColumn& column : *columns) {
+  for (InterpretedColumn& column : *columns) {
     if (column.meaning.role == Role::kCandidate && !column.meaning.is_time) {
-      // a pressure under its old name would be the best of all explanations of that pressure
+      // A pressure under the name in the file would explain the mapped pressure perfectly.
       if (column.raw->mapped_from) continue;
       if (taken(column.meaning.signal)) column.meaning.signal = column.raw->name;
       if (taken(column.meaning.signal)) {
@@ -98,10 +98,11 @@ void settle_signal_names(std::vector<UnderstoodColumn>* columns,
   *columns = std::move(kept);
 }
 
-/// The column that holds time. @throws InputError when there is none
-UnderstoodColumn time_column(const RawTable& table, const std::vector<UnderstoodColumn>& columns) {
+/// @return the column of time. @throws InputError when there is none
+InterpretedColumn time_column(const RawTable& table,
+                              const std::vector<InterpretedColumn>& columns) {
   const auto found = std::find_if(columns.begin(), columns.end(),
-                                  [](const UnderstoodColumn& c) { return c.meaning.is_time; });
+                                  [](const InterpretedColumn& c) { return c.meaning.is_time; });
   if (found == columns.end()) {
     throw InputError(
         {table.file, table.header_line, 0}, "t_s",
@@ -118,11 +119,11 @@ UnderstoodColumn time_column(const RawTable& table, const std::vector<Understood
   return *found;
 }
 
-/// Every joint needs a position, or the stroke of its cylinder.
-void require_positions(const RawTable& table, const std::vector<UnderstoodColumn>& columns,
+/// @throws InputError when a joint has neither its position nor the stroke of its cylinder
+void require_positions(const RawTable& table, const std::vector<InterpretedColumn>& columns,
                        const Machine& machine) {
   const auto usable = [&](Role role, int index) {
-    return std::any_of(columns.begin(), columns.end(), [&](const UnderstoodColumn& c) {
+    return std::any_of(columns.begin(), columns.end(), [&](const InterpretedColumn& c) {
       return c.meaning.role == role && c.meaning.index == index && !c.raw->text &&
              std::any_of(c.raw->values.begin(), c.raw->values.end(),
                          [](double v) { return !std::isnan(v); });
@@ -134,7 +135,7 @@ void require_positions(const RawTable& table, const std::vector<UnderstoodColumn
     if (cylinder >= 0 && usable(Role::kStroke, cylinder)) continue;
     const std::string expected = usual_name(Role::kJointPosition, joint, machine);
     std::string hint;
-    for (const UnderstoodColumn& column : columns) {
+    for (const InterpretedColumn& column : columns) {
       if (column.meaning.suggestion != expected) continue;
       hint = fmt::format("; is \"{}\" meant to be {}?", column.raw->name, expected);
     }
@@ -148,7 +149,7 @@ void require_positions(const RawTable& table, const std::vector<UnderstoodColumn
   }
 }
 
-Channel make_channel(const UnderstoodColumn& column, const std::vector<std::size_t>& rows) {
+Channel make_channel(const InterpretedColumn& column, const std::vector<std::size_t>& rows) {
   const ColumnMeaning& meaning = column.meaning;
   Channel channel;
   channel.column = column.raw->name;
@@ -164,8 +165,8 @@ Channel make_channel(const UnderstoodColumn& column, const std::vector<std::size
   return channel;
 }
 
-/// Whether the column can be a channel at all; if not, says why.
-bool is_usable(const UnderstoodColumn& column, const Channel& channel, Log* log) {
+/// @return whether the column can be a channel; if not, a warning says why
+bool is_usable(const InterpretedColumn& column, const Channel& channel, Log* log) {
   const RawColumn& raw = *column.raw;
   if (raw.text) {
     log->warnings.push_back(fmt::format("column {} left out: it holds text (\"{}\" in line {})",
@@ -195,14 +196,14 @@ void note_holes(const RawColumn& raw, const Channel& channel, std::int64_t fille
   }
 }
 
-void add_channels(const std::vector<UnderstoodColumn>& columns,
+void add_channels(const std::vector<InterpretedColumn>& columns,
                   const std::vector<std::size_t>& rows, const LogOptions& options, Log* log) {
-  for (const UnderstoodColumn& column : columns) {
+  for (const InterpretedColumn& column : columns) {
     if (column.meaning.is_time) continue;
     Channel channel = make_channel(column, rows);
     if (!is_usable(column, channel, log)) continue;
     if (!column.meaning.suggestion.empty() &&
-        std::none_of(columns.begin(), columns.end(), [&](const UnderstoodColumn& c) {
+        std::none_of(columns.begin(), columns.end(), [&](const InterpretedColumn& c) {
           return c.raw->name == column.meaning.suggestion;
         })) {
       log->warnings.push_back(
@@ -244,12 +245,12 @@ Log clean_log(const RawTable& table, const std::string& path, const std::string&
   log.counts.rows_wrong_width = table.rows_wrong_width;
   log.counts.rows_read = static_cast<std::int64_t>(table.rows()) + table.rows_wrong_width;
 
-  std::vector<UnderstoodColumn> columns = understand(table, machine);
-  const UnderstoodColumn clock = time_column(table, columns);
+  std::vector<InterpretedColumn> columns = interpret(table, machine);
+  const InterpretedColumn clock = time_column(table, columns);
   std::vector<double> time = clock.raw->values;
   for (double& t : time) t = clock.meaning.factor * t + clock.meaning.offset;
   require_positions(table, columns, machine);
-  settle_signal_names(&columns, &log.warnings);
+  make_names_unique(&columns, &log.warnings);
 
   const std::vector<std::size_t> rows =
       rows_in_time(table, clock.raw->name, time, &log.counts, &log.warnings);

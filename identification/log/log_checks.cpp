@@ -15,21 +15,22 @@
 namespace sparflow {
 namespace {
 
-// No loader crane turns a boom four times, carries 1000 bar or strokes 50 m: beyond, the unit is wrong.
+// Limits beyond which the unit must be wrong: no machine turns a joint four times, has 1000 bar or strokes of 50 m.
 constexpr double kLargestAngle = 8.0 * std::numbers::pi;
 constexpr double kLargestLength = 50.0;
 constexpr double kLargestPressure = 1000.0 * units::kBar;
 constexpr double kLowestPressure =
     -2.0 * units::kBar;  // absolute zero is -1 bar gauge; sensors drift
 constexpr double kLargestCommand = 1.5;
-constexpr double kRangeTolerance = 0.02;  // of the range; geometry from drawings is not better
-constexpr double kStuck = 2.0;            // [s] of exactly equal values on a sensor that has noise
+constexpr double kRangeTolerance = 0.02;  // of the range, the accuracy of geometry from drawings
+constexpr double kStuck = 2.0;            // [s] of equal values on a sensor with noise
 constexpr Eigen::Index kStuckSamples = 20;
 
-constexpr double kLowPressures = 40.0 * units::kBar;  // 400 bar, the most there is, read as MPa
-/// Weight against pressures when bar are MPa: ten, with what friction, dynamics and rough masses do to it.
+constexpr double kLowPressures = 40.0 * units::kBar;  // 40 MPa (400 bar) taken for bar
+/// Range of static force over measured force when MPa are taken for bar: ten, with a tolerance for friction, dynamics and
+/// inaccurate masses.
 constexpr Range kTenfold{5.0, 20.0};
-constexpr Eigen::Index kBalanceSamples = 200;  // evenly over the log: a mean force needs no more
+constexpr Eigen::Index kBalanceSamples = 200;  // evenly over the log, enough for a mean force
 
 struct Extent {
   double lo = 0.0, hi = 0.0;
@@ -48,7 +49,7 @@ Extent extent_of(const Channel& channel) {
 
 double largest(const Extent& e) { return std::max(std::abs(e.lo), std::abs(e.hi)); }
 
-/// Revolute joint: most samples outside its range, all inside once read as degrees.
+/// @return whether most samples of a revolute joint lie outside its range and all lie inside when taken as degrees
 bool looks_like_degrees(const Channel& channel, Range range, const Extent& e) {
   const double tolerance = kRangeTolerance * (range.hi - range.lo);
   if (!(tolerance > 0.0)) return false;
@@ -62,7 +63,7 @@ bool looks_like_degrees(const Channel& channel, Range range, const Extent& e) {
          e.hi * units::kDegree <= range.hi + tolerance;
 }
 
-/// Share of valid samples outside `range` by more than the tolerance, and how far at most.
+/// Warns of valid samples outside `range` by more than the tolerance.
 void check_range(const Channel& channel, Range range, const char* of_what, double unit_shown,
                  const char* unit_name, Log* log) {
   const double tolerance = kRangeTolerance * (range.hi - range.lo);
@@ -85,7 +86,7 @@ void check_range(const Channel& channel, Range range, const char* of_what, doubl
                   e.lo / unit_shown, e.hi / unit_shown));
 }
 
-/// The longest stretch of exactly equal values, on a channel that otherwise hardly ever repeats one.
+/// Warns of a long stretch of equal values on a channel that otherwise seldom repeats one.
 void check_stuck(const Channel& channel, Log* log) {
   Eigen::Index equal_steps = 0, steps = 0, best_begin = 0, best = 0, begin = 0;
   for (Eigen::Index i = 1; i < channel.values.size(); ++i) {
@@ -116,7 +117,7 @@ void check_stuck(const Channel& channel, Log* log) {
   }
 }
 
-/// Jumps no joint can make: ten times its velocity limit, and more than a hundredth of its range.
+/// Warns of jumps faster than ten times the joint's velocity limit and larger than a hundredth of its range.
 void check_jumps(const Channel& channel, const Joint& joint, Log* log) {
   const double speed = 10.0 * std::max(std::abs(joint.velocity.lo), std::abs(joint.velocity.hi));
   const double smallest = 0.01 * (joint.position.hi - joint.position.lo);
@@ -174,7 +175,7 @@ void check_pressure(const Channel& channel, const Extent& e, Log* log) {
   check_stuck(channel, log);
 }
 
-/// Joint coordinate of one sample, from its own channel or from its cylinder's stroke; NaN when unknown.
+/// @return joint coordinate of one sample from its channel or from its cylinder's stroke; NaN when unknown
 double joint_position(const Machine& machine, const Log& log, int joint, Eigen::Index k) {
   if (const Channel* q = log.find(Role::kJointPosition, joint)) return q->values[k];
   const int cylinder = machine.cylinder_of_joint(joint);
@@ -183,7 +184,7 @@ double joint_position(const Machine& machine, const Log& log, int joint, Eigen::
   return joint_at_stroke(machine, cylinder, x->values[k]);
 }
 
-/// What the machine's weight and the pressures say about each other, summed over samples and cylinders. [N]
+/// Static and measured cylinder forces, summed over samples and cylinders. [N]
 struct ForceBalance {
   double weight = 0.0;     ///< |static force| by virtual work
   double pressures = 0.0;  ///< |pA A_A - pB A_B|
@@ -202,7 +203,7 @@ ForceBalance force_balance(const Machine& machine, const Log& log) {
       statics.update(q.data(), payload != nullptr && payload->valid[k] ? payload->values[k] : 0.0,
                      0);
     } catch (const std::domain_error&) {
-      continue;  // the geometry does not reach this stroke: judged elsewhere
+      continue;  // the linkage does not reach this stroke; make_signals reports it
     }
     for (int i = 0; i < machine.cylinder_count(); ++i) {
       const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(i)];
@@ -220,7 +221,7 @@ ForceBalance force_balance(const Machine& machine, const Log& log) {
   return sum;
 }
 
-/// Pressures named bar that are a tenth of what carries the machine are MPa.
+/// Warns of pressures that are probably in MPa: taken as bar they give a tenth of the static forces.
 void check_megapascal(const Machine& machine, Log* log) {
   std::vector<std::string> columns;
   double highest = 0.0;

@@ -1,10 +1,10 @@
 #pragma once
-/// Values that are numbers but cannot be right: a unit mistaken, a sensor stuck, a joint outside its range.
+/// Finds values that are implausible for the machine: a wrong unit, a stuck sensor, a joint outside its range.
 #include "identification/log/log.h"
 
 namespace sparflow {
 
-/// Adds one plain sentence to `log->warnings` for each suspicion, with what to do about it.
+/// Adds a sentence to `log->warnings` for each implausible channel, with what to do about it. No value is changed.
 void check_plausible(const Machine& machine, Log* log);
 
 }  // namespace sparflow

@@ -59,7 +59,7 @@ const ColumnQuantity kTemperature = {
     "C",
     {{"C", 1.0}, {"K", 1.0, -273.15}, {"F", 5.0 / 9.0, -160.0 / 9.0}}};
 
-/// Units as people write them, to the spelling of column suffixes: "l/min" -> "lpm", "°" -> "deg".
+/// Converts common spellings of units to those of column suffixes: "l/min" -> "lpm", "°" -> "deg".
 std::string plain_unit(std::string_view written) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kSpellings = {
       {{"l/min", "lpm"},  {"L/min", "lpm"}, {"l_min", "lpm"},  {"LPM", "lpm"},     {"Lpm", "lpm"},
@@ -92,7 +92,7 @@ std::string unit_list(const ColumnQuantity& quantity) {
   return list;
 }
 
-/// "pA_boom [bar]" -> "pA_boom", unit "bar".
+/// Splits "pA_boom [bar]" into "pA_boom" and the unit "bar".
 std::string without_bracket(const std::string& name, std::string* unit) {
   const std::string_view text = trimmed(name);
   if (text.size() < 3 || (text.back() != ']' && text.back() != ')')) return std::string(text);
@@ -102,7 +102,7 @@ std::string without_bracket(const std::string& name, std::string* unit) {
   return std::string(trimmed(text.substr(0, open)));
 }
 
-/// A family of columns: prefix, and the names of the machine's parts that may follow it.
+/// A family of columns: a prefix and the names of the machine's parts that may follow it.
 struct Family {
   Role role;
   std::string_view prefix;
@@ -155,7 +155,7 @@ const ColumnQuantity& quantity_of(Role role, int index, const Machine& machine) 
   return kCommand;
 }
 
-/// The rest of `name` behind `stem` when that is nothing or "_something".
+/// @return the suffix of `name` after `stem`, without its underscore; nullopt when `name` does not continue so
 std::optional<std::string_view> suffix_behind(std::string_view name, std::string_view stem) {
   if (!name.starts_with(stem)) return std::nullopt;
   name.remove_prefix(stem.size());
@@ -164,8 +164,8 @@ std::optional<std::string_view> suffix_behind(std::string_view name, std::string
   return name.substr(1);
 }
 
-/// Settles the unit of a column whose quantity is known.
-/// @return false when the suffix says it is another signal: "pA_boom_valve_bar", "u_boom_filtered_percent"
+/// Determines the unit of a column whose quantity is known.
+/// @return false when the suffix shows that it is another signal: "pA_boom_valve_bar", "u_boom_filtered_percent"
 bool settle_unit(const ColumnQuantity& quantity, std::string_view suffix, const std::string& beside,
                  const std::string& column, ColumnMeaning* meaning) {
   const Unit* unit = find_unit(quantity, suffix);
@@ -200,7 +200,7 @@ bool settle_unit(const ColumnQuantity& quantity, std::string_view suffix, const 
   return true;
 }
 
-/// A column without a role keeps its name; a unit that can be recognised is still converted.
+/// Interprets a column without a role: it keeps its name, and a unit that is recognised is converted.
 void settle_candidate(const std::string& column, const std::string& beside,
                       ColumnMeaning* meaning) {
   *meaning = ColumnMeaning{};
@@ -215,7 +215,7 @@ void settle_candidate(const std::string& column, const std::string& beside,
   for (const ColumnQuantity* quantity :
        {&kPressure, &kAngle, &kLength, &kForce, &kFlow, &kTemperature}) {
     const Unit* unit = find_unit(*quantity, suffix);
-    // "_K" and "_F" behind an unknown name are as likely a gain or a force.
+    // "_K" and "_F" after an unknown name may equally mean a gain or a force.
     if (unit == nullptr || (beside.empty() && unit->offset != 0.0)) continue;
     meaning->unit = quantity->si;
     meaning->factor = unit->factor;
@@ -226,7 +226,7 @@ void settle_candidate(const std::string& column, const std::string& beside,
   meaning->unit = beside;
 }
 
-/// A misspelled part of the machine, or a prefix in the wrong case.
+/// @return the standard name that the column resembles (misspelled part, prefix in the wrong case), or ""
 std::string suggest(const std::string& column, const Machine& machine) {
   const auto lower = [](std::string text) {
     for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
@@ -240,7 +240,7 @@ std::string suggest(const std::string& column, const Machine& machine) {
     const std::string rest = column.substr(family.prefix.size());
     const std::string part = rest.substr(0, rest.rfind('_'));
     const std::string near = nearest_word(part, family.parts);
-    // A short name is near everything: two letters off is no slip of the finger there.
+    // Short names resemble many words, so for them the length must be equal.
     if (near.empty() || (near.size() < 4 && near.size() != part.size())) continue;
     const auto index = std::find(family.parts.begin(), family.parts.end(), near);
     return usual_name(family.role, static_cast<int>(index - family.parts.begin()), machine);
@@ -260,7 +260,7 @@ ColumnMeaning column_meaning(const std::string& name, const std::string& unit_be
     meaning.signal = "t";
     if (settle_unit(kTime, *suffix, beside, column, &meaning)) return meaning;
   }
-  // The longest name that fits wins: a machine may have both "boom" and "boom_2".
+  // The longest matching name is taken, because a machine may have both "boom" and "boom_2".
   std::string_view best_suffix;
   std::size_t best_length = 0;
   const auto consider = [&](const std::string& stem, Role role, int index) {

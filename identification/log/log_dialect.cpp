@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-/// One line at a time, with its number; a file without a single line feed ends its lines with CR.
+/// Splits text into numbered lines. In a file without line feeds, CR ends the lines.
 class Lines {
  public:
   explicit Lines(std::string_view text)
@@ -29,7 +29,7 @@ class Lines {
     ++number_;
     return true;
   }
-  /// The next line with something on it that is no comment.
+  /// Finds the next line that is neither blank nor a comment.
   bool next_filled(std::string_view* line) {
     while (next(line)) {
       const std::string_view content = trimmed(*line);
@@ -49,8 +49,8 @@ class Lines {
   int number_ = 0;
 };
 
-/// Cuts a line at the separator, outside quotes. A quoted cell comes without its quotes.
-/// @return false when a quote stays open
+/// Splits a line at the separators outside quotes. A quoted cell is returned without its quotes.
+/// @return false when a quote is not closed
 bool split(std::string_view line, char delimiter, std::vector<std::string_view>* cells) {
   cells->clear();
   const char* p = line.data();
@@ -71,7 +71,7 @@ bool split(std::string_view line, char delimiter, std::vector<std::string_view>*
     const char* stop = nullptr;
     if (p < end && *p == '"') {
       for (++start, ++p; p < end && !(*p == '"' && (p + 1 == end || p[1] != '"')); ++p) {
-        if (*p == '"') ++p;  // a doubled quote is content
+        if (*p == '"') ++p;  // a doubled quote belongs to the content
       }
       if (p >= end) return false;
       stop = p++;
@@ -87,15 +87,15 @@ bool split(std::string_view line, char delimiter, std::vector<std::string_view>*
   }
 }
 
-/// Number of cells without the empty ones at the end.
+/// @return number of cells without the empty ones at the end
 std::size_t filled_width(const std::vector<std::string_view>& cells) {
   std::size_t n = cells.size();
   while (n > 0 && cells[n - 1].empty()) --n;
   return n;
 }
 
-/// The separator under which header and first rows are equally wide; on a tie tab before `;` before `,`,
-/// because a decimal comma makes `,` look like one.
+/// @return the separator with which header and first rows have equally many cells; with equal scores tab precedes `;` and
+///   `;` precedes `,`, because a decimal comma looks like a separator
 char detect_delimiter(std::string_view header, Lines following) {
   std::vector<std::string_view> sample, cells;
   for (std::string_view line; sample.size() < 20 && following.next_filled(&line);) {
@@ -139,7 +139,7 @@ std::string delimiter_in_words(char delimiter) {
   return fmt::format("\"{}\"", delimiter);
 }
 
-/// Everything that is known once the header is read.
+/// Reads header, units row and rows of a text log.
 class DelimitedReader {
  public:
   DelimitedReader(const std::string& file, std::string_view text, const DialectOptions& options)
@@ -170,14 +170,14 @@ class DelimitedReader {
     }
     delimiter_ = options_.delimiter;
     const std::string_view first = trimmed(line);
-    if (first.starts_with("sep=") && first.size() <= 5) {  // a spreadsheet's own hint
+    if (first.starts_with("sep=") && first.size() <= 5) {  // written by spreadsheet programs
       if (delimiter_ == 0) delimiter_ = first.size() == 5 ? first[4] : '\t';
       if (!lines_.next_filled(&line)) fail(lines_.number(), "no header line under \"sep=\"");
     }
     if (delimiter_ == 0) delimiter_ = detect_delimiter(line, lines_);
     std::vector<std::string_view> names;
     if (!split(line, delimiter_, &names)) fail(lines_.number(), "a quote is opened and not closed");
-    if (all_numbers(names, options_)) {  // no header, unless the comment above names the columns
+    if (all_numbers(names, options_)) {  // then the comment above must be the header
       std::vector<std::string_view> in_comment;
       if (!split(lines_.last_comment(), delimiter_, &in_comment) ||
           in_comment.size() != names.size() || all_numbers(in_comment, options_)) {
@@ -231,7 +231,7 @@ class DelimitedReader {
     } while (lines_.next_filled(&line));
   }
 
-  /// A line under the header without a single number, whose filled cells are not "missing" marks.
+  /// @return true for a line under the header that holds text and no number
   bool is_units_row(const std::vector<std::string_view>& cells) {
     if (filled_width(cells) > table_.columns.size()) return false;
     CellReader reader(options_.decimal, options_.missing);

@@ -1,7 +1,7 @@
 #pragma once
-/// Text logs as they come: separators `,` `;` tab or blanks, decimal point or comma, a units row under the
+/// Reads delimited text: separators `,` `;` tab or blanks, decimal point or comma, a units row under the
 /// header, byte order marks, UTF-16, CRLF, quotes, comments, blank lines, trailing separators, marks for
-/// "missing". Everything is detected; a mapping file can fix it (log_mapping.h).
+/// "missing". All of these are detected; a mapping file can prescribe them (log_mapping.h).
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace sparflow {
 
-/// Zero or empty = detect.
+/// A field that is zero or empty is detected from the file.
 struct DialectOptions {
   char delimiter = 0;                ///< ',', ';', '\t' or ' ' (any number of blanks)
   char decimal = 0;                  ///< '.' or ','
@@ -26,7 +26,7 @@ struct DialectOptions {
 RawTable read_delimited(const std::string& file, std::string bytes,
                         const DialectOptions& options = {});
 
-/// Blanks, tabs and carriage returns off both ends.
+/// @return `text` without the blanks, tabs and carriage returns at its ends
 std::string_view trimmed(std::string_view text);
 
 }  // namespace sparflow

@@ -1,4 +1,4 @@
-/// Arithmetic over whole columns: recursive descent, each operation done on all rows at once.
+/// Evaluates expressions over columns by recursive descent; each operation acts on all rows at once.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ class Expression {
   }
 
  private:
-  static constexpr int kDeepest = 100;  // nested brackets; far beyond use, well within the stack
+  static constexpr int kDeepest = 100;  // largest nesting, which limits the use of the stack
 
   [[noreturn]] void fail(const std::string& message) const {
     throw InputError(place_, key_,
@@ -86,7 +86,7 @@ class Expression {
     }
   }
 
-  /// -2^2 is -4, 2^-1 is 0.5, 2^3^2 is 2^9.
+  /// A power binds more strongly than a sign and is right-associative: -2^2 = -4, 2^-1 = 0.5, 2^3^2 = 2^9.
   Values signed_power() {
     if (++depth_ > kDeepest) fail("nested too deeply");
     Values result;
@@ -148,7 +148,7 @@ class Expression {
     return values_of(*column, start);
   }
 
-  /// The longest column name that stands here as a whole word; a name that is itself a number needs backticks.
+  /// @return the longest column name that matches here as a whole word, or nullptr; a name that is a number needs backticks
   const RawColumn* longest_column() const {
     const RawColumn* best = nullptr;
     for (const RawColumn& column : table_.columns) {
@@ -212,7 +212,7 @@ class Expression {
     return result;
   }
 
-  /// What stands here up to the next sign that cannot be part of a name; a "-" may be.
+  /// Reports the text up to the next sign that cannot be part of a name as unknown; a "-" can be part of one.
   [[noreturn]] void unknown_column() const {
     const std::size_t end = std::min(text_.find_first_of("+*/^,()`", at_), text_.size());
     std::string name(trimmed(std::string_view(text_).substr(at_, end - at_)));

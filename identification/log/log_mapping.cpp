@@ -26,7 +26,7 @@ std::string scalar(const std::string& file, const YAML::Node& node, const std::s
   return node.Scalar();
 }
 
-/// A list of values; a single value is a list of one.
+/// Reads a list of values; a single value counts as a list of one.
 std::vector<std::string> scalars(const std::string& file, const YAML::Node& node,
                                  const std::string& key) {
   std::vector<std::string> list;
@@ -77,7 +77,7 @@ int read_skip_rows(const std::string& file, const YAML::Node& node) {
   try {
     const int rows = node.as<int>();
     if (rows >= 0) return rows;
-  } catch (const YAML::Exception&) {  // falls through to the one message
+  } catch (const YAML::Exception&) {  // reported below
   }
   throw InputError(place_of(file, node), "skip_rows", "expected a number of lines, 0 or more");
 }
@@ -134,7 +134,7 @@ LogMapping parse_log_mapping(const std::string& path, const std::string& text) {
 }
 
 void apply_mapping(const LogMapping& mapping, RawTable* table) {
-  // All expressions see the file's own columns, also when one of them replaces such a column.
+  // All expressions use the file's own columns, also when one of them replaces such a column.
   std::vector<RawColumn> mapped;
   std::set<std::string> read;
   for (const MappedColumn& column : mapping.columns) {
@@ -142,7 +142,7 @@ void apply_mapping(const LogMapping& mapping, RawTable* table) {
     result.name = column.name;
     result.values = evaluate_expression(column.expression, *table, column.place,
                                         "columns." + column.name, &read);
-    // Division by zero, the root of a negative number: missing, like any hole in the log.
+    // The result of a division by zero or the root of a negative number is missing, like a hole in the log.
     for (double& v : result.values) {
       if (!std::isfinite(v)) v = std::numeric_limits<double>::quiet_NaN();
     }

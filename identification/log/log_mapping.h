@@ -1,7 +1,7 @@
 #pragma once
-/// A mapping file gives a log with foreign column names the program's names, by small expressions:
+/// A mapping file computes the program's columns from a log with other column names, by expressions:
 ///   columns: {t_s: "Time [ms] * 0.001", pA_boom_bar: "PT01 / 1e5 - 1.01"}
-/// Described in docs/log_format.md.
+/// docs/log_format.md describes it.
 #include <set>
 #include <string>
 #include <vector>
@@ -26,18 +26,18 @@ struct LogMapping {
 
 /// @throws InputError with file:line:column for unknown keys, wrong types, names given twice
 LogMapping read_log_mapping(const std::string& path);
-/// The same from YAML in memory. @param path name for messages
+/// Parses a mapping file from memory. @param path name for messages  @throws InputError as above
 LogMapping parse_log_mapping(const std::string& path, const std::string& text);
 
-/// Adds the mapped columns (replacing a column of the same name), drops the ignored ones and marks those an
-/// expression read.
-/// @throws InputError at the expression's place: unknown column (with the nearest one), text column, syntax
+/// Adds the mapped columns (replacing a column of the same name), removes the ignored ones and marks those that an
+/// expression reads.
+/// @throws InputError at the expression's place: unknown column (with the most similar one), text column, syntax
 void apply_mapping(const LogMapping& mapping, RawTable* table);
 
-/// One expression over columns, row by row: + - * / ^ ( ), abs sqrt sin cos min max, pi deg rad; a column is
-/// written by its name (the longest that fits) or between backticks. Missing in, missing out.
-/// @param place and @param key for messages  @param read gets the names of the columns used; may be null
-/// @throws InputError
+/// Evaluates an expression row by row: + - * / ^ ( ), abs sqrt sin cos min max, pi deg rad; a column is written by its
+/// name (the longest that matches) or between backticks. A missing value in any operand makes the result missing.
+/// @param place, key for messages  @param read gets the names of the columns used; may be null
+/// @throws InputError for a syntax error, an unknown column or a column of text
 std::vector<double> evaluate_expression(const std::string& expression, const RawTable& table,
                                         const FilePlace& place, const std::string& key,
                                         std::set<std::string>* read = nullptr);

@@ -24,7 +24,7 @@ struct FreeVariable {
 };
 using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 
-/// A numeric array, column by column.
+/// A numeric array in column-major order.
 struct Array {
   std::string name;
   std::size_t rows = 0, columns = 0;
@@ -51,7 +51,7 @@ bool read_array(const matvar_t& variable, Array* array) {
   const std::size_t count = array->rows * array->columns;
   if (variable.data_size <= 0 ||
       variable.nbytes / static_cast<std::size_t>(variable.data_size) < count) {
-    return false;  // a damaged file that promises more than it holds
+    return false;  // a damaged file whose size does not match its data
   }
   switch (variable.class_type) {
     case MAT_C_DOUBLE:
@@ -94,7 +94,7 @@ bool read_array(const matvar_t& variable, Array* array) {
   return true;
 }
 
-/// Row `row` of a char array.
+/// @return row `row` of a char array
 std::string read_text(const matvar_t& variable, std::size_t row) {
   std::string text;
   if (variable.class_type != MAT_C_CHAR || variable.rank != 2 || variable.data == nullptr)
@@ -150,7 +150,7 @@ class MatlabReader {
   }
 
   void read_variables() {
-    static const bool quiet = [] {  // the library would write its own complaints to stderr
+    static const bool quiet = [] {  // the library would write its own messages to stderr
       Mat_LogInitFunc("sparflow", [](int, char*) {});
       return true;
     }();
@@ -196,7 +196,7 @@ class MatlabReader {
   void read_variable(matvar_t* variable, const char* field_name = nullptr) {
     const char* raw_name = field_name != nullptr ? field_name : variable->name;
     const std::string name = printable(raw_name == nullptr ? "" : raw_name);
-    if (name.starts_with('#')) return;  // the library's own bookkeeping
+    if (name.starts_with('#')) return;  // internal to the library
     if (name == "names") {
       names_ = read_names(variable);
       if (names_.empty()) fail(name, "expected a cell array of char, or a char matrix");
@@ -232,7 +232,7 @@ class MatlabReader {
       fail("names", fmt::format("{} names, but no matrix with that many columns; found {}",
                                 names_.size(), found));
     }
-    const bool across = matrix->columns != names_.size();  // a row a signal
+    const bool across = matrix->columns != names_.size();  // each row is a signal
     const std::size_t rows = across ? matrix->columns : matrix->rows;
     if (rows < 2) fail(matrix->name, "expected at least two instants");
     for (std::size_t i = 0; i < names_.size(); ++i) {
@@ -247,7 +247,7 @@ class MatlabReader {
   }
 
   void columns_from_vectors() {
-    // The log's length is that of most vectors; scalars are constants of the whole log.
+    // The length of most vectors is taken for the log; scalars become constant columns.
     std::map<std::size_t, int> lengths;
     for (const Array& array : arrays_) {
       if (array.vector() && array.values.size() > 1) ++lengths[array.values.size()];

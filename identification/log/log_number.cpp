@@ -12,7 +12,8 @@ namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Whole cell with a decimal point. Too small becomes 0, too large and "inf" are not numbers.
+/// Parses a whole cell with a decimal point. A number that underflows gives 0.
+/// @return false for text and for numbers that overflow
 bool parse(std::string_view cell, double* value) {
   if (!cell.empty() && cell.front() == '+') cell.remove_prefix(1);
   const char* end = cell.data() + cell.size();
@@ -31,7 +32,7 @@ bool equal_ignoring_case(std::string_view a, std::string_view b) {
                     [&](char x, char y) { return lower(x) == lower(y); });
 }
 
-/// Digits in groups of three with two or more separators: 1.234,5  1,234.5  1.234.567  1 234,5  1'234.5
+/// @return true for digits in groups of three: 1.234,5  1,234.5  1.234.567  1 234,5  1'234.5
 bool looks_like_thousands(std::string_view cell) {
   if (!cell.empty() && (cell.front() == '-' || cell.front() == '+')) cell.remove_prefix(1);
   std::size_t i = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// One cell of a text log: a number, nothing, or something else.
+/// Classifies a cell of a text log: number, missing, or text.
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,7 +10,7 @@ enum class CellKind {
   kNumber,
   kMissing,    ///< empty, "-", "NaN", "#N/A", an infinity ...
   kText,       ///< not a number
-  kThousands,  ///< "1.234,5": digits in groups, can be read two ways
+  kThousands,  ///< "1.234,5": digits in groups, which is ambiguous
   kOtherMark,  ///< a decimal comma where the file uses points, or the reverse
 };
 
@@ -19,10 +19,10 @@ struct Cell {
   double value = 0.0;
 };
 
-/// Reads cells of one file; learns from the first fractional number whether it uses points or commas.
+/// Reads the cells of one file; the first fractional number decides whether the file uses points or commas.
 class CellReader {
  public:
-  /// @param decimal '.', ',' or 0 = learn  @param missing further marks for "missing"
+  /// @param decimal '.', ',' or 0 = detect  @param missing further marks for "missing"
   CellReader(char decimal, std::vector<std::string> missing);
   /// @param cell without blanks around and without quotes
   Cell read(std::string_view cell);

@@ -9,7 +9,7 @@
 namespace sparflow {
 namespace {
 
-// A crane's motion lasts seconds: slower sampling cannot show it, faster than 1 MHz nobody logs.
+// [s] A crane's motion lasts seconds, so slower sampling cannot show it; no logger is faster than 1 MHz.
 constexpr double kSlowestStep = 2.0;
 constexpr double kFastestStep = 1e-6;
 
@@ -72,8 +72,8 @@ std::vector<std::size_t> rows_in_time(const RawTable& table, const std::string& 
   }
   if (rows.size() < 2) {
     throw InputError({table.file, table.header_line, 0}, column,
-                     fmt::format("{} {} with a time of its own, expected a log of many",
-                                 rows.size(), rows.size() == 1 ? "row" : "rows"));
+                     fmt::format("{} {} with a distinct time, expected at least two", rows.size(),
+                                 rows.size() == 1 ? "row" : "rows"));
   }
   refuse_odd_steps(table, column, time, rows);
   if (counts->rows_without_time > 0) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Rows in order of time, gaps, and holes in single channels.
+/// Orders rows by time, splits the log at gaps and interpolates short holes of single channels.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,25 +9,26 @@
 
 namespace sparflow {
 
-/// Rows that are kept: those with a time, without repetitions.
-/// @param time [s], a value a row, NaN where missing
+/// Selects the rows that have a time of their own.
+/// @param time [s] [rows], NaN where missing
 /// @return row numbers, along which time strictly increases
-/// @throws InputError with the line where time goes back, or when the time's unit cannot be right
+/// @throws InputError with the line where time decreases, or when the sampling interval is implausible
 std::vector<std::size_t> rows_in_time(const RawTable& table, const std::string& column,
                                       const std::vector<double>& time, LogCounts* counts,
                                       std::vector<std::string>* warnings);
 
-/// Stretches between gaps. @param time [s] increasing  @param step median interval [s]
+/// @param time [s] increasing  @param step median interval [s]
+/// @return the stretches between gaps, in order of time
 std::vector<SampleRange> runs_between_gaps(const Eigen::VectorXd& time, double step,
                                            const LogOptions& options);
 
-/// Fills short holes of a channel from their neighbours within a run and marks the rest as not valid.
-/// Payload and oil temperature change slowly and are often logged slowly: their holes are filled however long.
+/// Interpolates short holes of a channel from their neighbours within a run and marks the others as not valid.
+/// Payload and oil temperature change slowly and are often logged slowly, so their holes are filled at any length.
 /// @return number of samples filled
 std::int64_t fill_holes(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs,
                         const LogOptions& options, Channel* channel);
 
-/// Median of the intervals [s]; 0 for fewer than two instants.
+/// @return median sampling interval [s]; 0 for fewer than two instants
 double median_step(const Eigen::VectorXd& time);
 
 }  // namespace sparflow

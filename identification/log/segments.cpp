@@ -7,8 +7,8 @@
 namespace sparflow {
 namespace {
 
-/// Turns every stretch of `value` in the run that is shorter than `shortest` into its opposite.
-/// @param inside_only leave stretches that touch the run's ends as they are
+/// Inverts every stretch of `value` in the run that is shorter than `shortest` [s].
+/// @param inside_only true to keep stretches at the ends of the run
 void remove_short(const Eigen::VectorXd& time, SampleRange run, bool value, double shortest,
                   bool inside_only, std::vector<char>* moving) {
   Eigen::Index begin = run.begin;
@@ -16,7 +16,7 @@ void remove_short(const Eigen::VectorXd& time, SampleRange run, bool value, doub
     const auto at = static_cast<std::size_t>(begin);
     if (i < run.end && (*moving)[static_cast<std::size_t>(i)] == (*moving)[at]) continue;
     const bool at_end = begin == run.begin || i == run.end;
-    // A stretch lasts from its first sample to the first one of the next stretch.
+    // A stretch lasts from its first sample to the first sample of the next stretch.
     const double lasts = (i < run.end ? time[i] : time[i - 1]) - time[begin];
     if (((*moving)[at] != 0) == value && lasts < shortest && !(inside_only && at_end)) {
       for (Eigen::Index k = begin; k < i; ++k) (*moving)[static_cast<std::size_t>(k)] = !value;
@@ -51,7 +51,7 @@ Eigen::MatrixXi motion_directions(const Eigen::MatrixXd& velocity, const Eigen::
     const bool commanded = command.cols() > 0 && command.col(c).array().isFinite().any();
     for (Eigen::Index i = 0; i < velocity.rows(); ++i) {
       const double v = velocity(i, c);
-      if (!(std::abs(v) > options.speed)) continue;  // NaN as well
+      if (!(std::abs(v) > options.speed)) continue;  // true also for NaN
       if (commanded && !(std::abs(command(i, c)) > options.command)) continue;
       direction(i, c) = v > 0.0 ? 1 : -1;
     }

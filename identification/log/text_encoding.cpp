@@ -38,13 +38,13 @@ std::string from_utf16(std::string_view bytes, bool big_endian) {
         i += 2;
       }
     }
-    if (c >= 0xD800 && c < 0xE000) c = 0xFFFD;  // half of a pair: not a character
+    if (c >= 0xD800 && c < 0xE000) c = 0xFFFD;  // an unpaired surrogate is not a character
     append_code_point(out, c);
   }
   return out;
 }
 
-/// Length of the valid UTF-8 character at `i`, 0 when it is none.
+/// @return length of the UTF-8 character at `i`, 0 when it is not valid
 std::size_t character_length(std::string_view text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
   const unsigned char lead = byte(i);
@@ -57,7 +57,7 @@ std::size_t character_length(std::string_view text, std::size_t i) {
   for (std::size_t k = 1; k < n; ++k) {
     if ((byte(i + k) & 0xC0) != 0x80) return 0;
   }
-  const unsigned char second = byte(i + 1);  // overlong forms, surrogates, beyond U+10FFFF
+  const unsigned char second = byte(i + 1);  // refuses overlong forms, surrogates, > U+10FFFF
   if ((lead == 0xE0 && second < 0xA0) || (lead == 0xED && second >= 0xA0) ||
       (lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second >= 0x90)) {
     return 0;

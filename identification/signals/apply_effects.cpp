@@ -26,7 +26,7 @@ void add(const VectorXd& what, VectorXd& to) {
   }
 }
 
-/// Poses again, through the machine with its masses and angles as the effects say.
+/// Recomputes poses, speeds and forces with the machine as the effects change it.
 void evaluate_effective(const Machine& machine, MachineSignals& signals) {
   StaticForce statics(machine);
   VectorXd q(machine.joint_count());
@@ -37,7 +37,7 @@ void evaluate_effective(const Machine& machine, MachineSignals& signals) {
     try {
       statics.update(q.data(), signals.payload[k], 0);
     } catch (const std::domain_error&) {
-      continue;  // a four-bar that does not close with this angle; its force stays unknown
+      continue;  // a four-bar does not close at this angle, so the forces stay unknown
     }
     for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
       CylinderSignals& c = signals.cylinders[i];
@@ -57,7 +57,7 @@ void evaluate_effective(const Machine& machine, MachineSignals& signals) {
   }
 }
 
-/// One law without memory over a log. @param width results a sample @return [samples x width]
+/// Evaluates a law without memory over a log. @param width results per sample  @return [samples x width]
 template <class Law>
 Eigen::MatrixXd over_log(const MachineSeries& log, std::size_t width, const Law& law) {
   Eigen::MatrixXd result(log.samples(), static_cast<Index>(width));
@@ -78,7 +78,7 @@ void force_stage(const CraneModel& model, MachineSeries& log, MachineSignals& si
     log.cylinders[i].static_force = c.model_force;
     VectorXd sensors;
     for (const AppliedEffect& e : model.effects) {
-      if (e.effect->changes_machine()) continue;  // its forces are in already
+      if (e.effect->changes_machine()) continue;  // the changed machine contains its forces
       const bool sensor = e.effect->info().stage == EffectStage::kSensor;
       add(effect_series(e, log, EvidenceKind::kForce, static_cast<int>(i)),
           sensor ? sensors : c.model_force);
@@ -87,11 +87,11 @@ void force_stage(const CraneModel& model, MachineSeries& log, MachineSignals& si
     add(sensors, c.predicted_force);
   }
   for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
-    log.cylinders[i].force = signals.cylinders[i].model_force;  // what later laws see
+    log.cylinders[i].force = signals.cylinders[i].model_force;  // input of the following laws
   }
 }
 
-/// What its sensor reads beyond the working pressure, from both sides' evidence.
+/// Contribution of a sensor effect to the measured working pressure, from the evidence of both directions. [Pa]
 VectorXd sensor_effect(const AppliedEffect& e, const MachineSeries& log, int index) {
   VectorXd sum;
   const Eigen::VectorXi& direction = log.cylinders[static_cast<std::size_t>(index)].direction;
@@ -106,7 +106,8 @@ VectorXd sensor_effect(const AppliedEffect& e, const MachineSeries& log, int ind
   return sum;
 }
 
-/// Added to a cylinder's speed, as a filtered speed would show it; raw where that filter reaches beyond a run. [m/s]
+/// Contribution to a cylinder's speed after the low-pass of a filtered speed; unfiltered where the filter reaches beyond
+/// a run. [m/s]
 VectorXd flow_effect(const AppliedEffect& e, const MachineSeries& log, double window, int index) {
   VectorXd speed = effect_series(e, log, EvidenceKind::kFlow, index);
   if (speed.size() == 0 || !e.effect->columns_of_readings() || !(window > 0.0)) return speed;
@@ -145,7 +146,8 @@ void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSig
   }
 }
 
-/// Demand and leader as the model predicts them, or, where it cannot, with the demand effects on what is measured.
+/// Sets demand and leader by the model's prediction or, where pressure models are missing, adds the demand effects to the
+/// demand of the measured pressures.
 void predict_demand(const CraneModel& model, const MachineSignals& signals, MachineSeries& log) {
   const Machine& machine = model.machine;
   Chain chain(model);
@@ -192,7 +194,7 @@ void pump_stage(const CraneModel& model, const MachineSeries& log, MachineSignal
           });
     }
     for (std::size_t p = 0; p < signals.pumps.size(); ++p) {
-      // an effect that acts in a motion is its law (its demand is in the maximum already), others are series
+      // An effect that acts in planned motions is evaluated by its law, because its demand is contained in the maximum.
       add(law.size() > 0 ? VectorXd(law.col(static_cast<Index>(p)))
                          : effect_series(e, log, EvidenceKind::kPump, static_cast<int>(p)),
           signals.pumps[p].pressure_effect);
@@ -203,7 +205,7 @@ void pump_stage(const CraneModel& model, const MachineSeries& log, MachineSignal
 }  // namespace
 
 void ChainInputs::set(const MachineSignals& signals, Index k) {
-  // A cylinder that is asked for but stands (start, dead band) demands pressure without flow.
+  // A commanded cylinder that stands still (start, dead band) demands pressure without flow. [m/s]
   constexpr double kStanding = 1e-8;
   for (std::size_t i = 0; i < speed.size(); ++i) {
     const CylinderSignals& c = signals.cylinders[i];

@@ -1,20 +1,20 @@
 #pragma once
-/// A model's effects on a log: what each stage of fitting and comparing adds to the law without effects.
+/// Applies a model's effects to the signals of a log: the terms that they add at each stage of fitting and comparing.
 #include "identification/signals/signals.h"
 #include "models/chain/crane_model.h"
 
 namespace sparflow {
 
-/// Fills what the effects say into the signals (model_force, pressure_effect, ... of identification/signals/signals.h). With
-/// effects that are another machine, lengths, rates, speeds and flows become that machine's as well; the static
-/// force stays the machine file's. Effects with memory work on the log as it is; laws without memory are evaluated
-/// sample by sample with the model's own force. Pumps' effects build on the predicted demand where the model
-/// knows the processes, else on that of the measured pressures. May be called again, with another model.
-/// @param signals of the machine as its file says
+/// Writes the effects' contributions into the signals (model_force, pressure_effect, ... of signals.h). Effects that change
+/// the machine also replace lengths, rates, speeds and flows by those of the changed machine; the static force remains
+/// that of the machine file. Effects with memory are evaluated on the log's time series; laws without memory sample by
+/// sample with the model's own force. Effects on a pump start from the predicted demand where the pressure models are
+/// learned, else from the demand of the measured pressures. May be called again, with another model.
+/// @param signals of the machine as its file describes it
 void apply_effects(const CraneModel& model, MachineSignals& signals);
 
-/// What the chain is to be asked for at one sample: signed speed that makes it see flow and direction of the signals
-/// [m/s], total force [N], what effects add to working pressure, demand and return chamber [Pa].
+/// Inputs of the chain at one sample: the signed speed that gives the signals' flow and direction [m/s], the total
+/// force [N], and the effects' contributions to working pressure, demand and return chamber [Pa].
 struct ChainInputs {
   explicit ChainInputs(std::size_t cylinders)
       : speed(cylinders),
@@ -27,12 +27,12 @@ struct ChainInputs {
   std::vector<double> speed, force, pressure, demand, back;  ///< by cylinder
 };
 
-/// What the effects add to the working pressure at one sample, by the process of the side asked for: of the return
-/// chamber what reaches the supply, and what acts on the supply itself. [Pa]
+/// @return [Pa] contribution of the effects to the working pressure at one sample: those on the supply chamber, and the
+///   part of those on the return chamber that the pressure model of the commanded direction transmits to the supply
 double working_pressure_effect(const CraneModel& model, const MachineSignals& signals, int cylinder,
                                Eigen::Index k);
 
-/// signal[k], 0 for an empty one: effects that are not there.
+/// @return signal[k]; 0 for an empty signal, which stands for no effect
 inline double or_zero(const Eigen::VectorXd& signal, Eigen::Index k) {
   return signal.size() == 0 ? 0.0 : signal[k];
 }

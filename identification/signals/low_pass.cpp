@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Response of the filter's `derivative` to an impulse, inside an evenly sampled run.
+/// Impulse response of the filter's derivative inside an evenly sampled run.
 VectorXd impulse_response(double step, double window, int order, int derivative) {
   const auto half = static_cast<Index>(std::ceil(window / step)) + order + 2;
   const VectorXd time =
@@ -21,7 +21,7 @@ VectorXd impulse_response(double step, double window, int order, int derivative)
   impulse[half] = 1.0;
   const SavitzkyGolay filter(time, {{0, 2 * half + 1}}, window, order);
   VectorXd h = filter.apply(impulse, derivative);
-  // the one-sided windows at the ends are no part of the response
+  // The one-sided windows at the ends do not belong to the response.
   const Index reach = static_cast<Index>(std::floor(0.5 * window / step + 1e-9)) + 1;
   for (Index i = 0; i < h.size(); ++i) {
     if (std::abs(i - half) > reach) h[i] = 0.0;
@@ -29,16 +29,16 @@ VectorXd impulse_response(double step, double window, int order, int derivative)
   return h.segment(half - reach, 2 * reach + 1);
 }
 
-/// The low-pass whose derivative (difference) of that order is the kernel: sums it up, scaled to gain one.
+/// Sums the kernel `times` times, which inverts differences, and scales the result to unit gain.
 VectorXd summed(VectorXd h, int times) {
   for (int pass = 0; pass < times; ++pass) {
     std::partial_sum(h.begin(), h.end(), h.begin());
   }
-  // A difference shortens by half a sample: two sums are centred again after dropping one on the left
+  // A sum shifts the kernel by half a sample: two sums are centred again by a shift of one sample.
   VectorXd g = VectorXd::Zero(h.size());
   if (times == 2) {
     g.tail(h.size() - 1) = h.head(h.size() - 1);
-  } else if (times == 1) {  // centred between samples: mean of both neighbours
+  } else if (times == 1) {  // centred between samples, so the mean of both neighbours is taken
     for (Index i = 0; i < h.size(); ++i) g[i] = 0.5 * (h[i] + (i > 0 ? h[i - 1] : 0.0));
   } else {
     g = h;

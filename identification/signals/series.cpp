@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/signals/pump_leaders.h"
+#include "identification/signals/load_sensing_leader.h"
 #include "models/effects/memory.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kSteadyForce_s = 1.0;  ///< width of the mean that takes the pressures' noise off
+constexpr double kSteadyForce_s = 1.0;  ///< [s] width of the moving average against sensor noise
 
 CylinderSeries cylinder_series(const Cylinder& cylinder, const CylinderSignals& c) {
   CylinderSeries out;
@@ -39,7 +39,7 @@ CylinderSeries cylinder_series(const Cylinder& cylinder, const CylinderSignals& 
   return out;
 }
 
-/// max(standby, working pressures + margins), as far as the log measures them.
+/// Sets max(standby, working pressures + margins) as far as the log measures them.
 void demand(const CraneModel& model, const MachineSignals& signals, std::size_t index,
             PumpSeries& out) {
   const Pump& pump = model.machine.pumps[index];
@@ -84,7 +84,7 @@ void visit_statics(const Machine& machine, const MachineSeries& log, int order,
     try {
       statics.update(q.data(), log.payload[k], order);
     } catch (const std::domain_error&) {
-      continue;  // a four-bar that cannot close
+      continue;  // a four-bar does not close
     }
     visit(k, statics);
   }
@@ -97,7 +97,7 @@ VectorXd static_forces(const Machine& machine, const MachineSeries& log, int cyl
   return force;
 }
 
-/// What an error of one joint's position does to every cylinder's static force.
+/// Sets the derivatives of every cylinder's static force with respect to the joint positions.
 void set_static_slopes(const Machine& machine, MachineSeries& log) {
   for (CylinderSeries& c : log.cylinders)
     c.static_slope = Eigen::MatrixXd::Constant(log.samples(), machine.joint_count(), kNaN);
@@ -140,7 +140,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     demand(model, signals, p, pump);
     out.pumps.push_back(std::move(pump));
   }
-  out.pumps = pumps_led_by({}, out);  // what effects add to a demand may depend on the pump's own
+  out.pumps = pumps_led_by({}, out);  // first without effects, as these may depend on the demand
   if (!model.effects.empty()) out.pumps = pumps_led_by(model.effects, out);
   return out;
 }

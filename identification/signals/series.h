@@ -1,26 +1,27 @@
 #pragma once
-/// A log's signals as the physical effects see them, and what a model's effects say about a log.
+/// Converts a log's signals to the series on which effects are evaluated, and evaluates effects on them.
 #include "identification/signals/signals.h"
 #include "models/chain/crane_model.h"
 #include "models/effects/series.h"
 
 namespace sparflow {
 
-/// @param model gives machine, standby and margins (for the pumps' demand) and, by what its effects add to demands, the
-///        cylinder that leads; must outlive the result
-/// @param signals of the machine as its file says. Measured forces and chamber pressures are taken through the
-///        position's filter; the demand is made of the pressures as logged. It is empty for a load-sensing pump
-///        when a command or both chamber pressures of a cylinder it feeds are not logged, and NaN where the
-///        chamber that is asked for is not measured.
+/// Measured forces and chamber pressures are smoothed by the position's filter; the pumps' demand uses the pressures as
+/// logged. The demand of a load-sensing pump is empty when a command or both chamber pressures of a cylinder it feeds are
+/// not logged, and NaN where the supply chamber's pressure is not measured.
+/// @param model gives machine, standby, margins and, with the demands of its effects, the load-sensing leader; must
+///   outlive the result
+/// @param signals of the machine as its file describes it
 MachineSeries make_series(const CraneModel& model, const MachineSignals& signals);
 
-/// What these effects leave of each command (CylinderSeries::opening); make_series does it with the model's.
+/// Computes the valve openings (CylinderSeries::opening) that these effects leave of the commands; `make_series` does so
+/// with the model's effects.
 void set_openings(const std::vector<AppliedEffect>& effects, MachineSeries& series);
 
-/// What one effect adds to the measured quantity `kind` of cylinder or pump `index`, by its parameters' values, not
-/// filtered: exact for effects that are another machine, else the effect's columns times its linear parameters.
-/// Force [N], rod speed [m/s] or pressure [Pa].
-/// @return [samples]; empty when the effect does not touch this quantity or the log lacks what it needs
+/// Contribution of one effect, at its parameter values, to the measured quantity `kind` of cylinder or pump `index`, not
+/// filtered: exact for effects that change the machine, else the effect's columns times its linear parameters.
+/// @return [samples] force [N], rod speed [m/s] or pressure [Pa]; empty when the effect does not act on this quantity or
+///   the log lacks a signal that it needs
 Eigen::VectorXd effect_series(const AppliedEffect& effect, const MachineSeries& log,
                               EvidenceKind kind, int index);
 

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// One Newton solve from a neighbour; NaN when it does not settle inside the joint's range.
+/// Newton's method from `start`. @return NaN when it does not converge inside the joint's range
 double newton_from(const Machine& machine, int cylinder, double length, double start) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   const Range range = machine.joints[static_cast<std::size_t>(c.joint)].position;
@@ -28,14 +28,14 @@ double newton_from(const Machine& machine, int cylinder, double length, double s
       const double step = (length - x.value) / x.d1;
       q += step;
       if (!(q >= range.lo && q <= range.hi)) return kNaN;
-      if (std::abs(step) < 1e-10) return q;  // quadratic: what is left is far below
+      if (std::abs(step) < 1e-10) return q;  // quadratic convergence: the error is far smaller
     }
   } catch (const std::domain_error&) {
   }
   return kNaN;
 }
 
-/// The joint's coordinate as logged, or from the measured stroke of its cylinder.
+/// @return the joint's coordinate as logged, or from the measured stroke of its cylinder
 VectorXd raw_joint(const Machine& machine, const Log& log, int joint, MachineSignals& out) {
   const std::string& name = machine.joints[static_cast<std::size_t>(joint)].name;
   const Channel* direct = log.find(Role::kJointPosition, joint);
@@ -99,7 +99,7 @@ void measured(const Machine& machine, const Log& log, int index, MachineSignals&
   }
 }
 
-/// Pose, speeds, tip and static forces at every usable sample.
+/// Computes lengths, speeds, tip and static forces at every usable sample.
 void evaluate_machine(const Machine& machine, MachineSignals& out) {
   StaticForce statics(machine);
   std::vector<double> q(machine.joints.size());
@@ -132,7 +132,7 @@ void evaluate_machine(const Machine& machine, MachineSignals& out) {
   }
 }
 
-/// Direction, masks, flow and working pressure of one cylinder.
+/// Sets direction, masks, flow and working pressure of one cylinder.
 void judge_motion(const Cylinder& cylinder, const SegmentOptions& options, const Mask& usable,
                   const Eigen::VectorXi& moves, CylinderSignals& c) {
   const Index n = c.speed.size();
@@ -146,7 +146,7 @@ void judge_motion(const Cylinder& cylinder, const SegmentOptions& options, const
     if (!usable[k]) continue;
     const double towards = commanded ? c.command[k] : c.speed[k];
     const double threshold = commanded ? options.command : options.speed;
-    if (std::abs(towards) > threshold) c.direction[k] = towards > 0.0 ? 1 : -1;  // NaN: at rest
+    if (std::abs(towards) > threshold) c.direction[k] = towards > 0.0 ? 1 : -1;  // NaN gives 0
     if (c.direction[k] == 0) continue;
     const bool extend = c.direction[k] > 0;
     c.moving[k] = moves[k] != 0;
@@ -162,12 +162,12 @@ void judge_motion(const Cylinder& cylinder, const SegmentOptions& options, const
   }
 }
 
-/// A command that is zero throughout while its cylinder clearly moves was not recorded (open-loop tests, a lever
-/// past the logger): the cylinder is then judged as one without a logged command, by its speed.
+/// Removes commands that are zero throughout although their cylinder moves: they were not recorded (open-loop tests, a
+/// lever that bypasses the logger), and the direction then follows from the speed.
 void drop_dead_commands(const Machine& machine, const SegmentOptions& options,
                         MachineSignals& out) {
-  constexpr double kClearly = 5.0;  // times the speed of moving: no leak, no sensor's noise
-  constexpr double kLeast_s = 1.0;
+  constexpr double kClearly = 5.0;  // times the speed threshold, above leakage and sensor noise
+  constexpr double kLeast_s = 1.0;  // least duration of motion
   for (std::size_t i = 0; i < out.cylinders.size(); ++i) {
     CylinderSignals& c = out.cylinders[i];
     if (!c.has_command() || !c.command.array().isFinite().any()) continue;
@@ -214,7 +214,7 @@ Mask edges(const MachineSignals& s) {
   return edge;
 }
 
-/// All that follows from what is measured and the filter.
+/// Computes all signals that follow from the measured ones and the filter.
 void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOptions& options,
             MachineSignals& out) {
   const Index n = out.samples(), joints = machine.joint_count();

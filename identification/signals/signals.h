@@ -1,7 +1,7 @@
 #pragma once
-/// A log seen through its machine: for each sample what the joints and cylinders did, what the static model
-/// says about it, and what was measured. Every stage of fitting, comparing and diagnosing starts here, so
-/// that all of them mean the same thing by "moving", "extending" and "load".
+/// Signals of a log for its machine: for each sample the motion of joints and cylinders, the static forces, and the
+/// measured quantities. Fitting, comparing and diagnosing all use them, so that "moving", "extending" and "load" have
+/// one definition.
 #include <string>
 #include <vector>
 
@@ -16,46 +16,46 @@ using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
 struct SignalOptions {
   SmoothingOptions smoothing;  ///< one filter for every signal of a log
-  SegmentOptions motion;       ///< what counts as moving, as commanded and as one motion
+  SegmentOptions motion;       ///< thresholds of "moving" and "commanded", and what one motion is
 };
 
-/// One cylinder, all vectors [samples]. An empty vector: the log does not measure it. NaN: not valid there.
+/// One cylinder; all vectors are [samples]. A vector is empty when the log does not measure it and NaN where not valid.
 struct CylinderSignals {
-  Eigen::VectorXd length;                  ///< [m] pin to pin
-  Eigen::VectorXd rate;                    ///< dx/dq [m/rad] or [-]
-  Eigen::VectorXd speed;                   ///< dx/dt [m/s], positive extending
-  Eigen::VectorXd acceleration;            ///< d2x/dt2 [m/s^2]
-  Eigen::VectorXd static_force;            ///< [N] by virtual work, positive pushes the rod in
-  Eigen::VectorXd command;                 ///< [-] as logged
-  Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] piston side, rod side, as logged
-  Eigen::VectorXd pressure_a_smooth, pressure_b_smooth;  ///< [Pa] through the position's filter
+  Eigen::VectorXd length;        ///< [m] pin to pin
+  Eigen::VectorXd rate;          ///< dx/dq [m/rad] or [-]
+  Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
+  Eigen::VectorXd acceleration;  ///< d2x/dt2 [m/s^2]
+  Eigen::VectorXd static_force;  ///< [N] by virtual work, positive if the load pushes the rod in
+  Eigen::VectorXd command;       ///< [-] as logged
+  Eigen::VectorXd pressure_a, pressure_b;                ///< [Pa] bore side, rod side, as logged
+  Eigen::VectorXd pressure_a_smooth, pressure_b_smooth;  ///< [Pa] by the position's filter
   Eigen::VectorXd force;          ///< [N] measured: pA A_A - pB A_B, or the log's own force
-  Eigen::VectorXd force_smooth;   ///< [N] through the position's filter
+  Eigen::VectorXd force_smooth;   ///< [N] by the position's filter
   Eigen::VectorXd measured_flow;  ///< [m^3/s] magnitude, as logged
 
-  /// +1 extending, -1 retracting, 0 at rest. The command's side where commands are logged (a pump serves
-  /// the side that is asked for, also while lag or load still move the rod the other way), else the speed's.
+  /// +1 extending, -1 retracting, 0 at rest. It follows the command where commands are logged, because the valve section
+  /// connects the commanded side to the pump also while lag or load still move the rod the other way; else the speed.
   Eigen::VectorXi direction;
-  /// Fast enough and, where commands are logged, commanded (identification/log/segments.h): what force errors
-  /// are taken on.
+  /// Faster than the threshold and, where commands are logged, commanded (segments.h); force errors use these samples.
   Mask moving;
-  /// Moving, and towards the side of the command: what pressures and valve gains are learned on.
+  /// Moving in the direction of the command; pressure models and valve gains are learned from these samples.
   Mask driven;
-  /// [m^3/s] into the chamber the direction selects, area * dx/dt towards it, never negative; 0 at rest.
+  /// [m^3/s] into the supply chamber, area * dx/dt in the direction, never negative; 0 at rest.
   Eigen::VectorXd flow;
-  /// [Pa] measured in the chamber the direction selects; NaN at rest. Empty when neither is measured.
+  /// [Pa] measured in the supply chamber; NaN at rest. Empty when neither chamber is measured.
   Eigen::VectorXd working_pressure;
-  Eigen::VectorXd working_pressure_smooth;  ///< [Pa] the same through the filter
+  Eigen::VectorXd working_pressure_smooth;  ///< [Pa] the same by the position's filter
 
-  // What a model's effects say, by apply_effects (identification/signals/apply_effects.h); until then as without any.
-  Eigen::VectorXd model_force;      ///< [N] static force + force effects: what the processes see
-  Eigen::VectorXd predicted_force;  ///< [N] what a sensor of the force reads: + sensor effects
-  // Empty = none.
-  Eigen::VectorXd pressure_effect;  ///< [Pa] working pressure beyond the process
-  Eigen::VectorXd return_effect;  ///< [Pa] return chamber; the process says what reaches the supply
-  Eigen::VectorXd pressure_sensor_effect;  ///< [Pa] what its sensor reads beyond that
-  Eigen::VectorXd demand_effect;           ///< [Pa] asked of the pump beyond pressure and margin
-  Eigen::VectorXd flow_effect;             ///< [m/s] rod speed beyond valve gain * command
+  // `apply_effects` adds the model's effects to these; before, they hold the values without effects.
+  Eigen::VectorXd model_force;  ///< [N] static force + force effects, input of the pressure models
+  Eigen::VectorXd
+      predicted_force;  ///< [N] model force + sensor effects, to compare with the sensor
+  // An empty vector stands for no effect.
+  Eigen::VectorXd pressure_effect;         ///< [Pa] added to the pressure model's working pressure
+  Eigen::VectorXd return_effect;           ///< [Pa] added to the return chamber
+  Eigen::VectorXd pressure_sensor_effect;  ///< [Pa] added to the working pressure by its sensor
+  Eigen::VectorXd demand_effect;           ///< [Pa] added to working pressure + margin
+  Eigen::VectorXd flow_effect;             ///< [m/s] added to the rod speed by valve gain * command
 
   bool has_command() const { return command.size() > 0; }
   bool has_force() const { return force.size() > 0; }
@@ -63,12 +63,12 @@ struct CylinderSignals {
 };
 
 struct PumpSignals {
-  Eigen::VectorXd pressure;         ///< [Pa]; empty: not measured
-  Eigen::VectorXd pressure_smooth;  ///< [Pa]
-  Eigen::VectorXd pressure_effect;  ///< [Pa] beyond the maximum of the demands; empty = none
+  Eigen::VectorXd pressure;         ///< [Pa] as logged; empty when not measured
+  Eigen::VectorXd pressure_smooth;  ///< [Pa] by the position's filter
+  Eigen::VectorXd pressure_effect;  ///< [Pa] added to the maximum of the demands; empty = none
 };
 
-/// A column the program has no meaning for.
+/// A column without a known meaning.
 struct CandidateSignal {
   std::string name;  ///< without unit
   std::string unit;  ///< "" when unknown
@@ -85,23 +85,23 @@ struct MachineSignals {
   Eigen::MatrixXd tip;         ///< [samples x 3] [m] in the base frame
   Eigen::VectorXd payload;     ///< [kg]; 0 everywhere when not logged
   bool payload_measured = false;
-  Eigen::VectorXd oil;              ///< [degC]; empty: not measured
-  Eigen::VectorXd return_pressure;  ///< [Pa]; empty: not measured
+  Eigen::VectorXd oil;              ///< [degC]; empty when not measured
+  Eigen::VectorXd return_pressure;  ///< [Pa]; empty when not measured
   std::vector<CylinderSignals> cylinders;
   std::vector<PumpSignals> pumps;
   std::vector<CandidateSignal> candidates;
   std::vector<SampleRange> runs;  ///< gap-free stretches
   std::vector<Segment> segments;  ///< motion and rest in turn, covering every sample
   double window = 0.0;            ///< [s] full width of the filter used
-  Mask edge;                      ///< within half a filter window of a run's end
+  Mask edge;                      ///< within half a filter window of either end of a run
   Mask usable;                    ///< pose, speed and payload are known
   bool of_effective_machine =
-      false;  ///< apply_effects has set speeds and flows by an effect's machine
-  std::vector<std::string> notes;  ///< plain sentences: what was missing, converted, left out
+      false;  ///< apply_effects has computed speeds and flows with a changed machine
+  std::vector<std::string> notes;  ///< whole sentences: what was missing, converted, left out
 
   Eigen::Index samples() const { return time.size(); }
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // The .cpp file defines these, so that they are compiled once.
   MachineSignals();
   MachineSignals(const MachineSignals&);
   MachineSignals(MachineSignals&&) noexcept;
@@ -110,23 +110,24 @@ struct MachineSignals {
   ~MachineSignals();
 };
 
-/// @throws InputError when a stroke lies outside what the linkage can reach at every sample
+/// @throws InputError when the linkage cannot reach the measured stroke of a joint at any sample
 MachineSignals make_signals(const Machine& machine, const Log& log,
                             const SignalOptions& options = {});
 
-/// The same log through another filter; what effects have added (apply_effects) is gone.
+/// Recomputes the signals with another filter window; the contributions of effects (apply_effects) are removed.
 /// @param window_s full width [s], > 0
 MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signals, double window_s,
                              const SignalOptions& options = {});
 
-/// Joint coordinates of a series of strokes [m], NaN where no joint coordinate has that stroke: Newton's
-/// method from the sample before, the bracketed `joint_at_stroke` where that fails. Error below 1e-10 rad.
-/// @param unreachable gets the number of samples without a joint coordinate
+/// Joint coordinates of a series of strokes by Newton's method from the sample before, or by the bracketed
+/// `joint_at_stroke` where that fails. Error below 1e-10 rad.
+/// @param strokes [samples] [m]  @param unreachable gets the number of samples without a joint coordinate
+/// @return [samples] [rad] or [m], NaN where no joint coordinate has that stroke
 Eigen::VectorXd joints_at_strokes(const Machine& machine, int cylinder,
                                   const Eigen::VectorXd& strokes,
                                   Eigen::Index* unreachable = nullptr);
 
-/// Time each sample stands for [s]: half the intervals to its neighbours in the same run (trapezoidal rule).
+/// @return [samples] [s] weights of the trapezoidal rule: half the intervals to the neighbours in the same run
 Eigen::VectorXd sample_durations(const Eigen::VectorXd& time, const std::vector<SampleRange>& runs);
 
 }  // namespace sparflow

@@ -15,8 +15,8 @@ namespace {
 constexpr int kMaxOrder = 4;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// Weights [3 x window] of value, first and second derivative at `at` of the polynomial fitted to samples at
-/// `nodes` (both scaled to about -1..1).
+/// @param nodes, at sample positions and point of evaluation, both scaled to about -1..1
+/// @return [3 x window] weights of value, first and second derivative at `at` of the fitted polynomial
 Eigen::MatrixXd fit_weights(const Eigen::VectorXd& nodes, double at, int order) {
   Eigen::MatrixXd basis(nodes.size(), order + 1);
   basis.col(0).setOnes();
@@ -30,7 +30,7 @@ Eigen::MatrixXd fit_weights(const Eigen::VectorXd& nodes, double at, int order) 
   return least_norm_columns(basis, evaluate.transpose()).transpose();
 }
 
-/// Samples either side of the middle in a window of `window_s`.
+/// @return number of samples on either side of the middle in a window of `window_s`
 int half_width(double window_s, double step, int order) {
   const int from_time = step > 0.0 ? static_cast<int>(std::floor(0.5 * window_s / step + 1e-6)) : 0;
   return std::max(from_time, (order + 2) / 2);
@@ -119,7 +119,7 @@ void SavitzkyGolay::smooth_even(const Eigen::Ref<const Eigen::VectorXd>& values,
   for (Eigen::Index i = stretch.begin; i < stretch.end; ++i) {
     const Eigen::Index first = std::clamp(i - half_, stretch.begin, stretch.end - width);
     const Eigen::Index at = i - first;
-    // A constant taken off first keeps the sums of large offsets (pressures in Pa) exact.
+    // Subtracting a constant first avoids rounding errors with large offsets (pressures in Pa).
     const double level = values[i];
     window = values.segment(first, width).array() - level;
     out->value[i] = level + weights_[0].col(at).dot(window);
@@ -139,14 +139,14 @@ void SavitzkyGolay::smooth_uneven(const Eigen::Ref<const Eigen::VectorXd>& value
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxOrder + 1, 1>;
   Eigen::Index lo = stretch.begin, hi = stretch.begin;  // the window is lo .. hi-1
   for (Eigen::Index i = stretch.begin; i < stretch.end; ++i) {
-    // The window keeps its width at the ends.
+    // At the ends the window keeps its width and becomes one-sided.
     const double middle = std::max(std::min(time_[i], stop - half), std::min(start + half, stop));
     const double centre = stop - start <= 2.0 * half ? 0.5 * (start + stop) : middle;
     while (lo < i && time_[lo] < centre - half) ++lo;
     hi = std::max(hi, i + 1);
     while (hi < stretch.end && time_[hi] <= centre + half) ++hi;
     Eigen::Index first = lo, last = hi;
-    while (last - first < fewest) {  // coarse here: take the nearest neighbours
+    while (last - first < fewest) {  // coarse sampling: the nearest neighbours are added
       const bool right =
           first == stretch.begin ||
           (last < stretch.end && time_[last] - time_[i] < time_[i] - time_[first - 1]);
@@ -171,15 +171,15 @@ void SavitzkyGolay::smooth_uneven(const Eigen::Ref<const Eigen::VectorXd>& value
     }
     const Vector c = normal.ldlt().solve(right_side);
     const double s = (time_[i] - origin) / reach;
-    double value = 0.0, slope = 0.0, bend = 0.0;  // Horner, with both derivatives
+    double value = 0.0, slope = 0.0, curvature = 0.0;  // Horner's scheme with both derivatives
     for (int k = order_; k >= 0; --k) {
-      bend = bend * s + 2.0 * slope;
+      curvature = curvature * s + 2.0 * slope;
       slope = slope * s + value;
       value = value * s + c[k];
     }
     out->value[i] = level + value;
     out->first[i] = slope / reach;
-    out->second[i] = bend / (reach * reach);
+    out->second[i] = curvature / (reach * reach);
   }
 }
 

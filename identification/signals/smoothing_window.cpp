@@ -1,4 +1,4 @@
-/// The choice of the smoothing window, declared in smoothing.h.
+/// Chooses the smoothing window; declared in smoothing.h.
 #include <algorithm>
 #include <cmath>
 
@@ -8,18 +8,18 @@
 namespace sparflow {
 namespace {
 
-// The grid: ten samples, within 0.1 and 0.2 s, to 0.4 s. Below, real noise (digits, vibration) is not the white
-// noise the risk counts on; above, the starts and stops of a motion and a pump's lag (0.1-0.4 s) round off.
+// The grid of windows starts at ten samples, limited to 0.1 .. 0.2 s, and ends at 0.42 s. In shorter windows real noise
+// (digits, vibration) is not white as the risk assumes; longer ones smooth starts, stops and a pump's lag (0.1-0.4 s).
 constexpr double kSamples = 10.0;
 constexpr double kShortestLow = 0.1, kShortestHigh = 0.2;  // [s]
 constexpr double kLongest = 0.42;                          // [s]
 constexpr double kRatio = 1.2;             // between neighbouring windows of the grid
-constexpr Eigen::Index kEnough = 40000;    // samples looked at, in blocks spread over the log
+constexpr Eigen::Index kEnough = 40000;    // samples evaluated, in blocks spread over the log
 constexpr double kLargestDilution = 1e-3;  // share of noise in the variance of an acceleration
-constexpr double kWhenUnknown = 0.25;      // [s]
+constexpr double kWhenUnknown = 0.25;      // [s] without positions or noise
 
-/// Standard deviation of white noise on a channel: third differences have 20 times its variance and hardly
-/// any motion; the median of their size (0.6745 sigma) is blind to the starts and stops.
+/// Standard deviation of white noise on a channel. Third differences have 20 times its variance and contain hardly any
+/// motion; the median of their magnitude (0.6745 sigma) is robust to starts and stops.
 double noise_of(const Eigen::VectorXd& values, const std::vector<SampleRange>& runs) {
   std::vector<double> size;
   double lo = INFINITY, hi = -INFINITY;
@@ -30,7 +30,7 @@ double noise_of(const Eigen::VectorXd& values, const std::vector<SampleRange>& r
       hi = std::max(hi, values[i]);
       if (i < run.begin + 3) continue;
       const double d = values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3];
-      // Exact zeros are a sensor at rest within one digit: they say nothing about its noise.
+      // Exact zeros occur when a sensor rests within one digit; they carry no information about its noise.
       if (std::isfinite(d) && d != 0.0) size.push_back(std::abs(d));
     }
   }
@@ -40,7 +40,7 @@ double noise_of(const Eigen::VectorXd& values, const std::vector<SampleRange>& r
   return std::max(*middle / (0.6745 * std::sqrt(20.0)), 1e-9 * (hi - lo));
 }
 
-/// Blocks of the runs, spread evenly, of kEnough samples together; the runs themselves when they are no more.
+/// @return evenly spread blocks of the runs with about kEnough samples in total; the runs themselves if they have fewer
 std::vector<SampleRange> spread_blocks(const std::vector<SampleRange>& runs) {
   Eigen::Index total = 0;
   for (const SampleRange& run : runs) total += run.size();
@@ -56,8 +56,9 @@ std::vector<SampleRange> spread_blocks(const std::vector<SampleRange>& runs) {
   return blocks;
 }
 
-/// Centred, evenly spaced first-derivative weights padded to `half` samples either side.
-/// Closed form of the cubic filter's weights (for orders 1 and 2 the first derivative is the linear fit's).
+/// Closed form of the filter's centred first-derivative weights on even sampling, of the cubic for order 3 and above; for
+/// orders 1 and 2 they are those of the linear fit.
+/// @return [2 padded + 1] weights, zero beyond `half` samples on either side
 Eigen::VectorXd slope_weights(int half, int padded, int order) {
   Eigen::VectorXd w = Eigen::VectorXd::Zero(2 * padded + 1);
   double s2 = 0.0, s4 = 0.0, s6 = 0.0;
@@ -80,7 +81,7 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   const std::vector<SampleRange> runs = spread_blocks(all_runs);
   const double step = median_step(time);
   if (!(step > 0.0) || positions.cols() == 0) return kWhenUnknown;
-  const int fewest_half = (order + 2) / 2;  // samples either side that the filter insists on
+  const int fewest_half = (order + 2) / 2;  // least samples on either side in the filter
   const double shortest =
       std::max(std::clamp(kSamples * step, kShortestLow, kShortestHigh), 2.0 * fewest_half * step);
   std::vector<double> grid;
@@ -96,7 +97,7 @@ double choose_window(const Eigen::VectorXd& time, const std::vector<SampleRange>
   bool any = false;
   for (Eigen::Index c = 0; c < positions.cols(); ++c) {
     const double sigma =
-        noise_of(positions.col(c), runs) / step;  // of a velocity of weights norm 1
+        noise_of(positions.col(c), runs) / step;  // of a velocity whose weights have norm 1
     if (!(sigma > 0.0)) continue;
     const double reference = sigma * sigma * weights[0].squaredNorm();
     Eigen::VectorXd first;

@@ -13,7 +13,7 @@ CraneModel CraneModel::untrained(Machine machine) {
   CraneModel model;
   model.cylinders.resize(machine.cylinders.size());
   for (const Pump& pump : machine.pumps) {
-    // of a constant supply nothing but its ceiling is known before a log shows its pressure
+    // Of a constant-pressure supply only its maximum is known before a log shows its pressure.
     const bool constant = pump.type == PumpType::kConstantPressure;
     model.pumps.push_back({constant ? pump.max_pressure : pump.standby});
   }

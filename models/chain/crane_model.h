@@ -1,6 +1,6 @@
 #pragma once
-/// The one model object: a machine and what was learned about it. Identification, optimiser and pages all
-/// evaluate this, so whatever is learned once is seen by all of them. Immutable once built.
+/// The model: a machine and what was learned about it. Identification, optimiser and pages all evaluate this object, so
+/// that they share whatever was learned. It is not changed once it is built.
 #include <limits>
 #include <memory>
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace sparflow {
 
-/// What was learned about one cylinder.
+/// What was learned about one cylinder: two pressure models, margin and valve gains.
 struct CylinderModel {
   GaussianProcess extend;   ///< working pressure on the piston side, p(Q, F); empty = not learned
   GaussianProcess retract;  ///< working pressure on the rod side
@@ -25,10 +25,10 @@ struct CylinderModel {
 /// What was learned about one pump.
 struct PumpModel {
   double standby =
-      0.0;  ///< [Pa] load sensing: least pressure; constant-pressure supply: its pressure
+      0.0;  ///< [Pa] load sensing: standby pressure; constant-pressure supply: its pressure
 };
 
-/// One log the model has seen.
+/// One log on which the model was learned or judged.
 struct DataSource {
   std::string file;    ///< name without folder
   std::string sha256;  ///< of the file's bytes
@@ -56,40 +56,40 @@ struct StepParameter {
   double upper95 = std::numeric_limits<double>::quiet_NaN();  ///< [SI]
 };
 
-/// One step of extending a model: what was added or taken back, from which data, with which gain. A record, so it
-/// may name effects this model no longer has.
+/// One step of extending a model: what was added or removed, from which data, with which gain. It is a record and may
+/// name effects that the model no longer has.
 struct ModelStep {
   std::string added;             ///< "coulomb_friction:boom", empty when the step only removes
-  std::string removed;           ///< the same of an effect taken back, usually empty
+  std::string removed;           ///< the same for a removed effect, usually empty
   std::string date;              ///< "2025-03-14", empty = not recorded
   std::vector<DataSource> data;  ///< logs it was learned and judged on
   std::vector<StepParameter> parameters;    ///< of the added effect
   std::vector<StageQuality> before, after;  ///< on data held out
-  std::string stopped_because;  ///< why no step followed, with the last one; empty = one may follow
+  std::string stopped_because;  ///< in the last step: why no other followed; empty = one may follow
 };
 
 struct CraneModel {
-  Machine machine;                       ///< as its file says; `effective_machine` has the effects'
+  Machine machine;  ///< as in its file; `effective_machine` has the effects applied
   std::vector<CylinderModel> cylinders;  ///< by cylinder
   std::vector<PumpModel> pumps;          ///< by pump
   std::vector<AppliedEffect>
       effects;  ///< physical effects beyond paper eqs. 2-16, in the order added
-  /// Effects that users describe in YAML and that the model file carries, in the model or not: who reads the file
-  /// can choose them.
+  /// Effects that users described in YAML and that the model file contains, whether the model uses them or not, so that
+  /// later verbs can choose them.
   std::vector<const Effect*> user_effects;
-  std::vector<ModelStep> steps;  ///< how they came in
+  std::vector<ModelStep> steps;  ///< how the effects were added
   std::vector<DataSource> data;
   std::vector<StageQuality> quality;
 
-  /// A model of which nothing is learned yet: margins 0, standby from the machine file
+  /// A model before anything is learned: margins 0, standby from the machine file
   /// (a constant-pressure supply: its largest pressure).
   static CraneModel untrained(Machine machine);
-  /// Whether every hydraulic cylinder has both pressure processes.
+  /// Whether every hydraulic cylinder has a pressure model in both directions.
   bool complete() const;
   /// Names of what is missing ("boom retract"), for a message.
   std::vector<std::string> missing() const;
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // Defaulted in the source file, so that they are compiled once and not in every file that copies a model.
   CraneModel();
   CraneModel(const CraneModel&);
   CraneModel(CraneModel&&) noexcept;
@@ -104,11 +104,10 @@ struct CylinderState {
   double rate = 0.0;    ///< dx/dq [m/rad] or [-]
   double speed = 0.0;   ///< dx/dt [m/s], positive extending
   double force = 0.0;   ///< static force of the effective machine [N], positive pushes the rod in
-  double total_force =
-      0.0;                ///< [N] the same with what the force effects add: what the processes see
-  double flow = 0.0;      ///< [m^3/s] into the working chamber, never negative
-  double pressure = 0.0;  ///< [Pa] working pressure, 0 at rest
-  double pressure_std = 0.0;  ///< [Pa] of the process' mean; 0 at rest
+  double total_force = 0.0;   ///< [N] static force plus force effects; input of the pressure models
+  double flow = 0.0;          ///< [m^3/s] into the supply chamber, never negative
+  double pressure = 0.0;      ///< [Pa] working pressure, 0 at rest
+  double pressure_std = 0.0;  ///< [Pa] standard deviation of the pressure model's mean; 0 at rest
   bool moving = false;
 };
 
@@ -116,7 +115,7 @@ struct CylinderState {
 struct PumpState {
   double flow = 0.0;      ///< [m^3/s]
   double pressure = 0.0;  ///< [Pa]
-  int leader = -1;  ///< the cylinder that sets the pressure, -1 = standby or constant pressure
+  int leader = -1;        ///< load-sensing leader, -1 = standby or constant pressure
 };
 
 struct MachineState {
@@ -128,27 +127,27 @@ struct MachineState {
   double throttling(const Machine& machine, int cylinder) const;
 };
 
-/// |dx/dt| up to which a cylinder counts as at rest [m/s]: swallows rounding, no more.
+/// |dx/dt| up to which a cylinder counts as at rest [m/s]; it covers rounding only.
 inline constexpr double kRestSpeed = 1e-9;
 
-/// Evaluates the exact chain; a workspace, one a thread, no allocation after construction.
+/// Evaluates the exact law of the chain. Each thread needs its own object; nothing is allocated after construction.
 ///
 /// With the model's effects: static forces of the effective machine (models/effects/effective_machine.h), + force
-/// effects, flows, working pressure p(Q, F total) + what the effects on the return chambers do to it
+/// effects, flows, working pressure p(Q, F total) + its rise by effects on the return chambers
 /// (models/hydraulics/return_rise.h) + pressure effects of the moving hydraulic cylinders, demand =
-/// working pressure + margin + demand effects, pump = max(standby, demands) + pump effects. An effect of a stage
-/// sees what earlier effects of its stage do not add: all of a stage start from the same state.
-/// Effects with memory (lags, delays) and of flow and sensors say nothing here.
+/// working pressure + margin + demand effects, pump = max(standby, demands) + pump effects. All effects of a
+/// stage start from the same state; none depends on what another one of its stage adds.
+/// Effects with memory (lags, delays) and those of the stages flow and sensor do not act here.
 class Chain {
  public:
   /// @param model must outlive the chain
   explicit Chain(const CraneModel& model);
 
-  double oil = 40.0;  ///< [degC] for effects that look at the oil's temperature
+  double oil = 40.0;  ///< [degC] oil temperature, for effects that depend on it
 
   /// @param q, qd by joint  @param payload [kg]  @param with_std also predictive standard deviations
-  /// @param rest_speed |dx/dt| up to which a cylinder counts as at rest [m/s]. The exact law knows only
-  ///        zero; the default merely swallows rounding. Measured speeds need a threshold above noise.
+  /// @param rest_speed |dx/dt| up to which a cylinder counts as at rest [m/s]. The default covers rounding only,
+  ///        as the exact law demands. Measured speeds need a threshold above their noise.
   /// @param qdd by joint, for inertia; nullptr = 0
   /// @throws std::domain_error when a four-bar cannot close at q
   const MachineState& evaluate(const double* q, const double* qd, double payload,
@@ -158,7 +157,7 @@ class Chain {
   /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
   /// [N]: for logs, where effects are series (identification/signals/series.h).
   /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
-  /// @param added_demand [Pa] by cylinder, asked of the pump on top; nullptr = 0
+  /// @param added_demand [Pa] by cylinder, added to its demand on the pump; nullptr = 0
   /// @param added_return [Pa] by cylinder, added to its return chamber; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
                                          bool with_std = false, double rest_speed = kRestSpeed,
@@ -166,7 +165,7 @@ class Chain {
                                          const double* added_demand = nullptr,
                                          const double* added_return = nullptr);
 
-  /// The machine whose forces these are.
+  /// The effective machine, whose forces are evaluated.
   const Machine& machine() const { return *machine_; }
 
  private:
@@ -182,7 +181,7 @@ class Chain {
   std::shared_ptr<const Machine> machine_;
   StaticForce statics_;
   MachineState state_;
-  std::vector<AppliedEffect> laws_;  // those that act in a motion
+  std::vector<AppliedEffect> laws_;  // effects that act in a motion
   Instant<double> instant_;
   std::vector<double> added_, added_pump_;
 };

@@ -30,7 +30,7 @@ SmoothEffects::SmoothEffects(const CraneModel& model)
   if (size() > Jet::kMax) {
     throw InputError({}, "effects",
                      fmt::format("a motion of {} joints cannot be optimised with effects that act "
-                                 "in it: at most {} joints{}; take the effects out of the model",
+                                 "in it: at most {} joints{}; remove the effects from the model",
                                  n_, Jet::kMax / (with_acceleration_ ? 3 : 2),
                                  with_acceleration_ ? " with inertia" : ""));
   }
@@ -57,7 +57,7 @@ void SmoothEffects::set_state(const double* z, double payload, const CylinderMod
   const auto lift = [&](int index) {
     return derivatives ? Jet::variable(z[index], index, size()) : Jet(z[index]);
   };
-  // a function of q alone, from its matrices
+  // This lifts a function of q alone, given by value, gradient and Hessian.
   const auto of_posture = [&](double value, const auto& gradient, const auto& hessian) {
     if (!derivatives) return Jet(value);
     return Jet::of(

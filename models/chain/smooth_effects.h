@@ -1,14 +1,14 @@
 #pragma once
-/// The smooth twin of the exact chain for a model with effects that act in a motion: power and pressure of all
-/// pumps as functions of z = (q, qd) or (q, qd, qdd), with exact first and second derivatives by `Jet`. A model without
-/// such effects has the faster models/chain/smooth_power.h, whose law this is when no effect adds anything.
+/// Smooth law of the chain for a model with effects that act in a motion: power and pressure of all pumps as functions of
+/// z = (q, qd) or (q, qd, qdd), with exact first and second derivatives by `Jet`. A model without such effects uses the
+/// faster models/chain/smooth_power.h; the two laws agree when no effect adds anything.
 ///
-/// A cylinder whose mode is held is on one side. A free one is on both: the whole law from force to demand, effects
-/// included, is evaluated for either side with speed +-m, m = v tanh(v/eps), and
+/// A cylinder with a prescribed mode moves in one direction. For a free one the law from force to demand, effects
+/// included, is evaluated in both directions with speed +-m, m = v tanh(v/eps), and
 ///   demand d = t^2 [w d+ + (1-w) d-],  t = tanh(v/eps), w = (1+t)/2;
-/// flows are blended before, so that effects that sum over cylinders tend to the exact law. An effect on one
-/// cylinder may depend on that cylinder's side, not on the sides of others. Effects on a pump that look at its
-/// leading cylinder are weighted by the soft maximum's shares.
+/// flows are blended before, so that effects that sum over cylinders tend to the exact law. An effect on one cylinder may
+/// depend on that cylinder's direction, not on those of others. Effects on a pump that depend on its load-sensing leader
+/// are weighted by the shares of the soft maximum.
 #include <memory>
 #include <vector>
 
@@ -17,20 +17,20 @@
 
 namespace sparflow {
 
-/// A workspace, one a thread.
+/// Evaluates the law; each thread needs its own object.
 class SmoothEffects {
  public:
   /// @param model must outlive the object
-  /// @throws InputError when the machine has more joints than `Jet` carries (7 with accelerations, else 10)
+  /// @throws InputError when the machine has more joints than `Jet` can hold (7 with accelerations, else 10)
   explicit SmoothEffects(const CraneModel& model);
 
-  /// Whether a model needs this law at all.
+  /// Whether a model has effects that need this law.
   static bool needed(const CraneModel& model);
 
   Smoothing smoothing;
   double oil = 40.0;  ///< [degC]
 
-  /// Whether z holds accelerations: some effect depends on them.
+  /// Whether z contains accelerations, because an effect depends on them.
   bool uses_acceleration() const { return with_acceleration_; }
   int size() const { return n_ * (with_acceleration_ ? 3 : 2); }
 
@@ -45,12 +45,12 @@ class SmoothEffects {
   }  ///< [Pa]
 
  private:
-  /// What does not depend on the side a free cylinder is on.
+  /// Quantities of a cylinder that do not depend on the direction being evaluated.
   struct Cylinder {
     CylinderMode mode = CylinderMode::kFree;
     bool demands = false;  ///< hydraulic, moving and fed by a load-sensing pump
-    int side = 0;          ///< held, or the one the speed points to
-    bool both = false;     ///< the other side has a share, too
+    int side = 0;          ///< direction of the mode, or of the speed of a free cylinder
+    bool both = false;     ///< the other direction has a share as well
     Jet share;             ///< of `side`
     Jet activity;          ///< t^2
     Jet size;              ///< m, smooth |v|
@@ -59,12 +59,12 @@ class SmoothEffects {
   };
   void set_state(const double* z, double payload, const CylinderMode* mode, bool derivatives);
   void set_cylinder(std::size_t i);
-  /// From force to demand with free cylinders on their first or (those that have one) other side.
+  /// Evaluates force to demand with free cylinders in their first direction, or in the other one where it has a share.
   void evaluate_side(bool other);
   void add_demands();
   void soft_maximum(std::size_t pump);
   void pumps();
-  /// What the effects add to a pump's pressure if that cylinder leads.
+  /// What the effects add to a pump's pressure if `leader` is its load-sensing leader. [Pa]
   Jet pump_effects(std::size_t pump, int leader, Instant<Jet>& s);
 
   const CraneModel* model_;

@@ -6,7 +6,7 @@
 namespace sparflow {
 namespace {
 
-/// A process of (flow, force) seen as a function of (speed, force), with Q = area m(v).
+/// Derivatives of a process of (flow, force) with respect to (speed, force), with Q = area m(v).
 GpDerivatives in_speed(const GaussianProcess& process, double area, double m, double m1, double m2,
                        double force) {
   const GpDerivatives g = process.mean_derivatives(area * m, force);

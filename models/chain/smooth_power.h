@@ -1,23 +1,23 @@
 #pragma once
-/// The smooth twin of the exact pump law (models/chain/crane_model.h), for gradient-based optimisation: power of
+/// Smooth version of the exact pump law (models/chain/crane_model.h), for gradient-based optimisation: power of
 /// all pumps as a function of cylinder speeds and static forces, with exact first and second derivatives.
 ///
-/// Per cylinder, with t = tanh(v/eps), w = (1+t)/2:  |v| -> m = v t,  Q = (w A + (1-w) B) m,
+/// For each cylinder, with t = tanh(v/eps), w = (1+t)/2:  |v| -> m = v t,  Q = (w A + (1-w) B) m,
 ///   demand d = t^2 [w p+(A m, F) + (1-w) p-(B m, F) + c].
-/// Per pump: p = beta log(exp(standby/beta) + sum_i exp(d_i/beta)), which exceeds the maximum by at most
-/// beta log(n+1). An energy under this law is a means to an end and never reported.
+/// For each pump: p = beta log(exp(standby/beta) + sum_i exp(d_i/beta)), which exceeds the maximum by at most
+/// beta log(n+1). Energies under this law serve the solver only and are never reported.
 #include <vector>
 
 #include "models/chain/crane_model.h"
 
 namespace sparflow {
 
-/// What a cylinder does during a phase. In every mode but kFree the law needs no blending: kExtend and
-/// kRetract are exact for v of their sign, kRest takes no flow and demands nothing.
+/// What a cylinder does during a phase. Only kFree needs blending: kExtend and kRetract are exact for v of their sign,
+/// and kRest takes no flow and has no demand.
 enum class CylinderMode : unsigned char { kFree, kRest, kExtend, kRetract };
 
-/// Below this share a side's pressure changes the demand by less than 1e-11 bar for pressures up to
-/// 1000 bar, far under any tolerance of the solver, so its process is not evaluated.
+/// Below this share the pressure of a direction changes the demand by less than 1e-11 bar for pressures up to 1000 bar,
+/// far below any tolerance of the solver, so its pressure model is not evaluated.
 inline constexpr double kNegligibleShare = 1e-14;
 
 struct Smoothing {
@@ -25,7 +25,7 @@ struct Smoothing {
   double pressure = 1e5;  ///< beta [Pa]
 };
 
-/// A workspace, one a thread; no allocation after construction. Order of the variables everywhere:
+/// Each thread needs its own object; nothing is allocated after construction. Order of the variables everywhere:
 /// (v_0 .. v_{m-1}, F_0 .. F_{m-1}) over the machine's m cylinders.
 class SmoothPower {
  public:
@@ -41,7 +41,7 @@ class SmoothPower {
   const Eigen::VectorXd& gradient() const { return gradient_; }  ///< [W s/m | W/N], 2 m
   const Eigen::MatrixXd& hessian() const { return hessian_; }    ///< symmetric, 2 m x 2 m
 
-  /// Flow of one cylinder with d/dv and d2/dv2; cheap, no process is evaluated. [m^3/s, ...]
+  /// Flow of one cylinder with d/dv and d2/dv2; cheap, since no pressure model is evaluated. [m^3/s, ...]
   struct Flow {
     double q = 0.0, d1 = 0.0, d2 = 0.0;
   };
@@ -54,7 +54,7 @@ class SmoothPower {
   void add_pressure_hessian(int p, double factor, Eigen::MatrixXd& hessian) const;
 
  private:
-  struct Demand {  // of one cylinder: value and derivatives in (v, F); inactive ones take no part
+  struct Demand {  // value and derivatives in (v, F) of one cylinder; inactive ones do not count
     bool active = false;
     double d = 0.0, v = 0.0, f = 0.0, vv = 0.0, vf = 0.0, ff = 0.0;
     double share = 0.0;  // soft-max weight within its pump

@@ -1,5 +1,5 @@
 #pragma once
-/// The built-in effects' makers, one a file; registry.cpp lists them.
+/// Factories of the built-in effects, one for each file of laws/; registry.cpp lists them.
 #include <memory>
 
 #include "models/effects/effect.h"
@@ -35,10 +35,10 @@ std::unique_ptr<Effect> make_line_loss();
 std::unique_ptr<Effect> make_flow_dependent_margin();
 std::unique_ptr<Effect> make_torque_limit();
 
-/// First joint that turns about a nearly horizontal axis with all joints at zero; -1 = none.
+/// First joint whose axis is nearly horizontal with all joints at zero (it luffs the arm); -1 = none.
 int first_luffing_joint(const Machine& machine);
 
-/// Unit vector from a joint towards the next (or the tip), in the joint's frame: "along the link".
+/// Unit vector along the link, from a joint towards the next one or the tip, in the joint's frame.
 Eigen::Vector3d link_direction(const Machine& machine, int joint);
 
 }  // namespace sparflow

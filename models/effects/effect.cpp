@@ -95,7 +95,7 @@ bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int
   if (kind == EvidenceKind::kForce && changes_machine()) {
     const Matrix nominal = forces_of(*log.machine, log);
     for (Eigen::Index k = 0; k < linear; ++k) {
-      // a step of the size that matters: exact for masses, the chord for angles
+      // The step is the typical value: exact for masses, the secant for angles.
       const double size = info().parameters[static_cast<std::size_t>(k)].typical;
       Machine changed = *log.machine;
       std::vector<double> unit = p;

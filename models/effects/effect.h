@@ -1,9 +1,9 @@
 #pragma once
-/// A physical effect that a model may lack: what it is called, what it does, and where. One file an effect, one
-/// line in registry.cpp; fit, compare, diagnose, optimise, pages and help all work from this interface.
+/// A physical effect that a model may lack: its names, its law and its places on a machine. Each effect has one file and
+/// one line in registry.cpp; fit, compare, diagnose, optimise, pages and help all work from this interface.
 ///
-/// Signs. A force effect adds to the force the cylinder must carry (measured force = static force + effects;
-/// friction while extending is positive). A pressure effect adds to a chamber, a pump effect to the pump.
+/// Signs: a force effect adds to the force the cylinder must carry (measured force = static force + effects, so that
+/// friction while extending is positive). A pressure effect adds to a chamber's pressure, a pump effect to the pump's.
 #include <Eigen/Dense>
 #include <limits>
 #include <memory>
@@ -25,14 +25,15 @@ struct EffectParameter {
   std::string name;
   std::string unit;      ///< as shown and read, "bar/(l/min)^2"
   double si = 1.0;       ///< SI value = shown value * si
-  double lower, upper;   ///< [SI] beyond these a value is not plausible
-  double typical = 0.0;  ///< [SI] of a clear effect
+  double lower, upper;   ///< [SI] bounds of plausible values
+  double typical = 0.0;  ///< [SI] value at which the effect is clearly visible
   std::string meaning;
-  /// Whether the effect is proportional to it. One that is not is searched over `grid` (then refined).
+  /// Whether the effect is proportional to the parameter. One that is not is searched over `grid`, then refined.
   bool linear = true;
   std::vector<double> grid;  ///< [SI] empty for linear ones
-  bool choice = false;  ///< the grid's values name variants of the law: nothing lies between them
-  /// Of linear ones: the effect is whole without it, and a search pays for it only where it says something.
+  /// Whether the grid's values name variants of the law, between which no value has a meaning.
+  bool choice = false;
+  /// A linear parameter without which the effect is complete; a search adds it only where the log determines it.
   bool optional = false;
 };
 
@@ -43,20 +44,22 @@ struct EffectInfo {
   EffectPlace place = EffectPlace::kCylinder;
   std::vector<EffectParameter> parameters;  ///< linear ones first
   std::string equation;                     ///< one line of text
-  std::vector<std::string> signals;         ///< what a log must hold, in words: "chamber pressures"
-  std::vector<std::string> confused_with;   ///< ids or words
-  /// Id of the plainer effect that this one contains; that one is tried first.
+  std::vector<std::string> signals;  ///< what a log must contain, in words: "chamber pressures"
+  std::vector<std::string> confused_with;  ///< ids or words
+  /// Id of the simpler effect that this one contains as a special case; that one is tried first.
   std::string refines = {};
-  std::string separated_by;  ///< the motion that tells them apart
+  std::string separated_by;  ///< the motion that distinguishes them
   std::string citation;      ///< author (year), equation or chapter
-  /// Share by which other published laws of the same effect differ in these parameters when both are fitted to the
-  /// same data; part of every interval. Measured on simulated logs with other laws (bench/blind_test).
+  /// [-] Share by which other published laws of the same effect differ in these parameters when both are fitted to
+  /// the same data (model-form error); it widens every interval. Measured on simulated logs with other laws
+  /// (bench/blind_test).
   double form_error = 0.02;
-  /// What a motion's energy sees of it: "force", "pressure", "pump", "limit" or "nothing" with the reason.
+  /// Where it acts on a motion's energy: "force", "pressure", "pump", "limit" or "nothing" with the reason.
   std::string in_motion;
 };
 
-/// One instant of a machine, T = double or Jet. By joint: q ...; by cylinder: the rest.
+/// State of a machine at one instant, T = double or Jet. Vectors are by joint down to `static_torque`, then by cylinder
+/// unless a pump is named.
 template <class T>
 struct Instant {
   const Machine* machine = nullptr;
@@ -67,14 +70,14 @@ struct Instant {
   std::vector<T> length, rate;   ///< [m], dx/dq
   std::vector<T> speed;          ///< [m/s]
   std::vector<T> static_force;   ///< [N]
-  std::vector<T> force;          ///< [N] with force effects, once they are added
+  std::vector<T> force;          ///< [N] static force plus force effects, once these are added
   std::vector<int> side;         ///< +1 extends, -1 retracts, 0 rests
-  std::vector<T> flow;           ///< [m^3/s] into the working chamber, >= 0
-  std::vector<T> return_flow;    ///< [m^3/s] out of the other, >= 0
+  std::vector<T> flow;           ///< [m^3/s] into the supply chamber, >= 0
+  std::vector<T> return_flow;    ///< [m^3/s] out of the return chamber, >= 0
   std::vector<T> pressure;       ///< [Pa] working pressure
   std::vector<T> pump_flow;      ///< [m^3/s] by pump
   std::vector<T> pump_pressure;  ///< [Pa] by pump, before pump effects
-  /// Cylinder that leads by pump, -1 = standby. The smooth law calls once for each candidate instead.
+  /// Load-sensing leader of each pump, -1 = standby. The smooth law evaluates once for each candidate instead.
   std::vector<int> leader;
 };
 
@@ -83,78 +86,79 @@ class Effect {
   virtual ~Effect() = default;
   virtual const EffectInfo& info() const = 0;
 
-  /// Places of a machine where it can sit: indices of joints, cylinders or pumps, {-1} for the whole machine;
-  /// empty when it cannot (pad friction without a telescope).
+  /// Places of a machine where the effect can act: indices of joints, cylinders or pumps, {-1} for the whole machine;
+  /// empty where it cannot (pad friction without a telescope).
   virtual std::vector<int> places(const Machine& machine) const;
 
   // --- laws without memory; `p` holds the parameters [SI], results are added ---------------------------
 
-  /// Effects that are another machine: masses, tilt. Derivatives then come with the machine.
+  /// Whether the effect changes the machine (masses, tilt) instead of adding a law; its derivatives are then the
+  /// machine's.
   virtual bool changes_machine() const { return false; }
   virtual void change_machine(Machine& /*machine*/, int /*at*/,
                               std::span<const double> /*p*/) const {}
 
-  /// Force on each cylinder. [N]
+  /// Adds to the force of each cylinder. [N]
   virtual void add_force(const Instant<double>&, int, std::span<const double>,
                          std::span<double>) const {}
   virtual void add_force(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {}
-  /// Working pressure of each moving cylinder, seen at the cylinder and by the pump. [Pa]
+  /// Adds to the working pressure of each moving cylinder, and thereby to its demand on the pump. [Pa]
   virtual void add_pressure(const Instant<double>&, int, std::span<const double>,
                             std::span<double>) const {}
   virtual void add_pressure(const Instant<Jet>&, int, std::span<const double>,
                             std::span<Jet>) const {}
-  /// Return chamber of each moving cylinder. What of it reaches the supply the cylinder's learned pressure says
-  /// (models/hydraulics/return_rise.h). [Pa]
+  /// Adds to the pressure in the return chamber of each moving cylinder; how much of it reaches the supply chamber
+  /// follows from the cylinder's pressure model (models/hydraulics/return_rise.h). [Pa]
   virtual void add_return(const Instant<double>&, int, std::span<const double>,
                           std::span<double>) const {}
   virtual void add_return(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {
   }
-  /// What a cylinder asks of its pump beyond working pressure and margin. [Pa]
+  /// Adds to a cylinder's demand on its pump, beyond working pressure and margin. [Pa]
   virtual void add_demand(const Instant<double>&, int, std::span<const double>,
                           std::span<double>) const {}
   virtual void add_demand(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {
   }
-  /// Pressure of each pump, after the maximum. [Pa]
+  /// Adds to the pressure of each pump, after the maximum over its demands. [Pa]
   virtual void add_pump(const Instant<double>&, int, std::span<const double>,
                         std::span<double>) const {}
   virtual void add_pump(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {}
 
-  /// Largest flow of pump `pump` that this effect leaves [m^3/s]; infinity = no say. A motion keeps below it.
+  /// Largest flow that this effect permits pump `pump` [m^3/s], infinity = not limited; motions stay below it.
   virtual double flow_limit(const Machine& /*machine*/, int /*pump*/, int /*at*/,
                             std::span<const double> /*p*/) const {
     return std::numeric_limits<double>::infinity();
   }
 
-  /// What is left of a cylinder's command behind this effect of its valve (a dead band); [samples], [-], in place.
+  /// Changes a cylinder's command [samples, -] in place into the valve opening that this effect leaves (a dead band).
   virtual void shape_opening(int /*cylinder*/, int /*at*/, std::span<const double> /*p*/,
                              Eigen::VectorXd& /*opening*/) const {}
 
-  /// Text (YAML) that defines a user's effect, so that a model file can carry it; empty: built in.
+  /// YAML text that defines a user's effect, so that a model file can contain it; empty for built-in effects.
   virtual std::string definition() const { return {}; }
 
   // --- logs --------------------------------------------------------------------------------------------
 
-  /// Kinds of evidence this effect can show in.
+  /// Evidence channels in which the effect can show.
   virtual std::vector<EvidenceKind> shows_in() const = 0;
-  /// What one unit (SI) of each linear parameter adds to the measured quantity `kind` of cylinder or pump
-  /// `index`, not filtered. The default evaluates the laws above sample by sample.
+  /// Signature of the effect: what one unit (SI) of each linear parameter adds to the measured quantity `kind` of
+  /// cylinder or pump `index`, not filtered. The default evaluates the laws above sample by sample.
   /// @param shape values of the nonlinear parameters, in their order
   /// @param columns [samples x linear parameters], resized; NaN where not valid
-  /// @return false when the effect does not touch this quantity or the log lacks what it needs
+  /// @return false when the effect does not act on this quantity or the log lacks a channel it needs
   virtual bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                        std::span<const double> shape, Eigen::MatrixXd& columns) const;
-  /// Values of the nonlinear parameter `shape_index` (counted among those) to search on this log [SI]. The
-  /// default is the parameter's own grid; limits and thresholds depend on what the log reaches. Empty: the log
-  /// lacks what the effect needs.
+  /// Values of the nonlinear parameter `shape_index` (counted among the nonlinear ones) to search on this log [SI]. The
+  /// default is the parameter's own grid; limits and thresholds depend on the range of the log. Empty: the log lacks
+  /// what the effect needs.
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
-  /// Whether columns() are made of filtered derivatives alone (inertia) and must not be filtered again.
+  /// Whether columns() are computed from filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
-  /// Whether columns() hold readings as they are, with their noise: what is smoothed compares with them only after the
-  /// same filter.
+  /// Whether columns() contain unfiltered measurements with their noise; they are comparable to filtered signals only
+  /// after the same filter.
   virtual bool columns_of_readings() const { return false; }
 };
 
-/// Parameters of an effect that is part of a model.
+/// An effect that is part of a model, with its place and parameters.
 struct AppliedEffect {
   const Effect* effect = nullptr;
   int at = -1;                 ///< joint, cylinder or pump as info().place says; -1 = machine

@@ -13,17 +13,16 @@ namespace sparflow {
 namespace {
 
 constexpr std::size_t kWidth = 100;
-constexpr std::size_t kIndent = 15;  // of an entry's text behind its headings
+constexpr std::size_t kIndent = 15;  // columns before an entry's text
 
-/// Not an effect: a channel that does not tell what the machine does. It stands in the catalogue because users
+/// This is not an effect but a channel that does not measure what the machine does; it is in the catalogue because users
 /// look for it there.
 constexpr const char* kFault = "sensor_fault";
-constexpr const char* kFaultTitle = "noise far above the channel's own, stuck or jumping values";
+constexpr const char* kFaultTitle = "sensor fault: excess noise, stuck or jumping values";
 constexpr const char* kFaultText =
     "Such values are bad data, not missing physics: `compare` and `diagnose` look for them first, "
-    "name the channel "
-    "and the time (verdict \"bad_data\"), and leave those rows out. There is nothing to add to a "
-    "model.";
+    "name the channel and the time (verdict \"bad_data\") and exclude those rows. No effect is "
+    "added to the model.";
 
 const char* place_word(EffectPlace place) {
   switch (place) {
@@ -69,7 +68,7 @@ std::vector<std::string> shown_in(const Effect& effect) {
   return words;
 }
 
-/// Words broken at spaces, every line but the first behind `indent` blanks.
+/// Text wrapped at spaces to kWidth; every line but the first begins with `indent` blanks.
 std::string wrapped(const std::string& text, std::size_t indent) {
   std::istringstream words(text);
   std::string result, word;
@@ -100,7 +99,7 @@ std::string parameter_words(const EffectParameter& p) {
   std::string text =
       fmt::format("{}: {}{}{:.3g} to {:.3g}{}", p.name, p.meaning, p.meaning.empty() ? "" : ". ",
                   shown(p, p.lower), shown(p, p.upper), unit);
-  text += fmt::format(", clear at {:.3g}{}", shown(p, p.typical), unit);
+  text += fmt::format(", typical {:.3g}{}", shown(p, p.typical), unit);
   if (p.linear) return text;
   std::vector<std::string> values;
   for (const double v : p.grid) values.push_back(fmt::format("{:.3g}", shown(p, v)));
@@ -187,7 +186,7 @@ std::string effect_table() {
       rows += row("sensor_fault:<channel>", kFaultTitle, "bad data");
     if (!rows.empty()) text += fmt::format("{}\n{}", effect_stage_name(stage), rows);
   }
-  return text + "`sparflow effects ID` prints the whole entry.\n";
+  return text + "`sparflow effects ID` prints the complete entry.\n";
 }
 
 std::string effect_entry(const Effect& effect) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The catalogue of effects in words: what `sparflow effects` prints.
+/// The catalogue of effects as text, which `sparflow effects` prints.
 #include <string>
 #include <vector>
 
@@ -9,15 +9,15 @@ namespace sparflow {
 
 /// "coulomb_friction:<cyl>", as the command line takes it.
 std::string effect_signature(const EffectInfo& info);
-/// Every effect in one screen, by stage along the chain, and the verdict on bad data at the end.
+/// Every effect on one screen, in the order of the stages, with the sensor fault (bad data) at the end.
 std::string effect_table();
-/// A whole entry: equation, parameters with unit, bounds and typical size, where it shows in a log, what it is
-/// confused with and what separates them, what a motion sees of it, source.
+/// The complete entry of an effect: equation, parameters with unit, bounds and typical value, the channels in which it
+/// shows, what it is confused with and what separates them, how it acts on a motion, source.
 std::string effect_entry(const Effect& effect);
 /// Entry by id, with or without a place ("coulomb_friction:boom"); `sensor_fault` has one too.
 /// @throws UsageError when there is no such effect, with a suggestion
 std::string effect_entry(const std::string& id);
-/// {"effects": [...]} with the same facts, of one id or (empty) of all. @throws UsageError as above
+/// {"effects": [...]} with the same content, for one id or (empty) for all. @throws UsageError as above
 std::string effects_json(const std::string& id = {});
 
 }  // namespace sparflow

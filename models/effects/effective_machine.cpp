@@ -9,7 +9,7 @@
 namespace sparflow {
 namespace {
 
-/// A state in which every law has something to say. Values are of the size machines have.
+/// A random state in which every law acts; values are of the size that real machines have.
 void fill_random(std::mt19937& random, Instant<double>& s) {
   std::uniform_real_distribution<double> unit(0.05, 0.95);
   const auto either = [&](double size) {
@@ -42,7 +42,7 @@ void fill_random(std::mt19937& random, Instant<double>& s) {
   }
 }
 
-/// Everything an effect's laws say of one state, one after the other.
+/// Values of all laws of an effect at one state, one law after the other.
 std::vector<double> all_laws(const AppliedEffect& e, const Instant<double>& s) {
   const std::size_t m = s.speed.size();
   std::vector<double> out(4 * m + s.pump_flow.size(), 0.0);
@@ -78,7 +78,7 @@ bool acts_in_motion(const Effect& effect) {
 bool uses_acceleration(const Machine& machine, std::span<const AppliedEffect> effects) {
   std::mt19937 random(1);
   Instant<double> s = make_instant(machine);
-  constexpr int kStates = 16;  // enough that laws with conditions meet both sides of them
+  constexpr int kStates = 16;  // enough for laws with conditions to meet both of their branches
   for (const AppliedEffect& e : effects) {
     if (!acts_in_motion(*e.effect)) continue;
     for (int state = 0; state < kStates; ++state) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Areas, rated flows and units that the hydraulic effects share.
+/// Areas, rated flows and units that the hydraulic effects use in common.
 #include <vector>
 
 #include "models/effects/series.h"
@@ -14,11 +14,11 @@ inline constexpr double kBarPerLpm2 =
     kBar / (kLitrePerMinute * kLitrePerMinute);  ///< [Pa s^2/m^6] in one bar/(l/min)^2
 }  // namespace units
 
-/// Chamber that takes oil while moving to `side` (+1 extends, -1 retracts). [m^2]
+/// Area of the supply chamber while moving to `side` (+1 extends, -1 retracts). [m^2]
 inline double supply_area(const Cylinder& c, int side) {
   return side > 0 ? c.area_piston() : c.area_rod();
 }
-/// Chamber that gives oil back. [m^2]
+/// Area of the return chamber. [m^2]
 inline double return_area(const Cylinder& c, int side) { return supply_area(c, -side); }
 
 /// Cylinders with a bore.
@@ -28,7 +28,7 @@ std::vector<int> whole_circuit(const Machine& machine);
 /// Pumps of one type.
 std::vector<int> pumps_of_type(const Machine& machine, PumpType type);
 
-/// Flow a section is built for, into the chamber of `side` [m^3/s]: the valve's full flow, else the pump's
+/// Rated flow of a valve section into the supply chamber of `side` [m^3/s]: the valve's full flow, else the pump's
 /// largest, else 1e-3 (60 l/min).
 double rated_flow(const Machine& machine, int cylinder, int side);
 
@@ -36,12 +36,12 @@ double rated_flow(const Machine& machine, int cylinder, int side);
 Eigen::VectorXd total_return_flow(const MachineSeries& log);
 /// Flow a pump delivers to all its cylinders. [m^3/s]
 Eigen::VectorXd pump_flow(const MachineSeries& log, int pump);
-/// The force a cylinder carries: measured, or by virtual work where none is measured. [N]
+/// The force that a cylinder carries: measured, or by virtual work where it is not measured. [N]
 const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder);
-/// The same without the pressures' own noise, where it is known. [N]
+/// CylinderSeries::steady_force where it is known, else carried_force. [N]
 const Eigen::VectorXd& steady_force(const CylinderSeries& cylinder);
 
-/// Side whose return or supply chamber `kind` speaks of: +1, -1, 0 for other kinds.
+/// Direction of the motion whose return or supply chamber `kind` is: +1, -1; 0 for other kinds.
 int return_side(EvidenceKind kind);
 int supply_side(EvidenceKind kind);
 

@@ -4,7 +4,7 @@
 
 namespace sparflow {
 
-/// All vectors sized for the machine.
+/// An instant whose vectors have the machine's sizes.
 template <class T = double>
 Instant<T> make_instant(const Machine& machine) {
   Instant<T> s;
@@ -24,8 +24,8 @@ Instant<T> make_instant(const Machine& machine) {
   return s;
 }
 
-/// From a log: `force` and `pressure` as measured (static force where no force is measured), `side` the
-/// direction asked for; the pump's pressure its demand. @param s from make_instant
+/// Fills `s` from row `row` of a log: `force` and `pressure` as measured (static force where none is measured), `side`
+/// the commanded direction, `pump_pressure` the pump's demand. @param s from make_instant
 void fill_instant(const MachineSeries& log, Eigen::Index row, Instant<double>& s);
 
 }  // namespace sparflow

@@ -9,7 +9,7 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
   Eigen::VectorXd y = x;
   for (const auto& [first, last] : log.runs) {
     for (Eigen::Index i = first + 1; i < last; ++i) {
-      if (!std::isfinite(y[i - 1])) continue;  // nothing known before: start here
+      if (!std::isfinite(y[i - 1])) continue;  // Without a value before, the run starts here.
       const double keep = std::exp(-(log.time[i] - log.time[i - 1]) / tau);
       const double target = std::isfinite(x[i]) ? x[i] : y[i - 1];
       y[i] = target + keep * (y[i - 1] - target);
@@ -47,7 +47,7 @@ Eigen::VectorXd moving_average(const MachineSeries& log, const Eigen::VectorXd& 
       int count = 1;
       const double half = 0.5 * width;
       Eigen::Index back = i - 1, ahead = i + 1;
-      // symmetric: as far as both sides reach, so that a slope is kept
+      // The window is symmetric, as far as both sides reach, so that a slope is preserved.
       while (back >= first && ahead < last && same(back, i) && same(ahead, i) &&
              log.time[i] - log.time[back] <= half && log.time[ahead] - log.time[i] <= half &&
              std::isfinite(x[back]) && std::isfinite(x[ahead])) {

@@ -72,15 +72,15 @@ UserEffectScope::~UserEffectScope() { mutable_catalogue().resize(before_); }
 
 namespace {
 
-/// The id that was probably meant, or "".
+/// The id that was probably meant, or "" if none is near.
 std::string nearest_effect(const std::string& id) {
   std::vector<std::string> ids;
   ids.reserve(effect_catalogue().size());
   for (const auto& known : effect_catalogue()) ids.push_back(known->info().id);
   const std::string near = nearest_word(id, ids);
-  constexpr std::size_t kAWord = 4;  // letters; fewer begin too many ids
+  constexpr std::size_t kAWord = 4;  // letters; shorter beginnings fit too many ids
   if (!near.empty() || id.size() < kAWord) return near;
-  for (const std::string& full : ids) {  // "coulomb" is far from coulomb_friction by letters
+  for (const std::string& full : ids) {  // "coulomb" is far from coulomb_friction by edit distance
     if (full.starts_with(id)) return full;
   }
   return {};
@@ -105,8 +105,8 @@ EffectAt parse_effect(const std::string& key, const Machine& machine) {
     names.push_back(full);
   }
   if (names.size() == 1 && colon == std::string::npos) return parse_effect(names.front(), machine);
-  throw InputError({}, key,
-                   fmt::format("on this machine '{}' can sit at: {}", id, fmt::join(names, ", ")));
+  throw InputError(
+      {}, key, fmt::format("on this machine '{}' has the places: {}", id, fmt::join(names, ", ")));
 }
 
 std::vector<EffectAt> candidates(const Machine& machine) {

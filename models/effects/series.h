@@ -1,7 +1,7 @@
 #pragma once
-/// A log as the effects see it: what was measured and what the model computes from the measured pose, sample
-/// by sample, SI. Filled by identification from a log; effects with memory (lags, delays, hysteresis) work on it
-/// directly, laws without memory are evaluated sample by sample. An empty vector: not measured. NaN: not valid.
+/// A log in the form that effects evaluate: measured signals and what the model computes from the measured pose, sample
+/// by sample, in SI. identification/ fills it from a log. Effects with memory (lags, delays, hysteresis) work on whole
+/// series, laws without memory sample by sample. An empty vector means not measured, NaN not valid.
 #include <Eigen/Dense>
 #include <utility>
 #include <vector>
@@ -16,34 +16,36 @@ struct CylinderSeries {
   Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
   Eigen::VectorXd acceleration;  ///< [m/s^2]
   Eigen::VectorXd
-      static_force;  ///< [N] by virtual work of the machine file, positive pushes the rod in
+      static_force;  ///< [N] from the machine file by virtual work, positive when the load pushes the rod in
   Eigen::MatrixXd
       static_slope;  ///< [samples x joints] d static_force / d q, [N/rad] or [N/m]; empty: not computed
-  Eigen::VectorXd force;  ///< [N] measured, through the position's filter
-  /// [N] static force and the mean, within a motion and half a second either way, of what is measured beyond it: for
-  /// laws of one pressure in which the force made from both pressures must not carry that pressure's own noise.
+  Eigen::VectorXd force;  ///< [N] measured, through the same filter as the position
+  /// [N] static force plus the mean of (measured - static force) over half a second to either side within a motion. Laws
+  /// of one pressure use it, because the force from both pressures would carry that pressure's own noise.
   Eigen::VectorXd steady_force;
   Eigen::VectorXd command;  ///< [-] -1..1, as logged
-  /// [-] what the model's valve effects without memory (a dead band) leave of the command: what a valve that is late
-  /// as well is late with. Empty: the command itself.
+  /// [-] valve opening that the model's valve effects without memory (a dead band) leave of the command; a valve lag acts
+  /// on it. Empty: the command itself.
   Eigen::VectorXd opening;
-  Eigen::VectorXd pressure_a, pressure_b;  ///< [Pa] chambers, through the position's filter
+  Eigen::VectorXd pressure_a,
+      pressure_b;  ///< [Pa] chambers, through the same filter as the position
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
-  /// Side asked for: +1 extending, -1 retracting, 0 at rest (identification/signals/signals.h).
+  /// Commanded direction: +1 extending, -1 retracting, 0 at rest (identification/signals/signals.h).
   Eigen::VectorXi direction;
-  Eigen::VectorXd flow;  ///< [m^3/s] into the chamber of that side, never negative; 0 at rest
-  Eigen::VectorXd return_flow;  ///< [m^3/s] out of the other chamber, never negative; 0 at rest
+  Eigen::VectorXd
+      flow;  ///< [m^3/s] into the supply chamber of that direction, never negative; 0 at rest
+  Eigen::VectorXd return_flow;  ///< [m^3/s] out of the return chamber, never negative; 0 at rest
 };
 
 struct PumpSeries {
   Eigen::VectorXd pressure;  ///< [Pa] measured, through the filter
-  /// [Pa] what the law without missing effects asks for: max(standby, measured working pressures + margins),
-  /// not filtered. Empty: working pressures or commands are not measured.
+  /// [Pa] demand by the law without missing effects, max(standby, measured working pressures + margins), not filtered.
+  /// Empty: working pressures or commands are not measured.
   Eigen::VectorXd demand;
-  Eigen::VectorXi leader;  ///< cylinder that sets it, -1 = standby
+  Eigen::VectorXi leader;  ///< load-sensing leader, -1 = standby
   double standby = 0.0;    ///< [Pa]
   std::vector<int> feeds;  ///< hydraulic cylinders, the columns of `asked`
-  /// [samples x feeds, Pa] measured working pressure + margin of each; NaN at rest. No rows: not load-sensing.
+  /// [samples x feeds, Pa] measured working pressure + margin of each cylinder, NaN at rest. No rows: not load-sensing.
   Eigen::MatrixXd asked;
 };
 
@@ -61,7 +63,7 @@ struct MachineSeries {
   Eigen::Index samples() const { return time.size(); }
 };
 
-/// Where evidence for an effect is looked for: one measured quantity against what comes before it.
+/// Evidence channels: one measured quantity each, compared with what the preceding stages predict for it.
 enum class EvidenceKind {
   kForce,  ///< cylinder: measured force - static force [N]
   kFlow,   ///< cylinder: rod speed dx/dt, given the command [m/s]

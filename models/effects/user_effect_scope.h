@@ -3,8 +3,8 @@
 
 namespace sparflow {
 
-/// Takes user effects that were added in its lifetime out of the catalogue again. Nothing may point at them any more.
-/// For tests, and programs that read the effects of several users in turn.
+/// Removes the user effects that were added in its lifetime from the catalogue; no pointer to them may remain in use.
+/// Tests and programs that read the effects of several users one after another need it.
 class UserEffectScope {
  public:
   UserEffectScope();

@@ -9,9 +9,9 @@
 namespace sparflow {
 namespace {
 
-/// Enough commanded samples to learn a gain from; fewer, and the machine file is the better guess.
+/// With fewer commanded samples than this the machine file gives the better gain.
 constexpr int kFewest = 20;
-constexpr double kWidest = 0.5;  ///< dead bands are searched up to here
+constexpr double kWidest = 0.5;  ///< [-] upper end of the search for a dead band
 
 double file_gain(const Machine& machine, int cylinder, int side) {
   const Valve* valve = machine.valve_of_cylinder(cylinder);
@@ -20,10 +20,10 @@ double file_gain(const Machine& machine, int cylinder, int side) {
   return (side > 0 ? valve->max_flow_extend : valve->max_flow_retract) / area;
 }
 
-/// |u| and the speed towards u's side, of one direction.
+/// |u| [-] and the rod speed in the commanded direction [m/s], for one direction.
 struct Samples {
   std::vector<double> command, speed;
-  /// Least-squares gain behind a dead band. @param cost sum of squares
+  /// Least-squares gain [m/s] beyond a dead band. @param cost sum of squares
   double gain(double dead_band, double* cost = nullptr) const {
     double uu = 0.0, uv = 0.0, vv = 0.0;
     for (std::size_t k = 0; k < command.size(); ++k) {
@@ -56,7 +56,7 @@ double best_dead_band(const Samples& s) {
     s.gain(u0, &c);
     return c;
   };
-  // a step below the widest command leaves nothing to fit
+  // A dead band near the largest command would leave nothing to fit.
   const double most =
       std::min(kWidest, 0.8 * *std::max_element(s.command.begin(), s.command.end()));
   constexpr int kSteps = 25;

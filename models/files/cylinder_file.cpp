@@ -12,7 +12,7 @@ using quantities::kLength;
 using quantities::kMass;
 using quantities::Sign;
 
-// 3 m bores do not exist; 180 is a bore in millimetres.
+// Bores of 3 m do not exist; 180 is a bore in millimetres.
 constexpr Quantity kDiameter{"diameter", "m", Sign::kPositive, 1.0, 3.0};
 constexpr Quantity kCog{"distance", "m", Sign::kNonNegative, 1.0, 200.0};
 constexpr Quantity kStroke{"stroke", "m", Sign::kPositive, 1.0, 200.0};
@@ -53,7 +53,7 @@ class LinkageReader {
   std::size_t index() const { return static_cast<std::size_t>(joint_); }
   const std::string& own_name() const { return frames_.names[index()]; }
 
-  /// A pin may sit on the two links that the joint connects: the length depends on that joint alone.
+  /// Reads a pin on one of the two links that the joint connects, so that the length depends on that joint alone.
   Pin pin(const YamlMap& map) const {
     const YamlValue frame =
         map.need("frame", fmt::format("the frame, {} or {}", parent_name(), own_name()));

@@ -1,5 +1,5 @@
 #pragma once
-/// What machine and problem files share: quantities, rotations, ranges about rest.
+/// Quantities, rotations and ranges that machine and problem files have in common.
 #include <Eigen/Core>
 
 #include "models/machine/machine.h"
@@ -9,8 +9,7 @@
 namespace sparflow::quantities {
 
 using Sign = Quantity::Sign;
-/// Machines and their surroundings are smaller than 1 km and machine parts smaller than 200 m; a larger
-/// number is in millimetres.
+/// Coordinates and lengths of machines are below 200 m; a larger number is in millimetres.
 inline constexpr Quantity kCoordinate{"coordinate", "m", Sign::kAny, 1.0, 200.0};
 inline constexpr Quantity kLength{"length", "m", Sign::kPositive, 1.0, 200.0};
 inline constexpr Quantity kMass{"mass", "kg", Sign::kNonNegative};

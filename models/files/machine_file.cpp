@@ -68,13 +68,13 @@ class MachineReader {
   }
 
  private:
-  /// Names are looked up while reading, so a second one of a kind is reported before anything else.
+  /// Names are looked up while reading, so that a second one of a kind is reported before anything else.
   template <class Part>
   static void must_be_new(const YamlValue& value, const std::string& name,
                           const std::vector<Part>& parts, const std::vector<FilePlace>& places) {
     for (std::size_t i = 0; i < parts.size(); ++i) {
       if (parts[i].name != name) continue;
-      value.fail(fmt::format("the name {} stands twice (first on line {}); give each its own", name,
+      value.fail(fmt::format("the name {} occurs twice (first on line {}); give each its own", name,
                              places[i].line));
     }
   }
@@ -119,7 +119,7 @@ class MachineReader {
     if (map.has("dh")) {
       for (const char* key : {"origin", "axis"}) {
         if (const auto both = map.find(key)) {
-          both->fail(fmt::format("stands beside dh; give either dh or origin and axis"));
+          both->fail(fmt::format("is given beside dh; give either dh or origin and axis"));
         }
       }
       own_frame = read_dh(*map.find("dh"));
@@ -199,13 +199,13 @@ class MachineReader {
       check_slide(*slides, link);
       link.fraction = map.need_number("fraction", kFraction);
     } else if (const auto fraction = map.find("fraction")) {
-      fraction->fail("stands without slides_with; name the prismatic joint it is a fraction of");
+      fraction->fail("is given without slides_with; name the prismatic joint it is a fraction of");
     }
     machine_.links.push_back(link);
     places_.links.push_back(value.place());
   }
 
-  /// The slide's direction must not turn in the link's own frame.
+  /// Checks that the direction of sliding does not rotate in the link's own frame.
   void check_slide(const YamlValue& value, const Link& link) const {
     const std::string& name = value.word();
     if (link.slides_with < 0 ||
@@ -233,7 +233,7 @@ class MachineReader {
     for (const char* key : {"joints", "links"}) {
       if (const auto both = root.find(key)) {
         both->fail(
-            fmt::format("stands beside kinematics, whose URDF brings the {}; remove one", key));
+            fmt::format("is given beside kinematics, whose URDF defines the {}; remove one", key));
       }
     }
     const YamlValue kinematics = root.need("kinematics", "");
@@ -276,7 +276,7 @@ class MachineReader {
       const YamlMap map = entry.map(expected, {"position", "velocity", "acceleration"});
       JointLimitsOverride& limit = limits[name];
       limit.place = entry.place();
-      // the joint's type is the URDF's to say, so the unit is not named here
+      // The URDF gives the joint's type, so that the unit is not known here.
       if (const auto v = map.find("position")) limit.position = v->range({"position", "rad or m"});
       if (const auto v = map.find("velocity")) {
         limit.velocity = read_range_around_zero(*v, {"velocity", "rad/s or m/s"});

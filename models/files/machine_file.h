@@ -11,9 +11,9 @@ namespace sparflow {
 /// @throws InputError with file:line:column, key path, what was found, what was expected and what to do
 Machine load_machine(const std::string& path, std::vector<std::string>* warnings = nullptr);
 
-/// The same from text, as a fitted model carries it.
-/// @param name how messages call the text  @param folder base of relative paths in it (`kinematics.urdf`)
-/// `source_text` of the result stands alone: a URDF's joints and links are written out in it.
+/// The same from text, as a fitted model contains it.
+/// @param name of the text in messages  @param folder base of relative paths in it (`kinematics.urdf`)
+/// `source_text` of the result is complete: joints and links of a URDF are written out in it.
 Machine parse_machine(const std::string& text, const std::string& name, const std::string& folder,
                       std::vector<std::string>* warnings = nullptr);
 

@@ -15,7 +15,7 @@ std::string vector(const Eigen::Vector3d& v) {
 
 std::string range(const Range& r) { return fmt::format("[{}, {}]", r.lo, r.hi); }
 
-/// Text in double quotes with what YAML would misread escaped.
+/// Text in double quotes, with escapes for characters that YAML would misread.
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
@@ -28,7 +28,7 @@ std::string quoted(const std::string& text) {
 /// Roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Vector3d rpy(const Eigen::Matrix3d& r) {
   const double pitch = std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2)));
-  if (std::hypot(r(2, 1), r(2, 2)) < 1e-12) {  // gimbal lock: roll and yaw turn about one axis
+  if (std::hypot(r(2, 1), r(2, 2)) < 1e-12) {  // gimbal lock: roll and yaw have the same axis
     return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
   }
   return {std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))};

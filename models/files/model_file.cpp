@@ -17,7 +17,7 @@ using Cursor = ModelCursor;
 
 // ---------------------------------------------------------------- writing
 
-/// Objects and lists of objects a line each, lists of plain values on one line.
+/// Writes objects and lists of objects over several lines, lists of plain values on one line.
 void write(const Json& value, int indent, std::string& out) {
   const std::string pad(static_cast<std::size_t>(indent) + 1, ' ');
   const auto block = [&](char open, char close, const auto& element) {
@@ -86,7 +86,7 @@ Json process_json(const GaussianProcess& process) {
 
 // ---------------------------------------------------------------- reading
 
-/// A file of an earlier program has none.
+/// Files of earlier programs have no such key.
 LoadsBeyond read_beyond(const Cursor& c) {
   c.keys({"side", "static_slope", "static_level", "slope_heavier", "slope_lighter", "least"});
   const auto number = [&](const char* key, const char* expected) {
@@ -135,9 +135,9 @@ GaussianProcess read_process(const Cursor& c) {
   p.flow_max = flow.hi;
   p.force_min = force.lo;
   p.force_max = force.hi;
-  const std::string count = "how many measurements the process has seen";
+  const std::string count = "the number of measurements of the Gaussian process";
   p.data_count = static_cast<int>(std::min<long>(c.at("data_count", count).whole(count), 1L << 30));
-  p.weight = c.at("weight", "a list of numbers").numbers("a list of numbers, one a centre");
+  p.weight = c.at("weight", "a list of numbers").numbers("a list of numbers, one for each centre");
   const Eigen::Index n = p.weight.size();
   if (n == 0) c.at("weight", "").fail("got no number, expected at least one centre");
   const auto centres = [&](const char* key) {
@@ -173,7 +173,7 @@ GaussianProcess read_process(const Cursor& c) {
   }
 }
 
-/// Elements that must name the machine's parts, one each in the machine's order.
+/// Elements that must name the machine's parts, one for each part in the machine's order.
 template <class Part>
 std::vector<Cursor> matched(const Cursor& root, const std::string& key,
                             const std::vector<Part>& parts) {
@@ -219,7 +219,7 @@ Json parse(const std::string& text, const std::string& file) {
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {
-    // The library counts the character it stopped at, from one.
+    // The library gives the character at which it stopped, counted from one.
     const bool ended = error.byte > text.size();
     std::string reason = error.what();
     const std::size_t cut = reason.rfind("; ");

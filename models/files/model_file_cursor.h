@@ -1,5 +1,5 @@
 #pragma once
-/// How a model file is read: a value with its key path, for messages. Used by model_file*.cpp only.
+/// Reads a model file: a JSON value with its key path, for messages. Used by model_file*.cpp only.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>

@@ -43,7 +43,7 @@ std::string place_name(const AppliedEffect& effect, const Machine& machine) {
 
 Json effect_json(const AppliedEffect& effect, const Machine& machine) {
   const EffectInfo& info = effect.effect->info();
-  SPARFLOW_CHECK(effect.values.size() == info.parameters.size(), "one value a parameter");
+  SPARFLOW_CHECK(effect.values.size() == info.parameters.size(), "one value for each parameter");
   Json parameters = Json::array();
   for (std::size_t p = 0; p < info.parameters.size(); ++p) {
     const bool known = effect.lower95.size() > p && effect.upper95.size() > p;
@@ -114,14 +114,14 @@ std::vector<Row> read_rows(const Cursor& parent, const std::string& key,
   return rows;
 }
 
-/// [lower, upper] with the lower first, NaN for null.
+/// Reads [lower, upper]; null gives NaN.
 Range read_interval(const Cursor& parent) {
   const char* expected = "[lower, upper] or null";
   const Cursor c = parent.at("ci95", expected);
   return c.is_null() ? Range{kNaN, kNaN} : c.range(expected);
 }
 
-/// The effect an element names; what this program cannot evaluate is an error, never left out silently.
+/// The effect that an element names; one that this program cannot evaluate is an error and never left out silently.
 const Effect& named_effect(const Cursor& element) {
   const Cursor name = element.at("id", "an effect's id");
   const std::string id = name.text("an effect's id");
@@ -146,7 +146,7 @@ int read_place(const Cursor& element, const Effect& effect, const Machine& machi
     names.push_back(place_name({&effect, place, {}, {}, {}}, machine));
     if (names.back() == at) return place;
   }
-  if (names.empty()) c.fail("this effect cannot sit anywhere on this machine");
+  if (names.empty()) c.fail("this effect has no place on this machine");
   c.fail_expected("one of: " + (names.front().empty() ? "\"\"" : listed(names)));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The part of a model file that says where a model comes from: its data, how well it did, the physical effects
-/// added to it and the steps that brought them in. Used by model_file.cpp only.
+/// The provenance part of a model file: logs, quality, physical effects and the steps that added them. Used by
+/// model_file.cpp only.
 #include "models/chain/crane_model.h"
 #include "models/files/model_file_cursor.h"
 
@@ -11,7 +11,7 @@ void write_provenance(const CraneModel& model, ModelJson& root);
 
 /// Reads what write_provenance wrote. User effects that this program does not have yet are registered.
 /// @param model has its machine already
-/// @throws InputError as model_from_json; also for an effect this program does not know
+/// @throws InputError as model_from_json, and for an effect that this program does not have
 void read_provenance(const ModelCursor& root, CraneModel& model);
 
 }  // namespace sparflow

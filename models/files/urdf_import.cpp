@@ -13,7 +13,7 @@
 namespace sparflow {
 namespace {
 
-/// liburdfdom reports to a process-wide logger; this catches what it says while one file is parsed.
+/// liburdfdom reports to a logger of the whole process; this object collects its messages while one file is parsed.
 class CaughtMessages : public console_bridge::OutputHandler {
  public:
   CaughtMessages() : lock_(mutex()), before_(console_bridge::getOutputHandler()) {

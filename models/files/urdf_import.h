@@ -10,7 +10,7 @@
 
 namespace sparflow {
 
-/// What the machine file says about a URDF joint; takes the place of the URDF's own limit.
+/// Limits that the machine file gives for a URDF joint; they replace the URDF's own.
 struct JointLimitsOverride {
   FilePlace place;
   std::optional<Range> position;      ///< [rad] or [m]
@@ -28,8 +28,8 @@ struct UrdfChain {
 };
 
 /// The serial chain from the root to `tip_link` (empty: to the only leaf). Fixed joints are folded into
-/// the link that carries them, with their masses; a moving joint beside the chain is frozen at its zero
-/// and a warning says so. A link on a prismatic joint behind a revolute one becomes a mass that slides
+/// the link that carries them, with their masses; a moving joint outside the chain is held at zero,
+/// with a warning. A link on a prismatic joint behind a revolute one becomes a mass that slides
 /// (`slides_with`, fraction 1), so that its inertia keeps a revolute axis to refer to.
 /// @param place where the machine file names the URDF, for messages about the whole
 /// @throws InputError for unreadable files, unsupported joints and missing limits

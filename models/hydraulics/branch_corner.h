@@ -1,17 +1,17 @@
 #pragma once
-/// The corner of a supply pressure where one branch takes over from the other.
+/// Corner of a supply pressure between its two branches.
 ///
-/// The supply holds whichever asks for more, a counterbalance valve V or the static branch S = (load + A_return
-/// p_return)/A_supply (models/hydraulics/return_rise.h): p = max(V, S) = V + max(0, S - V). A process with a smooth kernel rounds such a
-/// corner off by bars and swings beside it, and between loads that its samples hold on either side of the corner it takes the
-/// straight line. So the second term, whose slope the balance of forces gives, is part of the mean, and the process learns
-/// the rest.
+/// The supply pressure is the larger of what a counterbalance valve requires, V, and the static branch
+/// S = (load + A_return p_return)/A_supply (models/hydraulics/return_rise.h): p = max(V, S) = V + max(0, S - V). A Gaussian
+/// process with a smooth kernel rounds such a corner by several bar and oscillates beside it, and where samples lie only
+/// away from the corner it interpolates linearly across it. Therefore the second term, whose slope follows from the
+/// balance of forces, is part of the mean, and the process learns the remainder.
 #include <cmath>
 
 namespace sparflow {
 
-/// S - V = level + per_flow Q + per_force F. Straight in the flow: its bend is the process' to learn where samples show it, and a
-/// square would run away beyond them.
+/// S - V = level + per_flow Q + per_force F. It is linear in the flow, because a square would diverge beyond the samples;
+/// the process learns a curvature that samples show.
 struct BranchCorner {
   double level = 0.0;      ///< [Pa]
   double per_flow = 0.0;   ///< [Pa/(m^3/s)]
@@ -20,11 +20,11 @@ struct BranchCorner {
   bool there() const { return per_force != 0.0; }
 };
 
-/// What max(0, S - V) is rounded over, as in models/hydraulics/loads_beyond.h. [Pa]
+/// Pressure over which max(0, S - V) is rounded, as in models/hydraulics/loads_beyond.h. [Pa]
 inline constexpr double kCornerRounded = 2e5;
 
-/// What the supply gains when the static branch gains `rise` [Pa], of either sign: nothing where the valve rules, all of it where
-/// the load does, and across the corner what is beyond it.
+/// Increase of the supply pressure [Pa] when the static branch increases by `rise` [Pa], of either sign: zero on the
+/// valve's branch, all of it on the static branch, and across the corner the part beyond it.
 template <class T>
 T rise_across(const BranchCorner& c, const T& flow, const T& force, const T& rise) {
   using std::sqrt;
@@ -57,7 +57,7 @@ inline CornerRise corner_rise(const BranchCorner& c, double flow, double force) 
           second * c.per_force * c.per_force};
 }
 
-/// [N] over which the corner bends.
+/// Range of force over which the corner is curved. [N]
 inline double corner_width(const BranchCorner& c) { return 10e5 / std::abs(c.per_force); }
 
 }  // namespace sparflow

@@ -64,7 +64,7 @@ ArrayXd padded(const ArrayXd& values, double scale) {
   return out;
 }
 
-/// One scratch array a thread: sharing a process between threads stays safe.
+/// One scratch array for each thread, so that threads can share a process.
 double* scratch(std::size_t size) {
   thread_local std::vector<double> buffer;
   if (buffer.size() < size) buffer.resize(size);
@@ -152,7 +152,7 @@ double GaussianProcess::variance(double flow, double force) const {
   basis[n] = 1.0;
   basis[n + 1] = force;
   product.noalias() = parameters_.variance_core * basis;
-  // Rounding may leave a tiny negative number where the data pin the pressure down.
+  // Rounding can leave a tiny negative number where the data determine the pressure precisely.
   return std::max(0.0, prior - basis.dot(product));
 }
 

@@ -2,10 +2,10 @@
 /// Working pressure of one cylinder in one direction as a Gaussian process of (flow, static force):
 ///   p(Q, F) = m0 + m1 F + max(0, S - V) + sum_j w_j s^2 exp(-1/2 [((Q-Q_j)/l_Q)^2 + ((F-F_j)/l_F)^2])
 /// Source: Rasmussen & Williams (2006), ch. 2.2, 2.7; sparse form: Titsias (2009), eqs. 6 and 9.
-/// The mean is linear in F because a zero-mean SE process falls back to a *low* pressure outside its
-/// data, which an optimiser would exploit. max(0, S - V), where the samples show it, is the corner between the
-/// two branches of a supply (models/hydraulics/branch_corner.h). Beyond the loads it was learned from physics takes over
-/// where it is known (models/hydraulics/loads_beyond.h).
+/// The mean is linear in F because a process with zero mean returns to a *low* pressure outside its data, which an
+/// optimiser would exploit. max(0, S - V), where the samples show it, is the corner between the two branches of a supply
+/// pressure (models/hydraulics/branch_corner.h). Beyond the learned loads the balance of forces continues the law where
+/// it is known (models/hydraulics/loads_beyond.h).
 #include <Eigen/Dense>
 
 #include "models/hydraulics/branch_corner.h"
@@ -21,7 +21,7 @@ struct GpDerivatives {
   double d_flow_flow = 0.0, d_flow_force = 0.0, d_force_force = 0.0;
 };
 
-/// Everything the process is, as stored in the model file. SI units.
+/// All parameters of the process, as stored in the model file. SI units.
 struct GpParameters {
   double length_flow = 1.0;    ///< [m^3/s]
   double length_force = 1.0;   ///< [N]
@@ -33,19 +33,19 @@ struct GpParameters {
   Eigen::ArrayXd force;        ///< [N] centres
   Eigen::ArrayXd weight;       ///< [1/Pa] so that signal_std^2 * weight is a pressure
   /// Latent variance is signal_std^2 - b^T C b with b = [k; 1; F], k the kernel vector at the n centres
-  /// [Pa^2] and C this symmetric matrix, (n+2) x (n+2). The last two rows and columns carry what the
-  /// data leave open about the mean's two coefficients, so the variance grows with F far outside
-  /// (Rasmussen & Williams 2006, eq. 2.42). Empty: the variance is not known and signal_std^2 is given.
+  /// [Pa^2] and C this symmetric matrix, (n+2) x (n+2). The last two rows and columns are the
+  /// uncertainty of the mean's two coefficients, so that the variance grows with F far outside the data
+  /// (Rasmussen & Williams 2006, eq. 2.42). Empty: the variance is not known, and signal_std^2 is returned.
   Eigen::MatrixXd variance_core;
-  /// Where the data lies; outside it the mean extrapolates and the variance says so. [lo, hi]
+  /// Range of the data [m^3/s], [N]; outside it the mean extrapolates and the variance grows.
   double flow_min = 0.0, flow_max = 0.0, force_min = 0.0, force_max = 0.0;
-  int data_count = 0;   ///< measurements the process has seen
+  int data_count = 0;   ///< number of measurements it was learned from
   BranchCorner corner;  ///< part of the mean
   LoadsBeyond beyond;   ///< outside force_min .. force_max
 };
 
-/// Immutable and safe to share between threads. Evaluation allocates nothing, except that the variance
-/// keeps one scratch array a thread, which grows to the largest process that thread has evaluated.
+/// Objects are immutable and can be shared between threads. Evaluation allocates nothing, except that the variance keeps
+/// one scratch array for each thread, which grows to the largest process that the thread has evaluated.
 class GaussianProcess {
  public:
   GaussianProcess() = default;
@@ -63,7 +63,7 @@ class GaussianProcess {
 
   const GpParameters& parameters() const { return parameters_; }
   bool empty() const { return parameters_.weight.size() == 0; }
-  /// [N] over which the mean may bend: the length-scale, the corner's, or what it does beyond the learned loads.
+  /// Smallest range of force over which the mean is curved: by the kernel, at the corner or beyond the learned loads. [N]
   double force_scale() const;
 
  private:

@@ -14,7 +14,7 @@ namespace sparflow {
 enum class KernelIsa { kBaseline, kAvx2, kAvx512 };
 
 /// Arrays must hold a multiple of kKernelPadding values: pad x and y with any finite number and
-/// `weight` with zero. No alignment is asked for. The arrays are not owned.
+/// `weight` with zero. No alignment is required. The arrays are not owned.
 inline constexpr std::size_t kKernelPadding = 8;
 struct KernelCentres {
   const double* x = nullptr;
@@ -44,7 +44,7 @@ void kernel_vector(const KernelCentres& centres, double x, double y, double* out
 KernelIsa kernel_isa();
 bool kernel_isa_available(KernelIsa isa);
 const char* kernel_isa_name(KernelIsa isa);
-/// For tests and benchmarks. @return false, and nothing changes, when the machine lacks it
+/// Chooses the instruction set, for tests and benchmarks. @return false, without a change, when the machine lacks it
 bool set_kernel_isa(KernelIsa isa);
 
 }  // namespace sparflow

@@ -1,4 +1,4 @@
-// Compiled for its own instruction set (see CMakeLists.txt); called only after the CPU was asked.
+// This file is compiled for its own instruction set (see CMakeLists.txt) and called only where the CPU has that set.
 #include "models/hydraulics/gp_kernel_body.h"
 
 #ifdef __x86_64__

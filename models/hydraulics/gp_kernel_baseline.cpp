@@ -1,4 +1,4 @@
-// Two lanes: SSE2 on x86-64, NEON on ARM; flags of the rest of the program.
+// Two lanes (SSE2 on x86-64, NEON on ARM), compiled with the flags of the rest of the program.
 #include "models/hydraulics/gp_kernel_body.h"
 
 namespace sparflow {

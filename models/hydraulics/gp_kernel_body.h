@@ -24,7 +24,7 @@ struct KernelLoops {
   static inline double lane_sum(const Vec& v) {
     double lane[kWidth];
     __builtin_memcpy(lane, &v, sizeof(Vec));
-    if constexpr (kWidth == 8) {  // written out: as a loop it costs as much as 50 centres
+    if constexpr (kWidth == 8) {  // Unrolled, because a loop takes as long as 50 centres.
       return ((lane[0] + lane[4]) + (lane[2] + lane[6])) +
              ((lane[1] + lane[5]) + (lane[3] + lane[7]));
     } else if constexpr (kWidth == 4) {

@@ -1,5 +1,5 @@
 #pragma once
-/// What one instruction set offers (models/hydraulics/gp_kernel.cpp picks one of these tables).
+/// Kernel functions of one instruction set; models/hydraulics/gp_kernel.cpp chooses one of these tables.
 #include "models/hydraulics/gp_kernel.h"
 
 namespace sparflow {

@@ -1,38 +1,40 @@
 #pragma once
-/// What a learned pressure says of loads heavier or lighter than all it was learned from.
+/// Continuation of a pressure model to loads heavier or lighter than all loads from which it was learned.
 ///
-/// The supply holds whichever asks for more, the static branch S = (load + A_return p_return)/A_supply, what a
-/// counterbalance valve asks for, or the tank, from which an anti-cavitation valve lets oil in (models/hydraulics/return_rise.h). Samples
-/// of one branch say nothing of the other, and a straight line through both belongs to neither. But the static branch is the
-/// balance of forces: a load that is heavier by e adds e/A_supply to it, and no supply can be lower than it. So with a process
-/// g of loads up to its border, where the branch that rules there rises by the share s of the static one,
+/// The supply pressure is the largest of the static branch S = (load + A_return p_return)/A_supply, the pressure that a
+/// counterbalance valve requires, and that of the tank, from which an anti-cavitation valve admits oil
+/// (models/hydraulics/return_rise.h). Samples of one branch contain nothing about another, and a straight line through two
+/// belongs to neither. The static branch, however, follows from the balance of forces: a load heavier by e adds
+/// e/A_supply to it, and no supply pressure is below it. With a process g of the learned loads, at whose border the active
+/// branch rises by the share s of the static one, the law is
 ///   heavier by e:  p = g(border) + max(s e/A_supply, e/A_supply - gap),  gap = g(border) - S(border)
 ///   lighter by e:  p = max(g(border) - s e/A_supply, least)
-/// Corners are rounded, values and both derivatives continuous; inside the learned loads nothing changes.
+/// Corners are rounded, values and both derivatives are continuous, and inside the learned loads nothing changes.
 #include <cmath>
 
 #include "models/math/jet.h"
 
 namespace sparflow {
 
-/// Of one cylinder moving to one side.
+/// Parameters of the continuation for one cylinder and direction.
 struct LoadsBeyond {
-  int side = 0;               ///< +1 extends, -1 retracts: side * force opposes it. 0 = not known
+  int side = 0;  ///< +1 extends, -1 retracts: side * force resists the motion; 0 = not known
   double static_slope = 0.0;  ///< [Pa/N] 1/A_supply
   double static_level = 0.0;  ///< [Pa] static branch without load: A_return p_return/A_supply
   double slope_heavier = 0.0, slope_lighter = 0.0;  ///< [Pa/N] of the branch at either border
-  double least = 0.0;                               ///< [Pa] lightest loads: the tank's pressure
+  double least = 0.0;  ///< [Pa] lower limit at light loads: the tank's pressure
 };
 
 namespace loads_beyond {
 
-/// What leaves the learned loads is bent over this many static pressures, corners are rounded over the other. [Pa]
-inline constexpr double kBend = 10e5, kRounded = 2e5;
+/// Static pressure over which the law passes from the learned loads to the continuation, and over which corners are
+/// rounded. [Pa]
+inline constexpr double kCornerWidth = 10e5, kRounded = 2e5;
 
-/// [N] over which the law bends.
-inline double bend(const LoadsBeyond& b) { return kBend / b.static_slope; }
+/// Range of force over which the law passes to the continuation. [N]
+inline double bend(const LoadsBeyond& b) { return kCornerWidth / b.static_slope; }
 
-/// x beyond zero, 0 before it: a parabola's integral over `bend` [N], then a straight line.
+/// max(0, x) with a smooth start: its slope rises from 0 to 1 over `bend` [N], with a parabola as second derivative.
 template <class T>
 T excess(const T& x, double bend) {
   if (x <= T(0.0)) return T(0.0);
@@ -53,7 +55,7 @@ T above(const T& x, const T& gap) {
 
 }  // namespace loads_beyond
 
-/// @param process callable: pressure [Pa] at a force [N], any derivative in flow inside
+/// @param process callable, pressure [Pa] at a force [N]; its flow is fixed inside
 /// @param force [N]  @param lowest, highest learned forces [N]
 template <class T, class Process>
 T pressure_beyond(const LoadsBeyond& b, const T& force, double lowest, double highest,

@@ -1,16 +1,17 @@
 #pragma once
-/// What a higher pressure in the return chamber does to the supply, by the cylinder's own learned pressure.
+/// Effect of a higher pressure in the return chamber on the supply pressure, from the cylinder's own pressure model.
 ///
-/// The supply holds whichever asks for more, the static branch S = (load + A_return p_return)/A_supply or what a
-/// counterbalance or anti-cavitation valve asks for. A return chamber higher by r acts on the static branch like a load
-/// larger by A_return r, and on the valves not at all. The law H(Q, F) learned without it knows which of them rules: the
-/// supply takes all of a larger load where the static branch does, and the share A_supply/A_return/(R + A_supply/A_return),
-/// R the valve's pilot ratio, where a counterbalance valve does: at most 0.6 for R >= 1. So
+/// The supply pressure is the larger of the static branch S = (load + A_return p_return)/A_supply and what a
+/// counterbalance or anti-cavitation valve requires. A return pressure higher by r acts on the static branch like a load
+/// larger by A_return r, and on the valves not at all. The pressure model H(Q, F), learned without the rise, shows which
+/// branch is active: the supply takes up all of a larger load on the static branch, and the share
+/// A_supply/A_return/(R + A_supply/A_return), R the valve's pilot ratio, where a counterbalance valve is active, which is
+/// at most 0.6 for R >= 1. Therefore
 ///   p = H(F) + w(s) r A_return/A_supply,  s = A_supply (H(F + A_return r) - H(F)) / (A_return r),
-/// A law that knows the corner between both branches (models/hydraulics/branch_corner.h) says so itself: S is higher by r A_return/A_supply.
-/// Elsewhere w = 0 up to s = 0.6, 1 from 0.9, a straight line between. A valve that is set high, or none, needs no parameter.
-/// A large rise carries the static branch over the valve's: beyond the gap between both, H - S with a usual return line's
-/// pressure in S, it appears in the supply although the valve ruled without it.
+/// with w = 0 up to s = 0.6, w = 1 from s = 0.9 and linear between. A valve that is set high, or absent, needs no parameter.
+/// A pressure model that contains the corner between both branches (models/hydraulics/branch_corner.h) needs no w: its S
+/// is higher by r A_return/A_supply. A large rise lifts the static branch above the valve's; what exceeds the gap H - S
+/// (with the usual pressure of a return line in S) then appears in the supply although the valve was active without it.
 #include <cmath>
 
 #include "models/hydraulics/gaussian_process.h"
@@ -19,7 +20,7 @@
 
 namespace sparflow {
 
-/// Process' mean with the derivatives of its arguments. [Pa]
+/// Mean of a process, with derivatives where its arguments have them. [Pa]
 inline double process_mean(const GaussianProcess& process, double flow, double force) {
   return process.mean(flow, force);
 }
@@ -34,15 +35,17 @@ inline Jet process_mean(const GaussianProcess& process, const Jet& flow, const J
 
 namespace return_rise {
 
-/// Share of the load that tells the branches apart where a rise is small, and the least that a law must have seen. [Pa]
+/// Loads by A_supply: the least change of load over which the slope is evaluated, and the least range of loads that a
+/// pressure model must have learned for it. [Pa]
 inline constexpr double kLeastLoad = 5e5, kLeastSeen = 3e5;
-/// A law that has seen one load alone shows no slope: its supply stands this far above the load, or a valve holds it. [Pa]
+/// A pressure model of a single load has no slope; a supply pressure this far above the static branch is then taken for
+/// that of a valve, with a transition of the second width. [Pa]
 inline constexpr double kValveFrom = 15e5, kValveSpread = 2e5;
-/// Usual pressure of a return line by itself. [Pa]
+/// Usual pressure of a return line. [Pa]
 inline constexpr double kReturnLine = 6e5;
 
-/// Share of a larger load that the supply takes: at most, where a valve rules; at least, where the load does (a force that
-/// is wrong by a tenth tilts it as much).
+/// Share of a larger load that the supply takes up: at most the first where a valve is active, at least the second on the
+/// static branch (a force that is wrong by a tenth changes the share as much).
 inline constexpr double kSteepestValve = 0.6, kFlattestLoad = 0.9;
 
 /// max(0, x) with its corner rounded over about `rounded`.
@@ -52,14 +55,14 @@ T positive(const T& x, double rounded = 0.02) {
   return 0.5 * (x + sqrt(x * x + T(rounded * rounded)));
 }
 
-/// w above. @param above own pressure less what the load asks for [Pa]
+/// The weight w above, 0..1. @param above supply pressure minus that which balances the load alone [Pa]
 template <class T>
 T static_share(const GaussianProcess& process, int side, double supply, double other,
                const T& above, const T& flow, const T& force, const T& rise) {
   using std::exp;
   using std::sqrt;
   const GpParameters& p = process.parameters();
-  const double seen = p.force_max - p.force_min;  // nothing: not known
+  const double seen = p.force_max - p.force_min;  // 0: not known
   if (seen > 0.0 && seen < kLeastSeen * supply)
     return 1.0 / (1.0 + exp((above - T(kValveFrom)) / kValveSpread));
   const double least = kLeastLoad * supply;
@@ -78,8 +81,8 @@ T static_share(const GaussianProcess& process, int side, double supply, double o
 
 }  // namespace return_rise
 
-/// What the supply pressure gains. Corners are rounded, alike in values and derivatives. Beyond the loads that a law was
-/// learned from, the branch is that of the last ones it has seen. [Pa]
+/// Increase of the supply pressure. Corners are rounded, consistently in values and derivatives. Beyond the learned loads
+/// the branch is that at their border. [Pa]
 /// @param process of this side, not empty  @param own its mean at (flow, force) [Pa]
 /// @param force total force [N]  @param rise of the return chamber, of either sign [Pa]
 template <class T>
@@ -93,7 +96,7 @@ T supply_rise(const GaussianProcess& process, const Cylinder& cylinder, int side
   const T above = own - (side / supply) * force;
   const T share = return_rise::static_share(process, side, supply, other, above, flow, force, rise);
   if (rise <= T(0.0)) return share * whole;
-  // from the valve's branch over the gap; nothing at no rise
+  // On the valve's branch the part beyond the gap counts; it is zero without a rise.
   constexpr double kRounded = 2e4;  // [Pa]
   const T gap =
       return_rise::positive<T>(above - T(other / supply * return_rise::kReturnLine), kRounded);

@@ -10,7 +10,7 @@ namespace {
 template <class T>
 using Vector = Eigen::Matrix<T, Eigen::Dynamic, 1>;
 
-/// A function of one joint coordinate, known by its derivatives, as a function of whatever T is.
+/// Value (and derivatives, where T has them) of a function of one joint coordinate with derivatives f0, f1, f2.
 double lifted(double, double f0, double, double) { return f0; }
 Jet lifted(const Jet& q, double f0, double f1, double f2) { return q.chain(f0, f1, f2); }
 
@@ -21,13 +21,13 @@ struct Motion {
   Vector3<T> acceleration = Vector3<T>::Zero();  // [rad/s^2]
   Vector3<T> origin = Vector3<T>::Zero();        // acceleration of the frame's origin [m/s^2]
 
-  /// Acceleration that turning gives a vector fixed in the frame.
+  /// Acceleration by rotation of a point at r, fixed in the frame. [m/s^2]
   Vector3<T> turning(const Vector3<T>& r) const {
     return acceleration.cross(r) + rate.cross(rate.cross(r).eval());
   }
 };
 
-/// Force and moment about the base's origin that a link's masses need.
+/// Force [N] and moment [N m] about the base's origin that accelerate a link's masses.
 template <class T>
 struct Wrench {
   Vector3<T> force = Vector3<T>::Zero();
@@ -72,12 +72,12 @@ class NewtonEuler {
     Wrench<T>& wrench = wrenches_[static_cast<std::size_t>(link.joint)];
     wrench.add(a * T(link.mass), p);
     if (link.inertia == 0.0) return;
-    for (int k = link.joint; k >= 0; --k) {  // the last joint that turns
+    for (int k = link.joint; k >= 0; --k) {  // down to the last revolute joint
       const auto i = static_cast<std::size_t>(k);
       if (machine_.joints[i].type != JointType::kRevolute) continue;
       const Vector3<T>& z = axes_[i];
       const Motion<T>& motion = motions_[static_cast<std::size_t>(link.joint)];
-      // Euler's equation of the tensor inertia z z^T
+      // Euler's equation for the inertia tensor inertia * z z^T
       wrench.moment += z * (T(link.inertia) * z.dot(motion.acceleration)) +
                        motion.rate.cross(z).eval() * (T(link.inertia) * z.dot(motion.rate));
       break;
@@ -112,7 +112,7 @@ class NewtonEuler {
     }
   }
 
-  /// Inward recursion: what a link and everything beyond it needs passes through its joint.
+  /// Inward recursion: a joint transmits the wrench of its link and of everything beyond it.
   Vector<T> torque() {
     Wrench<T> carried;
     for (Eigen::Index k = q_.size() - 1; k >= 0; --k) {
@@ -154,7 +154,7 @@ class NewtonEuler {
     }
   }
 
-  /// Coriolis and own acceleration of what moves with `share` of sliding joint k.
+  /// Coriolis and relative acceleration of a mass that moves by `share` of prismatic joint k.
   Vector3<T> along(std::size_t k, const T& share) const {
     const auto c = static_cast<Eigen::Index>(k);
     return motions_[k].rate.cross(axes_[k]).eval() * (T(2.0) * share * qd_[c]) +

@@ -8,8 +8,8 @@
 namespace sparflow {
 
 /// @param q, qd, qdd by joint  @param payload [kg], a point mass at the tip
-/// A link's inertia turns about its joint's axis; on a sliding joint about the axis of the last joint before that
-/// turns. Rods, barrels, rockers and couplers are point masses at their centres.
+/// A link's inertia acts about its joint's axis; for a prismatic joint about the axis of the last revolute joint before
+/// it. Rods, barrels, rockers and couplers are point masses at their centres.
 /// @return [N m] or [N] by joint, positive where the actuator must push towards +q
 /// @throws std::domain_error when a four-bar cannot close at q
 template <class T>

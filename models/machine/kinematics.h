@@ -14,7 +14,7 @@ struct Frame {
   Vector3<T> position;
 };
 
-/// Frames of all links, base to tip, templated on the scalar: the plain and the dual path.
+/// Frames of all links, base to tip; the scalar is a plain or a dual number.
 /// @param q joint coordinates in the machine's order, [rad] or [m]
 template <class T>
 std::vector<Frame<T>> forward_kinematics(const Machine& machine,
@@ -66,8 +66,8 @@ Vector3<T> tip_position(const Machine& machine, const Eigen::Matrix<T, Eigen::Dy
   return point_in_base(forward_kinematics(machine, q), machine.tip.joint, machine.tip.xyz);
 }
 
-/// Joint axes and origins in the base frame at one configuration: all that geometric derivatives need.
-/// Reused between calls without allocation.
+/// Joint axes and origins in the base frame at one configuration, from which all geometric derivatives follow. Calls of
+/// update() reuse the memory.
 struct ChainGeometry {
   std::vector<Eigen::Matrix3d> rotation;  ///< link frames
   std::vector<Eigen::Vector3d>
@@ -84,7 +84,7 @@ struct ChainGeometry {
 Eigen::Vector3d point_jacobian(const ChainGeometry& chain, int joint, const Eigen::Vector3d& p,
                                int k);
 
-/// d^2 p / d q_i d q_k with i <= k, from the Jacobian column k: turning joint i turns that column.
+/// d^2 p / d q_i d q_k with i <= k, from the Jacobian column k, which joint i rotates.
 Eigen::Vector3d point_hessian(const ChainGeometry& chain, int i, const Eigen::Vector3d& column_k);
 
 /// 3 x n Jacobian of a point fixed to a link.

@@ -6,7 +6,7 @@ namespace sparflow {
 
 namespace {
 
-/// k + c cos q + s sin q: what squares and products of a turning pin's place come to.
+/// k + c cos q + s sin q, the form of squared distances and scalar products of a rotating pin's position.
 struct Turning {
   double k, c, s;
   Taylor3 at(double cosine, double sine) const {
@@ -27,7 +27,7 @@ struct TurningPin {
     across = rotation * (point - along);
     turned = rotation * joint.axis.cross(point);
   }
-  /// Squared distance from a fixed point; across and turned are as long as each other and at right angles.
+  /// Squared distance from a fixed point; `across` and `turned` have equal length and are perpendicular.
   Turning distance2(const Eigen::Vector3d& from) const {
     const Eigen::Vector3d d = centre - from;
     return {d.squaredNorm() + across.squaredNorm(), 2.0 * d.dot(across), 2.0 * d.dot(turned)};
@@ -39,13 +39,13 @@ Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosi
   using std::sqrt;
   const Eigen::Vector3d axis = joint.origin.linear() * joint.axis;
   TurningPin coupler(joint, f.coupler);
-  // w: from rocker to coupler pin, across the axis
+  // w is the vector from rocker to coupler pin, normal to the axis.
   Eigen::Vector3d& centre = coupler.centre;
   centre -= f.rocker;
   centre -= axis * axis.dot(centre);
   const Taylor3 w2 = coupler.distance2(Eigen::Vector3d::Zero()).at(cosine, sine);
   const double r = f.rocker_length, k = f.coupler_length;
-  // rod pin = rocker + along w + beside (axis x w), at the rocker's length from it
+  // The rod pin is rocker + along w + beside (axis x w), at the rocker's length from the rocker pin.
   const Taylor3 inverse = Taylor3(1.0) / w2;
   const Taylor3 along = Taylor3(0.5) + Taylor3(0.5 * (r * r - k * k)) * inverse;
   const Taylor3 beside2 = Taylor3(r * r) * inverse - along * along;
@@ -64,8 +64,8 @@ Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosi
 
 }  // namespace
 
-/// For turning joints in closed form: the template's many numbers with three derivatives each took a fifth of an
-/// optimised reach. tests/models/machine/linkage_test.cpp compares the two.
+/// Revolute joints have a closed form, because the template with three derivatives of every number took a fifth of the
+/// time of an optimisation. tests/models/machine/linkage_test.cpp compares the two.
 Taylor3 linkage_rates(const Machine& machine, int cylinder, double q) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   const Joint& joint = machine.joints[static_cast<std::size_t>(c.joint)];
@@ -90,7 +90,7 @@ double joint_at_stroke(const Machine& machine, int cylinder, double stroke, doub
   if (std::holds_alternative<DirectLinkage>(c.linkage)) return length;
   if (const auto* rack = std::get_if<RackLinkage>(&c.linkage)) return length / rack->radius;
 
-  // Widen the range by the slack, but not past where the linkage opens or turns round.
+  // The range is widened by the slack, but not beyond where the linkage opens or passes a dead centre.
   double lo = joint.position.lo, hi = joint.position.hi;
   const double sign = linkage_rates(machine, cylinder, 0.5 * (lo + hi)).d1 > 0.0 ? 1.0 : -1.0;
   const auto good = [&](double q) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Cylinder length as a function of the joint it drives, for every linkage type (paper eqs. 2-4).
-/// Everything here lives in the *parent link's* frame of the driven joint and depends on that one joint
-/// coordinate only, so one-variable Taylor numbers give all derivatives.
+/// All quantities are in the *parent link's* frame of the driven joint and depend on that one joint coordinate only, so
+/// that Taylor numbers of one variable give all derivatives.
 #include <stdexcept>
 #include <vector>
 
@@ -19,7 +19,7 @@ Vector3<T> child_point_in_parent(const Joint& joint, const Eigen::Vector3d& poin
   if (joint.type == JointType::kPrismatic) {
     for (int i = 0; i < 3; ++i) local[i] = T(point[i]) + T(joint.axis[i]) * q;
   } else {
-    // Rodrigues: part along the axis stays, the rest turns
+    // Rodrigues: the part along the axis is constant, the rest rotates.
     const Eigen::Vector3d along = joint.axis * joint.axis.dot(point);
     const Eigen::Vector3d across = point - along;
     const Eigen::Vector3d turned = joint.axis.cross(point);
@@ -75,7 +75,7 @@ LinkagePins<T> linkage_pins(const Machine& machine, int cylinder, const T& q) {
     for (int i = 0; i < 3; ++i) e[i] = between[i] / distance;
     n = axis.cross(e);
     for (int i = 0; i < 3; ++i) pins.rod[i] = pins.rocker[i] + a * e[i] + h * n[i];
-  } else {  // rack and direct: the coordinate itself, drawn along the joint's axis
+  } else {  // For rack and direct the pins only serve drawings, along the joint's axis.
     pins.barrel = joint.origin.translation().cast<T>();
     pins.rod = child_point_in_parent(joint, Eigen::Vector3d::Zero(), q);
   }

@@ -1,6 +1,6 @@
 #pragma once
 /// The machine: joints, masses, cylinders with their linkages, pumps and valves. SI throughout.
-/// Plain data; read from YAML by models/files/machine_file.h, used by everything else.
+/// Plain data that models/files/machine_file.h reads from YAML.
 #include <Eigen/Geometry>
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@ struct Range {
 
 enum class JointType { kRevolute, kPrismatic };
 
-/// Joint i of a serial chain; its parent is joint i-1 (the base for i = 0). The link frame sits at the
+/// Joint i of a serial chain; its parent is joint i-1 (the base for i = 0). The link frame is at the
 /// joint as in URDF: child point = origin * Rot(axis, q) * p, or origin * (p + axis q) if prismatic.
 struct Joint {
   std::string name;
@@ -73,7 +73,7 @@ struct DirectLinkage {};
 using Linkage = std::variant<PinsLinkage, FourBarLinkage, RackLinkage, DirectLinkage>;
 
 /// A hydraulic cylinder, or (bore = 0) a drive of which only the force is known.
-/// A = piston side, B = rod side; x grows as the cylinder extends.
+/// A = bore side, B = rod side; x grows as the cylinder extends.
 struct Cylinder {
   std::string name;
   int joint = 0;      ///< the joint it drives
@@ -102,7 +102,7 @@ struct Pump {
   std::vector<int> feeds;     ///< cylinder indices
   double max_flow = 0.0;      ///< [m^3/s]
   double max_pressure = 0.0;  ///< [Pa]
-  double standby = 0.0;       ///< [Pa] from the data sheet; fitting learns the real one
+  double standby = 0.0;       ///< [Pa] from the data sheet; identification learns the real one
 };
 
 /// Flow of a spool section at full command.
@@ -116,8 +116,7 @@ struct Tip {
   int joint = -1;  ///< -1 = base
   Eigen::Vector3d xyz =
       Eigen::Vector3d::Zero();  ///< [m] in the frame of `joint`; the payload hangs here
-  double payload_scale =
-      1.0;  ///< true payload per payload told: a crane's scale has an error of its own
+  double payload_scale = 1.0;   ///< [-] true payload / given payload; crane scales have an error
 };
 
 struct Machine {
@@ -127,9 +126,9 @@ struct Machine {
   std::vector<Link> links;
   std::vector<Cylinder> cylinders;
   std::vector<Pump> pumps;
-  std::vector<Valve> valves;  ///< one a cylinder at most
+  std::vector<Valve> valves;  ///< at most one for each cylinder
   Tip tip;
-  std::string source_text;  ///< the file as read, so that a fitted model can carry its machine
+  std::string source_text;  ///< the file as read, so that a fitted model can contain its machine
 
   int joint_count() const { return static_cast<int>(joints.size()); }
   int cylinder_count() const { return static_cast<int>(cylinders.size()); }
@@ -141,7 +140,7 @@ struct Machine {
   int pump_of_cylinder(int cylinder) const;            ///< -1 when none feeds it
   const Valve* valve_of_cylinder(int cylinder) const;  ///< nullptr when there is none
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // Defaulted in the source file, so that they are compiled once and not in every file that copies a machine.
   Machine();
   Machine(const Machine&);
   Machine(Machine&&) noexcept;

@@ -12,10 +12,10 @@
 namespace sparflow {
 namespace {
 
-/// Positions at which a linkage is looked at: a dead centre or an opening narrower than 1/400 of the
-/// range lies at one of its ends, and the ends are looked at.
+/// Number of positions at which a linkage is checked. A dead centre or an opening narrower than 1/400 of the range is
+/// at one of its ends, and the ends are checked.
 constexpr int kSamples = 401;
-/// Below this share of its largest value |dx/dq| is a dead centre: the force grows a hundredfold.
+/// [-] Below this share of its largest value |dx/dq| counts as a dead centre, where the force is a hundredfold.
 constexpr double kDeadCentreShare = 0.01;
 
 class Checker {
@@ -56,7 +56,7 @@ class Checker {
       for (std::size_t j = 0; j < i; ++j) {
         if (parts[i].name != parts[j].name) continue;
         fail(list, i, fmt::format("{}[{}]", section, parts[i].name),
-             fmt::format("the name stands twice (first on line {}); give each its own",
+             fmt::format("the name occurs twice (first on line {}); give each its own",
                          place(list, j).line));
       }
     }
@@ -159,8 +159,8 @@ class Checker {
     check_stroke(i);
   }
 
-  /// Within a whole turn every pinned cylinder passes a dead centre, so a wider range is a slip of unit; said before
-  /// the dead centre is, whose position would only puzzle.
+  /// Within a whole turn every pinned cylinder passes a dead centre, so that a wider range is a unit error. It is
+  /// reported first, because the position of the dead centre would not help the user.
   void check_less_than_a_turn(std::size_t i) const {
     const auto j = static_cast<std::size_t>(machine_.cylinders[i].joint);
     const Joint& joint = machine_.joints[j];
@@ -190,7 +190,7 @@ class Checker {
     }
   }
 
-  /// Position between `good` and `bad` where the predicate stops holding.
+  /// Position between `good` and `bad` where the predicate changes, by bisection.
   template <class Predicate>
   static double border(double good, double bad, const Predicate& holds) {
     for (int k = 0; k < 60; ++k) {
@@ -231,7 +231,7 @@ class Checker {
              fmt::format("the four-bar cannot close anywhere in the range {} of {}; {}",
                          range(joint), joint.name, remedy));
       }
-      // the border of the open stretch that is nearest to a closed position
+      // the border of the open range that is nearest to a closed position
       const std::size_t open = k > 0 ? k : good - 1;
       const double edge = border(position[k > 0 ? k - 1 : good], position[open], closes);
       fail(places_.cylinders, i, key,
@@ -264,11 +264,11 @@ class Checker {
     const Cylinder& cylinder = machine_.cylinders[i];
     const Joint& joint = machine_.joints[static_cast<std::size_t>(cylinder.joint)];
     const std::string key = fmt::format("cylinders[{}]", cylinder.name);
-    // the length is monotonic in q (checked above), so its extremes lie at the range's ends
+    // The length is monotonic in q (checked above), so that its extremes lie at the range's ends.
     const double at_lo = cylinder_length(machine_, static_cast<int>(i), joint.position.lo);
     const double at_hi = cylinder_length(machine_, static_cast<int>(i), joint.position.hi);
     const double shortest = std::min(at_lo, at_hi), longest = std::max(at_lo, at_hi);
-    // a fraction of a millimetre is rounding of the file's numbers
+    // [m] A fraction of a millimetre is rounding of the file's numbers.
     constexpr double kTolerance = 5e-4;
     if (cylinder.length_at_zero_stroke && shortest < *cylinder.length_at_zero_stroke - kTolerance) {
       warn(places_.cylinders, i, key + ".length_at_zero_stroke",

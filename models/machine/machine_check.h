@@ -1,5 +1,5 @@
 #pragma once
-/// Judges a machine as a whole: what no single line of its file shows.
+/// Checks a machine as a whole, for errors that no single line of its file shows.
 #include <string>
 #include <vector>
 
@@ -8,13 +8,13 @@
 
 namespace sparflow {
 
-/// Where the machine's parts stand in its file, in the order of the machine's lists. Empty lists: unknown.
+/// Places of the machine's parts in its file, in the order of the machine's lists. Empty lists: not known.
 struct MachinePlaces {
   std::string file;
   std::vector<FilePlace> joints, links, cylinders, pumps, valves;
 };
 
-/// Errors: names that stand twice; a cylinder fed by two pumps; a joint with two cylinders; a valve or pump for
+/// Errors: names that occur twice; a cylinder fed by two pumps; a joint with two cylinders; a valve or pump for
 /// a drive without hydraulics; over the joint's range a dead centre (dx/dq changes sign or falls below
 /// 1 % of its largest value), a four-bar that cannot close, or more than a turn for a pinned cylinder (degrees
 /// written for radians). The message names cylinder and joint position.

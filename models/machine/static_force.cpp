@@ -3,7 +3,7 @@
 namespace sparflow {
 namespace {
 
-/// A function of one joint coordinate, known by its derivatives, as a function of whatever T is.
+/// Value (and derivatives, where T has them) of a function of one joint coordinate with derivatives f0, f1, f2.
 template <class T>
 T lifted(const T& q, double f0, double f1, double f2) {
   if constexpr (std::is_same_v<T, double>) {
@@ -170,7 +170,7 @@ void StaticForce::accumulate_moments(const double* q, double payload) {
       add_rigid(m.mass, j - 1, chain_.point(j - 1, part(&Taylor3::value)));
     }
   }
-  // What is fixed to link k or beyond turns (or slides) as one body with joint k.
+  // Everything fixed to link k or beyond moves as one body with joint k.
   double mass = 0.0;
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   for (int joint = n - 1; joint >= 0; --joint) {

@@ -6,7 +6,7 @@
 /// its position follow from the joint axes alone: for i <= j <= k (revolute z_i, z_j)
 ///   dp/dq_k = J_k,  d2p/dq_j dq_k = z_j x J_k,  d3p/dq_i dq_j dq_k = z_i x (z_j x J_k),
 /// and a prismatic joint before k contributes nothing. So gradient and Hessian of all torques need one
-/// vector a joint (its first mass moment) and cross products, whatever the number of masses.
+/// vector for each joint (its first mass moment) and cross products, whatever the number of masses.
 #include <vector>
 
 #include "models/machine/kinematics.h"
@@ -14,8 +14,8 @@
 
 namespace sparflow {
 
-/// Templated virtual work, tau_k = -sum m g . dp/dq_k, one mass at a time: the second path beside
-/// `StaticForce`, and the form that duals go through.
+/// Templated virtual work, tau_k = -sum m g . dp/dq_k, one mass at a time. It is the second
+/// code path that checks `StaticForce`, and it accepts dual numbers.
 /// @param q joint coordinates  @param payload [kg] at the tip
 /// @return tau [N m] or [N], positive where the actuator must push towards +q to hold the load
 template <class T>
@@ -23,7 +23,7 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_torque(const Machine& machine,
                                                   const Eigen::Matrix<T, Eigen::Dynamic, 1>& q,
                                                   double payload);
 
-/// Static force on each cylinder, F = tau / (dx/dq), templated: second path of `StaticForce`.
+/// Static force on each cylinder, F = tau / (dx/dq), templated: the second code path of `StaticForce`.
 /// @return [N], positive when the load pushes the rod in
 template <class T>
 Eigen::Matrix<T, Eigen::Dynamic, 1> static_force(const Machine& machine,
@@ -33,7 +33,7 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_force(const Machine& machine,
   Eigen::Matrix<T, Eigen::Dynamic, 1> result(machine.cylinder_count());
   for (int i = 0; i < machine.cylinder_count(); ++i) {
     const int j = machine.cylinders[static_cast<std::size_t>(i)].joint;
-    // dx/dq as a function of T: the Taylor derivatives carried through T by the chain rule
+    // The chain rule carries the Taylor derivatives of dx/dq through T.
     const Taylor3 x = linkage_rates(machine, i, plain(q[j]));
     if constexpr (std::is_same_v<T, double>) {
       result[i] = force[j] / x.d1;
@@ -47,13 +47,13 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_force(const Machine& machine,
 /// Potential energy [J] of all masses and the payload, zero at the base's origin.
 double potential_energy(const Machine& machine, const Eigen::VectorXd& q, double payload);
 
-/// Static torques and cylinder forces with derivatives: a workspace, one a thread, no allocation after
+/// Static torques and cylinder forces with derivatives. Each thread needs its own object; nothing is allocated after
 /// construction.
 class StaticForce {
  public:
   explicit StaticForce(const Machine& machine);
 
-  /// Everything at q. @param payload [kg] at the tip @param order 0 values, 1 + gradients, 2 + Hessians
+  /// Evaluates everything at q. @param payload [kg] at the tip @param order 0 values, 1 + gradients, 2 + Hessians
   /// @throws std::domain_error when a four-bar cannot close at q
   void update(const double* q, double payload, int order);
 
@@ -86,7 +86,7 @@ class StaticForce {
   std::vector<Eigen::MatrixXd> torque_hessian_, force_hessian_;
   std::vector<Taylor3> lengths_;
   std::vector<LinkageMass<Taylor3>> linkage_masses_;
-  // per joint: mass-weighted position derivatives d/dq_k, d2/dq_k2, d3/dq_k3 of everything it carries
+  // by joint: mass-weighted position derivatives d/dq_k, d2/dq_k2, d3/dq_k3 of all masses behind it
   std::vector<Eigen::Vector3d> first_, second_, third_;
   std::vector<Eigen::Vector3d> rigid_moment_;  // sum m p of what is fixed to link k or beyond
   std::vector<double> rigid_mass_;

@@ -1,5 +1,5 @@
 #pragma once
-/// A motion in joint space, the one type that planner, optimiser, simulator and page exchange.
+/// A motion in joint space; planners, optimiser, simulator and pages exchange this type.
 #include <Eigen/Dense>
 
 namespace sparflow {

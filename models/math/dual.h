@@ -1,7 +1,7 @@
 #pragma once
 /// Second-order forward-mode dual numbers of fixed size: value, gradient and Hessian carried through any
-/// formula templated on its scalar. Exact to rounding. They are the second path beside the hand-derived
-/// blocks of the hot loops (Fike & Alonso 2011, hyper-dual numbers, in packed form).
+/// formula templated on its scalar, exact to rounding. They are the second code path that checks the hand-derived
+/// derivatives of the inner loops (Fike & Alonso 2011, hyper-dual numbers, in packed form).
 #include <Eigen/Core>
 #include <array>
 #include <cmath>

@@ -1,12 +1,12 @@
 #pragma once
-/// Errors a user can cause, and the one check for errors only we can cause.
+/// Errors that a user can cause, and the check for defects of the program.
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace sparflow {
 
-/// Where in a user's file something was found; zero means "not known".
+/// Place in a user's file; zero means "not known".
 struct FilePlace {
   std::string file;
   int line = 0;    ///< 1-based
@@ -34,11 +34,11 @@ class UsageError : public std::runtime_error {
 /// The candidate nearest to `word` (edit distance), or "" when none is near enough to suggest.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates);
 
-/// Writes `content` beside `path` and renames it into place, so nothing half-written is ever seen.
+/// Writes `content` beside `path` and renames it, so that no incomplete file is ever visible.
 /// @throws InputError when the folder cannot be written
 void write_file_atomically(const std::string& path, const std::string& content);
 
-/// Whole file as bytes. @throws InputError "cannot read"
+/// The whole file as bytes. @throws InputError when it cannot be read
 std::string read_file(const std::string& path);
 
 }  // namespace sparflow

@@ -1,8 +1,8 @@
 #pragma once
-/// Second-order dual number whose number of variables is chosen at run time: the scalar effects are
-/// differentiated with when a machine's joints are only known from its file. Value, gradient and packed Hessian
-/// in a fixed buffer, so nothing allocates; operations touch only the variables in use.
-/// Constants have no variables and mix freely. Fike & Alonso (2011), hyper-dual numbers, in packed form.
+/// Second-order dual number whose number of variables is chosen at run time. Effects are differentiated with it, because
+/// the number of joints is known only from the machine file. Value, gradient and packed Hessian are in a fixed
+/// buffer, so that nothing is allocated; operations use only the variables present. Constants have no variables and can
+/// be combined with any number. Fike & Alonso (2011), hyper-dual numbers, in packed form.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace sparflow {
 
 class Jet {
  public:
-  /// q, qd and qdd of seven joints.
+  /// Largest number of variables: q, qd and qdd of seven joints.
   static constexpr int kMax = 21;
 
   double value = 0.0;
@@ -34,7 +34,7 @@ class Jet {
     return j;
   }
 
-  /// From known derivatives. @param gradient(i), hessian(i, j) callables, the second asked for j <= i
+  /// From known derivatives. @param gradient(i), hessian(i, j) callables, the second called for j <= i only
   template <class Gradient, class Hessian>
   static Jet of(double v, int count, const Gradient& gradient, const Hessian& hessian) {
     Jet r(v);

@@ -1,5 +1,5 @@
 #pragma once
-/// Lets Eigen's vectors and matrices hold Jets, so that kinematics templated on the scalar accept them.
+/// Traits by which Eigen's vectors and matrices can hold Jets; kinematics templated on the scalar need them.
 #include <Eigen/Core>
 
 #include "models/math/jet.h"

@@ -39,9 +39,8 @@ MatrixXd symmetric_inverse(const MatrixIn& a) {
 VectorXd least_squares(const MatrixIn& a, const VectorIn& b) { return Qr(a).solve(b); }
 
 MatrixXd least_norm_columns(const MatrixIn& a, const MatrixIn& b) {
-  if (a.cols() == 0)
-    return MatrixXd::Zero(a.rows(), b.cols());  // nothing is asked; Qr would read beyond its end
-  const Qr qr(a);                               // A P = Q R: X = Q R^-T P^T B
+  if (a.cols() == 0) return MatrixXd::Zero(a.rows(), b.cols());  // Qr would read beyond its end.
+  const Qr qr(a);                                                // A P = Q R: X = Q R^-T P^T B
   const Eigen::Index m = a.cols();
   MatrixXd x = MatrixXd::Zero(a.rows(), b.cols());
   x.topRows(m) = qr.colsPermutation().transpose() * b;

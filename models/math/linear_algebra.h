@@ -1,6 +1,6 @@
 #pragma once
-/// Dense linear algebra behind plain functions. Eigen's decompositions and matrix products are templates, compiled
-/// again in every file that names them (some five seconds each); here they are compiled once.
+/// Dense linear algebra as plain functions. Eigen's decompositions and matrix products are templates that every file
+/// would compile again (some five seconds each); here they are compiled once.
 #include <Eigen/Dense>
 
 namespace sparflow {
@@ -34,15 +34,15 @@ Eigen::MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b,
 
 /// Orthonormal columns that span A's columns (scaled to one first) to within rounding.
 Eigen::MatrixXd span_of(const MatrixIn& a);
-/// Orthonormal columns normal to all columns of A [n x (n - rank)]; what is below `threshold` of the largest pivot is
-/// rounding.
+/// Orthonormal columns normal to all columns of A [n x (n - rank)]; pivots below `threshold` times the
+/// largest count as rounding.
 Eigen::MatrixXd complement_of(const MatrixIn& a, double threshold = 1e-12);
 /// A = L L^T of a symmetric positive definite A; only its lower triangle is read.
 class Cholesky {
  public:
   Cholesky() = default;
   explicit Cholesky(const MatrixIn& a) { compute(a); }
-  /// false where A is not positive definite; nothing else may be asked for then
+  /// @return false where A is not positive definite; the other members must not be called then
   bool compute(const MatrixIn& a);
   double log_det() const;                                  ///< of A
   Eigen::MatrixXd lower() const;                           ///< L

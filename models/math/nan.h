@@ -4,7 +4,7 @@
 
 namespace sparflow {
 
-/// A value that was not measured or cannot be said.
+/// Stands for a value that was not measured or cannot be computed.
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace sparflow

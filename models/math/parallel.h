@@ -1,5 +1,5 @@
 #pragma once
-/// Independent pieces of work on all processors.
+/// Runs independent tasks on several processors.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -8,7 +8,8 @@
 
 namespace sparflow {
 
-/// work(0) ... work(count - 1), each once, in no order; returns when all are done. `work` must not throw.
+/// Calls work(0) ... work(count - 1), each once and in no fixed order, and returns when all are done. `work` must not
+/// throw.
 template <class F>
 void parallel(std::size_t count, const F& work) {
   std::atomic<std::size_t> next = 0;

@@ -10,7 +10,7 @@ double median(Eigen::VectorXd values);
 /// Value below which the fraction `at` (0..1) of the values lies; 0 when there are none.
 double quantile(Eigen::VectorXd values, double at);
 
-/// 1.4826 times the median absolute value: the standard deviation of normal residuals, unmoved by outliers.
+/// 1.4826 times the median absolute value: the standard deviation of normal residuals, robust against outliers.
 double robust_std(const Eigen::Ref<const Eigen::VectorXd>& residuals);
 
 /// Residuals count fully up to this many standard deviations: 95 % efficiency on normal data.

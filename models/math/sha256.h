@@ -1,5 +1,5 @@
 #pragma once
-/// Fingerprint of a file's bytes, so that a fitted model can say which data it has seen.
+/// Hash of a file's bytes, by which a fitted model records the logs that it was learned from.
 #include <string>
 #include <string_view>
 

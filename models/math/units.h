@@ -1,5 +1,5 @@
 #pragma once
-/// Units of the field, converted at the two doors (files in, files out) and nowhere else.
+/// Units of files and displays; values are converted where they are read or shown and nowhere else.
 namespace sparflow::units {
 inline constexpr double kBar = 1e5;                      ///< [Pa] in one bar
 inline constexpr double kLitrePerMinute = 1.0 / 6e4;     ///< [m^3/s] in one l/min

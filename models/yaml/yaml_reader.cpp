@@ -17,7 +17,7 @@ FilePlace place_of(const YAML::Mark& mark, const std::string& file) {
   return {file, mark.line + 1, mark.column + 1};
 }
 
-/// The value as a reader of the message would recognise it.
+/// The value in the form in which the user recognises it in a message.
 std::string shown(const YAML::Node& node) {
   switch (node.Type()) {
     case YAML::NodeType::Scalar: {
@@ -37,7 +37,7 @@ std::string shown(const YAML::Node& node) {
 
 struct ParsedNumber {
   double value = 0.0;
-  std::string rest;  ///< what stands behind the number
+  std::string rest;  ///< text after the number
   bool ok = false;
 };
 
@@ -95,9 +95,9 @@ std::string without_unit(const std::string& key) {
 }  // namespace
 
 std::string explained_yaml_error(const std::string& message, const std::string& text, int line) {
-  if (tab_indents(text, line)) return "a tab indents this line; YAML wants spaces";
+  if (tab_indents(text, line)) return "a tab indents this line; YAML needs spaces";
   static const std::array<std::array<const char*, 2>, 12> kTable = {{
-      {YAML::ErrorMsg::TAB_IN_INDENTATION, "a tab indents this line; YAML wants spaces"},
+      {YAML::ErrorMsg::TAB_IN_INDENTATION, "a tab indents this line; YAML needs spaces"},
       {YAML::ErrorMsg::END_OF_MAP_FLOW,
        "a `{` opened before here is not closed, or a comma is missing; write {key: value, key: "
        "value}"},
@@ -123,7 +123,7 @@ std::string explained_yaml_error(const std::string& message, const std::string& 
   for (const auto& [theirs, ours] : kTable) {
     if (message == theirs) return ours;
   }
-  // anchors, aliases, tags, escapes, directives: a special character in what was meant as plain text
+  // The rest (anchors, aliases, tags, escapes, directives) are special characters in text that was meant as plain.
   return fmt::format(
       "not readable as YAML ({}); if this is plain text, put it in single quotes ('...')", message);
 }
@@ -139,7 +139,7 @@ std::string Quantity::expected() const {
 }
 
 std::string suggestion(const std::string& word, const std::vector<std::string>& candidates) {
-  for (const std::string& candidate : candidates) {  // the right key with the wrong unit or none
+  for (const std::string& candidate : candidates) {  // the right key with a wrong unit or none
     if (without_unit(candidate) == without_unit(word)) {
       return fmt::format("; did you mean \"{}\"?", candidate);
     }
@@ -323,12 +323,12 @@ YamlMap::YamlMap(YamlValue value, std::vector<std::string> keys)
     for (const Entry& earlier : entries_) {
       if (earlier.key == key) {
         throw InputError(place, value_.path_,
-                         fmt::format("key \"{}\" stands here and on line {}; keep one of them", key,
+                         fmt::format("key \"{}\" occurs here and on line {}; keep one of them", key,
                                      earlier.place.line));
       }
     }
     YamlValue child = value_.child(pair.second, key_path(key));
-    if (pair.second.IsNull()) child.place_ = place;  // a value left out has no place of its own
+    if (pair.second.IsNull()) child.place_ = place;  // A missing value has no place of its own.
     entries_.push_back({key, std::move(place), std::move(child)});
   }
   if (!keys_.empty()) check_keys();
@@ -341,7 +341,7 @@ void YamlMap::check_keys() const {
   };
   for (const Entry& entry : entries_) {
     if (std::find(keys_.begin(), keys_.end(), entry.key) != keys_.end()) continue;
-    std::vector<std::string> absent;  // a key that is already there was not meant
+    std::vector<std::string> absent;  // Keys that are present already are not suggested.
     std::copy_if(keys_.begin(), keys_.end(), std::back_inserter(absent),
                  [&](const std::string& key) { return !present(key); });
     const std::string hint = suggestion(entry.key, absent);
@@ -393,7 +393,7 @@ std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() const {
 YamlValue parse_yaml(const std::string& text, const std::string& file) {
   std::vector<YAML::Node> documents;
   try {
-    // the end mark makes yaml-cpp see a quote that is never closed; by itself it takes the rest as text
+    // With the end mark yaml-cpp reports a quote that is not closed; without it the rest would be taken as text.
     documents = YAML::LoadAll(text + "\n...\n");
   } catch (const YAML::Exception& error) {
     throw InputError(place_of(error.mark, file), "",

@@ -1,5 +1,5 @@
 #pragma once
-/// A cursor over a YAML file that knows where everything stands, so that every message can say
+/// A cursor over a YAML file that keeps the place of every value, so that messages can read
 /// `crane.yaml:42:9: cylinders[boom].bore: got -0.18, expected a positive diameter [m]`.
 #include <Eigen/Core>
 #include <memory>
@@ -16,14 +16,14 @@ class Node;
 
 namespace sparflow {
 
-/// What a number means and which values make sense; the words of the error message come from here.
+/// Meaning and admissible values of a number; error messages take their words from here.
 struct Quantity {
   enum class Sign { kAny, kNonNegative, kPositive };
   const char* name = "number";  ///< "diameter"
   const char* unit = "";        ///< "m"; empty for pure numbers
   Sign sign = Sign::kAny;
   double scale = 1.0;  ///< SI value = number in the file * scale
-  /// A number in the file this large or larger is a slip of unit (180 for 0.18 m); 0 = no such bound.
+  /// A number in the file of this size or above is a unit error (180 for 0.18 m); 0 = no such bound.
   double implausible_from = 0.0;
 
   /// "a positive diameter [m]"
@@ -32,11 +32,11 @@ struct Quantity {
 
 class YamlMap;
 
-/// The YAML library's own message turned into what to do about it.
+/// Advice for the user in place of the YAML library's own error message.
 /// @param text the file's  @param line of the error, from 0; negative = not known
 std::string explained_yaml_error(const std::string& message, const std::string& text, int line);
 
-/// One value of the file: its place, its key path and its readers. Cheap to copy; keeps the document alive.
+/// One value of the file with its place, key path and readers. It is cheap to copy and keeps the document alive.
 class YamlValue {
  public:
   /// `joints[boom].axis`
@@ -44,18 +44,18 @@ class YamlValue {
   const FilePlace& place() const { return place_; }
   bool is_map() const;
   bool is_list() const;
-  /// The plain word, whatever it means; "" when it is no scalar.
+  /// The scalar as text; "" when the value is no scalar.
   std::string word() const;
-  /// The value written anew as YAML: comments, line breaks and quotes of the file no longer show.
+  /// The value as normalised YAML, without comments, line breaks and quotes of the file.
   std::string yaml() const;
 
-  /// SI. Rejects text, units behind the number, decimal commas, NaN, infinity and what `what` rules out.
+  /// The number in SI. Text, units after the number, decimal commas, NaN, infinity and what `what` excludes are errors.
   double number(const Quantity& what) const;
   int integer(const std::string& what, int least) const;
   bool flag() const;
   /// Any non-empty text.
   std::string text(const std::string& what) const;
-  /// A name fit for a CSV column and for `effect:name`: letters, digits, `_`, `-`, `.`, no `base`.
+  /// A name suitable for a CSV column and for `effect:name`: letters, digits, `_`, `-`, `.`, no `base`.
   std::string name(const std::string& what) const;
   /// One of `choices`; the index is returned.
   int choice(const std::vector<std::string>& choices) const;
@@ -65,8 +65,8 @@ class YamlValue {
   Range range(const Quantity& what) const;
   /// Elements; their path names them by `name`, `cylinder`, `joint` or `id` where they have one.
   std::vector<YamlValue> list(const std::string& what) const;
-  /// @param keys all keys that may stand in it; empty: the keys are names (of joints, of pumps)
-  /// @throws InputError at the first key that is unknown, with the nearest known one, or stands twice
+  /// @param keys all keys that it may contain; empty: the keys are names (of joints, of pumps)
+  /// @throws InputError at the first key that is unknown, with the nearest known one, or that occurs twice
   YamlMap map(const std::string& what, const std::vector<std::string>& keys) const;
 
   /// @throws InputError always, at this value
@@ -85,14 +85,14 @@ class YamlValue {
   std::string path_;
 };
 
-/// A mapping whose keys have been checked: no unknown one, none twice.
+/// A mapping whose keys have been checked: none is unknown, none occurs twice.
 class YamlMap {
  public:
   const FilePlace& place() const { return value_.place(); }
   const std::string& path() const { return value_.path(); }
   /// @throws InputError "missing; expected ..." when the key is absent or has no value
   YamlValue need(const std::string& key, const std::string& expected) const;
-  /// A number is asked for so often that it has its own pair.
+  /// Shortcuts for numbers, which are the most frequent values.
   double need_number(const std::string& key, const Quantity& what) const;
   double number_or(const std::string& key, const Quantity& what, double otherwise) const;
   /// Absent key: nullopt. A key without a value is an error.
@@ -118,8 +118,8 @@ class YamlMap {
   std::vector<std::string> keys_;
 };
 
-/// The document's root value. @param file how messages call the text
-/// @throws InputError at the place where the text stops being YAML, or when it is empty
+/// The document's root value. @param file name of the text in messages
+/// @throws InputError at the place where the text is not valid YAML, or when it is empty
 YamlValue parse_yaml(const std::string& text, const std::string& file);
 
 /// "; did you mean "max_flow_lpm"?" or "" when nothing is near; knows unit suffixes.

@@ -19,7 +19,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kMostLines = 16;  // end postures to which straight lines are driven
+constexpr std::size_t kMostLines = 16;  // number of goal configurations to which straight lines are tried
 
 /// Joint position at which the cylinder has length x, between two positions that enclose it.
 double position_at_length(const Machine& machine, int cylinder, double x, double a, double b) {
@@ -86,7 +86,7 @@ MatrixXd pseudo_inverse_line(const Machine& machine, const MotionProblem& proble
       for (Eigen::Index j = 0; j < q.size(); ++j) {
         if (held[static_cast<std::size_t>(j)]) weighted.col(j).setZero();
       }
-      // a planar machine's jacobian has no row along its normal, hence the small term
+      // The small term keeps the matrix regular for a planar machine, whose Jacobian is zero along its normal.
       const Eigen::Matrix3d normal =
           weighted * weighted.transpose() + 1e-12 * Eigen::Matrix3d::Identity();
       q += speed.asDiagonal() * (weighted.transpose() * solve_symmetric(normal, error));
@@ -135,7 +135,7 @@ void BaselineSet::make_lines() {
     }
     out.push_back({detail, {motion.motion}, {}, motion.shortest});
   };
-  no_line_ = no_nearest_ = no_actuator_ = "no end posture was found";
+  no_line_ = no_nearest_ = no_actuator_ = "no goal configuration was found";
   for (std::size_t i = 0; i < std::min(kMostLines, ends_.size()); ++i) {
     const std::string detail = posture_text(machine, ends_[i]);
     MatrixXd line(2, ends_[i].size());
@@ -227,14 +227,14 @@ BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, b
     }
     return none;
   }
-  // Energies first and coarsely, limits of the cheapest ones then: looking at limits costs more.
+  // Coarse energies are computed first and limits for the cheapest motions only, because checking limits costs more.
   std::vector<BaselineMotion> all;
   for (const DrivenPath& path : paths(kind)) {
     all.push_back(timed(kind, path, duration));
     if (all.back().found())
       all.back().energy = exact_energy(model_, all.back().motion, problem_.payload, 2);
   }
-  // other times, other redundancy: solved anew where it is the answer, not where a search looks around
+  // The best redundancy depends on the duration, so it is solved again for a result, but not during a search.
   if (kind == kBestTipLine && polish && !all.empty()) {
     BaselineMotion anew = best_tip_line(duration);
     if (anew.found()) all.push_back(std::move(anew));
@@ -267,7 +267,7 @@ double BaselineSet::shortest(const std::string& kind) const {
   double shortest = std::numeric_limits<double>::infinity();
   for (const DrivenPath& path : paths(kind)) shortest = std::min(shortest, path.shortest);
   if (!std::isfinite(shortest)) return 0.0;
-  // where a pressure is too high at full speed, slower may do
+  // A pump pressure that is too high at full speed may be kept in a longer duration.
   for (const double factor :
        {1.0, 1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0}) {
     if (cheapest(kind, factor * shortest, false).found()) return factor * shortest;
@@ -284,7 +284,7 @@ BaselineMotion BaselineSet::at_own_best(const std::string& kind, double idle_pow
     return m.found() ? m.energy.total + idle_power * duration
                      : std::numeric_limits<double>::infinity();
   };
-  // a bracket by steps of 15 %, then golden section: cost is nearly convex in the duration
+  // Bracketing by steps of 15 % and golden section suffice, because the cost is nearly convex in the duration.
   double best = first, least = cost(first), step = 1.15;
   for (double t = first * step; t < 12.0 * first; t *= step) {
     const double value = cost(t);

@@ -1,4 +1,4 @@
-/// One cylinder after another, in every order and with every set of joints at rest that still reaches the goal.
+/// Sequential motions in every order and with every set of joints at rest with which the goal can be reached.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,19 +19,19 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double kStill = 1e-4;    // [rad] or [m] below which a joint counts as at rest throughout
-constexpr double kSameEnd = 1e-3;  // [rad] or [m] between end postures that are one
-constexpr int kRedundancyCuts = 13;  // values of each joint at which the goal region is cut
+constexpr double kSameEnd = 1e-3;  // [rad] or [m] below which two goal configurations count as equal
+constexpr int kRedundancyCuts = 13;  // values of each joint at which goal configurations are sought
 constexpr std::size_t kMostEnds = 120;
 constexpr std::size_t kEndsOfAnOrder = 3;
 constexpr int kLegIntervals = 24;
 
-/// One joint's move, judged quasi-statically.
+/// Quasi-static estimate of one joint's move.
 struct LegEstimate {
   double energy = 0.0;    // [J]
   double shortest = 0.0;  // [s]
 };
 
-/// The move of one joint at constant speed, half of the fastest one that flows allow everywhere on the way.
+/// Estimates the move of one joint at constant speed, half of the highest that flows allow everywhere on its travel.
 LegEstimate estimate_leg(const MotionProblem& problem, Chain& chain, LimitRatios& ratios,
                          const VectorXd& from, int joint, double to) {
   constexpr int kSamples = 10;
@@ -46,8 +46,8 @@ LegEstimate estimate_leg(const MotionProblem& problem, Chain& chain, LimitRatios
   const Range& limit = problem.limits.acceleration[static_cast<std::size_t>(joint)];
   const double acceleration = std::min(limit.hi, -limit.lo), speed = std::abs(way) / ratio;
   LegEstimate leg;
-  leg.shortest = ratio + speed / acceleration;  // at full speed, and the ramps
-  const double slow = 0.5 / ratio;              // [1/s] ways per second
+  leg.shortest = ratio + speed / acceleration;  // travel at full speed, and ramps
+  const double slow = 0.5 / ratio;              // [1/s] share of the travel in a second
   qd[joint] = way * slow;
   for (int i = 0; i < kSamples; ++i) {
     q[joint] = from[joint] + way * (i + 0.5) / kSamples;
@@ -62,7 +62,7 @@ struct SequenceEstimate {
   LegEstimate sum;
 };
 
-/// Energy of each leg at some durations, linear in between.
+/// Energy of a leg at some durations, interpolated linearly.
 struct LegTable {
   std::vector<double> duration, energy;
   double at(double t) const {
@@ -122,7 +122,7 @@ std::vector<double> shared_time(const CraneModel& model, double payload,
   for (std::size_t i = 0; i < legs.size(); ++i) {
     LegTable table;
     for (int s = 0; s < kTableSize; ++s) {
-      // denser where the leg is fast: that is where its energy changes most
+      // Points are denser at short durations, where the energy changes most.
       const double extra = spare * std::pow(static_cast<double>(s) / (kTableSize - 1), 2);
       table.duration.push_back(times[i] + extra);
       table.energy.push_back(
@@ -178,7 +178,7 @@ void BaselineSet::find_end_postures(const std::vector<VectorXd>& given) {
     add(q);
     starts.push_back(q);
   }
-  // with every set of joints at rest
+  // Goal configurations with every set of joints at rest.
   for (const VectorXd& from : starts) {
     for (unsigned still = 1; still < (1u << n) - 1u && n <= 7; ++still) {
       std::vector<bool> free(static_cast<std::size_t>(n));
@@ -190,7 +190,7 @@ void BaselineSet::find_end_postures(const std::vector<VectorXd>& given) {
       if (solve_end_posture(model_.machine, problem_.limits, goal, free, q)) add(q);
     }
   }
-  // and along the goal region, cut at values of each joint
+  // Goal configurations at given values of each joint.
   for (const VectorXd& from : starts) {
     for (int j = 0; j < n; ++j) {
       const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
@@ -211,7 +211,7 @@ void BaselineSet::make_sequences() {
   LimitRatios ratios(problem_);
   std::unique_ptr<ClearanceModel> clearance;
   if (!problem_.obstacles.empty()) clearance = std::make_unique<ClearanceModel>(problem_);
-  no_sequence_ = ends_.empty() ? "no end posture was found" : "every order meets an obstacle";
+  no_sequence_ = ends_.empty() ? "no goal configuration was found" : "every order meets an obstacle";
   std::map<std::vector<int>, std::vector<SequenceEstimate>> by_order;
   for (std::size_t e = 0; e < ends_.size(); ++e) {
     std::vector<int> order;
@@ -236,7 +236,7 @@ void BaselineSet::make_sequences() {
       if (clear) by_order[order].push_back(s);
     } while (std::next_permutation(order.begin(), order.end()));
   }
-  // of each order the cheapest end postures and the one soonest reached
+  // Of each order the cheapest goal configurations are kept, and the one reached in the shortest time.
   std::vector<std::vector<SequenceEstimate>> kept;
   for (auto& [order, all] : by_order) {
     const auto soonest = *std::min_element(
@@ -286,7 +286,7 @@ void BaselineSet::make_sequences() {
 
 std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polished_count,
                                                       bool only_best) const {
-  // the cheapest end posture of each order
+  // Of each order the cheapest goal configuration is kept.
   std::map<std::string, std::pair<BaselineMotion, const DrivenPath*>> best;
   for (const DrivenPath& path : sequences_) {
     BaselineMotion m = timed(kSequential, path, duration);
@@ -316,9 +316,9 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
   for (auto& [m, path] : all) {
     if (!m.found()) continue;
     if (only_best && kept_one && left <= 0) {
-      // dearer than the one that was kept, and its limits were not looked at
+      // It costs more than the motion that is kept, and its limits were not checked.
       m.motion = Trajectory{};
-      m.why = "dearer";
+      m.why = "costs more than another order";
       continue;
     }
     const std::vector<LimitCheck> checks =
@@ -343,12 +343,12 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
 
 BaselineMotion BaselineSet::polished(const BaselineMotion& from, const DrivenPath& path) const {
   ModeCandidate candidate;
-  candidate.name = "one by one: " + path.detail;
+  candidate.name = "sequential: " + path.detail;
   candidate.guess = from.motion;
   candidate.energy = from.energy.total;
   candidate.modes = ModeTable::Constant(from.motion.size() - 1, model_.machine.cylinder_count(),
                                         CylinderMode::kRest);
-  Eigen::Index at = 0;  // the legs' meshes follow each other
+  Eigen::Index at = 0;  // first interval of the leg
   for (std::size_t i = 0; i < path.legs.size(); ++i) {
     const Trajectory& leg = path.legs[i];
     const int joint = path.joints[i], c = model_.machine.cylinder_of_joint(joint);
@@ -362,7 +362,7 @@ BaselineMotion BaselineSet::polished(const BaselineMotion& from, const DrivenPat
     }
     at += leg.size() - 1;
   }
-  // no overlaps: it shall remain one cylinder after another; how long each leg takes is free
+  // Overlaps are not allowed, so the motion stays sequential; the durations of its legs are free.
   OptimizeOptions options = options_.optimize;
   options.overlap = 0.0;
   const StartResult solved = optimize_with_phases(

@@ -1,4 +1,4 @@
-/// The tip line with the redundancy of least energy as one of the baselines.
+/// The tip line with the redundancy of least energy, as a baseline.
 #include <algorithm>
 #include <cmath>
 
@@ -9,22 +9,22 @@
 namespace sparflow {
 namespace {
 
-constexpr double kFirstLineDuration = 10.0;  // [s] where nothing says how long the line takes
-constexpr int kDoublings = 3;                // of it, until a motion is found
+constexpr double kFirstLineDuration = 10.0;  // [s] first duration tried where none is known
+constexpr int kDoublings = 3;                // largest number of doublings until a motion is found
 
-/// The same motion as fast as speeds, flows and accelerations allow.
+/// The motion compressed in time as far as speeds, flows and accelerations allow.
 Trajectory at_its_fastest(const MotionProblem& problem, const Trajectory& motion) {
   constexpr int kInstants = 16;
   LimitRatios limits(problem);
   const Trajectory fine = motion.refined(kInstants);
-  double share = 0.0;  // of the duration
+  double share = 0.0;  // shortest duration as share of the present one
   for (Eigen::Index k = 0; k < fine.size(); ++k) {
     const Eigen::VectorXd q = fine.q.row(k).transpose(), qd = fine.qd.row(k).transpose(),
                           qdd = fine.qdd.row(k).transpose();
     share = std::max(
         {share, limits.speed(q, qd, nullptr), std::sqrt(limits.acceleration(qdd, nullptr))});
   }
-  // flows may be a little larger between those instants
+  // Flows may be slightly larger between those instants.
   return share > 0.0 ? with_duration(motion, (1.0 + 1e-4) * share * motion.duration()) : motion;
 }
 
@@ -56,7 +56,7 @@ void BaselineSet::make_best_tip_lines() {
   double duration = kFirstLineDuration;
   if (!tip_lines_.empty()) {
     duration = 1.05 * tip_lines_.front().shortest;
-    best_tip_lines_ = tip_lines_;  // one of the choices, and the fastest where little time is left
+    best_tip_lines_ = tip_lines_;  // one of the candidates, and the fastest one
   } else if (problem_.duration.min > 0.0) {
     duration = problem_.duration.min;
   }
@@ -71,7 +71,7 @@ void BaselineSet::make_best_tip_lines() {
   };
   for (int i = 0; i <= kDoublings; ++i, duration *= 2.0) {
     if (!keep(best_tip_line(duration))) continue;
-    keep(best_tip_line(2.0 * duration));  // with more time another course may be cheaper
+    keep(best_tip_line(2.0 * duration));  // a longer duration may allow a cheaper course
     return;
   }
 }

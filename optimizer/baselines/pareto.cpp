@@ -11,7 +11,7 @@
 namespace sparflow {
 namespace {
 
-constexpr double kVerySlow = 30.0;  // times the shortest: flow losses have vanished
+constexpr double kVerySlow = 30.0;  // multiple of the shortest duration at which flow losses are negligible
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double energy_or_none(const std::vector<StrategyOutcome>& all, const std::string& kind) {
@@ -62,7 +62,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
       anchor = s.shortest_duration;
   }
   if (anchor <= 0.0) {
-    curve.message = "no way tried reaches the goal within the limits at any duration";
+    curve.message = "no kind of motion tried reaches the goal within the limits at any duration";
     return curve;
   }
   for (const auto& [kind, limit] :
@@ -96,7 +96,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     }
     return p;
   };
-  // the fastest motion first: it is where the curve begins
+  // The fastest motion is solved first, because the curve begins there.
   std::vector<StrategyOutcome> first;
   for (const std::string& kind : BaselineSet::kinds()) {
     const double own = baselines.shortest(kind);
@@ -108,7 +108,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   fastest = search.fastest(first);
   double low = fastest.found() ? std::min(anchor, fastest.duration) : anchor;
   if (!problem.duration.fixed()) low = std::max(low, problem.duration.min);
-  // dense where the curve bends, near the shortest time; each optimum starts the next
+  // Points are dense near the shortest duration, where the curve is steep; each optimum starts the next.
   for (int i = options.points - 1; i >= 0 && go_on; --i) {
     const double share = static_cast<double>(i) / std::max(1, options.points - 1);
     ParetoPoint p = evaluate(low * std::pow(options.longest, std::pow(share, 1.4)),
@@ -122,7 +122,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     return curve;
   }
   curve.shortest = curve.points.front().duration;
-  // A slower motion need not cost more: where a shorter time has the cheaper motion, it is driven slower.
+  // Where a shorter duration has the cheaper motion, that motion is driven slower.
   for (std::size_t i = 1; i < curve.points.size() && go_on; ++i) {
     ParetoPoint& p = curve.points[i];
     const StrategyOutcome& before = curve.points[i - 1].optimal;

@@ -1,6 +1,6 @@
 #pragma once
-/// Energy against time: the energy-optimal motion at many durations, each warm started from its neighbours, beside the
-/// best sequential and the best simultaneous motion.
+/// Energy against time: the energy-optimal motion at many durations, each started from its neighbours, with the best
+/// sequential and the best simultaneous motion.
 #include <functional>
 #include <vector>
 
@@ -11,43 +11,44 @@ namespace sparflow {
 struct ParetoPoint {
   double duration = 0.0;      ///< [s]
   StrategyOutcome optimal;    ///< not found below the shortest time
-  double sequential = 0.0;    ///< [J] best one-by-one motion in this time; NaN = none
-  double simultaneous = 0.0;  ///< [J] cheapest straight joint line in this time; NaN = none
+  double sequential = 0.0;    ///< [J] best sequential motion in this duration; NaN = none
+  double simultaneous = 0.0;  ///< [J] cheapest straight joint line in this duration; NaN = none
 };
 
-/// The duration that is best when the engine burns this much meanwhile.
+/// The best duration at an idle power.
 struct IdleChoice {
   double idle_power = 0.0;  ///< [W]
   double duration = 0.0;    ///< [s]
   double energy = 0.0;      ///< [J] of the pump
-  bool at_end = false;      ///< the curve ends there: a longer time may be better
+  bool at_end = false;      ///< true at the curve's longest duration: a longer one may be better
 };
 
 struct ParetoCurve {
-  std::vector<ParetoPoint> points;  ///< by duration; only those with a motion
+  std::vector<ParetoPoint> points;  ///< by increasing duration; only those with a motion
   double shortest = 0.0;            ///< [s] of the fastest motion found
-  double sequential_limit = 0.0;  ///< [J] the best one-by-one motion driven very slowly, NaN = none
+  double sequential_limit = 0.0;  ///< [J] the best sequential motion driven very slowly, NaN = none
   double simultaneous_limit = 0.0;  ///< [J] the cheapest straight joint line driven very slowly
-  double grid_limit = 0.0;          ///< [J] cheapest path of the joint-space grid, unlimited time
+  double grid_limit = 0.0;          ///< [J] cheapest path of the joint grid, unlimited time
   std::vector<IdleChoice> idle;
   std::string message;  ///< why there is no point
 };
 
 struct ParetoOptions {
-  int points = 14;
-  double longest = 6.0;                                           ///< of the shortest time
+  int points = 14;                                                ///< number of durations
+  double longest = 6.0;                                           ///< largest duration, in units of the shortest
   std::vector<double> idle_powers = {1e3, 2e3, 5e3, 10e3, 15e3};  ///< [W]
-  int grid_nodes = 20000;  ///< of the grid for the limit at unlimited time; 0 = not asked
+  int grid_nodes = 20000;  ///< nodes of the joint grid for grid_limit; 0 = not computed
   StrategyOptions strategies;
-  std::function<bool(double, const std::string&)> progress;  ///< share done, what; false interrupts
+  /// Called with the share done and what is being solved; false interrupts.
+  std::function<bool(double, const std::string&)> progress;
 };
 
-/// The fastest motion, then from long times to short ones, each optimum starting the next, then once back: what a
-/// shorter time found, driven slower, must not be cheaper than what the longer one has.
+/// Solves for the fastest motion, then from long to short durations, each optimum starting the next, then once back, so
+/// that no optimum costs more than that of a shorter duration driven slower.
 ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& problem,
                                 const std::vector<SeedMotion>& seeds, const ParetoOptions& options);
 
-/// For each idle power the point with the least energy + idle power x time.
+/// For each idle power [W] the point with the least energy + idle power x time.
 std::vector<IdleChoice> idle_choices(const std::vector<ParetoPoint>& points,
                                      const std::vector<double>& idle_powers);
 

@@ -23,8 +23,8 @@ using Eigen::VectorXd;
 constexpr double kNoCost = std::numeric_limits<double>::infinity();
 constexpr int kFirstStages = 25;  // control points of the first grid
 constexpr double kFirstLineSpacing =
-    0.4;  // of the first grid, in stages: reachable with full speed 2.5 values away
-constexpr double kSameValue = 1e-9;  // [s at full speed] a joint's step that is Newton's rounding
+    0.4;  // spacing of the first grid, in stages: at full speed a joint moves 2.5 values in a stage
+constexpr double kSameValue = 1e-9;  // [s at full speed] a smaller step of a joint is Newton's residual
 constexpr double kFlowMargin =
     2e-3;  // relative, for flows between the knots where limits are judged
 
@@ -55,7 +55,7 @@ MatrixXd spline_controls(const Trajectory& motion) {
   return c;
 }
 
-/// Row of `c` at a share of its rows, linear between them.
+/// Row of `c` at a share (0 to 1) of its rows, interpolated linearly.
 VectorXd row_at(const MatrixXd& c, double share) {
   const double x = share * static_cast<double>(c.rows() - 1);
   const auto k = std::min(static_cast<Eigen::Index>(x), c.rows() - 2);
@@ -63,17 +63,17 @@ VectorXd row_at(const MatrixXd& c, double share) {
   return ((1.0 - rest) * c.row(k) + rest * c.row(k + 1)).transpose();
 }
 
-/// A step from one posture of a stage to one of the next, with the cheapest way to it.
+/// A step from a posture of one stage to one of the next, with the cheapest sequence of steps before it.
 struct LineStep {
   int from = 0, to = 0;
-  int before = -1;         // step of the stage before
-  double total = kNoCost;  // [J] up to and with this step
+  int before = -1;         // index of the step in the stage before
+  double total = kNoCost;  // [J] cost up to this step, included
 };
 
 struct LineFound {
   MatrixXd control;  // empty = no path
   double sum = kNoCost;
-  int stage = 0;  // the last one that was reached
+  int stage = 0;  // last stage that was reached
 };
 
 class LineProgram {
@@ -91,7 +91,7 @@ class LineProgram {
     if (line.size() > 2) known_ = spline_controls(line);
   }
 
-  /// The time law of the motion handed in.
+  /// The time law of the motion given as `line`.
   std::optional<TipLaw> known_law() const {
     const Eigen::Vector3d way = to_ - from_;
     if (known_.rows() == 0 || !(way.squaredNorm() > 0.0)) return std::nullopt;
@@ -107,8 +107,8 @@ class LineProgram {
     return law;
   }
 
-  /// @param spacing of the grid [s at full speed]  @param around control points near which to look, empty = everywhere
-  /// @param reach how far from them [s at full speed]
+  /// @param spacing of the grid [s at full speed]  @param around control points near which to search, empty = everywhere
+  /// @param reach distance from them [s at full speed]
   LineFound solve(const TipLaw& law, int stages, double spacing, const MatrixXd& around,
                   double reach) {
     const double h = duration_ / stages;
@@ -157,8 +157,8 @@ class LineProgram {
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-  /// Largest steps and changes of a step, in seconds at full speed. Values on a grid of some spacing have second
-  /// differences rounded by up to two of it: a coarse grid must not fail for that.
+  /// Sets the largest steps and changes of a step, in seconds at full speed. Grid values round second differences by up
+  /// to two spacings, which is allowed for, so that a coarse grid does not fail.
   void set_limits(double h, double spacing) {
     const VectorXd& scale = postures_.scale();
     const Eigen::Index n = scale.size();
@@ -184,21 +184,21 @@ class LineProgram {
     return true;
   }
 
-  /// Postures of one stage.
+  /// Collects the postures of one stage.
   void place(const Eigen::Vector3d& tip, double time, double spacing, const MatrixXd& around,
              double reach, const std::vector<VectorXd>& before, std::vector<VectorXd>& states) {
     const auto begin = [&](VectorXd z, double far) {
       if (!postures_.project(tip, -1, z)) return;
       if (!postures_.within_range(z)) return;
       for (const VectorXd& s : states) {
-        if ((s - z).norm() < spacing) return;  // its curve has been traced
+        if ((s - z).norm() < spacing) return;  // its self-motion has been traced already
       }
       postures_.trace(tip, z, spacing, far, states);
     };
     if (around.rows() > 0) {
       VectorXd z = postures_.scaled(row_at(around, time));
       begin(z, reach);
-      // at a limit of position, where the line's curvature leads out of it
+      // Near a limit of position the projection can leave the range; then that joint is held at its limit.
       for (Eigen::Index j = 0; states.empty() && j < z.size(); ++j) {
         const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
         for (const double limit : {r.lo, r.hi}) {
@@ -225,11 +225,11 @@ class LineProgram {
     }
   }
 
-  /// Steps from stage k - 1 to k that keep the limits, each with its cheapest way.
+  /// Finds the steps from stage k - 1 to k that keep the limits, each with its cheapest predecessor.
   void extend(std::size_t k, double h, const std::vector<std::vector<VectorXd>>& states,
               std::vector<std::vector<LineStep>>& steps) {
     const std::vector<VectorXd>& here = states[k - 1];
-    std::vector<std::vector<int>> arriving(here.size());  // steps to each posture, cheapest first
+    std::vector<std::vector<int>> arriving(here.size());  // steps that end in each posture, cheapest first
     if (k > 1) {
       const std::vector<LineStep>& before = steps[k - 1];
       for (std::size_t i = 0; i < before.size(); ++i)
@@ -271,7 +271,7 @@ class LineProgram {
     }
   }
 
-  /// [J] of one step, infinite where a limit breaks.
+  /// Energy of one step [J], infinite where a limit is violated.
   double cost(const VectorXd& from, const VectorXd& d, double h) {
     q_ = postures_.joints(from + 0.5 * d);
     qd_ = postures_.joints(d) / h;
@@ -290,7 +290,7 @@ class LineProgram {
     return h * s.power;
   }
 
-  static constexpr double kWholeCurve = 1e3;  // [s at full speed] the whole curve
+  static constexpr double kWholeCurve = 1e3;  // [s at full speed] longer than any self-motion
 
   const MotionProblem& problem_;
   double duration_;
@@ -299,11 +299,11 @@ class LineProgram {
   SelfMotion postures_;
   Eigen::Vector3d from_, to_;
   std::unique_ptr<ClearanceModel> clearance_;
-  MatrixXd known_;  // control points of the motion handed in
+  MatrixXd known_;  // control points of the motion given as `line`
   VectorXd least_step_, most_step_, least_change_, most_change_, q_, qd_;
 };
 
-/// Finer and finer grids around what the one before found.
+/// Solves on a sequence of refined grids, each around the result of the one before.
 PathRedundancy refined_line(const CraneModel& model, const MotionProblem& problem, double duration,
                             LineProgram& program, const TipLaw& law, LineFound coarse,
                             const PathRedundancyOptions& options) {
@@ -312,7 +312,7 @@ PathRedundancy refined_line(const CraneModel& model, const MotionProblem& proble
   double spacing = kFirstLineSpacing * duration / kFirstStages, last = kNoCost;
   int stages = kFirstStages;
   for (int grid = 1; grid < options.most_grids; ++grid) {
-    // values of the grid before stay values of this one: joints that rested may rest
+    // The values of the grid before are values of this one too, so a joint at rest can stay at rest.
     const double reach = 1.4 * spacing;
     spacing /= 3.0;
     stages = std::min(2 * stages, options.intervals);
@@ -362,7 +362,7 @@ std::string path_redundancy_refusal(const MotionProblem& problem) {
   const int redundant = problem.machine.joint_count() - directions;
   if (redundant != 1) {
     return fmt::format(
-        "{} joints move the tip in {} directions: {} redundant joints, this way needs exactly one",
+        "{} joints move the tip in {} directions: {} redundant joints, this method needs exactly one",
         problem.machine.joint_count(), directions, std::max(0, redundant));
   }
   return {};
@@ -400,7 +400,7 @@ PathRedundancy best_redundancy_line(const CraneModel& model, const MotionProblem
   }
   std::sort(order.begin(), order.end());
   for (const auto& [sum, i] : order) {
-    // the best law, and the line's own, which is the one to beat
+    // Refined are the best time law and the line's own, with which the result is compared.
     const bool own = laws[i].table.size() > 0;
     if (result.found() && !own) continue;
     PathRedundancy one =
@@ -411,7 +411,7 @@ PathRedundancy best_redundancy_line(const CraneModel& model, const MotionProblem
     }
     if (!result.found() || one.energy.total < result.energy.total) result = std::move(one);
   }
-  // the line handed in is one of the choices even where the grids miss it, at the limits' edge
+  // `line` itself is a candidate too, because the grids can miss it at the edge of a limit.
   if (line.size() > 2) {
     const double energy = exact_total_energy(model, line, problem.payload, options.refine);
     if (result.found() && result.energy.total <= energy) return result;

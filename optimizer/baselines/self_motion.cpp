@@ -12,11 +12,11 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double kProjectionError = 1e-11;  // [m] at which Newton's method stops
-constexpr int kMostTraceSteps = 4000;       // of a trace, either way
+constexpr int kMostTraceSteps = 4000;       // largest number of steps of a trace in one direction
 constexpr double kTraceShare =
-    0.6;  // of the grid's spacing: no value of a joint is stepped over twice
+    0.6;  // step as share of the grid's spacing, so that a step passes at most one value of a joint
 constexpr Eigen::Index kMostTracedJoints =
-    4;  // joints: three directions of the tip and the redundant one
+    4;  // three directions of the tip and one redundant joint
 
 using SquareSystem = std::array<std::array<double, kMostTracedJoints + 1>, kMostTracedJoints>;
 
@@ -52,7 +52,7 @@ SelfMotion::SelfMotion(const MotionProblem& problem)
     hi_[j] = r.hi / scale_[j];
   }
   origin_ = scaled(problem.start);
-  // directions square to the fixed ones: Gram-Schmidt over the axes
+  // The directions perpendicular to the fixed ones are found by Gram-Schmidt over the axes.
   const std::vector<Eigen::Vector3d> fixed = fixed_tip_directions(problem.machine);
   std::vector<Eigen::Vector3d> all = fixed;
   for (int axis = 0; axis < 3 && all.size() < 3; ++axis) {
@@ -92,7 +92,7 @@ void SelfMotion::derivative(const VectorXd& z) {
 }
 
 VectorXd SelfMotion::tangent() const {
-  // component j is the minor without column j: its sign is continuous along the curve
+  // Component j is the minor without column j, whose sign is continuous along the curve.
   const Eigen::Index n = scale_.size(), m = n - 1;
   VectorXd t(n);
   const auto at = [&](Eigen::Index row, Eigen::Index left_out, Eigen::Index c) {
@@ -137,7 +137,7 @@ bool SelfMotion::project(const Eigen::Vector3d& tip, int held, VectorXd& z) {
     }
     if (!eliminate_square(a, n)) return false;
     for (std::size_t j = 0; j < n; ++j) {
-      if (static_cast<int>(j) == held) continue;  // to the last bit
+      if (static_cast<int>(j) == held) continue;  // its value stays bitwise equal
       z[static_cast<Eigen::Index>(j)] += a[j][n];
     }
     if (!z.allFinite()) return false;
@@ -169,7 +169,7 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
         const double cell = std::floor((z[j] - origin_[j]) / spacing),
                      other = std::floor((next[j] - origin_[j]) / spacing);
         const auto between = [&](double value) {
-          if (value == z[j]) return;  // has its sample
+          if (value == z[j]) return;  // this value has been sampled
           const double share = (value - z[j]) / (next[j] - z[j]);
           sample_at(z + share * (next - z), j, value);
         };
@@ -181,7 +181,7 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
       derivative(next);
       VectorXd turn = tangent();
       if (turn.dot(direction) < 0.0) turn = -turn;
-      // once round a closed curve
+      // The trace of a closed curve ends where it began.
       if (i > 4 && (next - from).norm() < 0.5 * step) break;
       direction = turn;
       z = next;

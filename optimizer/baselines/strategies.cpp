@@ -14,7 +14,7 @@
 namespace sparflow {
 namespace {
 
-/// Pressures of the pumps on the way.
+/// Sets peak and mean pressures of the pumps.
 void add_pump_pressures(const CraneModel& model, double payload, StrategyOutcome& outcome) {
   const std::size_t pumps = model.pumps.size();
   outcome.peak_pressure.assign(pumps, 0.0);
@@ -92,18 +92,18 @@ OptimumSearch::OptimumSearch(const CraneModel& model, const MotionProblem& probl
 std::vector<SeedMotion> OptimumSearch::starts_from(const std::vector<StrategyOutcome>& known,
                                                    bool thorough) const {
   std::vector<SeedMotion> from;
-  // first, because the first starts are the ones solved through the smooth law too
+  // Seeds come first, because the first starts are also solved with the smooth law.
   for (std::size_t i = 0;
        thorough && i < std::min(seeds_.size(), static_cast<std::size_t>(options_.smooth_seeds));
        ++i)
     from.push_back(seeds_[i]);
   for (const StrategyOutcome& o : known) {
-    // cylinder strokes in proportion differ little from joints in proportion: one of them is enough to start from
+    // Strokes in proportion differ little from joints in proportion, so one of them is enough as start.
     if (o.found() && o.kind != kActuatorLine)
       from.push_back({o.detail.empty() ? o.kind : o.kind + " (" + o.detail + ")", o.motion,
                       o.shortest, false});
   }
-  // the last optima driven faster or slower: an overlap may be what a shorter time needs
+  // The last optima are driven faster or slower, because a shorter duration may need their overlaps.
   for (std::size_t i = 0; i < std::min<std::size_t>(2, earlier_.size()); ++i)
     from.push_back(earlier_[earlier_.size() - 1 - i]);
   return from;
@@ -292,7 +292,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
   };
   const double anchor = out.shortest > 0.0 ? out.shortest : 1.0;
   if (options.equal_time) {
-    // where time is free, all ways get what the problem allows up to twice the shortest
+    // With a free duration all strategies get twice the shortest one, within the problem's range.
     const double duration =
         problem.duration.fixed()
             ? problem.duration.min
@@ -307,7 +307,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
     const StrategyRow& row = out.rows.back();
     if (!row.outcomes.back().found()) out.message = row.outcomes.back().why;
   }
-  // long times first: each optimum starts the next, and an overlap is found by squeezing
+  // Long durations come first: each optimum starts the next, and overlaps appear as the duration is shortened.
   std::vector<double> factors = options.factors;
   std::sort(factors.rbegin(), factors.rend());
   for (const double factor : factors) {
@@ -335,7 +335,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
     out.rows.push_back(std::move(row));
   }
   if (out.shortest <= 0.0 && out.message.empty())
-    out.message = "no way tried reaches the goal within the limits at any duration";
+    out.message = "no kind of motion tried reaches the goal within the limits at any duration";
   out.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

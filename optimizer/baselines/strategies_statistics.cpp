@@ -26,7 +26,7 @@ SignedRank signed_rank_test(const std::vector<double>& differences) {
   test.n = static_cast<int>(n);
   if (n == 0) return test;
   std::sort(d.begin(), d.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  // twice the rank, so that shared ranks are whole numbers
+  // Twice the rank is used, so that mean ranks are whole numbers.
   std::vector<int> rank(n);
   double ties = 0.0;
   for (std::size_t i = 0; i < n;) {
@@ -46,7 +46,7 @@ SignedRank signed_rank_test(const std::vector<double>& differences) {
   test.w_minus = 0.5 * (total - plus);
   constexpr std::size_t kExactUpTo = 60;
   if (n <= kExactUpTo) {
-    // probability of each sum when every sign is a fair coin
+    // Probability of each sum when both signs are equally likely.
     std::vector<double> chance(static_cast<std::size_t>(total) + 1, 0.0);
     chance[0] = 1.0;
     for (const int r : rank) {

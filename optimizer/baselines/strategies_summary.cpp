@@ -26,7 +26,7 @@ PairedSummary paired(const std::vector<StrategyComparison>& all, const std::stri
     if (has_one && !has_other) ++s.only_kind;
     if (!has_one && has_other) ++s.only_against;
     if (!has_one || !has_other) continue;
-    // at equal times idling is the same for both
+    // At equal durations idling is the same for both.
     const double idle = r->duration > 0.0 ? 0.0 : c.idle_power;
     const double a = cost_with_idling(*one, idle), b = cost_with_idling(*other, idle);
     if (!(b > 0.0)) continue;

@@ -1,5 +1,5 @@
 #pragma once
-/// What a set of comparisons says: by how much each way is dearer than the optimum, and whether that is chance.
+/// Summary of several comparisons: excess cost of each strategy over the optimum, and its significance.
 #include <string>
 #include <vector>
 
@@ -8,14 +8,14 @@
 
 namespace sparflow {
 
-/// One way against another over all problems in which both keep the limits.
+/// One strategy against another over all problems in which both keep the limits.
 struct PairedSummary {
   std::string kind, against;
   int n = 0;             ///< problems in which both were found
-  int only_kind = 0;     ///< in which only `kind` was
-  int only_against = 0;  ///< in which only the other was
-  int cheaper = 0;       ///< in which `kind` is cheaper by more than 0.1 %
-  int dearer = 0;        ///< in which it is dearer by more than 0.1 %
+  int only_kind = 0;     ///< problems in which only `kind` was found
+  int only_against = 0;  ///< problems in which only `against` was found
+  int cheaper = 0;       ///< problems in which `kind` is cheaper by more than 0.1 %
+  int dearer = 0;        ///< problems in which `kind` costs more by more than 0.1 %
   double median = 0.0;   ///< [-] of cost / other cost - 1
   double lower = 0.0;    ///< [-] first quartile
   double upper = 0.0;    ///< [-] third quartile
@@ -24,10 +24,11 @@ struct PairedSummary {
   SignedRank test;       ///< of the differences of cost
 };
 
-/// Pump energy and what the engine idles meanwhile [J].
+/// Pump energy and idle power times duration [J].
 double cost_with_idling(const StrategyOutcome& outcome, double idle_power);
 
-/// @param row "equal", "own" or the name of a factor's row. Equal times: energies; own times: with idling
+/// @param row "equal", "own" or the name of a factor's row. Energies are compared at equal durations, costs with idling at
+/// own durations.
 PairedSummary paired(const std::vector<StrategyComparison>& all, const std::string& row,
                      const std::string& kind, const std::string& against);
 

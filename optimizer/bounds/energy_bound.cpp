@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Largest ratio of the potential's slope to the price it must not exceed, at random postures.
+/// Largest ratio of the potential's slope to the price it must not exceed, over random postures.
 double largest_slope_ratio(const MotionProblem& problem, const EnergyPotential& potential,
                            MoveWeights& weights, int samples) {
   std::mt19937_64 random(1);
@@ -59,7 +59,7 @@ std::string no_bound_reason(const CraneModel& model, const MotionProblem& proble
                        most_joints);
   }
   if (const std::string names = acting_effects(model); !names.empty()) {
-    return "no bound: not proven with effects along the chain (" + names + ")";
+    return "no bound: its inequality does not cover effects along the chain (" + names + ")";
   }
   for (int j = 0; j < n; ++j) {
     const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
@@ -91,7 +91,7 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
   for (const VectorXd& lines : potential.lattice().lines) {
     bound.lines.push_back(static_cast<int>(lines.size()));
   }
-  // The allowances are estimates from the grid itself; here their effect is tested where the grid did not look.
+  // The allowances are estimated from the grid's own nodes, so the inequality is sampled away from the nodes.
   constexpr int kSamples = 4000;
   const double ratio = largest_slope_ratio(problem, potential, weights, kSamples);
   if (ratio > 1.0) {

@@ -1,11 +1,15 @@
 #pragma once
-/// A certified lower bound of the energy of every motion from the start to the goal, whatever its time, its path and what
-/// moves together, under the quasi-static law of the model (pump = max(standby, demands), rest costs nothing). Proof,
-/// figures and what is left out: docs/energy_bound.md.
+/// Estimated lower bound of the energy of every motion from the start to the goal, whatever its duration, its path and
+/// which cylinders move together, under the quasi-static law of the model (pump = max(standby, demands), a cylinder at
+/// rest costs nothing). Derivation, figures and what is left out: docs/energy_bound.md.
 ///
-/// In short: max_i(d_i) sum Q_i >= sum d_i Q_i, so power >= sum_j W_j(q, sign) |dq_j/dt| with W_j the least price of moving
-/// joint j alone. A potential with -W_j- <= d phi/d q_j <= W_j+ everywhere then gives E >= phi(end) - phi(start). It is
-/// built on a grid from the start outwards with edge costs that stay below the weights, and interpolated.
+/// max_i(d_i) sum Q_i >= sum d_i Q_i, so power >= sum_j W_j(q, sign) |dq_j/dt| with W_j the least price of moving joint j
+/// alone. A potential with -W_j- <= d phi/d q_j <= W_j+ everywhere then gives E >= phi(end) - phi(start). It is built on
+/// a grid from the start outwards with edge costs below the weights, and interpolated.
+///
+/// These steps are proven. That the weights hold inside the cells is not: allowances are estimated from second
+/// differences, and |d phi/d q_j| <= W_j is tested at random postures only; rounding is not enclosed. So the result is
+/// an estimated bound, not a proven one.
 #include <string>
 #include <vector>
 
@@ -15,9 +19,9 @@
 namespace sparflow {
 
 struct EnergyBoundOptions {
-  long nodes = 250000;          ///< of the grid, about
-  int most_joints = 4;          ///< beyond, no bound
-  double goal_accuracy = 2e-4;  ///< relative, of the least potential over the goal set
+  long nodes = 250000;          ///< approximate number of grid nodes
+  int most_joints = 4;          ///< a machine with more joints gets no bound
+  double goal_accuracy = 2e-4;  ///< relative accuracy of the least potential over the goal set
 };
 
 struct EnergyBound {
@@ -25,18 +29,18 @@ struct EnergyBound {
   std::string message;
   double lower_bound_J = 0.0;  ///< idle power not included
   Eigen::VectorXd end;  ///< posture at the goal where the potential is (nearly) least [rad] or [m]
-  std::vector<int> lines;  ///< of the grid, by joint
+  std::vector<int> lines;  ///< number of grid lines by joint
   double checked_scale =
-      1.0;  ///< factor <= 1 the potential was multiplied by after its inequality was tested
+      1.0;  ///< factor <= 1 on the potential, by which its inequality holds at all sampled postures
   double seconds = 0.0;  ///< wall time
 };
 
-/// Obstacles, the tip line, speeds and times are left out: without them motions can only be cheaper.
-/// @param model without effects that act along the chain (machine effects are in): else there is no bound
+/// Obstacles, the tip line, and limits of speed and time are left out: without them motions can only be cheaper.
+/// @param model a model with effects that act along the chain gets no bound; effects on the machine are included
 EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
                          const EnergyBoundOptions& options = {});
 
-/// Why there can be no bound, empty when there can.
+/// Sentence that says why there can be no bound; empty when there can be one.
 std::string no_bound_reason(const CraneModel& model, const MotionProblem& problem, int most_joints);
 
 }  // namespace sparflow

@@ -12,16 +12,16 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// How far from the goal a tip still counts as there (the check of a motion's end). [m]
+/// Distance from the goal within which a tip counts as there, as in the check of a motion's end. [m]
 constexpr double kAtGoal = 1e-5;
 
-/// Tells whether the tip can be at the goal anywhere in a box.
+/// Decides whether the tip can be at the goal anywhere in a box.
 class TipBoxes {
  public:
   TipBoxes(const MotionProblem& problem, const Machine& machine)
       : machine_(machine), goal_(std::get<TipGoal>(problem.goal).tip), chain_(machine) {
     const int n = machine.joint_count();
-    // furthest the tip can be from each joint
+    // reach_ is the largest distance of the tip from each joint.
     reach_.setZero(n);
     double beyond = machine.tip.xyz.norm();
     for (int j = n - 1; j >= 0; --j) {
@@ -42,7 +42,8 @@ class TipBoxes {
     const Eigen::Vector3d tip = chain_.point(machine_.tip.joint, machine_.tip.xyz);
     const Eigen::Index n = middle.size();
     Eigen::Matrix3Xd jacobian(3, n);
-    // second-order rest: |d2p/dq_i dq_k| is at most the outer joint's reach, and zero with a prismatic inner one
+    // In the second-order remainder |d2p/dq_i dq_k| is at most the outer joint's reach, and zero when the inner joint is
+    // prismatic.
     double rest = 0.0;
     for (Eigen::Index k = 0; k < n; ++k) {
       jacobian.col(k) = point_jacobian(chain_, machine_.tip.joint, tip, static_cast<int>(k));
@@ -57,7 +58,7 @@ class TipBoxes {
     const Eigen::MatrixXd scaled = moves * half.asDiagonal();
     if (((error.cwiseAbs() - scaled.cwiseAbs().rowwise().sum()).array() > slack).any())
       return false;
-    // the same seen along each joint's own direction, which the box is aligned with
+    // The same test in joint coordinates is sharper where the tip's directions are oblique to the box.
     const Eigen::MatrixXd gram = scaled * scaled.transpose();
     const double small = 1e-12 * gram.trace() + 1e-300;
     const Eigen::MatrixXd back =
@@ -71,7 +72,7 @@ class TipBoxes {
     return true;
   }
 
-  /// Most the tip moves along one side of the box. [m]
+  /// Largest travel of the tip along one side of the box. [m]
   double side(int joint, double half) const { return 2.0 * reach_[joint] * half; }
 
  private:
@@ -103,7 +104,7 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
   const Lattice& lattice = potential.lattice();
   const int n = lattice.joints();
   std::priority_queue<PostureBox, std::vector<PostureBox>, std::greater<>> open;
-  /// Least and the sides along which the potential varies most, over the corners of a box within one cell.
+  /// Sets a box's least potential and, by joint, the variation along its sides from its corners; the box lies in one cell.
   VectorXd variation(n), corner(n);
   std::vector<double> values(1u << n);
   const auto survey = [&](PostureBox& box) {
@@ -121,7 +122,7 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
       }
     }
   };
-  // cells that can hold the goal, by halving ranges of lines
+  // Cells that can hold the goal are found by halving ranges of grid lines.
   struct Block {
     std::vector<int> from, to;
   };
@@ -190,7 +191,7 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
       survey(part);
       open.push(std::move(part));
     }
-    if (open.empty()) {  // what is left by rounding alone
+    if (open.empty()) {  // the last box passed its test by rounding alone
       result.reachable = false;
       return result;
     }

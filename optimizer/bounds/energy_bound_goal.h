@@ -1,21 +1,21 @@
 #pragma once
-/// Least value of a grid potential over the goal set, from below.
+/// Lower bound of a grid potential over the goal set.
 #include "optimizer/bounds/energy_bound_potential.h"
 
 namespace sparflow {
 
 struct LeastOnGoal {
   bool reachable = false;  ///< false: no box of the grid can hold a posture at the goal
-  double lower = 0.0;      ///< never above the least value over all postures at the goal [J]
-  Eigen::VectorXd q;       ///< middle of the box that held it
-  long boxes = 0;          ///< examined
+  double lower = 0.0;      ///< at most the least value over all postures at the goal, rounding aside [J]
+  Eigen::VectorXd q;       ///< middle of the box with that value
+  long boxes = 0;          ///< number of boxes examined
 };
 
-/// Best-first branch and bound over boxes of postures: within a cell the interpolated potential is least at a corner; a
-/// box is dropped when the tip, linear from its middle plus a bound of the rest, cannot be at the goal. Works for goal
-/// sets of any dimension.
-/// @param accuracy relative, and  @param tip_accuracy how finely the goal set is followed [m]; the answer is a bound
-/// whatever they are
+/// Best-first branch and bound over boxes of postures. Within a cell the interpolated potential is least at a corner; a
+/// box is dropped when the tip, linearised at the box's middle with a bound of the second-order remainder, cannot be at
+/// the goal. The goal set may have any dimension.
+/// @param accuracy relative accuracy of the value  @param tip_accuracy how finely the goal set is resolved [m]; both
+/// change how close the answer is, not that it lies below
 LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
                           const EnergyPotential& potential, double accuracy,
                           double tip_accuracy = 2e-3);

@@ -14,10 +14,10 @@ using Eigen::VectorXd;
 
 std::size_t ix(long i) { return static_cast<std::size_t>(i); }
 
-/// Share of the largest rate below which a cylinder's length is no coordinate (dead centre).
+/// Share of the largest rate dx/dq below which a cylinder's length is not used as coordinate (near its dead centre).
 constexpr double kLeastRate = 0.15;
 
-/// The largest of each node's own and its neighbours' values along one axis.
+/// Replaces each node's value by the largest of it and its two neighbours along one axis.
 void widen(const Lattice& lattice, int joint, std::vector<float>& field) {
   const long stride = lattice.stride[ix(joint)];
   const long lines = lattice.lines[ix(joint)].size();
@@ -29,30 +29,30 @@ void widen(const Lattice& lattice, int joint, std::vector<float>& field) {
   }
 }
 
-/// The prices are divided by m, which is straight between lines where the prices' mean is curved: what is divided can be
-/// lower inside an edge than at both its ends. Factor <= 1 by edge that covers it, from the second differences of m with
-/// the same fourfold safety.
+/// Factor <= 1 by edge for the error of m. The prices are divided by m, which is linear between lines although the
+/// prices' mean is curved, so the quotient can be lower inside an edge than at both its ends. The factor is estimated
+/// from the second differences of m, with the same fourfold margin as the allowances of edge_costs().
 VectorXd chord_factors(const AxisCoordinate& axis) {
   const Eigen::Index lines = axis.x.size();
-  VectorXd bend = VectorXd::Zero(lines);
+  VectorXd curve = VectorXd::Zero(lines);
   for (Eigen::Index k = 1; k + 1 < lines; ++k) {
     const double a = axis.x[k] - axis.x[k - 1], b = axis.x[k + 1] - axis.x[k];
     const double second =
         2.0 * ((axis.m[k + 1] - axis.m[k]) / b - (axis.m[k] - axis.m[k - 1]) / a) / (a + b);
-    bend[k] = 0.5 * std::max(a, b) * std::max(a, b) * std::max(0.0, second) / axis.m[k];
+    curve[k] = 0.5 * std::max(a, b) * std::max(a, b) * std::max(0.0, second) / axis.m[k];
   }
-  if (lines >= 4) {  // towards the ends of the axis it may still grow
+  if (lines >= 4) {  // the ends of the axis have no second difference: theirs is extrapolated
     const auto grown = [](double next, double after) {
       return next * (after > 0.0 ? std::clamp(next / after, 1.0, 3.0) : 1.0);
     };
-    bend[0] = grown(bend[1], bend[2]);
-    bend[lines - 1] = grown(bend[lines - 2], bend[lines - 3]);
+    curve[0] = grown(curve[1], curve[2]);
+    curve[lines - 1] = grown(curve[lines - 2], curve[lines - 3]);
   }
   VectorXd keep(lines - 1);
   for (Eigen::Index k = 0; k + 1 < lines; ++k) {
-    double worst = std::max(bend[k], bend[k + 1]);
-    if (k > 0) worst = std::max(worst, bend[k - 1]);
-    if (k + 2 < lines) worst = std::max(worst, bend[k + 2]);
+    double worst = std::max(curve[k], curve[k + 1]);
+    if (k > 0) worst = std::max(worst, curve[k - 1]);
+    if (k + 2 < lines) worst = std::max(worst, curve[k + 2]);
     keep[k] = std::max(0.0, 1.0 - worst);
   }
   return keep;
@@ -113,10 +113,10 @@ std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, cons
   std::vector<double> lines(n);
   for (std::size_t j = 0; j < n; ++j) {
     const bool varies = losses[j][0] > 1e-9 || losses[j][1] > 1e-9;
-    // two cells suffice along an axis that changes no price; else curvature must be seen
+    // Two cells suffice along an axis that changes no price; on others second differences must be computable.
     lines[j] = varies ? 7.0 : 3.0;
   }
-  const auto gain = [&](std::size_t j) {  // what 1 % more lines saves
+  const auto gain = [&](std::size_t j) {  // loss that 1 % more lines saves
     const double ratio = static_cast<double>(coarse.lines[j].size() - 1) / (lines[j] - 1.0);
     return losses[j][0] * ratio + 2.0 * losses[j][1] * ratio * ratio;
   };
@@ -170,8 +170,7 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
   for (int j = 0; j < n; ++j) {
     const VectorXd& lines = lattice_.lines[ix(j)];
     AxisCoordinate& axis = axes_[ix(j)];
-    // the coordinate's x
-    int own = 0;
+    int own = 0;  // number of cylinders that drive this joint
     for (const CylinderDemand& d : weights.demands()) {
       if (d.joint != j) continue;
       ++own;
@@ -187,7 +186,7 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
                                : VectorXd((forces.length[ix(axis.cylinder)].array() -
                                            forces.length[ix(axis.cylinder)][0])
                                               .abs());
-    // prices per unit of x, and their mean along the axis
+    // From here on the field holds prices per unit of x; m is their mean along the axis.
     std::array<std::vector<float>, 2>& field = cost_[ix(j)];
     VectorXd sum = VectorXd::Zero(lines.size());
     for (long node = 0; node < lattice_.nodes; ++node) {
@@ -213,7 +212,7 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
   for (int j = 0; j < n; ++j) {
     losses_[ix(j)][1] += (1.0 - chord_factors(axes_[ix(j)]).array()).mean();
     for (const int direction : {0, 1}) edge_costs(j, cost_[ix(j)][ix(direction)]);
-    // a cylinder at its dead centre within an edge costs nothing there
+    // A cylinder that passes its dead centre within an edge can have price zero there.
     for (std::size_t c = 0; c < cylinders; ++c) {
       if (machine_->cylinders[c].joint != j) continue;
       const VectorXd& r = forces.rate[c];
@@ -229,9 +228,9 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
 
 void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
   const int n = lattice_.joints();
-  // What linear interpolation along each axis can be above the price: h^2/8 times a smooth second derivative; at a kink
-  // (standby, tabulated least demand) half the larger of the second differences of the cell's nodes times h^2. The
-  // latter is four times the former, so it serves both.
+  // The allowance covers what linear interpolation along each axis can exceed the price by: h^2/8 times a smooth second
+  // derivative; at a kink (standby, tabulated least demand) half the larger of the second differences of the cell's
+  // nodes times h^2. The latter is four times the former, so it is used for both.
   constexpr double kShare = 0.5;
   std::vector<float> allowance(ix(lattice_.nodes), 0.0F);
   for (int k = 0; k < n; ++k) {
@@ -251,7 +250,7 @@ void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
       along[ix(node)] = static_cast<float>(off);
       if (f > 0.0) total += off / f;
     }
-    if (lines >= 4) {  // towards the ends of the axis it may still grow
+    if (lines >= 4) {  // the ends of the axis have no second difference: theirs is extrapolated
       for (long node = 0; node < lattice_.nodes; ++node) {
         const long line = node / stride % lines;
         if (line > 0 && line + 1 < lines) continue;
@@ -288,7 +287,7 @@ void EnergyPotential::solve(long start) {
   phi_.assign(ix(lattice_.nodes), std::numeric_limits<double>::infinity());
   phi_[ix(start)] = 0.0;
   const unsigned orders = 1u << lattice_.joints();
-  // sweeps in all orders until none finds a shorter way: then every edge's inequality holds
+  // Once sweeps in all orders find no shorter path, the inequality holds on every edge.
   for (unsigned quiet = 0, order = 0; quiet < orders; order = (order + 1) % orders) {
     quiet = sweep(order) ? 0 : quiet + 1;
   }
@@ -378,7 +377,7 @@ void EnergyPotential::over_corners(const VectorXd& q, const Function& function) 
   const int n = lattice_.joints();
   long base = 0;
   std::array<double, 8> share{};
-  SPARFLOW_CHECK(n <= 8, "a grid has few joints");
+  SPARFLOW_CHECK(n <= 8, "a grid has at most eight joints");
   for (int j = 0; j < n; ++j) {
     const int cell = cell_of(j, q[j]);
     const VectorXd& u = axes_[ix(j)].u;

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// A grid with its forces, on which potentials for different shares are built.
+/// A grid with its forces, on which the potentials for different shares are built.
 struct TimedGrid {
   Lattice lattice;
   LatticeForces forces;
@@ -39,7 +39,7 @@ class TimedSearch {
 
   bool possible() const { return weights_->possible(); }
 
-  /// @param moves by joint: net way to the goal [rad] or [m], to know which directions need a share of the time
+  /// @param moves net travel to the goal by joint [rad] or [m], from which the directions that need a share follow
   TimedBound run(const VectorXd& moves, double price) {
     shares_.energy_weight = energy_weight_;
     shares_.share = Eigen::MatrixX2d::Zero(n_, 2);
@@ -62,12 +62,12 @@ class TimedSearch {
     x = best_shares(small, x, options_.evaluations, std::log(4.0));
     TimedBound bound;
     bound.value = -1.0;
-    for (const Found& found :
-         along_the_way(small, x)) {  // the small grid's best need not be the fine one's
+    // The best shares on the small grid need not be the best on the fine one, so all candidates are evaluated there.
+    for (const Found& found : posture_shares(small, x)) {
       base_ = found.base;
       set(found.x);
       const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
-      TimedBound one = certified(
+      TimedBound one = bound_on(
           grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
       if (one.value > bound.value) bound = std::move(one);
     }
@@ -86,23 +86,23 @@ class TimedSearch {
   }
 
   struct Found {
-    Eigen::MatrixX2d base;  ///< what the shares of x stand beside
+    Eigen::MatrixX2d base;  ///< shares that those of x multiply
     VectorXd x;
   };
 
-  /// Shares that change along the way: searched on from those of dynamic programming and, where those are not better to
-  /// begin with, from constant ones too. @param x constant shares and the price
-  std::vector<Found> along_the_way(const TimedGrid& g, const VectorXd& x) {
+  /// Shares that change with the posture, found by a search from those of dynamic programming and, where those do not
+  /// begin better, from constant ones too. @param x constant shares and the price
+  std::vector<Found> posture_shares(const TimedGrid& g, const VectorXd& x) {
     const double constant = objective(g, x), price = shares_.price;
-    constexpr double kHaste = 0.01;  // with less the slow bound is as good
-    if (energy_weight_ > 0.0 && price * duration_ < kHaste * constant) return {{base_, x}};
+    constexpr double kShortTime = 0.01;  // below this share the bound of unlimited time is as good
+    if (energy_weight_ > 0.0 && price * duration_ < kShortTime * constant) return {{base_, x}};
     TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
     double guide_price = price;
     if (energy_weight_ > 0.0) {  // the price at which the guide's own bound is the largest
       double best = guide.solve(price) - price * duration_;
       for (const double factor : {1.6, 1.0 / 1.6}) {
         const double before = best;
-        constexpr int kMost = 4;  // on so coarse a grid the shortest time may be longer than this
+        constexpr int kMost = 4;  // the guide's shortest time may exceed the duration: no price is best then
         for (int k = 0; k < kMost; ++k) {
           const double next = guide_price * factor, value = guide.solve(next) - next * duration_;
           if (!(value > best)) break;
@@ -137,11 +137,11 @@ class TimedSearch {
 
   int guide_cells() const { return n_ == 1 ? 60 : n_ == 2 ? 40 : n_ == 3 ? 10 : 5; }
 
-  /// x = logarithms of the shares (beside base_) and of the price, and the tilts column by column, if any.
+  /// Sets the shares from x: logarithms of the factors on base_ and of the price, then the tilts column by column, if any.
   void set(const VectorXd& x) {
     shares_.price = energy_weight_ > 0.0 ? std::exp(x[n_]) : 1.0;
     const double top = x.head(n_).maxCoeff();
-    constexpr double kLeastLog = -6.0;  // of a share: less is none
+    constexpr double kLeastLog = -6.0;  // a smaller share has no influence
     shares_.share =
         (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * base_;
     shares_.tilt.resize(0, 0);
@@ -149,7 +149,7 @@ class TimedSearch {
     weights_->set_shares(shares_);
   }
 
-  /// Entries of x that mean something.
+  /// Entries of x that the bound depends on.
   std::vector<Eigen::Index> free_entries(const VectorXd& x) const {
     std::vector<Eigen::Index> free;
     free.reserve(static_cast<std::size_t>(x.size()));
@@ -169,23 +169,24 @@ class TimedSearch {
     return value_of(least.lower, shares_.price);
   }
 
-  /// The bound from the least potential over the goal when no gain exceeds `price`. Near the ends of a motion speeds are
-  /// small and so are gains: at most ramp_gain t. What the constant price charges too much there is given back.
+  /// The bound from the least potential over the goal when the maximised Hamiltonian nowhere exceeds `price`. Near the
+  /// ends of a motion speeds are small, and the Hamiltonian is at most ramp_gain t; the part of the constant price above
+  /// that is subtracted from what the price of time costs.
   double value_of(double least, double price) const {
     constexpr double kBetweenNodes = 1.02;
     price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
-    const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until a motion can gain the price
+    const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until the Hamiltonian can reach the price
     if (energy_weight_ > 0.0) {
       return least - price * std::max(duration_ - time, 0.5 * duration_);
     }
-    // all of a short motion may be ramps: then least <= ramp T^2 / 4
+    // A short motion may consist of ramps alone: then least <= ramp T^2 / 4.
     const double cruise = least / price;
     return time <= cruise ? cruise + time : 2.0 * std::sqrt(cruise * time);
   }
 
-  /// Compass search along the coordinates and, since the objective has ridges across them, along turned axes in turn; the
-  /// step is halved when neither helps.
+  /// Compass search, alternately along the coordinates and along random orthonormal axes, since the objective has ridges
+  /// oblique to the coordinates. The step is halved when neither improves the bound.
   VectorXd best_shares(const TimedGrid& g, VectorXd x, int evaluations, double step) {
     const std::vector<Eigen::Index> free = free_entries(x);
     const auto count = static_cast<Eigen::Index>(free.size());
@@ -197,7 +198,7 @@ class TimedSearch {
       Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(count, count);
       if (round % 2 == 1) {
         for (double& entry : axes.reshaped()) entry = normal(random);
-        axes = span_of(axes);  // orthonormal
+        axes = span_of(axes);  // orthonormalised
       }
       bool any = false;
       for (Eigen::Index k = count; k-- > 0;) {
@@ -224,7 +225,8 @@ class TimedSearch {
     return x;
   }
 
-  TimedBound certified(const TimedGrid& g) {
+  /// The bound of the current shares on a grid, with its inequality tested at random postures.
+  TimedBound bound_on(const TimedGrid& g) {
     TimedBound bound;
     EnergyPotential potential(*loaded_, problem_, *weights_, g.lattice, g.forces);
     for (const VectorXd& lines : g.lattice.lines) {
@@ -234,8 +236,8 @@ class TimedSearch {
     const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kAccuracy);
     bound.valid = least.reachable;
     if (!least.reachable) bound.message = "no posture within the limits puts the tip at its goal";
-    // The inequality, tested where the grid did not look: if it fails by a little, a price that covers it is charged, or
-    // the potential is scaled (the gain is convex and zero at zero), whichever costs less.
+    // The inequality is sampled away from the nodes. Where it fails, either the price is raised to the largest value met
+    // or the potential is scaled down (the Hamiltonian is convex in the slopes and zero at zero), whichever costs less.
     const double price = shares_.price, gain = std::max(price, largest_gain(potential));
     bound.checked_scale = price / gain;
     const double charged = value_of(least.lower, gain);
@@ -259,7 +261,7 @@ class TimedSearch {
         q[j] = r.lo + (r.hi - r.lo) * share(random);
       }
       worst = std::max(worst, weights_->largest_gain(q, potential.gradient(q)));
-      weights_->at(q, price);  // ramp_gain() sees this posture, too
+      weights_->at(q, price);  // so that ramp_gain() includes this posture
     }
     return worst;
   }
@@ -286,7 +288,7 @@ TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem
     bound.message = "no bound: a joint's cylinders are fed by different pumps";
     return bound;
   }
-  // A motion that is cheap at this duration tells the directions and the size of the price.
+  // A cheap motion of this duration gives the directions of the joints and the magnitude of the price.
   MotionProblem open = problem;
   open.tip_line.reset();
   EnergyGrid grid(model, open, {8000, options.most_joints});
@@ -314,7 +316,7 @@ TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem
   unlimited.nodes = options.nodes;
   unlimited.most_joints = options.most_joints;
   const EnergyBound slow = energy_bound(model, problem, unlimited);
-  if (slow.valid && slow.lower_bound_J > bound.value) {  // time is no matter at this duration
+  if (slow.valid && slow.lower_bound_J > bound.value) {  // this duration raises no motion's energy
     bound.value = slow.lower_bound_J;
     bound.price_W = 0.0;
     bound.shares.setZero();

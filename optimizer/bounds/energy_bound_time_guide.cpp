@@ -21,7 +21,7 @@ EnergyPotential empty_potential(const Machine& loaded, const MotionProblem& prob
   return {loaded, problem, weights, lattice, lattice_forces(loaded, lattice, problem.payload)};
 }
 
-/// Sums of a weighted straight fit of a logarithm over the posture.
+/// Normal equations of a weighted linear fit of a logarithm over the posture.
 struct LogFit {
   Eigen::MatrixXd square;
   VectorXd right;
@@ -35,7 +35,7 @@ struct LogFit {
     right += w * log_share * row;
     weight += w;
   }
-  /// Value in the middle of the ranges, then slopes; those that the way does not tell stay small.
+  /// Value in the middle of the ranges, then slopes; a ridge keeps slopes small that the way does not determine.
   VectorXd solved() const {
     constexpr double kRidge = 3e-3;  // of a posture's share of its range, squared
     Eigen::MatrixXd a = square;
@@ -72,7 +72,7 @@ TimeGuide::Upwind TimeGuide::upwind(long node, int joint) const {
   const int line = lattice_.line(node, joint);
   Upwind best;
   best.value = kFar;
-  for (const int direction : {0, 1}) {  // from below and from above
+  for (const int direction : {0, 1}) {  // from the line below and from the line above
     const int from = direction == 0 ? line - 1 : line + 1;
     if (from < 0 || from >= lines.size()) continue;
     const long other = direction == 0 ? node - stride : node + stride;
@@ -102,7 +102,7 @@ double TimeGuide::update(long node) {
     const TimedMove& m = all_[place(2 * (node * lattice_.joints() + j) + up.direction)];
     low = std::min(low, up.value);
     if (m.top > 0.0) {
-      high = std::min(high, up.value + up.width * m.area * m.least_slope(price_));  // j alone
+      high = std::min(high, up.value + up.width * m.area * m.least_slope(price_));  // j moves alone
     }
   }
   if (!(low < high)) return high;
@@ -161,7 +161,7 @@ double TimeGuide::solve(double price) {
   for (unsigned quiet = 0, k = 0; quiet < orders && k < kMost; ++k) {
     quiet = sweep(k % orders) ? 0 : quiet + 1;
   }
-  // what cannot be reached is no place to end at
+  // Nodes that cannot be reached get a value so large that no motion ends there.
   const double top = std::transform_reduce(
       value_.begin(), value_.end(), 0.0, [](double a, double b) { return std::max(a, b); },
       [](double v) { return std::isfinite(v) ? v : 0.0; });
@@ -176,7 +176,7 @@ double TimeGuide::solve(double price) {
 
 TimeShares TimeGuide::shares(const TimeShares& like) {
   const int n = lattice_.joints();
-  // how much of the way leads through each node, from the end back to the start
+  // Share of the way that leads through each node, propagated from the end back to the start.
   std::vector<double> flow = potential_.corner_weights(end_);
   std::vector<long> order(place(lattice_.nodes));
   std::iota(order.begin(), order.end(), 0L);
@@ -191,7 +191,7 @@ TimeShares TimeGuide::shares(const TimeShares& like) {
     set_moves(node, value_[place(node)]);
     if (moves_.empty()) continue;
     const double gain = gain_.of(moves_, weights_.pump_flow());
-    // the best speeds are the gain's derivatives by the slopes
+    // The best speeds are the Hamiltonian's derivatives with respect to the slopes.
     std::vector<double> rate(moves_.size());
     double rates = 0.0;
     for (std::size_t i = 0; i < moves_.size(); ++i) {

@@ -48,7 +48,7 @@ TimedMove TimedWeights::move_of(int joint, int direction, const double* force,
   m.top = speed;
   if (hardest == nullptr) m.pump = -1;
   if (m.pump < 0) {
-    m.area = 1.0;  // its "volume" is its travel
+    m.area = 1.0;  // the travel itself takes the place of the volume
     return m;
   }
   m.top = speed * m.area;
@@ -97,7 +97,7 @@ void TimedWeights::prices(const double* q, const double* force, const double* ra
   make_moves(q, force, rate);
   if (moves_.empty() || !(shares_.price > 0.0)) return;
   const double largest = *std::max_element(move_share_.begin(), move_share_.end());
-  // What is gained beyond the price of time at these slopes; rises with alpha.
+  // Maximised Hamiltonian of these slopes less the price of time; it rises with alpha.
   const auto surplus = [&](double alpha) {
     for (std::size_t i = 0; i < moves_.size(); ++i) {
       TimedMove& m = moves_[i];
@@ -107,13 +107,14 @@ void TimedWeights::prices(const double* q, const double* force, const double* ra
     }
     return gain_.of(moves_, pump_flow_) - shares_.price;
   };
-  // False position (Illinois) from where one move alone uses the price up; ends where the inequality holds.
+  // False position (Illinois variant) from the alpha at which one move alone uses up the price, to one that keeps the
+  // inequality.
   const double enough = kPriceTolerance * shares_.price;
   double high = shares_.price / largest, over = surplus(high);
   if (over > enough) {
     double low = 0.0, under = -shares_.price, reached = under;
     int last = 0;
-    double alpha = alpha_ratio_ * high;  // as at the posture before, which mostly is a neighbour
+    double alpha = alpha_ratio_ * high;  // the previous posture mostly is a neighbour
     constexpr int kMost = 40;
     for (int i = 0; i < kMost && reached < -enough; ++i) {
       const double value = surplus(alpha);
@@ -144,11 +145,11 @@ double TimedWeights::gain_from_rest() const {
   const auto least_pressure = [](const TimedMove& m) {
     return m.flow_step > 0.0 ? std::max(m.standby, m.demand[0]) : m.standby;
   };
-  // with a pump at that pressure; of a joint only the better direction
+  // Rate with a pump at that pressure; of each joint only the direction with the larger rate is summed.
   const auto at = [&](int pump, double pressure) {
     double total = 0.0, of_joint = 0.0;
     int joint = -1;
-    for (const TimedMove& m : moves_) {  // by joint
+    for (const TimedMove& m : moves_) {  // ordered by joint
       if (m.pump != pump || (pump >= 0 && least_pressure(m) > pressure)) continue;
       if (m.joint != joint) {
         total += of_joint;
@@ -163,7 +164,7 @@ double TimedWeights::gain_from_rest() const {
   };
   double total = at(-1, 0.0);
   for (int pump = 0; pump < static_cast<int>(pump_flow_.size()); ++pump) {
-    double most = 0.0;  // falls with the pressure between two cylinders' least ones
+    double most = 0.0;  // the sum falls with the pressure between two cylinders' least demands
     for (const TimedMove& m : moves_) {
       if (m.pump == pump) most = std::max(most, at(pump, least_pressure(m)));
     }

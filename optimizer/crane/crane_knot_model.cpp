@@ -14,9 +14,9 @@ using namespace knot_units;
 
 namespace {
 
-// Rows within 2 cm of the exact distance: at 5 cm goals beside an obstacle were lost, at 2 cm rows double.
+// Rows lie within 2 cm of the exact distance: with 5 cm goals beside an obstacle were lost, 2 cm doubles the rows.
 constexpr double kRowInflation = 0.02;  // [m]
-// A row further from zero than this along the start is left out: no solve has moved a link that far.
+// A row further from zero than this along the start is left out: solves have not moved a link that far.
 constexpr double kNearRow = 0.5;  // [m]
 
 }  // namespace

@@ -1,7 +1,7 @@
 #pragma once
-/// The machine as a KnotModel: power of its pumps under the smooth law and every limit that is not a plain
-/// bound (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks. A model's
-/// effects are in it: masses and angles in the forces, laws by models/chain/smooth_effects.h, limits in the rows.
+/// The machine as a KnotModel: power of its pumps under the smooth law and every limit that is not a bound on a variable
+/// (pump flow, valves, pump pressure, clearance, tip line), with exact dense derivative blocks. The model's effects are
+/// included: masses and angles in the forces, laws by models/chain/smooth_effects.h, limits in the rows.
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,11 +18,11 @@ namespace sparflow {
 /// Rod speed at full command. [m/s]
 struct FullSpeed {
   double extend = 0.0, retract = 0.0;
-  /// Command that drives the rod at `speed`; its square has a kink in the second derivative at rest only.
+  /// Command [-] that drives the rod at `speed`; the second derivative of its square jumps at rest only.
   double command(double speed) const { return speed / (speed > 0.0 ? extend : retract); }
 };
 
-/// By cylinder: through its valve where one is known, else at its joint's velocity limit in the middle of its range.
+/// Full speeds by cylinder: from the valve's full flow, else from the joint's velocity limit in the middle of its range.
 std::vector<FullSpeed> full_speeds(const Machine& machine, const MotionLimits& limits);
 
 /// Mode of every cylinder in every interval, [intervals x cylinders].
@@ -33,27 +33,27 @@ struct CraneKnotOptions {
   double energy_weight = 1.0;   ///< [-] factor on the power
   double command_weight = 0.0;  ///< [W] factor on the sum of the squared commands
   ModeTable modes;              ///< empty = every cylinder free everywhere
-  /// Shares of the limits that may be used, slightly below one so that they also hold between knots.
+  /// Shares of the limits that may be used [-]; bound tightening sets them below one.
   double flow_share = 1.0;
   double valve_share = 1.0;
   double pressure_share = 1.0;
   double extra_clearance = 0.0;  ///< [m]
-  /// Postures known to be clear by the exact distance, one a row. The smooth clearance rows are conservative by
-  /// some centimetres; none asks for more than it has there, or a goal near an obstacle could not be reached.
+  /// Postures that are clear by the exact distance, one in each row. The smooth clearance rows are conservative by some
+  /// centimetres; their lower bounds are lowered to their values there, or a goal near an obstacle could not be reached.
   Eigen::MatrixXd clear_postures;
-  /// Postures the solve starts from, one a row: only clearance rows within kNearRow of zero in one of them are
-  /// imposed (all, when there is none). Whoever solves checks the exact distance afterwards.
+  /// Postures the solve starts from, one in each row: only clearance rows within kNearRow of zero in one of them are
+  /// imposed (all of them if this is empty). The caller must check the exact distance afterwards.
   Eigen::MatrixXd near_postures;
   double tip_line_share = 1.0;
-  /// Rows for the pumps' pressure limits cost a second evaluation of the processes; they are only asked for
-  /// when a motion without them came too near.
+  /// Whether to impose the pumps' pressure limits. Their rows need a second evaluation of the pressure models, so they
+  /// are added only after a motion without them came too near a limit.
   bool limit_pressure = false;
-  double trust_share = 1.0;  ///< of the trusted standard deviation (MotionLimits::pressure_std)
-  double oil = 40.0;         ///< [degC] for effects that look at it
+  double trust_share = 1.0;  ///< share of the largest standard deviation allowed (MotionLimits::pressure_std)
+  double oil = 40.0;         ///< oil temperature for effects that depend on it [degC]
 };
 
-/// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m: all
-/// near one, as the solver likes it.
+/// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m, so that all values are
+/// near one and the NLP is well scaled.
 class CraneKnotModel final : public KnotModel {
  public:
   /// The references must outlive the object.
@@ -83,16 +83,16 @@ class CraneKnotModel final : public KnotModel {
     double lower, upper;
   };
 
-  /// Speeds, forces (of `order` derivatives) and the joint-space derivatives of both.
+  /// Computes speeds, forces (with derivatives up to `order`) and the joint-space derivatives of both.
   void update(const double* z, int order, bool forces);
   /// gradient += D^T g and hessian += D^T H D + sum g_a Hess(z_a), for a function of (v, F).
   void chain_gradient(const double* g, double* gradient) const;
   void chain_hessian(const double* z, const double* g, const Eigen::MatrixXd& h, double* hessian);
-  /// The law with effects at z, unless it was evaluated there last.
+  /// Evaluates the law with effects at z, unless z is that of the last evaluation.
   void update_effects(const double* z, bool derivatives);
-  /// Variance of a moving cylinder's pressure over the trusted one, with its derivatives in (v, F); 0 at rest.
+  /// Variance of a moving cylinder's pressure over the variance allowed, with derivatives in (v, F); 0 at rest.
   GpDerivatives trust(int cylinder) const;
-  /// Adds weight * sum u_i^2 of the speeds last updated, and its derivatives where they are asked for. [kW]
+  /// Adds weight * sum u_i^2 at the speeds last updated, and its derivatives unless their pointers are null. [kW]
   double add_commands(const double* z, double* gradient, double* hessian);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
   void choose_clearance_rows();
@@ -101,22 +101,22 @@ class CraneKnotModel final : public KnotModel {
   const CraneModel* model_;
   const MotionProblem* problem_;
   std::shared_ptr<const Machine>
-      machine_;  // that carries the loads; goals and obstacles are the problem's
+      machine_;  // with the effects' masses; goals and obstacles are taken from the problem
   CraneKnotOptions options_;
   int n_, m_;
   bool trusts_ = false;
   SmoothPower power_;
-  std::unique_ptr<SmoothEffects> effects_;  // for a model with effects that act in a motion
-  Eigen::VectorXd effects_z_;               // where it was evaluated last, with
-  std::vector<CylinderMode> effects_mode_;  // these modes and
+  std::unique_ptr<SmoothEffects> effects_;  // null when no effect of the model acts in a motion
+  Eigen::VectorXd effects_z_;               // z of the last evaluation of effects_,
+  std::vector<CylinderMode> effects_mode_;  // its modes, and whether derivatives were computed
   bool effects_derivatives_ = false;
   StaticForce statics_;
   ChainGeometry tip_chain_;
   std::vector<Row> rows_;
   std::unique_ptr<ClearanceModel> clearance_;
   int clearance_rows_ = 0;
-  std::vector<int> near_rows_;       // of the clearance model, those imposed
-  Eigen::VectorXd clearance_lower_;  // [m] of those
+  std::vector<int> near_rows_;       // rows of the clearance model that are imposed
+  Eigen::VectorXd clearance_lower_;  // their lower bounds [m]
   Eigen::VectorXd all_clearance_, all_multipliers_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all_clearance_jacobian_;
   Eigen::Vector3d line_start_, line_direction_;
@@ -129,7 +129,7 @@ class CraneKnotModel final : public KnotModel {
   Eigen::Matrix3Xd tip_jacobian_;
 };
 
-/// The tip (in the directions in which it can move) at a goal point [m].
+/// Constraint that the tip, in the directions in which it can move, is at a goal point [m].
 class TipAtGoal final : public TerminalModel {
  public:
   TipAtGoal(const Machine& machine, const Eigen::Vector3d& goal);
@@ -138,7 +138,7 @@ class TipAtGoal final : public TerminalModel {
   void value(const double* q, double* g) override;
   void jacobian(const double* q, double* jacobian) override;
   void add_hessian(const double* q, const double* multiplier, double* hessian) override;
-  /// "z of the tip at its goal (3.5 m)", or the direction where it is none of the base frame's axes.
+  /// "z of the tip at its goal (3.5 m)", or with the direction's components where it is no axis of the base frame.
   std::string name(int row) const override;
 
  private:

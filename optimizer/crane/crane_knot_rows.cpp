@@ -54,7 +54,7 @@ std::string CraneKnotModel::path_name(int row) const {
 }
 
 double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessian, double factor) {
-  // squared distance from the line in units of the tolerance
+  // The row is the squared distance from the line in units of the tolerance.
   ChainGeometry& chain = tip_chain_;
   chain.update(model_->machine, q);
   const Tip& tip = model_->machine.tip;

@@ -1,5 +1,5 @@
 #pragma once
-/// What the files of CraneKnotModel share: the units its rows and costs are scaled to.
+/// Units to which rows and costs of CraneKnotModel are scaled, shared by its files.
 #include <limits>
 
 #include "models/math/jet.h"
@@ -11,7 +11,7 @@ constexpr double kFlowUnit = 1e-3;     // l/s
 constexpr double kPressureUnit = 1e7;  // 100 bar
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Adds factor times the derivatives of a jet over all of z; null: not asked for. @param hessian symmetric
+/// Adds factor times the derivatives of a jet over all of z. @param gradient, hessian null = not wanted; full symmetric
 inline void add_jet(const Jet& jet, double factor, double* gradient, double* hessian) {
   const int n = jet.variables();  // 0 for a constant
   for (int i = 0; i < n; ++i) {

@@ -83,15 +83,15 @@ double exact_total_energy(const CraneModel& model, const Trajectory& motion, dou
 
 namespace {
 
-/// Collects the worst instant of each limit, named by what is limited and of which part. Words are put together once
-/// only: it is asked at every instant of every check.
+/// Collects the worst instant of each limit, named by quantity and part. The name is composed once only, because see() is
+/// called at every instant of every check.
 class LimitBook {
  public:
-  /// @param over value - limit in the limit's own direction  @param scale what an overshoot is relative to
+  /// @param over violation, value - limit for an upper limit  @param scale by which `over` becomes a relative excess
   void see(const char* what, const std::string& part, double value, double limit, double over,
            double scale, const char* unit, double time) {
     const double excess = over / scale;
-    if (++next_ >= entries_.size()) next_ = 0;  // limits come in the same order every time
+    if (++next_ >= entries_.size()) next_ = 0;  // limits are passed in the same order every time
     if (next_ < entries_.size() && !entries_[next_].is(what, part)) {
       next_ = 0;
       while (next_ < entries_.size() && !entries_[next_].is(what, part)) ++next_;
@@ -151,7 +151,7 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
     book.see("distance from the goal posture", "", error, 0.0, error - 1e-6, 1.0, "rad or m",
              motion.t[last]);
   }
-  // the nearest knots, in order: waypoints are passed at knots
+  // Waypoints are passed at knots, so the nearest knots are sought, in order.
   Eigen::Index from = 0;
   for (std::size_t w = 0; w < problem.waypoints.size(); ++w) {
     Eigen::Index best = from;

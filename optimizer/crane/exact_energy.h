@@ -1,6 +1,6 @@
 #pragma once
-/// What a motion costs and whether it keeps its limits under the exact law, looked at between the knots as
-/// well: the only source of the energies and violations the program reports.
+/// Energy of a motion and its limits under the exact law, evaluated between the knots as well. All energies and
+/// violations that the program reports come from here.
 #include <string>
 #include <vector>
 
@@ -16,27 +16,26 @@ struct MotionEnergy {
   std::vector<double> throttling;     ///< [J] by cylinder, integral of (p_pump - P_i) Q_i
   std::vector<double> useful;         ///< [J] by cylinder, integral of P_i Q_i
   double potential_difference = 0.0;  ///< [J] of machine and payload, end minus start
-  double largest_pressure_std = 0.0;  ///< [Pa] least certain prediction on the way
+  double largest_pressure_std = 0.0;  ///< [Pa] largest standard deviation of a predicted pressure
   double moving_share_outside_data =
-      0.0;  ///< share of moving cylinder-time outside its process' data box
+      0.0;  ///< share of moving cylinder-time outside the data of its pressure model
   std::vector<double> share_moving;  ///< share of time with 0, 1, 2, ... cylinders moving
 
-  /// The pumps give less than machine and load gain: pressures extrapolated far from what they were learned at.
+  /// True when the pumps deliver less than machine and load gain: the pressures are extrapolated far beyond their data.
   bool impossible() const { return total < potential_difference; }
 };
 
-/// Integrates the exact law over a motion: midpoint rule on every interval cut into `refine` parts. Whether
-/// a cylinder moves cannot change within a part (velocities are linear in between, a sign change aside),
-/// and a midpoint never falls on the instant at which it starts, so the jumps of the exact maximum and
-/// activation at knots cost no accuracy.
+/// Integrates the exact law over a motion by the midpoint rule on every interval cut into `refine` parts. Velocities are
+/// linear within an interval, so a cylinder starts or stops at knots only (a change of sign aside), and no midpoint falls
+/// on such an instant. The jumps of the exact maximum and activation therefore cost no accuracy.
 MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
                           int refine = 16);
 
-/// `total` of exact_energy() alone, at less than half its price: no standard deviations of pressures, no shares. [J]
+/// MotionEnergy::total alone, in less than half the time: standard deviations and shares are not computed. [J]
 double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,
                           int refine = 16);
 
-/// Integral of the squared commands of all valves (1 = full flow) over a motion. [s]
+/// Integral over a motion of the sum of the squared valve commands (1 = full flow). [s]
 double command_effort(const CraneModel& model, const MotionProblem& problem,
                       const Trajectory& motion, int refine = 16);
 
@@ -55,9 +54,9 @@ struct LimitCheck {
       0.0;  ///< relative overshoot: (value - limit) / scale of the limit; <= 0 when kept
 };
 
-/// Every limit at its worst, most violated first: joint position, velocity and acceleration, valves, pump
-/// flow and pressure, clearance, tip line, start and goal; on `refine` times the knots' density.
-/// @param model may be untrained: pressures are then not checked
+/// Worst instant of every limit, most violated first: joint position, velocity and acceleration, valves, pump
+/// flow and pressure, clearance, tip line, start and goal, evaluated at `refine` samples per mesh interval.
+/// @param model without pressure models the pressures are not checked
 std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProblem& problem,
                                      const Trajectory& motion, int refine = 16);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The instants at which a motion is judged by the exact law.
+/// The instants at which a motion is evaluated by the exact law.
 #include <Eigen/Core>
 
 #include "models/machine/trajectory.h"

@@ -6,7 +6,7 @@ namespace sparflow {
 
 TipAtGoal::TipAtGoal(const Machine& machine, const Eigen::Vector3d& goal)
     : machine_(&machine), chain_(machine), goal_(goal) {
-  // the directions in which the tip moves = the complement of those in which it cannot
+  // The directions in which the tip can move are the complement of those in which it cannot.
   const std::vector<Eigen::Vector3d> fixed = fixed_tip_directions(machine);
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::Vector3d d = Eigen::Vector3d::Unit(axis);

@@ -24,7 +24,7 @@ DrivenGridPath driven_grid_path(const CraneModel& model, const MotionProblem& pr
   const Trajectory motion = timed_grid_path(model, problem, path, duration);
   const std::vector<LimitCheck> checks = check_limits(model, problem, motion, kDensity);
   if (worst_excess(checks) > kGridTolerance) {
-    out.message = "the grid's path breaks a limit: " + checks.front().what;
+    out.message = "the grid's path violates a limit: " + checks.front().what;
     return out;
   }
   out.energy = exact_total_energy(model, motion, problem.payload, kDensity);

@@ -13,8 +13,8 @@
 #include "models/effects/effective_machine.h"
 #include "optimizer/crane/exact_energy.h"
 #include "optimizer/grid/energy_grid_goal.h"
-#include "optimizer/grid/energy_grid_legs.h"
 #include "optimizer/grid/energy_grid_timing.h"
+#include "optimizer/grid/simplify_path.h"
 
 namespace sparflow {
 namespace {
@@ -42,7 +42,7 @@ class EnergyGrid::Search {
       trouble_ = fmt::format("a grid over {} joints has too many nodes (at most {} joints)", n_,
                              options.most_joints);
     } else if (problem.tip_line) {
-      trouble_ = "a tip line leaves no choice of path for a grid";
+      trouble_ = "a grid cannot follow a tip line";
     } else {
       build(options.nodes);
     }
@@ -57,7 +57,7 @@ class EnergyGrid::Search {
     return path;
   }
 
-  /// All distinct paths met while the price is bisected for `duration`, with their energies when timed to it.
+  /// All distinct paths found while the price is bisected for `duration`, with their energies when timed to it.
   std::vector<std::pair<double, GridPath>> for_duration(double duration) {
     std::vector<std::pair<double, GridPath>> found;
     const auto offer = [&](double price) {
@@ -86,8 +86,8 @@ class EnergyGrid::Search {
       found.emplace_back(kNoPath, none);
       return found;
     }
-    // A second is worth between nothing and far more than the pumps' full power; ramps and corners, which the price of
-    // time does not see well, can make the path at the highest price not the fastest.
+    // The bracket reaches from almost no price of time to far above the pumps' full power. Ramps and corners are only
+    // approximately contained in the graph's times, so the path at the highest price need not be the fastest.
     double lo = 10.0, hi = 1e6;
     if (!enough) {
       bool fast = false;
@@ -98,7 +98,7 @@ class EnergyGrid::Search {
     for (int step = 0; step < kSteps; ++step) {
       const double middle = std::sqrt(lo * hi);
       (offer(middle).first ? hi : lo) = middle;
-      if (enough && step >= 3) break;  // slow enough for the cheapest: a few alternatives do
+      if (enough && step >= 3) break;  // the cheapest path is fast enough: a few alternatives suffice
     }
     return found;
   }
@@ -108,7 +108,7 @@ class EnergyGrid::Search {
 
  private:
   struct Step {
-    std::vector<int> by;  // lines, by joint
+    std::vector<int> by;  // number of lines by joint, signed
     long delta = 0;
   };
 
@@ -136,7 +136,7 @@ class EnergyGrid::Search {
     price_ends();
   }
 
-  /// Lines are spent where forces vary; an axis along which none does gets a few.
+  /// Distributes the lines to the axes along which forces vary; the other axes get a few.
   std::vector<int> cells_by_axis(int wanted) const {
     constexpr int kProbe = 5, kFew = 4;
     std::vector<bool> varies(static_cast<std::size_t>(n_), false);
@@ -176,7 +176,7 @@ class EnergyGrid::Search {
         all = all.size() == 0 ? f.cwiseAbs().eval() : all.cwiseMax(f.cwiseAbs()).eval();
       }
       for (int c = 0; c < lo.size(); ++c) {
-        // a cylinder's own force also varies where its linkage does
+        // A cylinder's own force also varies with its linkage.
         if (hi[c] - lo[c] > 1e-3 * all[c] + 1.0) return true;
       }
     }
@@ -241,12 +241,12 @@ class EnergyGrid::Search {
     }
   }
 
-  /// Last moves from nodes near the goal set onto it.
+  /// Prices the last moves, from nodes near the goal set onto it.
   void price_ends() {
     for (GoalEnd& end : goal_ends(problem_, *loaded_, lattice_)) {
       const VectorXd from = lattice_.posture(end.node);
       MoveCost together = pricer_->price_line(from, end.q, 1);
-      // one after another, in the joints' order: an order hardly matters within a cell
+      // The joints move in sequence in their own order, which hardly matters within a cell.
       MoveCost each;
       VectorXd q = from;
       for (int j = 0; j < n_; ++j) {
@@ -345,7 +345,7 @@ class EnergyGrid::Search {
     return raw;
   }
 
-  /// Marks the moves of a path that meet an obstacle. @return whether there are any
+  /// Blocks the moves of a path that meet an obstacle. @return whether there are any
   bool block(const RawPath& raw) {
     if (!clearance_) return false;
     bool any = false;
@@ -374,7 +374,7 @@ class EnergyGrid::Search {
       raw = dijkstra(price);
     }
     if (!raw.found) {
-      path.message = "no way over the grid reaches the goal clear of the obstacles";
+      path.message = "no path of the grid reaches the goal clear of the obstacles";
       return path;
     }
     finish(raw, price, path);
@@ -393,7 +393,7 @@ class EnergyGrid::Search {
       const Range& a = problem_.limits.acceleration[i];
       ramp = std::max(ramp, problem_.limits.velocity[i].hi / std::min(a.hi, -a.lo));
     }
-    // A corner costs a ramp's time, and at least as much as the grid's own coarseness is worth.
+    // A corner costs a ramp's time, and at least the error of the energy on so coarse a grid.
     constexpr double kCoarseness = 1e-3;
     legs.leg_penalty = kCoarseness * raw.cost + price * std::min(ramp, 2.0);
     if (clearance_) {
@@ -401,7 +401,7 @@ class EnergyGrid::Search {
         return clearance_->motion_clear(a.data(), b.data());
       };
     }
-    const Legs chosen = few_legs(*pricer_, straight_runs(raw.points), legs);
+    const Legs chosen = simplify_path(*pricer_, straight_runs(raw.points), legs);
     path.found = true;
     path.corners = chosen.corners;
     path.slow_energy_J = chosen.slow_energy;
@@ -414,7 +414,7 @@ class EnergyGrid::Search {
     }
   }
 
-  /// The path without points that lie on a straight line between their neighbours.
+  /// Removes points that lie on a straight line between their neighbours.
   static MatrixXd straight_runs(const MatrixXd& points) {
     std::vector<Eigen::Index> kept = {0};
     for (Eigen::Index k = 1; k + 1 < points.rows(); ++k) {
@@ -447,7 +447,7 @@ class EnergyGrid::Search {
   LatticeForces forces_;
   std::unique_ptr<MovePricer> pricer_;
   std::unique_ptr<ClearanceModel> clearance_;
-  std::vector<char> clear_;  // by node: 0 not looked at, 1 clear, 2 not
+  std::vector<char> clear_;  // by node: 0 not checked, 1 clear, 2 in collision
   std::vector<Step> steps_;
   std::vector<MoveCost> moves_;  // [nodes x steps]
   std::vector<PricedEnd> ends_;

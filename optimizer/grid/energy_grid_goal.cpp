@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Newton on the tip in the directions in which it can move, least in units of `scale`; frozen joints stay.
+/// Newton's method on the tip in the directions in which it can move; steps are least in units of `scale`, frozen joints
+/// do not move.
 class GoalNewton {
  public:
   GoalNewton(const MotionProblem& problem, const Machine& machine, const Eigen::Vector3d& goal)
@@ -45,7 +46,7 @@ class GoalNewton {
       VectorXd step =
           scaled.transpose() * solve_symmetric(normal + small * Eigen::Matrix3d::Identity(), error);
       const double length = step.cwiseAbs().maxCoeff();
-      if (length > 3.0) step *= 3.0 / length;  // three cells at most
+      if (length > 3.0) step *= 3.0 / length;  // a step is at most three cells long
       q += scale.cwiseProduct(step);
       for (Eigen::Index k = 0; k < q.size(); ++k) {
         const Range& r = limits_[static_cast<std::size_t>(k)];
@@ -76,7 +77,7 @@ std::vector<VectorXd> anchor_postures(const MotionProblem& problem, const Machin
     }
     ends.push_back(q);
   };
-  // from the start, and from the middle of the range where that leads nowhere
+  // Newton's method begins at the start and, if that fails, at postures inside the range.
   for (const double share : {0.0, 0.5, 0.2, 0.8}) {
     if (share > 0.0 && !ends.empty()) break;
     for (unsigned still = 0; still < (1u << n) - 1u; ++still) {
@@ -113,7 +114,7 @@ std::vector<GoalEnd> goal_ends(const MotionProblem& problem, const Machine& mach
                          k + 1 < lines.size() ? lines[k + 1] - lines[k] : 0.0);
     }
     const Eigen::Vector3d error = goal - newton.tip(from);
-    // cheap test before the Jacobian: a cell's corners are no further than its joints' ways add up to
+    // Cheap test: the tip cannot travel further within a cell than its joints' travels add up to.
     const Eigen::Matrix3Xd& jacobian = newton.jacobian(from);
     const double reach = (jacobian.cwiseAbs() * cell).norm();
     if (error.norm() > 1.2 * reach) continue;
@@ -122,7 +123,7 @@ std::vector<GoalEnd> goal_ends(const MotionProblem& problem, const Machine& mach
       if (!newton.solve(q, frozen, cell, 8)) continue;
       if (((q - from).cwiseAbs().array() > 1.05 * cell.array()).any()) continue;
       for (int j = 0; j < n; ++j) {
-        // what Newton leaves of a joint that need not move is no move
+        // A joint's step of this size is Newton's residual, not a move.
         if (std::abs(q[j] - from[j]) < 1e-8) q[j] = from[j];
       }
       ends.push_back({node, q});

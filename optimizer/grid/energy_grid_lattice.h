@@ -1,5 +1,5 @@
 #pragma once
-/// A rectilinear grid in joint space: places of its nodes and what the machine is there.
+/// A rectilinear grid in joint space: its nodes, and forces and rates of the machine at them.
 #include <Eigen/Dense>
 #include <vector>
 
@@ -29,8 +29,8 @@ struct Lattice {
   long nearest_node(const Eigen::VectorXd& q) const;
 };
 
-/// Lines of one axis over its range in `cells` cells or a few more, all of `on_line` (coordinates in the range) exactly
-/// on one; in between equally spaced. Coordinates closer than 1e-9 of the range are one.
+/// Lines of one axis over its range, in `cells` cells or a few more. Each coordinate of `on_line` (within the range) has
+/// a line of its own; between them lines are equally spaced. Coordinates closer than 1e-9 of the range are merged.
 Eigen::VectorXd axis_lines(const Range& range, const std::vector<double>& on_line, int cells);
 
 /// Machine quantities at all nodes.
@@ -38,14 +38,14 @@ struct LatticeForces {
   Eigen::MatrixXf force;                ///< [cylinders x nodes] static force [N]
   std::vector<Eigen::VectorXd> length;  ///< by cylinder: x at the lines of the joint it drives [m]
   std::vector<Eigen::VectorXd> rate;    ///< by cylinder: dx/dq there
-  std::vector<Range> range;             ///< [N] by cylinder, of the forces, widened by 2 %
+  std::vector<Range> range;             ///< [N] by cylinder, range of the forces at the nodes, widened by 2 %
 
-  /// Of one node. @param force [N] and rate by cylinder, filled
+  /// Forces [N] and rates dx/dq by cylinder at one node.
   void at(const Machine& machine, const Lattice& lattice, long node, double* force_there,
           double* rate_there) const;
 };
 
-/// @param machine that carries the loads (effective_machine())
+/// @param machine with the masses of its effects (effective_machine())  @param payload [kg]
 /// @throws std::domain_error when a four-bar cannot close at a node
 LatticeForces lattice_forces(const Machine& machine, const Lattice& lattice, double payload);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What straight moves in joint space cost under the quasi-static law, and a path made of few of them.
+/// Costs of straight moves in joint space under the quasi-static law.
 #include <vector>
 
 #include "models/machine/static_force.h"
@@ -7,7 +7,7 @@
 
 namespace sparflow {
 
-/// Shares of a move's highest speed at which its energy is known.
+/// Shares of a move's highest speed at which its energy is tabulated.
 inline constexpr double kMoveSpeeds[3] = {1.0, 0.45, 0.12};
 
 /// Energies are +infinity where a pump would exceed its pressure.
@@ -21,7 +21,7 @@ struct MoveCost {
   void add(const MoveCost& other);
 };
 
-/// A workspace. Refers to model and problem.
+/// A mutable workspace that refers to model and problem.
 class MovePricer {
  public:
   MovePricer(const CraneModel& model, const MotionProblem& problem, const Machine& loaded,
@@ -29,9 +29,9 @@ class MovePricer {
 
   const std::vector<CylinderDemand>& demands() const { return demands_; }
 
-  /// A short move. @param dq by joint  @param dx [m] and force [N] by entry of demands()
+  /// Cost of a short move. @param dq [rad] or [m] by joint  @param dx [m] and force [N] by entry of demands()
   MoveCost price(const double* dq, const double* dx, const double* force);
-  /// A straight line of any length, cut into `parts`.
+  /// Cost of a straight line of any length, cut into `parts`.
   MoveCost price_line(const Eigen::VectorXd& from, const Eigen::VectorXd& to, int parts);
 
  private:

@@ -38,7 +38,7 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
   flow_step_ = flow_max / (flows - 1);
   force_step_ = width / (forces - 1);
   demand_.resize(flows, forces);
-  double flow_curve = 0.0, force_curve = 0.0;  // second derivatives of the process, upwards only
+  double flow_curve = 0.0, force_curve = 0.0;  // largest positive second derivatives of the pressure model
   for (int f = 0; f < forces; ++f) {
     for (int q = 0; q < flows; ++q) {
       const double flow = q * flow_step_, load = force.lo + f * force_step_;
@@ -51,7 +51,7 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
     }
   }
   constexpr double kSafety =
-      1.5;  // points an eighth of a length scale apart miss less of a maximum
+      1.5;  // samples an eighth of a length scale apart miss less than this factor of a maximum
   allowance_ = kSafety / 8.0 *
                (flow_step_ * flow_step_ * flow_curve + force_step_ * force_step_ * force_curve);
   least_ = demand_.colwise().minCoeff().transpose().array() - allowance_;
@@ -63,7 +63,7 @@ void DemandTable::make_rising() {
   const Eigen::Index rows = demand_.rows(), cells = rows - 1;
   rising_.resize(knots + 1, demand_.cols());
   Eigen::VectorXd from(rows);  // least demand at this flow or a larger one
-  // at a place along the rows, by straight lines
+  // Linear interpolation at a fractional row.
   const auto at = [&](double row) {
     const Eigen::Index r = std::min(static_cast<Eigen::Index>(row), cells - 1);
     return from[r] + (row - static_cast<double>(r)) * (from[r + 1] - from[r]);
@@ -72,7 +72,7 @@ void DemandTable::make_rising() {
   for (Eigen::Index f = 0; f < demand_.cols(); ++f) {
     from = demand_.col(f).array() - allowance_;
     for (Eigen::Index r = cells; r-- > 0;) from[r] = std::min(from[r], from[r + 1]);
-    // what straight lines between the knots exceed the finer ones by is taken off both knots
+    // The excess of a line between two knots over the finer table is subtracted at both knots.
     auto column = rising_.col(f);
     Eigen::VectorXd over = Eigen::VectorXd::Zero(knots + 1);
     for (Eigen::Index k = 0; k <= knots; ++k) column[k] = at(static_cast<double>(k) * per_knot);
@@ -148,7 +148,7 @@ std::vector<CylinderDemand> cylinder_demands(const CraneModel& model, const Moti
     d.load_sensing = machine.pumps[pump].type == PumpType::kLoadSensing;
     d.area[0] = cylinder.area_piston();
     d.area[1] = cylinder.area_rod();
-    // the fastest the joint's own speed limit lets the cylinder be, anywhere in its range
+    // The largest rod speed that the joint's speed limit allows is sought over its range.
     const Range& q = problem.limits.position[static_cast<std::size_t>(d.joint)];
     const Range& v = problem.limits.velocity[static_cast<std::size_t>(d.joint)];
     double rate = 0.0;

@@ -1,4 +1,4 @@
-/// Speeds along a grid path.
+/// Speed profiles along a grid path.
 #include "optimizer/grid/energy_grid_timing.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kLongestRamp = 0.45;  // share of a leg
 
-/// Speed at the corners: 0 where a joint stops or turns, else the lower of the two legs' mean speeds.
+/// Speed at the corners: 0 where a joint stops or reverses, else the lower of the two legs' mean speeds.
 MatrixXd corner_speeds(const MatrixXd& corners, const VectorXd& durations) {
   MatrixXd speed = MatrixXd::Zero(corners.rows(), corners.cols());
   for (Eigen::Index k = 1; k + 1 < corners.rows(); ++k) {
@@ -85,7 +85,7 @@ Trajectory profile_motion(const MatrixXd& corners, const VectorXd& durations,
       motion.q.row(at + 1) =
           motion.q.row(at) + 0.5 * step[i] * (motion.qd.row(at) + motion.qd.row(at + 1));
     }
-    motion.q.row(3 * k + 3) = corners.row(k + 1);  // rounding only
+    motion.q.row(3 * k + 3) = corners.row(k + 1);  // removes rounding errors
   }
   motion.qdd.row(3 * legs) = motion.qdd.row(3 * legs - 1);
   return motion;
@@ -93,7 +93,7 @@ Trajectory profile_motion(const MatrixXd& corners, const VectorXd& durations,
 
 namespace {
 
-/// How far a leg is beyond its limits: the factor its duration must grow by.
+/// Factor by which a leg's duration must grow so that it keeps its limits.
 double leg_ratio(LimitRatios& ratios, const Trajectory& motion, Eigen::Index leg) {
   constexpr int kFine = 24;
   double worst = 1e-3;
@@ -141,7 +141,7 @@ VectorXd shortest_leg_durations(const CraneModel& model, const MotionProblem& pr
     if (round + 1 == kRounds) break;
     for (Eigen::Index k = 0; k < legs; ++k) durations[k] *= std::clamp(ratio[k], 0.6, 2.0);
   }
-  // what is left is spread evenly: stretching all by r divides speeds by r and accelerations by r^2
+  // The remaining violation is removed by stretching all legs: a factor r divides speeds by r and accelerations by r^2.
   constexpr double kBetweenSamples = 1.0 + 2e-4;
   return durations * std::max(1.0, worst) * kBetweenSamples;
 }

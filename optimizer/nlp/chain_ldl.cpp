@@ -13,12 +13,12 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// A scaled column below this is rounding: its terms were near one when they cancelled.
+/// A scaled column below this consists of rounding errors, since its terms were near one before they cancelled.
 constexpr double kVanished = 1e-14;
-/// A pivot this large beside its column is taken at once; smaller ones only if there is no better one.
+/// A pivot of at least this share of its column is taken at once, a smaller one only if there is no better one.
 constexpr double kGoodPivot = 0.1;
 
-/// 2^-k with k half the exponent of `largest`: a scale that rounds nothing.
+/// 2^-k with k half the exponent of `largest`; scaling by it causes no rounding.
 double half_power(double largest) {
   const auto bits = std::bit_cast<std::uint64_t>(largest);
   const int exponent = static_cast<int>((bits >> 52) & 0x7ff) - 1023;
@@ -26,8 +26,8 @@ double half_power(double largest) {
   return std::bit_cast<double>(static_cast<std::uint64_t>(1023 - half) << 52);
 }
 
-/// How good a pivot of two rows (a, b; b, d) is, with the largest entries beside its rows: the inverse of what they can
-/// grow by, as own / beside is of a pivot of one row. 0 = none.
+/// Quality of a pivot of two rows (a, b; b, d), given the largest other entries of its rows: the inverse of their possible
+/// growth, as own / beside for a pivot of one row. 0 = the block is singular.
 double pair_quality(double a, double b, double d, double beside_a, double beside_d) {
   const double det = std::abs(a * d - b * b);
   if (std::abs(b) <= kVanished || det <= kVanished * std::max(std::abs(a * d), b * b)) return 0.0;
@@ -81,7 +81,7 @@ LdlOutcome ChainLdl::factorise(const double* value, double threshold) {
   return LdlOutcome::kRegular;
 }
 
-/// Empties the dense front and adds what the fronts below left. @return unknowns that wait from below
+/// Clears the dense front and adds the contributions of its children. @return number of unknowns they delayed
 int ChainLdl::take_contributions(const Front& front) {
   int delayed = 0;
   const std::size_t first = waiting_.size() - at(front.children);
@@ -120,7 +120,7 @@ int ChainLdl::take_contributions(const Front& front) {
   return delayed;
 }
 
-/// The matrix' own values, beside `delayed` unknowns from below.
+/// Adds the matrix' own values to a front with `delayed` unknowns of its children.
 void ChainLdl::assemble(int number, int delayed, const double* value) {
   const int end = number + 1 < statistics_.fronts ? fronts_[at(number + 1)].first_entry
                                                   : static_cast<int>(entry_.size());
@@ -132,8 +132,8 @@ void ChainLdl::assemble(int number, int delayed, const double* value) {
   }
 }
 
-/// Eliminates what can be among the first `candidates` unknowns of the front and updates the others.
-/// @param last nothing may wait: there is no front above
+/// Eliminates as many as possible of the first `candidates` unknowns of the front and updates the others.
+/// @param last true for a front without parent, where no pivot can be delayed
 /// @return false when the matrix is singular
 bool ChainLdl::eliminate(int candidates, int size, double threshold, bool last) {
   const detail::LdlKernel& kernel = detail::ldl_kernel();
@@ -186,14 +186,14 @@ bool ChainLdl::eliminate(int candidates, int size, double threshold, bool last) 
   return true;
 }
 
-/// Finds the next pivot and brings it to the front.
-/// @return false when no candidate passes `threshold`; `vanished`: because one is zero altogether
+/// Finds the next pivot and moves it to position k.
+/// @return false when no candidate passes `threshold`; `vanished` is set when one has a zero column
 bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, int& width,
                             bool& vanished) {
   const double* f = work_.data();
   const long stride = stride_;
   const auto entry = [&](int i, int j) { return i >= j ? f[j * stride + i] : f[i * stride + j]; };
-  /// largest beside the diagonal in column c, and the candidate `partner` that has it, if one does
+  // Largest off-diagonal entry of column c, and the candidate `partner` whose row has it, if one does.
   const auto largest = [&](int c, int without, int& partner) {
     double most = 0.0;
     partner = -1;
@@ -216,14 +216,14 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
     for (int i = candidates; i < size; ++i) below = std::max(below, std::abs(column[i]));
     return std::max(most, below);
   };
-  // most often the first candidate will do
+  // Mostly the first candidate is good enough.
   const double first = std::abs(f[k * stride + k]);
   if (first > kVanished &&
       first >= kGoodPivot * detail::ldl_kernel().largest(size - k - 1, f + k * stride + k + 1)) {
     width = 1;
     return true;
   }
-  // or the pair the order was made for, if it stands together still
+  // Otherwise the pair that pair_up() formed is tried, if it is still adjacent.
   if (k + 1 < candidates) {
     const double* l1 = f + k * stride;
     const double* l2 = l1 + stride;
@@ -268,7 +268,7 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
   return true;
 }
 
-/// Exchanges unknowns a < b of the front, rows of columns eliminated before included.
+/// Exchanges unknowns a < b of the front, also in the rows of columns already eliminated.
 void ChainLdl::swap(int a, int b, int size) {
   if (a == b) return;
   double* f = work_.data();
@@ -298,7 +298,7 @@ void ChainLdl::keep_panel(Front& front) {
   std::copy_n(unknown_.begin(), size, index_.begin() + static_cast<long>(front.index));
 }
 
-/// What the front above has to add, its `delayed` unknowns first.
+/// Pushes a front's contribution to its parent on the stack, `delayed` unknowns first.
 void ChainLdl::push_contribution(int number, int delayed) {
   const Front& front = fronts_[at(number)];
   Waiting to;

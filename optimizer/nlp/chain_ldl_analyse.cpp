@@ -1,4 +1,4 @@
-// Order, fronts and storage: what is found once for a pattern.
+// Analysis of a pattern: elimination order, fronts and storage.
 #include <algorithm>
 #include <cmath>
 
@@ -48,8 +48,8 @@ bool ChainLdl::same_pattern(int order, int entries, const int* row, const int* c
   return true;
 }
 
-/// Rows whose diagonal vanishes (constraints) cannot be pivots on their own: each is put beside the free neighbour
-/// that has the fewest couplings (a slack beside its row, an acceleration beside its defect).
+/// Pairs each row with zero diagonal (a constraint), which cannot be a pivot on its own, with the free neighbour that has
+/// the fewest couplings (a slack for its row, an acceleration for its defect).
 /// @return group of every unknown
 std::vector<int> ChainLdl::pair_up(const double* value) const {
   struct Coupling {
@@ -116,7 +116,7 @@ std::vector<int> ChainLdl::pair_up(const double* value) const {
   return group;
 }
 
-/// Unknowns of every front, where each contribution and each value goes, and the room all that needs.
+/// Sets the unknowns of every front, the indices at which contributions and values are added, and the storage needed.
 void ChainLdl::make_fronts(const Tree& tree) {
   const auto count = tree.fronts.size();
   fronts_.resize(count);
@@ -143,7 +143,7 @@ void ChainLdl::make_fronts(const Tree& tree) {
     }
     front.rows = static_cast<int>(rows_.size()) - front.first_row;
   }
-  // each value is assembled where the first of its two unknowns is eliminated
+  // Each value is assembled in the front in which the first of its two unknowns is eliminated.
   std::vector<std::vector<int>> entries(count);
   for (std::size_t e = 0; e < row_.size(); ++e) {
     const int f = std::min(front_of[place_at(row_[e])], front_of[place_at(column_[e])]);
@@ -155,7 +155,7 @@ void ChainLdl::make_fronts(const Tree& tree) {
   place_.reserve(rows_.size());
   long room = 0, waiting = 0, most_waiting = 0;
   int most_rows = 0;
-  std::vector<long> from_below(count, 0);  // room of the contributions a front takes from the stack
+  std::vector<long> from_below(count, 0);  // storage of the contributions that a front takes from the stack
   for (std::size_t f = 0; f < count; ++f) {
     Front& front = fronts_[f];
     for (int k = 0; k < front.rows; ++k) place[place_at(rows_[place_at(front.first_row + k)])] = k;
@@ -178,7 +178,7 @@ void ChainLdl::make_fronts(const Tree& tree) {
       statistics_.factor_entries += front.rows - k - 1;
     }
   }
-  // where a front's updated rows stand in the front above
+  // Indices of a front's updated rows in its parent.
   for (std::size_t f = 0; f < count; ++f) {
     first_place_[f] = static_cast<int>(place_.size());
     const Front& front = fronts_[f];
@@ -188,7 +188,7 @@ void ChainLdl::make_fronts(const Tree& tree) {
     for (int k = front.own; k < front.rows; ++k)
       place_.push_back(place[place_at(rows_[place_at(front.first_row + k)])]);
   }
-  // half as much again as foreseen, for delayed pivots
+  // Half of the predicted storage is reserved in addition, for delayed pivots.
   constexpr std::size_t kSpare = 4096;
   factor_.resize(place_at(static_cast<int>(room)) * 3 / 2 + kSpare);
   index_.resize(rows_.size() * 3 / 2 + kSpare);

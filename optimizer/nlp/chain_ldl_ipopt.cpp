@@ -12,10 +12,10 @@ namespace {
 
 ChainLdlSession* current_session = nullptr;
 
-/// A front larger than this is no chain's: there MUMPS with its blocked kernels is the better choice.
+/// Above this front size the matrix is not a chain, and MUMPS with its blocked kernels is faster.
 constexpr int kLargestFront = 320;
 
-// What Ipopt 3.11 (IpMa27TSolverInterface.cpp) reads of INFO, 0-based.
+// Entries of INFO that Ipopt 3.11 reads (IpMa27TSolverInterface.cpp), 0-based.
 constexpr int kFlag = 0, kRealsNeeded = 4, kIntegersNeeded = 5, kCompressedReals = 11,
               kCompressedIntegers = 12, kNegative = 14, kInfoSize = 20;
 constexpr int kSingularFlag = -5;  // Ipopt adds to the diagonal and tries again
@@ -23,8 +23,8 @@ constexpr int kFatalFlag = -1;     // Ipopt gives up
 
 }  // namespace
 
-/// Arguments as MA27's: entries (irn, icn) from 1, `a` their values at the time of factorisation. `ikeep` is handed from
-/// analysis to factorisation, `iw` from there to the solution: their first entries carry which solver it is.
+/// Arguments as in MA27: indices (irn, icn) from 1, `a` their values at the factorisation. `ikeep` is passed from analysis
+/// to factorisation and `iw` from there to the solution; their first entries hold the index of the ChainLdl object.
 struct ChainLdlRoutines {
   static void defaults(ipfint* icntl, double* cntl) {
     for (int i = 0; i < 30; ++i) icntl[i] = 0;
@@ -43,7 +43,7 @@ struct ChainLdlRoutines {
       info[kFlag] = kFatalFlag;
       return;
     }
-    // the order is found with the first values: which diagonals vanish is not in the pattern
+    // The analysis needs the first values, because the pattern does not show which diagonals are zero.
     ikeep[0] = static_cast<ipfint>(current_session->solvers_.size());
     current_session->solvers_.emplace_back();
   }
@@ -63,7 +63,7 @@ struct ChainLdlRoutines {
         for (int& i : column) --i;
         solver = std::make_unique<ChainLdl>(*n, row, column, a);
         if (solver->statistics().largest_front > kLargestFront) {
-          current_session->refusal_ = fmt::format("the KKT matrix is no chain: a front of {} rows",
+          current_session->refusal_ = fmt::format("the KKT matrix is no chain: it has a front of {} rows",
                                                   solver->statistics().largest_front);
           info[kFlag] = kFatalFlag;
           return;
@@ -87,7 +87,7 @@ struct ChainLdlRoutines {
 };
 
 ChainLdlSession::ChainLdlSession() {
-  SPARFLOW_CHECK(current_session == nullptr, "Ipopt's solves take turns");
+  SPARFLOW_CHECK(current_session == nullptr, "only one Ipopt solve runs at a time");
   current_session = this;
   LSL_setMA27(ChainLdlRoutines::analyse, ChainLdlRoutines::factorise, ChainLdlRoutines::solve,
               ChainLdlRoutines::defaults);
@@ -96,9 +96,9 @@ ChainLdlSession::ChainLdlSession() {
 ChainLdlSession::~ChainLdlSession() { current_session = nullptr; }
 
 std::vector<std::pair<std::string, std::string>> ChainLdlSession::ipopt_options() {
-  // Scaling is ChainLdl's own (Ipopt's default beside "ma27" would be another routine of that library). The pivot
-  // threshold begins higher than Ipopt's 1e-8: in a chain a delayed pivot costs next to nothing.
-  // Ipopt looks at every solution's residual anyway and refines where it exceeds 1e-10: no step of that in advance.
+  // ChainLdl scales the matrix itself (Ipopt's default for "ma27" would be another HSL routine). The pivot
+  // threshold begins higher than Ipopt's 1e-8, because in a chain a delayed pivot costs little.
+  // Ipopt checks every solution's residual anyway and refines where it exceeds 1e-10, so no refinement is forced.
   return {{"linear_solver", "ma27"},
           {"min_refinement_steps", "0"},
           {"linear_system_scaling", "none"},

@@ -9,11 +9,11 @@
 
 namespace sparflow::detail {
 
-/// While an object lives, Ipopt's linear solver "ma27" is ChainLdl. One at a time, under the lock of Ipopt's solves.
+/// While an object lives, Ipopt's linear solver "ma27" is ChainLdl. Only one may exist, under the lock of Ipopt's solves.
 ///
 /// Ipopt 3.11 takes the routines of a sparse symmetric indefinite solver by function pointer (HSLLoader.h); the published
-/// argument list of MA27 (analyse, factorise, solve) is the one whose error returns Ipopt distinguishes. Behind it stands
-/// this project's own code: no line of HSL is used, linked or loaded.
+/// argument list of MA27 (analyse, factorise, solve) is used, because Ipopt distinguishes its error returns. The routines
+/// are this project's own: no HSL code is used, linked or loaded.
 class ChainLdlSession {
  public:
   ChainLdlSession();
@@ -21,9 +21,9 @@ class ChainLdlSession {
   ChainLdlSession(const ChainLdlSession&) = delete;
   ChainLdlSession& operator=(const ChainLdlSession&) = delete;
 
-  /// Ipopt options that go with it, name and value.
+  /// Ipopt options that this solver needs, name and value.
   static std::vector<std::pair<std::string, std::string>> ipopt_options();
-  /// Why a matrix was not factorised (too much fill, out of memory); empty = all were.
+  /// Why a matrix was not factorised (too large a front, out of memory); empty = all were.
   const std::string& refusal() const { return refusal_; }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// The dense inner loops of ChainLdl, compiled for the baseline and for AVX2, chosen at run time. Private to it.
+/// Dense inner loops of ChainLdl, compiled for the baseline and for AVX2 and chosen at run time. Private to ChainLdl.
 /// All columns are padded: a loop may read and write up to kLdlPadding entries beyond a column's last row.
 namespace sparflow::detail {
 
@@ -9,7 +9,7 @@ inline int ldl_padded(int rows) { return (rows + 3) / 4 * 4; }
 inline int ldl_stride(int rows) { return ldl_padded(rows + kLdlPadding); }
 
 struct LdlKernel {
-  /// Largest |column[i]|, 0 <= i < size; what follows up to whole vectors must be zero.
+  /// Largest |column[i]|, 0 <= i < size; the padding up to whole vectors must be zero.
   double (*largest)(int size, const double* column);
   /// f(i, c) -= l1[i] w1[c] (+ l2[i] w2[c] when l2 is given) for first <= c < last, c <= i < size.
   void (*update)(double* f, int stride, int first, int last, int size, const double* l1,

@@ -10,15 +10,15 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Rows eliminated and rows only updated, as long as a front is being put together.
+/// A front under construction: rows eliminated in it and rows only updated.
 struct Growing {
   std::vector<int> own, updated;  // positions
   int own_rows = 0, updated_rows = 0;
-  bool merged = false;  // into the one above
+  bool merged = false;  // into its parent
 };
 
-/// Estimated cost of a front in multiply-adds. A front's own overhead (index lists, assembly, loops too short to
-/// vectorise) was fitted on the motions' KKT systems: merging less or more than this makes them slower.
+/// Estimated cost of a front in multiply-adds. The overhead of a front (index lists, assembly, loops too short to
+/// vectorise) was tuned on the motions' KKT systems: with a larger or smaller value they become slower.
 double front_cost(int own, int updated) {
   constexpr double kFront = 300.0, kRow = 12.0, kAssembled = 2.0;
   double sum = kFront + kRow * (own + updated) + kAssembled * 0.5 * updated * (updated + 1);
@@ -76,8 +76,8 @@ Graph quotient(const Graph& graph, const std::vector<int>& group, int groups) {
 std::vector<int> elimination_order(const Graph& graph) {
   const int size = graph.size();
   std::vector<int> position(at(size), -1);
-  // The border: minimum degree would find it late as well, but counts its couplings in every degree before. A posture
-  // with very many rows of its own (clearances) is none: its share of all unknowns is that of one knot.
+  // Nodes of the border are ordered last at once, because otherwise their couplings would count in every degree. A posture
+  // with very many rows of its own (clearances) does not belong to it: its share of all unknowns is that of one knot.
   constexpr double kLeast = 48.0, kShare = 0.05;
   const double many = std::max(kLeast, kShare * size);
   std::vector<int> border, inner(at(size), -1), node;
@@ -89,7 +89,7 @@ std::vector<int> elimination_order(const Graph& graph) {
       node.push_back(i);
     }
   }
-  if (2 * border.size() > at(size)) {  // no chain: everything is coupled to everything
+  if (2 * border.size() > at(size)) {  // a dense matrix, not a chain
     std::iota(position.begin(), position.end(), 0);
     return position;
   }
@@ -126,7 +126,7 @@ std::vector<FrontNodes> fronts_of(const Graph& graph, const std::vector<int>& po
   std::vector<int> parent(at(size), -1), mark(at(size), -1);
   std::vector<std::vector<int>> children(at(size));
   const auto rows = [&](int k) { return weight[at(node[at(k)])]; };
-  for (int k = 0; k < size; ++k) {  // the elimination tree, and what each node reaches
+  for (int k = 0; k < size; ++k) {  // elimination tree, and the later nodes that each node updates
     Growing& f = front[at(k)];
     f.own = {k};
     f.own_rows = rows(k);
@@ -148,7 +148,7 @@ std::vector<FrontNodes> fronts_of(const Graph& graph, const std::vector<int>& po
     children[at(f.updated.front())].push_back(k);
   }
   for (int k = 0; k < size;
-       ++k) {  // merging: children were decided before, as their positions are smaller
+       ++k) {  // merging: children have smaller positions, so they are decided already
     Growing& f = front[at(k)];
     std::vector<int> kept;
     const std::vector<int> candidates = std::move(children[at(k)]);

@@ -15,10 +15,10 @@ struct Graph {
 
 Graph graph_of(int size, const std::vector<int>& row, const std::vector<int>& column);
 
-/// The graph of groups: group[i] of every node, 0 .. groups-1.
+/// Quotient graph of groups. @param group number of every node's group, 0 .. groups-1
 Graph quotient(const Graph& graph, const std::vector<int>& group, int groups);
 
-/// Position of every node: those coupled to a large part of all last, the others by approximate minimum degree.
+/// Position of every node: nodes coupled to a large part of all come last, the others by approximate minimum degree.
 std::vector<int> elimination_order(const Graph& graph);
 
 /// One front: nodes eliminated together, and the later ones they reach.
@@ -27,9 +27,8 @@ struct FrontNodes {
   std::vector<int> own, updated;  ///< positions in the order, rising
 };
 
-/// Fronts in an order in which every front follows its children directly one after another (postorder), small ones
-/// merged with the one above where that is estimated to be faster.
-/// @param position of every node; @param weight rows of every node
+/// Fronts in postorder (every front directly follows its children), small ones merged with their parent where that is
+/// estimated to be faster. @param position of every node in the elimination order  @param weight rows of every node
 std::vector<FrontNodes> fronts_of(const Graph& graph, const std::vector<int>& position,
                                   const std::vector<int>& weight);
 

@@ -12,7 +12,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Eigen::VectorXi;
 
-/// Sparse values laid out densely, doubles in the structure summed.
+/// Dense matrix of sparse values; values with equal indices are added.
 MatrixXd dense(int rows, int columns, const VectorXi& row, const VectorXi& column,
                const VectorXd& value, bool symmetric) {
   MatrixXd matrix = MatrixXd::Zero(rows, columns);
@@ -23,7 +23,7 @@ MatrixXd dense(int rows, int columns, const VectorXi& row, const VectorXi& colum
   return matrix;
 }
 
-/// f, g and the gradient of the Lagrangian in one long vector, so that one difference serves all.
+/// f, g and the gradient of the Lagrangian in one vector, so that one difference gives all derivatives.
 struct Everything {
   NlpProblem& problem;
   NlpSize size;
@@ -49,7 +49,7 @@ struct Everything {
 void compare(double exact, double numeric, double scale, double& worst, std::string& where,
              const std::string& row, const std::string& column) {
   const double error = std::abs(exact - numeric) / scale;
-  if (error <= worst) return;  // a NaN falls through
+  if (error <= worst) return;  // false for a NaN, which is recorded below
   worst = std::isnan(error) ? kNoBound : error;
   where =
       fmt::format("d {} / d {}: {:.12g}, differences give {:.12g}", row, column, exact, numeric);
@@ -93,7 +93,7 @@ DerivativeCheck check_derivatives(NlpProblem& problem, const VectorXd& x, double
       VectorXd difference = all.at(moved);
       moved[j] = x[j] - h;
       difference -= all.at(moved);
-      difference /= up - moved[j];  // what the sum really was, not 2 h
+      difference /= up - moved[j];  // the step as rounded, not 2 h
       moved[j] = x[j];
       return difference;
     };

@@ -1,6 +1,6 @@
 #pragma once
-/// Numeric twins of an NlpProblem's derivatives: central differences, once Richardson-extrapolated (error of
-/// order h^4). Tests use it on every problem; users may on theirs.
+/// Checks an NlpProblem's derivatives against central differences with one Richardson extrapolation (error of
+/// order h^4). Tests use it on every problem; users may apply it to their own.
 #include <string>
 
 #include "optimizer/nlp/nlp_problem.h"
@@ -17,10 +17,10 @@ struct DerivativeCheck {
 };
 
 /// Entries missing from a sparse structure count as zeros, so a wrong structure is found too.
-/// @param x a point inside the domain of all functions (bounds are not looked at)
+/// @param x a point inside the domain of all functions; bounds are ignored
 /// @param step difference step relative to max(1, |x_i|). The default balances the truncation error
 ///        h^4 f^(5) against the rounding error eps f / h for functions whose natural scale is 1; pass less
-///        for functions that bend over a shorter length.
+///        for functions that vary over a shorter length.
 DerivativeCheck check_derivatives(NlpProblem& problem, const Eigen::VectorXd& x,
                                   double step = 1e-3);
 

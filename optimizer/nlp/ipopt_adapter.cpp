@@ -22,7 +22,7 @@ IpoptAdapter::IpoptAdapter(NlpProblem& problem, const NlpOptions& options, NlpRe
       size_(problem.size()),
       began_(Clock::now()) {}
 
-/// After an exception every further request is refused, which makes Ipopt cut its step to nothing and leave.
+/// After an exception every further evaluation fails, so that Ipopt reduces its step to zero and returns.
 template <class Evaluation>
 bool IpoptAdapter::guarded(int& count, const Evaluation& evaluation) {
   if (error_) return false;
@@ -52,7 +52,7 @@ bool IpoptAdapter::get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_h
 bool IpoptAdapter::get_bounds_info(Index n, Number* x_l, Number* x_u, Index m, Number* g_l,
                                    Number* g_u) {
   int ignored = 0;
-  // Ipopt takes anything beyond +-1e19 for no bound, infinity included.
+  // Ipopt treats values beyond +-1e19 as no bound, infinity included.
   return guarded(ignored,
                  [&] { problem_.bounds(Map(x_l, n), Map(x_u, n), Map(g_l, m), Map(g_u, m)); });
 }

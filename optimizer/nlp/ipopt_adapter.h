@@ -1,5 +1,5 @@
 #pragma once
-/// NlpProblem seen as Ipopt's TNLP: times every evaluation, counts it, and keeps exceptions on this side.
+/// Adapts NlpProblem to Ipopt's TNLP: measures and counts every evaluation, and lets no exception pass through Ipopt.
 /// Private to optimizer/nlp.
 #include <IpIpoptApplication.hpp>
 #include <IpIpoptCalculatedQuantities.hpp>

@@ -136,7 +136,7 @@ struct Bounds {
   Eigen::VectorXd x_lower, x_upper, g_lower, g_upper;
 };
 
-/// The first pair of bounds that exclude each other, in words; "" when there is none.
+/// Sentence on the first pair of bounds that exclude each other; "" when there is none.
 std::string crossed_bounds(const NlpProblem& problem, const Bounds& bounds) {
   for (int i = 0; i < bounds.x_lower.size(); ++i) {
     if (!(bounds.x_lower[i] <= bounds.x_upper[i])) {
@@ -170,7 +170,7 @@ void find_violation(const NlpProblem& problem, const Bounds& bounds, NlpResult& 
        [&](int i) { return problem.constraint_name(i); });
 }
 
-/// Nothing is free: the only candidate is the point itself (Ipopt refuses such a problem).
+/// Evaluates a problem without free variables, which Ipopt refuses: the only candidate is the point itself.
 void judge_fixed_point(NlpProblem& problem, const Bounds& bounds, const NlpOptions& options,
                        NlpResult& result) {
   result.x = bounds.x_lower;
@@ -229,9 +229,9 @@ std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, Kkt
   return adapter->error();
 }
 
-/// With the solver asked for, and once more with MUMPS if that one gave up.
+/// Solves with the requested linear solver, and again with MUMPS if that one gave up.
 std::exception_ptr run_ipopt(NlpProblem& problem, const NlpOptions& options, NlpResult& result) {
-  // Held to the end of this scope, the destruction of the linear solver's instance included.
+  // The lock also covers the destruction of the linear solver's instance at the end of this scope.
   const std::lock_guard<std::mutex> lock(ipopt_mutex());
   const bool named = options.more.count("linear_solver") > 0;
   const KktSolver asked = named ? KktSolver::kMumps : options.kkt_solver;

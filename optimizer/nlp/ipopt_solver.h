@@ -1,7 +1,7 @@
 #pragma once
 /// Ipopt behind one function. Source: Waechter & Biegler (2006), Math. Programming 106, 25-57.
-/// Ipopt 3.11 with MUMPS is not thread-safe (MUMPS keeps module variables), so solves of one process take turns:
-/// a second thread waits. Solve in child processes to use several cores.
+/// Ipopt 3.11 with MUMPS is not thread-safe (MUMPS keeps module variables), so only one solve runs in a process:
+/// a second thread waits. To use several cores, solve in child processes.
 #include <functional>
 #include <limits>
 #include <map>
@@ -23,14 +23,14 @@ enum class NlpStatus {
 };
 const char* to_string(NlpStatus status);
 
-/// What solves the KKT systems.
+/// Linear solver of the KKT systems.
 enum class KktSolver {
-  kChain,  ///< ChainLdl: faster where the problem is a chain in time; MUMPS takes over where it is none
+  kChain,  ///< ChainLdl: faster for a problem that is a chain in time; MUMPS replaces it for others
   kMumps,
 };
 const char* to_string(KktSolver solver);
 
-/// One line of progress.
+/// Progress of one iteration.
 struct NlpIteration {
   int iteration = 0;
   double objective = 0.0;
@@ -49,10 +49,10 @@ struct NlpOptions {
   std::optional<double> constraint_tolerance;
   int max_iterations = 3000;
   double max_seconds =
-      std::numeric_limits<double>::infinity();  ///< wall time, looked at once an iteration
+      std::numeric_limits<double>::infinity();  ///< wall time, checked in every iteration
   /// Start of the barrier parameter; absent = 0.1 cold (Ipopt's default), warm_start_mu warm.
   std::optional<double> mu_init;
-  /// Used when the problem offers start_multipliers(): barrier parameter, and how far start values are
+  /// Used when the problem has start_multipliers(): barrier parameter, and how far start values are
   /// pushed off their bounds.
   double warm_start_mu = 1e-5;
   double warm_start_push = 1e-8;
@@ -77,30 +77,30 @@ struct NlpResult {
   NlpMultipliers multipliers;
   int iterations = 0;
   int restoration_iterations = 0;
-  /// Largest unscaled distance of x or g(x) outside its bounds, and who it is (empty when below 1e-12).
+  /// Largest unscaled distance of x or g(x) outside its bounds, and its name (empty when below 1e-12).
   double max_violation = 0.0;
   std::string max_violation_at;
   NlpEvaluations evaluations;
   double solve_s = 0.0;  ///< wall time in Ipopt; waiting for another thread's solve is not in it
-  double callbacks_s = 0.0;  ///< wall time of it in the problem's evaluations
-  /// The same two as processor time of the solving thread: what they are on a machine that does other things too.
+  double callbacks_s = 0.0;  ///< share of it in the problem's evaluations [s]
+  /// The same two as processor time of the solving thread, which other programs on the machine do not change.
   double solve_cpu_s = 0.0;
   double callbacks_cpu_s = 0.0;
-  KktSolver kkt_solver = KktSolver::kMumps;  ///< that ended the solve
-  std::string kkt_note;                      ///< why it was not the one asked for; empty = it was
-  /// Wall time of it in solving KKT systems: assembling the augmented matrix, ordering, factorisation and back
+  KktSolver kkt_solver = KktSolver::kMumps;  ///< linear solver with which the solve ended
+  std::string kkt_note;                      ///< why it is not the requested one; empty = it is
+  /// Share of solve_s in solving KKT systems: assembling the augmented matrix, ordering, factorisation and back
   /// substitution, refinement. From Ipopt's timing statistics (its narrower timers leave the factorisation out),
   /// which do not cover the restoration phase: a lower bound when restoration_iterations > 0.
   double linear_solver_s = 0.0;
   std::map<std::string, std::string>
-      options_used;  ///< every option that was set, as Ipopt was given it
+      options_used;  ///< every option that was set, with the value passed to Ipopt
 
   bool solved() const { return status == NlpStatus::kOptimal || status == NlpStatus::kAcceptable; }
   std::string brief() const;  ///< one line
 };
 
-/// Solves from problem.start(). A solver's outcome is a status, never an exception.
-/// @throws whatever a callback of the problem or on_iteration threw, once Ipopt has been left;
+/// Solves from problem.start(). The outcome of the solver is a status, never an exception.
+/// @throws an exception of the problem's callbacks or of on_iteration, after Ipopt has returned;
 ///         UsageError when an option of `more` is unknown to Ipopt
 NlpResult solve_with_ipopt(NlpProblem& problem, const NlpOptions& options = {});
 

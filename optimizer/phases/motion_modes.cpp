@@ -8,7 +8,7 @@
 namespace sparflow {
 namespace {
 
-/// Runs [begin, end) of equal modes in one cylinder's column.
+/// A range [begin, end) of intervals with equal mode in one cylinder's column.
 struct Run {
   Eigen::Index begin, end;
   CylinderMode mode;
@@ -45,13 +45,13 @@ double full_speed(const CraneModel& model, const MotionProblem& problem, int cyl
   return std::max(std::abs(v.lo), std::abs(v.hi)) * std::abs(rate);
 }
 
-/// A cylinder that covered much of its way creeping gets a window for it where it was fastest, long enough to
-/// cover the way at half speed.
+/// Gives a cylinder that covered much of its stroke creeping a window around its fastest interval, long enough to cover
+/// that stroke at half speed.
 void concentrate(ModeTable& modes, int c, const Trajectory& motion, const CraneModel& model,
                  const MotionProblem& problem, const ModeOptions& options) {
   const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
   const Eigen::Index intervals = modes.rows();
-  Eigen::VectorXd way(intervals);  // signed, [m]
+  Eigen::VectorXd way(intervals);  // signed travel of the rod [m]
   for (Eigen::Index k = 0; k < intervals; ++k) {
     way[k] = linkage_rates(model.machine, c, motion.q(k + 1, j)).value -
              linkage_rates(model.machine, c, motion.q(k, j)).value;
@@ -102,7 +102,7 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
                     : speed > 0.0           ? CylinderMode::kExtend
                                             : CylinderMode::kRetract;
     }
-    // pauses of one or two intervals inside a move are part of it; moves too short to matter are dropped
+    // Pauses of one or two intervals inside a move belong to it; moves that are too short are dropped.
     std::vector<Run> runs = runs_of(modes, c);
     for (std::size_t r = 1; r + 1 < runs.size(); ++r) {
       const bool same =
@@ -115,7 +115,7 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
       if (run.end - run.begin < options.shortest_move) fill(modes, c, run, CylinderMode::kRest);
     }
     concentrate(modes, c, motion, model, problem, options);
-    // a joint that has to arrive somewhere must be allowed to move: its fastest stretch, if all creeps
+    // A joint with a net travel must be allowed to move; if it creeps throughout, it moves where it is fastest.
     const double travel = motion.q(intervals, j) - motion.q(0, j);
     const bool must_move =
         std::holds_alternative<JointGoal>(problem.goal) && std::abs(travel) > 1e-9;
@@ -130,7 +130,7 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
 }
 
 void apply_modes(const CraneModel& model, const ModeTable& modes, TranscriptionBounds& bounds) {
-  SPARFLOW_CHECK(modes.rows() == bounds.qdd_lower.rows(), "modes and bounds are of one mesh");
+  SPARFLOW_CHECK(modes.rows() == bounds.qdd_lower.rows(), "modes and bounds must have the same mesh");
   for (int c = 0; c < model.machine.cylinder_count(); ++c) {
     const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
     const Range& range = model.machine.joints[static_cast<std::size_t>(j)].position;

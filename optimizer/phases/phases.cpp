@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 bool moves(CylinderMode m) { return m == CylinderMode::kExtend || m == CylinderMode::kRetract; }
 
-/// Rows one by one, joined with the one before where both are the same.
+/// Appends phases to a plan and joins each with the one before where their modes are equal.
 class PlanBuilder {
  public:
   explicit PlanBuilder(Index cylinders) : cylinders_(cylinders) {}
@@ -28,7 +28,7 @@ class PlanBuilder {
     rows_.push_back(row);
     durations_.push_back(duration);
   }
-  /// At the end of what was added last. @return false when nothing was
+  /// Puts a waypoint at the end of the last phase. @return false when there is no phase yet
   bool pass_waypoint() {
     if (rows_.empty()) return false;
     waypoints_.push_back(count() - 1);
@@ -64,7 +64,7 @@ void pass_waypoints(const PhasePlan& plan, Index phase, PlanBuilder& out) {
   }
 }
 
-/// Moves of both phases; false where a cylinder would move both ways.
+/// Unites the moves of two phases. @return false where a cylinder would move in both directions
 bool join(const ModeTable& modes, Index a, Index b,
           Eigen::Matrix<CylinderMode, 1, Eigen::Dynamic>& row) {
   row = modes.row(a);
@@ -76,7 +76,7 @@ bool join(const ModeTable& modes, Index a, Index b,
   return true;
 }
 
-/// Every move (cylinder and direction) of the one is in the other.
+/// Whether every move (cylinder and direction) of `wanted` occurs in `plan`.
 bool covers(const PhasePlan& wanted, const PhasePlan& plan) {
   for (Index c = 0; c < wanted.modes.cols(); ++c) {
     for (const CylinderMode m : {CylinderMode::kExtend, CylinderMode::kRetract}) {
@@ -91,7 +91,7 @@ bool covers(const PhasePlan& wanted, const PhasePlan& plan) {
 
 PhasePlan plan_of(const ModeTable& modes, const VectorXd& times,
                   const std::vector<double>& waypoint_times) {
-  SPARFLOW_CHECK(modes.rows() + 1 == times.size(), "modes and mesh belong together");
+  SPARFLOW_CHECK(modes.rows() + 1 == times.size(), "modes and mesh must have the same intervals");
   PlanBuilder plan(modes.cols());
   std::size_t next = 0;
   for (Index k = 0; k < modes.rows(); ++k) {
@@ -141,7 +141,7 @@ PhasePlan without_short(const PhasePlan& plan, double shortest) {
   double owed = 0.0;
   for (Index p = 0; p < plan.modes.rows(); ++p) {
     if (plan.durations[p] < shortest) {
-      // what ends at a waypoint cannot go unless something before it stays to end there
+      // A phase that ends at a waypoint is removed only if an earlier phase can end there instead.
       if (!ends_at_waypoint(plan, p) || out.count() > 0) {
         owed += plan.durations[p];
         pass_waypoints(plan, p, out);
@@ -180,7 +180,7 @@ std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
     if (candidate.count() > 0) candidate.durations *= plan.total() / candidate.total();
     keep(candidate);
   };
-  for (Index p = 0; p < phases; ++p) {  // left out
+  for (Index p = 0; p < phases; ++p) {  // one phase left out
     PlanBuilder out(cylinders);
     for (Index o = 0; o < phases; ++o) {
       if (o != p) out.add(plan.modes.row(o), plan.durations[o]);
@@ -189,7 +189,7 @@ std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
     if (candidate.count() > 0) candidate.durations *= plan.total() / candidate.total();
     keep(candidate);
   }
-  for (Index p = 0; p + 1 < phases; ++p) {  // exchanged; made one
+  for (Index p = 0; p + 1 < phases; ++p) {  // two phases exchanged, or merged
     ModeTable modes = plan.modes;
     VectorXd durations = plan.durations;
     modes.row(p).swap(modes.row(p + 1));
@@ -201,7 +201,7 @@ std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
     modes.row(p) = modes.row(p + 1) = row;
     build(modes, plan.durations);
   }
-  for (Index c = 0; c < cylinders; ++c) {  // begun or ended a phase earlier or later
+  for (Index c = 0; c < cylinders; ++c) {  // a cylinder starts or stops a phase earlier or later
     for (Index p = 0; p < phases; ++p) {
       for (const Index from : {p - 1, p + 1}) {
         if (from < 0 || from >= phases) continue;
@@ -213,7 +213,7 @@ std::vector<PhasePlan> neighbours(const PhasePlan& plan) {
       }
     }
   }
-  // the longest phase in which several move cut in two, each of them at rest in one half
+  // The longest phase in which several cylinders move is halved, with one of them at rest in either half.
   Index longest = -1;
   for (Index p = 0; p < phases; ++p) {
     const bool several =
@@ -281,7 +281,7 @@ PhaseMesh mesh_of(const PhasePlan& plan, int intervals, int least) {
 }
 
 VectorXd durations_of(const PhaseMesh& mesh, const VectorXd& times) {
-  SPARFLOW_CHECK(times.size() == mesh.times.size(), "the motion is on another mesh");
+  SPARFLOW_CHECK(times.size() == mesh.times.size(), "motion and phases must have the same mesh");
   VectorXd durations = VectorXd::Zero(mesh.of_interval.back() + 1);
   for (std::size_t k = 0; k < mesh.of_interval.size(); ++k) {
     const auto i = static_cast<Index>(k);
@@ -291,7 +291,7 @@ VectorXd durations_of(const PhaseMesh& mesh, const VectorXd& times) {
 }
 
 Trajectory with_durations(const Trajectory& motion, const VectorXd& from, const VectorXd& to) {
-  SPARFLOW_CHECK(from.size() == to.size(), "as many durations before as after");
+  SPARFLOW_CHECK(from.size() == to.size(), "both lists of durations must have the same length");
   Trajectory out = motion;
   for (Index k = 0; k < motion.size(); ++k) {
     const double t = motion.t[k] - motion.t[0];

@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Highest joint speed all along a joint's way that its own limit, its valve and its pump allow. [rad/s] or [m/s]
+/// Highest speed that joint, valve and pump allow everywhere on a joint's travel. [rad/s] or [m/s]
 double joint_speed(const CraneModel& model, const MotionProblem& problem, int joint, double from,
                    double to) {
   const Range& v = problem.limits.velocity[static_cast<std::size_t>(joint)];
@@ -50,7 +50,7 @@ double joint_speed(const CraneModel& model, const MotionProblem& problem, int jo
   return speed;
 }
 
-constexpr double kDeepestGuess = 0.05;  // [m] into the clearance zone that a guess may be
+constexpr double kDeepestGuess = 0.05;  // [m] by which a guess may violate the clearance
 
 struct Leg {
   int joint = 0;
@@ -101,11 +101,11 @@ void integrate(const VectorXd& start, Trajectory& motion) {
   motion.qdd.row(motion.size() - 1) = motion.qdd.row(motion.size() - 2);
 }
 
-/// Modes and guess for legs driven one after another over the whole mesh. @return false when time is too short
+/// Builds modes and guess of legs driven one after another over the whole mesh. @return false when time is too short
 bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd& times,
            const std::vector<Leg>& legs, ClearanceModel* clearance, ModeCandidate& out) {
   const double total = times[times.size() - 1];
-  // two intervals a leg for what the trapezoid loses by starting and stopping at knots
+  // Each leg gets two more intervals, because its trapezoid can start and stop at knots only.
   const double slack = 2.0 * total / static_cast<double>(times.size() - 1);
   const double needed = std::accumulate(legs.begin(), legs.end(), 0.0, [&](double s, const Leg& l) {
     return s + l.shortest + slack;
@@ -136,14 +136,14 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
     begin = end;
   }
   integrate(problem.start, m);
-  // a start that passes through an obstacle rarely finds its way out with its modes held
+  // With fixed modes the solver rarely moves a guess out of an obstacle.
   if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess) return false;
   out.energy = exact_total_energy(model, m, problem.payload, 2);
   return true;
 }
 
 std::string order_name(const Machine& machine, const std::vector<Leg>& legs) {
-  std::string name = "one by one: ";
+  std::string name = "sequential: ";
   for (std::size_t i = 0; i < legs.size(); ++i) {
     name += (i > 0 ? ", " : "") + machine.joints[static_cast<std::size_t>(legs[i].joint)].name;
   }
@@ -163,8 +163,8 @@ bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
       if (!free[static_cast<std::size_t>(j)]) jacobian.col(j).setZero();
     }
     VectorXd step;
-    // A joint at a limit that the step would push further is left out of it: cut short instead, it would hold the
-    // others back for good.
+    // A joint at a limit that the step would push further is removed from the step; a shortened step instead would stop
+    // the other joints too.
     for (bool pushes = true; pushes;) {
       const Eigen::Matrix3d normal =
           jacobian * jacobian.transpose() + 1e-9 * Eigen::Matrix3d::Identity();
@@ -240,7 +240,7 @@ std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
   }
   std::sort(found.begin(), found.end(),
             [](const ModeCandidate& a, const ModeCandidate& b) { return a.energy < b.energy; });
-  // one candidate an order: what distinguishes two of them is an end posture, which the solver moves anyway
+  // One candidate of each order is kept: two of one order differ in their end posture only, which the solver varies.
   std::vector<ModeCandidate> best;
   for (ModeCandidate& candidate : found) {
     const bool known = std::any_of(best.begin(), best.end(), [&](const ModeCandidate& b) {

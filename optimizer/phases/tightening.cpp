@@ -6,8 +6,8 @@
 
 namespace sparflow {
 
-bool Tightening::draw_in(const MotionProblem& problem, const std::vector<LimitCheck>& checks,
-                         double tolerance) {
+bool Tightening::tighten_bounds(const MotionProblem& problem, const std::vector<LimitCheck>& checks,
+                                double tolerance) {
   bool any = false;
   for (const LimitCheck& c : checks) {
     if (c.excess <= tolerance) continue;

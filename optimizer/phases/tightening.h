@@ -1,5 +1,5 @@
 #pragma once
-/// What a start does about limits that are kept at the knots and broken between them: drawing them in, or more knots.
+/// Treatment of limits that hold at the knots and are violated between them: bound tightening, or more knots.
 #include <vector>
 
 #include "optimizer/crane/exact_energy.h"
@@ -8,23 +8,23 @@
 
 namespace sparflow {
 
-/// How far limits are drawn in so that they also hold between knots.
+/// Bound tightening: limits narrowed at the knots, so that they also hold between them.
 struct Tightening {
-  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  ///< shares [-]
-  double clearance = 0.0;                                                   ///< [m]
-  std::vector<double> position;  ///< [rad] or [m] by joint
-  bool limit_pressure = false;   ///< rows for the pumps' pressures are wanted
+  double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0, trust = 1.0;  ///< shares of the limits [-]
+  double clearance = 0.0;        ///< added to the required clearance [m]
+  std::vector<double> position;  ///< narrowing of the position range, by joint [rad] or [m]
+  bool limit_pressure = false;   ///< whether the NLP has rows for the pumps' pressures
 
-  /// Draws in what is broken. @param tolerance relative overshoot that counts as kept
-  /// @return false when all limits are kept
-  bool draw_in(const MotionProblem& problem, const std::vector<LimitCheck>& checks,
-               double tolerance);
+  /// Tightens every limit that is violated. @param tolerance relative overshoot that still counts as kept
+  /// @return false when no limit is violated
+  bool tighten_bounds(const MotionProblem& problem, const std::vector<LimitCheck>& checks,
+                      double tolerance);
 };
 
-/// Between far knots a link can cut a corner of an obstacle; drawing in the clearance by as much would close narrow
-/// ways. Such intervals are cut in four instead.
-/// @param motion on the mesh  @param parts looked at in an interval  @param most intervals a mesh may have before it is cut
-/// @return false when none is deep enough, or the mesh is full or has no phases
+/// Splits intervals in four in which a link cuts a corner of an obstacle; tightening the clearance by that depth instead
+/// would close narrow passages.
+/// @param motion on the mesh  @param parts instants checked in an interval  @param most intervals above which a mesh is not split
+/// @return false when no interval is split: no violation is deep enough, or the mesh has too many intervals or no phases
 bool split_where_it_touches(const MotionProblem& problem, const Trajectory& motion, int parts,
                             int most, PhaseMesh& mesh);
 

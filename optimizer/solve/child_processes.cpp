@@ -65,14 +65,14 @@ Child start_child(const std::function<std::string(int)>& work, int index,
   const pid_t pid = ::fork();
   SPARFLOW_CHECK(pid >= 0, "no child process");
   if (pid == 0) {
-    // whoever asked is gone, killed or interrupted: nobody waits for the answer
+    // The child ends with its parent (killed or interrupted), since then nothing reads its result.
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(1);
     ::close(ends[0]);
     for (const Child& other : others) ::close(other.pipe);
     write_all(ends[1], run_here(work, index));
     ::close(ends[1]);
-    ::_exit(0);  // no destructors, no flushing of streams that belong to the parent
+    ::_exit(0);  // without destructors and without flushing the parent's streams
   }
   ::close(ends[1]);
   return {index, pid, ends[0], {}};
@@ -154,7 +154,7 @@ Packer& Packer::numbers(const double* values, std::size_t count) {
 }
 
 void Unpacker::take(void* out, std::size_t size) {
-  SPARFLOW_CHECK(at_ + size <= bytes_->size(), "a child process sent too little");
+  SPARFLOW_CHECK(at_ + size <= bytes_->size(), "a child process sent an incomplete result");
   if (size > 0) std::memcpy(out, bytes_->data() + at_, size);
   at_ += size;
 }

@@ -1,6 +1,5 @@
 #pragma once
-/// Independent solves in child processes: the solver underneath is not thread-safe (MUMPS keeps module
-/// variables), processes are.
+/// Independent solves in child processes, because the linear solver is not thread-safe (MUMPS keeps module variables).
 #include <Eigen/Core>
 #include <functional>
 #include <string>
@@ -10,14 +9,14 @@ namespace sparflow {
 
 struct ChildResult {
   bool ok = false;
-  std::string bytes;  ///< what the work returned
+  std::string bytes;  ///< return value of the work
   std::string
-      error;  ///< why there is nothing: an exception's text, or the signal that ended the child
+      error;  ///< why there is no result: an exception's text, or the signal that ended the child
 };
 
-/// Runs work(0) .. work(count-1), at most `at_once` at a time, each in a forked child whose return value
-/// comes back through a pipe; a child never outlives this process. With at_once <= 1 or count == 1 everything runs in this process.
-/// @param on_done called in this process as results arrive: (index, finished so far)
+/// Runs work(0) .. work(count-1), at most `at_once` at a time, each in a forked child that returns its result through a
+/// pipe. No child outlives this process. With at_once <= 1 or count == 1 everything runs in this process.
+/// @param on_done called in this process as results arrive, with (index, number finished so far)
 std::vector<ChildResult> run_in_children(int count, int at_once,
                                          const std::function<std::string(int)>& work,
                                          const std::function<void(int, int)>& on_done = {});
@@ -25,7 +24,7 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
 /// Number of processors this process may use.
 int usable_processors();
 
-/// Plain binary packing of what travels through the pipe (same program at both ends).
+/// Binary packing of results for the pipe; the same program must read it.
 class Packer {
  public:
   Packer& number(double value);

@@ -10,7 +10,7 @@
 #include "optimizer/grid/energy_grid.h"
 #include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/optimize_outcome.h"
-#include "optimizer/solve/start_pack.h"
+#include "optimizer/solve/start_bytes.h"
 
 namespace sparflow {
 namespace {
@@ -28,15 +28,15 @@ bool same_plan(const PhasePlan& a, const PhasePlan& b) {
          (a.modes.array() == b.modes.array()).all();
 }
 
-/// Up to so many times the shortest motion cylinders must move together somewhere: taking turns needs about twice its time.
-constexpr double kHurried = 2.0;
+/// Below this multiple of the shortest duration some cylinders must move together: sequential motions need about twice.
+constexpr double kShortOfTime = 2.0;
 
-/// Where time is short, the sequences tried are also those of motions so many times slower.
+/// Where time is short, mode sequences of motions with these multiples of the duration are tried too.
 constexpr double kSlower[] = {1.25, 1.6};
 
-constexpr double kRoomForTheRows = 0.04;  // [m] their inflation, and what lies between two knots
+constexpr double kRoomForTheRows = 0.04;  // [m] inflation of the smooth clearance rows, and sag between two knots
 
-/// Everything that is solved for one problem in one window of time.
+/// All solves for one problem in one window of durations.
 class Search {
  public:
   Search(const CraneModel& model, const MotionProblem& problem,
@@ -51,17 +51,17 @@ class Search {
     if (options.modes && options.free_phases && options.search_intervals > 0)
       coarse_.intervals = std::min(options.intervals, options.search_intervals);
     coarse_.phase_iterations = options.phase_iterations / 2;
-    // beside obstacles a solve takes ten times longer, and the seeds differ more than their neighbours do
+    // Near obstacles a solve takes ten times longer, and seeds differ more than neighbouring sequences do.
     searched_ = problem.obstacles.empty() ? options.searched_starts : 1;
   }
 
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<ModeCandidate> one_by_one = sequences(time_.guess);
-    if (hurried()) {
+    if (short_of_time()) {
       for (const double slower : kSlower) {
         for (ModeCandidate& c : sequences(slower * time_.guess)) {
-          c.name = fmt::format("squeezed {:g} times: {}", slower, c.name);
+          c.name = fmt::format("shortened {:g} times: {}", slower, c.name);
           c.guess = with_duration(c.guess, time_.guess);
           one_by_one.push_back(std::move(c));
         }
@@ -96,16 +96,16 @@ class Search {
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
 
-  /// Too little time for taking turns: what is cheap then is a slower motion's sequence with its phases overlapping,
-  /// which neither the seeds (all joints at once) nor the grid at this time shows. Beside obstacles the ways round are
-  /// what differs, and a solve takes ten times longer.
-  bool hurried() const {
+  /// Whether time is too short for sequential motions. Then the mode sequence of a slower motion with overlapping phases is
+  /// cheap, which neither the seeds (all joints at once) nor the grid at this duration contain. Near obstacles it is not
+  /// used: there paths differ in how they pass the obstacles, and a solve takes ten times longer.
+  bool short_of_time() const {
     const double shortest = shortest_seed(seeds_);
     return problem_.objective.energy > 0.0 && problem_.obstacles.empty() &&
-           time_.lower == time_.upper && time_.guess < kHurried * shortest;
+           time_.lower == time_.upper && time_.guess < kShortOfTime * shortest;
   }
 
-  /// One by one in so long a time, and the cheapest ways a search over the whole joint space knows.
+  /// Sequential starts for this duration, and the cheapest paths of the joint grid.
   std::vector<ModeCandidate> sequences(double duration) const {
     std::vector<ModeCandidate> found;
     if (options_.sequential_starts > 0 && options_.modes && !problem_.tip_line &&
@@ -123,7 +123,7 @@ class Search {
     return found;
   }
 
-  /// @param wanted [s] longer than the window allows: the path is to be driven faster by whoever asked
+  /// @param wanted duration of the paths [s]; if it is longer than the window allows, the caller shortens the motion
   std::vector<ModeCandidate> grid_candidates(double wanted) const {
     std::vector<ModeCandidate> found;
     const EnergyGridOptions size{options_.grid_nodes};
@@ -148,7 +148,7 @@ class Search {
     };
     search(problem_, options_.grid_starts);
     if (!problem_.obstacles.empty()) {
-      // the solver's rows keep a little more distance than the exact one: ways it can start from
+      // The smooth clearance rows keep a larger distance than the exact check, so paths with that distance are sought.
       MotionProblem wider = problem_;
       wider.clearance += kRoomForTheRows;
       search(wider, options_.grid_starts);
@@ -183,8 +183,8 @@ class Search {
     }
   }
 
-  /// No start kept all limits: the shortest motion there is tells whether the time is the reason. Where it is not, that
-  /// motion driven slower is a start like any other.
+  /// Called when no start kept all limits. The shortest motion found shows whether the duration is the reason; if it is
+  /// not, this motion, driven slower, becomes a start.
   void rescue() {
     if (interrupted() || time_is_everything(problem_)) return;
     const OptimizeResult shortest = shortest_motion(model_, problem_, seeds_, options_);
@@ -210,7 +210,7 @@ class Search {
         [&](int) { return name; });
   }
 
-  /// From the best few motions on: neighbouring mode sequences, as long as one of them is cheaper.
+  /// Local search over mode sequences: neighbours of the best few motions are solved as long as one of them is cheaper.
   void search_sequences() {
     std::vector<PhasePlan> tried;
     const auto known = [&](const PhasePlan& plan) {
@@ -262,7 +262,7 @@ class Search {
     }
   }
 
-  /// What the trapezoid misses on this mesh, the softness of the maximum (known to lie within it) apart.
+  /// Error of the trapezoidal rule on this mesh, less the smoothing of the maximum, which is known.
   double mesh_error(const StartResult& s) const {
     const ObjectiveWeights& w = problem_.objective;
     if (s.energy_exact <= 0.0 || w.energy <= 0.0 || w.commands > 0.0) return 0.0;
@@ -282,7 +282,7 @@ class Search {
     return std::max(0.0, std::max(excess - softness, -excess)) / s.energy_exact;
   }
 
-  /// The best motions again on the answer's mesh, finer until the trapezoid's error does not matter.
+  /// Solves the best motions again on the result's mesh, refined until the trapezoidal error is below `mesh_error`.
   void refine() {
     std::vector<int> best = ranking(result_, options_.limit_tolerance);
     std::vector<int> chosen;
@@ -315,7 +315,7 @@ class Search {
                                         fine);
           },
           name);
-      // the coarse motion is kept as what the finer one is compared with, not as an answer of its own
+      // The coarse motion stays in the list for comparison, but is not a candidate of its own.
       std::size_t winner = first;
       for (std::size_t i = first; i < result_.starts.size(); ++i) {
         if (result_.starts[i].usable(options_.limit_tolerance) &&
@@ -381,17 +381,17 @@ OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem
 OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& problem,
                                const std::vector<SeedMotion>& seeds,
                                const OptimizeOptions& options) {
-  MotionProblem hurried = problem;
-  hurried.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
+  MotionProblem fastest = problem;
+  fastest.objective = {0.0, 1e3, 0.0, problem.objective.smoothness};
   const double shortest = shortest_seed(seeds);
   const double guess = shortest > 0.0 ? 1.1 * shortest : std::max(problem.duration.min, 1.0);
-  hurried.duration = {0.0, 20.0 * guess};
+  fastest.duration = {0.0, 20.0 * guess};
   OptimizeOptions direct = options;
   direct.schedule.clear();
   direct.sequential_starts = 0;
   direct.sequence_rounds = 0;
   direct.progress = {};
-  return optimize_in(model, hurried, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
+  return optimize_in(model, fastest, seeds, {guess, 0.02 * guess, 20.0 * guess}, direct);
 }
 
 OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem,
@@ -413,7 +413,7 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
   if (problem.duration.fixed())
     return optimize_at(model, problem, seeds, problem.duration.min, options);
 
-  // Free or bounded time is a variable of every start; where the search begins still matters, so two beginnings.
+  // A free duration is a variable of every start. Its result depends on the initial duration, so two are tried.
   const auto begin = std::chrono::steady_clock::now();
   const double shortest = shortest_seed(seeds);
   const double lo = std::max(problem.duration.min, 0.05 * shortest);

@@ -88,13 +88,13 @@ const char* to_string(OptimizeStatus status) {
 
 namespace {
 
-/// How many times longer the motion would have to take for this limit to hold: what makes a velocity, an
-/// acceleration and a flow comparable. Lengths do not mend with time.
+/// Factor by which the duration would have to grow for this limit to hold, so that velocities, accelerations and flows
+/// are comparable. Violated lengths do not depend on the duration.
 double stretch_asked(const LimitCheck& c) {
   if (c.excess <= 0.0 || c.limit == 0.0) return 1.0 + std::max(c.excess, 0.0);
   const double ratio = std::abs(c.value / c.limit);
   if (c.what.starts_with("acceleration of")) return std::sqrt(ratio);
-  // between equals the flow, which is why the accelerations of a shortened path are too high
+  // Among equal factors the flow is named, because it is the cause of too high accelerations of a shortened path.
   return c.what.starts_with("flow") ? 1.01 * ratio : ratio;
 }
 
@@ -117,7 +117,7 @@ void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMoti
   if (!result.checks.empty()) {
     worst = fmt::format(" Worst: {}.", limit_text(worst_limit(result.checks)));
   } else if (!result.starts.empty()) {
-    worst = " The solver says: " + result.starts.front().message + ".";
+    worst = " The solver reports: " + result.starts.front().message + ".";
   }
   const double shortest = shortest_seed(seeds);
   std::string remedy;

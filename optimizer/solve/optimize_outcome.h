@@ -1,5 +1,5 @@
 #pragma once
-/// What is made of a search's starts: which one wins, what the seeds would cost, why nothing was found.
+/// Evaluation of a search's starts: ranking, energies of the seeds, and why nothing was found.
 #include <string>
 #include <vector>
 
@@ -7,30 +7,30 @@
 
 namespace sparflow {
 
-/// Two starts that ended in the same motion: all joints within a thousandth of their range at all of a's knots.
+/// Whether two motions are equal: all joints within a thousandth of their range at all of a's knots.
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b);
 
-/// The shortest time a seed path takes within all limits; 0 when none does. [s]
+/// Shortest duration in which a seed path keeps all limits; 0 = none does. [s]
 double shortest_seed(const std::vector<SeedMotion>& seeds);
 
-/// Starts from the cheapest on: those that keep all limits, each motion once.
+/// Indices of the starts that keep all limits, each motion once, by increasing cost.
 std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance);
 
-/// What the seeds themselves cost, driven in the result's time, where they keep the limits in it.
+/// Sets the energies of the seeds in the result's duration, where they keep the limits.
 void set_baselines(const CraneModel& model, const MotionProblem& problem,
                    const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result);
 
-/// The start nearest to keeping every limit; null when none came to a motion.
+/// The start with the smallest violation; null when no start has a motion.
 const StartResult* nearest_start(const OptimizeResult& result);
 
-/// The limit that is broken worst: the one that asks for the most time. @param checks not empty
+/// The most violated limit: the one that would need the longest duration. @param checks not empty
 const LimitCheck& worst_limit(const std::vector<LimitCheck>& checks);
 
 /// "flow of pump main at t=1.84 s, 134 against a limit of 120 l/min".
 std::string limit_text(const LimitCheck& check);
 
-/// Names the worst constraint, where and when, and the shortest feasible duration known.
-/// @param result with the checks of its nearest motion, if there is one
+/// Sets the message: the worst violation, where and when, and the shortest feasible duration known.
+/// @param result with the checks of the motion with the smallest violation, if there is one
 void say_why_infeasible(const MotionProblem& problem, const std::vector<SeedMotion>& seeds,
                         double duration, OptimizeResult& result);
 

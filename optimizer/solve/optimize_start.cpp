@@ -1,4 +1,4 @@
-/// One start: smooth stages, modes, tightening.
+/// One start: smooth stages, solves with fixed modes, bound tightening.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,8 +43,8 @@ class Start {
     result_.seed_feasible = worst_excess(verdict(timed).checks) <= 1e-3;
     if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
     keep_clear_ends(timed);
-    if (options_.modes) offer(timed, false);  // no start ends dearer than its seed
-    // The seed's own modes first: whatever the smooth law then leads to, the start never ends dearer than that.
+    if (options_.modes) offer(timed, false);  // so no start ends with more energy than its seed
+    // The seed's own modes are solved first, so the smooth law can only improve on that result.
     if (options_.modes) hold_modes(resampled(timed, mesh_.times));
     Trajectory motion = timed;
     const std::size_t stages = problem_.waypoints.empty() ? options_.schedule.size() : 0;
@@ -56,7 +56,7 @@ class Start {
           solve(motion, options_.schedule[stage], rough ? 1e-2 : options_.tolerance);
       note_status(solved);
       if (solved.status == NlpStatus::kInterrupted) return finished();
-      if (!usable(solved)) break;  // a coarser motion, if there is one, starts the modes
+      if (!usable(solved)) break;  // the last usable motion, if any, has supplied the modes
       motion = transcription_->trajectory(solved.x);
       if (options_.modes || last) {
         keep_limits(motion, options_.schedule[stage], !options_.modes);
@@ -67,15 +67,15 @@ class Start {
   }
 
  private:
-  /// A solve may converge and its motion break a limit all the same: one that had no row yet, or one that no drawing in
-  /// keeps between the knots. Then it is the limit that is named, not the convergence.
+  /// The motion of a converged solve may still violate a limit: one without a row in the NLP, or one that tightening does
+  /// not enforce between the knots. Then the message names the limit.
   StartResult finished() {
     const bool converged =
         result_.status == NlpStatus::kOptimal || result_.status == NlpStatus::kAcceptable;
     if (converged && result_.motion.size() > 1 && result_.excess > options_.limit_tolerance) {
       result_.status = NlpStatus::kInfeasible;
       result_.message =
-          "its motion breaks a limit: " + limit_text(worst_limit(verdict(result_.motion).checks));
+          "its motion violates a limit: " + limit_text(worst_limit(verdict(result_.motion).checks));
     }
     return std::move(result_);
   }
@@ -84,7 +84,7 @@ class Start {
     return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
   }
 
-  /// One phase of one mode over the whole time.
+  /// Sets a mesh of equal intervals without phases.
   void uniform_mesh() {
     mesh_ = PhaseMesh{};
     mesh_.times.setLinSpaced(options_.intervals + 1, 0.0, time_.guess);
@@ -133,7 +133,7 @@ class Start {
       spec.joint_names.push_back(model_.machine.joints[i].name);
       const Range& a = problem_.limits.acceleration[i];
       const double full = std::max({std::abs(a.lo), std::abs(a.hi), 1e-6});
-      // default: full acceleration all the time costs one watt, which only decides between equals
+      // By default full acceleration all the time costs one watt, which only decides between motions of equal energy.
       spec.acceleration_weight[j] = problem_.objective.smoothness
                                         ? *problem_.objective.smoothness * 1e-3
                                         : 1e-3 / (full * full);
@@ -159,7 +159,7 @@ class Start {
                                    : fmt::format("smooth, {:g} mm/s, {:g} bar",
                                                  1e3 * smoothing.speed, smoothing.pressure / 1e5);
     if (tightenings_used_ > 0)
-      record.what += fmt::format(", limits drawn in ({})", tightenings_used_);
+      record.what += fmt::format(", limits tightened ({})", tightenings_used_);
     record.status = solved.status;
     record.iterations = solved.iterations;
     record.solve_s = solved.solve_s;
@@ -198,13 +198,13 @@ class Start {
     }
   }
 
-  /// What the exact law says of a motion, between its knots too.
+  /// Limits and energy of a motion by the exact law, between its knots too.
   struct Verdict {
     Trajectory motion;
     std::vector<LimitCheck> checks;
     double energy = 0.0;  // [J]
   };
-  /// Asked twice of the same motion more often than not; the last answer is kept.
+  /// The last result is kept, because it is mostly asked for twice.
   const Verdict& verdict(const Trajectory& motion) {
     const Trajectory& known = verdict_.motion;
     const bool same = known.t.size() == motion.t.size() && known.t == motion.t &&
@@ -218,7 +218,7 @@ class Start {
     return verdict_;
   }
 
-  /// Keeps a motion if it is better than what there is: limits first, then exact energy. @return its limits
+  /// Keeps a motion if it is better than the best so far: by violation first, then by exact cost. @return its limits
   std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
     const std::vector<LimitCheck> checks = verdict(motion).checks;
     const double excess = worst_excess(checks);
@@ -242,7 +242,7 @@ class Start {
       result_.plan = plan_;
       result_.plan.durations = durations_of(mesh_, motion.t);
     }
-    // of the law last solved for; before the first solve there is none
+    // The smooth energy is that of the last solve; before the first one there is none.
     result_.energy_smooth =
         transcription_ ? 1e3 * transcription_->model_cost(transcription_->variables(motion)) /
                              problem_energy_weight()
@@ -250,8 +250,8 @@ class Start {
     return checks;
   }
 
-  /// Keeps a motion if it is better than what there is; while it breaks limits between knots, solves again with
-  /// those drawn in.
+  /// Keeps a motion if it is better than the best so far; while it violates limits between knots, solves again with those
+  /// limits tightened.
   void keep_limits(Trajectory motion, const Smoothing& smoothing, bool solve_again = true) {
     for (int attempt = 0;; ++attempt) {
       const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0);
@@ -259,7 +259,7 @@ class Start {
       if (split_where_it_touches(problem_, motion, options_.refine, 4 * options_.intervals,
                                  mesh_)) {
         motion = resampled(motion, mesh_.times);
-      } else if (!tightening_.draw_in(problem_, checks, options_.limit_tolerance)) {
+      } else if (!tightening_.tighten_bounds(problem_, checks, options_.limit_tolerance)) {
         return;
       }
       ++tightenings_used_;
@@ -273,7 +273,7 @@ class Start {
     return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
   }
 
-  /// Start and end posture of a motion, where the exact distance calls them clear.
+  /// Remembers start and end posture of a motion if they are clear by the exact distance.
   void keep_clear_ends(const Trajectory& motion) {
     if (problem_.obstacles.empty()) return;
     ClearanceModel clearance(problem_);
@@ -288,7 +288,7 @@ class Start {
     }
   }
 
-  /// The outcome reported is that of the solve behind the motion, or of the last one while there is none.
+  /// Records the status of the solve that gave the motion, or of the last solve while there is none.
   void note_status(const NlpResult& solved) {
     if (result_.status == NlpStatus::kOptimal && result_.modes_held) return;
     result_.status = solved.status;
@@ -298,26 +298,26 @@ class Start {
     }
   }
 
-  /// Holds the modes a motion shows and makes the best of them; the start's motion is the best of all.
+  /// Solves with the modes of a motion held fixed and keeps the best result.
   void hold_modes(const Trajectory& shown) {
     hold(modes_of(model_, problem_, shown, options_.mode_options), shown, true);
   }
 
   void hold(const ModeTable& modes, const Trajectory& shown, bool overlaps) {
-    // a guess may be on a mesh of its own; modes without one are on equal intervals
+    // A guess may have a mesh of its own; modes without a guess are on equal intervals.
     const Trajectory from =
         shown.size() == modes.rows() + 1
             ? shown
             : resampled(shown, Eigen::VectorXd::LinSpaced(modes.rows() + 1, shown.t[0],
                                                           shown.t[shown.size() - 1]));
-    // beside obstacles free times at once would drive a rough start through them
+    // Near obstacles a rough start would move through them if durations were free from the beginning.
     const bool hemmed =
         !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();
     if (options_.free_phases && !hemmed &&
         hold_plan(plan_of(modes, from.t, waypoint_times(from)), from, overlaps))
       return;
-    if (!problem_.waypoints.empty()) return;  // only phases know when one is passed
-    if (time_.lower < time_.upper) return;    // only phases know what to do with free time
+    if (!problem_.waypoints.empty()) return;  // waypoints need phases
+    if (time_.lower < time_.upper) return;    // a free duration needs phases
     mesh_ = PhaseMesh{};
     mesh_.times = from.t;
     mesh_.modes = modes;
@@ -329,7 +329,7 @@ class Start {
       hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
   }
 
-  /// When the tip comes nearest to each waypoint, one after the other. [s]
+  /// Instants at which the tip is nearest to each waypoint, in increasing order. [s]
   std::vector<double> waypoint_times(const Trajectory& motion) const {
     std::vector<double> times;
     Eigen::Index from = 1;
@@ -353,17 +353,17 @@ class Start {
     return times;
   }
 
-  /// The law without blends: only the maximum keeps a little softness.
+  /// Smoothing with fixed modes: no blends, only the maximum is slightly smoothed.
   Smoothing exact_law() const {
     Smoothing exact = options_.schedule.empty() ? Smoothing{} : options_.schedule.back();
     exact.pressure = options_.pressure_in_modes;
     return exact;
   }
 
-  /// [s] no valve opens and closes in less, and the problem needs some lower bound
+  /// [s] lower bound of a phase's duration, below the time in which a valve opens and closes
   double shortest_phase() const { return std::min(0.02, 2e-3 * time_.guess); }
 
-  /// Phases of free durations; phases that shrink to nothing are dropped and the rest is solved again.
+  /// Solves with free durations of the phases; phases that shrink to zero are dropped and the others solved again.
   bool hold_plan(const PhasePlan& wanted, const Trajectory& from, bool overlaps) {
     PhasePlan plan = wanted;
     if (overlaps) plan = with_overlaps(plan, options_.overlap);
@@ -394,8 +394,8 @@ class Start {
   const MotionProblem& problem_;
   TimeWindow time_;
   const OptimizeOptions& options_;
-  PhaseMesh mesh_;  // of the next solve; no phases: all times fixed
-  PhasePlan plan_;  // behind the mesh
+  PhaseMesh mesh_;  // mesh of the next solve; without phases all times are fixed
+  PhasePlan plan_;  // phases of the mesh
   Tightening tightening_;
   int tightenings_used_ = 0;
   Eigen::MatrixXd clear_postures_;

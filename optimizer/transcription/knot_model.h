@@ -1,16 +1,15 @@
 #pragma once
-/// What the transcription needs to know about one instant of a motion: its power and its path constraints,
-/// each with exact dense derivative blocks. Implemented by the crane (optimizer/crane/crane_knot_model.h)
-/// and by the reference problem (bench/).
+/// Power and path constraints at one instant of a motion, with exact dense derivative blocks, as the transcription needs
+/// them. Implemented by the crane (optimizer/crane/crane_knot_model.h) and by the reference problem (bench/).
 #include <Eigen/Dense>
 #include <string>
 
 namespace sparflow {
 
 /// z = [q; qd] (2 n values) or, when uses_acceleration(), [q; qd; qdd] (3 n values).
-/// An object is a mutable workspace over an immutable model: one a thread. No call allocates.
-/// The transcription calls cost then path, and cost_derivatives then path_jacobian, at the same z in turn: a model
-/// may remember the last z and share its kinematics.
+/// An object is a mutable workspace over an immutable model; each thread needs its own. No call allocates.
+/// The transcription calls cost and then path, or cost_derivatives and then path_jacobian, at the same z, so that a model
+/// can keep the kinematics of the last z.
 class KnotModel {
  public:
   virtual ~KnotModel() = default;
@@ -18,10 +17,10 @@ class KnotModel {
   virtual bool uses_acceleration() const { return false; }
   int size() const { return joint_count() * (uses_acceleration() ? 3 : 2); }
 
-  /// Called before every evaluation: the knot, and the interval (knot - 1 or knot) in whose name it happens.
-  /// A model whose law changes from interval to interval (modes) looks here.
+  /// Called before every evaluation with the knot and the interval (knot - 1 or knot) whose law applies. A model whose
+  /// law changes from interval to interval (modes) selects it here.
   virtual void begin_node(int /*knot*/, int /*interval*/) {}
-  /// Whether the law differs on the two sides of this knot: it is then evaluated once for each.
+  /// Whether the law differs on the two sides of this knot; the model is then evaluated once for each side.
   virtual bool split_at(int /*knot*/) const { return false; }
 
   /// Cost rate at z (power, in the problem's scaled unit).
@@ -37,7 +36,7 @@ class KnotModel {
   /// Whether row `row` depends on the accelerations. Rows that do are imposed at both ends of every
   /// interval with that interval's qdd, the others once a knot.
   virtual bool path_uses_acceleration(int /*row*/) const { return uses_acceleration(); }
-  /// Words for messages, e.g. "flow of pump main".
+  /// Name for messages, e.g. "flow of pump main".
   virtual std::string path_name(int row) const { return "path row " + std::to_string(row); }
   virtual void path(const double* /*z*/, double* /*g*/) {}
   /// Values and Jacobian [path_count x size, row-major].
@@ -58,7 +57,7 @@ class TerminalModel {
   virtual void jacobian(const double* q, double* jacobian) = 0;
   /// Adds sum_row multiplier[row] * Hessian to `hessian` [n x n, column-major].
   virtual void add_hessian(const double* q, const double* multiplier, double* hessian) = 0;
-  /// Words for messages, e.g. "x of the tip at the goal".
+  /// Name for messages, e.g. "x of the tip at the goal".
   virtual std::string name(int row) const { return "goal row " + std::to_string(row); }
 };
 

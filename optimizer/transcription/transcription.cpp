@@ -42,7 +42,7 @@ Transcription::Transcription(TranscriptionSpec spec)
     SPARFLOW_CHECK(m->rows() == intervals_ && m->cols() == n_, "bounds of qdd are N x n");
   }
   if (spec_.acceleration_weight.size() == 0) spec_.acceleration_weight = VectorXd::Zero(n_);
-  SPARFLOW_CHECK(spec_.acceleration_weight.size() == n_, "one acceleration weight a joint");
+  SPARFLOW_CHECK(spec_.acceleration_weight.size() == n_, "there is one acceleration weight for each joint");
 
   check_phases();
   if (phase_count_ > 0) {
@@ -109,8 +109,7 @@ double Transcription::acceleration_cost(const double* x) const {
   return sum;
 }
 
-/// Cost and path constraints of every node, one after the other, so that a model can share what both need: a
-/// line search always asks for both.
+/// Evaluates cost and path constraints node by node, so that a model can share the work: a line search always needs both.
 void Transcription::update_values(const double* x) {
   if (same_point(value_x_, x)) return;
   double total = 0.0;
@@ -125,7 +124,7 @@ void Transcription::update_values(const double* x) {
   std::memcpy(value_x_.data(), x, sizeof(double) * static_cast<std::size_t>(value_x_.size()));
 }
 
-/// The same with first derivatives of both and the Hessian of the cost; the values come along.
+/// Evaluates values and first derivatives of both and the Hessian of the cost.
 void Transcription::update_derivatives(const double* x) {
   if (same_point(derivative_x_, x)) return;
   double total = 0.0;
@@ -242,7 +241,7 @@ void Transcription::hessian(In x, double objective_factor, In multiplier, Out va
     const Node& node = nodes_[s];
     const double* cost = node_cost_hessian_.data() + s * block;
     const double factor = objective_factor * weight(node, x.data());
-    if (factor != 0.0) {  // the restoration phase asks for the constraints' part alone
+    if (factor != 0.0) {  // in the restoration phase it is zero: only the constraints' part is needed
       for (std::size_t i = 0; i < block; ++i) block_[i] = factor * cost[i];
     } else {
       std::fill(block_.begin(), block_.end(), 0.0);

@@ -5,8 +5,8 @@
 ///   subject to  q_{k+1}  = q_k + h_k/2 (qd_k + qd_{k+1})      (exact, not an approximation)
 ///               qd_{k+1} = qd_k + h_k qdd_k                   (exact)
 ///               terminal(q_N), path(z_k), bounds on every single variable
-/// The cost integral alone is approximate (trapezoid). A model that uses the acceleration sees each interval at
-/// both its ends with the interval's own qdd, because qdd jumps at the knots.
+/// Only the cost integral is approximate (trapezoidal rule). A model that uses the acceleration is evaluated at both ends
+/// of each interval with the interval's own qdd, because qdd jumps at the knots.
 /// With free times, x ends in tau_0 .. tau_{P-1}: the intervals of phase p keep their shares of tau_p, and
 ///   h_k = share_k tau_p,   total_lower <= sum tau <= total_upper,   price sum tau is added to the objective.
 /// Source: Betts (2010), Practical Methods for Optimal Control, ch. 4; equations and layout: docs/transcription.md.
@@ -19,8 +19,8 @@
 
 namespace sparflow {
 
-/// One row an instant (q, qd: N+1 rows; qdd: N rows), one column a joint. Equal bounds fix a value, so a joint is
-/// frozen over a phase by zeros, a sign is imposed by one zero.
+/// One row for each instant (q, qd: N+1 rows; qdd: N rows), one column for each joint. Equal bounds fix a value: two zeros
+/// hold a joint at rest, one zero fixes the sign of its velocity.
 struct TranscriptionBounds {
   Eigen::MatrixXd q_lower, q_upper;      ///< [rad] or [m]
   Eigen::MatrixXd qd_lower, qd_upper;    ///< [rad/s] or [m/s]
@@ -35,23 +35,23 @@ struct TranscriptionBounds {
                                      const Eigen::VectorXd& qdd_upper);
   void fix_q(int knot, const Eigen::VectorXd& q);
   void fix_qd(int knot, const Eigen::VectorXd& qd);
-  /// From rest at q_start to rest.
+  /// Fixes the start at rest in q_start and the end at rest.
   void rest_to_rest(const Eigen::VectorXd& q_start);
 };
 
-/// Free durations of groups of intervals ("phases"), so that when a mode ends is itself optimised, and with it, if
-/// the total is free, how long the motion takes.
+/// Free durations of groups of intervals ("phases"). The instants at which modes change are thereby optimised, and the
+/// motion's duration too if the total is free.
 struct PhaseTimes {
-  /// [N] phase of every interval, 0, .., 0, 1, .., P-1; empty: all times are fixed as `t` has them.
+  /// [N] phase of every interval, 0, .., 0, 1, .., P-1; empty = the knots are fixed at TranscriptionSpec::t.
   std::vector<int> of_interval;
-  Eigen::VectorXd lower, upper;   ///< [P] s, lower > 0
+  Eigen::VectorXd lower, upper;   ///< [P] of each duration [s], lower > 0
   double total_lower = 0.0;       ///< [s]
   double total_upper = kNoBound;  ///< [s]
-  double price = 0.0;             ///< cost of a second (idle power), in the cost's own unit
+  double price = 0.0;             ///< cost of time (idle power), in the unit of the cost rate
   int count() const { return of_interval.empty() ? 0 : of_interval.back() + 1; }
 };
 
-/// A configuration constraint at one knot on the way.
+/// A configuration constraint at one knot.
 struct Waypoint {
   int knot = 0;
   std::shared_ptr<TerminalModel> model;
@@ -59,9 +59,9 @@ struct Waypoint {
 
 struct TranscriptionSpec {
   Eigen::VectorXd
-      t;  ///< [s] the N+1 knots, increasing, any spacing; with free times where they start from
+      t;  ///< [s] the N+1 knots, increasing, any spacing; with free times their initial values
   std::shared_ptr<KnotModel> knot;
-  std::shared_ptr<TerminalModel> terminal;  ///< null = the end posture is ruled by the bounds alone
+  std::shared_ptr<TerminalModel> terminal;  ///< null = only the bounds restrict the end posture
   std::vector<Waypoint> waypoints;
   PhaseTimes phases;
   TranscriptionBounds bounds;
@@ -90,7 +90,7 @@ class Transcription final : public NlpProblem {
   int interval_count() const { return intervals_; }
   const TranscriptionSpec& spec() const { return spec_; }
 
-  // Where a value stands in x.
+  // Index of a value in x.
   int q_index(int knot, int joint) const { return knot * n_ + joint; }
   int qd_index(int knot, int joint) const { return (knots_ + knot) * n_ + joint; }
   int qdd_index(int interval, int joint) const { return (2 * knots_ + interval) * n_ + joint; }
@@ -98,9 +98,9 @@ class Transcription final : public NlpProblem {
 
   /// Start values; before the first call they are the middle of the bounds (0 where a side is open).
   void set_start(const Eigen::VectorXd& x);
-  /// Start from a motion, sampled at this mesh (with free times a motion of as many knots is taken as it is, its
-  /// phases' durations with it): q and qd from the motion (held at rest beyond its ends), qdd such
-  /// that the velocity defects vanish. Values outside their bounds are clipped.
+  /// Start from a motion sampled on this mesh: q and qd from the motion (at rest beyond its ends), qdd such that the
+  /// velocity defects vanish. With free times a motion with as many knots is taken unsampled, with its phases' durations.
+  /// Values outside their bounds are clipped.
   void set_start(const Trajectory& motion);
   /// Multipliers for a warm start; their shapes must be this transcription's.
   void set_start_multipliers(const TranscriptionMultipliers& multipliers);
@@ -131,20 +131,20 @@ class Transcription final : public NlpProblem {
   /// acceleration) one end of an interval.
   struct Node {
     int knot = 0;
-    int interval = -1;  ///< whose qdd; -1 = the model does not use it
-    int before = -1;    ///< interval on the left whose half step is in the weight; -1 = none
+    int interval = -1;  ///< interval whose qdd is used; -1 = the model does not use qdd
+    int before = -1;    ///< interval on the left that contributes half a step to the weight; -1 = none
     int after = -1;     ///< the same on the right
-    int first_row = 0;  ///< in g, of this node's path rows
-    int law = 0;        ///< interval in whose name the model is evaluated
-    /// false: only rows that use the acceleration (the others are another node's)
+    int first_row = 0;  ///< index in g of this node's first path row
+    int law = 0;        ///< interval whose law applies
+    /// false: only rows that use the acceleration; another node of the knot has the others
     bool all_rows = true;
   };
   struct Defect {
     int interval, joint;
-    bool velocity;  ///< of qd, else of q
+    bool velocity;  ///< true: defect of qd, false: of q
   };
 
-  /// A terminal model at its knot, with its rows in g and its places in the derivatives.
+  /// A terminal model at its knot, with the indices of its rows in g and of its entries in the derivatives.
   struct Point {
     int knot = 0;
     TerminalModel* model = nullptr;
@@ -205,7 +205,7 @@ class Transcription final : public NlpProblem {
   Eigen::VectorXd start_;
   std::unique_ptr<NlpMultipliers> start_multipliers_;
 
-  // Workspace: what is known, and at which x.
+  // Workspace: the last evaluations and their x.
   Eigen::VectorXd value_x_, derivative_x_;
   double cost_ = 0.0;
   Eigen::VectorXd cost_gradient_;
@@ -217,11 +217,11 @@ class Transcription final : public NlpProblem {
   std::vector<double> block_, terminal_block_;
 };
 
-/// Position and velocity of a motion at any instants; at rest in its first and last posture outside its time.
-/// Accelerations are those that make qd piecewise linear between the instants.
+/// The motion at other instants; before its first and after its last instant it is at rest in that posture.
+/// Its accelerations make qd piecewise linear between the new instants. @param t [s] increasing
 Trajectory resampled(const Trajectory& motion, const Eigen::VectorXd& t);
 
-/// The same path driven uniformly faster or slower, beginning at the same instant.
+/// The same motion uniformly stretched or compressed in time to `duration` [s], beginning at the same instant.
 Trajectory with_duration(const Trajectory& motion, double duration);
 
 }  // namespace sparflow

@@ -1,4 +1,4 @@
-// Motions in and out of a transcription: bounds, start values, multipliers.
+// Conversion between motions and the variables of a transcription: bounds, start values, multipliers.
 #include <algorithm>
 #include <cmath>
 
@@ -141,7 +141,7 @@ Trajectory resampled(const Trajectory& motion, const VectorXd& t) {
   SPARFLOW_CHECK(motion.size() >= 1, "an empty motion cannot be sampled");
   const Eigen::Index last = motion.size() - 1, rows = t.size(), joints = motion.q.cols();
   Trajectory out{t, MatrixXd(rows, joints), MatrixXd(rows, joints), MatrixXd::Zero(rows, joints)};
-  // A mesh laid over the motion may end a rounding error beyond it; that is not outside.
+  // A mesh over the whole motion may exceed it by a rounding error, which does not count as outside.
   const double slack = 1e-12 * (std::abs(motion.t[0]) + std::abs(motion.t[last]));
   for (Eigen::Index r = 0; r < rows; ++r) {
     if (t[r] < motion.t[0] - slack || t[r] > motion.t[last] + slack) {

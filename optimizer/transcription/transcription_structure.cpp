@@ -1,4 +1,4 @@
-// The fixed part of a transcription: who stands where, computed once.
+// The fixed structure of a transcription: indices of nodes, rows and derivatives, computed once.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -52,7 +52,7 @@ void Transcription::make_nodes() {
     }
     return;
   }
-  // Rows without acceleration belong to the interval that begins at the knot; at the last knot, to the last one.
+  // Rows without acceleration belong to the interval that begins at the knot; those of the last knot to the last interval.
   for (int k = 0; k < intervals_; ++k) {
     nodes_.push_back({k, k, -1, k, 0, k, true});
     nodes_.push_back({k + 1, k, k, -1, 0, k, k + 1 == intervals_});
@@ -63,9 +63,9 @@ const std::vector<int>& Transcription::rows_of(const Node& node) const {
   return node.all_rows ? all_rows_ : acceleration_rows_;
 }
 
-/// A defect all of whose variables are fixed and which holds anyway is left out: it would be an empty row that
-/// makes the KKT matrix singular and counts against the degrees of freedom (a joint frozen over a phase has
-/// one an interval). One that does not hold stays, and the solver reports the contradiction.
+/// Leaves out a defect that holds and all of whose variables are fixed: its empty row would make the KKT matrix singular
+/// and count against the degrees of freedom (a joint at rest over a phase has one in each interval). A defect that does
+/// not hold stays, so that the solver reports the contradiction.
 void Transcription::make_defects() {
   const TranscriptionBounds& b = spec_.bounds;
   const auto fixed = [](const MatrixXd& lower, const MatrixXd& upper, int row, int column) {
@@ -89,7 +89,7 @@ void Transcription::make_defects() {
           residual = q1 - q0 - 0.5 * step_[k] * (qd0 + qd1);
           scale = std::abs(q0) + std::abs(q1);
         }
-        // with free times only what holds for every step may go
+        // With free times a defect is left out only if it holds for every step.
         const double moving = velocity ? b.qdd_lower(k, i) : std::max(std::abs(qd0), std::abs(qd1));
         if (phase_count_ > 0 && moving != 0.0) all_fixed = false;
         constexpr double kRounding = 1e-14;  // some 50 units in the last place of the terms
@@ -165,7 +165,7 @@ void Transcription::make_jacobian() {
 }
 
 void Transcription::make_hessian() {
-  // Two nodes share a knot's block, or a qdd's: each place of the lower triangle has one value.
+  // Two nodes can share the block of a knot or of a qdd, but each entry of the lower triangle has one value.
   std::unordered_map<long, int> known;
   const long width = tau_index(phase_count_);
   const auto place = [&](int row, int column) {

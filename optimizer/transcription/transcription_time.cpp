@@ -1,4 +1,4 @@
-// Free durations of phases: what they add to gradient and Hessian.
+// Free durations of phases: their contributions to gradient and Hessian.
 #include <cmath>
 
 #include "models/math/error.h"
@@ -11,14 +11,14 @@ void Transcription::check_phases() const {
   const PhaseTimes& p = spec_.phases;
   SPARFLOW_CHECK(static_cast<int>(p.of_interval.size()) == intervals_,
                  "every interval has a phase");
-  SPARFLOW_CHECK(p.of_interval.front() == 0, "phases are counted from 0");
+  SPARFLOW_CHECK(p.of_interval.front() == 0, "phases are numbered from 0");
   for (std::size_t k = 1; k < p.of_interval.size(); ++k) {
     const int step = p.of_interval[k] - p.of_interval[k - 1];
     SPARFLOW_CHECK(step == 0 || step == 1, "phases follow one another");
   }
   SPARFLOW_CHECK(p.lower.size() == phase_count_ && p.upper.size() == phase_count_,
                  "every phase has bounds of its duration");
-  SPARFLOW_CHECK((p.lower.array() > 0.0).all(), "a phase takes some time");
+  SPARFLOW_CHECK((p.lower.array() > 0.0).all(), "the lower bound of a phase's duration must be positive");
 }
 
 void Transcription::time_gradient(const double* x, Out gradient) const {
@@ -45,7 +45,7 @@ void Transcription::time_hessian(const double* x, double objective_factor, const
     for (const int side : {nodes_[s].before, nodes_[s].after}) {
       if (side < 0) continue;
       for (int i = 0; i < z_size_; ++i, ++place) {
-        // the restoration phase asks for the constraints' part alone, maybe before any evaluation
+        // In the restoration phase the factor is zero, possibly before any evaluation of the objective.
         if (objective_factor != 0.0)
           value[*place] += objective_factor * 0.5 * share_[side] * gradient[i];
       }

@@ -7,7 +7,7 @@
 namespace sparflow::simulator {
 namespace {
 
-// central differences of smooth functions of order 1 over 1 rad or 1 m: truncation 1e-9, rounding 1e-11, relative
+// Central differences of functions that vary by 1 over 1 rad or 1 m: relative truncation 1e-9, rounding 1e-11.
 constexpr double kStep = 1e-4;
 constexpr double kSlack = 1e-3;  // [rad] or [m]
 
@@ -68,7 +68,7 @@ void BodyForces::place(const double* q, std::vector<Eigen::Vector3d>& positions)
     const Body& body = bodies_[b];
     positions[b] = in_base(body.joint, body.cog);
     if (body.slides_with >= 0) {
-      // the stage follows the prismatic joint's axis, which is fixed in that joint's (not turning) frame
+      // The stage moves along the prismatic joint's axis, which is fixed in that joint's frame.
       const auto s = static_cast<std::size_t>(body.slides_with);
       positions[b] += rotation_[s] * machine_.joints[s].axis * (body.fraction * q[s]);
     }
@@ -82,11 +82,11 @@ void BodyForces::place(const double* q, std::vector<Eigen::Vector3d>& positions)
                           bodies_[b + 2].mass == 0.0 && bodies_[b + 3].mass == 0.0;
     if (!massless) {
       const Joint& joint = machine_.joints[static_cast<std::size_t>(c.joint)];
-      // a posture that gives way under load may lie beyond the range in which a four-bar closes
+      // A posture deflected under load may lie outside the range in which a four-bar closes.
       const double reached =
           std::clamp(q[c.joint], joint.position.lo - kSlack, joint.position.hi + kSlack);
       const auto pins = linkage_pins<double>(machine_, i, reached);
-      // a direct cylinder lies along its joint's axis, also at zero stroke where the pins coincide
+      // A direct cylinder lies along its joint's axis, also at zero stroke, where its pins coincide.
       const Eigen::Vector3d along = std::holds_alternative<DirectLinkage>(c.linkage)
                                         ? Eigen::Vector3d(joint.origin.linear() * joint.axis)
                                         : Eigen::Vector3d((pins.rod - pins.barrel).normalized());
@@ -169,7 +169,7 @@ void BodyForces::dynamic(const double* q, const double* qd, const double* qdd, d
   bodies_[linkage_begin_ - 1].mass = payload;
   const std::size_t n = shifted_.size();
   loads.inertia.assign(n, 0.0);
-  // positions a moment later and earlier along the motion
+  // Positions a short time later and earlier along the motion.
   constexpr double kMoment =
       1e-3;  // [s] second difference: rounding 1e-9 m/s^2, truncation below 1e-6
   const auto along = [&](double t, std::vector<Eigen::Vector3d>& positions) {
@@ -182,7 +182,7 @@ void BodyForces::dynamic(const double* q, const double* qd, const double* qdd, d
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     acceleration_[b] = (ahead_[b] - 2.0 * here_[b] + behind_[b]) / (kMoment * kMoment);
   const auto spin_along = [&](double t, std::vector<double>& rates) {
-    std::vector<double>& rate_now = loads.gravity;  // scratch of the right size, overwritten below
+    std::vector<double>& rate_now = loads.gravity;  // used as scratch memory, overwritten below
     rate_now.resize(n);
     for (std::size_t k = 0; k < n; ++k) {
       shifted_[k] = q[k] + t * qd[k] + 0.5 * t * t * qdd[k];
@@ -194,7 +194,7 @@ void BodyForces::dynamic(const double* q, const double* qd, const double* qdd, d
   spin_along(-kMoment, spin_behind_);
   loads.gravity.assign(n, 0.0);
   place(q, here_);
-  // axes at q, before the shifts below overwrite the frames
+  // The axes at q are taken before the shifts below overwrite the frames.
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     if (bodies_[b].spin_joint < 0 || bodies_[b].inertia == 0.0) continue;
     const auto s = static_cast<std::size_t>(bodies_[b].spin_joint);
@@ -231,7 +231,7 @@ double BodyForces::bending_moment(const double* q, double payload, int joint) {
   if (hinge < 0) return 0.0;
   const auto j = static_cast<std::size_t>(joint), h = static_cast<std::size_t>(hinge);
   const Eigen::Vector3d axis = rotation_[h] * machine_.joints[h].axis;
-  // the guide stands where the joint's frame is at zero travel
+  // The guide is at the origin of the joint's frame at zero travel.
   const Eigen::Vector3d guide = origin_[j] - rotation_[j] * machine_.joints[j].axis * q[j];
   double moment = 0.0;
   for (std::size_t b = 0; b < linkage_begin_; ++b) {

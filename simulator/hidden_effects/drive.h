@@ -1,5 +1,5 @@
 #pragma once
-/// One drive of the crane by its operator, step by step: what makes a log, and what else watches it.
+/// Simulates the operator's drive of a crane step by step; callbacks record the log or compare with a second crane.
 #include <functional>
 #include <memory>
 #include <vector>
@@ -8,15 +8,15 @@
 
 namespace sparflow::simulator {
 
-/// A crane with its hidden laws as drawn for a request. Stays where it is: laws keep its address.
+/// A crane with its hidden laws as drawn for a request. It must not be moved, because laws keep its address.
 struct HiddenCase {
   CraneLaws laws;
-  std::vector<HiddenEffect> drawn;  ///< place and law filled in
+  std::vector<HiddenEffect> drawn;  ///< with place and law set
   std::vector<std::unique_ptr<HiddenLaw>> hidden;
   double usual_payload = 0.0;  ///< [kg]
 };
 
-/// The same for the same request: drawn twice, two cranes that do the same.
+/// Draws the crane of a request. It is deterministic: the same request drawn twice gives two cranes that behave alike.
 std::unique_ptr<HiddenCase> draw_hidden(const LogRequest& request);
 
 struct StepInput {
@@ -24,9 +24,10 @@ struct StepInput {
   double oil;                          ///< [degC]
   const std::vector<double>& command;  ///< [-] by cylinder
 };
-using StepWatch = std::function<void(const Plant&, const StepInput&)>;  ///< before each step
-using RowWatch = std::function<void(Plant&, double payload)>;           ///< at each row of the log
+using StepWatch = std::function<void(const Plant&, const StepInput&)>;  ///< called before each step
+using RowWatch = std::function<void(Plant&, double payload)>;  ///< called at each row of the log; [kg]
 
+/// Drives the crane through the motions of a request. @param before_step may be empty
 void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& before_step,
                const RowWatch& after_row);
 

@@ -10,7 +10,7 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kLongestStep = 0.01;  // [s] of the plant; fast beside every lag that is drawn
+constexpr double kLongestStep = 0.01;  // [s] of the plant; short compared with every lag that is drawn
 
 int place_index(const LawEntry& entry, const Machine& machine, const std::string& at) {
   switch (entry.place) {
@@ -25,7 +25,7 @@ int place_index(const LawEntry& entry, const Machine& machine, const std::string
   }
 }
 
-/// Draws place, law and strength of each effect; the drawn ones are written back.
+/// Draws place, law and strength of each effect and writes place and law into `effects`. @throws InputError
 std::vector<std::unique_ptr<HiddenLaw>> make_laws(std::vector<HiddenEffect>& effects,
                                                   const Machine& machine, const CraneLaws& laws,
                                                   std::uint64_t crane_seed, double usual) {
@@ -39,11 +39,11 @@ std::vector<std::unique_ptr<HiddenLaw>> make_laws(std::vector<HiddenEffect>& eff
     const int variant = random.below(static_cast<int>(entry.laws.size()));
     if (places.empty())
       throw InputError({}, "effects",
-                       effect.id + " cannot sit anywhere on machine " + machine.name);
+                       effect.id + " has no possible place on machine " + machine.name);
     if (effect.at.empty()) effect.at = places[static_cast<std::size_t>(picked)];
     if (std::find(places.begin(), places.end(), effect.at) == places.end())
       throw InputError({}, "effects",
-                       fmt::format("{} cannot sit at \"{}\"; possible: {}", effect.id, effect.at,
+                       fmt::format("{} has no place \"{}\"; possible: {}", effect.id, effect.at,
                                    fmt::join(places, ", ")));
     if (effect.law < 0) effect.law = variant;
     if (effect.law >= static_cast<int>(entry.laws.size()))
@@ -57,7 +57,7 @@ std::vector<std::unique_ptr<HiddenLaw>> make_laws(std::vector<HiddenEffect>& eff
   return hidden;
 }
 
-/// Load on the hook, constant over each third of a log.
+/// Payloads [kg], each constant over about a third of a log, with the times [s] at which they end.
 struct Payloads {
   std::vector<double> mass, until;
   std::size_t now = 0;
@@ -132,7 +132,7 @@ std::unique_ptr<HiddenCase> draw_hidden(const LogRequest& request) {
                      fmt::format("got {} Hz for {} s, expected 5..200 Hz and a "
                                  "positive duration",
                                  request.rate, request.seconds));
-  auto drawn = std::make_unique<HiddenCase>();  // laws keep its address
+  auto drawn = std::make_unique<HiddenCase>();  // The laws keep its address.
   HiddenCase& one = *drawn;
   one.usual_payload = usual_payload(machine, request.crane_seed);
   one.laws = draw_crane_laws(machine, request.crane_seed);
@@ -168,7 +168,7 @@ void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& befo
       for (std::size_t i = 0; i < rate.size(); ++i) rate[i] = s.cylinders[i].rate;
       motion.levers(s.t, h, s.q, rate, command);
       for (std::size_t i = 0; i < command.size(); ++i) {
-        // over a dead band the lever is thrown: the operator has learned most of it
+        // The operator moves the lever quickly over most of a dead band.
         for (const auto& law : one.hidden) {
           const double gap = laws.operator_deadband_share *
                              law->lever_deadband(static_cast<int>(i), sign_of(command[i]));
@@ -176,7 +176,7 @@ void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& befo
           command[i] =
               std::clamp(command[i] * (1.0 - gap) + sign_of(command[i]) * gap * small, -1.0, 1.0);
         }
-        command[i] = std::round(command[i] * 1e4) / 1e4;  // what is logged is what the valve gets
+        command[i] = std::round(command[i] * 1e4) / 1e4;  // The valve gets the rounded value that is logged.
       }
       const double oil = laws.oil_end - (laws.oil_end - laws.oil_start) *
                                             std::exp(-(s.t + oil_before) / laws.oil_time);

@@ -1,5 +1,6 @@
 #pragma once
-/// One hidden effect at work: what it changes at each step of the plant. Hooks are called in this order, once a step.
+/// Interface of a hidden effect: the hooks by which it changes a step of the plant, each called once in every step, in
+/// the order of their declaration.
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -19,20 +20,20 @@ struct Recording {
   std::vector<std::vector<double>> command;                                ///< by cylinder
   std::vector<std::vector<double>> pressure_a, pressure_b;                 ///< by cylinder
   std::vector<std::vector<double>> pump;                                   ///< by pump
-  std::vector<std::vector<double>> noise_a, noise_b, noise_pump, noise_q;  ///< what will be added
+  std::vector<std::vector<double>> noise_a, noise_b, noise_pump, noise_q;  ///< noise that is added at the end
 };
 
-/// Everything a law may draw its strength from.
+/// Quantities from which a law draws its strength.
 struct LawContext {
   const Machine* machine = nullptr;
   const CraneLaws* laws = nullptr;
   Random* random = nullptr;
   int at = -1;          ///< joint, cylinder or pump
-  std::string channel;  ///< for sensor faults
+  std::string channel;  ///< of a sensor fault
   double size = 1.0;
   int law = 0;
-  double payload = 0.0;         ///< [kg] largest usual
-  double sensor_noise = 0.8e5;  ///< [Pa] standard deviation
+  double payload = 0.0;         ///< [kg] usual_payload()
+  double sensor_noise = 0.8e5;  ///< [Pa] standard deviation of pressure sensors
 
   const Cylinder& cylinder() const { return machine->cylinders[static_cast<std::size_t>(at)]; }
   const Joint& joint() const { return machine->joints[static_cast<std::size_t>(at)]; }
@@ -40,8 +41,8 @@ struct LawContext {
   double draw(double lo, double hi) { return random->uniform(lo, hi); }
 };
 
-/// Least-squares value of a text-book parameter from what an effect really did: sum(effect * regressor) /
-/// sum(regressor^2).
+/// Least-squares estimate of a text-book parameter from the simulated action of an effect:
+/// sum(effect * regressor) / sum(regressor^2).
 class Equivalent {
  public:
   void add(double effect, double regressor) {
@@ -57,28 +58,28 @@ class Equivalent {
 class HiddenLaw {
  public:
   virtual ~HiddenLaw() = default;
-  /// Base laws that the effect needs to be visible; also applied to the reference crane, which lacks the effect.
+  /// Changes base laws so that the effect can be seen; also applied to the reference crane, which lacks the effect.
   virtual void prepare_crane(CraneLaws& /*laws*/) const {}
-  virtual void change_machine(Machine& /*machine*/) const {}  ///< bodies the forces come from
-  virtual void payload(PlantState&) {}  ///< s.payload is what really hangs there
-  virtual void opening(PlantState&) {
-  }  ///< command -> opening, every cylinder; s.opening is preset to the command
-  virtual void flow(PlantState&) {}   ///< opening -> flow; flow is preset by the valve's gain
-  virtual void drift(PlantState&) {}  ///< s.drift += ...
-  virtual void posture(PlantState&) {
-  }  ///< s.q_load += ...; uses the joint loads of the step before
-  virtual void force(PlantState&, BodyForces&) {}  ///< force += ...
-  virtual void return_line(PlantState&) {}         ///< return_pressure += ...
-  virtual void pilot(PlantState&) {}               ///< pilot_pressure
-  virtual void demand(PlantState&) {}              ///< line_drop, margin, asked
-  virtual void pump(PlantState&) {}                ///< pressure of pumps, preset to the demand
-  virtual void sensors(const PlantState&, SensorState&) {}
-  virtual void recording(Recording&, Random&) {}  ///< delays, stuck values
+  virtual void change_machine(Machine& /*machine*/) const {}  ///< changes the bodies of body_forces.h
+  virtual void payload(PlantState&) {}  ///< changes s.payload to the true payload
+  /// Sets the opening of every cylinder's valve, which is preset to the command.
+  virtual void opening(PlantState&) {}
+  virtual void flow(PlantState&) {}   ///< sets the flow, which is preset to opening times valve gain
+  virtual void drift(PlantState&) {}  ///< adds to the cylinders' drift
+  /// Adds to s.q_load; the joint loads are those of the step before.
+  virtual void posture(PlantState&) {}
+  virtual void force(PlantState&, BodyForces&) {}  ///< adds to the cylinders' force
+  virtual void return_line(PlantState&) {}         ///< adds to return_pressure
+  virtual void pilot(PlantState&) {}               ///< changes pilot_pressure
+  virtual void demand(PlantState&) {}              ///< changes line_drop, margin, asked
+  virtual void pump(PlantState&) {}  ///< changes the pumps' pressure, which is preset to the demand
+  virtual void sensors(const PlantState&, SensorState&) {}  ///< changes readings, without noise
+  virtual void recording(Recording&, Random&) {}  ///< changes whole channels: delays, stuck values
   virtual bool needs_inertia() const { return false; }
-  virtual double lever_deadband(int /*cylinder*/, int /*side*/) const {
-    return 0.0;
-  }                                                             ///< operator jumps over it
-  virtual std::vector<HiddenParameter> parameters() const = 0;  ///< after the run
+  /// Dead band [-] that the operator skips with the lever.
+  virtual double lever_deadband(int /*cylinder*/, int /*side*/) const { return 0.0; }
+  /// True parameters; valid after the run, because equivalents are estimated from it.
+  virtual std::vector<HiddenParameter> parameters() const = 0;
 };
 
 inline int sign_of(double v) { return v > 0.0 ? 1 : (v < 0.0 ? -1 : 0); }
@@ -93,10 +94,10 @@ struct LawEntry {
   std::vector<std::string> laws;
   std::string parameters;
   std::unique_ptr<HiddenLaw> (*make)(LawContext&);
-  bool (*fits)(const Machine&, int) = nullptr;  ///< nullptr: everywhere
+  bool (*fits)(const Machine&, int) = nullptr;  ///< whether a place is possible; nullptr: all are
 };
 
-/// The tables, one a file.
+/// The tables of the files in laws/, one for each file.
 std::vector<LawEntry> friction_laws();
 std::vector<LawEntry> contact_laws();
 std::vector<LawEntry> mass_laws();
@@ -111,12 +112,11 @@ const std::vector<LawEntry>& all_laws();
 const LawEntry& law_entry(const std::string& id);
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kMoving =
-    2e-3;  ///< [m/s] equivalents count samples that move, as the error measures do
+constexpr double kMoving = 2e-3;  ///< [m/s] samples from here on count as moving, as in the error measures
 
-/// Area that turns a force into a pressure; of a drive without hydraulics a usual one. [m^2]
+/// Area [m^2] that converts a force into a pressure; a typical one for a drive without hydraulics.
 inline double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }
-/// Machines an effect can be hidden in: by cylinder `i`, by pump `p`.
+/// Conditions for the place of an effect: cylinder `i` is hydraulic, pump `p` is load sensing.
 inline bool hydraulic(const Machine& machine, int i) {
   return machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
 }

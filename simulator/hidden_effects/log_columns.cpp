@@ -11,8 +11,8 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kOilNoise = 0.12;    // [K]
-constexpr double kForceNoise = 0.01;  // share of a drive's RMS force
+constexpr double kOilNoise = 0.12;    // [K] standard deviation
+constexpr double kForceNoise = 0.01;  // [-] of a drive's RMS force
 
 using Columns = std::vector<std::vector<double>>;
 
@@ -109,7 +109,7 @@ GeneratedLog LogRecorder::log() const {
   }
   for (std::size_t i = 0; has.commands && i < r_.command.size(); ++i)
     add("u_" + machine_.cylinders[i].name, r_.command[i], 1.0, 4, kAny);
-  // a transducer of 0..400 bar reads no suction
+  // A transducer of 0..400 bar cannot read a negative pressure.
   constexpr double kNoSuction = 0.0;
   for (std::size_t i = 0; i < r_.command.size(); ++i) {
     const std::string& name = machine_.cylinders[i].name;

@@ -1,10 +1,10 @@
 #pragma once
-/// What the sensors make of the plant: sampling, noise, rounding, the log's columns.
+/// Turns the plant's states into a log: sampling, noise, rounding, columns.
 #include "simulator/hidden_effects/hidden_law.h"
 
 namespace sparflow::simulator {
 
-// Standard deviations at noise factor 1, white, as in the shared logs.
+// Standard deviations of white noise at noise factor 1, as in the shared example logs.
 inline constexpr double kPressureNoise = 0.8 * kBar;  ///< [Pa]
 inline constexpr double kAngleNoise = 3.0e-4;         ///< [rad]
 inline constexpr double kTravelNoise = 1.0e-3;        ///< [m]
@@ -13,7 +13,7 @@ class LogRecorder {
  public:
   LogRecorder(const Machine& machine, const LogRequest& request, std::size_t rows);
   void add(const PlantState& state, const SensorState& sensors, double payload);
-  /// Draws the noise, lets laws act on whole channels (delays, stuck values), then adds the noise.
+  /// Draws the noise, lets the laws change whole channels (delays, stuck values), then adds the noise.
   void finish(std::vector<std::unique_ptr<HiddenLaw>>& hidden, Random& random);
   GeneratedLog log() const;  ///< columns rounded, without truth
 
@@ -21,7 +21,7 @@ class LogRecorder {
   const Machine& machine_;
   const LogRequest& request_;
   Recording r_;
-  std::vector<std::vector<double>> force_;  ///< of drives without chambers [N]
+  std::vector<std::vector<double>> force_;  ///< [N] of drives without chambers
 };
 
 }  // namespace sparflow::simulator

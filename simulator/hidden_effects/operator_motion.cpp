@@ -8,9 +8,9 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kStopMargin = 0.03;  // share of a joint's range the operator keeps from its ends
-constexpr double kPumpShare = 0.97;   // of the pump's flow the operator uses at most
-constexpr double kSlowMoves = 0.12;   // share of careful moves
+constexpr double kStopMargin = 0.03;  // [-] of a joint's range that the operator keeps from its ends
+constexpr double kPumpShare = 0.97;   // [-] of the pump's flow that the operator uses at most
+constexpr double kSlowMoves = 0.12;   // [-] share of slow moves
 
 double smooth_step(double s) {
   s = std::clamp(s, 0.0, 1.0);
@@ -80,7 +80,7 @@ bool OperatorMotion::plan_move(int cylinder, double window, double q, Move& move
   move.lever_held = random_.chance(0.3);
   move.amplitude = way * speed;
   if (move.lever_held) {
-    // a held lever moves the joint at a pose-dependent speed: keep it from outrunning the room left
+    // A constant lever moves the joint at a speed that depends on posture; the move must end within the range left.
     const double held = 0.85 * speed * std::abs(rate) * area / gain;
     move.amplitude = way * (rate > 0.0 ? 1.0 : -1.0) * std::min(held, 1.0);
   }
@@ -135,7 +135,7 @@ void OperatorMotion::levers(double t, double h, const std::vector<double>& q,
       u[c] = rod_speed * area / laws_.cylinders[c].direction[d].valve_gain;
     }
     u[c] = std::clamp(u[c], -1.0, 1.0);
-    // a lever open towards an end that is reached is let go
+    // The operator releases a lever when the joint has reached that end of its range.
     const auto j = static_cast<std::size_t>(machine_.cylinders[c].joint);
     const Range range = machine_.joints[j].position;
     const double way = u[c] * length_rate[c];

@@ -1,6 +1,7 @@
 #pragma once
-/// The operator: blocks of single and simultaneous moves with pauses between, levers moved open loop. Statistics like
-/// those of a working log: moves of 3 to 10 s, rest a seventh of the time, two functions at once a third of it.
+/// The operator: blocks of single and simultaneous moves with pauses between them, with levers moved open loop. The
+/// statistics are those of a working log: moves of 3 to 10 s, rest for a seventh of the time, two cylinders at once for
+/// a third of it.
 #include <vector>
 
 #include "models/machine/machine.h"
@@ -10,11 +11,11 @@ namespace sparflow::simulator {
 
 class OperatorMotion {
  public:
-  /// @param machine outlives this
+  /// @param machine must outlive this object, as must `laws`
   OperatorMotion(const Machine& machine, const CraneLaws& laws, std::uint64_t motion_seed);
 
   std::vector<double> start_posture();
-  /// Levers by cylinder at time t, given where the crane stands.
+  /// Sets the levers [-] by cylinder at time t [s] for the crane at q. @param h [s] step
   /// @param length_rate dx/dq by cylinder
   void levers(double t, double h, const std::vector<double>& q,
               const std::vector<double>& length_rate, std::vector<double>& command);
@@ -23,11 +24,11 @@ class OperatorMotion {
  private:
   struct Move {
     int cylinder = 0;
-    bool lever_held = false;        ///< trapezoid of the lever; else of the joint's speed
+    bool lever_held = false;        ///< the profile is that of the lever, else of the joint's speed
     double amplitude = 0.0;         ///< [-] lever, or [rad/s] or [m/s]
     double start = 0.0;             ///< [s] after the block's begin
     double ramp = 0.5, hold = 3.0;  ///< [s]
-    double phase = 0.0;  ///< [s] of its profile; slower than time when the pump is short of flow
+    double phase = 0.0;  ///< [s] in its profile; grows slower than time when the pump's flow is limited
     double duration() const { return hold + 2.0 * ramp; }
     double profile() const;
   };
@@ -38,7 +39,7 @@ class OperatorMotion {
   const CraneLaws& laws_;
   Random random_;
   std::vector<Move> moves_;
-  std::vector<int> preferred_;  ///< last direction by cylinder, so that poses are swept
+  std::vector<int> preferred_;  ///< last direction by cylinder, so that all postures are visited
   double block_start_ = 0.0, pause_end_ = 0.0;
 };
 

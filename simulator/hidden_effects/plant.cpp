@@ -86,21 +86,21 @@ void Plant::move() {
     const auto j = static_cast<std::size_t>(drive.joint);
     const double area = c.side > 0 ? drive.area_piston() : drive.area_rod();
     const double other = c.side > 0 ? drive.area_rod() : drive.area_piston();
-    // a drive without chambers moves at the joint's largest speed with its lever fully open
+    // With its lever fully open, a drive without chambers moves at the joint's largest speed.
     double speed =
         drive.hydraulic() ? c.side * c.flow / area : c.opening * machine_.joints[j].velocity.hi;
-    // oil that is displaced through the valve; leaks and compression bypass the return line
+    // Only oil displaced through the valve enters the return line; leakage and compression bypass it.
     c.return_flow = c.side == 0 ? 0.0 : std::abs(speed) * other;
     speed += c.drift;
     double joint_speed = speed / c.rate;
     const Range range = machine_.joints[j].position;
     if ((s.q[j] >= range.hi && joint_speed > 0.0) || (s.q[j] <= range.lo && joint_speed < 0.0))
-      speed = joint_speed = 0.0;  // the stop
+      speed = joint_speed = 0.0;  // at the mechanical stop
     c.acceleration = (speed - c.speed) / s.h;
     c.speed = speed;
     speed_before2_[j] = speed_before_[j];
     speed_before_[j] = s.qd[j];
-    // second order backward difference: no delay against the trapezoidal position
+    // A backward difference of second order has no delay relative to the trapezoidal position.
     s.qdd[j] = (3.0 * joint_speed - 4.0 * speed_before_[j] + speed_before2_[j]) / (2.0 * s.h);
     s.q[j] = std::clamp(s.q[j] + 0.5 * s.h * (s.qd[j] + joint_speed), range.lo, range.hi);
     s.qd[j] = joint_speed;
@@ -156,7 +156,7 @@ void Plant::pressurise() {
     const Cylinder& drive = machine_.cylinders[i];
     const DirectionLaws& law = laws_.cylinders[i].direction[c.side > 0 ? 0 : 1];
     const double holding = c.side > 0 ? drive.area_rod() : drive.area_piston();
-    // load that pushes in the direction of motion stands in the return chamber
+    // A load that drives the motion pressurises the return chamber.
     const double load_pressure = drive.hydraulic() ? -c.side * c.force / holding : 0.0;
     c.pilot_pressure = law.counterbalance ? law.pilot_pressure - law.pilot_slope * load_pressure +
                                                 law.pilot_flow * c.flow
@@ -170,7 +170,7 @@ void Plant::pressurise() {
     if (!drive.hydraulic()) continue;
     const double area_a = drive.area_piston(), area_b = drive.area_rod();
     if (c.side == 0) {
-      // locked: the loaded chamber carries, the other one stands near the tank
+      // With a closed valve the loaded chamber carries the load, and the other one is near tank pressure.
       const double tank = laws_.cylinders[i].rest_tank;
       const bool on_a = c.force + area_b * tank > area_a * tank;
       c.pressure_a = on_a ? (c.force + area_b * tank) / area_a : tank;
@@ -178,10 +178,10 @@ void Plant::pressurise() {
       continue;
     }
     const double fed = c.side > 0 ? area_a : area_b, other = c.side > 0 ? area_b : area_a;
-    const double against = c.side * c.force;  // load against the motion
+    const double against = c.side * c.force;  // [N] positive against the motion
     double supply = (against + other * c.return_pressure) / fed;
     double back = c.return_pressure;
-    // below the tank's pressure oil is sucked in through the anti-cavitation valve
+    // Below tank pressure the anti-cavitation valve lets oil in.
     const double least = std::max(c.pilot_pressure, laws_.cylinders[i].rest_tank);
     if (least > supply) {
       supply = least;

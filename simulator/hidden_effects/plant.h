@@ -1,6 +1,6 @@
 #pragma once
 /// The crane with its base laws and hidden laws, stepped in time: lever -> spool -> flow -> rod -> load -> chambers
-/// -> pump -> sensors. Quasi-static: inertia is an effect.
+/// -> pump -> sensors. It is quasi-static; inertia is one of the hidden effects.
 #include "simulator/hidden_effects/hidden_law.h"
 #include "simulator/hidden_effects/operator_motion.h"
 
@@ -8,14 +8,14 @@ namespace sparflow::simulator {
 
 class Plant {
  public:
-  /// @param machine as drawn, what the log's reader knows; hidden laws may change the bodies
+  /// @param machine as in the machine file; hidden laws may change its bodies  @param step [s]
   Plant(const Machine& machine, const CraneLaws& laws,
         std::vector<std::unique_ptr<HiddenLaw>>& hidden, std::vector<double> start, double step);
 
-  /// One step of state().h: levers in, everything else follows.
+  /// Advances by state().h. @param payload [kg]  @param oil [degC]  @param command levers [-] by cylinder
   void step(double payload, double oil, const std::vector<double>& command);
   void sense(SensorState& sensors);
-  /// Stands where another one stands, before a step: what follows differs by the laws alone.
+  /// Takes over the positions of another plant before a step, so that the two then differ only by their laws.
   void follow(const PlantState& other);
   const PlantState& state() const { return state_; }
 

@@ -19,7 +19,7 @@ class Random {
       s = z ^ (z >> 31);
     }
   }
-  /// A stream of its own for each use, so that one more draw here changes nothing there.
+  /// Gives each purpose a stream of its own, so that one more draw for one purpose changes no other.
   Random(std::uint64_t seed, std::string_view purpose) : Random(seed ^ hash(purpose)) {}
 
   std::uint64_t next() {
@@ -33,7 +33,7 @@ class Random {
     state_[3] = rotate(state_[3], 45);
     return result;
   }
-  /// In [0, 1).
+  /// Uniform in [0, 1).
   double unit() { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
   double uniform(double lo, double hi) { return lo + (hi - lo) * unit(); }
   int below(int n) { return static_cast<int>(unit() * n); }

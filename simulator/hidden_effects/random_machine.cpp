@@ -54,7 +54,7 @@ void drop_telescope(Machine& machine) {
 void add_slewing(Machine& machine, Random& random) {
   if (machine.joints.empty() || machine.pumps.empty()) return;
   const Joint& first = machine.joints.front();
-  // a column that turns already needs no second one
+  // A machine whose column slews already gets no second slewing joint.
   if ((first.origin.linear() * first.axis).cross(Eigen::Vector3d::UnitZ()).norm() < 0.1) return;
   Joint slew;
   slew.name = "slew";
@@ -64,7 +64,7 @@ void add_slewing(Machine& machine, Random& random) {
   slew.acceleration = {-0.4, 0.4};
   machine.joints.insert(machine.joints.begin(), slew);
   for (Link& link : machine.links) {
-    ++link.joint;  // what stood on the base turns with the column now
+    ++link.joint;  // A link that was fixed to the base now turns with the column.
     if (link.slides_with >= 0) ++link.slides_with;
   }
   ++machine.tip.joint;
@@ -97,7 +97,7 @@ void add_pump(Machine& machine, Random& random) {
 
 void scale(Machine& machine, double spread, Random& random) {
   const auto factor = [&] { return random.uniform(1.0 - spread, 1.0 + spread); };
-  // one factor for all pins, so that linkages keep their shape; bones of their own lengths on top
+  // One factor scales all pins, so that linkages keep their shape; link lengths vary in addition.
   const double size = factor();
   for (Joint& joint : machine.joints) {
     joint.origin.translation() *= size;
@@ -140,7 +140,7 @@ void scale(Machine& machine, double spread, Random& random) {
     v.max_flow_extend *= flow;
     v.max_flow_retract *= flow;
   }
-  // the outer boom's own length: the last joint's foot and the tip
+  // The outer boom has a length of its own, which moves the last joint's origin and the tip.
   if (machine.joints.size() > 1 && machine.joints.back().type == JointType::kPrismatic)
     machine.joints.back().origin.translation() *=
         random.uniform(1.0 - 0.5 * spread, 1.0 + 0.5 * spread);
@@ -163,18 +163,18 @@ Machine vary_machine(const Machine& drawing, const MachineVariation& variation,
     machine.name = fmt::format("{}-{}", drawing.name, seed);
     try {
       check_machine(machine);
-      // through its file and back, so that it is what a reader of the file will see
+      // The machine is written to text and read back, so that it equals what a reader of its file gets.
       return parse_machine(write_machine(machine), machine.name + ".yaml", ".");
     } catch (const InputError&) {
-      continue;  // a linkage beyond its dead centre: draw again
+      continue;  // A linkage passes its dead centre, so another machine is drawn.
     }
   }
   throw InputError({}, "machine",
-                   "no variation of " + drawing.name + " passes the machine's checks");
+                   "no variation of " + drawing.name + " passes check_machine()");
 }
 
 Machine random_machine(const std::vector<Machine>& drawings, std::uint64_t seed) {
-  SPARFLOW_CHECK(!drawings.empty(), "random_machine needs a drawing");
+  SPARFLOW_CHECK(!drawings.empty(), "random_machine needs at least one machine to vary");
   Random random(seed, "choice");
   const Machine& drawing =
       drawings[static_cast<std::size_t>(random.below(static_cast<int>(drawings.size())))];

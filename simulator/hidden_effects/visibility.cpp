@@ -17,21 +17,21 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kMean_s = 0.3;         // changes and noise are means over this long
-constexpr double kLeastSize = 1.0;      // standard deviations where it acts
-constexpr double kLeastSeconds = 10.0;  // an effect of that size acting so long is enough
-constexpr double kLeastActing_s = 3.0;  // one stroke; a shorter incident proves no law
-constexpr double kMostSwallowed = 0.9;  // what is asked of a diagnosis: nothing above is named
+constexpr double kMean_s = 0.3;         // [s] over which changes and noise are averaged
+constexpr double kLeastSize = 1.0;      // [-] standard deviations where the effect acts
+constexpr double kLeastSeconds = 10.0;  // [s] for which an effect of that size must act
+constexpr double kLeastActing_s = 3.0;  // [s] one stroke; no law can be tested on a shorter event
+constexpr double kMostAbsorbed = 0.9;   // [-] a diagnosis need not name an effect with a larger absorbed share
 constexpr double kForceShareNoise = 0.01;
 
-/// One measured quantity: the change by the effect, and what may follow it when learned from this very log.
+/// One measured quantity: its change by the effect, and the basis of a law that may be learned from this log.
 struct Channel {
   std::string name;
-  double deviation = 0.0;  // of the noise of a mean over kMean_s
-  bool learned = false;    // pressures and pumps: a law of flow and force
+  double deviation = 0.0;  // standard deviation of the noise of a mean over kMean_s
+  bool learned = false;    // pressures and pumps, for which a law is learned
   std::vector<double> change;
   std::vector<VectorXd> basis;
-  // the mean under way
+  // sums of the current mean
   double sum = 0.0;
   VectorXd basis_sum;
   int count = 0;
@@ -42,7 +42,7 @@ struct Channel {
     basis_sum += own;
     ++count;
   }
-  /// Ends a mean; one over less than half of its rows does not count.
+  /// Ends a mean, which is dropped when it has less than half of its rows.
   void close(int rows) {
     if (2 * count >= rows) {
       change.push_back(sum / count);
@@ -52,38 +52,38 @@ struct Channel {
     basis_sum = VectorXd();
     count = 0;
   }
-  /// The means of another log of the same quantity.
+  /// Appends the means of another log of the same quantity.
   void append(const Channel& other) {
     change.insert(change.end(), other.change.begin(), other.change.end());
     basis.insert(basis.end(), other.basis.begin(), other.basis.end());
   }
 };
 
-/// Pressure that the return line or the counterbalance valve sets, and which of the two does.
-struct Ruled {
+/// Pressure that the return line or the counterbalance valve determines, and which of the two does.
+struct DeterminedPressure {
   double pressure = 0.0;
   bool counterbalance = false;
-  bool fed_a = false;  // the chamber it shows in is A
+  bool fed_a = false;  // it is the pressure of chamber A
 };
 
-Ruled ruled_pressure(const Cylinder& drive, const CylinderLaws& laws, const CylinderState& c) {
+DeterminedPressure determined_pressure(const Cylinder& drive, const CylinderLaws& laws, const CylinderState& c) {
   const double fed = c.side > 0 ? drive.area_piston() : drive.area_rod();
   const double other = c.side > 0 ? drive.area_rod() : drive.area_piston();
   const double least = std::max(c.pilot_pressure, laws.rest_tank);
-  Ruled r;
+  DeterminedPressure r;
   r.counterbalance = least > (c.side * c.force + other * c.return_pressure) / fed;
   r.pressure = r.counterbalance ? least : c.return_pressure;
   r.fed_a = (c.side > 0) == r.counterbalance;
   return r;
 }
 
-/// The crane without one of the effects.
+/// A second crane without one of the effects, driven beside the first, with the channels that compare both.
 struct Shadow {
   std::unique_ptr<HiddenCase> crane;
   std::unique_ptr<Plant> plant;
   SensorState sensors;
   std::vector<Channel> force, speed, pump;
-  std::vector<std::vector<Channel>> pressure;  // by cylinder: direction (2) times branch (2)
+  std::vector<std::vector<Channel>> pressure;  // by cylinder, for each direction and branch (2 x 2)
 };
 
 std::vector<Channel> channels_like(const Machine& machine, double rate, double factor,
@@ -106,7 +106,7 @@ double noise_factor(const LogRequest& request) {
   return request.noise_factor > 0.0 ? request.noise_factor : 1.0;
 }
 
-/// @param without effect that it lacks, or kNothing
+/// @param without index of the effect that the second crane lacks, or kNothing
 std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t without,
                                     const Plant& plant) {
   auto s = std::make_unique<Shadow>();
@@ -124,7 +124,7 @@ std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t witho
     const Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[i].joint)];
     const double sensor =
         (joint.type == JointType::kRevolute ? kAngleNoise : kTravelNoise) * factor;
-    // slope of a line through n readings; a usual lever
+    // Standard deviation of the slope of a line through n readings, at the transmission of the first posture.
     s->speed[i].deviation = sensor * std::abs(plant.state().cylinders[i].rate) * request.rate *
                             std::sqrt(12.0 / (n * n * n));
     s->pressure.emplace_back();
@@ -146,8 +146,9 @@ std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t witho
   return s;
 }
 
-/// Largest chamber pressure, as read, with its margin, of what the levers ask of a pump: who leads may change with an
-/// effect elsewhere, and with it the margin, without any riddle in the pump. @param leader -1: none
+/// Demand of a pump [Pa]: the largest measured pressure plus margin of the commanded cylinders. It is computed for each
+/// crane, because an effect elsewhere may change the leader, and with it the margin, without an effect in the pump.
+/// @param leader index of the leader, -1 = none
 double asked_pressure(const Pump& pump, double standby, const CraneLaws& laws, const PlantState& s,
                       const SensorState& read, int& leader) {
   double most = standby;
@@ -181,15 +182,15 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
       s.force[i].add(change, VectorXd());
     }
     if (!drive.hydraulic() || ca.side == 0 || ca.side != cb.side) continue;
-    const Ruled ra = ruled_pressure(drive, s.crane->laws.cylinders[i], ca);
-    const Ruled rb = ruled_pressure(drive, s.crane->laws.cylinders[i], cb);
+    const DeterminedPressure ra = determined_pressure(drive, s.crane->laws.cylinders[i], ca);
+    const DeterminedPressure rb = determined_pressure(drive, s.crane->laws.cylinders[i], cb);
     double change = ra.pressure - rb.pressure;
-    if (ra.counterbalance != rb.counterbalance)  // the one that rules now against what was there
+    if (ra.counterbalance != rb.counterbalance)  // The effect changes the branch: the same chamber is compared.
       change = ra.fed_a ? ca.pressure_a - cb.pressure_a : ca.pressure_b - cb.pressure_b;
     change += ra.fed_a ? read_a - (ca.pressure_a - cb.pressure_a)
                        : read_b - (ca.pressure_b - cb.pressure_b);
     const double q = (ra.counterbalance ? ca.flow : ca.return_flow) / 1e-3, f = ca.force / 1e5;
-    // a learned law of flow and force is smooth, not linear: polynomials up to the fourth degree
+    // Polynomials up to the fourth degree stand for a learned law, which is smooth but not linear in flow and force.
     VectorXd own(15);
     Index term = 0;
     for (int degree = 0; degree <= 4; ++degree) {
@@ -209,8 +210,8 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
   }
 }
 
-/// @param effect with its place drawn
-bool has_twin(const Machine& machine, const HiddenEffect& effect) {
+/// Whether another effect of the catalogue has the same law at this place. @param effect with its place set
+bool has_equivalent_effect(const Machine& machine, const HiddenEffect& effect) {
   int pump = -1;
   if (effect.id == "flow_dependent_margin") pump = machine.pump_index(effect.at);
   if (effect.id == "line_loss") pump = machine.pump_of_cylinder(machine.cylinder_index(effect.at));
@@ -243,11 +244,11 @@ void judge_channel(const Channel& c, bool learned, Visibility& best, double& who
   v.size = std::sqrt(x.array().pow(4).sum() / energy);
   v.seconds = energy / (v.size * v.size) * kMean_s;
   v.channel = c.name;
-  v.swallowed = c.learned ? 1.0 : 0.0;  // filled in once all are known
+  v.absorbed = c.learned ? 1.0 : 0.0;  // judge() sets the share once all channels are known
   if (std::make_pair(shows(v), v.energy) > std::make_pair(shows(best), best.energy)) best = v;
 }
 
-/// Every channel of a shadow, in a fixed order.
+/// All channels of a second crane, in a fixed order.
 std::vector<Channel*> channels_of(Shadow& s) {
   std::vector<Channel*> all;
   for (auto* group : {&s.force, &s.speed, &s.pump}) {
@@ -263,11 +264,11 @@ Visibility judge(Shadow& s, bool learned) {
   Visibility best;
   double whole = 0.0, left = 0.0;
   for (const Channel* c : channels_of(s)) judge_channel(*c, learned, best, whole, left);
-  if (best.swallowed > 0.0) best.swallowed = whole > 0.0 ? 1.0 - left / whole : 0.0;
+  if (best.absorbed > 0.0) best.absorbed = whole > 0.0 ? 1.0 - left / whole : 0.0;
   return best;
 }
 
-/// Drives the request's crane with one shadow for each of `without` beside it.
+/// Drives the request's crane with one second crane for each entry of `without` beside it.
 std::vector<std::unique_ptr<Shadow>> drive_beside(const LogRequest& request,
                                                   const std::vector<std::size_t>& without) {
   const Machine& machine = request.machine;
@@ -314,7 +315,7 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
   std::vector<std::size_t> each(request.effects.size());
   std::iota(each.begin(), each.end(), std::size_t{0});
   const auto shadows = drive_beside(request, each);
-  if (learned && reference) {  // nothing changes there: the same crane beside itself
+  if (learned && reference) {  // Both cranes of the reference log are the same, so that the change is zero there.
     const auto beside = drive_beside(*reference, {kNothing});
     const std::vector<Channel*> known = channels_of(*beside.front());
     for (const auto& s : shadows) {
@@ -332,11 +333,11 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
       continue;
     }
     all.push_back(judge(*shadows[k], learned));
-    all.back().twin = has_twin(request.machine, drawn[k]);
+    all.back().equivalent = has_equivalent_effect(request.machine, drawn[k]);
   }
   return all;
 }
 
-bool visible(const Visibility& v) { return shows(v) && v.swallowed <= kMostSwallowed && !v.twin; }
+bool visible(const Visibility& v) { return shows(v) && v.absorbed <= kMostAbsorbed && !v.equivalent; }
 
 }  // namespace sparflow::simulator

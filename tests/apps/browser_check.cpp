@@ -75,7 +75,7 @@ BrowserReport check_page(const std::string& path, const std::string& options) {
 
   std::string scratch = (fs::temp_directory_path() / "sparflow-page-XXXXXX").string();
   SPARFLOW_CHECK(::mkdtemp(scratch.data()) != nullptr, "cannot make a folder for the browser");
-  // Virtual time: timers run at once, so the page's own report is there when the document is written out.
+  // With virtual time, timers run at once, so that the page's own report exists when the document is written.
   const std::string command = fmt::format(
       "timeout -k 5 120 '{0}' --headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
       "--disable-background-networking --disable-component-update --disable-sync "

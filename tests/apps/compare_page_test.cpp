@@ -25,7 +25,7 @@ using testing_support::channel;
 
 constexpr double kNoise = 0.8;  // [bar]
 
-/// The lift's log with friction that the model does not have: the measured force is larger when extending.
+/// The arm's log with friction that the model does not have: the measured force is larger when extending.
 Log log_with_force(double friction) {
   Log log = arm_log(kNoise);
   const double area = testing_support::arm_machine().cylinders[0].area_piston();
@@ -47,7 +47,7 @@ void expect_compare_page_good(const Page& page, const std::string& name) {
   EXPECT_EQ(report.plots_drawn, report.plots_expected);
 }
 
-TEST(ComparePage, RightModelIsGoodInEveryStage) {
+TEST(ComparePage, CorrectModelIsGoodInEveryStage) {
   const CraneModel model = arm_model();
   const CompareResult result = compare(model, {arm_log(kNoise)});
   const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
@@ -55,7 +55,7 @@ TEST(ComparePage, RightModelIsGoodInEveryStage) {
   for (const JudgedScore& j : judged) {
     EXPECT_EQ(j.tone, Tone::kGood) << j.score.stage << " " << j.score.regime;
     if (j.score.stage != "pump") continue;
-    // the filter keeps a part of the noise: low by at most 15 %
+    // The filter keeps a part of the noise, so the estimate is low, by at most 15 %.
     EXPECT_NEAR(j.noise / units::kBar, kNoise, 0.15 * kNoise);
   }
   EXPECT_THAT(compare_page(model, result).html(),
@@ -70,12 +70,12 @@ TEST(ComparePage, FrictionIsNamedInTheVerdict) {
   EXPECT_EQ(worst_score(judged)->score.stage, "force");
   EXPECT_EQ(worst_score(judged)->tone, Tone::kBad);
   const std::string html = compare_page(model, result).html();
-  EXPECT_THAT(html, HasSubstr("The model misses the force of arm: 4"));  // 40 kN and the noise
+  EXPECT_THAT(html, HasSubstr("The model misses the force of arm: 4"));  // friction of 40 kN, plus noise
   EXPECT_THAT(html, HasSubstr("kN RMS"));
   EXPECT_THAT(html, HasSubstr("arm.csv, 3000 samples, sha256 0000000000000000"));
 }
 
-TEST(ComparePage, LogWithoutPressuresSaysWhatItNeeds) {
+TEST(ComparePage, NamesTheColumnsThatALogWithoutPressuresLacks) {
   const CraneModel model = arm_model();
   Log log = arm_log();
   for (const char* signal : {"u_arm", "pA_arm", "pB_arm", "p_main"})
@@ -87,14 +87,14 @@ TEST(ComparePage, LogWithoutPressuresSaysWhatItNeeds) {
   EXPECT_THAT(html, HasSubstr("pA_arm_bar"));
 }
 
-TEST(ComparePage, MapsNeedAnArea) {
-  // a lift of one joint draws an arc: it has both width and height, so there is a map for each quantity
+TEST(ComparePage, DrawsNoMapWithoutAnArea) {
+  // The tip of one lifting joint moves on an arc with width and height, so there is a map for each quantity.
   const CraneModel model = arm_model();
   const CompareResult result = compare(model, {arm_log(kNoise)});
   Page page("maps");
   add_working_area(page, model.machine, result, "");
   EXPECT_EQ(page.plot_count(), static_cast<int>(compared_quantities(result).size()));
-  // a joint that never moves: nothing is compared, so nothing is drawn
+  // With a joint that never moves nothing is compared, so nothing is drawn.
   Log still = arm_log();
   channel(still, "q_arm").values.setConstant(0.3);
   Page empty("no maps");
@@ -102,7 +102,7 @@ TEST(ComparePage, MapsNeedAnArea) {
   EXPECT_EQ(empty.plot_count(), 0);
 }
 
-TEST(ComparePage, ShareExplainedIsOneForALawAndNoneForNoise) {
+TEST(ComparePage, ShareExplainedIsOneForALawAndZeroForNoise) {
   const Eigen::Index n = 2400;
   const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(n, -1.0, 1.0);
   Eigen::VectorXd noise(n);
@@ -111,9 +111,9 @@ TEST(ComparePage, ShareExplainedIsOneForALawAndNoneForNoise) {
     seed = seed * 1664525u + 1013904223u;
     noise[k] = static_cast<double>(seed >> 8) / 16777216.0 - 0.5;
   }
-  // 24 bins of a straight line leave 1/24^2 of its variance within
+  // Within 24 bins of a straight line 1/24^2 of its variance remains.
   EXPECT_NEAR(share_explained(x, 3.0 * x), 1.0 - 1.0 / 576.0, 1e-4);
-  // adjusted R^2 of noise: zero with a deviation of sqrt(2*23)/2400 = 0.003
+  // The adjusted R^2 of noise is zero with a standard deviation of sqrt(2*23)/2400 = 0.003.
   EXPECT_LT(share_explained(x, noise), 0.012);
   EXPECT_EQ(share_explained(Eigen::VectorXd::Constant(n, 2.0), x), 0.0);
   EXPECT_EQ(share_explained(x.head(39), x.head(39)), 0.0);
@@ -130,18 +130,18 @@ TEST(FitPageInBrowser, EveryFigureIsDrawn) {
   const FitResult result = fit(testing_support::arm_machine(), {arm_log(kNoise)});
   const Page page = fit_page(result);
   const std::string html = page.html();
-  EXPECT_THAT(html, HasSubstr("All 2 pressure processes were learned"));
+  EXPECT_THAT(html, HasSubstr("All 2 pressure models were identified"));
   EXPECT_THAT(html, HasSubstr("Held-out motions: Scores"));
   EXPECT_THAT(html, HasSubstr("Working pressure of arm retracting"));
   EXPECT_THAT(html, Not(HasSubstr("not learned")));
   expect_compare_page_good(page, "fit page");
 }
 
-TEST(FitPage, ProcessesThatWereNotLearnedAreNamed) {
+TEST(FitPage, NamesPressureModelsThatWereNotIdentified) {
   Log log = arm_log(kNoise);
   testing_support::remove_channel(log, "pB_arm");
   const std::string html = fit_page(fit(testing_support::arm_machine(), {log})).html();
-  EXPECT_THAT(html, HasSubstr("1 of 2 pressure processes were learned"));
+  EXPECT_THAT(html, HasSubstr("1 of 2 pressure models were identified"));
   EXPECT_THAT(html, HasSubstr("Missing: arm retract"));
 }
 

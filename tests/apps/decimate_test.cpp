@@ -17,14 +17,14 @@ bool contains(const std::vector<Index>& rows, Index row) {
   return std::binary_search(rows.begin(), rows.end(), row);
 }
 
-TEST(DecimateRows, FewRowsAllStay) {
+TEST(DecimateRows, KeepsAllOfFewRows) {
   const VectorXd y = VectorXd::Random(50);
   const auto rows = decimate_rows({&y}, 50);
   ASSERT_EQ(rows.size(), 50u);
   for (Index i = 0; i < 50; ++i) EXPECT_EQ(rows[static_cast<std::size_t>(i)], i);
 }
 
-TEST(DecimateRows, EverySpikeOfEveryColumnStays) {
+TEST(DecimateRows, KeepsEverySpikeOfEveryColumn) {
   const Index n = 100000;
   VectorXd a = VectorXd::Zero(n), b = VectorXd::Zero(n);
   a[12345] = 9.0;
@@ -38,33 +38,33 @@ TEST(DecimateRows, EverySpikeOfEveryColumnStays) {
   }
 }
 
-TEST(DecimateRows, ShortGapStaysAGap) {
+TEST(DecimateRows, KeepsAShortGap) {
   VectorXd y = VectorXd::LinSpaced(10000, 0, 1);
   y.segment(5000, 3).setConstant(kNaN);
   const auto rows = decimate_rows({&y}, 200);
   EXPECT_TRUE(contains(rows, 5000));
 }
 
-TEST(DecimateRows, AllNaNAndEmptyAreHarmless) {
+TEST(DecimateRows, AcceptsEmptyAndAllNaNColumns) {
   const VectorXd nothing(0), gaps = VectorXd::Constant(1000, kNaN);
   EXPECT_TRUE(decimate_rows({}, 10).empty());
   EXPECT_TRUE(decimate_rows({&nothing}, 10).empty());
   EXPECT_LE(decimate_rows({&gaps}, 10).size(), 12u);
 }
 
-TEST(DecimateCloud, OutlierStaysAndTheHeapIsThinned) {
+TEST(DecimateCloud, KeepsTheOutlierAndThinsTheCluster) {
   VectorXd x = VectorXd::Random(50000), y = VectorXd::Random(50000);
   x[31000] = 10.0;
   y[31000] = -10.0;
   x[5] = kNaN;
   const auto points = decimate_cloud(x, y, 2000);
   EXPECT_LE(points.size(), 2000u);
-  EXPECT_GE(points.size(), 700u);  // two thirds of the cells may go in one coarsening, not more
+  EXPECT_GE(points.size(), 700u);  // one coarsening of the grid removes at most two thirds of the cells
   EXPECT_TRUE(contains(points, 31000));
   EXPECT_FALSE(contains(points, 5));
 }
 
-TEST(DecimateCloud, CoincidingPointsAreOne) {
+TEST(DecimateCloud, KeepsOneOfCoincidingPoints) {
   const VectorXd same = VectorXd::Ones(5000);
   EXPECT_EQ(decimate_cloud(same, same, 100).size(), 1u);
   EXPECT_TRUE(decimate_cloud(VectorXd(0), VectorXd(0), 100).empty());
@@ -81,8 +81,8 @@ TEST(BinnedMedian, FollowsAStepAndIgnoresOutliers) {
   EXPECT_EQ(binned_median(x.head(39), y.head(39), 24).x.size(), 0);
 }
 
-TEST(BinnedMedian, NoLineAcrossAGapInTheData) {
-  // nothing between -1 and 1: a jump there must not look like a slope
+TEST(BinnedMedian, HasNoLineAcrossAGapInTheData) {
+  // There are no points between -1 and 1; a step there must not be drawn as a slope.
   Eigen::VectorXd x(400), y(400);
   for (Eigen::Index i = 0; i < 400; ++i) {
     x[i] = i < 200 ? -6.0 + 0.025 * static_cast<double>(i)

@@ -1,4 +1,4 @@
-// Pages of diagnose and improve, on a diagnosis put together by hand: what is drawn must not depend on the search.
+// Pages of diagnose and improve, on a diagnosis composed by hand, so that the pages are tested apart from the search.
 #include "apps/report/model_pages/diagnose_page.h"
 
 #include <gmock/gmock.h>
@@ -35,7 +35,7 @@ std::size_t force_channel(const Evidence& evidence) {
   throw std::logic_error("no force in the evidence");
 }
 
-/// Real evidence with an answer written down by hand.
+/// Evidence computed from a log, with effects and verdict set by hand.
 Diagnosis missing_friction(const CraneModel& model) {
   Diagnosis d;
   d.evidence = collect_evidence(model, {make_signals(model.machine, log_with_friction())});
@@ -63,14 +63,14 @@ Diagnosis missing_friction(const CraneModel& model) {
                {"sensor_delay", -4.0}};
   d.search.threshold = 6.5;
   d.indistinguishable = {{"coulomb_friction:arm", "load_friction:arm"}};
-  d.experiments = {{"tells coulomb_friction:arm from load_friction:arm",
+  d.experiments = {{"distinguishes coulomb_friction:arm from load_friction:arm",
                     "arm up and down slowly, with no load and with about 500 kg", 2.5, 0.2}};
   d.notes = {"pump main: nothing to say"};
   return d;
 }
 
-/// Written, opened and checked: no script errors, all plots drawn, the verdict in the first 900 px of a page as
-/// wide as a laptop's.
+/// Writes and opens the page; expects no script errors, all figures drawn, and the verdict within the first 900 px of
+/// a page as wide as a laptop's.
 void expect_good_in_browser(const Page& page, const std::string& name) {
   const std::string path = (std::filesystem::path(SPARFLOW_BINARY_DIR) / (name + ".html")).string();
   std::string html = page.html();
@@ -96,43 +96,43 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   const std::string html = diagnose_page(model, missing_friction(model)).html();
   EXPECT_THAT(html, HasSubstr("force 5.01 \u00B1 0.12 kN"));
   EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
-  EXPECT_THAT(html, HasSubstr("Chance of such evidence with nothing missing: below 0.5 %"));
+  EXPECT_THAT(html, HasSubstr("Chance of such evidence if no effect were missing: below 0.5 %"));
   EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
-  // 4 nats at 2.5 a minute
+  // 4 nats at 2.5 nats a minute
   EXPECT_THAT(html, HasSubstr("Record 2 minutes of: arm up and down slowly, with no load and with "
-                              "about 500 kg (tells coulomb_friction:arm from load_friction:arm)."));
+                              "about 500 kg (distinguishes coulomb_friction:arm from load_friction:arm)."));
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 
-TEST(DiagnosePage, PictureTakesTheEffectAway) {
+TEST(DiagnosePage, ChannelPictureRemovesTheEffect) {
   const CraneModel model = arm_model();
   const Diagnosis d = missing_friction(model);
   const ChannelPicture p = channel_picture(d, 0, force_channel(d.evidence));
   const auto rms = [](const Eigen::VectorXd& x) {
     return std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
   };
-  // without: the friction and the noise; with: the noise and what the filter rounds off at starts
+  // Without the effect: friction and noise. With it: noise, and friction that the filter smooths where motions begin.
   EXPECT_NEAR(rms(p.without), kFriction, 0.1 * kFriction);
   EXPECT_LT(rms(p.with), 0.2 * kFriction);
-  // measured - residual = the model: static force, which the log was made of
+  // Measured minus residual is the model's prediction: the static force from which the log was made.
   EXPECT_TRUE(p.measured.allFinite());
   EXPECT_LT(rms(p.measured - p.without) / rms(p.measured), 1.0);
 }
 
-TEST(DiagnosePage, HeadlineOfEveryVerdict) {
+TEST(DiagnosePage, HasAHeadlineForEveryVerdict) {
   const CraneModel model = arm_model();
   Diagnosis d;
   d.evidence = collect_evidence(model, {make_signals(model.machine, arm_log(0.8))});
   d.verdict = Verdict::kNone;
   d.p_value = 0.4;
-  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("what chance leaves (p = 0.4)"));
+  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("no more than noise would (p = 0.4)"));
   d.verdict = Verdict::kUnknown;
   d.unexplained =
       Unexplained{"force", "arm", {"arm angle"}, 0.8,
                   900.0,   300.0, {"N", 1.0},    "the force of arm swings with its angle"};
   const std::string html = diagnose_page(model, d).html();
   EXPECT_THAT(html, HasSubstr("The force of arm swings with its angle."));
-  EXPECT_THAT(html, HasSubstr("900 N RMS are left, the sensors\u0026#39; noise is 300"));
+  EXPECT_THAT(html, HasSubstr("the residual is 900 N RMS, the sensors\u0026#39; noise 300"));
   d.verdict = Verdict::kBadData;
   d.unexplained.reset();
   d.bad = {{"pA_arm", BadDataKind::kStuck, 12.0, 15.0, 0.05, "It rests at 81.2 bar for 3 s",
@@ -174,11 +174,11 @@ TEST(DiagnosePageInBrowser, Unknown) {
       "force", "arm", {"arm rod speed"}, 0.9,
       5e3,     300.0, {"N", 1.0},        "the force of arm changes sides with its speed"};
   const Page page = diagnose_page(model, d);
-  EXPECT_EQ(page.plot_count(), 2);  // the two telling signals
+  EXPECT_EQ(page.plot_count(), 2);  // residual against two signals
   expect_good_in_browser(page, "diagnose page unknown");
 }
 
-TEST(DiagnosePageInBrowser, SwingIsDrawnOverTime) {
+TEST(DiagnosePageInBrowser, OscillationIsDrawnOverTime) {
   const CraneModel model = arm_model();
   Diagnosis d;
   d.evidence = collect_evidence(model, {make_signals(model.machine, log_with_friction())});
@@ -186,7 +186,7 @@ TEST(DiagnosePageInBrowser, SwingIsDrawnOverTime) {
   d.unexplained = Unexplained{"force", "arm", {"time, 1.13 Hz"}, 0.9,
                               5e3,     300.0, {"N", 1.0},        "the force of arm swings"};
   const Page page = diagnose_page(model, d);
-  EXPECT_THAT(page.html(), HasSubstr("What is left of the force of arm, over time"));
+  EXPECT_THAT(page.html(), HasSubstr("Residual of the force of arm over time"));
   expect_good_in_browser(page, "diagnose page swing");
 }
 
@@ -208,7 +208,7 @@ TEST(DiagnosePageInBrowser, BadChannelIsDrawnOverTimeWithTheFaultMarked) {
   EXPECT_NEAR(chart.series[0].y[from], pressure.values[from] / 1e5, 1e-9);
   ASSERT_EQ(chart.spans.size(), 1u);
   EXPECT_EQ(chart.spans[0].label, "stuck");
-  // the machine rests for a moment around it: stuck is what has one value
+  // The machine rests shortly around it; the stuck samples are those with a single value.
   EXPECT_NEAR(chart.spans[0].from, log.time[from], 2.0);
   EXPECT_NEAR(chart.spans[0].to, log.time[from + length - 1], 2.0);
   const Page page = diagnose_page(model, d);
@@ -225,12 +225,12 @@ TEST(DiagnosePageInBrowser, NothingMissing) {
   d.ranking = {{"coulomb_friction:arm", -0.5}};
   d.search.threshold = 6.5;
   const Page page = diagnose_page(model, d);
-  EXPECT_GT(page.plot_count(), 1) << "what is left, beside the ranking";
-  EXPECT_THAT(page.html(), HasSubstr("What is left of each quantity"));
+  EXPECT_GT(page.plot_count(), 1) << "residuals, beside the ranking";
+  EXPECT_THAT(page.html(), HasSubstr("Residual of each quantity"));
   expect_good_in_browser(page, "diagnose page none");
 }
 
-TEST(ImprovePage, StepsAreWholeNumbersAndSharesOfTheErrorBefore) {
+TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const std::string html =
       improve_page(extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
@@ -246,13 +246,13 @@ TEST(ImprovePageInBrowser, StepsOfExtend) {
                                      {log_with_friction(1)}, {log_with_friction(2)});
   const Page page = improve_page(result);
   const std::string html = page.html();
-  EXPECT_THAT(html, HasSubstr("Error falling step by step"));
+  EXPECT_THAT(html, HasSubstr("Error after each step"));
   EXPECT_THAT(html, HasSubstr("sensor noise"));
   EXPECT_GE(page.plot_count(), 3);  // overview, the force's error, its curves
   expect_good_in_browser(page, "improve page");
 }
 
-TEST(ImprovePage, NothingAddedSaysWhy) {
+TEST(ImprovePage, StatesWhyNothingWasAdded) {
   ExtendResult result;
   result.model = arm_model();
   result.stopped_because = "nothing more is missing that these logs could show";

@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// Sums of a few rotations of points some ten metres away: 1e-12 m is a thousand rounding errors.
+// Positions are sums of a few rotations of points some ten metres away; 1e-12 m is a thousand rounding errors.
 constexpr double kGeometryRounding = 1e-12;
 
 std::vector<MachinePart> of_kind(const std::vector<MachinePart>& parts, PartKind kind) {
@@ -33,7 +33,7 @@ TEST(DrawingGeometry, KindsAndTheirOrderDoNotDependOnTheConfiguration) {
   for (const Machine& machine : test_support::all_test_machines()) {
     const auto first = machine_parts(machine, test_support::random_configuration(machine, random));
     for (int i = 0; i < 5; ++i) {
-      // twice the range: some four-bars do not close there
+      // Over twice the range, where some four-bars do not close.
       const VectorXd q = 2.0 * test_support::random_configuration(machine, random);
       const auto parts = machine_parts(machine, q);
       ASSERT_EQ(parts.size(), first.size()) << machine.name;
@@ -64,7 +64,7 @@ TEST(DrawingGeometry, RodsAreAsLongAsTheCylinderAndBarsKeepTheirLength) {
         ++drawn;
         if (four_bar == nullptr) continue;
         EXPECT_NEAR(length(rockers[bars]), four_bar->rocker_length, kGeometryRounding);
-        // the coupler of a random machine may lie a little off the plane of the four-bar
+        // The coupler of a random machine may lie a little outside the plane of the four-bar.
         if (machine.name.rfind("random", 0) != 0) {
           EXPECT_NEAR(length(couplers[bars]), four_bar->coupler_length, kGeometryRounding);
         }
@@ -87,7 +87,7 @@ TEST(DrawingGeometry, PlanarCraneIsDrawnInBaseCoordinates) {
   const DrawingFrame frame = drawing_frame(machine, q, 1.5);
   EXPECT_EQ(frame.time, 1.5);
   EXPECT_NEAR((frame.tip - Vector2d(tip.x(), tip.z())).norm(), 0.0, kGeometryRounding);
-  // closed form: two booms and the telescope
+  // Closed form of two booms and the telescope.
   const Vector2d expected = Vector2d(0, 2) + 3.4 * Vector2d(std::cos(0.4), std::sin(0.4)) +
                             5.0 * Vector2d(std::cos(-0.5), std::sin(-0.5));
   EXPECT_NEAR((frame.tip - expected).norm(), 0.0, kGeometryRounding);
@@ -109,7 +109,7 @@ TEST(DrawingGeometry, TelescopeStagesFollowOneAnotherToTheTip) {
       0.0, kGeometryRounding);
 }
 
-/// Swinging the arm turns the plane with it, so the picture stays the same on level ground.
+/// The plane turns with the swinging arm, so that the drawing stays the same on level ground.
 TEST(DrawingGeometry, SwingCraneIsDrawnByRadiusAndHeight) {
   Machine machine = test_support::swing_crane();
   machine.joints[0].origin.linear().setIdentity();
@@ -142,9 +142,9 @@ TEST(DrawingGeometry, PlaneIsUprightAndOrthonormalForAnyMachine) {
   }
 }
 
-TEST(DrawingGeometry, FourBarThatDoesNotCloseLeavesTheRest) {
+TEST(DrawingGeometry, DrawsTheOtherPartsWhereAFourBarDoesNotClose) {
   const Machine machine = test_support::knuckle_crane();
-  // At 1.76 rad the jib's coupler pin is 0.11 m from the rocker pin; bars of 0.49 m and 0.22 m need 0.27 m.
+  // At 1.76 rad the jib's coupler pin is 0.11 m from the rocker pin; the bars of 0.49 m and 0.22 m need 0.27 m.
   const auto parts = machine_parts(machine, Eigen::Vector2d(0.2, 1.76));
   for (const PartKind kind :
        {PartKind::kRocker, PartKind::kCoupler, PartKind::kRod, PartKind::kBarrel}) {

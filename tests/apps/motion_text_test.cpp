@@ -6,7 +6,7 @@
 namespace sparflow {
 namespace {
 
-TEST(MotionText, BesideTheSeedsByName) {
+TEST(MotionText, ComparesWithSeedsByName) {
   OptimizeResult r;
   r.energy.total = 80e3;
   EXPECT_EQ(against_seeds(r), "") << "no seed keeps the limits";
@@ -14,11 +14,11 @@ TEST(MotionText, BesideTheSeedsByName) {
   r.best_seed_name = "RRT-Connect 2";
   EXPECT_EQ(against_seeds(r),
             "20 % less than the best seed, RRT-Connect 2 (100.0 kJ) in the same time");
-  // a straight line that is the best seed is not told twice
+  // A straight line that is also the best seed is named once.
   r.straight_line_energy = r.nearest_line_energy = 100e3;
   r.straight_line_name = r.best_seed_name = "straight line 1";
   EXPECT_EQ(against_seeds(r),
-            "20 % less than the straight joint line to the nearest end posture (100.0 kJ) in the "
+            "20 % less than the straight joint line to the nearest goal configuration (100.0 kJ) in the "
             "same time");
   r.straight_line_energy = r.best_seed_energy = 81e3;
   EXPECT_THAT(against_seeds(r),
@@ -34,12 +34,12 @@ TEST(MotionText, BesideTheSeedsByName) {
 
 TEST(MotionText, ConstantPressureIsSaid) {
   CraneModel model;
-  EXPECT_EQ(only_strokes_count(model), "") << "no pump, nothing to say";
+  EXPECT_EQ(constant_pressure_note(model), "") << "no pump, nothing to say";
   model.machine.pumps.resize(2);
   model.machine.pumps[0].type = PumpType::kConstantPressure;
-  EXPECT_EQ(only_strokes_count(model), "") << "one of two senses the load";
+  EXPECT_EQ(constant_pressure_note(model), "") << "one of two senses the load";
   model.machine.pumps[1].type = PumpType::kConstantPressure;
-  EXPECT_THAT(only_strokes_count(model), testing::HasSubstr("only which strokes"));
+  EXPECT_THAT(constant_pressure_note(model), testing::HasSubstr("depends on the strokes alone"));
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ double area(const std::vector<Vector2d>& p) {
   return std::abs(sum);
 }
 
-TEST(CutObstacles, BoxesByTheirSection) {
+TEST(CutObstacles, CutsBoxesInTheirSection) {
   Box upright{{4, 0.2, 1}, {2, 1, 3}, Eigen::Matrix3d::Identity()};
   Box beside{{4, 5, 1}, {2, 1, 3}, Eigen::Matrix3d::Identity()};
   Box turned =
@@ -33,11 +33,11 @@ TEST(CutObstacles, BoxesByTheirSection) {
   EXPECT_EQ(shapes[0].points.size(), 4u);
   EXPECT_NEAR(area(shapes[0].points), 6.0, 1e-12);
   EXPECT_EQ(shapes[1].name, "c");
-  // through the middle, along 45 degrees, a 2 x 1 rectangle is sqrt(2) wide
+  // Through the middle at 45 degrees, a 2 x 1 rectangle is sqrt(2) wide.
   EXPECT_NEAR(area(shapes[1].points), 3.0 * std::sqrt(2.0), 1e-12);
 }
 
-TEST(CutObstacles, SpheresByTheirCircle) {
+TEST(CutObstacles, CutsSpheresInACircle) {
   const auto shapes = cut_obstacles(
       {{"near", Sphere{{3, 0.3, 1}, 0.5}}, {"far", Sphere{{3, 0.6, 1}, 0.5}}}, DrawingPlane{});
   ASSERT_EQ(shapes.size(), 1u);
@@ -45,7 +45,7 @@ TEST(CutObstacles, SpheresByTheirCircle) {
   EXPECT_NEAR((shapes[0].points[0] - Vector2d(3, 1)).norm(), 0.0, 1e-12);
 }
 
-TEST(CutObstacles, HalfSpacesOnTheirSolidSide) {
+TEST(CutObstacles, DrawsHalfSpacesOnTheirSolidSide) {
   const HalfSpace ground{{0, 0, -0.5}, Vector3d::UnitZ()};
   const HalfSpace parallel{{0, 1, 0}, Vector3d::UnitY()};
   const auto shapes = cut_obstacles({{"ground", ground}, {"side", parallel}}, DrawingPlane{});

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-/// A file that lives as long as the test.
+/// A file that is removed when the test ends.
 class PageFile {
  public:
   explicit PageFile(const std::string& html) {
@@ -69,7 +69,7 @@ TEST(Page, SameInputMakesTheSameBytes) {
   EXPECT_EQ(test_support::sample_page().html(), test_support::sample_page().html());
 }
 
-TEST(Page, AsksForNothingFromANetwork) {
+TEST(Page, MakesNoNetworkRequest) {
   const std::string html = test_support::sample_page().html();
   EXPECT_NE(html.find("default-src 'none'"), std::string::npos);
   for (const char* request :
@@ -78,7 +78,7 @@ TEST(Page, AsksForNothingFromANetwork) {
   }
 }
 
-TEST(Page, NumbersForReading) {
+TEST(Page, FormatsNumbers) {
   EXPECT_EQ(display_number(0.0, 4), "0");
   EXPECT_EQ(display_number(1.23456, 3), "1.23");
   EXPECT_EQ(display_number(-1.23456, 3), "\u22121.23");
@@ -86,7 +86,7 @@ TEST(Page, NumbersForReading) {
   EXPECT_EQ(display_number(20347.4, 5), "20\u202F347");
   EXPECT_EQ(display_number(1234567.0, 4), "1\u202F234\u202F567");
   EXPECT_EQ(display_number(9.9999, 3),
-            "10.00");  // rounding up may cost one digit more, never one less
+            "10.00");  // Rounding up may add one digit, but never removes one.
   EXPECT_EQ(display_number(1.5e-7, 3), "1.50e-07");
   EXPECT_EQ(display_number(kNaN, 4), "\u2014");
 }
@@ -105,7 +105,7 @@ TEST(Page, TablesAlignNumbersAndNameUnitsInTheHeader) {
   EXPECT_THAT(html, HasSubstr("<td class=\"num\">\u2014</td><td class=\"num\">7</td>"));
 }
 
-TEST(Page, RowOfTheWrongLengthIsOurDefect) {
+TEST(Page, ChecksTheLengthOfTableRows) {
   Page page("t");
   Table table;
   table.columns = {{"a"}, {"b"}};
@@ -114,13 +114,13 @@ TEST(Page, RowOfTheWrongLengthIsOurDefect) {
   EXPECT_THROW(page.html(), std::logic_error);
 }
 
-TEST(Page, SeriesOfTheWrongLengthIsOurDefect) {
+TEST(Page, ChecksTheLengthOfSeries) {
   Page page("t");
   page.plot(line_chart(Eigen::Vector3d(0, 1, 2), Eigen::Vector2d(0, 1)));
   EXPECT_THROW(page.html(), std::logic_error);
 }
 
-TEST(Page, LongSeriesStayBelowThreeMegabytesAndThePageSaysSo) {
+TEST(Page, ThinsLongSeriesToThreeMegabytesAndStatesIt) {
   Page page("long");
   const Eigen::Index n = 100000;
   const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(n, 0.0, 1234.5);
@@ -129,17 +129,17 @@ TEST(Page, LongSeriesStayBelowThreeMegabytesAndThePageSaysSo) {
   }
   const std::string html = page.html();
   EXPECT_LT(html.size(), 3'000'000u);
-  EXPECT_GT(html.size(), 1'000'000u);  // not thinned more than needed
+  EXPECT_GT(html.size(), 1'000'000u);  // Not thinned more than needed.
   EXPECT_THAT(html, HasSubstr("of 100000 points drawn"));
 }
 
-TEST(Page, ShortSeriesAreNotThinned) {
+TEST(Page, DoesNotThinShortSeries) {
   Page page("short");
   page.plot(line_chart(Eigen::VectorXd::LinSpaced(500, 0, 1), Eigen::VectorXd::Random(500)));
   EXPECT_THAT(page.html(), Not(HasSubstr("points drawn")));
 }
 
-TEST(Page, UnwritableFolderIsTheUsersError) {
+TEST(Page, ThrowsInputErrorForAFolderThatCannotBeWritten) {
   EXPECT_THROW(Page("t").write("/no such folder/page.html"), InputError);
 }
 
@@ -157,7 +157,7 @@ TEST(PageInBrowser, DarkThemeDrawsToo) {
   EXPECT_GOOD_PAGE(report);
 }
 
-/// Figures of every kind with nothing, only NaN, or one point in them.
+/// Figures of every kind that are empty, have only NaN, or have one point.
 TEST(PageInBrowser, EmptyFiguresAreDrawnAsEmpty) {
   Page page("empty");
   page.plot(LineChart{});
@@ -209,7 +209,7 @@ TEST(PageInBrowser, EmptyFiguresAreDrawnAsEmpty) {
   EXPECT_EQ(report.plots_expected, 18);
 }
 
-TEST(PageInBrowser, HostileNamesAreText) {
+TEST(PageInBrowser, ShowsNamesWithMarkupAsText) {
   const std::string name =
       "</script><script>alert(1)</script> <!-- \"'& \u00D6lzylinder \u6CB9\u7F38 \xFF\xC3";
   Page page(name);
@@ -250,7 +250,7 @@ TEST(PageInBrowser, HostileNamesAreText) {
   EXPECT_THAT(report.dom, HasSubstr("\u00D6lzylinder \u6CB9\u7F38 \uFFFD\uFFFD"));
 }
 
-/// Every button of every figure gives a file that is not empty; pictures are PNGs.
+/// Every button of every figure saves a file that is not empty; pictures are PNGs.
 TEST(PageInBrowser, FiguresCanBeSaved) {
   std::string html = test_support::sample_page().html();
   const std::string probe = R"(<script>
@@ -299,7 +299,7 @@ TEST(PageInBrowser, SliderMovesCraneAndChartsOfItsGroup) {
   EXPECT_THAT(report.body_data("other"), Not(HasSubstr("bar")));
 }
 
-/// The check itself must be able to fail.
+/// The browser check itself must be able to fail.
 TEST(PageInBrowser, CheckSeesErrorsAndFiguresThatAreNotDrawn) {
   std::string html = test_support::sample_page().html();
   const std::string figure = "\"kind\":\"heat\"";

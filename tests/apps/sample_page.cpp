@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-/// From low and near to high and far in eight seconds.
+/// A motion of eight seconds from low and near to high and far.
 Trajectory reach() {
   Trajectory motion;
   motion.t = VectorXd::LinSpaced(81, 0.0, 8.0);

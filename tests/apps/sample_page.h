@@ -1,5 +1,5 @@
 #pragma once
-/// A page with every kind of figure, filled with made-up but realistic data.
+/// A page with every kind of figure, with invented but realistic data.
 #include "apps/report/page/page.h"
 
 namespace sparflow::test_support {

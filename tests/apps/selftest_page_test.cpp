@@ -1,4 +1,4 @@
-// The page of selftest, on a result put together by hand.
+// The page of selftest, on a result composed by hand.
 #include "apps/report/model_pages/selftest_page.h"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,7 @@ Selftest by_hand(const Machine& machine) {
   viscous.power = 0.1;
   InjectedEffect& never =
       add("end_cushion:arm", Visibility::kNever, std::numeric_limits<double>::infinity());
-  never.reason = "no motion of these logs provokes it";
+  never.reason = "no motion of these logs excites it";
   t.checks = {{"coulomb_friction:arm", "force", 1.0, true, true, "coulomb_friction:arm"}};
   t.sets = {{"coulomb_friction:arm", "load_friction:arm"}};
   t.samples = 3000.0;
@@ -50,12 +50,12 @@ Selftest by_hand(const Machine& machine) {
   return t;
 }
 
-TEST(SelftestPage, SaysWhatWouldBeSeen) {
+TEST(SelftestPage, NamesWhatWouldBeFound) {
   const CraneModel model = arm_model();
   const std::string html = selftest_page(model, by_hand(model.machine)).html();
   EXPECT_THAT(html, HasSubstr("Of 3 effects at their places 1 would be seen"));
   EXPECT_THAT(html, HasSubstr("Fc 880 N"));
-  EXPECT_THAT(html, HasSubstr("no motion of these logs provokes it"));
+  EXPECT_THAT(html, HasSubstr("no motion of these logs excites it"));
   EXPECT_THAT(html, HasSubstr("1 of 1 as predicted"));
   EXPECT_THAT(html, HasSubstr("coulomb_friction:arm, load_friction:arm"));
 }

@@ -1,4 +1,4 @@
-// Pages of strategies and pareto, on results put together by hand, opened in a browser.
+// Pages of strategies and pareto, on results composed by hand, opened in a browser.
 #include "apps/report/motion_pages/strategies_page.h"
 
 #include <gmock/gmock.h>
@@ -70,34 +70,34 @@ void check_in_browser(const Page& page, const std::string& name) {
   EXPECT_EQ(report.plots_drawn, page.plot_count());
 }
 
-TEST(StrategiesPage, OneProblemShowsItsWaysAndWhatIsMissing) {
+TEST(StrategiesPage, ShowsTheStrategiesOfOneProblemAndWhatIsMissing) {
   const MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   const CraneModel model = test_support::synthetic_model(problem.machine);
   const Page page = strategies_page({comparison(problem, 0.2)}, &model, &problem);
   EXPECT_THAT(page.html(), HasSubstr("needs 99.00 s"));
-  EXPECT_THAT(page.html(), HasSubstr("one after another +2.0 %"));
+  EXPECT_THAT(page.html(), HasSubstr("sequential +2.0 %"));
   check_in_browser(page, "strategies page.html");
 }
 
-TEST(StrategiesPage, AboutASetShowsMediansAndTests) {
+TEST(StrategiesPage, ShowsMediansAndTestsOfSeveralProblems) {
   const MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   std::vector<StrategyComparison> all;
   for (const double excess : {0.1, 0.2, 0.3}) all.push_back(comparison(problem, excess));
   const Page page = strategies_page(all, nullptr, nullptr);
-  EXPECT_THAT(page.html(), HasSubstr("simultaneous to the best end posture +20.0 %"));
+  EXPECT_THAT(page.html(), HasSubstr("simultaneous to the best goal configuration +20.0 %"));
   check_in_browser(page, "strategies set page.html");
   const auto json =
       test_support::parsed_json(strategies_json(all, std::vector<Machine>(3, problem.machine)));
   const auto& line = json.at("summary").at("equal").at("simultaneous");
   EXPECT_NEAR(line.at("median_excess_percent").get<double>(), 20.0, 1e-9);
   EXPECT_NEAR(line.at("wilcoxon_p").get<double>(), 0.25, 1e-12);  // 2 / 2^3
-  // own times count idling: 101 + 80 against 104 + 40 kJ
+  // At own times idle power counts: 101 + 80 against 104 + 40 kJ.
   EXPECT_NEAR(json["summary"]["own"]["sequential"]["median_excess_percent"].get<double>(),
               100.0 * (181.0 / 144.0 - 1.0), 1e-9);
   EXPECT_EQ(json["problems"][0]["strategies"]["tip_line"]["energy_J"], nullptr);
 }
 
-TEST(StrategiesPage, RoundingIsNoExcess) {
+TEST(StrategiesPage, ShowsRoundingAsZeroExcess) {
   const MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   const std::string html =
       strategies_page({comparison(problem, 4e-14), comparison(problem, 0.2)}, nullptr, nullptr)
@@ -121,7 +121,7 @@ TEST(ParetoPage, ShowsTheCurveItsLimitAndTheBestTimes) {
   curve.sequential_limit = 80e3;
   curve.simultaneous_limit = 95e3;
   curve.grid_limit = std::nan("");
-  // dE/dT = -300e3/T^2 = -P: 1 kW is best at 17.3 s, so of the points at 20 s; 5 kW at 7.7 s, so at the shortest
+  // dE/dT = -300e3/T^2 = -P: for 1 kW 17.3 s is best, so the point at 20 s; for 5 kW 7.7 s, so the shortest.
   curve.idle = idle_choices(curve.points, {1e3, 5e3});
   ASSERT_EQ(curve.idle.size(), 2U);
   EXPECT_EQ(curve.idle[0].duration, 20.0);

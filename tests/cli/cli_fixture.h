@@ -1,5 +1,5 @@
 #pragma once
-/// The program run as a stranger runs it, in a folder of its own.
+/// Runs the program as a user does, in a folder of its own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -60,7 +60,7 @@ class Cli : public ::testing::Test {
             slurp(folder_ / ".out"), slurp(folder_ / ".err")};
   }
 
-  /// A bundled reach whose machine no longer hangs on where the file lies.
+  /// A bundled reach with the absolute path of its machine, so that the file can be moved.
   static std::string reach(const std::string& name) {
     std::string text = slurp(kData + "/reaches/" + name + ".yaml");
     const std::string relative = "../machines/loader_crane.yaml";
@@ -68,7 +68,7 @@ class Cli : public ::testing::Test {
     return text;
   }
 
-  /// A model fitted once for all tests of this program.
+  /// A model that is fitted once for all tests of this program.
   static const std::string& model() {
     static const std::string path = [] {
       const std::string file = (fs::temp_directory_path() /

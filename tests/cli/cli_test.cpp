@@ -1,4 +1,4 @@
-// The program as a stranger meets it: exit codes, messages, nothing half-written, the contract's JSON keys.
+// The program as a user runs it: exit codes, messages, no half-written files, the documented JSON keys.
 #include <algorithm>
 #include <map>
 #include <vector>
@@ -9,7 +9,7 @@
 namespace sparflow::test {
 namespace {
 
-TEST_F(Cli, HelpAndVersionAreDone) {
+TEST_F(Cli, HelpAndVersionExitWithZero) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.code, 0);
   for (const char* verb : {"demo", "fit", "compare", "plan", "optimize"}) {
@@ -21,7 +21,7 @@ TEST_F(Cli, HelpAndVersionAreDone) {
   EXPECT_THAT(run("--version").out, HasSubstr("sparflow "));
 }
 
-TEST_F(Cli, WrongUsageIsTwoWithASuggestion) {
+TEST_F(Cli, WrongUsageExitsWithTwoAndASuggestion) {
   EXPECT_EQ(run("").code, 2);
   const Outcome verb = run("optimise -p x.yaml");
   EXPECT_EQ(verb.code, 2);
@@ -31,7 +31,7 @@ TEST_F(Cli, WrongUsageIsTwoWithASuggestion) {
   EXPECT_EQ(run("optimize -p " + kData + "/reaches/loader_crane_lift.yaml").code, 2);
 }
 
-TEST_F(Cli, BadInputIsThreeAndLeavesNothingBehind) {
+TEST_F(Cli, BadInputExitsWithThreeAndWritesNothing) {
   const std::string fit = "fit -o " + at("m.json") + " -m ";
   Outcome o = run(fit + "nowhere.yaml -l x.csv");
   EXPECT_EQ(o.code, 3);
@@ -64,7 +64,7 @@ TEST_F(Cli, BadInputIsThreeAndLeavesNothingBehind) {
   }
 }
 
-TEST_F(Cli, CompareWritesTheContractsKeys) {
+TEST_F(Cli, CompareWritesTheDocumentedKeys) {
   const Outcome o = run("compare --model " + model() + " -l " + kData +
                         "/logs/loader_crane_test.csv --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
@@ -76,7 +76,7 @@ TEST_F(Cli, CompareWritesTheContractsKeys) {
       EXPECT_TRUE(force.contains(key)) << key;
     EXPECT_TRUE(c.at("stages").at("flow").contains(cylinder));
     for (const char* direction : {"extend", "retract"}) {
-      // sensor noise is 0.8 bar; 1.5 is what the model is asked for on a log it has not seen
+      // The sensor noise is 0.8 bar; 1.5 bar is what is required on a test log.
       EXPECT_LE(c.at("stages").at("pressure").at(cylinder).at(direction).at("rmse").get<double>(),
                 1.5)
           << cylinder;
@@ -112,8 +112,8 @@ std::map<std::string, std::vector<double>> columns_of(const std::string& csv) {
   return columns;
 }
 
-/// The motion's file evaluated without the program: the exact pump law on its pressures and the model's margins,
-/// power from pressure and flow, energy by the trapezoidal rule.
+/// Evaluates the motion's file without the program: the exact pump law on its pressures and the model's margins, power
+/// from pressure and flow, energy by the trapezoidal rule.
 void expect_motion_costs(const std::string& csv, const json& model, double energy) {
   constexpr double kBar = 1e5, kLitrePerMinute = 1.0 / 60000.0;
   const auto c = columns_of(csv);
@@ -147,7 +147,7 @@ void expect_motion_costs(const std::string& csv, const json& model, double energ
   EXPECT_NEAR(sum, energy, 3e-4 * energy);
 }
 
-TEST_F(Cli, AMachineAloneIsComparedByItsForcesOnly) {
+TEST_F(Cli, ComparesOnlyForcesOfAMachineFile) {
   const Outcome o = run("compare -m " + kCrane + " -l " + kTest + " --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   const json stages = test_support::parsed_json(slurp(at("c.json"))).at("stages");
@@ -156,7 +156,7 @@ TEST_F(Cli, AMachineAloneIsComparedByItsForcesOnly) {
     EXPECT_TRUE(stages.at(learned).empty()) << learned;
 }
 
-TEST_F(Cli, OptimizeWritesMotionPageAndTheContractsKeys) {
+TEST_F(Cli, OptimizeWritesMotionPageAndTheDocumentedKeys) {
   const Outcome o =
       run("optimize -p " + kData +
           "/reaches/loader_crane_lift.yaml --paths 3 --intervals 60 --model " + model() + " -o " +
@@ -206,7 +206,7 @@ TEST_F(Cli, BoundSaysForWhichMotions) {
     EXPECT_LT(r.at("lower_bound_J"), r.at("energy_exact_J"));
     // the solver starts from such paths and only makes them cheaper; a finer grid gains less than a percent
     EXPECT_GT(r.at("grid_path_energy_exact_J"), 0.99 * r.at("energy_exact_J").get<double>());
-    // a slow motion, so no measure of a bound for motions in a hurry
+    // The grid's path is slow, so it is no measure of a bound at a short duration.
     if (r.at("lower_bound_time_s").is_null()) {
       EXPECT_GT(r.at("unlimited_time_J"), r.at("lower_bound_J"));
     }
@@ -221,13 +221,13 @@ TEST_F(Cli, BoundSaysForWhichMotions) {
   const json leisure = bound_of(at("leisure.yaml")),
              hurry = bound_of(kData + "/reaches/loader_crane_hurry.yaml");
   EXPECT_TRUE(leisure.at("lower_bound_time_s").is_null());
-  EXPECT_THAT(leisure.at("text"), HasSubstr("no motion takes less, whatever its time"));
+  EXPECT_THAT(leisure.at("text"), HasSubstr("of motions of any duration"));
   EXPECT_EQ(hurry.at("lower_bound_time_s"), 9.0);
-  EXPECT_THAT(hurry.at("text"), HasSubstr("no motion of 9.00 s or less takes less"));
+  EXPECT_THAT(hurry.at("text"), HasSubstr("of motions of 9.00 s or less"));
   EXPECT_GT(hurry.at("lower_bound_J"), leisure.at("lower_bound_J"));
 }
 
-TEST_F(Cli, InfeasibleIsFourAndNamed) {
+TEST_F(Cli, InfeasibleExitsWithFourAndNamesTheLimit) {
   const std::string text = reach("loader_crane_lift");
   std::string hurried = text;
   hurried.replace(hurried.find("duration_s: 16"), 14, "duration_s: 2");
@@ -248,7 +248,7 @@ TEST_F(Cli, InfeasibleIsFourAndNamed) {
   EXPECT_EQ(run("plan -p " + at("far.yaml")).code, 4);
 }
 
-TEST_F(Cli, PlanListsPathsWithTheirShortestDuration) {
+TEST_F(Cli, PlanListsPathsWithTheirShortestDurations) {
   const Outcome o = run("plan -p " + kData + "/reaches/loader_crane_over_wall.yaml --paths 4 -o " +
                         at("p.csv") + " --json " + at("p.json"));
   ASSERT_EQ(o.code, 0) << o.err << o.out;

@@ -1,5 +1,5 @@
-// What the program says on the way: warnings of machine and log, files that would overwrite each other, work that
-// takes long, Ctrl-C.
+// Messages of the program: warnings about machine and log, files that would overwrite each other, progress of long
+// work, Ctrl-C.
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -14,7 +14,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::StartsWith;
 
-/// The bundled crane with a range its boom cylinder's stroke cannot follow: possible, but unusual.
+/// The bundled crane with a joint range beyond its boom cylinder's stroke, which is possible but unusual.
 std::string crane_with_short_stroke() {
   std::string text = slurp(kCrane);
   const std::string bore = "bore: 0.180";
@@ -23,7 +23,7 @@ std::string crane_with_short_stroke() {
   return text.replace(at, bore.size(), bore + "\n    stroke: 0.1");
 }
 
-/// The bundled test log with the cells of some columns multiplied; `rows` of it, 0 = all.
+/// The bundled test log with the values of some columns multiplied. @param rows kept, 0 = all
 template <class Which>
 std::string scaled_log(double factor, const Which& which, int rows = 0) {
   std::istringstream lines(slurp(kTest));
@@ -68,7 +68,7 @@ TEST_F(CliSays, WhatALogLacksWhenNothingIsLearned) {
   write("log.csv", scaled_log(1.0, none, 29));  // 0.6 s at rest
   Outcome o = run("fit -m " + kCrane + " -l " + at("log.csv") + " -o " + at("m.json"));
   EXPECT_EQ(o.code, 3);
-  EXPECT_THAT(o.err, HasSubstr("nothing was learned, no model is written: the logs lack motion"));
+  EXPECT_THAT(o.err, HasSubstr("nothing was learned, so no model is written: the logs lack motion"));
   EXPECT_FALSE(fs::exists(at("m.json")));
 
   std::string bare = slurp(kTest);
@@ -84,7 +84,7 @@ TEST_F(CliSays, WhatALogLacksWhenNothingIsLearned) {
   EXPECT_THAT(o.err, Not(HasSubstr("lack motion")));
 }
 
-TEST_F(CliSays, AMachineWithNothingToLearnIsDone) {
+TEST_F(CliSays, ThatAMachineHasNothingToLearnAndExitsWithZero) {
   write("drive.yaml",
         "name: drive\njoints:\n  - {name: axis, type: prismatic, parent: base, axis: [1, 0, 0], "
         "position: [-1, 1], velocity: [-1, 1], acceleration: [-5, 5]}\n"
@@ -101,7 +101,7 @@ TEST_F(CliSays, AMachineWithNothingToLearnIsDone) {
   const Outcome o =
       run("fit -m " + at("drive.yaml") + " -l " + at("log.csv") + " -o " + at("m.json"));
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_THAT(o.err, HasSubstr("has no hydraulic cylinder: nothing to learn"));
+  EXPECT_THAT(o.err, HasSubstr("has no hydraulic cylinder: there is nothing to learn"));
   EXPECT_TRUE(fs::exists(at("m.json")));
 }
 
@@ -110,7 +110,7 @@ TEST_F(CliSays, WhichUnitALogSeemsToHave) {
   write("mpa.csv", scaled_log(0.1, pressures));
   EXPECT_THAT(run("compare --model " + model() + " -l " + at("mpa.csv")).err,
               AllOf(HasSubstr("are they in MPa?"), HasSubstr("pA_boom_MPa")));
-  // a boom between -2 and 56 degrees, shrunk to where no single value gives it away
+  // A boom between -2 and 56 degrees, scaled so that no single value shows that the unit is degrees.
   write("deg.csv", scaled_log(10.0, [](const std::string& c) { return c == "q_boom_rad"; }));
   EXPECT_THAT(run("compare --model " + model() + " -l " + at("deg.csv")).err,
               AllOf(HasSubstr("are they in degrees? Then name the column q_boom_deg"),
@@ -125,7 +125,7 @@ TEST_F(CliSays, WhichUnitALogSeemsToHave) {
                            Not(HasSubstr("dead centre"))));
 }
 
-TEST_F(CliSays, FilesThatWouldOverwriteEachOtherAreWrongUsage) {
+TEST_F(CliSays, WhichFilesWouldOverwriteEachOther) {
   const std::string compare = "compare --model " + model() + " -l " + kTest;
   const auto wrong = [&](const std::string& arguments, const std::string& sentence) {
     const Outcome o = run(arguments);
@@ -133,13 +133,13 @@ TEST_F(CliSays, FilesThatWouldOverwriteEachOtherAreWrongUsage) {
     EXPECT_THAT(o.err, HasSubstr(sentence)) << arguments;
   };
   const std::string here = folder_.string();
-  wrong(compare + " --json " + at("x") + " --report " + here + "/./x", "name one file");
+  wrong(compare + " --json " + at("x") + " --report " + here + "/./x", "name the same file");
   const std::string lift = " -p " + kData + "/reaches/loader_crane_lift.yaml";
   wrong("optimize" + lift + " --model " + model() + " -o " + at("x") + " --json " + at("x"),
-        "--json and --output name one file");
-  wrong("plan" + lift + " -o " + at("x") + " --json " + at("x"), "name one file");
+        "--json and --output name the same file");
+  wrong("plan" + lift + " -o " + at("x") + " --json " + at("x"), "name the same file");
   wrong("fit -m " + kCrane + " -l " + kTrain + " -o " + at("x") + " --report " + at("x"),
-        "name one file");
+        "name the same file");
   wrong("fit -m " + kCrane + " -l " + kTrain + " -t " + kData + "/logs/../logs/" +
             fs::path(kTrain).filename().string() + " -o " + at("x"),
         "is given with --log and with --test");
@@ -151,14 +151,14 @@ TEST_F(CliSays, FilesThatWouldOverwriteEachOtherAreWrongUsage) {
   EXPECT_FALSE(fs::exists(at("x")));
 }
 
-TEST_F(CliSays, NoPercentOfNothing) {
+TEST_F(CliSays, WhyAnEnergyErrorIsUndefined) {
   write("log.csv", scaled_log(1.0, none, 29));  // 0.6 s at rest
   const Outcome o = run("compare --model " + model() + " -l " + at("log.csv") + " --report " +
                         at("c.html") + " --json " + at("c.json"));
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(o.out, Not(HasSubstr("nan")));
   EXPECT_THAT(o.out,
-              HasSubstr("energy of pump main: \u2013 %, nothing was delivered in the 0.6 s"));
+              HasSubstr("energy of pump main: \u2013 %, the pump delivered nothing in the 0.6 s"));
   EXPECT_THAT(slurp(at("c.html")), Not(HasSubstr("nan")));
   EXPECT_TRUE(test_support::parsed_json(slurp(at("c.json")))
                   .at("stages")
@@ -172,7 +172,7 @@ TEST_F(CliSays, NoPercentOfNothing) {
   EXPECT_THAT(fitted.out, AllOf(Not(HasSubstr("nan")), HasSubstr("energy of main \u2013 %")));
 }
 
-/// The program in the background, in a process group of its own as a shell makes it.
+/// The program in the background, in a process group of its own like that of a shell.
 class Running {
  public:
   Running(const std::vector<std::string>& arguments, const std::string& out, const std::string& err)
@@ -198,7 +198,7 @@ class Running {
     }
   }
   pid_t pid() const { return pid_; }
-  /// Exit code, or -1 when it has not ended after so many seconds.
+  /// Waits at most this many seconds. @return the exit code, -1 when the program has not ended
   int wait(double seconds) {
     for (int k = 0; k < 20.0 * seconds && !ended_; ++k) {
       int status = 0;
@@ -211,7 +211,7 @@ class Running {
     }
     return ended_ ? code_ : -1;
   }
-  /// Processes of its group that still work (those that ended but were not collected do not).
+  /// Counts the processes of its group that still run (zombies do not count).
   int alive() const {
     int count = 0;
     for (const auto& entry : fs::directory_iterator("/proc")) {
@@ -233,7 +233,7 @@ class Running {
   int code_ = -1;
 };
 
-/// Waits until a file holds this text. @return whether it came
+/// Waits until a file contains this text. @return whether it did in time
 bool comes(const std::string& path, const std::string& text, double seconds) {
   for (int k = 0; k < 10.0 * seconds; ++k) {
     if (slurp(path).find(text) != std::string::npos) return true;
@@ -243,13 +243,13 @@ bool comes(const std::string& path, const std::string& text, double seconds) {
 }
 
 TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
-  // starts on a very fine mesh between obstacles: minutes of work
+  // Starts on a very fine mesh between obstacles take minutes.
   Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_beam.yaml", "--model",
                    model(), "--intervals", "2000", "--json", at("o.json")},
                   at("out"), at("err"));
   ASSERT_TRUE(comes(at("err"), "optimize: 10 s, ", 120.0)) << slurp(at("err"));
   EXPECT_THAT(slurp(at("err")), StartsWith("optimize ...\n"));
-  // another program's kill reaches the parent alone, and the children must go with it
+  // A signal from another program reaches only the parent, and the children must end with it.
   ::kill(program.pid(), SIGINT);
   ASSERT_TRUE(comes(at("err"), "Ctrl-C again ends at once", 180.0));
   ::kill(program.pid(), SIGINT);
@@ -264,7 +264,7 @@ TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
 
 TEST_F(CliSays, OneCtrlCKeepsTheBestSoFar) {
   for (const bool whole_group : {false, true}) {
-    // Until the first seed is timed there is nothing to keep: the later the slower the machine is.
+    // Before the first seed is timed there is no result; how long that takes depends on the machine.
     for (int seconds = 3; seconds < 60; seconds *= 2) {
       Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
                        model(), "-o", at("motion.csv"), "--json", at("o.json")},

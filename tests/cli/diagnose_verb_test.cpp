@@ -1,4 +1,4 @@
-// diagnose, extend, improve as a stranger meets them: usage, exit codes, JSON keys, files that read back.
+// diagnose, extend and improve as a user runs them: usage, exit codes, JSON keys, files that can be read back.
 #include <algorithm>
 #include <sstream>
 #include <vector>
@@ -11,7 +11,7 @@ namespace {
 
 class CliDiagnose : public Cli {
  protected:
-  /// A bundled log with dry friction on the boom cylinder: `bar` more on its piston side extending, less retracting.
+  /// A bundled log with dry friction on the boom cylinder: `bar` more on its bore side extending, less retracting.
   std::string with_friction(const std::string& log, const std::string& name, double bar) const {
     std::istringstream in(slurp(log));
     std::string line, out;
@@ -53,7 +53,7 @@ TEST_F(CliDiagnose, HelpHasExamples) {
   }
 }
 
-TEST_F(CliDiagnose, WrongUsageIsTwo) {
+TEST_F(CliDiagnose, WrongUsageExitsWithTwo) {
   EXPECT_EQ(run("diagnose --log " + kTest).code, 2);
   EXPECT_EQ(run("improve --model " + model() + " --log " + kTest).code, 2);  // no output
   Outcome o = run("extend --model " + model() + " --log " + kTest + " -o " + at("m.json"));
@@ -68,7 +68,7 @@ TEST_F(CliDiagnose, WrongUsageIsTwo) {
   EXPECT_THAT(o.err, HasSubstr("overwrite"));
 }
 
-TEST_F(CliDiagnose, BadInputIsThree) {
+TEST_F(CliDiagnose, BadInputExitsWithThree) {
   const std::string extend =
       "extend --model " + model() + " --log " + kTest + " -o " + at("m.json") + " --add ";
   Outcome o = run(extend + "colomb_friction:boom");
@@ -80,16 +80,17 @@ TEST_F(CliDiagnose, BadInputIsThree) {
   o = run("extend --model " + model() + " --log " + kTest + " -o " + at("m.json") +
           " --remove coulomb_friction:boom");
   EXPECT_EQ(o.code, 3);
-  EXPECT_THAT(o.err, HasSubstr("no effects to take back"));
+  EXPECT_THAT(o.err, HasSubstr("no effects to remove"));
   EXPECT_EQ(run("diagnose --model nowhere.json --log " + kTest).code, 3);
   EXPECT_EQ(run("diagnose --model " + model() + " --log nowhere.csv").code, 3);
   EXPECT_FALSE(fs::exists(at("m.json")));
 }
 
-TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
+TEST_F(CliDiagnose, FrictionIsNamedAddedAndRemoved) {
   const std::string log = with_friction(kTrain, "train.csv", 6.0);
   const std::string test = with_friction(kTest, "test.csv", 6.0);
-  // few candidates: the whole catalogue is the diagnosis' own test; without a place an effect may sit anywhere
+  // Few candidates suffice, because tests of the diagnosis search the whole catalogue; an effect without a place stands
+  // for all its places.
   const std::string few = " --candidates coulomb_friction unmodelled_mass:jib";
   Outcome o = run("diagnose --model " + model() + " --log " + log + few + " --json " +
                   at("d.json") + " --report " + at("d.html"));
@@ -112,23 +113,23 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndTakenBack) {
             0.5 * force.at("before").at("rmse").get<double>());
   EXPECT_FALSE(i.at("stopped_because").get<std::string>().empty());
   EXPECT_THAT(slurp(at("m2.json")), HasSubstr("coulomb_friction"));
-  EXPECT_THAT(slurp(at("i.html")), HasSubstr("step by step"));
+  EXPECT_THAT(slurp(at("i.html")), HasSubstr("Error after each step"));
 
-  // the same model is read by the other verbs
+  // The other verbs read the same model.
   o = run("compare --model " + at("m2.json") + " --log " + test + " --json " + at("c.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   json c = test_support::parsed_json(slurp(at("c.json")));
   EXPECT_NEAR(c.at("stages").at("force").at("boom").at("rmse").get<double>(),
-              force.at("after").at("rmse").get<double>(), 1.0);  // [N] one computation, two doors
+              force.at("after").at("rmse").get<double>(), 1.0);  // [N] both verbs run the same computation
 
   o = run("extend --model " + at("m2.json") + " --remove coulomb_friction:boom --log " + log +
           " --test " + test + " -o " + at("m3.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_THAT(o.out, HasSubstr("taken back"));
+  EXPECT_THAT(o.out, HasSubstr("removed"));
 }
 
 TEST_F(CliDiagnose, AnEffectOfTheUsersOwnIsFoundAndCarried) {
-  // friction in all but name: the catalogue's stands in no --candidates here
+  // A copy of the catalogue's friction, which is not among the --candidates here.
   write("mine.yaml",
         "effects:\n"
         "  - id: seal_drag\n"
@@ -140,7 +141,7 @@ TEST_F(CliDiagnose, AnEffectOfTheUsersOwnIsFoundAndCarried) {
   const std::string own = " --effects " + at("mine.yaml");
   const std::string few = " --candidates seal_drag:boom unmodelled_mass:jib";
   const std::string diagnose = "diagnose --model " + model() + " --log " + log + few;
-  EXPECT_EQ(run(diagnose).code, 3);  // nobody knows seal_drag
+  EXPECT_EQ(run(diagnose).code, 3);  // without --effects seal_drag is unknown
   Outcome o = run(diagnose + own + " --json " + at("d.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   const json effect = test_support::parsed_json(slurp(at("d.json"))).at("effects").at(0);
@@ -151,11 +152,11 @@ TEST_F(CliDiagnose, AnEffectOfTheUsersOwnIsFoundAndCarried) {
           at("m2.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(slurp(at("m2.json")), HasSubstr("\"user_effects\": ["));
-  // the model brings it along
+  // The model file contains the effect.
   o = run("extend --model " + at("m2.json") + " --remove seal_drag:boom --log " + log + " -o " +
           at("m3.json"));
   EXPECT_EQ(o.code, 0) << o.err;
-  // another law under the same name
+  // Another law with the same name is refused.
   write("other.yaml",
         "effects:\n"
         "  - {id: seal_drag, stage: force, law: B * v, parameters: {B: {unit: N s/m, bounds: [0, "

@@ -85,7 +85,7 @@ TEST_F(EffectsVerb, PrintsAnEffectOfTheUsersOwn) {
   EXPECT_EQ(entry["shows_in"][0], "force");
   ASSERT_EQ(run("--effects " + file), 0) << read("err");
   EXPECT_THAT(read("out"), HasSubstr("seal_drag:<cyl>"));
-  EXPECT_EQ(run("seal_drag"), 2);  // without the file nobody knows it
+  EXPECT_EQ(run("seal_drag"), 2);  // without the file the effect is unknown
 }
 
 TEST_F(EffectsVerb, AWrongUnitIsBadInputAndSaysWhere) {

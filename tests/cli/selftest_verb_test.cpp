@@ -1,4 +1,4 @@
-// selftest as a stranger meets it.
+// selftest as a user runs it.
 #include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
@@ -18,7 +18,7 @@ TEST_F(CliSelftest, HelpAndUsage) {
   EXPECT_EQ(run("selftest --model nowhere.json --log " + kTest).code, 3);
 }
 
-TEST_F(CliSelftest, SaysWhatTheLogCouldReveal) {
+TEST_F(CliSelftest, ReportsWhatTheLogCouldReveal) {
   const Outcome o =
       run("selftest --model " + model() + " --log " + kTrain +
           " --candidates coulomb_friction:boom unmodelled_mass:jib --check 1 --json " +

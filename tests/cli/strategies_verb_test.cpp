@@ -1,4 +1,4 @@
-// strategies and pareto as a stranger runs them: keys, files, and what they refuse.
+// strategies and pareto as a user runs them: keys, files, refused inputs.
 #include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
@@ -23,12 +23,12 @@ TEST_F(Cli, StrategiesWritesTheKeysThatScriptsRead) {
     EXPECT_GT(s.at("energy_J").get<double>(), 0.0) << kind;
     EXPECT_NEAR(s.at("duration_s").get<double>(), 25.0, 1e-6) << kind;
     EXPECT_TRUE(s.at("throttling_J").contains("main")) << kind;
-    // nothing in equal time is cheaper than the optimum
+    // In equal time no strategy takes less than the optimum.
     EXPECT_GE(s["energy_J"].get<double>(),
               p["strategies"]["optimal"]["energy_J"].get<double>() * (1 - 1e-12))
         << kind;
   }
-  // two joints, two directions of the tip: nothing is redundant
+  // Two joints move the tip in two directions, so the arm is not redundant.
   EXPECT_FALSE(p["strategies"].at("tip_line_best").at("feasible").get<bool>());
   EXPECT_THAT(p["strategies"]["tip_line_best"].at("why").get<std::string>(),
               HasSubstr("needs exactly one"));
@@ -41,7 +41,7 @@ TEST_F(Cli, StrategiesWritesTheKeysThatScriptsRead) {
   EXPECT_THAT(o.out, HasSubstr("energy-optimal"));
 }
 
-TEST_F(Cli, StrategiesTakesFoldersAndLeavesOutWhatNamesNoModel) {
+TEST_F(Cli, StrategiesTakesFoldersAndLeavesOutProblemsWithoutModel) {
   fs::create_directories(at("set"));
   const auto put = [&](const std::string& name, const std::string& model, double goal_x) {
     std::ofstream(at("set/" + name))
@@ -56,14 +56,14 @@ TEST_F(Cli, StrategiesTakesFoldersAndLeavesOutWhatNamesNoModel) {
   const Outcome o =
       run("strategies -p " + at("set") + " --orders 0" + kQuick + " --json " + at("s.json"));
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_THAT(o.err, HasSubstr("b.yaml: names no model, left out"));
+  EXPECT_THAT(o.err, HasSubstr("b.yaml is left out: it names no model"));
   const json j = test_support::parsed_json(slurp(at("s.json")));
   ASSERT_EQ(j["problems"].size(), 2U);
   EXPECT_THAT(j["problems"][1].at("message").get<std::string>(), HasSubstr("infeasible"));
   EXPECT_EQ(j["summary"].at("solved"), 1);
 }
 
-TEST_F(Cli, StrategiesSaysWhatItCannotRead) {
+TEST_F(Cli, StrategiesNamesWhatItCannotRead) {
   const Outcome word = run("strategies -p " + kHop + " --time soon");
   EXPECT_EQ(word.code, 2);
   EXPECT_THAT(word.err, HasSubstr("\"soon\""));
@@ -84,7 +84,7 @@ TEST_F(Cli, ParetoFallsWithTimeAndNamesTheBestTimes) {
   ASSERT_GE(points.size(), 3U);
   for (std::size_t i = 1; i < points.size(); ++i) {
     EXPECT_GT(points[i]["duration_s"].get<double>(), points[i - 1]["duration_s"].get<double>());
-    // slower is not dearer: a motion driven slower loses less in the valves (0.1 % for the meshes)
+    // A slower motion takes no more energy, because it throttles less (0.1 % allowed for the meshes).
     EXPECT_LE(points[i]["energy_J"].get<double>(), 1.001 * points[i - 1]["energy_J"].get<double>());
   }
   EXPECT_NEAR(j.at("shortest_s").get<double>(), points[0]["duration_s"].get<double>(), 1e-9);

@@ -1,6 +1,6 @@
 #pragma once
-/// Evidence made by hand: a series in blocks with noise of a known law and columns that are plain matrices, so that a
-/// dense computation on small matrices can say what the right answer is.
+/// Evidence made by hand: a series in blocks with noise of a known model and columns that are plain matrices, so that a
+/// dense computation on small matrices gives the right answer.
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
@@ -31,7 +31,7 @@ inline Eigen::VectorXd white(Eigen::Index n, std::mt19937_64& random) {
   return e;
 }
 
-/// A draw of the noise: each block starts in the stationary law (200 values thrown away) and has an offset of its own.
+/// A draw of the noise: each block is stationary (after 200 discarded values) and has an offset of its own.
 /// @param offsets the drawn ones [blocks], may be null
 inline Eigen::VectorXd draw(const NoiseModel& m, const std::vector<NoiseBlock>& blocks,
                             std::mt19937_64& random, Eigen::VectorXd* offsets = nullptr) {
@@ -53,8 +53,8 @@ inline Eigen::VectorXd draw(const NoiseModel& m, const std::vector<NoiseBlock>& 
   return y;
 }
 
-/// [rows x rows] covariance of the series, written down from the law: the Yule-Walker equations for the
-/// autoregression, a constant inside a block for its offset.
+/// [rows x rows] covariance of the series from its definition: the Yule-Walker equations for the autoregression, a
+/// constant inside a block for its offset.
 inline Eigen::MatrixXd dense_covariance(const NoiseModel& m,
                                         const std::vector<NoiseBlock>& blocks) {
   const Eigen::Index n = rows_of(blocks);
@@ -74,7 +74,7 @@ inline Eigen::MatrixXd dense_covariance(const NoiseModel& m,
   return covariance;
 }
 
-/// A channel of evidence without a machine behind it.
+/// An evidence channel that belongs to no machine.
 inline EvidenceChannel plain_channel(const std::vector<NoiseBlock>& blocks,
                                      const Eigen::VectorXd& y,
                                      const Eigen::MatrixXd& baseline = {}) {
@@ -86,7 +86,7 @@ inline EvidenceChannel plain_channel(const std::vector<NoiseBlock>& blocks,
   return c;
 }
 
-/// An effect given by what one unit of each parameter adds to each channel; bounds far away.
+/// An effect given by its signature in each channel, with wide bounds.
 inline EffectDesign plain_design(std::vector<Eigen::MatrixXd> columns, double lower = -1e9,
                                  double upper = 1e9) {
   EffectDesign d;
@@ -98,7 +98,7 @@ inline EffectDesign plain_design(std::vector<Eigen::MatrixXd> columns, double lo
   return d;
 }
 
-/// A regressor as motions make them: slow, other in each block.
+/// A regressor as motions make them: slow, and different in each block.
 inline Eigen::VectorXd slow_column(const std::vector<NoiseBlock>& blocks, std::mt19937_64& random) {
   NoiseModel slow;
   slow.phi1 = 0.95;

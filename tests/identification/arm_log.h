@@ -1,6 +1,6 @@
 #pragma once
-/// A one-cylinder lift and logs of it made in memory from a law that the model can hold exactly, so that
-/// every error a test sees is one it has put in.
+/// A one-cylinder lift and logs of it, simulated by a law that the model can represent exactly, so that every error in a
+/// test is one that the test has injected.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -40,7 +40,7 @@ constexpr double kStandby = 20.0 * units::kBar;
 constexpr double kGainExtend = 60.0 * units::kLitrePerMinute;
 constexpr double kGainRetract = 40.0 * units::kLitrePerMinute;
 
-/// Working pressures of the made-up plant [Pa]: linear in the force, so that a process' mean holds them.
+/// Working pressures of the simulated plant [Pa], linear in the force, so that the linear mean represents them.
 inline double extend_pressure(const Machine& m, double force) {
   return force / m.cylinders[0].area_piston() + 4.0 * units::kBar;
 }
@@ -55,13 +55,13 @@ inline GaussianProcess linear_process(double constant, double slope) {
   p.mean_slope = slope;
   p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
   p.data_count = 1;
-  p.flow_max = 1.0;  // right everywhere
+  p.flow_max = 1.0;  // the training range covers everything
   p.force_min = -1e9;
   p.force_max = 1e9;
   return GaussianProcess(p);
 }
 
-/// The model that is right.
+/// @return the model with the plant's own laws
 inline CraneModel arm_model() {
   CraneModel model = CraneModel::untrained(arm_machine());
   model.cylinders[0].extend =
@@ -106,7 +106,7 @@ inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
   log.runs = {{0, n}};
   Eigen::VectorXd q(n), u = Eigen::VectorXd::Zero(n), a(n), b(n), pump(n), payload(n);
   StaticForce statics(m);
-  const auto random = [&seed] {  // sum of uniforms: near enough to normal, the same everywhere
+  const auto random = [&seed] {  // sum of uniforms: nearly normal, and equal on all platforms
     double sum = -6.0;
     for (int i = 0; i < 12; ++i) {
       seed = seed * 1664525u + 1013904223u;
@@ -114,7 +114,7 @@ inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
     }
     return sum;
   };
-  // rest, up, rest, down: smooth bumps of speed in strokes of 6 s, each faster than the one before
+  // Rest, up, rest, down: smooth speed profiles in strokes of 6 s, each faster than the one before.
   const auto rate_at = [](double t) {
     const int stroke = static_cast<int>(t / 6.0);
     const double phase = t / 6.0 - stroke, local = phase < 0.5 ? 2.0 * phase : 2.0 * phase - 1.0;
@@ -157,7 +157,7 @@ inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
   return log;
 }
 
-/// The same with dry friction [N] that no part of the model knows: the measured force is larger extending.
+/// The same with Coulomb friction [N] that the model lacks: the measured force is larger while extending.
 inline Log arm_log_with_friction(double friction, unsigned seed = 1) {
   Log log = arm_log(0.8, seed);
   const double area = arm_machine().cylinders[0].area_piston();

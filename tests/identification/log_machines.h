@@ -1,5 +1,5 @@
 #pragma once
-/// Machines and files for the tests of logs.
+/// Machines and log files for the tests of logs.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -79,8 +79,7 @@ inline Machine drive() {
   return m;
 }
 
-/// A log of small_crane() without a fault, 50 Hz.
-/// Rows of the plain log all dialects below hold.
+/// @return a log of small_crane() without faults, 50 Hz, with the rows that all dialects of the tests contain
 inline std::string plain_log(int rows = 30) {
   std::string text =
       "t_s,q_boom_rad,q_extension_m,u_boom,pA_boom_bar,p_main_bar,payload_kg,oil_C\n";

@@ -1,5 +1,5 @@
 #pragma once
-/// Numeric twins of derivatives, and the random numbers of property tests.
+/// Numeric derivatives, and the random numbers of property tests.
 #include <Eigen/Dense>
 #include <random>
 

@@ -222,7 +222,7 @@ inline Machine random_machine(int joints, unsigned seed, bool linkage_masses = t
     const int kind = random.integer(0, 2);
     if (!prismatic && kind == 0) linkage = RackLinkage{random.uniform(0.1, 0.4)};
     if (!prismatic && kind == 1) {
-      // pins near the plane, a quarter turn apart at q = 0, so that |q| < 1.2 stays off the dead centre
+      // pins near the plane, a quarter turn apart at q = 0, so that |q| < 1.2 stays away from the dead centre
       const Eigen::Vector3d fixed = 1.3 * v + 0.2 * random.uniform(-1, 1) * joint.axis;
       linkage = PinsLinkage{joint.origin * fixed, 0.5 * u + 0.1 * random.vector(1.0),
                             random.integer(0, 1) == 0};

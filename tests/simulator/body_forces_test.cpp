@@ -1,4 +1,4 @@
-/// The generator's forces against models/static_force, the other path, and against energy.
+/// The simulator's forces against models/machine/static_force, which shares no code with them, and against energy.
 #include "simulator/hidden_effects/body_forces.h"
 
 #include <random>
@@ -25,7 +25,7 @@ TEST_P(BodyForcesOf, GravityAgreesWithVirtualWork) {
     bodies.gravity(q.data(), 640.0, loads);
     for (std::size_t k = 0; k < q.size(); ++k) {
       const double exact = statics.torque()[static_cast<Eigen::Index>(k)];
-      // numeric differentiation at 1e-4: truncation 2e-9 of the largest load, 1e5 N m
+      // Numeric differentiation with step 1e-4: truncation of 2e-9 of the largest load, 1e5 N m.
       EXPECT_NEAR(loads.gravity[k], exact, 1e-3 + 1e-8 * std::abs(exact)) << machine.joints[k].name;
     }
   }
@@ -36,7 +36,7 @@ TEST_P(BodyForcesOf, WorkOfAllLoadsIsTheChangeOfEnergy) {
   BodyForces bodies(machine);
   const std::size_t n = machine.joints.size();
   std::vector<double> q(n), qd(n), qdd(n);
-  // a smooth motion about mid range at working speed
+  // A smooth motion about mid-range at working speed.
   const auto at = [&](double t) {
     for (std::size_t k = 0; k < n; ++k) {
       const Joint& j = machine.joints[k];
@@ -69,7 +69,7 @@ TEST_P(BodyForcesOf, WorkOfAllLoadsIsTheChangeOfEnergy) {
     work += piece;
     turnover += std::abs(piece);
   }
-  // Simpson at 7.5 ms: below 1e-8 of the work turned over; differences in `dynamic` 1e-6
+  // Simpson's rule at 7.5 ms errs by less than 1e-8 of the work; differences in dynamic() by 1e-6.
   EXPECT_NEAR(work, energy(kEnd) - energy(0.0), 1e-5 * turnover + 1e-6);
   EXPECT_GT(turnover, 1e-3);
 }
@@ -89,7 +89,7 @@ TEST_P(BodyForcesOf, InertiaIsQuadraticInSpeed) {
   bodies.dynamic(q.data(), qd.data(), zero.data(), 640.0, slow);
   bodies.dynamic(q.data(), twice.data(), zero.data(), 640.0, fast);
   for (std::size_t k = 0; k < n; ++k)
-    // differences along 1 ms: relative 1e-6 of forces up to 1e4
+    // Differences over 1 ms: relative error 1e-6 of forces up to 1e4 N.
     EXPECT_NEAR(fast.inertia[k], 4.0 * slow.inertia[k], 0.1 + 1e-4 * std::abs(fast.inertia[k]));
 }
 

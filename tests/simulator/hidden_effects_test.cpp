@@ -1,4 +1,4 @@
-/// Each hidden effect changes the channels it should and no others, by an amount one could see.
+/// Each hidden effect changes the channels that it should and no others, by an amount above the noise.
 #include <map>
 #include <set>
 
@@ -66,7 +66,7 @@ class HiddenEffectTest : public ::testing::TestWithParam<std::string> {};
 TEST_P(HiddenEffectTest, TouchesItsChannelsOnly) {
   const std::string id = GetParam();
   LogRequest base = quiet_request(machine_named("loader_crane"), 120.0);
-  if (id == "sensor_fault") base.noise_factor = 1.0;  // a noisy channel has noise to multiply
+  if (id == "sensor_fault") base.noise_factor = 1.0;  // This effect multiplies the channel's noise, so there must be some.
   const auto& all = effect_descriptions();
   const auto description =
       std::find_if(all.begin(), all.end(), [&](const auto& e) { return e.id == id; });
@@ -88,13 +88,13 @@ TEST_P(HiddenEffectTest, TouchesItsChannelsOnly) {
       if (name.rfind("q_", 0) == 0) motion = std::max(motion, d);
       if (name.rfind("pA_", 0) == 0 || name.rfind("pB_", 0) == 0)
         pressures = std::max(pressures, d);
-      // payloads change in pauses, and these come at other times once motions differ
+      // Payloads change in pauses, whose times shift when the motions differ.
       const bool told = name == "payload_kg" && expectations().at(id) != Changes::kMotion;
       if (told || name == "oil_C" || name == "t_s") {
         EXPECT_EQ(d, 0.0) << name;
       }
     }
-    // 1 bar is what a clear effect reaches at least somewhere; positions are rounded to 1e-4
+    // A clear effect reaches at least 1 bar somewhere; positions are rounded to 1e-4.
     switch (expectations().at(id)) {
       case Changes::kPressures:
         EXPECT_EQ(motion, 0.0);
@@ -163,7 +163,7 @@ TEST(HiddenEffects, TheCatalogueIsCoveredWithAtLeastTwoLaws) {
 }
 
 TEST(HiddenEffects, TextBookLawsHaveTheirOwnEquivalent) {
-  // a linear law is its own text-book equivalent; soft signs cost less than 3 % above 2 mm/s
+  // A linear law is its own text-book equivalent; smooth signs change it by less than 3 % above 2 mm/s.
   LogRequest base = quiet_request(machine_named("loader_crane"), 120.0);
   for (const char* id : {"coulomb_friction", "viscous_friction", "load_friction", "line_loss",
                          "flow_dependent_margin", "return_back_pressure", "leakage"}) {

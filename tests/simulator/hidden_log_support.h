@@ -23,7 +23,7 @@ inline LogRequest quiet_request(const Machine& machine, double seconds = 60.0) {
   return request;
 }
 
-/// Largest difference of two columns.
+/// Largest absolute difference of two columns.
 inline double difference(const GeneratedLog& a, const GeneratedLog& b, const std::string& column) {
   const auto *x = a.find(column), *y = b.find(column);
   if (!x || !y || x->size() != y->size()) return INFINITY;

@@ -1,4 +1,4 @@
-/// Logs as a whole: reproducible, at the noise they claim, in the format, like the shared example.
+/// Simulated logs: reproducible, with the stated noise and format, similar to the shared example.
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,7 +10,7 @@
 namespace sparflow::simulator {
 namespace {
 
-TEST(HiddenLog, SameSeedsSameLogOtherSeedsAnother) {
+TEST(HiddenLog, DependsOnTheSeedsOnly) {
   LogRequest request = quiet_request(machine_named("loader_crane"));
   request.noise_factor = 1.0;
   const std::string once = csv_text(generate(request));
@@ -19,7 +19,7 @@ TEST(HiddenLog, SameSeedsSameLogOtherSeedsAnother) {
   EXPECT_NE(once, csv_text(generate(request)));
 }
 
-TEST(HiddenLog, OneMoreEffectLeavesMotionAndNoiseAlone) {
+TEST(HiddenLog, AnotherEffectChangesNeitherMotionNorNoise) {
   LogRequest request = quiet_request(machine_named("loader_crane"));
   request.noise_factor = 1.0;
   const GeneratedLog plain = generate(request);
@@ -42,7 +42,7 @@ TEST(HiddenLog, NoiseHasTheStatedLevel) {
       for (std::size_t i = 0; i < x.size(); ++i) square += (y[i] - x[i]) * (y[i] - x[i]);
       return std::sqrt(square / static_cast<double>(x.size()));
     };
-    // 6000 samples: the standard deviation is known to 1 %; five of them, rounding 0.04 bar on top
+    // With 6000 samples the standard deviation is known to 1 %; five times that is allowed, and rounding of 0.04 bar.
     EXPECT_NEAR(deviation("pA_boom_bar"), 0.8 * factor, 0.05 * factor);
     EXPECT_NEAR(deviation("p_main_bar"), 0.8 * factor, 0.05 * factor);
     EXPECT_NEAR(deviation("q_boom_rad"), 3e-4 * factor, 0.2e-4 * factor);
@@ -50,7 +50,7 @@ TEST(HiddenLog, NoiseHasTheStatedLevel) {
   }
 }
 
-TEST(HiddenLog, ColumnsAsRequested) {
+TEST(HiddenLog, HasTheRequestedColumns) {
   LogRequest request = quiet_request(machine_named("loader_crane"), 10.0);
   request.rate = 30.0;
   const GeneratedLog all = generate(request);
@@ -69,7 +69,7 @@ TEST(HiddenLog, ADriveWithoutChambersReportsItsForce) {
   EXPECT_EQ(log.find("pA_axis_bar"), nullptr);
 }
 
-TEST(HiddenLog, WrongRequestsSayWhatIsPossible) {
+TEST(HiddenLog, NamesWhatIsPossibleForAWrongRequest) {
   const auto message = [](const HiddenEffect& effect) {
     LogRequest request = quiet_request(machine_named("loader_crane"), 5.0);
     request.effects = {effect};
@@ -146,7 +146,7 @@ TEST(HiddenLog, PlainLogsAreLikeTheSharedExample) {
     mean.standby += s.standby / kLogs;
     mean.busy += s.busy / kLogs;
   }
-  // one log of 40 moves has shares with a standard deviation of 0.07; cranes differ by 20 % in pressure
+  // In a log of 40 moves shares have a standard deviation of 0.07; pressures of cranes differ by 20 %.
   EXPECT_NEAR(mean.rest, example.rest, 0.05);
   EXPECT_NEAR(mean.one, example.one, 0.15);
   EXPECT_NEAR(mean.two, example.two, 0.15);
@@ -163,7 +163,7 @@ TEST(HiddenLog, TheReferenceIsTheSameCrane) {
   EXPECT_EQ(logs.test.rows(), 1500u);
   EXPECT_TRUE(logs.reference.truth.empty());
   ASSERT_EQ(logs.train.truth.size(), 1u);
-  // nothing but the pump is touched, and standby is the crane's own: the lowest pump pressure of both logs
+  // Only the pump is changed, and standby belongs to the crane: it is the lowest pump pressure of both logs.
   const auto lowest = [](const GeneratedLog& log) {
     const auto& p = *log.find("p_main_bar");
     return *std::min_element(p.begin(), p.end());

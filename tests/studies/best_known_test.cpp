@@ -1,4 +1,4 @@
-// The file of best known energies: what a later run may change in it.
+// The file of best known energies, and how a later run may change it.
 #include "studies/best_known.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ bench::ReachFigures figures_of(double energy, double duration, double bound, dou
   return f;
 }
 
-/// A file of one reach that runs write to, one after the other.
+/// A file of one reach, to which several runs write.
 class BestKnown : public ::testing::Test {
  protected:
   BestKnown() {
@@ -68,7 +68,7 @@ TEST_F(BestKnown, KeepsTheLeastEnergyTheLargestBoundAndTheShortestTime) {
   EXPECT_EQ(entry.at("lower_bound_J"), 78e3) << "still the larger one";
 }
 
-TEST_F(BestKnown, ARunThatFindsNothingOrLeavesAReachOutChangesNothing) {
+TEST_F(BestKnown, IsNotChangedByARunThatFindsNothingOrLeavesAReachOut) {
   bench::ReachFigures nothing;
   nothing.named = "too little time";
   const nlohmann::json named = lift_after(nothing);
@@ -82,7 +82,7 @@ TEST_F(BestKnown, ARunThatFindsNothingOrLeavesAReachOutChangesNothing) {
   EXPECT_FALSE(after(nothing).contains("lower.yaml"));
 }
 
-TEST_F(BestKnown, EntriesNameTheirModelAndAnotherModelForgetsThem) {
+TEST_F(BestKnown, EntriesNameTheirModelAndAreDroppedForAnotherModel) {
   const nlohmann::json first = lift_after(figures_of(80e3, 16.0, 70e3, 7.4));
   EXPECT_EQ(first.at("model"), (nlohmann::json{{"file", "crane.json"}, {"sha256", "abc"}}));
   EXPECT_EQ(first.at("program"), std::string("sparflow ") + program_version());
@@ -106,7 +106,7 @@ std::string bytes_of(const std::string& name) {
   return bytes.str();
 }
 
-TEST(BundledBestKnown, IsOfTheBundledModelsAndAboveItsBounds) {
+TEST(BundledBestKnown, BelongsToTheBundledModelsAndIsAboveItsBounds) {
   const nlohmann::json known = test_support::parsed_json(bytes_of("best_known.json"));
   EXPECT_EQ(known.size(), 43u);
   int optimal = 0;
@@ -131,7 +131,7 @@ TEST(BundledBestKnown, IsOfTheBundledModelsAndAboveItsBounds) {
   EXPECT_EQ(optimal, 36);
 }
 
-TEST_F(BestKnown, BaselinesAndTheUnlimitedTimeStandBesideTheOptimum) {
+TEST_F(BestKnown, ContainsBaselinesAndTheUnlimitedTimeBesideTheOptimum) {
   bench::ReachFigures f = figures_of(80e3, 16.0, 70e3, 7.4);
   f.unlimited = 79e3;
   std::vector<StrategyOutcome>& outcomes = f.comparison.rows[0].outcomes;

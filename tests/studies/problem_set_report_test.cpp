@@ -1,4 +1,4 @@
-// What the problem set counts: a reach that cannot be done is named only when a limit is.
+// Counts of the problem set: an infeasible reach counts as named only when its message names a limit.
 #include "studies/problem_set_report.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// What is printed: a line each, then the counts.
+/// The printed output: one line for each reach, then the counts.
 std::string printed(const std::vector<bench::ReachFigures>& figures, bool feasible = false) {
   std::vector<bench::ReachTask> tasks(figures.size());
   testing::internal::CaptureStdout();
@@ -24,7 +24,7 @@ std::string printed(const std::vector<bench::ReachFigures>& figures, bool feasib
   return testing::internal::GetCapturedStdout();
 }
 
-TEST(ProblemSetReport, AMessageWithoutALimitIsNoName) {
+TEST(ProblemSetReport, DoesNotCountAMessageWithoutALimitAsNamed) {
   bench::ReachFigures said, named;
   said.named = "no way tried reaches the goal";
   named.named = "infeasible. Worst: flow of pump main at t=0.26 s";
@@ -53,7 +53,7 @@ bench::ReachFigures solved_in(double times, double above) {
   return f;
 }
 
-TEST(ProblemSetReport, DistanceFromTheUnlimitedTimeIsThatOfLongTimes) {
+TEST(ProblemSetReport, ComparesWithUnlimitedTimeOnlyAtLongDurations) {
   const std::string text =
       printed({solved_in(1.9, 0.50), solved_in(2.1, 0.03), solved_in(3.1, 0.01)}, true);
   EXPECT_THAT(text, HasSubstr("feasible 3: solved 3 (100.0 %)"));
@@ -65,17 +65,17 @@ TEST(ProblemSetReport, DistanceFromTheUnlimitedTimeIsThatOfLongTimes) {
 
 TEST(ProblemSetReport, CountsByTheFineLatticeAndByThePathInItsOwnTime) {
   bench::ReachFigures coarse = solved_in(1.5, 0.10), loose = solved_in(1.5, 0.10);
-  coarse.slow_bound = 0.9 * coarse.unlimited;  // not tight by its slow path
+  coarse.slow_bound = 0.9 * coarse.unlimited;  // Its slow path does not make the bound tight.
   coarse.grid_path = 1.03 * coarse.bound;
   loose.bound = 95e3;
   loose.grid_path = 1.05 * loose.bound;
   bench::ReachFigures none = solved_in(1.5, 0.10);
-  none.grid_path = 0.0;  // no path of the grid keeps all limits in that time
+  none.grid_path = 0.0;  // No path of the grid keeps all limits in that time.
   const std::string text = printed({coarse, loose, none}, true);
   EXPECT_THAT(text, HasSubstr("within 2 % of the bound: 1 of 2 where the lattice is fine, 1 of 1"));
 }
 
-TEST(ProblemSetReport, WhatIsLeftOutIsNeitherPrintedNorCounted) {
+TEST(ProblemSetReport, NeitherPrintsNorCountsReachesLeftOut) {
   bench::ReachFigures out;
   out.left_out = true;
   const std::string text = printed({out});

@@ -4,7 +4,8 @@
   const { theme, number, ticks, element, svg } = page;
   const { line, label } = page.svgTools;
 
-  /* Parts of one instant into an SVG group, thicknesses in parts of the crane's size; `only`: all in one colour. */
+  /* Draws the parts of one instant into an SVG group, with line widths relative to the crane's size; `only` is one
+     colour for all parts. */
   page.drawParts = function (into, kinds, points, plane, weight, only) {
     const reach = Math.max(plane.z1 - plane.z0, 0.5 * (plane.x1 - plane.x0)) * plane.scale;
     const unit = Math.min(Math.max(reach * 0.0022, 0.7), 1.6) * (weight || 1);
@@ -21,7 +22,7 @@
         return;
       }
       const [color, width] = looks[kind];
-      const thinner = kind === "telescope" ? Math.pow(0.82, stage++) : 1;  // inner stages are slimmer
+      const thinner = kind === "telescope" ? Math.pow(0.82, stage++) : 1;  // Inner stages are slimmer.
       into.append(svg("polyline", { points: polyline(p, plane), fill: "none", stroke: only || color,
         "stroke-width": width * thinner * unit, "stroke-linecap": kind === "barrel" ? "butt" : "round",
         "stroke-linejoin": "round" }));
@@ -40,7 +41,7 @@
     into.append(svg("rect", { x: x - s / 2, y: z + s * 1.1, width: s, height: s * 0.8, fill: theme.color(1), rx: 1 }));
   }
 
-  /* What is to be seen: everything the crane touches; obstacles widen it by half at most. */
+  /* The view: it holds everything the crane touches; obstacles widen it by half at most. */
   function extent(spec) {
     const box = { x0: 0, x1: 0, z0: 0, z1: 0 };
     const include = (x, z) => {
@@ -82,7 +83,7 @@
     }
   }
 
-  /* Names of obstacles over everything, at their middle (of what is in view). */
+  /* Writes the names of obstacles over everything, at the middle of their visible part. */
   function drawObstacleNames(plane, spec) {
     for (const o of spec.obstacles) {
       let x = 0, z = 0;
@@ -113,7 +114,7 @@
     }
   }
 
-  /* Outside the plane, where nothing can be in its way. */
+  /* Draws the scale bar below the axes, where it covers nothing. */
   function drawScaleBar(plane) {
     const metres = ticks(0, 70 / plane.scale, 1).step, to = plane.right, from = to - metres * plane.scale;
     const y = plane.height - 8;
@@ -124,7 +125,7 @@
     plane.drawing.append(g);
   }
 
-  /* The instant between two frames: every coordinate in proportion. */
+  /* Interpolates all coordinates linearly between two frames. */
   function between(frames, time) {
     let k = frames.findIndex((f) => f.t >= time);
     if (k < 0) k = frames.length - 1;
@@ -175,7 +176,7 @@
         `${spec.z_axis.label} ${metres(frame.tip[1])}`;
     }
 
-    // Real time, hurried when the motion takes longer than ten seconds.
+    // Plays in real time, faster when the motion takes longer than ten seconds.
     const speed = Math.max(1, (end - start) / 10);
     let playing = 0, since = 0;
     function step(now) {

@@ -2,9 +2,9 @@
 /* Line and scatter charts, drawn by uPlot. */
 (function () {
   const { theme, faded, titled, number, tickLabels, element } = page;
-  const kLeft = 62, kRight = 14;  // equal margins: charts below one another share their time axis
+  const kLeft = 62, kRight = 14;  // equal margins, so that the time axes of charts below one another are aligned
 
-  /* uPlot leaves a scale without values undefined; an empty chart still needs its axes. */
+  /* Gives a scale without values a range: uPlot leaves it undefined, but an empty chart still needs its axes. */
   function range(pad) {
     return (u, lo, hi) => {
       if (lo == null || !isFinite(lo)) return [0, 1];
@@ -56,7 +56,7 @@
     c.restore();
   }
 
-  /* Labels of spans and markers at the top, left out where they would run into the one before. */
+  /* Writes labels of spans and markers at the top, except where they would overlap the one before. */
   function drawLabels(u, spec) {
     const c = u.ctx, b = u.bbox, ratio = devicePixelRatio;
     const labels = spec.spans.map((s) => ({ x: s.from, label: s.label, line: false }))
@@ -93,7 +93,7 @@
     c.restore();
   }
 
-  /* The curve's look; the key shows the same colour. */
+  /* Returns the style of a curve; the legend shows the same colour. */
   function look(series) {
     const color = theme.color(series.color);
     if (series.style === "measured") return { stroke: faded(color, 0.38), width: 3.5 };
@@ -109,7 +109,7 @@
     const series = [{ label: spec.x_axis.label, class: "instant", value: (u, v) => (v == null ? "" : number(v, 5) + xUnit) }];
     const bands = [];
     for (const s of spec.series) {
-      if (!s.lower) continue;  // bands lie under all curves
+      if (!s.lower) continue;  // Bands are drawn under all curves.
       for (const edge of [s.upper, s.lower]) {
         data.push(edge);
         series.push({ label: s.name, class: "quiet", stroke: "transparent", width: 0, points: { show: false } });
@@ -144,7 +144,7 @@
       },
     }, data, host);
     const forget = page.onInstant(spec.group, (time, source) => {
-      if (source instanceof uPlot) return;  // between charts uPlot does it
+      if (source instanceof uPlot) return;  // uPlot itself synchronises the charts.
       chart.setCursor({ left: chart.valToPos(time, "x"), top: chart.bbox.height / 2 / devicePixelRatio }, false);
     });
     return {
@@ -167,7 +167,7 @@
   };
 
   page.kinds.scatter = function (host, spec) {
-    // uPlot wants one ascending abscissa: all points sorted by x, each in the column of its group.
+    // uPlot needs one ascending abscissa, so all points are sorted by x and each stands in the column of its group.
     const points = [];
     spec.groups.forEach((g, k) => g.x.forEach((x, i) => points.push([x, k, g.y[i]])));
     const groupCount = spec.groups.length, trends = [];
@@ -176,7 +176,7 @@
     points.sort((a, b) => a[0] - b[0]);
     const columns = groupCount + trends.length;
     const data = [points.map((p) => p[0])];
-    // null breaks a line, undefined (another column's point) does not
+    // null interrupts a line; undefined (a point of another column) does not.
     for (let k = 0; k < columns; ++k) data.push(points.map((p) => (p[1] === k ? p[2] : k < groupCount ? null : undefined)));
 
     const series = [{ label: spec.x_axis.label, class: "quiet" }];
@@ -221,7 +221,7 @@
     };
   };
 
-  /* The zero line, or y = x. */
+  /* Draws the zero line, or the line y = x. */
   function drawReferenceLines(u, spec) {
     const c = u.ctx, b = u.bbox, { x, y } = u.scales;
     c.save();

@@ -1,5 +1,5 @@
 "use strict";
-/* What all figures share: colours of the theme, numbers, saving, and the links between figures of one group.
+/* Functions for all figures: colours of the theme, numbers, saving, and the links between figures of one group.
    A kind of figure is page.kinds[kind] = function (host, spec) that draws `spec` into the element `host` and
    returns { picture(): canvas or promise of one, rows(): table with a header row, remove(): optional }. */
 var page = (function () {
@@ -14,12 +14,12 @@ var page = (function () {
     font: "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif",
   };
 
-  /* "#rrggbb" with an opacity. */
+  /* Adds an opacity to a colour "#rrggbb". */
   const faded = (hex, alpha) => hex + Math.round(alpha * 255).toString(16).padStart(2, "0");
 
   const titled = (q) => (q.unit ? q.label + " [" + q.unit + "]" : q.label);
 
-  /* A value to four significant digits, thousands apart. */
+  /* Formats a value with four significant digits and spaces between thousands. */
   function number(v, digits) {
     if (v == null || !isFinite(v)) return "–";
     if (v === 0) return "0";
@@ -35,7 +35,7 @@ var page = (function () {
     return fraction === undefined ? spaced : spaced + "." + fraction;
   }
 
-  /* Round ticks over [lo, hi], about `count` of them. */
+  /* Returns about `count` round ticks over [lo, hi]. */
   function ticks(lo, hi, count) {
     if (!(hi > lo)) return [lo];
     const raw = (hi - lo) / Math.max(1, count);
@@ -47,7 +47,7 @@ var page = (function () {
     return out;
   }
 
-  /* Tick labels with as many decimals as their distance asks for. */
+  /* Returns tick labels with the decimals that the distance of the ticks needs. */
   function tickLabels(values) {
     const step = values.length > 1 ? Math.abs(values[1] - values[0]) : Math.abs(values[0]) || 1;
     const largest = Math.max(...values.map(Math.abs), step);
@@ -71,7 +71,7 @@ var page = (function () {
     return e;
   }
 
-  /* An <svg> as a canvas of twice its size, for saving. */
+  /* Draws an <svg> on a canvas of twice its size, for saving. */
   function rasterised(drawing) {
     const width = drawing.width.baseVal.value, height = drawing.height.baseVal.value;
     const text = new XMLSerializer().serializeToString(drawing);
@@ -97,7 +97,7 @@ var page = (function () {
   const fileName = (spec, ending) =>
     (spec.title.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").slice(0, 60) || "figure") + ending;
 
-  /* Title, key and drawing on paper, so that the picture stands by itself. */
+  /* Draws title, legend and figure on one canvas, so that the saved picture needs no page. */
   async function savePng(figure) {
     const drawn = await figure.drawn.picture();
     const scale = drawn.ratio || devicePixelRatio, key = figure.drawn.key ? figure.drawn.key() : [];
@@ -153,7 +153,7 @@ var page = (function () {
     figure.width = figure.host.clientWidth;
   }
 
-  /* A figure counts as drawn when it has ink: a pixel that is not transparent, or an SVG with content. */
+  /* A figure counts as drawn when it has a pixel that is not transparent, or an SVG with content. */
   function inked(figure) {
     const canvas = figure.host.querySelector("canvas"), drawing = figure.host.querySelector("svg");
     if (drawing) return drawing.childElementCount > 0;
@@ -177,7 +177,7 @@ var page = (function () {
       draw(figure);
       addTools(figure);
     }
-    setTimeout(report, 0);  // uPlot paints in a microtask
+    setTimeout(report, 0);  // uPlot draws in a microtask, so the report waits for it.
     const redraw = () => figures.forEach(draw);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
     for (const [event, printing] of [["beforeprint", true], ["afterprint", false]]) {
@@ -193,7 +193,7 @@ var page = (function () {
     });
   }
 
-  /* Instant under the cursor, told to all figures of a group: listeners are called with (time, source). */
+  /* Passes the instant under the cursor to all figures of a group: listeners are called with (time, source). */
   const listeners = {};
   function onInstant(group, listener) {
     if (!group) return () => {};

@@ -24,7 +24,7 @@
     return svg("text", { x, y, "text-anchor": anchor || "start", fill: color || theme.muted(), ...more }, text);
   }
 
-  /* Names with their colours above a drawing; returns the height used. */
+  /* Writes the legend above a drawing and returns the height used. */
   function key(drawing, entries, left, width) {
     let x = left, y = 14;
     for (const { name, color } of entries) {
@@ -40,12 +40,12 @@
     return y + 8;
   }
 
-  /* Metres to pixels, equal on both axes, with grid and labels. `height` is at most what is given. */
+  /* Scales metres to pixels, equally on both axes, with grid and labels. The height used is at most `height`. */
   page.plane = function (host, box, spec, right, tallest) {
     const left = 62, top = 12, bottom = 46;
     const wide = Math.max(1e-9, box.x1 - box.x0), tall = Math.max(1e-9, box.z1 - box.z0);
     const scale = Math.min((host.clientWidth - left - right) / wide, (tallest - top - bottom) / tall);
-    // of what the height leaves free on the sides a little is shown, the rest stays paper
+    // Of the width that the height leaves free a little is shown, the rest stays empty.
     const spare = Math.min(0.12 * wide, ((host.clientWidth - left - right) / scale - wide) / 2);
     const width = Math.round(left + right + (wide + 2 * spare) * scale);
     const x0 = box.x0 - spare, x1 = box.x1 + spare, { z0, z1 } = box;
@@ -135,7 +135,7 @@
     };
   };
 
-  /* Even in lightness (stops of matplotlib's magma, reversed: much is dark), and blue - white - vermilion. */
+  /* Colour maps: stops of matplotlib's magma, reversed so that large values are dark, and blue - white - vermilion. */
   const kSequential = ["#fcf0c0", "#fdbc7d", "#f8765c", "#d3436e", "#982d80", "#5f187f", "#231151"];
   const kDiverging = ["#00446b", "#0072b2", "#86bfe0", "#f4f4f2", "#f0a878", "#d55e00", "#803800"];
   function colorScale(stops) {

@@ -14,7 +14,7 @@ namespace {
 using Index = Eigen::Index;
 using nlohmann::json;
 
-// Digits enough for the eye and for a saved CSV: time keeps 1 ms in a three-hour log.
+// Significant digits that suffice for a chart and a saved CSV: time keeps 1 ms in a three-hour log.
 constexpr int kValueDigits = 5;
 constexpr int kAbscissaDigits = 8;
 
@@ -43,7 +43,7 @@ json matrix(const Eigen::MatrixXd& values) {
   return out;
 }
 
-/// Metres to the millimetre.
+/// Rounds metres to the millimetre.
 json metre(double value) {
   if (!std::isfinite(value)) return nullptr;
   return std::round(value * 1e3) / 1e3;
@@ -119,7 +119,7 @@ void check_lines(const LineChart& chart) {
 json number_json(double value, int digits) {
   if (!std::isfinite(value)) return nullptr;
   const double rounded = std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr);
-  // Whole numbers print without ".0": a tenth of the page's size.
+  // Whole numbers are printed without ".0", which saves a tenth of the page's size.
   if (rounded == std::trunc(rounded) && std::abs(rounded) < 1e9) return std::lround(rounded);
   return rounded;
 }
@@ -190,7 +190,7 @@ json chart_json(const ScatterChart& chart, Index most_points) {
   out["of"] = total;
   if (chart.trend) {
     out["trends"] = json::array();
-    for (const ScatterGroup& group : chart.groups) {  // before decimation: of all points
+    for (const ScatterGroup& group : chart.groups) {  // The medians are of all points, so they are computed before decimation.
       const BinnedMedian trend = binned_median(group.x, group.y, 24);
       out["trends"].push_back(
           {{"x", numbers(trend.x, kValueDigits)}, {"y", numbers(trend.y, kValueDigits)}});
@@ -243,7 +243,7 @@ json chart_json(const CraneDrawing& chart, Index /*most_points*/) {
   out["payload"] = chart.payload;
   out["goal"] = chart.goal ? flat({*chart.goal}) : json(nullptr);
   out["ground"] = chart.ground ? metre(*chart.ground) : json(nullptr);
-  out["kinds"] = json::array();  // the same parts at every instant: their kinds are written once
+  out["kinds"] = json::array();  // The parts are the same at every instant, so their kinds are written once.
   out["frames"] = json::array();
   for (const DrawingFrame& frame : chart.frames) {
     if (out["kinds"].empty()) {

@@ -1,6 +1,6 @@
 #pragma once
-/// What can be drawn on a page, as plain data. Values are given in the unit named beside them: a page is a
-/// door out of the program, so its caller converts (models/math/units.h). NaN means "no value" everywhere.
+/// The figures of a page as plain data. Values are in the unit named beside them; the caller converts them from SI
+/// (models/math/units.h). NaN means "no value" everywhere.
 #include <Eigen/Dense>
 #include <limits>
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace sparflow {
 
-/// A quantity on an axis: shown as "label [unit]", or the label alone when the unit is empty.
+/// A quantity on an axis, shown as "label [unit]", or as the label alone when the unit is empty.
 struct Quantity {
   std::string label;
   std::string unit;
@@ -19,12 +19,12 @@ struct Quantity {
 
 enum class FigureWidth { kFull, kHalf };  ///< two halves stand side by side on a wide screen
 
-/// What all figures have.
+/// Members that all figures have.
 struct Figure {
   std::string title;
-  std::string note;  ///< one or two sentences below: what is to be seen, where the data is from
+  std::string note;  ///< one or two sentences below the figure: what it shows, where the data is from
   FigureWidth width = FigureWidth::kFull;
-  int height = 0;     ///< [px] of the drawing, 0 = a sensible one
+  int height = 0;     ///< [px] of the drawing, 0 = default of its kind
   std::string group;  ///< charts over time and crane drawings of one group share cursor and zoom
 };
 
@@ -55,7 +55,7 @@ struct LineChart : Figure {
   Quantity x_axis = {"time", "s"};
   Quantity y_axis;
   Eigen::VectorXd x;      ///< ascending and finite
-  bool x_counts = false;  ///< x are whole numbers: no ticks between them
+  bool x_counts = false;  ///< x are whole numbers, so there are no ticks between them
   std::vector<LineSeries> series;
   std::vector<Marker> markers;
   std::vector<Span> spans;
@@ -75,10 +75,10 @@ struct ScatterChart : Figure {
 
 struct BarSeries {
   std::string name;
-  Eigen::VectorXd values;  ///< one a category
+  Eigen::VectorXd values;  ///< [categories]
 };
 
-/// Horizontal bars, one row a category.
+/// Horizontal bars, one row for each category.
 struct BarChart : Figure {
   Quantity value_axis;
   std::vector<std::string> categories;
@@ -94,7 +94,7 @@ struct HeatMap : Figure {
   Eigen::VectorXd x_edges, z_edges;  ///< [m] ascending cell borders
   Eigen::MatrixXd
       values;  ///< (z_edges.size()-1) x (x_edges.size()-1), row 0 is the lowest; NaN = empty
-  Eigen::MatrixXd counts;  ///< samples a cell, same shape, shown at the cursor; may be empty
+  Eigen::MatrixXd counts;  ///< samples of each cell, same shape, shown at the cursor; may be empty
   bool diverging = false;  ///< signed values, white at zero
   std::vector<DrawingPart> crane;  ///< drawn over the map
 };
@@ -111,14 +111,14 @@ struct DrawingPath {
   std::vector<Eigen::Vector2d> points;  ///< [m]
 };
 
-/// The crane at several instants with a slider that moves it.
+/// The crane at several instants, with a slider that moves it.
 struct CraneDrawing : Figure {
   Quantity x_axis = {"x", "m"};
   Quantity z_axis = {"z", "m"};
   std::vector<DrawingFrame> frames;  ///< ascending in time; 60 to 120 make a smooth motion
-  int stills = 5;                    ///< instants that stay visible, the later the stronger
+  int stills = 5;                    ///< instants that stay visible; later ones are drawn darker
   std::vector<DrawingObstacle> obstacles;
-  std::vector<DrawingPath> paths;  ///< besides the tip's own, e.g. the seed
+  std::vector<DrawingPath> paths;  ///< paths of the tip besides that of the frames, e.g. of a seed
   std::optional<Eigen::Vector2d> goal;
   std::optional<double> ground;  ///< [m] height of the ground line
   bool payload = true;           ///< draw a load at the tip

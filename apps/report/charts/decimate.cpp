@@ -68,7 +68,7 @@ std::vector<Index> decimate_cloud(const Eigen::VectorXd& x, const Eigen::VectorX
     y_hi = std::max(y_hi, y[i]);
   }
   std::vector<Index> kept;
-  // 640 x 320 cells is about what a chart can show; coarser only when that leaves too many.
+  // 640 x 320 cells are about what a chart can show; the grid is coarser only when that leaves too many points.
   for (double cells = 640.0; cells >= 2.0; cells *= 0.8) {
     kept.clear();
     std::unordered_set<long> taken;
@@ -84,8 +84,8 @@ std::vector<Index> decimate_cloud(const Eigen::VectorXd& x, const Eigen::VectorX
   return kept;
 }
 
-/// Where the points leave out this share of their range, a line through them would be made up: a friction that jumps
-/// with the direction would look as if it grew with the speed.
+/// [-] A gap of this share of the points' range interrupts the line of medians: a line across it would show friction that
+/// changes sign with the direction as if it grew with the speed.
 constexpr double kGapShare = 0.05;
 
 BinnedMedian binned_median(const Eigen::VectorXd& x, const Eigen::VectorXd& y, int bins) {
@@ -98,7 +98,7 @@ BinnedMedian binned_median(const Eigen::VectorXd& x, const Eigen::VectorXd& y, i
   const double gap = kGapShare * (at(count - 1) - at(0));
   std::vector<double> middle_x, middle_y;
   for (Index first = 0, last = 0; first < count; first = last) {
-    // a stretch without a gap, in bins of equal numbers of points
+    // A stretch without a gap is cut into bins with equally many points.
     for (last = first + 1; last < count && at(last) - at(last - 1) <= gap;) ++last;
     const Index n = last - first;
     const Index own = std::max<Index>(1, (used * n + count / 2) / count);

@@ -16,9 +16,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Frames = std::vector<Frame<double>>;
 
-// Within 45 degrees of the vertical a revolute joint swings the arm, beyond it lifts it.
+// A revolute joint swings the arm when its axis is within 45 degrees of the vertical, otherwise it lifts it.
 constexpr double kUprightCosine = 0.7071;
-// Share of the shortest pin-to-pin length that the barrel takes; the rest is rod eye and gland.
+// [-] Share of the shortest pin-to-pin length that the barrel takes; the rest is rod eye and gland.
 constexpr double kBarrelShare = 0.86;
 
 Vector3d axis_in_base(const Machine& machine, const Frames& frames, int joint) {
@@ -26,7 +26,7 @@ Vector3d axis_in_base(const Machine& machine, const Frames& frames, int joint) {
   return frames[j].rotation * machine.joints[j].axis;
 }
 
-/// Where joint k is mounted on its parent link: its frame at coordinate zero [m].
+/// Origin [m] of joint k's frame at coordinate zero, where it is mounted on its parent link.
 Vector3d mount(const Machine& machine, const Frames& frames, int joint) {
   const Joint& j = machine.joints[static_cast<std::size_t>(joint)];
   return point_in_base(frames, joint - 1, Vector3d(j.origin.translation()));
@@ -48,7 +48,7 @@ VectorXd mid_range(const Machine& machine) {
   return q;
 }
 
-/// Index of the joint that lifts the arm and, below it, the one that swings it; -1 = none.
+/// Indices of the joint that lifts the arm and of the joint before it that swings it; -1 = none.
 struct ArmJoints {
   int lift = -1;
   int swing = -1;
@@ -68,7 +68,8 @@ ArmJoints arm_joints(const Machine& machine, const Frames& frames, const Vector3
   return arm;
 }
 
-/// Without any lifting joint: along the first sliding joint that is not upright, else along x or y.
+/// Horizontal direction of a machine without a lifting joint: along the first prismatic joint that is not vertical,
+/// else along x or y.
 Vector3d fallback_direction(const Machine& machine, const Frames& frames, const Vector3d& up) {
   for (int k = 0; k < machine.joint_count(); ++k) {
     if (machine.joints[static_cast<std::size_t>(k)].type != JointType::kPrismatic) continue;
@@ -96,7 +97,7 @@ void append_links(const Machine& machine, const Frames& frames, const Vector3d& 
         k == 0 ? horizontal_part(to, up) : frames[static_cast<std::size_t>(k - 1)].position;
     parts.push_back({PartKind::kLink, {from, to}});
     if (machine.joints[static_cast<std::size_t>(k)].type == JointType::kRevolute) continue;
-    // The stages that share this joint's travel, each ending where its fraction of it ends.
+    // The stages that share this joint's travel; each ends at its fraction of the travel.
     std::vector<double> ends;
     for (const Link& link : machine.links) {
       if (link.slides_with == k && link.fraction > 0.0 && link.fraction < 1.0) {
@@ -132,13 +133,13 @@ double shortest_length(const Machine& machine, int cylinder) {
       const double q = range.lo + (range.hi - range.lo) * i / kSamples;
       shortest = std::min(shortest, cylinder_length(machine, cylinder, q));
     } catch (const std::domain_error&) {
-      continue;  // a four-bar that does not close there
+      continue;  // The four-bar does not close there.
     }
   }
   return shortest;
 }
 
-/// Bars and cylinder go to `parts`, their pins to `pins` (drawn over everything).
+/// Appends bars and cylinder to `parts` and their pins to `pins`, which are drawn over everything.
 void append_cylinder(const Machine& machine, const Frames& frames, const VectorXd& q, int cylinder,
                      std::vector<MachinePart>& parts, std::vector<MachinePart>& pins) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
@@ -169,7 +170,7 @@ void append_cylinder(const Machine& machine, const Frames& frames, const VectorX
       pins.push_back({PartKind::kPin, {base(local.coupler)}});
     }
   } catch (const std::domain_error&) {
-    // A logged posture may lie a little outside what the linkage can do: the rest is still drawn.
+    // A logged posture may lie a little outside the linkage's range; the other parts are still drawn.
     for (const PartKind kind : kinds) parts.push_back({kind, {}});
     for (std::size_t i = 0; i < pin_count; ++i) pins.push_back({PartKind::kPin, {}});
   }
@@ -191,7 +192,7 @@ DrawingPlane drawing_plane(const Machine& machine, const VectorXd& q) {
   if (plane.turns) {
     const Vector3d on_axis = frames[static_cast<std::size_t>(arm.swing)].position;
     plane.origin = horizontal_part(on_axis, plane.up);
-    // The sign is the machine's, not the posture's: an arm that swings back over its column stays behind it.
+    // The sign is that at mid-range, not of this posture, so that an arm that leans back over its column is drawn behind it.
     const Frames middle = forward_kinematics<double>(machine, mid_range(machine));
     const Vector3d reach = point_in_base(middle, machine.tip.joint, machine.tip.xyz) - plane.origin;
     if (reach.dot(direction(middle, arm)) < 0.0) plane.horizontal = -plane.horizontal;

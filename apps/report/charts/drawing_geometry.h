@@ -1,6 +1,6 @@
 #pragma once
-/// The machine as plain lines, for pictures: links, telescope stages, cylinders, rockers and couplers at one
-/// configuration, in the base frame and projected onto the upright plane the arm works in.
+/// The machine as lines for drawings: links, telescope stages, cylinders, rockers and couplers at one configuration,
+/// in the base frame and projected onto the vertical plane of the arm.
 #include <Eigen/Dense>
 #include <string>
 #include <vector>
@@ -12,14 +12,14 @@ namespace sparflow {
 
 enum class PartKind { kLink, kTelescope, kBarrel, kRod, kRocker, kCoupler, kPin };
 
-/// One polyline (a single point for kPin) in the base frame. No points: it cannot be drawn at this
+/// One polyline (a single point for kPin) in the base frame. It has no points where it cannot be drawn at this
 /// configuration, e.g. a four-bar that does not close.
 struct MachinePart {
   PartKind kind = PartKind::kLink;
   std::vector<Eigen::Vector3d> points;  ///< [m]
 };
 
-/// The same in the plane of the drawing.
+/// One polyline in the plane of the drawing.
 struct DrawingPart {
   PartKind kind = PartKind::kLink;
   std::vector<Eigen::Vector2d> points;  ///< [m] (horizontal, up)
@@ -32,12 +32,12 @@ struct DrawingFrame {
   Eigen::Vector2d tip = Eigen::Vector2d::Zero();  ///< [m]
 };
 
-/// An upright plane of the base frame.
+/// A vertical plane of the base frame.
 struct DrawingPlane {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< [m]
-  Eigen::Vector3d horizontal = Eigen::Vector3d::UnitX();  ///< unit
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();          ///< unit, against gravity
-  bool turns = false;                                     ///< a swing joint turns it with the arm
+  Eigen::Vector3d horizontal = Eigen::Vector3d::UnitX();  ///< unit vector
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();          ///< unit vector, against gravity
+  bool turns = false;                                     ///< whether a swing joint turns the plane with the arm
   std::string horizontal_name = "x";  ///< "radius" when it turns, else the base axis it lies along
   std::string vertical_name = "z";    ///< "height" when gravity is not along -z
 
@@ -47,21 +47,21 @@ struct DrawingPlane {
   Eigen::Vector3d normal() const { return horizontal.cross(up); }
 };
 
-/// The plane of the arm: across the first revolute axis that is not upright. Without a swing joint below
+/// Returns the plane of the arm: across the first revolute axis that is not vertical. Without a swing joint below
 /// that axis its coordinates are those of the base frame (x and z for most cranes) at every
 /// configuration; with one they are radius from the swing axis and height, positive towards the tip at mid-range.
 /// @param q joint coordinates [rad] or [m]
 DrawingPlane drawing_plane(const Machine& machine, const Eigen::VectorXd& q);
 
-/// All lines of the machine in the base frame, those further back first. Rack and direct drives have none of their
-/// own. Barrels are drawn a little shorter than the cylinder's shortest length.
+/// Returns all lines of the machine in the base frame, those further back first. Rack and direct drives have none.
+/// Barrels are drawn a little shorter than the cylinder's shortest length.
 std::vector<MachinePart> machine_parts(const Machine& machine, const Eigen::VectorXd& q);
 
-/// machine_parts() projected onto drawing_plane() at the same configuration.
+/// Projects machine_parts() onto drawing_plane() at the same configuration.
 DrawingFrame drawing_frame(const Machine& machine, const Eigen::VectorXd& q, double time = 0.0);
 
-/// `count` frames evenly spaced in time over a motion, joint coordinates in proportion between its instants;
-/// fewer when the motion has a single instant, none when it has none.
+/// Returns `count` frames evenly spaced in time over a motion, with joint coordinates interpolated linearly between its
+/// instants; one frame when the motion has a single instant, none when it has none.
 std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajectory& motion,
                                          int count);
 

@@ -9,11 +9,11 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Half-spaces have no end; drawings show at most this much of one [m].
+/// [m] Half-spaces are unbounded; drawings show at most this much of one.
 constexpr double kFarAway = 100.0;
 
 std::vector<Vector2d> cut(const Box& box, const DrawingPlane& plane) {
-  // Corners numbered by bits: an edge joins two that differ in one bit.
+  // Corners are numbered by bits, so that an edge joins two that differ in one bit.
   Vector3d corners[8];
   double height[8];
   for (int c = 0; c < 8; ++c) {
@@ -32,7 +32,7 @@ std::vector<Vector2d> cut(const Box& box, const DrawingPlane& plane) {
     }
   }
   if (points.empty()) return points;
-  // The cut is convex: going round its middle gives its outline.
+  // The section is convex, so ordering its points by their angle about its centre gives the outline.
   Vector2d middle = Vector2d::Zero();
   for (const Vector2d& p : points) middle += p / static_cast<double>(points.size());
   std::sort(points.begin(), points.end(), [&](const Vector2d& a, const Vector2d& b) {
@@ -45,9 +45,9 @@ std::vector<Vector2d> cut(const Box& box, const DrawingPlane& plane) {
 std::vector<Vector2d> cut(const HalfSpace& solid, const DrawingPlane& plane) {
   const Vector2d normal(solid.normal.dot(plane.horizontal), solid.normal.dot(plane.up));
   const double length = normal.norm();
-  if (length < 1e-9) return {};  // parallel to the drawing
+  if (length < 1e-9) return {};  // The half-space's border is parallel to the drawing.
   const Vector2d out = normal / length, along(-out.y(), out.x());
-  // The border's point nearest to the plane's origin.
+  // The point of the border nearest to the plane's origin.
   const Vector2d at = out * (solid.normal.dot(solid.point - plane.origin) / length);
   return {at - kFarAway * along, at + kFarAway * along, at + kFarAway * (along - out),
           at - kFarAway * (along + out)};

@@ -1,5 +1,5 @@
 #pragma once
-/// Obstacles of a motion problem as shapes of a crane drawing.
+/// Turns obstacles of a motion problem into shapes of a crane drawing.
 #include <vector>
 
 #include "apps/report/charts/charts.h"
@@ -7,8 +7,8 @@
 
 namespace sparflow {
 
-/// What the plane cuts out of each obstacle; obstacles it misses are left out. For a crane that swings the
-/// cut holds for the one swing angle of `plane`.
+/// Returns the section of each obstacle with the plane; obstacles that it misses are left out. For a crane that swings
+/// the sections are those at the swing angle of `plane`.
 std::vector<DrawingObstacle> cut_obstacles(const std::vector<Obstacle>& obstacles,
                                            const DrawingPlane& plane);
 

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 
-/// The smallest of 0.05, 0.1, 0.2, 0.5, 1, ... m that is at least `width`.
+/// Returns the smallest of 0.05, 0.1, 0.2, 0.5, 1, ... m that is at least `width` [m].
 double round_width(double width) {
   double decade = 0.01;
   while (true) {

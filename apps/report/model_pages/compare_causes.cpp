@@ -21,12 +21,12 @@ void add_bad_data(Page& page, const CompareResult& result) {
   table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
   for (const BadChannelOfLog& b : result.bad_data)
     table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
-  table.note = "No model explains these; repair or leave them out before anything is learned.";
+  table.note = "No model explains these channels; repair them or leave them out before learning.";
   page.table(std::move(table));
 }
 
-/// Own and inherited error as a share of what varies, so that kN and bar stand side by side. Squares, for those of
-/// causes that have nothing to do with each other add up, and RMS errors do not.
+/// Appends own and inherited error as shares of the measured variance, so that kN and bar can be compared. The shares
+/// are of squared errors, because squares of independent errors add up and RMS errors do not.
 void add_stages(Page& page, const CompareResult& result) {
   const std::vector<StageSplit>& stages = result.fault.stages;
   if (stages.empty()) return;
@@ -34,10 +34,10 @@ void add_stages(Page& page, const CompareResult& result) {
   BarChart chart;
   chart.title = "Own and inherited error of each stage";
   chart.note =
-      "Mean squared error as a share of the measured quantity's variance: at 100 a constant would "
-      "do as well. Own: with what the stage before gives taken as measured, beyond the sensor's "
-      "noise. Inherited: what the error of the stage before changes. What varies little has much "
-      "noise in it; that is no fault.";
+      "Mean squared error as a share of the measured quantity's variance; at 100 % a constant would "
+      "predict as well. Own: the error beyond the sensor's noise when the input from the stage "
+      "before is the measured one. Inherited: the change when that input is the predicted one. A "
+      "quantity that varies little has a large share of noise, which is no fault of the model.";
   chart.value_axis = {"squared error", "%"};
   const auto n = static_cast<Index>(stages.size());
   BarSeries own{"own", VectorXd(n)}, inherited{"inherited", VectorXd(n)};
@@ -48,7 +48,7 @@ void add_stages(Page& page, const CompareResult& result) {
     const auto share = [&s](double rms) {
       return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
     };
-    // where a law makes up for what it inherits, what is left of both is what there is to see
+    // Where a law compensates the error that it inherits, the remaining error of both is drawn.
     const double own_error = s.makes_up() ? s.error : s.own;
     noise.values[i] = share(std::min(s.noise, own_error));
     own.values[i] = share(own_error) - noise.values[i];
@@ -63,8 +63,9 @@ void add_stages(Page& page, const CompareResult& result) {
   for (const StageSplit& s : stages)
     table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
   table.note =
-      "RMS. Where own and inherited errors are related, their squares do not add up; where they "
-      "cancel, the law was learned with the wrong force and makes up for it (drawn: what is left).";
+      "RMS. Where own and inherited errors are correlated, their squares do not add up; where they "
+      "cancel, the law was learned with the wrong force and compensates it (the remaining error is "
+      "drawn).";
   table.highlighted_row = result.fault.fault;
   page.table(std::move(table));
 }
@@ -75,17 +76,17 @@ void add_tests(Page& page, const CompareResult& result) {
   if (tests.tests.empty()) return;
   if (tests.smallest_p() > kAlarm) {
     page.paragraph(fmt::format(
-        "Nothing in the error repeats: {} tests of bias and of dependence on signals, over {} "
-        "blocks of motion, found nothing that noise of the same colour would not show.",
+        "No part of the error is systematic: {} tests of bias and of dependence on signals, over {} "
+        "blocks of motion, found no more than autocorrelated noise would show.",
         tests.tested, tests.blocks));
     return;
   }
   Table table;
-  table.title = "What repeats in the error";
+  table.title = "Systematic errors";
   table.columns = {
       {"finding"}, {"of the error", "%", 2}, {"p", "", 2}, {"independent samples", "", 3}};
   BarChart chart;
-  chart.title = "Share of the error that repeats";
+  chart.title = "Share of the error that is systematic";
   chart.width = FigureWidth::kHalf;
   chart.value_axis = {"of the squared error", "%"};
   std::vector<double> shares;
@@ -99,8 +100,9 @@ void add_tests(Page& page, const CompareResult& result) {
     shares.push_back(100.0 * t.share_explained);
   }
   table.note = fmt::format(
-      "Signs of whole blocks of motion are flipped at random ({} blocks, {} tests together): the "
-      "chance that noise alone, however coloured, brings even one line here is {:.0f} %.",
+      "The signs of whole blocks of motion are flipped at random ({} blocks, {} tests together); the "
+      "chance that noise alone, whatever its autocorrelation, gives even one line of this table is "
+      "{:.0f} %.",
       tests.blocks, tests.tested, 100.0 * kAlarm);
   chart.series = {
       {"explained", Eigen::Map<VectorXd>(shares.data(), static_cast<Index>(shares.size()))}};
@@ -108,7 +110,7 @@ void add_tests(Page& page, const CompareResult& result) {
   page.table(std::move(table));
 }
 
-/// The stage at fault, or the first, by regime; the others are in the machine-readable result.
+/// Appends the errors by regime of the stage at fault, or of the first stage; the JSON result has all stages.
 void add_regimes(Page& page, const CompareResult& result) {
   if (result.regimes.empty()) return;
   std::string stage = result.regimes.front().stage, at = result.regimes.front().at;
@@ -141,8 +143,8 @@ void add_regimes(Page& page, const CompareResult& result) {
   if (values.empty()) return;
   chart.series = {{"RMSE", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size()))}};
   table.note =
-      "Intervals by bootstrap of whole blocks of motion. All quantities are in the "
-      "machine-readable result.";
+      "Intervals are from a bootstrap of whole blocks of motion. The JSON result (--json) has all "
+      "quantities.";
   page.plot(std::move(chart));
   page.table(std::move(table));
 }

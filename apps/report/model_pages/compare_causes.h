@@ -1,5 +1,5 @@
 #pragma once
-/// The part of a comparison's page that says where, when and in which regimes its error arises.
+/// The part of a comparison's page that shows at which stage, when and in which regimes the error arises.
 #include <string>
 
 #include "apps/report/page/page.h"
@@ -7,8 +7,8 @@
 
 namespace sparflow {
 
-/// Own against inherited error of each stage, what repeats, errors by regime, worst motions, bad channels; each with a
-/// figure or a table. Nothing where the comparison looked for no causes.
+/// Appends, each as a figure or a table: own and inherited error of each stage, systematic errors, errors by regime,
+/// worst motions, bad channels. Appends nothing when the comparison was made without a search for causes.
 void add_causes(Page& page, const CompareResult& result, const std::string& heading_prefix);
 
 }  // namespace sparflow

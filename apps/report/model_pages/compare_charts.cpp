@@ -13,15 +13,14 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr std::size_t kMostCurveCharts = 40;  // more than anybody scrolls through
+constexpr std::size_t kMostCurveCharts = 40;  // keeps the page readable and small
 const char* const kCurvesExplained =
     "Only samples that count in the scores are drawn. Bands: \u00B12 standard deviations of one "
-    "measurement. Shaded: "
-    "the regions named above. Drag to zoom; all charts of a log follow.";
+    "measurement. Shaded: the regions named above. Drag to zoom; all charts of a log zoom together.";
 
 bool compared(const ComparedSeries& s) { return s.measured.array().isFinite().any(); }
 
-/// Samples of one log that lie in a region found by the comparison.
+/// Marks the samples of one log that lie in a region found by the comparison.
 Mask in_region(const Machine& machine, const MachineSignals& signals, const ComparedSeries& series,
                const WorstRegion& region) {
   Mask inside(series.measured.size());
@@ -39,7 +38,7 @@ Mask in_region(const Machine& machine, const MachineSignals& signals, const Comp
   return inside;
 }
 
-/// Stretches of time inside, those nearer than half a second joined, the longest 40 of them.
+/// Stretches of time in which `inside` is set; those less than half a second apart are joined, the longest 40 kept.
 std::vector<Span> spans_of(const Mask& inside, const VectorXd& time) {
   constexpr double kJoin = 0.5;  // [s]
   constexpr std::size_t kMost = 40;
@@ -164,15 +163,15 @@ void add_compared_curves(Page& page, const Machine& machine, const CompareResult
   }
   if (left_out > 0) {
     page.paragraph(fmt::format(
-        "{} more charts are left out to keep the page small: compare fewer logs at a time to "
-        "see them.",
+        "{} more charts are left out to keep the page small; compare fewer logs at a time to see "
+        "them.",
         left_out));
   }
 }
 
 void add_working_area(Page& page, const Machine& machine, const CompareResult& result,
                       const std::string& heading_prefix) {
-  constexpr double kFlat = 0.02;  // [m] an area less high or wide is a line
+  constexpr double kFlat = 0.02;  // [m] an area less high or wide counts as a line
   bool heading = false;
   for (const ComparedQuantity& quantity : compared_quantities(result)) {
     std::vector<Eigen::Vector2d> tip;
@@ -218,9 +217,8 @@ void add_working_area(Page& page, const Machine& machine, const CompareResult& r
     if (!heading) {
       page.section(heading_prefix + "Error over the working area");
       page.paragraph(
-          "Root mean square of predicted \u2212 measured by position of the tip. The crane stands "
-          "where the error is "
-          "largest.");
+          "Root mean square of predicted \u2212 measured over the positions of the tip. The crane is "
+          "drawn where the error is largest.");
       heading = true;
     }
     page.plot(std::move(map));

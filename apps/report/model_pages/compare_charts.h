@@ -13,35 +13,37 @@ namespace sparflow {
 struct ComparedQuantity {
   std::string stage, at;
   std::string words;  ///< "force of boom"
-  FieldUnit unit;     ///< to draw it in: kN where its own would need five digits
+  FieldUnit unit;     ///< of the charts: kN where N would need five digits
   /// The log and its curves, both owned by the result.
   std::vector<std::pair<const LogComparison*, const ComparedSeries*>> logs;
 };
 
-/// In the order of the stages, those without a single compared sample left out. The result must outlive them.
+/// Lists the quantities in the order of the stages, without those that have no compared sample.
+/// @param result must outlive the list, which points into it
 std::vector<ComparedQuantity> compared_quantities(const CompareResult& result);
 
-/// With a capital letter, for titles.
+/// Returns the text with a capital first letter, for titles.
 std::string capitalised(std::string text);
 
-/// "force of boom", "working pressure of boom", "pressure of pump main"
+/// Names a quantity: "force of boom", "working pressure of boom", "pressure of pump main".
 std::string quantity_words(const std::string& stage, const std::string& at);
 
-/// Measured and predicted over time, a section a log; the worst regions' times are shaded.
+/// Appends measured and predicted curves over time, one section for each log; the worst regions are shaded.
 void add_compared_curves(Page& page, const Machine& machine, const CompareResult& result,
                          const std::string& heading_prefix);
 
-/// Residual against the signals that explain most of it, the quantity (stage, at) first and with more of them.
+/// Appends residuals against the signals that explain most of them; the quantity (stage, at) comes first and has more
+/// charts than the others.
 void add_residuals(Page& page, const Machine& machine, const CompareResult& result,
                    const std::string& stage, const std::string& at);
 
-/// A section of RMS residuals over the tip's positions, the crane drawn where they are largest. Nothing where it
-/// moves along a line only.
+/// Appends a section of RMS residuals over the tip's positions, with the crane drawn where they are largest. A quantity
+/// whose tip positions lie on a line gets no map.
 void add_working_area(Page& page, const Machine& machine, const CompareResult& result,
                       const std::string& heading_prefix);
 
-/// Share of the variance of `y` that the means of equally filled bins of `x` explain, corrected for the
-/// number of bins (0 expected from noise; Ezekiel's adjusted R^2), 0..1. Samples with a NaN are left out; 0
+/// Share (0..1) of the variance of `y` that the means of equally filled bins of `x` explain, corrected for the
+/// number of bins (0 expected from noise; Ezekiel's adjusted R^2). Samples with a NaN are left out; 0
 /// with fewer than 40 of them.
 double share_explained(const Eigen::VectorXd& x, const Eigen::VectorXd& y);
 

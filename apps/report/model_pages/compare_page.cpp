@@ -14,7 +14,7 @@
 namespace sparflow {
 namespace {
 
-/// RMSE in the unit it reads best in: {"20.3", "kN"}.
+/// RMSE in the unit that keeps it short: {"20.3", "kN"}.
 std::pair<std::string, std::string> error_text(const StageScore& s) {
   if (s.unit.name == "N" && s.rmse >= 1e3) return {display_number(s.rmse / 1e3, 3), "kN"};
   return {display_number(s.rmse / s.unit.si, 3), s.unit.name};
@@ -34,7 +34,7 @@ std::string stage_words(const std::string& stage) {
   return stage;
 }
 
-/// Rounded to a step, so that what is nothing reads as 0.
+/// Rounds to a multiple of `step`, so that rounding errors are shown as 0.
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
 std::string signed_percent(double share) {
@@ -60,7 +60,7 @@ void add_tiles(Page& page, const CompareResult& result, const std::vector<Judged
          std::isfinite(e.relative_error)
              ? fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
                            display_number(e.measured / 1e3, 4))
-             : fmt::format("nothing was delivered in {:.1f} s: no cylinder is driven", e.duration),
+             : fmt::format("the pump delivered nothing in {:.1f} s: no cylinder is driven", e.duration),
          judge_energy(e)});
   }
   if (!tiles.empty()) page.tiles(std::move(tiles));
@@ -84,10 +84,10 @@ void add_scores(Page& page, const std::vector<JudgedScore>& judged) {
                           static_cast<double>(s.n), std::string(tone_word(j.tone))});
   }
   table.note =
-      "Samples in which the cylinder moves (a pump: any cylinder it serves). Bias: mean of "
+      "Only samples in which the cylinder moves (for a pump: any of its cylinders). Bias: mean of "
       "predicted \u2212 measured. "
-      "Fit: 100 % when nothing is left, 0 % when a constant would do as well; noise alone keeps it "
-      "below 100 %. ";
+      "Fit: 100 % when there is no error, 0 % when a constant would predict as well; noise alone "
+      "keeps it below 100 %. ";
   if (intervals) table.note += "Inside: share of samples within the model's own 95 % interval. ";
   table.note += kJudgementRule;
   if (!table.rows.empty()) page.table(std::move(table));
@@ -101,7 +101,7 @@ void add_energy(Page& page, const CompareResult& result) {
                    {"measured", "kJ", 5},
                    {"predicted", "kJ", 5},
                    {"error", "%", 3},
-                   {"from commands alone", "kJ", 5},
+                   {"from commands only", "kJ", 5},
                    {"time", "s", 4}};
   for (const EnergyScore& e : result.energy) {
     table.rows.push_back(
@@ -110,9 +110,8 @@ void add_energy(Page& page, const CompareResult& result) {
          e.duration});
   }
   table.note =
-      "Pressure times flow over time. The flow is that of the measured speeds, in both columns; "
-      "\"from commands "
-      "alone\" takes it from the valve gains instead.";
+      "Integral of pressure times flow. Measured and predicted use the flow of the measured speeds; "
+      "\"from commands only\" uses commands and valve gains instead.";
   page.table(std::move(table));
 }
 
@@ -120,12 +119,12 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
   page.section(prefix + "Where it fails");
   if (result.worst.empty()) {
     page.paragraph(
-        "No region stands out: what error there is lies evenly over poses, speeds and loads, as "
-        "noise does.");
+        "No region stands out: the error is spread evenly over postures, speeds and loads, as noise "
+        "is.");
     return;
   }
   Table table;
-  table.title = "Regions with the most error for their size";
+  table.title = "Regions with the largest error for their size";
   table.columns = {{"stage"},       {"where"}, {"of the error", "%", 2}, {"of the samples", "%", 2},
                    {"RMSE", "", 3}, {"unit"}};
   for (const WorstRegion& w : result.worst) {
@@ -133,14 +132,13 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
                           100.0 * w.share_of_samples, w.rmse, w.unit});
   }
   table.note =
-      "Shares are of the squared error. One region at most for each cylinder and direction; the "
-      "curves below are "
-      "shaded where the log passes through one.";
+      "Shares are of the squared error. There is at most one region for each cylinder and direction; "
+      "the curves below are shaded where the log passes through one.";
   page.table(std::move(table));
 }
 
 /// "force 2.3 kN, working pressure 0.9 bar, energy of main +0.40 %"
-std::string in_short(const CompareResult& result, const std::vector<JudgedScore>& judged) {
+std::string worst_errors(const CompareResult& result, const std::vector<JudgedScore>& judged) {
   std::string text;
   for (const JudgedScore& j : worst_of_stages(judged)) {
     const auto [value, unit] = error_text(j.score);
@@ -154,7 +152,7 @@ std::string in_short(const CompareResult& result, const std::vector<JudgedScore>
   return text;
 }
 
-/// How the error of one quantity is spread, in whole sentences.
+/// Describes in whole sentences how the error of one quantity is distributed.
 std::string where_it_fails(const CompareResult& result, const StageScore& worst) {
   std::string text;
   if (std::abs(worst.bias) > 0.5 * worst.rmse) {
@@ -166,8 +164,8 @@ std::string where_it_fails(const CompareResult& result, const StageScore& worst)
   const auto region = std::find_if(
       result.worst.begin(), result.worst.end(),
       [&](const WorstRegion& w) { return w.stage == worst.stage && w.at == worst.at; });
-  if (region != result.worst.end()) return text + "It fails most here: " + region->sentence + ". ";
-  text += "Its error is spread over all poses, speeds and loads. ";
+  if (region != result.worst.end()) return text + "Its error is largest here: " + region->sentence + ". ";
+  text += "Its error is spread over all postures, speeds and loads. ";
   if (!result.worst.empty()) text += "Elsewhere: " + result.worst.front().sentence + ". ";
   return text;
 }
@@ -185,7 +183,7 @@ const char* bad_words(BadDataKind kind) {
     case BadDataKind::kSaturated:
       return "is cut off";
     case BadDataKind::kWild:
-      return "has wild samples";
+      return "has single samples far off";
   }
   return "";
 }
@@ -194,7 +192,7 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
   const JudgedScore* worst = worst_score(judged);
   if (worst == nullptr) {
     page.verdict(Tone::kWarning, "Nothing could be compared",
-                 "The notes below say which columns the log would need.");
+                 "The notes below name the columns that the log lacks.");
     return;
   }
   Tone tone = worst->tone;
@@ -213,10 +211,10 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
     text = where_it_fails(result, s);
   } else {
     if (tone != Tone::kGood)
-      headline = "The model follows the measurements, but its energy does not";
+      headline = "The model follows the measurements, except for the energy";
     text = result.worst.empty()
-               ? "No region of poses, speeds or loads stands out. "
-               : "What error there is lies most here: " + result.worst.front().sentence + ". ";
+               ? "No region of postures, speeds or loads stands out. "
+               : "The error is largest here: " + result.worst.front().sentence + ". ";
   }
   if (!result.bad_data.empty()) {
     tone = Tone::kBad;
@@ -227,7 +225,7 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
   if (!result.fault.sentence.empty()) text = result.fault.sentence + " " + text;
   page.verdict(tone, headline,
                text + fmt::format("RMS error at the worst place of each stage: {}.",
-                                  in_short(result, judged)));
+                                  worst_errors(result, judged)));
 }
 
 }  // namespace
@@ -247,11 +245,10 @@ void add_comparison(Page& page, const CraneModel& model, const CompareResult& re
   add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");
   page.paragraph(
-      "Of each quantity, the signals that explain most of its error, with the median of each "
-      "direction. A median that "
-      "leaves zero is an error that repeats: physics that the model lacks. Two medians a constant "
-      "apart are what "
-      "friction leaves. A cloud about zero is noise.");
+      "For each quantity: its error against the signals that explain most of it, with the median of "
+      "each direction. A median that differs from zero is a systematic error, so the model lacks a "
+      "physical effect. Two medians with a constant difference indicate friction. A cloud about "
+      "zero is noise.");
   const JudgedScore* worst = worst_score(judged);
   add_residuals(page, model.machine, result, worst->score.stage, worst->score.at);
   add_compared_curves(page, model.machine, result, heading_prefix);

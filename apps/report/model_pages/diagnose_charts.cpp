@@ -15,15 +15,15 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kStretchSeconds = 30.0;  // of a log, as much as the eye can compare
+constexpr double kStretchSeconds = 30.0;  // [s] length of a stretch in which curves can still be compared by eye
 constexpr std::size_t kMostRanked = 10, kFewestRanked = 3;
-constexpr std::size_t kMostChannels = 2;  // of an effect that shows in several
+constexpr std::size_t kMostChannels = 2;  // drawn of an effect that acts in several
 
 bool suspect_row(const Evidence& evidence, const EvidenceChannel& channel, std::size_t block) {
   return static_cast<std::size_t>(channel.log[block]) < evidence.suspects;
 }
 
-/// The kind of signal that shows this effect best.
+/// The kind of signal against which the residual of this effect has its typical form; "" when none is known.
 std::string shows_against(const Effect& effect) {
   static const std::map<std::string, std::string> known = {
       {"coulomb_friction", "speed"},
@@ -58,13 +58,13 @@ std::string shows_against(const Effect& effect) {
   return at == known.end() ? "" : at->second;
 }
 
-/// The telling signal: the kind made for this effect where it tells at least half of what the best one does.
-const TellingSignal* choose(const std::vector<TellingSignal>& signals, const VectorXd& residual,
+/// Chooses a signal of the preferred kind where it explains at least half as much as the best signal, else the best.
+const ExplainingSignal* choose(const std::vector<ExplainingSignal>& signals, const VectorXd& residual,
                             const std::string& preferred) {
-  const TellingSignal* best = nullptr;
-  const TellingSignal* own = nullptr;
+  const ExplainingSignal* best = nullptr;
+  const ExplainingSignal* own = nullptr;
   double most = -1.0, most_own = -1.0;
-  for (const TellingSignal& s : signals) {
+  for (const ExplainingSignal& s : signals) {
     const double share = share_explained(s.values, residual);
     if (share > most) most = share, best = &s;
     if (s.id == preferred && share > most_own) most_own = share, own = &s;
@@ -88,10 +88,10 @@ Quantity axis_of(const EvidenceChannel& channel, const std::string& unit) {
           unit};
 }
 
-/// Rows of a stretch of one log, blocks apart.
+/// Draws measurement and model over the stretch of one log in which the effect shows most, with gaps between blocks.
 LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string& effect) {
   const EvidenceChannel& channel = *p.channel;
-  // best stretch over all suspect logs: each log's rows in time order
+  // The rows of each suspect log are in the order of time; the best stretch of all logs is kept.
   std::vector<Index> rows;
   std::size_t best_log = 0;
   double most = -1.0;
@@ -124,7 +124,7 @@ LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string&
   const double gap = 3.0 * d.evidence.stride * log.step;
   for (const Index r : rows) {
     const double t = log.time[channel.sample[static_cast<std::size_t>(r)]];
-    if (!time.empty() && t - time.back() > gap) {  // rest in between is not evidence
+    if (!time.empty() && t - time.back() > gap) {  // no row there: the machine rests
       time.push_back(time.back() + 0.5 * (t - time.back()));
       for (auto* column : {&measured, &without, &with}) column->push_back(kNaN);
     }
@@ -146,17 +146,17 @@ LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string&
   chart.series.push_back(
       {"model with " + effect, column(with) / unit.si, LineStyle::kPredicted, 2, {}, {}});
   chart.note =
-      fmt::format("The {:.0f} s in which the effect shows most. Gaps: nothing is compared there.",
+      fmt::format("The {:.0f} s in which the effect shows most. Nothing is compared in the gaps.",
                   kStretchSeconds);
   return chart;
 }
 
-ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const TellingSignal& signal,
+ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const ExplainingSignal& signal,
                        bool both) {
   const EvidenceChannel& channel = *p.channel;
   const FieldUnit unit = shown_unit(channel, largest_of(p.without));
   ScatterChart chart;
-  chart.title = fmt::format("What is left of the {}, against {}", channel.text, signal.words);
+  chart.title = fmt::format("Residual of the {} against {}", channel.text, signal.words);
   chart.x_axis = {signal.words, signal.unit};
   chart.y_axis = {"measured \u2212 model", unit.name};
   chart.trend = true;
@@ -174,8 +174,8 @@ ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const Tellin
     return VectorXd(Eigen::Map<const VectorXd>(v.data(), n));
   };
   if (both) chart.groups.push_back({"without the effect", column(x), column(without)});
-  chart.groups.push_back({both ? "with it" : "left over", column(x), column(with)});
-  chart.note = fmt::format("Lines: median in bins. {} explains {:.0f} % of what is left{}.",
+  chart.groups.push_back({both ? "with it" : "residual", column(x), column(with)});
+  chart.note = fmt::format("Lines: medians in bins. {} explains {:.0f} % of the residual's variance{}.",
                            capitalised(signal.words),
                            100.0 * share_explained(column(x), column(both ? without : with)),
                            both ? fmt::format(" without the effect, {:.0f} % with it",
@@ -184,8 +184,8 @@ ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const Tellin
   return chart;
 }
 
-/// What is left over time, in the longest block: a swing is seen there and against no signal.
-LineChart left_over_time(const Diagnosis& d, const ChannelPicture& p) {
+/// Draws the residual over time in the longest block, since an oscillation does not show against a signal.
+LineChart residual_over_time(const Diagnosis& d, const ChannelPicture& p) {
   const EvidenceChannel& channel = *p.channel;
   std::size_t longest = 0;
   Index rows = 0;
@@ -194,7 +194,7 @@ LineChart left_over_time(const Diagnosis& d, const ChannelPicture& p) {
     if (suspect_row(d.evidence, channel, b) && n > rows) rows = n, longest = b;
   }
   LineChart chart;
-  chart.title = fmt::format("What is left of the {}, over time", channel.text);
+  chart.title = fmt::format("Residual of the {} over time", channel.text);
   if (rows == 0) return chart;
   const MachineSeries& log = d.evidence.series[static_cast<std::size_t>(channel.log[longest])];
   const FieldUnit unit = shown_unit(channel, largest_of(p.with));
@@ -204,13 +204,13 @@ LineChart left_over_time(const Diagnosis& d, const ChannelPicture& p) {
     chart.x[i] = log.time[channel.sample[row]];
   }
   chart.y_axis = {"measured \u2212 model", unit.name};
-  chart.series.push_back({"left over",
+  chart.series.push_back({"residual",
                           p.with.segment(channel.blocks[longest].first, rows) / unit.si,
                           LineStyle::kPredicted,
                           0,
                           {},
                           {}});
-  chart.note = "One motion, the longest without a gap.";
+  chart.note = "The longest motion without a gap.";
   return chart;
 }
 
@@ -224,8 +224,8 @@ void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
   for (std::size_t n = 0; n < channels.size(); ++n) {
     const ChannelPicture p = channel_picture(d, static_cast<int>(effect), channels[n]);
     LineChart over_time = curves(d, p, e.key());
-    const std::vector<TellingSignal> signals = telling_signals(d.evidence, *p.channel);
-    const TellingSignal* signal = choose(signals, p.without, shows_against(*e.effect.effect));
+    const std::vector<ExplainingSignal> signals = explaining_signals(d.evidence, *p.channel);
+    const ExplainingSignal* signal = choose(signals, p.without, shows_against(*e.effect.effect));
     if (n > 0) over_time.width = FigureWidth::kHalf;
     page.plot(std::move(over_time));
     if (signal == nullptr) continue;
@@ -235,23 +235,23 @@ void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
   }
 }
 
-void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, const std::string& at,
+void add_unexplained_residual(Page& page, const Diagnosis& d, const std::string& stage, const std::string& at,
                    bool swings) {
-  constexpr double kTells = 0.03;  // of the residual: less is no picture of anything
+  constexpr double kLeastShare = 0.03;  // [-] of the residual's variance, for a chart against a signal
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = d.evidence.channels[c];
     if (channel.at != at || evidence_stage(channel.kind) != stage) continue;
     const ChannelPicture p = channel_picture(d, -1, c);
-    if (swings) page.plot(left_over_time(d, p));
-    const std::vector<TellingSignal> signals = telling_signals(d.evidence, channel);
-    std::vector<std::pair<double, const TellingSignal*>> ranked;
+    if (swings) page.plot(residual_over_time(d, p));
+    const std::vector<ExplainingSignal> signals = explaining_signals(d.evidence, channel);
+    std::vector<std::pair<double, const ExplainingSignal*>> ranked;
     ranked.reserve(signals.size());
-    for (const TellingSignal& s : signals)
+    for (const ExplainingSignal& s : signals)
       ranked.emplace_back(share_explained(s.values, p.with), &s);
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     for (std::size_t i = 0; i < std::min<std::size_t>(2, ranked.size()); ++i) {
-      if (swings && ranked[i].first < kTells) continue;
+      if (swings && ranked[i].first < kLeastShare) continue;
       ScatterChart chart = residuals(d, p, *ranked[i].second, false);
       chart.width = FigureWidth::kHalf;
       page.plot(std::move(chart));
@@ -259,25 +259,25 @@ void add_left_over(Page& page, const Diagnosis& d, const std::string& stage, con
   }
 }
 
-void add_noise(Page& page, const Diagnosis& d) {
+void add_remaining_residuals(Page& page, const Diagnosis& d) {
   constexpr std::size_t kMostPictures = 4;
   struct Left {
     std::size_t channel;
-    double share;  // of the residual's variance that its strongest signal explains
-    TellingSignal signal;
+    double share;  // [-] of the residual's variance that `signal` explains
+    ExplainingSignal signal;
   };
   std::vector<Left> left;
   Table table;
-  table.title = "What is left of each quantity";
-  table.columns = {{"quantity"}, {"left, RMS", "", 3}, {"sensor noise", "", 3},
+  table.title = "Residual of each quantity";
+  table.columns = {{"quantity"}, {"residual, RMS", "", 3}, {"sensor noise", "", 3},
                    {"unit"},     {"strongest signal"}, {"it explains", "%", 2}};
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = d.evidence.channels[c];
     if (channel.rows() == 0) continue;
     const ChannelPicture p = channel_picture(d, -1, c);
     Left best{c, -1.0, {}};
-    for (TellingSignal& s : telling_signals(d.evidence, channel)) {
-      // the error of a speed goes with the noise of that speed, whatever the model
+    for (ExplainingSignal& s : explaining_signals(d.evidence, channel)) {
+      // The noise of a measured speed correlates with its own error, whatever the model.
       const bool same_sensor = s.id == "speed" || s.id == "acceleration" || s.id.ends_with("flow");
       if (channel.kind == EvidenceKind::kFlow && same_sensor) continue;
       const double share = share_explained(s.values, p.with);
@@ -292,11 +292,11 @@ void add_noise(Page& page, const Diagnosis& d) {
     if (best.share >= 0.0) left.push_back(std::move(best));
   }
   if (table.rows.empty()) return;
-  page.section("What is left");
+  page.section("Residuals");
   table.note =
-      "Error of the model with the smooth laws these logs allow, filtered as the evidence is. "
-      "Strongest signal: the one "
-      "that explains most of it in bins; some per cent are chance.";
+      "Residual of the model after its pressure models were fitted to these logs, filtered as the "
+      "evidence is. Strongest signal: the one that explains most of the variance in bins; a few per "
+      "cent are chance.";
   page.table(std::move(table));
   std::stable_sort(left.begin(), left.end(),
                    [](const Left& a, const Left& b) { return a.share > b.share; });
@@ -316,22 +316,22 @@ LineChart bad_channel_chart(const BadChannel& bad) {
   chart.series.push_back({"as logged", bad.values, LineStyle::kPlain, 0, {}, {}});
   std::string word = bad_data_word(bad.kind);
   std::replace(word.begin(), word.end(), '_', ' ');
-  const double thinnest = bad.time.size() > 1  // one sample would not be seen
+  const double thinnest = bad.time.size() > 1  // A single sample would be too thin to be seen.
                               ? 0.002 * (bad.time[bad.time.size() - 1] - bad.time[0])
                               : 0.0;
   for (const auto& [from, to] : bad.stretches) {
     const double more = std::max(0.0, 0.5 * (thinnest - (to - from)));
     chart.spans.push_back({from - more, to + more, chart.spans.empty() ? word : ""});
   }
-  chart.note = fmt::format("Shaded: where it is {}.", word);
+  chart.note = fmt::format("Shaded: the channel is {} there.", word);
   return chart;
 }
 
 void add_ranking(Page& page, const Diagnosis& d) {
   if (d.ranking.empty()) return;
   BarChart chart;
-  chart.title = "How much each single effect explains";
-  chart.value_axis = {"gain in log likelihood", "nats"};
+  chart.title = "Gain of each single effect";
+  chart.value_axis = {"gain in log-likelihood", "nats"};
   std::vector<double> values;
   for (const auto& [key, gain] : d.ranking) {
     if (values.size() == kMostRanked) break;
@@ -346,10 +346,10 @@ void add_ranking(Page& page, const Diagnosis& d) {
   chart.series.push_back(
       {"gain", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size()))});
   chart.note =
-      "Each candidate alone in the model, less half a log of the sample size for each parameter. "
-      "One that stands for another (friction of one kind for another kind) gains as well until "
-      "the right one is in. The last bar: what the best of all candidates reaches on data with "
-      "nothing missing in one case of twenty.";
+      "Gain with this candidate alone in the model, less half the logarithm of the sample size for "
+      "each parameter. A candidate similar to the missing effect (another kind of friction) gains "
+      "too until the right one is in the model. The last bar is the threshold of the gain: where "
+      "nothing is missing, the best candidate reaches it in one case of twenty.";
   page.plot(std::move(chart));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The pictures that prove a diagnosis: measured against the model with and without an effect, and what is left
-/// against the signal that tells.
+/// The figures of a diagnosis: measurement beside the model with and without an effect, and residuals against the
+/// signals that explain most of them.
 #include <string>
 #include <vector>
 
@@ -9,43 +9,45 @@
 
 namespace sparflow {
 
-/// One evidence channel's rows with everything that was found, and without one effect. SI.
+/// Rows of one evidence channel with all effects found, and without one of them. SI.
 struct ChannelPicture {
   const EvidenceChannel* channel = nullptr;
-  Eigen::VectorXd measured;  ///< [rows] filtered as the evidence is
+  Eigen::VectorXd measured;  ///< [rows] measured quantity, from Evidence::series
   Eigen::VectorXd with;      ///< [rows] residual with all effects found
-  Eigen::VectorXd without;   ///< [rows] the same without the one
+  Eigen::VectorXd without;   ///< [rows] residual without that effect
 };
 
 /// @param effect index into diagnosis.effects, -1: `without` has none of them
 /// @param channel index into diagnosis.evidence.channels
 ChannelPicture channel_picture(const Diagnosis& diagnosis, int effect, std::size_t channel);
 
-/// A signal a residual may depend on, at the rows of a channel, in the unit beside it.
-struct TellingSignal {
-  std::string id;  ///< "speed", "load", "angle" ...: what kind of signal
+/// A signal that a residual may depend on, at the rows of a channel, in the unit named here.
+struct ExplainingSignal {
+  std::string id;  ///< kind of the signal: "speed", "load", "angle" ...
   std::string words, unit;
   Eigen::VectorXd values;  ///< [rows]
 };
-std::vector<TellingSignal> telling_signals(const Evidence& evidence,
-                                           const EvidenceChannel& channel);
+/// Lists the signals of the channel's place that the logs measure.
+std::vector<ExplainingSignal> explaining_signals(const Evidence& evidence,
+                                                 const EvidenceChannel& channel);
 
-/// Curves over a well-chosen stretch of time, and residuals against the telling signal.
+/// Appends curves over the stretch of time in which the effect shows most, and residuals against the signal that
+/// explains them.
 void add_effect_pictures(Page& page, const Diagnosis& diagnosis, std::size_t effect);
 
-/// What is left at a place against the two signals that explain most of it.
-/// @param swings it goes with the time: drawn over it, and against signals only where these tell something
-void add_left_over(Page& page, const Diagnosis& diagnosis, const std::string& stage,
+/// Appends the residual at a place against the two signals that explain most of it.
+/// @param swings the residual oscillates: it is also drawn over time, and against signals only where these explain some
+void add_unexplained_residual(Page& page, const Diagnosis& diagnosis, const std::string& stage,
                    const std::string& at, bool swings);
 
-/// Where nothing is missing: how large each quantity's error is beside its sensors' noise, and pictures of those that a
-/// signal explains most of, for eyes to find nothing.
-void add_noise(Page& page, const Diagnosis& diagnosis);
+/// Appends, for a diagnosis without missing effects, each quantity's residual beside its sensors' noise, and charts of
+/// the residuals of which a signal explains most, so that the reader can check that no structure is left.
+void add_remaining_residuals(Page& page, const Diagnosis& diagnosis);
 
-/// A bad channel over time as logged, where it is bad shaded.
+/// Draws a bad channel over time as logged; the stretches where it is bad are shaded.
 LineChart bad_channel_chart(const BadChannel& bad);
 
-/// Gains of the candidates, and what chance would reach.
+/// Appends the gains of the candidates beside the gain that chance alone reaches.
 void add_ranking(Page& page, const Diagnosis& diagnosis);
 
 }  // namespace sparflow

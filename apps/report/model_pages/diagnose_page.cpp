@@ -15,7 +15,7 @@
 namespace sparflow {
 namespace {
 
-constexpr std::size_t kMostBadPictures = 4;  // the worst; the table has all
+constexpr std::size_t kMostBadPictures = 4;  // of the first channels; the table has all
 
 Tone tone_of(Verdict verdict) {
   switch (verdict) {
@@ -49,7 +49,7 @@ std::string channel_words(const Diagnosis& d, const ChannelGain& g) {
   return d.evidence.channels[g.channel].text;
 }
 
-/// "force of boom 4.1 -> 0.62 kN on motions left out (noise 0.55)"
+/// "force of boom 4.1 -> 0.62 kN, sensor noise 0.55"
 std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
   const FieldUnit& unit = d.evidence.channels[g.channel].unit;
   const auto [before, name] = readable_error(g.rmse_before, unit);
@@ -70,19 +70,17 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
       text += fmt::format("; error of the {}", gain_text(d, e.channels.front()));
     text += ". ";
   }
-  for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline has the first
+  for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline names the first
     if (i > 0) text += sentence(bad_channel_sentence(d.bad[i])) + " ";
   }
   if (d.verdict == Verdict::kUnknown)
     text +=
-        "Nothing is to be added to the model before its cause is known: see below what it goes "
-        "with.";
+        "Do not add anything to the model before the cause is known; the signals on which the "
+        "residual depends are shown below.";
   if (d.verdict == Verdict::kNone) {
-    text += fmt::format("What the model leaves is what chance leaves (p = {:.2g}). ", d.p_value);
+    text += fmt::format("The residuals contain no more than noise would (p = {:.2g}). ", d.p_value);
   } else if (d.verdict == Verdict::kMissing) {
-    text +=
-        fmt::format("Chance of such evidence with nothing missing: {}.",
-                    d.p_value < 0.005 ? "below 0.5 %" : fmt::format("{:.1f} %", 100 * d.p_value));
+    text += fmt::format("Chance of such evidence if no effect were missing: {}.", d.p_value_text());
   }
   page.verdict(tone_of(d.verdict), sentence(d.headline()), text);
 }
@@ -106,10 +104,10 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                           std::round(100.0 * e.absorbed)});
   }
   table.note =
-      "Probability: that it is this effect, not chance nor a rival. Gain: logarithm of how much "
-      "more probable these logs are with it than without. Motions left out: estimated on some "
-      "motions, how much better it predicts the others, in standard errors of that. Absorbed: the "
-      "share that a model fitted anew on these logs would swallow.";
+      "Probability: that it is this effect, and neither chance nor a rival. Gain: increase of the "
+      "log-likelihood of these logs by the effect. Motions left out: gain on motions that took no "
+      "part in the estimate, in its standard errors. Absorbed: the share of the signature that "
+      "pressure models fitted again on these logs would take over.";
   page.table(std::move(table));
 
   Table errors;
@@ -126,11 +124,11 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                              std::isfinite(g.noise_floor) ? g.noise_floor * scale : kNaN, name});
     }
   }
-  errors.note = "RMS, all other effects found are in the model in both columns.";
+  errors.note = "RMS. All other effects found are in the model in both columns.";
   if (!errors.rows.empty()) page.table(std::move(errors));
 }
 
-void add_proofs(Page& page, const Machine& machine, const Diagnosis& d) {
+void add_evidence(Page& page, const Machine& machine, const Diagnosis& d) {
   for (std::size_t i = 0; i < d.effects.size(); ++i) {
     const DiagnosedEffect& e = d.effects[i];
     page.section(capitalised(title_of(machine, e)));
@@ -141,24 +139,24 @@ void add_proofs(Page& page, const Machine& machine, const Diagnosis& d) {
     if (e.rivals.empty()) continue;
     std::string rivals;
     for (const auto& [key, worse] : e.rivals)
-      rivals += fmt::format("{}{} ({:.1f} nats worse)", rivals.empty() ? "" : ", ", key, worse);
-    page.paragraph("Rivals that could stand in its place: " + rivals + ".");
+      rivals += fmt::format("{}{} ({:.1f} nats less gain)", rivals.empty() ? "" : ", ", key, worse);
+    page.paragraph("Rivals that explain the residuals in its place: " + rivals + ".");
   }
 }
 
 void add_sets(Page& page, const Diagnosis& d) {
   if (d.indistinguishable.empty()) return;
-  page.section("What these logs cannot tell apart");
+  page.section("Indistinguishable sets");
   for (std::size_t i = 0; i < d.indistinguishable.size(); ++i) {
     page.paragraph("One of: " + joined(d.indistinguishable[i], ", ") +
-                   ". These logs fit all of them equally well.");
+                   ". All of them explain these logs equally well.");
     if (i >= d.experiments.size()) continue;
     const Experiment& e = d.experiments[i];
     page.paragraph(capitalised(sentence(e.sentence())));
     if (!(e.nats_per_minute > 0.0)) continue;
     page.paragraph(fmt::format(
-        "A minute of that motion is worth {:.2g} nats of likelihood, the wrong ones of the set "
-        "would lose as much; a minute of the logs at hand {:.2g}. Told apart means 4.",
+        "A minute of that motion lowers the log-likelihood of the wrong effects of the set by {:.2g} "
+        "nats, a minute of these logs by {:.2g}. Effects count as distinguished from 4 nats on.",
         e.nats_per_minute, e.nats_here));
   }
 }
@@ -166,32 +164,32 @@ void add_sets(Page& page, const Diagnosis& d) {
 void add_unexplained(Page& page, const Diagnosis& d) {
   if (!d.unexplained) return;
   const Unexplained& u = *d.unexplained;
-  page.section(u.few_places ? "What happened too seldom to prove a law"
-                            : "What nothing in the catalogue explains");
+  page.section(u.few_places ? "Isolated event"
+                            : "Unmodelled structure in the residual");
   page.paragraph(sentence(u.sentence));
   if (u.rmse > 0.0 && u.unit.si > 0.0) {
     const auto [rmse, name] = readable_error(u.rmse, u.unit);
     std::string text =
-        fmt::format("At the {} stage of {}: {} {} RMS are left", u.stage,
+        fmt::format("At the {} stage of {} the residual is {} {} RMS", u.stage,
                     u.at.empty() ? "the machine" : u.at, display_number(rmse, 3), name);
     if (std::isfinite(u.noise_floor))
-      text += fmt::format(", the sensors' noise is {}",
+      text += fmt::format(", the sensors' noise {}",
                           display_number(u.noise_floor * rmse / u.rmse, 2));
     page.paragraph(text + ".");
   }
   if (!u.depends_on.empty() && !u.few_places)
-    page.paragraph("It depends on: " + joined(u.depends_on, ", ") + ", strongest first.");
+    page.paragraph("It depends on: " + joined(u.depends_on, ", ") + " (strongest first).");
   const bool swings =
       std::any_of(u.depends_on.begin(), u.depends_on.end(),
                   [](const std::string& s) { return s.find("Hz") != std::string::npos; });
-  add_left_over(page, d, u.stage, u.at, swings);
+  add_unexplained_residual(page, d, u.stage, u.at, swings);
 }
 
 void add_bad_data(Page& page, const Diagnosis& d) {
   if (d.bad.empty()) return;
   page.section("Bad data");
   Table table;
-  table.title = "Channels that no physics explains";
+  table.title = "Channels with faults of sensor or recording";
   table.columns = {
       {"channel"},  {"kind"},      {"from", "s", 4}, {"to", "s", 4}, {"of the log", "%", 2},
       {"evidence"}, {"what to do"}};
@@ -221,9 +219,9 @@ Page diagnose_page(const CraneModel& model, const Diagnosis& d, const ExtendResu
   add_bad_data(page, d);
   add_effects(page, machine, d);
   add_sets(page, d);
-  add_proofs(page, machine, d);
+  add_evidence(page, machine, d);
   add_unexplained(page, d);
-  if (d.verdict == Verdict::kNone) add_noise(page, d);
+  if (d.verdict == Verdict::kNone) add_remaining_residuals(page, d);
   if (!d.ranking.empty()) {
     page.section("Ranking");
     add_ranking(page, d);

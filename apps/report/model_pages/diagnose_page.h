@@ -1,12 +1,12 @@
 #pragma once
-/// A diagnosis as a page: verdict, effects with their proofs, what is left.
+/// The page of diagnose: verdict, effects with their evidence, unexplained residuals.
 #include "apps/report/page/page.h"
 #include "diagnosis/extension/extend.h"
 
 namespace sparflow {
 
-/// @param diagnosis must have been made of `model`, which must still live
-/// @param tested the effects found, added to the model and judged on test logs; may be null
+/// @param diagnosis made of `model`, which must outlive it
+/// @param tested result of adding the effects found to the model, judged on test logs; may be null
 Page diagnose_page(const CraneModel& model, const Diagnosis& diagnosis,
                    const ExtendResult* tested = nullptr);
 

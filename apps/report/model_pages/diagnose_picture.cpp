@@ -1,4 +1,4 @@
-// Numbers behind the pictures of a diagnosis: residuals with and without an effect, signals that may tell.
+// Data of the figures of a diagnosis: residuals with and without an effect, signals that may explain them.
 #include <cmath>
 
 #include "apps/report/model_pages/diagnose_charts.h"
@@ -12,6 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// What an effect with its estimated parameters adds to the channel's rows. SI.
 VectorXd contribution(const Evidence& evidence, const AppliedEffect& effect,
                       const EvidenceChannel& channel) {
   std::vector<double> linear, shape;
@@ -24,8 +25,8 @@ VectorXd contribution(const Evidence& evidence, const AppliedEffect& effect,
   return columns * Eigen::Map<const VectorXd>(linear.data(), columns.cols());
 }
 
-/// What the learned laws leave.
-VectorXd beside_baseline(const EvidenceChannel& channel, const VectorXd& y) {
+/// Residual of y after a least-squares fit of the channel's baseline.
+VectorXd residual_of_baseline(const EvidenceChannel& channel, const VectorXd& y) {
   if (channel.baseline.cols() == 0) return y;
   return y - channel.baseline * least_squares(channel.baseline, y);
 }
@@ -50,8 +51,9 @@ const VectorXd& measured_of(const MachineSeries& log, const EvidenceChannel& cha
   return log.pumps[i].pressure;
 }
 
-/// Values of a log's samples at the channel's rows.
-template <class Get>  // const VectorXd& (or VectorXd) from a MachineSeries; empty = not known
+/// Values of the logs' samples at the channel's rows; NaN where a log does not have them.
+/// @param get returns the samples of a MachineSeries, empty when they are not measured
+template <class Get>
 VectorXd at_rows(const Evidence& evidence, const EvidenceChannel& channel, const Get& get) {
   std::vector<VectorXd> by_log;
   for (const MachineSeries& log : evidence.series) by_log.push_back(get(log));
@@ -97,14 +99,14 @@ ChannelPicture channel_picture(const Diagnosis& d, int effect, std::size_t chann
     rest -= part;
     if (effect < 0 || static_cast<std::size_t>(effect) == e) own += part;
   }
-  out.with = beside_baseline(c, rest);
-  out.without = beside_baseline(c, rest + own);
+  out.with = residual_of_baseline(c, rest);
+  out.without = residual_of_baseline(c, rest + own);
   return out;
 }
 
-std::vector<TellingSignal> telling_signals(const Evidence& evidence,
+std::vector<ExplainingSignal> explaining_signals(const Evidence& evidence,
                                            const EvidenceChannel& channel) {
-  std::vector<TellingSignal> out;
+  std::vector<ExplainingSignal> out;
   const Machine& machine = *evidence.series.front().machine;
   const auto add = [&](const char* id, const std::string& words, const std::string& unit,
                        double scale, const auto& get) {
@@ -146,7 +148,7 @@ std::vector<TellingSignal> telling_signals(const Evidence& evidence,
     add("all_return_flow", "total return flow", "l/min", units::kLitrePerMinute,
         [p](const MachineSeries& log) { return pump_flow(log, p, true); });
     if (is_pump) {
-      add("demand", "pressure asked for", "bar", units::kBar,
+      add("demand", "pressure demand", "bar", units::kBar,
           [p](const MachineSeries& log) { return log.pumps[p].demand; });
       add("pressure_slope", "rate of the pump's pressure", "bar/s", units::kBar,
           [p](const MachineSeries& log) { return slope(log, log.pumps[p].pressure); });

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Digits that show the interval's half-width with two figures.
+/// Significant digits of a value that show its interval's half-width with two digits.
 int digits_for(double value, double half_width) {
   if (!(half_width > 0.0) || value == 0.0) return 4;
   const double ratio = std::max(std::abs(value), half_width) / half_width;
@@ -92,7 +92,7 @@ Stretch best_stretch(const Eigen::VectorXd& time, const Eigen::VectorXd& gain, d
       best = {first, last};
     }
   }
-  // a stretch that ends early (the log's begin) may grow to the full length
+  // The best stretch may have ended early, near the log's beginning; it is extended to the full length.
   while (best.last < n && time[best.last] - time[best.first] <= length) ++best.last;
   return best;
 }

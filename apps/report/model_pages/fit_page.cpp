@@ -31,14 +31,14 @@ const GaussianProcess& process_of(const FitResult& r, const ProcessFit& f) {
 
 void add_processes(Page& page, const FitResult& r) {
   if (r.processes.empty()) {
-    page.paragraph("The machine has no hydraulic cylinder: there is no pressure to learn.");
+    page.paragraph("The machine has no hydraulic cylinder, so there is no pressure to learn.");
     return;
   }
   Table table;
-  table.title = "Working pressures as processes of flow and load";
+  table.title = "Pressure models: working pressure over flow and force (Gaussian processes)";
   table.columns = {{"cylinder"},      {"direction"},  {"samples"},        {"used"},
                    {"outliers"},      {"centres"},    {"RMSE", "bar", 3}, {"noise", "bar", 3},
-                   {"flow", "l/min"}, {"load", "kN"}, {"learned by"}};
+                   {"flow", "l/min"}, {"load", "kN"}, {"method"}};
   for (const ProcessFit& f : r.processes) {
     const GaussianProcess& g = process_of(r, f);
     if (g.empty()) {
@@ -58,11 +58,9 @@ void add_processes(Page& page, const FitResult& r) {
          std::string(gp_method_name(f.report.method))});
   }
   table.note =
-      "RMSE of the samples used; noise: standard deviation of one measurement as learned. A "
-      "cylinder's samples are "
-      "thinned where neighbours tell the same. Flow and load: the range of the data, beyond which "
-      "a process "
-      "extrapolates.";
+      "RMSE: of the samples used. Noise: learned standard deviation of one measurement. Samples are "
+      "thinned where neighbours carry the same information. Flow and load: the range of the data, "
+      "beyond which a model extrapolates.";
   page.table(std::move(table));
 }
 
@@ -71,7 +69,7 @@ void add_supplies(Page& page, const FitResult& r) {
   Table table;
   table.title = "Pumps: standby and margins";
   table.columns = {
-      {"pump"}, {"term"}, {"pressure", "bar", 3}, {"\u00B1", "bar", 2}, {"samples it leads"}, {""}};
+      {"pump"}, {"term"}, {"pressure", "bar", 3}, {"\u00B1", "bar", 2}, {"samples as leader"}, {""}};
   for (std::size_t p = 0; p < r.pumps.size(); ++p) {
     if (!r.pumps[p]) continue;
     const Pump& pump = machine.pumps[p];
@@ -81,18 +79,18 @@ void add_supplies(Page& page, const FitResult& r) {
                           static_cast<double>(r.pumps[p]->standby_leading),
                           std::string(!sensing || r.pumps[p]->standby_identified
                                           ? "learned"
-                                          : "never seen in the logs: from the machine file")});
+                                          : "not in the logs: from the machine file")});
     for (std::size_t f = 0; f < pump.feeds.size() && f < r.pumps[p]->margins.size(); ++f) {
       const LearnedMargin& m = r.pumps[p]->margins[f];
       table.rows.push_back(
           {pump.name, "margin of " + cylinder_name(r, pump.feeds[f]), m.margin / kBar,
            m.identified ? m.standard_error / kBar : kNaN, static_cast<double>(m.leading),
-           std::string(m.identified ? "learned" : "assumed: it leads too rarely")});
+           std::string(m.identified ? "learned" : "assumed: leader too rarely")});
     }
   }
   table.note =
-      "The pump's pressure is the largest of its standby and each moving cylinder's working "
-      "pressure plus margin.";
+      "The pump pressure is the largest of the standby and, for each moving cylinder, working pressure "
+      "plus margin. The cylinder that sets it is the load-sensing leader.";
   if (!table.rows.empty()) page.table(std::move(table));
 }
 
@@ -117,13 +115,12 @@ void add_valves(Page& page, const FitResult& r) {
          v.valve.affine ? std::round(1000.0 * v.valve.dead_band) / 10.0 : kNaN});
   }
   table.note =
-      "Gain: flow at full command, on a line through zero. Largest command: of those learned from. "
-      "Dead band: what a "
-      "line with an offset would find, for information.";
+      "Gain: flow at full command, by a line through zero. Largest command: of the samples used. Dead "
+      "band: estimate by a line with an offset, for information only.";
   page.table(std::move(table));
 }
 
-/// Pressure over flow at five loads, a little beyond the data, which is shaded off.
+/// Draws pressure over flow at five loads, a little beyond the data; where there are no data it is shaded.
 LineChart pressure_chart(const FitResult& r, const ProcessFit& f) {
   const GaussianProcess& g = process_of(r, f);
   const GpParameters& p = g.parameters();
@@ -169,16 +166,15 @@ void add_pressures(Page& page, const FitResult& r, const std::string& heading) {
   }
   page.section(heading);
   page.paragraph(
-      "Pressure over flow at five loads across the data's range; the band is \u00B12 standard "
-      "deviations of the curve "
-      "itself, measurement noise not included. Where a band widens, the logs hold no such load at "
-      "that flow.");
+      "Working pressure over flow at five loads across the range of the data. The band is \u00B12 "
+      "standard deviations of the curve, without measurement noise. Where it widens, the logs have "
+      "no such load at that flow.");
   for (const ProcessFit& f : r.processes) {
     if (!process_of(r, f).empty()) page.plot(pressure_chart(r, f));
   }
 }
 
-/// What the model is judged by: data it has not seen, where there are such.
+/// The comparison that judges the model: on data that took no part in learning, where there are such.
 const CompareResult& judged_on(const FitResult& r) {
   return r.test ? *r.test : r.held_out ? *r.held_out : r.train;
 }
@@ -188,25 +184,25 @@ void set_verdict(Page& page, const FitResult& r) {
       std::count_if(r.processes.begin(), r.processes.end(),
                     [&](const ProcessFit& f) { return !process_of(r, f).empty(); });
   const auto all = static_cast<std::ptrdiff_t>(r.processes.size());
-  std::string headline = fmt::format("All {} pressure processes were learned", all);
+  std::string headline = fmt::format("All {} pressure models were identified", all);
   Tone tone = Tone::kGood;
   if (learned < all) {
-    headline = fmt::format("{} of {} pressure processes were learned", learned, all);
+    headline = fmt::format("{} of {} pressure models were identified", learned, all);
     tone = learned == 0 ? Tone::kBad : Tone::kWarning;
   }
-  if (all == 0) headline = "A drive without hydraulics: forces alone are compared";
+  if (all == 0) headline = "The machine has no hydraulics: only forces are compared";
   std::string text = r.brief() + ".";
   const std::vector<JudgedScore> judged = judge_scores(r.model.machine, judged_on(r));
   const JudgedScore* worst = worst_score(judged);
   if (worst != nullptr && worst->tone == Tone::kBad) {
     tone = std::max(tone, Tone::kWarning);
-    text += fmt::format(" It misses the {}, though: see the scores.",
+    text += fmt::format(" The {}, however, is predicted poorly: see the scores.",
                         quantity_words(worst->score.stage, worst->score.at));
   }
   if (learned < all) {
     std::string names;
     for (const std::string& n : r.model.missing()) names += (names.empty() ? "" : ", ") + n;
-    text += " Missing: " + names + "; the notes say what to record.";
+    text += " Missing: " + names + "; the notes name the motions to record.";
   }
   page.verdict(all == 0 ? Tone::kNeutral : tone, headline, text);
 }
@@ -214,12 +210,12 @@ void set_verdict(Page& page, const FitResult& r) {
 }  // namespace
 
 void add_fit(Page& page, const FitResult& result) {
-  page.section("What was learned");
+  page.section("Identified model");
   add_processes(page, result);
   add_supplies(page, result);
   add_valves(page, result);
   for (const std::string& note : result.notes) page.paragraph(note);
-  add_pressures(page, result, "The pressures it learned");
+  add_pressures(page, result, "Identified pressures");
 }
 
 Page fit_page(const FitResult& result) {

@@ -16,13 +16,13 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kMoved = 0.02;       // [-] an error that changes less is not worth a picture
-constexpr double kCurveSeconds = 30;  // of a log, as much as the eye can compare
+constexpr double kLeastChange = 0.02;  // [-] of an error's logarithm, for the error to be drawn
+constexpr double kCurveSeconds = 30;   // [s] length of a stretch in which curves can still be compared by eye
 constexpr std::size_t kMostErrorCharts = 12;
 
-/// One error over the steps: [0] before the first, [i] after step i.
+/// One error over the steps; entry 0 is before the first step, entry i after step i.
 struct ErrorTrace {
-  StageScore score;  // of the first that has it
+  StageScore score;  // before the first step
   std::string words;
   VectorXd rmse;       // SI
   double noise = 0.0;  // SI, NaN = not known
@@ -85,25 +85,25 @@ LineChart over_steps(const ExtendResult& result) {
   return chart;
 }
 
-/// All errors that moved, as a share of what they were: which of them fell, and at which step.
+/// Appends all errors that changed, relative to their value before the first step.
 void add_overview(Page& page, const ExtendResult& result, const std::vector<ErrorTrace>& traces) {
   LineChart chart = over_steps(result);
-  chart.title = "Error falling step by step";
+  chart.title = "Error after each step";
   chart.markers = step_markers(result);
   chart.note = fmt::format(
-      "RMS error on the {}, as a share of what it was before the first step. Quantities that did "
-      "not move are left out.",
+      "RMS error on the {}, relative to its value before the first step. Quantities whose error did "
+      "not change are left out.",
       result.steps.front().judged_on);
   chart.y_axis = {"RMS error", "% of before"};
   for (const ErrorTrace& t : traces) {
-    if (!(t.rmse[0] > 0.0) || !(t.largest_change() > kMoved)) continue;
+    if (!(t.rmse[0] > 0.0) || !(t.largest_change() > kLeastChange)) continue;
     chart.series.push_back({t.words, 100.0 / t.rmse[0] * t.rmse, LineStyle::kPlain, -1, {}, {}});
   }
   if (!chart.series.empty()) page.plot(std::move(chart));
 }
 
 void add_error_charts(Page& page, const ExtendResult& result, std::vector<ErrorTrace> traces) {
-  std::erase_if(traces, [](const ErrorTrace& t) { return !(t.largest_change() > kMoved); });
+  std::erase_if(traces, [](const ErrorTrace& t) { return !(t.largest_change() > kLeastChange); });
   if (traces.size() > kMostErrorCharts) {
     std::stable_sort(traces.begin(), traces.end(), [](const ErrorTrace& a, const ErrorTrace& b) {
       return a.largest_change() > b.largest_change();
@@ -160,7 +160,7 @@ Table steps_table(const std::string& title, const std::vector<ExtendStep>& steps
   return table;
 }
 
-/// The series of a step with the largest squared error taken away (or added).
+/// The series of a step whose squared error changed by the largest factor.
 struct MostChanged {
   const LogComparison* log = nullptr;
   const ComparedSeries* before = nullptr;
@@ -210,8 +210,8 @@ void add_curves(Page& page, const ExtendStep& step) {
   chart.title = fmt::format("{}: {}", capitalised(quantity_words(m.after->stage, m.after->at)),
                             step.added.empty() ? "without " + step.removed : "with " + step.added);
   chart.note = fmt::format(
-      "{}, the {:.0f} s in which the change shows most. Only samples that "
-      "count in the scores are drawn.",
+      "{}, the {:.0f} s in which the change is largest. Only samples that count in the scores are "
+      "drawn.",
       m.log->signals.file, kCurveSeconds);
   chart.y_axis = {m.after->stage == "force"            ? "force"
                   : m.after->stage.starts_with("flow") ? "flow"
@@ -227,7 +227,7 @@ void add_curves(Page& page, const ExtendStep& step) {
   page.plot(std::move(chart));
 }
 
-/// As later steps left it; what was taken back, as it was.
+/// The effect with the values that later steps gave it; an effect that was removed, with its own values.
 const AppliedEffect& in_the_model(const CraneModel& model, const AppliedEffect& e) {
   for (const AppliedEffect& m : model.effects) {
     if (m.effect == e.effect && m.at == e.at) return m;
@@ -235,7 +235,7 @@ const AppliedEffect& in_the_model(const CraneModel& model, const AppliedEffect& 
   return e;
 }
 
-/// Without what was tried and not kept: that has a section of its own.
+/// Why improve() stopped, without the list of rejected effects, which have a section of their own.
 std::string stopped_briefly(const ExtendResult& r) {
   if (r.rejected.empty()) return r.stopped_because;
   const std::size_t at =
@@ -270,7 +270,7 @@ void set_verdict(Page& page, const ExtendResult& r) {
 }
 
 void add_last(Page& page, const Diagnosis& d) {
-  page.section("What is left");
+  page.section("Remaining residuals");
   page.paragraph(d.headline());
   if (d.unexplained) {
     std::string on;
@@ -285,11 +285,11 @@ void add_last(Page& page, const Diagnosis& d) {
 void add_steps(Page& page, const ExtendResult& result, const std::string& heading_prefix) {
   if (!result.steps.empty()) {
     const std::vector<ErrorTrace> traces = traces_of(result);
-    page.section(heading_prefix + "Error step by step");
+    page.section(heading_prefix + "Error after each step");
     Table table = steps_table("Steps", result.steps);
     table.note = fmt::format(
-        "Errors on the {}: RMS after against before; overall is the geometric mean over everything "
-        "compared.",
+        "Errors on the {}: RMS after the step relative to before; overall is the geometric mean over all "
+        "compared quantities.",
         result.steps.front().judged_on);
     page.table(std::move(table));
     if (result.steps.size() > 1) {
@@ -298,7 +298,7 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
       now.columns = {{"effect"}, {"parameters, 95 % interval"}};
       for (const AppliedEffect& e : result.model.effects)
         now.rows.push_back({e.key(result.model.machine), parameters_text(estimates_of(e))});
-      now.note = "All are estimated together: each step moves those before it.";
+      now.note = "All are estimated together, so that each step changes the values of the earlier ones.";
       page.table(std::move(now));
     }
     add_overview(page, result, traces);
@@ -307,7 +307,7 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
     for (const ExtendStep& s : result.steps) add_curves(page, s);
   }
   if (!result.rejected.empty()) {
-    page.section(heading_prefix + "Tried, not kept");
+    page.section(heading_prefix + "Tried and not kept");
     Table table = steps_table("Changes that made the error worse", result.rejected);
     page.table(std::move(table));
     for (const ExtendStep& s : result.rejected) add_curves(page, s);
@@ -317,7 +317,7 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
 }
 
 Page improve_page(const ExtendResult& result) {
-  Page page("Model with more physics: " + result.model.machine.name);
+  Page page("Extended model: " + result.model.machine.name);
   page.subtitle(fmt::format("{} step{}{}", result.steps.size(), result.steps.size() == 1 ? "" : "s",
                             result.rejected.empty()
                                 ? ""

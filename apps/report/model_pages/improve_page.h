@@ -1,15 +1,15 @@
 #pragma once
-/// Pages about extending a model.
+/// The page of extend and improve.
 #include "apps/report/page/page.h"
 #include "diagnosis/extension/extend.h"
 
 namespace sparflow {
 
-/// Appends the steps: error falling step by step above the sensors' noise, parameters, curves before and after.
+/// Appends the steps: errors after each step beside the sensors' noise, parameters, curves before and after.
 /// @param heading_prefix put before each section's heading, e.g. "Test logs: "
 void add_steps(Page& page, const ExtendResult& result, const std::string& heading_prefix = "");
 
-/// A page of its own, of `extend` or `improve`.
+/// Makes the page of `extend` or `improve`.
 Page improve_page(const ExtendResult& result);
 
 }  // namespace sparflow

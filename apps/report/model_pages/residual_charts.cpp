@@ -14,10 +14,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr std::size_t kCharts = 2, kChartsOfTheFirst = 6;
-constexpr double kTelling =
-    0.01;  // a signal that explains less of the variance is not worth a picture
+constexpr double kLeastShare = 0.01;  // [-] of the variance that a signal must explain to be drawn
 
-/// Residuals of a quantity over all logs, one row a compared sample, with every signal any log offers.
+/// Residuals of a quantity over all logs, one row for each compared sample, with all signals that any log has.
 struct ResidualTable {
   VectorXd residual;        // in the quantity's unit
   std::vector<int> regime;  // index into names
@@ -61,7 +60,7 @@ ResidualTable residual_table(const Machine& machine, const ComparedQuantity& qua
 
 std::string regime_words(const std::string& stage, const std::string& regime) {
   if (stage != "pump") return regime == "extend" ? "extending" : "retracting";
-  return regime == "standby" || regime == "constant" ? regime : "led by " + regime;
+  return regime == "standby" || regime == "constant" ? regime : "leader " + regime;
 }
 
 ScatterChart scatter(const ComparedQuantity& quantity, const ResidualTable& table,
@@ -88,8 +87,8 @@ ScatterChart scatter(const ComparedQuantity& quantity, const ResidualTable& tabl
   return chart;
 }
 
-/// The signals to draw. The first two thirds of the places are for those with a meaning (pose, speed, load):
-/// columns without one often are another sensor of what was measured, and tell less.
+/// Chooses the signals to draw. Two thirds of the charts are for signals with a known meaning (posture, speed, load),
+/// since other columns often are a second sensor of the measured quantity and explain nothing physical.
 std::vector<std::pair<double, const RegimeSignal*>> chosen(const ComparedQuantity& quantity,
                                                            const ResidualTable& table,
                                                            std::size_t most) {
@@ -114,8 +113,8 @@ std::vector<std::pair<double, const RegimeSignal*>> chosen(const ComparedQuantit
   std::stable_sort(rest.begin(), rest.end(), better);
   rest.resize(std::min(rest.size(), most - std::min(most, out.size())));
   out.insert(out.end(), rest.begin(), rest.end());
-  const auto dull = [](const auto& signal) { return signal.first < kTelling; };
-  out.erase(std::remove_if(out.begin() + (out.empty() ? 0 : 1), out.end(), dull), out.end());
+  const auto explains_little = [](const auto& signal) { return signal.first < kLeastShare; };
+  out.erase(std::remove_if(out.begin() + (out.empty() ? 0 : 1), out.end(), explains_little), out.end());
   return out;
 }
 
@@ -137,7 +136,7 @@ double share_explained(const VectorXd& x, const VectorXd& y) {
   for (const Index k : order) total += (y[k] - mean) * (y[k] - mean);
   Index used = 0;
   for (Index from = 0; from < n;) {
-    // equal values stay in one bin: how they were sorted must not matter
+    // Equal values stay in one bin, so that the result does not depend on their order.
     Index to = std::min(n, from + (n + bins - 1) / bins);
     while (to < n &&
            x[order[static_cast<std::size_t>(to)]] == x[order[static_cast<std::size_t>(to - 1)]]) {

@@ -12,10 +12,10 @@ using Eigen::Index;
 constexpr double kGoodFit = 85.0, kPoorFit = 50.0;            // [%]
 constexpr double kGoodRelative = 0.05, kPoorRelative = 0.15;  // error over RMS of the measured
 constexpr double kGoodEnergy = 0.02, kPoorEnergy = 0.05;      // relative error
-/// The smoothed signal keeps a part of the noise, so its estimate is a little low.
+/// [-] The smoothed signal keeps a part of the noise, so that the noise is estimated a little too low.
 constexpr double kNoiseAllowance = 1.1;
 
-/// Measured minus smoothed, or an empty vector where the log or the stage has none.
+/// Measured minus smoothed signal; empty where the log or the stage has none.
 Eigen::VectorXd roughness(const Machine& machine, const MachineSignals& signals,
                           const ComparedSeries& series) {
   if (series.stage == "pump") {
@@ -64,8 +64,8 @@ Measured describe(const Machine& machine, const CompareResult& result, const Sta
   return out;
 }
 
-/// For candidates taken in the order of the stages: of two stages as poor the earlier is named, an error in the
-/// force is one in the pressure too.
+/// Whether a is worse than b, for scores in the order of the stages. Of two stages with the same judgement the earlier
+/// is the worse, because an error in the force causes one in the pressure.
 bool worse(const JudgedScore& a, const JudgedScore& b) {
   if (a.tone != b.tone) return static_cast<int>(a.tone) > static_cast<int>(b.tone);
   if (a.score.stage != b.score.stage) return false;

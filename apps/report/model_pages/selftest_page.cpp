@@ -35,10 +35,11 @@ void add_power_chart(Page& page, const Selftest& t) {
   std::stable_sort(seen.begin(), seen.end(),
                    [](const auto* a, const auto* b) { return a->times80 < b->times80; });
   BarChart chart;
-  chart.title = "How small an effect these logs would still show";
+  chart.title = "Smallest size at which each effect would be found";
   chart.note =
-      "Decades below the typical size at which an effect would be named with 80 % power: 1 is a "
-      "tenth of it, 0 the typical size itself, below 0 only more than typical is seen.";
+      "Size at which an effect would be named with 80 % power, in decades below its typical size: 1 "
+      "is a tenth of the typical size, 0 the typical size, and below 0 the effect is found only if "
+      "it is larger than typical.";
   chart.value_axis = {"decades below the typical size", ""};
   chart.stacked = false;
   chart.series = {{"80 % power", Eigen::VectorXd(static_cast<Eigen::Index>(seen.size()))}};
@@ -61,7 +62,7 @@ void add_table(Page& page, const Selftest& t) {
                    {"size by noise", "", 2},
                    {"absorbed", "%", 2},
                    {"without reference", "%", 2},
-                   {"cannot be told from"}};
+                   {"indistinguishable from"}};
   for (const InjectedEffect& e : t.effects) {
     if (e.visibility == Visibility::kNever) continue;
     table.rows.push_back({e.key(), e.stage, values_text(e.typical), std::round(100.0 * e.power),
@@ -70,15 +71,16 @@ void add_table(Page& page, const Selftest& t) {
                           std::round(100.0 * e.absorbed_alone), confusions_text(e)});
   }
   table.note =
-      "Power: chance to be named. Named from: the size that is named with 80 % power. Size by "
-      "noise: the typical effect where it acts, by the noise of what it shows in. Absorbed: the "
-      "share that learned laws imitate, with the references given and without any.";
+      "Power: chance that the effect is named. Named from: the size that is named with 80 % power. "
+      "Size by noise: the typical effect where it acts, divided by the noise of that channel. "
+      "Absorbed: the share of its signature that fitted pressure models would take over, with the "
+      "references given and without any.";
   if (!table.rows.empty()) page.table(std::move(table));
 }
 
 void add_never(Page& page, const Selftest& t) {
   Table table;
-  table.title = "Not from these logs";
+  table.title = "Effects that these logs cannot reveal";
   table.columns = {{"effect"}, {"why"}, {"what to record"}};
   for (const InjectedEffect& e : t.effects) {
     if (e.visibility != Visibility::kNever) continue;
@@ -89,9 +91,9 @@ void add_never(Page& page, const Selftest& t) {
 
 void add_sets(Page& page, const Selftest& t) {
   if (t.sets.empty()) return;
-  page.section("What these motions cannot tell apart");
+  page.section("Indistinguishable sets");
   Table table;
-  table.title = "Sets, and the motion that separates them";
+  table.title = "Sets, and a motion that decides between their effects";
   table.columns = {{"one of"}, {"motion"}};
   for (std::size_t k = 0; k < t.sets.size(); ++k) {
     std::string keys, motions = k < t.experiments.size() ? t.experiments[k].sentence() : "";
@@ -106,8 +108,8 @@ void add_sets(Page& page, const Selftest& t) {
     table.rows.push_back({keys, motions});
   }
   table.note =
-      "Below 4 nats of log likelihood, the other effects refitted, these logs fit all of a set "
-      "equally well.";
+      "The effects of a set differ by less than 4 nats of log-likelihood on these logs, with the other "
+      "effects fitted again.";
   page.table(std::move(table));
 }
 
@@ -115,10 +117,10 @@ void add_checks(Page& page, const Selftest& t) {
   if (t.checks.empty()) return;
   page.section("Checked by injection");
   page.paragraph(
-      "The figures above are computed. These effects were added to noise drawn anew and the search "
-      "of `diagnose` was run on them.");
+      "The figures above are calculated. For this check the effects were added to newly drawn noise, "
+      "and the search of `diagnose` was run on the result.");
   Table table;
-  table.title = "Injected, and what was named";
+  table.title = "Injected and named effects";
   table.columns = {{"effect"}, {"stage"}, {"power", "%", 3}, {"named"}, {"as predicted"}};
   for (const InjectionCheck& c : t.checks) {
     table.rows.push_back({c.key, c.stage, std::round(100.0 * c.power),
@@ -144,7 +146,7 @@ Page selftest_page(const CraneModel& model, const Selftest& t) {
   if (!t.checks.empty())
     text = fmt::format("Checked by injection: {} of {} as predicted. ", right, t.checks.size());
   if (!t.sets.empty())
-    text += fmt::format("{} set{} of effects cannot be told apart on these motions.", t.sets.size(),
+    text += fmt::format("{} set{} of effects cannot be distinguished on these motions.", t.sets.size(),
                         t.sets.size() == 1 ? "" : "s");
   page.verdict(!all_right                        ? Tone::kWarning
                : t.count(Visibility::kNever) > 0 ? Tone::kNeutral

@@ -1,5 +1,5 @@
 #pragma once
-/// What logs could reveal, as a page: power of every effect, what would be confused, what is missing from the logs.
+/// The page of selftest: power of every effect, indistinguishable sets, effects that the logs cannot reveal.
 #include "apps/report/page/page.h"
 #include "diagnosis/selftest/selftest.h"
 #include "models/chain/crane_model.h"

@@ -73,7 +73,7 @@ std::vector<Eigen::Vector2d> tip_path(const Machine& machine, const Trajectory& 
   return points;
 }
 
-/// Height of the ground where the problem has one; base frames stand at all heights, so none is assumed.
+/// Height of the ground [m] where the problem has one. None is assumed, because base frames stand at any height.
 std::optional<double> ground_of(const MotionProblem& problem) {
   for (const Obstacle& o : problem.obstacles) {
     const auto* half = std::get_if<HalfSpace>(&o.shape);
@@ -88,9 +88,8 @@ void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
   CraneDrawing drawing;
   drawing.title = "The motion";
   drawing.note =
-      "Move the slider to drive the crane; the stronger the picture, the later the instant. Solid: "
-      "the tip's way" +
-      (baseline != nullptr ? "; dashed: its way along " + baseline_name : std::string()) + ".";
+      "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the tip" +
+      (baseline != nullptr ? "; dashed: its path along " + baseline_name : std::string()) + ".";
   drawing.group = "motion";
   const DrawingPlane plane = drawing_plane(machine, problem.start);
   drawing.x_axis = {plane.horizontal_name, "m"};
@@ -132,9 +131,9 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
   LineChart flow = chart("Flows", "flow", "l/min");
   LineChart pressure = chart("Pressures", "pressure", "bar");
   pressure.note =
-      "Working pressure of each moving cylinder, and the pump's above them: the gap is what each "
-      "valve throttles away.";
-  // pumps first: where one cylinder moves alone, its curve lies on its pump's
+      "Working pressure of each moving cylinder, and pump pressure. Their difference is the pressure "
+      "drop that each valve throttles.";
+  // Pumps come first: where one cylinder moves alone, its flow is drawn over that of its pump.
   for (int p = 0; p < machine.pump_count(); ++p) {
     const auto i = static_cast<std::size_t>(p);
     const std::string name = "pump " + machine.pumps[i].name;
@@ -163,11 +162,11 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
                 const OptimizeResult& result, const Trajectory* baseline,
                 const std::string& baseline_name) {
   BarChart bars;
-  bars.title = "Where the energy goes";
+  bars.title = "Useful energy and throttling loss";
   bars.value_axis = {"energy", "kJ"};
   bars.note =
-      "Useful: working pressure times flow. Throttled: what the valve takes because another "
-      "cylinder, the margin or standby sets the pump's pressure.";
+      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, times "
+      "flow; another cylinder, the margin or standby sets the pump pressure.";
   std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
   if (baseline != nullptr)
     motions.push_back({baseline_name, exact_energy(model, *baseline, problem.payload)});
@@ -191,7 +190,7 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
   page.plot(std::move(bars));
 }
 
-/// What is left to a limit [%]; in words where the figure would only show the solver's last digits.
+/// Distance to a limit [%]; in words where the number would only show the solver's rounding.
 TableCell margin_cell(const LimitCheck& c) {
   constexpr double kTouching = 1e-4;  // of the limit's scale
   const bool end_condition =
@@ -208,19 +207,19 @@ std::string in_words(NlpStatus status) {
 
 void add_tables(Page& page, const OptimizeResult& result) {
   Table limits;
-  limits.title = "Limits at their worst, 16 times between the knots";
+  limits.title = "Limits at their worst, at 16 samples per mesh interval";
   if (result.motion.size() < 2) {
     const auto nearest = std::min_element(result.starts.begin(), result.starts.end(),
                                           [](const StartResult& a, const StartResult& b) {
                                             return (a.motion.size() > 1 ? a.excess : INFINITY) <
                                                    (b.motion.size() > 1 ? b.excess : INFINITY);
                                           });
-    limits.title = "Limits of the motion that came nearest (from " + nearest->seed + ")";
+    limits.title = "Limits of the motion that breaks them least (from " + nearest->seed + ")";
   }
   limits.columns = {{"limit"}, {"value", "", 5}, {"allowed", "", 5},
                     {"unit"},  {"at", "s", 4},   {"margin", "%", 3}};
   for (const LimitCheck& c : result.checks) {
-    constexpr double kRounding = 1e-9;  // of any unit here: the solver's last digits say nothing
+    constexpr double kRounding = 1e-9;  // in any unit: smaller values are the solver's rounding
     const double value = std::abs(c.value) < kRounding ? 0.0 : c.value;
     limits.rows.push_back({c.what, value, c.limit, c.unit, c.time, margin_cell(c)});
   }
@@ -230,18 +229,18 @@ void add_tables(Page& page, const OptimizeResult& result) {
   starts.columns = {{"from"},
                     {"outcome"},
                     {"duration", "s", 4},
-                    {"start itself", "kJ"},
+                    {"initial guess", "kJ"},
                     {"optimised", "kJ"},
                     {"iterations", "", 5},
                     {"solver", "s", 3},
                     {"note"}};
   starts.note =
-      "Exact energies. \"Start itself\" is the seed driven in the same time; blank where it breaks "
-      "a limit at that time.";
+      "Energies by the exact law. \"Initial guess\" is the energy of the seed path driven in the same "
+      "time, blank where that breaks a limit.";
   if (result.motion.size() < 2) {
     starts.note +=
-        " A defect is a step from one instant to the next that the joint cannot make with the "
-        "speeds and accelerations it is allowed: too little time, or the way is blocked.";
+        " A defect is a step between knots that a joint cannot make within its speed and acceleration "
+        "limits: the time is too short, or the path is blocked.";
   }
   for (std::size_t i = 0; i < result.starts.size(); ++i) {
     const StartResult& s = result.starts[i];
@@ -268,14 +267,14 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
   page.section("Motion: " + problem.name);
   if (result.motion.size() < 2) {
     page.paragraph("No motion was found; " + std::string(result.starts.empty()
-                                                             ? "no path to start from either."
-                                                             : "below, how far every start came."));
+                                                             ? "there is no seed path either."
+                                                             : "the table shows all starts."));
     if (!result.starts.empty()) add_tables(page, result);
     return;
   }
   const std::string beside =
       result.nearest_line_energy > 0.0
-          ? fmt::format("straight line, nearest end: {:.1f} kJ", result.nearest_line_energy / 1e3)
+          ? fmt::format("straight line, nearest goal: {:.1f} kJ", result.nearest_line_energy / 1e3)
       : result.best_seed_energy > 0.0
           ? fmt::format("best seed, {}: {:.1f} kJ", result.best_seed_name,
                         result.best_seed_energy / 1e3)
@@ -286,21 +285,20 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
       {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law", beside,
         Tone::kGood},
        {seconds_text(result.duration), "s", "duration"},
-       {fmt::format("{:.1f}", lost / 1e3), "kJ", "lost in valves",
+       {fmt::format("{:.1f}", lost / 1e3), "kJ", "throttling loss",
         fmt::format("{:.0f} % of the energy", 100.0 * lost / std::max(1.0, result.energy.total))},
        {fmt::format("{:+.1f}", result.energy.potential_difference / 1e3), "kJ",
-        "potential energy gained", "end posture against start"}});
+        "potential energy gained", "end minus start"}});
   if (result.energy.impossible()) {
     page.paragraph(
-        "Warning: the pump gives less energy than machine and load gain. The pressures here are "
-        "extrapolated to "
-        "loads they were never learned at; fit the model with such loads.");
+        "Warning: the pump delivers less energy than machine and payload gain. The working pressures are "
+        "extrapolated to loads beyond the data; fit the model to logs with such loads.");
   }
   if (result.energy.moving_share_outside_data > 0.02) {
     page.paragraph(
-        fmt::format("{:.0f} % of the cylinders' moving time lies outside the flows and forces the "
-                    "model was learned on; "
-                    "the least certain pressure on the way has a standard deviation of {:.1f} bar.",
+        fmt::format("{:.0f} % of the cylinders' moving time lies outside the flows and forces of "
+                    "the data; the least certain working pressure of the motion has a standard "
+                    "deviation of {:.1f} bar.",
                     100.0 * result.energy.moving_share_outside_data,
                     result.energy.largest_pressure_std / units::kBar));
   }
@@ -320,18 +318,18 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
         Tone::kGood,
         fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,
                     against.empty() ? "" : ": ", against),
-        "All limits are kept at 16 times the knots' density. Energies are those of the exact, "
+        "All limits are kept at 16 samples per mesh interval. Energies are those of the exact, "
         "unsmoothed law. " +
-            only_strokes_count(model));
+            constant_pressure_note(model));
   } else {
-    // "lift: infeasible. Worst: ..." under its own headline
+    // The message begins like the headline ("lift: infeasible. Worst: ..."); that part is left out.
     const std::string prefix = problem.name + ": infeasible. ";
     std::string why = result.message;
     if (why.rfind(prefix, 0) == 0) why.erase(0, prefix.size());
     const std::string in = result.duration > 0.0 ? fmt::format(" in {:g} s", result.duration) : "";
     page.verdict(Tone::kBad,
                  result.status == OptimizeStatus::kInfeasible
-                     ? fmt::format("Infeasible: no motion found that keeps all limits{}", in)
+                     ? fmt::format("Infeasible: no motion was found that keeps all limits{}", in)
                      : std::string(to_string(result.status)),
                  why);
   }

@@ -1,4 +1,4 @@
-/// The terminal's and the machine's view of a motion.
+/// The texts of optimize: a table for the terminal, JSON.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,7 +50,7 @@ std::string against_seeds(const OptimizeResult& r) {
   const auto add = [&](const std::string& what, double energy) {
     if (energy <= 0.0) return;
     const double saved = 100.0 * (1.0 - r.energy.total / energy);
-    if (std::abs(saved) < 0.05) {  // "0.0 % less" would be nothing to be proud of
+    if (std::abs(saved) < 0.05) {  // instead of "0.0 % less"
       parts.push_back(fmt::format("as much as {} ({:.1f} kJ)", what, energy / 1e3));
       return;
     }
@@ -58,7 +58,7 @@ std::string against_seeds(const OptimizeResult& r) {
                                 std::abs(saved) < 9.95 ? 1 : 0, saved >= 0.0 ? "less" : "more",
                                 what, energy / 1e3));
   };
-  add("the straight joint line to the nearest end posture", r.nearest_line_energy);
+  add("the straight joint line to the nearest goal configuration", r.nearest_line_energy);
   if (r.straight_line_energy != r.nearest_line_energy)
     add("the cheapest straight line", r.straight_line_energy);
   if (r.best_seed_energy != r.straight_line_energy)
@@ -66,15 +66,14 @@ std::string against_seeds(const OptimizeResult& r) {
   return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
 }
 
-std::string only_strokes_count(const CraneModel& model) {
+std::string constant_pressure_note(const CraneModel& model) {
   const std::vector<Pump>& pumps = model.machine.pumps;
   const bool constant =
       !pumps.empty() && std::all_of(pumps.begin(), pumps.end(), [](const Pump& p) {
         return p.type == PumpType::kConstantPressure;
       });
-  return constant ? "At constant supply pressure the energy is pressure times the oil drawn: only "
-                    "which strokes are "
-                    "made counts, not when."
+  return constant ? "At constant supply pressure the energy is pressure times oil volume: it "
+                    "depends on the strokes alone, not on their timing."
                   : "";
 }
 
@@ -154,30 +153,30 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
     if (energy > 0.0)
       add(fmt::format(
           "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %{}{}", what, energy / 1e3,
-          r.energy.total <= energy ? "saves" : "takes more, as energy is not all it counts:",
+          r.energy.total <= energy ? "saves" : "takes more (energy is not its only cost):",
           100.0 * std::abs(1.0 - r.energy.total / energy), name.empty() ? "" : "; ", name));
     else
-      add(fmt::format("  {:<20}         -      breaks a limit in this time", what));
+      add(fmt::format("  {:<20}         -      it breaks a limit in this time", what));
   };
   against("straight, nearest", r.nearest_line_energy, "");
   against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
   against("best seed path", r.best_seed_energy, r.best_seed_name);
   if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
   if (r.unlimited_energy > 0.0) {
-    add(fmt::format("  at unlimited time    {:9.2f} kJ   the cheapest slow path of a joint grid",
+    add(fmt::format("  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly",
                     r.unlimited_energy / 1e3));
   }
   if (r.lower_bound > 0.0) {
     const std::string which =
         r.lower_bound_time > 0.0
-            ? fmt::format("no motion of {:.2f} s or less takes less", r.lower_bound_time)
-            : "no motion takes less, whatever its time";
-    add(fmt::format("  lower bound          {:9.2f} kJ   {}: {:.1f} % below this one",
+            ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
+            : "of motions of any duration";
+    add(fmt::format("  estimated bound      {:9.2f} kJ   {}: {:.1f} % below this one",
                     r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total)));
   } else if (!r.bound_note.empty()) {
-    add("  lower bound               none   " + r.bound_note);
+    add("  estimated bound           none   " + r.bound_note);
   }
-  add(fmt::format("  potential energy     {:+9.2f} kJ   end against start",
+  add(fmt::format("  potential energy     {:+9.2f} kJ   end minus start",
                   r.energy.potential_difference / 1e3));
   add(fmt::format("  {:<14} {:>12} {:>14}", "cylinder", "useful [kJ]", "throttled [kJ]"));
   for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
@@ -190,23 +189,24 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
     if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
       continue;
     add(fmt::format(
-        "  limits               {} at 16x the knots; nearest: {} {:.4g} of {:.4g} {} at {:.2f} s",
+        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} {} at "
+        "{:.2f} s",
         margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time));
     break;
   }
   if (r.energy.moving_share_outside_data > 0.02) {
     add(fmt::format(
         "  note                 {:.0f} % of the moving time lies outside the data; least certain "
-        "pressure +-{:.1f} bar",
+        "pressure +-{:.1f} bar (one standard deviation)",
         100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
   }
-  if (const std::string why = only_strokes_count(model); !why.empty())
+  if (const std::string why = constant_pressure_note(model); !why.empty())
     add("  note                 " + why);
   if (r.energy.impossible()) {
-    add("  WARNING              the pump gives less energy than machine and load gain: pressures "
-        "here are\n"
-        "                       extrapolated to loads they were never learned at; fit with such "
-        "loads");
+    add("  WARNING              the pump delivers less energy than machine and payload gain: working "
+        "pressures\n"
+        "                       are extrapolated to loads beyond the data; fit the model to logs with "
+        "such loads");
   }
   int usable = 0, distinct = 0;
   for (const StartResult& s : r.starts) {
@@ -214,7 +214,7 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
     distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
   }
   add(fmt::format(
-      "  starts               {} tried, {} kept all limits, {} different motions; {:.1f} s",
+      "  starts               {} tried, {} kept all limits, {} distinct motions; {:.1f} s",
       r.starts.size(), usable, distinct, r.solve_s));
   return text;
 }

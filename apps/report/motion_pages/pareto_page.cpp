@@ -28,11 +28,9 @@ LineChart energy_chart(const ParetoCurve& curve) {
   LineChart chart;
   chart.title = "Pump energy against time";
   chart.note =
-      "Each point is a motion of its own that keeps all limits. Level and dashed: what is left "
-      "when "
-      "time does not matter. Falling and dashed: equal cost when the engine burns so much "
-      "meanwhile; "
-      "where such a line touches the curve is the best time, marked.";
+      "Each point is a motion that keeps all limits. Horizontal dashed lines: energy at unlimited "
+      "time. Falling dashed lines: equal cost of pump energy and idle power; such a line touches the "
+      "curve at the best duration, which is marked.";
   chart.x_axis = {"duration", "s"};
   chart.y_axis = {"pump energy", "kJ"};
   chart.x.resize(n);
@@ -45,19 +43,19 @@ LineChart energy_chart(const ParetoCurve& curve) {
     simultaneous[i] = p.simultaneous / 1e3;
   }
   chart.series.push_back(named_line("energy-optimal", best));
-  chart.series.push_back(named_line("one cylinder after another", sequential));
-  chart.series.push_back(named_line("simultaneous, best end posture", simultaneous));
+  chart.series.push_back(named_line("sequential", sequential));
+  chart.series.push_back(named_line("simultaneous, best goal configuration", simultaneous));
   if (std::isfinite(curve.sequential_limit)) {
-    chart.series.push_back(named_line("one after another, unlimited time",
+    chart.series.push_back(named_line("sequential, unlimited time",
                                       VectorXd::Constant(n, curve.sequential_limit / 1e3),
                                       LineStyle::kLimit));
   }
   if (std::isfinite(curve.grid_limit)) {
-    chart.series.push_back(named_line("cheapest path of a grid, unlimited time",
+    chart.series.push_back(named_line("cheapest path of a joint grid, unlimited time",
                                       VectorXd::Constant(n, curve.grid_limit / 1e3),
                                       LineStyle::kLimit));
   }
-  // energy + idle power x time is the same along such a line; it touches the curve at the best time
+  // Energy + idle power x duration is constant along such a line; it touches the curve at the best duration.
   for (const IdleChoice& c : curve.idle) {
     if (c.at_end) continue;
     VectorXd iso(n);
@@ -78,8 +76,8 @@ LineChart energy_chart(const ParetoCurve& curve) {
 LineChart moving_chart(const ParetoCurve& curve) {
   const auto n = static_cast<Eigen::Index>(curve.points.size());
   LineChart chart;
-  chart.title = "What the optimum does";
-  chart.note = "Share of the time in which so many cylinders move.";
+  chart.title = "Number of moving cylinders in the optimum";
+  chart.note = "Share of the duration in which this number of cylinders moves.";
   chart.x_axis = {"duration", "s"};
   chart.y_axis = {"share of time", "%"};
   chart.x.resize(n);
@@ -111,25 +109,25 @@ Page pareto_page(const CraneModel& model, const MotionProblem& problem, const Pa
                            first.optimal.energy.total / 1e3, first.duration,
                            last.optimal.energy.total / 1e3, last.duration),
                std::isfinite(curve.sequential_limit)
-                   ? fmt::format("With unlimited time, one cylinder after another costs {:.1f} kJ.",
+                   ? fmt::format("At unlimited time the sequential motion takes {:.1f} kJ.",
                                  curve.sequential_limit / 1e3)
-                   : "No motion with one cylinder after another keeps the limits.");
+                   : "No sequential motion keeps the limits.");
   page.plot(energy_chart(curve));
   page.plot(moving_chart(curve));
   Table idle;
-  idle.title = "The best time, by what the engine burns meanwhile";
+  idle.title = "Best duration for each idle power";
   idle.columns = {
-      {"engine", "kW"}, {"duration", "s"}, {"pump energy", "kJ"}, {"with idling", "kJ"}, {"note"}};
+      {"idle power", "kW"}, {"duration", "s"}, {"pump energy", "kJ"}, {"with idling", "kJ"}, {"note"}};
   for (const IdleChoice& c : curve.idle) {
     idle.rows.push_back({c.idle_power / 1e3, c.duration, c.energy / 1e3,
                          (c.energy + c.idle_power * c.duration) / 1e3,
-                         c.at_end ? "the longest time looked at" : ""});
+                         c.at_end ? "the longest duration searched" : ""});
   }
   page.table(std::move(idle));
   Table points;
   points.title = "Points";
   points.columns = {
-      {"duration", "s"}, {"optimal", "kJ"}, {"one by one", "kJ"}, {"simultaneous", "kJ"}, {"from"}};
+      {"duration", "s"}, {"optimal", "kJ"}, {"sequential", "kJ"}, {"simultaneous", "kJ"}, {"from"}};
   for (const ParetoPoint& p : curve.points) {
     points.rows.push_back({p.duration, p.optimal.energy.total / 1e3, p.sequential / 1e3,
                            p.simultaneous / 1e3, p.optimal.detail});
@@ -192,7 +190,7 @@ std::string pareto_table(const MotionProblem& problem, const ParetoCurve& curve)
   std::string text = problem.name + "\n";
   if (curve.points.empty()) return text + "  " + curve.message + "\n";
   text += fmt::format("  {:>8} {:>10} {:>12} {:>14}   cylinders moving, share of time\n", "s",
-                      "optimal kJ", "one by one", "simultaneous");
+                      "optimal kJ", "sequential", "simultaneous");
   const auto cell = [](double v) {
     return std::isfinite(v) ? fmt::format("{:.2f}", v / 1e3) : std::string("-");
   };
@@ -203,11 +201,11 @@ std::string pareto_table(const MotionProblem& problem, const ParetoCurve& curve)
       text += fmt::format(" {}: {:.0f} %", k, 100.0 * p.optimal.energy.share_moving[k]);
     text += "\n";
   }
-  text += fmt::format("  unlimited time: one by one {} kJ, cheapest path of a grid {} kJ\n",
+  text += fmt::format("  unlimited time: sequential {} kJ, cheapest path of a joint grid {} kJ\n",
                       cell(curve.sequential_limit), cell(curve.grid_limit));
   for (const IdleChoice& c : curve.idle) {
-    text += fmt::format("  engine at {:4.1f} kW: best in {:.2f} s{}\n", c.idle_power / 1e3,
-                        c.duration, c.at_end ? " (the longest looked at)" : "");
+    text += fmt::format("  idle power {:4.1f} kW: best duration {:.2f} s{}\n", c.idle_power / 1e3,
+                        c.duration, c.at_end ? " (the longest searched)" : "");
   }
   return text;
 }

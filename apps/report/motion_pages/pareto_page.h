@@ -1,5 +1,5 @@
 #pragma once
-/// Energy against time, for people and for machines.
+/// The page and the texts of pareto: least energy as a function of the duration.
 #include "apps/report/page/page.h"
 #include "optimizer/baselines/pareto.h"
 
@@ -7,13 +7,14 @@ namespace sparflow {
 
 Page pareto_page(const CraneModel& model, const MotionProblem& problem, const ParetoCurve& curve);
 
-/// Keys: docs/strategies.md.
+/// Returns the curve as JSON (keys: docs/strategies.md).
 std::string pareto_json(const MotionProblem& problem, const ParetoCurve& curve);
 
-/// duration_s, energy_J, sequential_J, simultaneous_J, share_moving_0 ... one row a duration.
+/// Returns the curve as CSV, one row for each duration: duration_s, energy_J, sequential_J, simultaneous_J,
+/// share_moving_0 ...
 std::string pareto_csv(const ParetoCurve& curve);
 
-/// One screen for a terminal.
+/// Returns the curve as text of one screen.
 std::string pareto_table(const MotionProblem& problem, const ParetoCurve& curve);
 
 }  // namespace sparflow

@@ -23,14 +23,14 @@ std::string row_title(const StrategyRow& row) {
 
 std::string excess_text(double share) { return fmt::format("{:+.1f} %", 100.0 * share); }
 
-/// Energy by where it goes, a bar each way.
+/// Draws useful energy, throttling losses and idling, one bar for each strategy.
 BarChart energy_bars(const StrategyRow& row, double idle_power, const Machine& machine) {
   BarChart bars;
   bars.title = row_title(row);
   bars.value_axis = {"energy", "kJ"};
   bars.note =
-      "Useful: working pressure times flow. Throttled: lost in the valves because another "
-      "cylinder, the margin or standby sets the pump's pressure.";
+      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, times "
+      "flow; another cylinder, the margin or standby sets the pump pressure.";
   std::vector<double> useful, idle;
   std::vector<std::vector<double>> lost(machine.cylinders.size());
   for (const StrategyOutcome& o : row.outcomes) {
@@ -55,16 +55,17 @@ BarChart energy_bars(const StrategyRow& row, double idle_power, const Machine& m
   return bars;
 }
 
-/// Energies, times and pressures of each way.
+/// Lists energies, times and pressures of each strategy.
 Table row_table(const StrategyRow& row, double idle_power) {
   Table table;
   table.title = row_title(row);
   table.note =
-      "Potential: gained by machine and load, part of the useful energy. Pressures: the pump's.";
-  table.columns = {{"way"},
+      "Throttling: throttling loss. Potential: energy gained by machine and payload, part of the useful "
+      "energy. Peak, mean: pump pressure.";
+  table.columns = {{"strategy"},
                    {"pump energy", "kJ"},
                    {"duration", "s"},
-                   {"in valves", "kJ", 3},
+                   {"throttling", "kJ", 3},
                    {"idling", "kJ", 3},
                    {"potential", "kJ", 3},
                    {"peak", "bar", 3},
@@ -90,11 +91,11 @@ Table row_table(const StrategyRow& row, double idle_power) {
   return table;
 }
 
-/// How many cylinders move, how fast each way could be, and where its motion comes from.
+/// Lists how many cylinders move, the shortest time of each strategy, and which start its motion comes from.
 Table moving_table(const StrategyRow& row) {
   Table table;
-  table.title = "What moves";
-  table.columns = {{"way"}};
+  table.title = "Number of moving cylinders";
+  table.columns = {{"strategy"}};
   for (int k = 1; k <= 3; ++k)
     table.columns.push_back({fmt::format("{} move{}", k, k == 1 ? "s" : ""), "% of time", 3});
   table.columns.push_back({"shortest", "s", 4});
@@ -114,7 +115,7 @@ Table moving_table(const StrategyRow& row) {
   return table;
 }
 
-/// Pump power over time of the three ways everybody asks about.
+/// Draws pump power over time of the sequential, the simultaneous and the optimal motion.
 void add_powers(Page& page, const CraneModel& model, const MotionProblem& problem,
                 const StrategyRow& row) {
   LineChart chart;
@@ -147,9 +148,9 @@ void add_paths(Page& page, const Machine& machine, const MotionProblem& problem,
   const StrategyOutcome* best = row.find(kOptimal);
   if (best == nullptr || !best->found()) return;
   CraneDrawing drawing;
-  drawing.title = "Where the tip goes";
+  drawing.title = "Paths of the tip";
   drawing.note =
-      "The machine drives the energy-optimal motion; dashed, the tip's way in the others.";
+      "The crane drives the energy-optimal motion. Dashed: paths of the tip in the other motions.";
   const DrawingPlane plane = drawing_plane(machine, problem.start);
   drawing.x_axis = {plane.horizontal_name, "m"};
   drawing.z_axis = {plane.vertical_name, "m"};
@@ -169,11 +170,10 @@ void add_paths(Page& page, const Machine& machine, const MotionProblem& problem,
 void add_orders(Page& page, const StrategyComparison& c) {
   if (c.orders.empty()) return;
   Table table;
-  table.title = "Every order in which the cylinders may take turns";
+  table.title = "Sequential motions in every order of the cylinders";
   table.note =
-      "A joint that is not named stays at rest. The end posture is the cheapest one for that "
-      "order; "
-      "the cheapest orders have their segments optimised.";
+      "A joint that is not named stays at rest. The goal configuration is the cheapest one for that "
+      "order. The segments of the cheapest orders are optimised.";
   table.columns = {{"order"}, {"energy", "kJ"}, {"shortest", "s"}, {"note"}};
   for (const BaselineMotion& m : c.orders) {
     const bool kept = m.why == "kept";
@@ -199,17 +199,17 @@ void add_one(Page& page, const StrategyComparison& c, const CraneModel& model,
   }
 }
 
-/// [%] Two sums of the same motion's energy differ by rounding: below a ten-thousandth of a percent is nothing.
+/// Excess [%], rounded to 1e-4, because two sums of the same motion's energy differ by rounding errors.
 double excess_percent(double cost, double best) {
   return std::round(1e6 * (cost / best - 1.0)) / 1e4;
 }
 
-/// By how much each way is dearer, problem by problem.
+/// Draws by how much each strategy exceeds the optimum, problem by problem.
 BarChart excess_bars(const std::vector<StrategyComparison>& all, const std::string& name) {
   BarChart bars;
-  bars.title = "Dearer than the optimum";
-  bars.note = "No bar: this way keeps the limits in no motion of that duration.";
-  bars.value_axis = {"more than the energy-optimal motion", "%"};
+  bars.title = "Energy above the optimum";
+  bars.note = "No bar: this strategy has no motion of that duration that keeps the limits.";
+  bars.value_axis = {"above the energy-optimal motion", "%"};
   bars.stacked = false;
   const std::vector<std::string> kinds = {kSequential, kJointLine, kTipLine, kBestTipLine};
   std::vector<std::vector<double>> values(kinds.size());
@@ -236,11 +236,11 @@ BarChart excess_bars(const std::vector<StrategyComparison>& all, const std::stri
 
 Table summary_table(const std::vector<StrategyComparison>& all, const std::string& name) {
   Table table;
-  table.title = "How much dearer, over all problems";
+  table.title = "Energy above the other strategy, over all problems";
   table.note =
-      "Of the problems in which both keep all limits. p: Wilcoxon's signed-rank test, two-sided, "
-      "that the difference is chance.";
-  table.columns = {{"way"},
+      "Only problems in which both strategies keep all limits. p: two-sided p-value of Wilcoxon's "
+      "signed-rank test for no difference.";
+  table.columns = {{"strategy"},
                    {"against"},
                    {"problems", "", 4},
                    {"only this one", "", 4},
@@ -264,10 +264,10 @@ Table summary_table(const std::vector<StrategyComparison>& all, const std::strin
 
 ScatterChart pairs_chart(const std::vector<StrategyComparison>& all, const std::string& name) {
   ScatterChart chart;
-  chart.title = "Each problem a dot";
-  chart.note = "On the diagonal a way costs what the optimum costs; above it, more.";
+  chart.title = "Energy against the optimum, problem by problem";
+  chart.note = "One point for each problem. On the diagonal a strategy takes as much as the optimum, above it more.";
   chart.x_axis = {"energy-optimal", "kJ"};
-  chart.y_axis = {"this way", "kJ"};
+  chart.y_axis = {"this strategy", "kJ"};
   chart.diagonal = true;
   for (const char* kind : {kSequential, kJointLine, kTipLine}) {
     std::vector<double> x, y;
@@ -329,12 +329,12 @@ void set_verdict(Page& page, const std::vector<StrategyComparison>& all) {
   page.verdict(
       Tone::kNeutral,
       fmt::format("{} against the energy-optimal motion{}: {}, {}, {}", where,
-                  all.size() > 1 ? " (medians)" : "", text(sequential, "one after another"),
-                  text(line, "simultaneous to the best end posture"),
+                  all.size() > 1 ? " (medians)" : "", text(sequential, "sequential"),
+                  text(line, "simultaneous to the best goal configuration"),
                   text(tip, "tip on a straight line")),
-      "Every motion keeps all limits at 16 times its knots' density; energies are those of the "
-      "exact law. Which way is cheapest depends on the time there is and on what the engine "
-      "burns meanwhile: times are therefore always named.");
+      "Every motion keeps all limits at 16 samples per mesh interval; energies are those of the exact "
+      "law. Which strategy takes least energy depends on the duration and on the idle power, so "
+      "every energy is given with its duration.");
 }
 
 }  // namespace

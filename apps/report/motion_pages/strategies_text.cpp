@@ -1,4 +1,4 @@
-/// The terminal's and the machine's view of a comparison.
+/// The texts of strategies: a table for the terminal, JSON.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -115,7 +115,7 @@ std::string strategies_json(const std::vector<StrategyComparison>& all,
         p["strategies"] = std::move(r);
       }
     }
-    // asked for own times only: they are what stands under the contract's key
+    // With own times only, these also stand under the key that docs/strategies.md promises.
     if (p["strategies"].empty() && p.contains("own_time")) p["strategies"] = p["own_time"];
     json orders = json::array();
     for (const BaselineMotion& m : c.orders) {
@@ -146,7 +146,7 @@ std::string strategies_table(const std::vector<StrategyComparison>& all) {
               : fmt::format("  {} time, {:.2f} s\n", row.factor > 0.0 ? row.name : "equal",
                             row.duration);
       text += fmt::format("    {:34} {:>8} {:>8} {:>9} {:>8} {:>8}\n", "", "kJ", "s",
-                          own ? "with idle" : "optimum +", "in valves", "bar peak");
+                          own ? "with idle" : "optimum +", "throttled", "bar peak");
       for (const StrategyOutcome& o : row.outcomes) {
         if (!o.found()) {
           text += fmt::format("    {:34} {}\n", strategy_title(o.kind), o.why);
@@ -170,7 +170,7 @@ std::string strategies_table(const std::vector<StrategyComparison>& all) {
   }
   if (all.size() < 2) return text;
   for (const std::string& name : row_names(all)) {
-    text += fmt::format("over {} problems, {}: dearer than the optimum by\n", all.size(), name);
+    text += fmt::format("over {} problems, {}: energy above the optimum\n", all.size(), name);
     text += fmt::format("    {:34} {:>4} {:>8} {:>17} {:>8} {:>10}\n", "", "n", "median",
                         "quartiles", "worst", "Wilcoxon p");
     const auto line = [&](const PairedSummary& s, const std::string& title) {

@@ -37,7 +37,7 @@ std::string with_unit(const std::string& label, const std::string& unit) {
   return fmt::format("{} <span class=\"unit\">[{}]</span>", html_escape(label), html_escape(unit));
 }
 
-/// Thousands apart by narrow no-break spaces (1234 stays together), a true minus sign.
+/// Separates thousands by narrow no-break spaces (not in 1234) and writes a true minus sign.
 std::string grouped(std::string text) {
   const std::size_t point = std::min(text.find('.'), text.size());
   const std::size_t first = text[0] == '-' ? 1 : 0;
@@ -76,7 +76,7 @@ bool is_numeric(const Table& table, std::size_t column) {
   });
 }
 
-/// A column of counts: no decimals.
+/// True when all numbers of a column are whole: they are printed without decimals.
 bool is_whole(const Table& table, std::size_t column) {
   return std::all_of(table.rows.begin(), table.rows.end(), [&](const auto& row) {
     const double* number = column < row.size() ? std::get_if<double>(&row[column]) : nullptr;
@@ -231,7 +231,7 @@ std::string Page::html() const {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n"
       "<style>\n{}\n{}</style>\n</head>\n<body data-plots-expected=\"{}\">\n"
-      // first of all scripts, so that an error in any later one is counted
+      // This script is the first one, so that an error in any later one is counted.
       "<script>var pageErrors = []; window.addEventListener('error', function (e) {{ "
       "pageErrors.push(String(e.message)); }});</script>\n<header>\n<h1>{}</h1>\n",
       html_escape(title_), page_asset("uplot/uPlot.min.css"), page_asset("page.css"), plot_count(),

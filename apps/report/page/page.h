@@ -1,7 +1,7 @@
 #pragma once
-/// A self-contained HTML page: one file, no network (its content security policy forbids it), light and
-/// dark, printable. Everything given is escaped; nothing in it depends on the clock, so the same input makes
-/// the same bytes.
+/// A self-contained HTML page: one file that needs no network (its content security policy forbids requests), has a
+/// light and a dark theme and can be printed. All text is escaped; nothing depends on the clock, so that the same input
+/// gives the same bytes.
 #include <string>
 #include <utility>
 #include <variant>
@@ -13,7 +13,7 @@ namespace sparflow {
 
 enum class Tone { kNeutral, kGood, kWarning, kBad };
 
-/// A big number: value already formatted, e.g. {"12.4", "kJ", "energy", "18 % less than the seed"}.
+/// A number in large type; the value is already formatted, e.g. {"12.4", "kJ", "energy", "18 % less than the seed"}.
 struct Tile {
   std::string value;
   std::string unit;
@@ -25,7 +25,7 @@ struct Tile {
 struct TableColumn {
   std::string header;
   std::string unit = "";
-  int digits = 4;  ///< significant digits of its numbers
+  int digits = 4;  ///< [-] significant digits of the column's numbers
 };
 
 /// A number (right-aligned, an em dash when it is not finite) or a text.
@@ -36,7 +36,7 @@ struct Table {
   std::vector<TableColumn> columns;
   std::vector<std::vector<TableCell>> rows;
   std::string note = "";
-  int highlighted_row = -1;  ///< drawn strong, e.g. the best; -1 = none
+  int highlighted_row = -1;  ///< index of the row in bold type, e.g. the best; -1 = none
 };
 
 class Page {
@@ -44,15 +44,15 @@ class Page {
   explicit Page(std::string title);
 
   void subtitle(std::string text);
-  /// The answer, in a box above everything else.
+  /// Sets the main result, which stands in a box above everything else.
   void verdict(Tone tone, std::string headline, std::string text);
-  /// Stands in the footer: program version, input files and their hashes, seed ... in the order given.
+  /// Adds a line to the footer (program version, input files and their hashes, seed ...), in the order of the calls.
   void provenance(std::string name, std::string value);
 
-  /// What follows belongs to this section; with more than two sections the page gets a contents line.
+  /// Begins a section. A page with more than two sections gets a line of contents.
   void section(std::string heading);
   void paragraph(std::string text);
-  /// Text as it is, in a fixed-width font, behind a click (long listings, options used).
+  /// Adds preformatted text in a fixed-width font that a click opens (long listings, options used).
   void details(std::string summary, std::string preformatted);
   void tiles(std::vector<Tile> tiles);
   void table(Table table);
@@ -63,9 +63,9 @@ class Page {
   void plot(CraneDrawing chart);
 
   int plot_count() const;
-  /// The whole file. Long series are thinned so that it stays below 3 MB, and each figure says so.
+  /// Returns the whole file. Long series are thinned so that it stays below 3 MB; each figure states how far.
   std::string html() const;
-  /// @throws InputError when the folder cannot be written
+  /// Writes html() to `path`. @throws InputError when the folder cannot be written
   void write(const std::string& path) const;
 
  private:
@@ -93,8 +93,8 @@ class Page {
   std::vector<Item> items_;
 };
 
-/// `value` with `digits` significant digits, thousands apart, no exponent between 1e-4 and 1e7; an em dash when
-/// it is not finite.
+/// Formats `value` with `digits` significant digits, spaces between thousands and no exponent between 1e-4 and 1e7;
+/// returns an em dash when it is not finite.
 std::string display_number(double value, int digits);
 
 }  // namespace sparflow

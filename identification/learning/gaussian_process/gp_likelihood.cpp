@@ -16,7 +16,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Everything that the exact process needs of its points at one set of hyperparameters.
+/// Matrices of the exact process at one set of hyperparameters.
 struct ExactSystem {
   MatrixXd kernel;         ///< [n x n] without noise
   MatrixXd projection;     ///< P = Ky^-1 - Ky^-1 H A^-1 H^T Ky^-1
@@ -105,7 +105,7 @@ double exact_log_likelihood(const GpPoints& p, const GpHyper& hyper, GpHyper* gr
 
 GpPosterior exact_posterior(const GpPoints& p, const GpHyper& hyper) {
   const ExactSystem s = exact_system(p, hyper);
-  SPARFLOW_CHECK(s.ok, "posterior asked for at hyperparameters without a likelihood");
+  SPARFLOW_CHECK(s.ok, "posterior requested at hyperparameters without a likelihood");
   const Index n = p.size(), b = p.basis.cols();
   GpPosterior out;
   out.x1 = p.x1;
@@ -122,7 +122,7 @@ GpPosterior exact_posterior(const GpPoints& p, const GpHyper& hyper) {
 
 VectorXd leave_one_out_residuals(const GpPoints& p, const GpHyper& hyper) {
   const ExactSystem s = exact_system(p, hyper);
-  SPARFLOW_CHECK(s.ok, "residuals asked for at hyperparameters without a likelihood");
+  SPARFLOW_CHECK(s.ok, "residuals requested at hyperparameters without a likelihood");
   return -(s.projection * p.y).cwiseQuotient(s.projection.diagonal());
 }
 

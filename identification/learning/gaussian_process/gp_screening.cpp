@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Residuals from a least-squares quadratic of both inputs; minimum norm, so constant inputs do no harm.
+/// @return residuals from a least-squares quadratic of both inputs; the minimum-norm solution permits constant inputs
 VectorXd quadratic_residuals(const GpPoints& p) {
   MatrixXd features(p.size(), 6);
   features << VectorXd::Ones(p.size()), p.x1, p.x2, p.x1.square(), p.x1 * p.x2, p.x2.square();

@@ -10,9 +10,9 @@
 #include <mutex>
 #include <thread>
 
-#include "identification/learning/gaussian_process/box_bfgs.h"
 #include "identification/learning/gaussian_process/gp_likelihood.h"
 #include "identification/learning/gaussian_process/gp_screening.h"
+#include "identification/learning/gaussian_process/minimise_bounded.h"
 #include "identification/learning/gaussian_process/sparse_gp.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
@@ -37,16 +37,16 @@ Scale input_scale(const ArrayXd& x) {
   const double lo = x.minCoeff(), hi = x.maxCoeff();
   s.offset = lo;
   s.scale = hi - lo;
-  // A spread of one millionth of the value is rounding of the log, not variation.
+  // A spread of one millionth of the value is the rounding of the log.
   s.constant = s.scale <= 1e-6 * std::max(std::abs(lo), std::abs(hi));
   if (s.constant) s.scale = std::max({std::abs(lo), std::abs(hi), 1e-9});
   return s;
 }
 
-/// The data of one process in scaled units, and the way back.
+/// The data of one pressure model in scaled units, with the scales.
 struct Problem {
   Scale flow, force, pressure;
-  double line_constant = 0.0, line_slope = 0.0;  // of the straight line taken off points.y
+  double line_constant = 0.0, line_slope = 0.0;  // straight line that is subtracted from points.y
   GpPoints points;
   GpHyper lower, upper;
 };
@@ -75,7 +75,7 @@ Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& p
   const double shortest = std::log(options.shortest_length);
   const double longest = std::log(options.longest_length);
   const double noise = 2.0 * std::log(options.smallest_noise / p.pressure.scale);
-  // The signal deviates from its linear mean by at most ten and at least a thousandth of the spread.
+  // Bounds of the signal's deviation from the linear mean: a thousandth of the spread to `largest_signal` spreads.
   p.lower = GpHyper(p.flow.constant ? longest : shortest, p.force.constant ? longest : shortest,
                     std::log(1e-6), noise);
   p.upper = GpHyper(longest, longest, 2.0 * std::log(options.largest_signal),
@@ -83,20 +83,20 @@ Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& p
   return p;
 }
 
-/// Maximises a likelihood; counts its evaluations in the report.
+/// Maximises a likelihood and counts its evaluations in the report.
 template <class Likelihood>
 GpHyper maximise(const Problem& problem, const GpHyper& start, int iterations, GpReport& report,
                  Likelihood&& likelihood) {
-  BoxBfgsOptions options;
-  options.max_iterations = iterations;
-  options.gradient_tolerance = 0.02;  // nats for each e-fold: far below what the data can tell
+  MinimiseOptions options;
+  options.max_evaluations = 3 * iterations;  // a step costs two evaluations or three
+  options.value_tolerance = 1e-6;  // of some thousand nats, far below statistical significance
   const auto negative = [&](const VectorXd& x, VectorXd& gradient) {
     GpHyper g = GpHyper::Zero();
     const double value = likelihood(GpHyper(x), &g);
     gradient = -g;
     return -value;
   };
-  const BoxBfgsResult r = minimise_in_box(negative, start, problem.lower, problem.upper, options);
+  const Minimum r = minimise_bounded(negative, start, problem.lower, problem.upper, options);
   report.evaluations += r.evaluations;
   report.converged = r.converged;
   report.log_likelihood = -r.value;
@@ -109,8 +109,8 @@ GpHyper maximise_exact(const Problem& problem, const GpPoints& points, const GpH
                   [&](const GpHyper& h, GpHyper* g) { return exact_log_likelihood(points, h, g); });
 }
 
-/// Few representatives, several starts: the likelihood has one optimum that explains the data by a
-/// smooth signal and often another that calls the signal noise.
+/// Fits the representatives from several starts, because the likelihood often has a second maximum at which the signal
+/// is explained as noise.
 GpHyper preliminary_fit(const Problem& problem, const GpPoints& few, GpReport& report) {
   GpHyper best;
   double best_value = -INFINITY;
@@ -134,7 +134,8 @@ std::vector<Index> every_kth(Index n, Index at_most) {
   return rows;
 }
 
-/// Inducing points depend on the length-scales and the other way round: alternate until both agree.
+/// Alternates between the choice of inducing points and the hyperparameters, which depend on each other, until the
+/// length-scales change little.
 GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
                          const LearnGpOptions& options, GpHyper& hyper, GpReport& report) {
   const auto choose = [&](const GpPoints& from) {
@@ -153,7 +154,8 @@ GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
   const double left = choice.mean_variance * std::exp(hyper[2] - hyper[3]);
   if (left > 10.0 * options.sparse_tolerance) {
     report.warnings.push_back(fmt::format(
-        "{} centres leave {:.0f} % of the noise variance open; more centres would fit closer.",
+        "With {} centres the mean conditional variance is {:.0f} % of the noise variance; more "
+        "centres would fit more closely.",
         choice.rows.size(), 100.0 * left));
   }
   SparseGp sparse(points, choice.rows);
@@ -163,7 +165,7 @@ GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
 
 GpPosterior fit_subset(const Problem& problem, const GpPoints& points,
                        const LearnGpOptions& options, GpHyper& hyper, GpReport& report) {
-  // Where the inputs are covered a further point adds only averaging: the rest comes evenly from the log.
+  // Once the inputs are covered further points only average noise, so the remaining ones are taken evenly from the log.
   const double tolerance = options.sparse_tolerance * std::exp(hyper[3] - hyper[2]);
   std::vector<Index> rows =
       choose_inducing(points.x1, points.x2, hyper, options.max_centres, tolerance).rows;
@@ -180,7 +182,7 @@ GpPosterior fit_subset(const Problem& problem, const GpPoints& points,
   return exact_posterior(chosen, hyper);
 }
 
-/// From scaled units to SI.
+/// Converts a posterior from scaled units to SI.
 GpParameters to_si(const Problem& problem, const GpPosterior& posterior, const GpHyper& hyper) {
   const Scale &q = problem.flow, &f = problem.force, &p = problem.pressure;
   const Index m = posterior.weight.size(), b = posterior.beta.size();
@@ -281,7 +283,7 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
   ArrayXd q = flow(rows), f = force(rows), p = pressure(rows);
   Problem problem = make_problem(q, f, p, options);
 
-  // Preliminary fit on representatives: start values, and a yardstick for outliers.
+  // The preliminary fit on representatives gives initial values and the reference for outliers.
   const std::vector<Index> few = representative_points(problem.points, 11);
   GpHyper hyper = preliminary_fit(problem, problem.points.select(few), report);
   const Screening screening = screen_outliers(problem.points, few, hyper, options.outlier_threshold,
@@ -296,7 +298,7 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
     q = ArrayXd(q(screening.kept));
     f = ArrayXd(f(screening.kept));
     p = ArrayXd(p(screening.kept));
-    // Scales of the inputs may shrink with an outlier; length-scales follow.
+    // Removing outliers may reduce the scales; the hyperparameters are converted to the new ones.
     const Problem before = problem;
     problem = make_problem(q, f, p, options);
     hyper[0] += std::log(before.flow.scale / problem.flow.scale);
@@ -346,7 +348,7 @@ std::vector<LearnedGp> learn_gps(const std::vector<GpDataset>& datasets,
   std::atomic<int> next{0};
   int done = 0;
   std::mutex mutex;
-  std::exception_ptr defect;  // anything but the user's data
+  std::exception_ptr defect;  // any exception except InputError
   const auto work = [&] {
     for (int i = next++; i < total; i = next++) {
       const std::size_t at = static_cast<std::size_t>(i);

@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Added to the diagonal of Kuu, relative to the signal variance. Inducing points are never closer than
-/// their conditional variance allows, so this only covers rounding.
+/// Added to the diagonal of Kuu, relative to the signal variance. It only covers rounding, since the choice by conditional
+/// variance keeps inducing points apart.
 constexpr double kJitter = 1e-9;
 
 }  // namespace
@@ -31,7 +31,7 @@ InducingChoice choose_inducing(const ArrayXd& x1, const ArrayXd& x2, const GpHyp
   for (Index m = 0; m < count; ++m) {
     Index pivot = 0;
     const double largest = left.maxCoeff(&pivot);
-    // Below a thousand jitters a further point adds rounding, not information.
+    // Below a thousand times the jitter a further point adds rounding errors only.
     if (largest < 1e3 * kJitter || (m > 2 && left.mean() < tolerance)) break;
     const ArrayXd p1 = ArrayXd::Constant(1, x1[pivot]), p2 = ArrayXd::Constant(1, x2[pivot]);
     VectorXd column = kernel_matrix(x1, x2, p1, p2, unit);
@@ -91,7 +91,7 @@ double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
   gamma.noalias() -= v_.transpose() * b_v_residual / noise;
   gamma /= noise;
   const double lost_trace = n * signal - trace_v_;  // tr(Kff - Qff)
-  // With a prior on beta, residual^T gamma is y^T P y only together with beta's own part.
+  // With a prior on beta, y^T P y is residual^T gamma plus the prior's quadratic form of beta.
   const double quadratic = residual.dot(gamma) + beta_.cwiseAbs2().dot(points_.basis_precision);
   const double value =
       points_.log_constant() -
@@ -142,7 +142,7 @@ double SparseGp::bound(const GpHyper& hyper, GpHyper* gradient) {
 }
 
 GpPosterior SparseGp::posterior(const GpHyper& hyper) {
-  SPARFLOW_CHECK(factorise(hyper), "posterior asked for at hyperparameters without a bound");
+  SPARFLOW_CHECK(factorise(hyper), "posterior requested at hyperparameters without a bound");
   const double noise = std::exp(hyper[3]);
   const Index m = z1_.size(), b = points_.basis.cols();
   GpPosterior out;

@@ -1,5 +1,5 @@
 #pragma once
-/// Sparse Gaussian process for long logs: m inducing points stand for all n measurements, at a cost of
+/// Sparse Gaussian process for long logs: m inducing points summarise all n measurements, at a cost of
 /// O(n m^2) for learning and O(m) for evaluation.
 /// Source: Titsias (2009), eq. 9 (collapsed bound), eq. 6 (prediction); the linear mean is integrated out
 /// as in Rasmussen & Williams (2006), ch. 2.7. Inducing points by greedy conditional variance: Burt,
@@ -14,24 +14,24 @@ namespace sparflow {
 
 struct InducingChoice {
   std::vector<Eigen::Index> rows;  ///< chosen points, in order of choice
-  double mean_variance = 0.0;      ///< left conditional variance, mean over the points, of s^2 = 1
-  double max_variance = 0.0;       ///< the largest
+  double mean_variance = 0.0;      ///< mean conditional variance of the points, for s^2 = 1
+  double max_variance = 0.0;       ///< largest conditional variance
 };
 
-/// Chooses the point whose value is least determined by those already chosen, again and again, until
-/// `count` are chosen or the mean conditional variance is below `tolerance` (fraction of the signal's).
-/// @param hyper only the length-scales are read
+/// Repeatedly chooses the point with the largest conditional variance given those already chosen, until `count` are chosen
+/// or the mean conditional variance is below `tolerance` (fraction of the signal's).
+/// @param hyper only the length-scales are used
 InducingChoice choose_inducing(const Eigen::ArrayXd& x1, const Eigen::ArrayXd& x2,
                                const GpHyper& hyper, Eigen::Index count, double tolerance);
 
 /// The collapsed bound at fixed inducing points; keeps its arrays between evaluations.
 class SparseGp {
  public:
-  /// @param points is referred to and must outlive the object
+  /// @param points is kept by reference and must outlive the object
   SparseGp(const GpPoints& points, const std::vector<Eigen::Index>& inducing);
 
-  /// Lower bound on the log marginal likelihood. -infinity where it cannot be computed.
   /// @param gradient with respect to `hyper`, or nullptr
+  /// @return lower bound on the log marginal likelihood; -infinity where it cannot be computed
   double bound(const GpHyper& hyper, GpHyper* gradient);
 
   GpPosterior posterior(const GpHyper& hyper);

@@ -36,7 +36,7 @@ std::string identifier(const YamlValue& value, const std::string& what) {
   return word;
 }
 
-/// Units of a joint's coordinate and its first two derivatives by time.
+/// Dimension of a joint's coordinate or of its first or second time derivative.
 Dimension joint_dimension(JointType type, SignalKind kind) {
   const Dimension q = type == JointType::kPrismatic ? dimensions::kLength : dimensions::kNone;
   return kind == SignalKind::kJointPosition ? q
@@ -86,7 +86,7 @@ class EffectReader {
     judge_parameters(places, law, spec);
     spec.equation = text_or("equation", "one line of text", spec.law.text());
     spec.citation = text_or("citation", "author (year), where", "");
-    spec.separated_by = text_or("separated_by", "the motion that tells it apart", "");
+    spec.separated_by = text_or("separated_by", "the motion that distinguishes it", "");
     if (const auto list = map.find("confused_with")) {
       for (const YamlValue& word : list->list("ids of effects or words")) {
         spec.confused_with.push_back(word.text("the id of an effect or words"));
@@ -162,7 +162,7 @@ class EffectReader {
     return p;
   }
 
-  /// A number of the parameter's unit inside its bounds, SI.
+  /// A number in the parameter's unit, checked to be inside its bounds; returned in SI.
   static double within(const YamlValue& value, const Quantity& what, const UserParameter& p) {
     const double si = value.number(what);
     if (!(si >= p.lower && si <= p.upper)) {
@@ -172,7 +172,7 @@ class EffectReader {
     return si;
   }
 
-  /// What may stand in a law of this stage.
+  /// The names that a law of this stage may contain.
   std::vector<Symbol> vocabulary(Stage stage) const {
     std::vector<Symbol> symbols;
     for (const SignalInfo& signal : user_effect_signals()) {
@@ -214,7 +214,7 @@ class EffectReader {
     }
   }
 
-  /// A law of a pump that asks for a cylinder's signal deserves to be told so; else the parser's own words.
+  /// The message when a pump's law uses a cylinder's signal; otherwise the parser's own message.
   static std::string explained(const std::string& law, const TextError& error, Stage stage) {
     const std::size_t begin = static_cast<std::size_t>(error.column) - 1;
     std::size_t end = begin;
@@ -248,7 +248,7 @@ class EffectReader {
     check_failed("signal", __FILE__, __LINE__, "a law has a signal outside the table: " + name);
   }
 
-  /// Every parameter does something; the effect can be absent; the others have a grid.
+  /// Checks that every parameter occurs in the law and that the effect can be absent; gives the nonlinear ones a grid.
   static void judge_parameters(const std::vector<std::pair<std::string, YamlValue>>& places,
                                const YamlValue& law, UserEffectSpec& spec) {
     const std::vector<std::string> sizes = spec.law.proportional_parameters();
@@ -282,7 +282,7 @@ class EffectReader {
         spec.law.text()));
   }
 
-  /// Evenly spaced, by ratio where all values are positive and span more than a decade.
+  /// Values at equal steps over the bounds, at equal ratios where they are positive and span more than a decade.
   static std::vector<double> default_grid(const UserParameter& p) {
     std::vector<double> grid;
     const bool by_ratio = p.lower > 0.0 && p.upper > 10.0 * p.lower;
@@ -298,7 +298,7 @@ class EffectReader {
   const std::vector<std::string>& reserved_;
 };
 
-/// A file with this effect alone.
+/// YAML text of a file that contains this effect alone.
 std::string alone(const YamlValue& effect) {
   std::string text = "effects:\n";
   std::istringstream lines(effect.yaml());

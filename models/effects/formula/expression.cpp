@@ -15,7 +15,7 @@ Expression::Curve Expression::curve(const Node& node, double x) {
     case Op::kAbs:
       return x < 0.0 ? Curve{-x, -1.0, 0.0} : Curve{x, 1.0, 0.0};
     case Op::kSign:
-      return {x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x, 0.0, 0.0};  // x: keeps NaN
+      return {x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x, 0.0, 0.0};  // The last x preserves NaN.
     case Op::kStep:
       return {x > 0.0 ? 1.0 : x <= 0.0 ? 0.0 : x, 0.0, 0.0};
     case Op::kPositive:
@@ -196,7 +196,7 @@ std::vector<std::string> Expression::proportional_parameters() const {
   unsigned best = 0;
   for (unsigned group = 1; group < 1u << parameters_.size(); ++group) {
     if (std::popcount(group) <= std::popcount(best) && best != 0) {
-      // of equal size the group with the earlier parameters, that is the lower bits, stays
+      // Of groups of equal size the one with earlier parameters (lower bits) is kept.
       continue;
     }
     std::vector<bool> in_group(parameters_.size());

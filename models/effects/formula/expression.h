@@ -1,7 +1,7 @@
 #pragma once
-/// The law of a user's effect: a text such as `Fc * tanh(v / v0)` over named signals and parameters, checked for
-/// units when read, compiled to a flat tape, evaluated in SI with any scalar of the program, exact derivatives
-/// included. Grammar and functions: docs/user_effects.md.
+/// The law of a user's effect: a text such as `Fc * tanh(v / v0)` over named signals and parameters. Its units are
+/// checked when it is read, it is compiled to a flat tape, and it is evaluated in SI with any scalar of the program,
+/// including exact derivatives. Grammar and functions: docs/user_effects.md.
 #include <array>
 #include <span>
 #include <string>
@@ -12,30 +12,30 @@
 
 namespace sparflow {
 
-/// A name that may stand in a law.
+/// A name that a law may contain.
 struct Symbol {
   std::string name;  ///< "v", "q.boom"; "q.*" stands for every name that begins with "q."
-  Unit unit;         ///< values are SI whatever its factor; a reading [degC] stays in degC
+  Unit unit;         ///< values are SI whatever its factor; a temperature reading stays in degC
   bool unit_known =
-      true;  ///< false: the machine decides (a joint turns or slides), no check is made
+      true;  ///< false: it depends on the machine (revolute or prismatic joint) and is not checked
 };
 
-/// How a law depends on a group of parameters while everything else is held.
+/// How a law depends on a group of parameters while everything else is constant.
 enum class Dependence {
   kNone,          ///< not at all
-  kProportional,  ///< sum of p_k f_k(signals, others): it vanishes with them
-  kAffine,        ///< the same plus a part without them
-  kOther          ///< not linear, or not seen to be (p^2/p is not simplified)
+  kProportional,  ///< sum of p_k f_k(signals, others): zero when the group is zero
+  kAffine,        ///< the same plus a term without them
+  kOther          ///< not linear, or not recognised as such (p^2/p is not simplified)
 };
 
 class Expression {
  public:
-  /// Parses, checks units, compiles. At most ten parameters.
+  /// Parses the law, checks its units and compiles it. A law has at most ten parameters.
   /// @throws TextError with the column in `law` [characters]
   static Expression compile(const std::string& law, const std::vector<Symbol>& signals,
                             const std::vector<Symbol>& parameters);
 
-  /// Names of the functions a law may call; no symbol may bear one.
+  /// Names of the functions a law may call; no symbol may have one of them.
   static std::vector<std::string> functions();
 
   const std::string& text() const { return text_; }
@@ -47,9 +47,10 @@ class Expression {
   const std::vector<std::string>& parameters() const { return parameters_; }
   bool uses_parameter(const std::string& name) const;
 
-  /// Value in SI, NaN or infinite where the law is not defined (log of a negative number, 1/0). Nothing is
-  /// allocated; const and safe to share. Where a function has a kink the derivative is that of the branch taken
-  /// (abs and max at the kink: the right or first one; sign, step: 0); where it would be infinite (sqrt at 0), 0.
+  /// Value in SI, NaN or infinite where the law is not defined (log of a negative number, 1/0). Nothing
+  /// is allocated, and objects can be shared between threads. Where a function has a kink the derivative is that of the
+  /// branch taken (abs and max at the kink: the right or first one; sign, step: 0); where it would be infinite (sqrt at
+  /// 0) it is 0.
   /// @param signals SI, readings in degC, in the order of signals(); T is double or has `double value` and
   ///   `T chain(f0, f1, f2) const`, as Dual2<N> and Jet
   /// @param parameters SI, in the order of parameters()
@@ -57,20 +58,22 @@ class Expression {
   T evaluate(std::span<const T> signals, std::span<const double> parameters) const {
     return run<T, double>(signals, parameters);
   }
-  /// The same with derivatives by parameters too.
+  /// The same with derivatives by parameters as well.
   template <class T>
   T evaluate_with(std::span<const T> signals, std::span<const T> parameters) const {
     return run<T, T>(signals, parameters);
   }
-  /// Value; @param gradient by parameter, of the size of parameters(), overwritten. Reverse sweep, nothing allocated.
+  /// Value and gradient by a reverse sweep, without allocation.
+  /// @param gradient [parameters], overwritten
   double value_and_gradient(std::span<const double> signals, std::span<const double> parameters,
                             std::span<double> gradient) const;
 
-  /// Decided on the tape, so for every value of the signals.
+  /// Decided from the tape, therefore for every value of the signals.
   Dependence dependence(std::span<const std::string> names) const;
-  /// Linear in this parameter while the others are held. @throws logic_error for a name that is no parameter
+  /// Whether the law is linear in this parameter while the others are constant.
+  /// @throws logic_error for a name that is no parameter
   bool linear_in(const std::string& parameter) const;
-  /// The largest group the law is jointly proportional to, of several the one with earlier parameters:
+  /// The largest group to which the law is jointly proportional, of several the one with earlier parameters:
   /// `Fc * sign(v) + B * v` gives {Fc, B}, `a * b * v` {a}, `k * (oil - T0)` {k}, `max(0, F - F0)` none.
   /// The law is then sum of p_k dlaw/dp_k over the group, whose derivatives do not depend on the group.
   std::vector<std::string> proportional_parameters() const;
@@ -105,7 +108,7 @@ class Expression {
     kCos,
     kPower,
   };
-  /// Operands stand before their operator (postfix), so one sweep with a stack evaluates.
+  /// Operands precede their operator (postfix), so that one sweep with a stack evaluates the tape.
   struct Node {
     Op op = Op::kNumber;
     int a = -1;          ///< operand's node; for signals and parameters their index
@@ -114,7 +117,7 @@ class Expression {
   };
   static constexpr std::size_t kMaxParameters = 10;
   static constexpr std::size_t kMaxNodes = 256;
-  static constexpr std::size_t kMaxDepth = 24;  ///< operands waiting at a time
+  static constexpr std::size_t kMaxDepth = 24;  ///< largest size of the stack
 
   /// Value and derivatives of a function of one variable.
   struct Curve {

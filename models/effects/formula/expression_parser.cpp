@@ -17,7 +17,7 @@ namespace {
 bool letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 bool digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
-/// As it must stand in a law: q.'jib-2' for a joint whose name would read as a difference.
+/// The name as a law must write it: q.'jib-2' for a joint whose name would otherwise be read as a difference.
 std::string as_written(const std::string& name) {
   const std::size_t dot = name.find('.');
   if (dot == std::string::npos || name.find('-') == std::string::npos) return name;
@@ -98,7 +98,7 @@ ExpressionParser::Operand ExpressionParser::product() {
   return left;
 }
 
-/// -x^2 is -(x^2), as in mathematics.
+/// Parses a sign; -x^2 is -(x^2), as in mathematics.
 ExpressionParser::Operand ExpressionParser::signed_power() {
   if (++depth_ > kMaxNesting) fail(pos_, "the law is nested too deeply; split it into two effects");
   const char sign = next();
@@ -108,7 +108,7 @@ ExpressionParser::Operand ExpressionParser::signed_power() {
     ++pos_;
     result = signed_power();
     if (sign == '-') {
-      // -10[degC] is a reading; the negative of any other reading is none
+      // -10[degC] is a reading; no other reading can be negated.
       if (result.kind == Kind::kReading && !is_number(result.node)) {
         fail_reading(result, "is negated");
       }
@@ -241,7 +241,7 @@ ExpressionParser::Operand ExpressionParser::call(const std::string& word, std::s
   return result;
 }
 
-/// `a > b` inside step(); a plain value is compared with 0.
+/// Parses `a > b` inside step(); a single value is compared with 0.
 ExpressionParser::Operand ExpressionParser::condition() {
   const Operand left = sum();
   const char c = next();
@@ -260,7 +260,7 @@ ExpressionParser::Operand ExpressionParser::condition() {
           Kind::kQuantity};
 }
 
-/// `v`, `q.boom`, `q.'jib-2'` (without its quotes).
+/// Parses a name: `v`, `q.boom`, `q.'jib-2'` (returned without its quotes).
 std::string ExpressionParser::name() {
   std::string word;
   const auto more = [&] { return !at_end() && (letter(law_[pos_]) || digit(law_[pos_])); };

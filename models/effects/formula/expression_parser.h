@@ -1,5 +1,5 @@
 #pragma once
-/// Recursive descent from the text of a law to the tape of an Expression; internal to expression*.cpp.
+/// Recursive-descent parser from the text of a law to the tape of an Expression; internal to expression*.cpp.
 /// Grammar and lexing are in expression_parser.cpp, the rules of units in expression_units.cpp.
 #include <string>
 #include <vector>
@@ -18,12 +18,12 @@ class ExpressionParser {
 
  private:
   using Op = Expression::Op;
-  /// A reading is a temperature on the Celsius scale; a bare 0 fits every unit; an unknown fits everything.
+  /// A reading is a temperature on the Celsius scale. A bare 0 is compatible with every unit, an unknown unit with all.
   enum class Kind { kQuantity, kReading, kZero, kUnknown };
-  /// A part of the law that has a value.
+  /// A part of the law that has a value and a unit.
   struct Operand {
     int node = -1;
-    std::size_t begin = 0, end = 0;  ///< in the law
+    std::size_t begin = 0, end = 0;  ///< [characters] in the law
     Dimension dimension;
     Kind kind = Kind::kQuantity;
   };
@@ -36,7 +36,7 @@ class ExpressionParser {
   };
   static const std::vector<Function>& functions();
 
-  // grammar, one function a level
+  // grammar, one function for each level of precedence
   Operand sum();
   Operand product();
   Operand signed_power();
@@ -53,7 +53,7 @@ class ExpressionParser {
   Operand multiplied(const Operand& left, const Operand& right, std::size_t at);
   Operand raised(const Operand& base, const Operand& exponent, std::size_t at);
   Operand applied(const Function& function, Operand x, std::size_t at);
-  /// The common unit of two operands of a comparison; the node is left to the caller.
+  /// The common unit of two compared operands; the caller sets the node.
   Operand same_unit(const Operand& a, const Operand& b, std::size_t at,
                     const std::string& verb) const;
   void wants_none(const Operand& x, const std::string& who) const;
@@ -86,7 +86,7 @@ class ExpressionParser {
   Expression result_;
   std::size_t pos_ = 0;
   int depth_ = 0;
-  int arguments_ = 0;  ///< open function calls: a comma may follow a number
+  int arguments_ = 0;  ///< number of open function calls, within which a comma may follow a number
 };
 
 }  // namespace sparflow

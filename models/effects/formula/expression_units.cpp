@@ -1,4 +1,4 @@
-// Which units may meet in a law, and the operations put on the tape.
+// Rules for units in a law, and the operations that are appended to the tape.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,8 @@ ExpressionParser::Operand ExpressionParser::added(const Operand& left, const Ope
   if (reading_left && reading_right) {
     if (!minus) fail_reading(right, "is added to another");
     result.kind = Kind::kQuantity;
-  } else if (reading_left && kelvin(right)) {  // a reading and some kelvin: a reading
+  } else if (reading_left && kelvin(right)) {
+    // A reading plus or minus a difference in K is a reading.
   } else if (reading_right && kelvin(left)) {
     if (minus) fail_reading(right, "is subtracted from what is none");
     result.kind = Kind::kReading;
@@ -146,7 +147,7 @@ ExpressionParser::Operand ExpressionParser::same_unit(const Operand& a, const Op
 void ExpressionParser::wants_none(const Operand& x, const std::string& who) const {
   if (x.kind == Kind::kReading) fail_reading(x, "stands in " + who);
   if (x.kind == Kind::kUnknown || x.kind == Kind::kZero || x.dimension.none()) return;
-  fail(x.begin, fmt::format("{} wants a number without unit, \"{}\" has {}; divide it by a "
+  fail(x.begin, fmt::format("{} needs a number without unit, \"{}\" has {}; divide it by a "
                             "parameter or a number of that unit",
                             who, source(x), shown(x)));
 }
@@ -187,7 +188,7 @@ int ExpressionParser::emit(const Expression::Node& node, std::size_t at) {
   const bool constant = operands > 0 && tape.size() >= operands &&
                         std::all_of(tape.end() - static_cast<std::ptrdiff_t>(operands), tape.end(),
                                     [](const Expression::Node& n) { return n.op == Op::kNumber; });
-  if (constant) {  // operands stand last, so numbers there are the operands
+  if (constant) {  // Operands are the last nodes, so numbers there are the operands.
     const double b = tape.back().value;
     double value = 0.0;
     if (operands == 2) {

@@ -77,7 +77,7 @@ const Named* find_unit(const std::string& name) {
   return nullptr;
 }
 
-/// What was probably meant by a word that is no unit: "; did you mean "N m"?" or "".
+/// Hint for a word that is no unit: "; did you mean "N m"?", or the list of known units.
 std::string meant(const std::string& word) {
   struct Habit {
     const char* written;
@@ -114,13 +114,13 @@ std::string meant(const std::string& word) {
   }
   if (found.empty()) {
     const std::string nearest = nearest_word(word, names);
-    if (word.size() > 2) found = nearest;  // anything is near a word of two letters
+    if (word.size() > 2) found = nearest;  // Every unit is near a word of two letters.
   }
   return found.empty() ? "; known units: " + known_units()
                        : fmt::format("; did you mean \"{}\"?", found);
 }
 
-/// Recursive descent over one unit text.
+/// Recursive-descent parser of one unit text.
 class UnitParser {
  public:
   explicit UnitParser(const std::string& text) : text_(text) {}
@@ -139,7 +139,7 @@ class UnitParser {
   }
 
  private:
-  /// Factors up to the end or a closing parenthesis.
+  /// Parses factors up to the end or a closing parenthesis.
   Unit product() {
     if (++depth_ > kMaxDepth) fail(pos_, "too many parentheses in a unit");
     Unit unit = factor();
@@ -232,7 +232,7 @@ class UnitParser {
     return value;
   }
 
-  /// Letters, % and bytes beyond ASCII other than the three marks this grammar uses.
+  /// Reads letters, % and bytes beyond ASCII other than the three marks that this grammar uses.
   std::string name() {
     const std::size_t begin = pos_;
     while (!at_end()) {
@@ -321,7 +321,7 @@ Dimension Dimension::power(double exponent) const {
 }
 
 std::string Dimension::text() const {
-  // What people of the field write: masses and densities in kg, the rest in N or Pa, whichever is shorter.
+  // Masses and densities are written in kg and the rest in N or Pa, whichever is shorter, as is usual in the field.
   const int mass = twice[1];
   const bool in_kg = twice[2] == 0 && std::abs(twice[0]) <= 6;
   struct Head {

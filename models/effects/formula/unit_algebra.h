@@ -7,7 +7,7 @@
 
 namespace sparflow {
 
-/// Something wrong inside a short text (a unit, a law). Whoever knows the file turns it into an InputError.
+/// An error inside a short text (a unit, a law). The caller, who knows the file, turns it into an InputError.
 class TextError : public std::runtime_error {
  public:
   TextError(int column_in, const std::string& message)
@@ -15,7 +15,7 @@ class TextError : public std::runtime_error {
   int column;  ///< 1-based, in characters
 };
 
-/// Exponents of m, kg, s and K; halves are allowed, as in the flow through an orifice [m^3/(s Pa^0.5)].
+/// Exponents of m, kg, s and K. Halves are allowed, as for the flow through an orifice [m^3/(s Pa^0.5)].
 struct Dimension {
   std::array<int, 4> twice{};  ///< two times each exponent, in the order above
 
@@ -51,14 +51,14 @@ std::string in_brackets(const Dimension& dimension);
 struct Unit {
   Dimension dimension;
   double si = 1.0;  ///< SI value = number in this unit * si
-  /// `degC` alone: a reading of a thermometer. The program counts temperatures in degC, so its factor is 1; only
+  /// True for `degC` alone, the reading of a thermometer. Temperatures stay in degC, so that its factor is 1; only
   /// the difference of two readings is a quantity [K]. Inside a compound (`1/degC`) the degree is a kelvin.
   bool reading = false;
 };
 
 /// Product of unit names with `*`, a space or `·` between, at most one level of `/` (or several: `m/s/s`),
 /// parentheses, exponents `^2`, `^-1`, `^0.5`, `²`, `³`. `1` and `-` are pure numbers.
-/// @throws TextError with the column and, where there is one, what was probably meant
+/// @throws TextError with the column and, where there is one, the unit that was probably meant
 Unit parse_unit(const std::string& text);
 
 /// All unit names that parse_unit() knows, for documentation: "m, mm, cm, ...".

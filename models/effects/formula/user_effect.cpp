@@ -69,7 +69,7 @@ class UserEffect final : public Effect {
     info_.title = spec_.title;
     info_.stage = stage_of(spec_.stage);
     info_.place = place_of(spec_.place);
-    // the catalogue's order: proportional ones first
+    // The catalogue lists proportional parameters first.
     for (const bool linear : {true, false}) {
       for (std::size_t k = 0; k < spec_.parameters.size(); ++k) {
         const UserParameter& p = spec_.parameters[k];
@@ -85,7 +85,7 @@ class UserEffect final : public Effect {
     info_.confused_with = spec_.confused_with;
     info_.separated_by = spec_.separated_by;
     info_.citation = spec_.citation;
-    info_.in_motion = !spec_.in_motion() ? "nothing: its law is about signals only a log has"
+    info_.in_motion = !spec_.in_motion() ? "nothing: its law uses signals that only a log has"
                       : spec_.stage == UserEffectStage::kFlow ? "nothing: a motion prescribes flow"
                                                               : user_effect_stage_name(spec_.stage);
   }
@@ -173,16 +173,16 @@ class UserEffect final : public Effect {
   }
 
  private:
-  /// What one unit of the law is in that evidence.
+  /// What one unit of the law adds to that evidence channel.
   static double in_evidence(const Cylinder& c, EvidenceKind kind, int side) {
     if (kind == EvidenceKind::kForce) return 1.0;
     if (kind == EvidenceKind::kFlow) return side < 0 ? -1.0 / c.area_rod() : 1.0 / c.area_piston();
-    // a working pressure that is higher at the same load has its cause in the return chamber, or is the supply's own
+    // A working pressure that is higher at the same load has its cause in the return chamber or in the supply chamber.
     const int back = return_side(kind);
     return back != 0 ? supply_area(c, back) / return_area(c, back) : 1.0;
   }
 
-  /// Whether the log has what only logs have.
+  /// Whether the log contains the measured signals of the law.
   bool measured(const MachineSeries& log, int index) const {
     for (const UserSignal& s : spec_.signals) {
       if (s.kind == SignalKind::kOil && log.oil.size() == 0) return false;
@@ -266,7 +266,8 @@ class UserEffect final : public Effect {
       case SignalKind::kJointAcceleration:
         return s.qdd[joint()];
       default:
-        return T(std::numeric_limits<double>::quiet_NaN());  // a log's alone: not asked in a motion
+        // Only logs have this signal; laws with it are not evaluated in motions.
+        return T(std::numeric_limits<double>::quiet_NaN());
     }
   }
 
@@ -283,7 +284,7 @@ class UserEffect final : public Effect {
     const bool of_pump = stage == UserEffectStage::kPump;
     for (std::size_t i = 0; i < out.size(); ++i) {
       if (at >= 0 && static_cast<std::size_t>(at) != i) continue;
-      // at rest a law of the working pressure has no chamber to act in
+      // At rest a law of the working pressure has no supply chamber to act on.
       if (stage == UserEffectStage::kPressure && s.side[i] == 0) continue;
       for (std::size_t k = 0; k < signals.size(); ++k) {
         signals[k] = instant_signal(spec_.signals[k], s, static_cast<int>(i), of_pump);
@@ -295,7 +296,7 @@ class UserEffect final : public Effect {
 
   UserEffectSpec spec_;
   EffectInfo info_;
-  std::vector<std::size_t> law_index_;  // of the catalogue's parameters in the law's order
+  std::vector<std::size_t> law_index_;  // index in the law of each catalogue parameter
   int linear_ = 0;
 };
 

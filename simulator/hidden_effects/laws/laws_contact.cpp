@@ -1,4 +1,4 @@
-/// Forces of guides, stops and sensors of force; inertia.
+/// Hidden effects: guide pads, end stops, constant forces, inertia.
 #include <algorithm>
 #include <cmath>
 
@@ -30,7 +30,7 @@ class PadFriction final : public HiddenLaw {
     if (c.speed == 0.0) return;
     const double moment = std::abs(bodies.bending_moment(s.q.data(), s.payload, joint_));
     double spacing = spacing_;
-    if (law_ == 1) {  // the overlap shrinks a little as the telescope runs out
+    if (law_ == 1) {  // The overlap shrinks as the telescope extends.
       const double out =
           (s.q[static_cast<std::size_t>(joint_)] - travel_.lo) / (travel_.hi - travel_.lo);
       spacing = spacing_ * (1.1 - 0.2 * out);
@@ -94,7 +94,7 @@ class ForceOffset final : public HiddenLaw {
         law_(c.law),
         force_(c.random->sign() * c.size * c.draw(3.0, 8.0) * kBar * drive_area(c.cylinder())) {}
   void force(PlantState& s, BodyForces&) override {
-    // law 1: a spring that hardly bends over the stroke (hose, gas spring)
+    // Law 1: a spring whose force varies little over the stroke (hose, gas spring).
     CylinderState& c = s.cylinders[at_];
     if (first_ == 0.0) first_ = c.length;
     const double f =
@@ -125,7 +125,7 @@ class Inertia final : public HiddenLaw {
       CylinderState& c = s.cylinders[i];
       double f =
           s.inertia[static_cast<std::size_t>(machine_->cylinders[i].joint)] / c.rate * scale_;
-      // law 1: rod and barrel come on top, a few per cent along the cylinder's axis
+      // Law 1: rod and barrel add a few per cent along the cylinder's axis.
       if (law_ == 1) f += 0.02 * std::abs(c.weight) / 9.81 * c.acceleration;
       c.force += f;
     }

@@ -1,4 +1,4 @@
-/// Friction in cylinders and pins.
+/// Hidden effects: friction in cylinders and pins.
 #include <algorithm>
 #include <cmath>
 
@@ -7,10 +7,10 @@
 namespace sparflow::simulator {
 namespace {
 
-/// sign(v) without its jump: 0 at rest, 1 within 1 % at three times `width`.
+/// Smooth sign(v): 0 at rest, 1 within 1 % at three times `width` [m/s].
 double soft_sign(double v, double width) { return std::tanh(v / width); }
 
-/// Deflection of a bristle in units of its break-away deflection, -1..1.
+/// Deflection of a bristle in units of its break-away deflection (-1..1).
 class Bristle {
  public:
   explicit Bristle(double distance) : distance_(distance) {}
@@ -49,9 +49,9 @@ class Coulomb final : public OnCylinder {
     double f = 0.0;
     if (law_ == 0) {
       f = force_ * soft_sign(c.speed, width_);
-    } else if (law_ == 1) {  // LuGre: the bristles' state is all there is at rest
+    } else if (law_ == 1) {  // LuGre: at rest the force is that of the bristles' state.
       f = force_ * bristle_.step(c.speed, s.h);
-    } else {  // Stribeck's dip is there but shallow
+    } else {  // tanh with a shallow Stribeck dip.
       f = force_ * soft_sign(c.speed, width_) *
           (1.0 + 0.12 * std::exp(-std::pow(c.speed / 4e-3, 2)));
     }
@@ -83,9 +83,9 @@ class Viscous final : public OnCylinder {
     CylinderState& c = here(s);
     const double v = std::abs(c.speed);
     double f = coefficient_ * v;
-    if (law_ == 1) {  // shear-thinning seal film, the same force at the reference speed
+    if (law_ == 1) {  // Shear-thinning seal film with the same force at the reference speed.
       f = coefficient_ * reference_speed_ * std::pow(v / reference_speed_, power_);
-    } else if (law_ == 2) {  // film that thickens with speed: slightly saturating
+    } else if (law_ == 2) {  // Film that thickens with speed, so that the force saturates slightly.
       f = coefficient_ * v / (1.0 + 0.15 * v / reference_speed_);
     }
     f *= sign_of(c.speed);
@@ -134,11 +134,11 @@ class LoadFriction final : public OnCylinder {
     CylinderState& c = here(s);
     double f = share_ * std::abs(c.weight) * soft_sign(c.speed, 0.5e-3);
     if (law_ == 1) {
-      // pins of radius r turn with the joint: force = mu r |F| |dtheta/dx|; the lever arm varies with the pose
+      // Pins of radius r turn with the joint: force = mu r |F| |dtheta/dx|, where the lever arm varies with posture.
       arm_ += 1e-3 * (std::abs(c.rate) - arm_) * (c.speed != 0.0 ? 1.0 : 0.0);
       if (arm_ == 0.0) arm_ = std::abs(c.rate);
       if (pins_) f *= std::pow(arm_ / std::abs(c.rate), 0.3);
-    } else if (law_ == 2) {  // seals: grows a little less than the load
+    } else if (law_ == 2) {  // Seals: the friction grows a little less than the load.
       f = share_ * 1e5 * std::pow(std::abs(c.weight) / 1e5, 0.9) * soft_sign(c.speed, 0.5e-3);
     }
     c.force += f;
@@ -167,7 +167,7 @@ class Presliding final : public OnCylinder {
     double state = 0.0;
     if (law_ == 0) {  // Dahl (1968)
       state = bristle_.step(c.speed, s.h);
-    } else {  // Maxwell slip: parallel elements that yield one after the other
+    } else {  // Maxwell slip: parallel elements that slip one after the other.
       for (Play& p : plays_) {
         p.deflection = std::clamp(p.deflection + c.speed * s.h, -p.yield, p.yield);
         state += p.deflection / p.yield / kElements;

@@ -1,4 +1,4 @@
-/// Masses, gravity and posture that the machine file does not know.
+/// Hidden effects: masses, direction of gravity and postures that differ from the machine file.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// From a joint to the next (or the tip), in its frame: the link's bone. [m]
+/// Vector [m] from a joint to the next one (or the tip), in the joint's frame.
 Eigen::Vector3d bone(const Machine& machine, int joint) {
   const auto next = static_cast<std::size_t>(joint) + 1;
   Eigen::Vector3d d = Eigen::Vector3d::Zero();
@@ -41,7 +41,7 @@ Eigen::Vector3d axis_in_base(const Machine& machine, int joint) {
          machine.joints[static_cast<std::size_t>(joint)].axis;
 }
 
-/// A joint whose load depends on gravity at all: not a vertical slewing axis that comes first.
+/// Whether gravity loads a joint, which it does not on a vertical slewing axis that comes first.
 bool feels_weight(const Machine& machine, int joint) {
   for (int k = 0; k <= joint; ++k) {
     const bool turns = machine.joints[static_cast<std::size_t>(k)].type == JointType::kRevolute;
@@ -74,7 +74,7 @@ class UnmodelledMass final : public HiddenLaw {
     const Eigen::Vector3d along = bone(machine, joint_).normalized();
     if (law_ == 0) {
       machine.links.push_back({"hidden mass", joint_, mass_, along * cog_});
-    } else {  // two parts with the same mass and moment
+    } else {  // Two parts with the same total mass and moment.
       machine.links.push_back({"hidden mass", joint_, 0.5 * mass_, along * (0.7 * cog_)});
       machine.links.push_back({"hidden mass", joint_, 0.5 * mass_, along * (1.3 * cog_)});
     }
@@ -99,7 +99,7 @@ class PayloadError final : public HiddenLaw {
   }
   void payload(PlantState& s) override {
     s.payload += mass_;
-    // law 1: a grab or rope that is not told, always there, and a scale that shows 1 % too little
+    // Law 1: a grab or rope that the log does not contain, and a scale that reads 1 % too little.
     if (law_ == 1) s.payload += 0.01 * (s.payload - mass_);
   }
   std::vector<HiddenParameter> parameters() const override {
@@ -120,9 +120,9 @@ class BaseTilt final : public HiddenLaw {
     axis_ = axis_in_base(*c.machine, luffing_joint(*c.machine)).normalized();
   }
   void change_machine(Machine& machine) const override {
-    // turning the base about +axis turns gravity about -axis in the base's frame
+    // Turning the base about +axis turns gravity about -axis in the base frame.
     machine.gravity = Eigen::AngleAxisd(-angle_, axis_) * machine.gravity;
-    if (law_ == 1) {  // the ground also leans sideways a little
+    if (law_ == 1) {  // The ground is also inclined sideways a little.
       const Eigen::Vector3d forward = axis_.cross(machine.gravity).normalized();
       machine.gravity = Eigen::AngleAxisd(roll_, forward) * machine.gravity;
     }
@@ -148,7 +148,7 @@ class AngleOffset final : public HiddenLaw {
     span_ = span;
   }
   void sensors(const PlantState& s, SensorState& sensors) override {
-    // q true = q measured + offset; law 1: the sensor's gain is off by a trifle as well
+    // True q = measured q + offset; law 1: the sensor also has a small gain error.
     const double away = law_ == 1 ? 0.1 * offset_ * (s.q[joint_] - middle_) / span_ : 0.0;
     sensors.q[joint_] -= offset_ + away;
   }
@@ -180,7 +180,7 @@ class StructuralFlex final : public HiddenLaw {
     for (std::size_t k = 0; k < turns_.size(); ++k) {
       if (!turns_[k]) continue;
       const double torque = s.gravity[k];
-      // law 1: stiffens by a tenth at the typical load
+      // Law 1: the stiffness is a tenth larger at the typical load.
       const double stiffening = law_ == 1 ? 1.0 + 0.1 * (1.0 - std::abs(torque) / typical_) : 1.0;
       s.q_load[k] -= compliance_ * torque * std::max(0.5, stiffening);
     }
@@ -218,8 +218,8 @@ std::vector<LawEntry> mass_laws() {
           {"payload_error",
            HiddenPlace::kMachine,
            true,
-           {"constant at the tip", "untold gear plus a scale 1 % low"},
-           "mass [kg] really there beyond payload_kg",
+           {"constant at the tip", "gear not in the log plus a scale 1 % low"},
+           "mass [kg] at the tip beyond payload_kg",
            make_law<PayloadError>,
            has_weight},
           {"base_tilt",

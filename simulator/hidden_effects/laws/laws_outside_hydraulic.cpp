@@ -1,4 +1,4 @@
-/// Effects that the catalogue does not know: valves, pump, sensors. A diagnosis should say "unknown".
+/// Hidden effects outside the catalogue: valves, pump, sensors. The right verdict is "unknown".
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -35,7 +35,7 @@ class PumpRipple final : public HiddenLaw {
   double amplitude_, hz_, phase_;
 };
 
-/// Limit cycle of the pump control: grows while flow is asked for, dies at standby; its frequency wanders.
+/// Limit cycle of the pump control that grows while there is flow and decays at standby; its frequency varies.
 class PumpHunting final : public HiddenLaw {
  public:
   explicit PumpHunting(LawContext& c)
@@ -44,7 +44,7 @@ class PumpHunting final : public HiddenLaw {
         hz_(c.draw(1.5, 3.0)) {}
   void pump(PlantState& s) override {
     PumpState& p = s.pumps[at_];
-    // Van der Pol oscillator, averaged: amplitude to 1 within some cycles
+    // Averaged Van der Pol oscillator, whose amplitude reaches 1 within some cycles.
     const double goal = p.leader >= 0 ? 1.0 : 0.0;
     level_ += (goal - level_) * s.h / 0.4;
     angle_ += s.h * kTwoPi * hz_ * (0.7 + 0.5 * p.demand / 200e5);
@@ -71,7 +71,7 @@ class PoseMargin final : public HiddenLaw {
   void demand(PlantState& s) override {
     const double x = (s.q[joint_] - range_.lo) / (range_.hi - range_.lo);
     double share = std::sin(kTwoPi * 1.2 * x);
-    if (law_ == 1) share = x > 0.5 ? 1.0 : 0.0;  // a hose that kinks beyond a pose
+    if (law_ == 1) share = x > 0.5 ? 1.0 : 0.0;  // A hose kinks beyond a posture.
     for (const int i : feeds_) s.cylinders[static_cast<std::size_t>(i)].margin += rise_ * share;
   }
   std::vector<HiddenParameter> parameters() const override { return one("rise", rise_, "Pa"); }
@@ -84,7 +84,7 @@ class PoseMargin final : public HiddenLaw {
   Range range_;
 };
 
-/// Pressure compensator that fails: flow follows the square root of the pressure over the spool.
+/// Failed pressure compensator: the flow follows the square root of the pressure drop over the spool.
 class CompensatorFailure final : public HiddenLaw {
  public:
   explicit CompensatorFailure(LawContext& c)
@@ -97,7 +97,7 @@ class CompensatorFailure final : public HiddenLaw {
     if (p < 0 || c.side == 0) return;
     const double chamber = c.side > 0 ? c.pressure_a : c.pressure_b;
     const double over = std::max(2e5, s.pumps[static_cast<std::size_t>(p)].pressure - chamber);
-    // the pump's flow rises with what the *other* cylinder makes of its pressure; at most twice
+    // The flow rises with the pressure that the other cylinder causes, at most to twice its value.
     const double gain = std::clamp(std::sqrt(over / std::max(1e5, c.margin)), 0.5, 2.0);
     smooth_ += (gain - smooth_) * std::min(1.0, s.h / 0.08);
     c.flow *= 1.0 + share_ * (smooth_ - 1.0);
@@ -110,7 +110,7 @@ class CompensatorFailure final : public HiddenLaw {
   double share_, smooth_ = 1.0;
 };
 
-/// Backlash between lever and spool.
+/// Hysteresis between lever and spool.
 class SpoolHysteresis final : public HiddenLaw {
  public:
   explicit SpoolHysteresis(LawContext& c)
@@ -118,10 +118,10 @@ class SpoolHysteresis final : public HiddenLaw {
   void opening(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
     if (c.command == 0.0) {
-      spool_ = 0.0;  // the centring spring is stronger than the friction
+      spool_ = 0.0;  // At zero the centring spring overcomes the friction.
     } else if (law_ == 0) {
       spool_ = std::clamp(spool_, c.command - 0.5 * width_, c.command + 0.5 * width_);
-    } else {  // Prandtl-Ishlinskii: two plays
+    } else {  // Prandtl-Ishlinskii model with two play operators.
       inner_ = std::clamp(inner_, c.command - 0.3 * width_, c.command + 0.3 * width_);
       outer_ = std::clamp(outer_, c.command - 0.8 * width_, c.command + 0.8 * width_);
       spool_ = 0.5 * (inner_ + outer_);
@@ -137,7 +137,7 @@ class SpoolHysteresis final : public HiddenLaw {
   double width_, spool_ = 0.0, inner_ = 0.0, outer_ = 0.0;
 };
 
-/// The engine slows under power, the pump's and with it all flow falls, late.
+/// The engine slows down under load, so that the pump's speed and all flows fall after a lag.
 class EngineDroop final : public HiddenLaw {
  public:
   explicit EngineDroop(LawContext& c)
@@ -166,7 +166,7 @@ class CubicGain final : public HiddenLaw {
   void flow(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
     const double u = std::abs(c.opening);
-    // progressive spool; law 1: S shape
+    // Progressive spool; law 1: S shape.
     const double bend = law_ == 0 ? u * u : 0.6 + 0.6 * std::sin(kTwoPi * u);
     c.flow *= 1.0 - share_ + share_ * bend;
   }
@@ -178,7 +178,7 @@ class CubicGain final : public HiddenLaw {
   double share_;
 };
 
-/// A common ground: one chamber's reading takes up a share of another cylinder's pressure.
+/// Common ground of two sensors: one chamber's reading contains a share of another cylinder's pressure.
 class SensorCrosstalk final : public HiddenLaw {
  public:
   explicit SensorCrosstalk(LawContext& c)
@@ -255,7 +255,7 @@ std::vector<LawEntry> outside_hydraulic_laws() {
           {"compensator_failure",
            cylinder,
            false,
-           {"flow with the root of the pressure over the spool"},
+           {"flow with the square root of the pressure drop over the spool"},
            "share [-]",
            make_law<CompensatorFailure>,
            shares_pump},

@@ -1,4 +1,4 @@
-/// Effects that the catalogue does not know: structure, guides, load.
+/// Hidden effects outside the catalogue: structure, guides, load. The right verdict is "unknown".
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,7 +10,7 @@
 namespace sparflow::simulator {
 namespace {
 
-/// Boom on its cylinder's oil spring: a light damped oscillator driven by the rod's acceleration.
+/// Boom on the oil spring of its cylinder: a lightly damped oscillator driven by the rod's acceleration.
 class Vibration final : public HiddenLaw {
  public:
   explicit Vibration(LawContext& c)
@@ -22,19 +22,19 @@ class Vibration final : public HiddenLaw {
     const double speed = (valve && c.cylinder().hydraulic()
                               ? 0.5 * valve->max_flow_extend / c.cylinder().area_piston()
                               : 0.1);
-    // a full stop from half speed rings with about this force
+    // A stop from half speed excites about this force.
     stiffness_ =
         c.size * c.draw(10.0, 20.0) * kBar * drive_area(c.cylinder()) / speed * kTwoPi * hz_;
   }
   void force(PlantState& s, BodyForces&) override {
     CylinderState& c = s.cylinders[at_];
     const double omega = kTwoPi * hz_;
-    // symplectic Euler, stable for omega h < 2
+    // Symplectic Euler integration, stable for omega h < 2.
     rate_ += s.h * (-omega * omega * deflection_ - 2.0 * damping_ * omega * rate_ - c.acceleration);
     deflection_ += s.h * rate_;
     double f = -stiffness_ * deflection_;
     if (law_ == 1)
-      f *= std::min(1.0, 0.4 + std::abs(f) / (8.0 * kBar * drive()));  // play in the pins
+      f *= std::min(1.0, 0.4 + std::abs(f) / (8.0 * kBar * drive()));  // Play in the pins reduces small forces.
     c.force += f;
   }
   std::vector<HiddenParameter> parameters() const override {
@@ -48,7 +48,7 @@ class Vibration final : public HiddenLaw {
   double hz_, damping_, stiffness_ = 0.0, deflection_ = 0.0, rate_ = 0.0;
 };
 
-/// A dent in the tube: friction over part of the stroke only.
+/// Dent in the tube: friction over a part of the stroke.
 class FrictionBump final : public HiddenLaw {
  public:
   explicit FrictionBump(LawContext& c)
@@ -80,7 +80,7 @@ class FrictionBump final : public HiddenLaw {
   double force_, centre_ = 0.0, width_ = 1.0;
 };
 
-/// The payload hangs on a rope: a pendulum in the arm's plane, driven by the tip's acceleration.
+/// Payload on a rope: a pendulum in the arm's plane, driven by the tip's acceleration.
 class PayloadSwing final : public HiddenLaw {
  public:
   explicit PayloadSwing(LawContext& c)
@@ -103,12 +103,12 @@ class PayloadSwing final : public HiddenLaw {
     const double g = machine_->gravity.norm();
     const Eigen::Vector3d up = -machine_->gravity / std::max(g, 1e-6);
     const Eigen::Vector3d level = acceleration - up * acceleration.dot(up);
-    // small angles, both level directions at once
+    // Small angles, in both horizontal directions.
     rate_ += s.h * (-swing_ * (g / rope_) - 2.0 * damping_ * std::sqrt(g / rope_) * rate_ -
                     level / rope_);
     swing_ += s.h * rate_;
     const double mass = std::max(s.payload, least_);
-    // rope pulls the tip sideways by m g swing, and down a little more while it swings fast
+    // The rope pulls the tip sideways with m g times the angle, and downwards a little more while it swings fast.
     const Eigen::Vector3d down = law_ == 1
                                      ? Eigen::Vector3d(-up * rope_ * rate_.squaredNorm() * mass)
                                      : Eigen::Vector3d::Zero();

@@ -1,4 +1,4 @@
-/// Pressure losses in lines and valves.
+/// Hidden effects: pressure losses in lines and valves.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -9,7 +9,7 @@
 namespace sparflow::simulator {
 namespace {
 
-/// Return flow of a usual simultaneous move. [m^3/s]
+/// Return flow [m^3/s] of a usual simultaneous move.
 double usual_return(const LawContext& c) {
   double most = 0.0;
   for (int i = 0; i < c.machine->cylinder_count(); ++i) {
@@ -63,7 +63,7 @@ class LineLoss final : public HiddenLaw {
     double p = loss_ * r * r;                                              // orifice
     if (law_ == 1) p = loss_ * (laminar_ * r + (1.0 - laminar_) * r * r);  // hose and orifice
     if (law_ == 2)
-      p = loss_ * (std::sqrt(0.01 + r * r * r * r) - 0.1);  // orifice with a laminar start
+      p = loss_ * (std::sqrt(0.01 + r * r * r * r) - 0.1);  // orifice, laminar at small flow
     c.line_drop += p;
     if (std::abs(c.speed) > kMoving) equivalent_.add(p, c.flow * c.flow);
   }
@@ -79,11 +79,11 @@ class LineLoss final : public HiddenLaw {
   Equivalent equivalent_;
 };
 
-/// Least squares y = a + b x.
+/// Least-squares line y = a + b x.
 class StraightLine {
  public:
   void add(double y, double x) { n_ += 1.0, x_ += x, y_ += y, xx_ += x * x, xy_ += x * y; }
-  /// @param otherwise where x varied too little to say
+  /// @param otherwise returned when x varied too little to determine it
   std::pair<double, double> line(std::pair<double, double> otherwise) const {
     const double variance = n_ > 0.0 ? xx_ / n_ - x_ / n_ * x_ / n_ : 0.0;
     if (variance < 1e-4 * xx_ / std::max(1.0, n_) || variance <= 0.0) return otherwise;
@@ -99,7 +99,7 @@ class Counterbalance final : public HiddenLaw {
  public:
   explicit Counterbalance(LawContext& c)
       : at_(static_cast<std::size_t>(c.at)), law_(c.law), slope_(c.draw(0.15, 0.33)) {
-    // the side that holds the load most of the time is the one that is lowered against
+    // The valve is on the chamber that holds the load most of the time.
     const Cylinder& drive = c.cylinder();
     BodyForces bodies(*c.machine);
     JointLoads loads;
@@ -113,7 +113,7 @@ class Counterbalance final : public HiddenLaw {
     holding_area_ = lowering_ < 0 ? drive.area_piston() : drive.area_rod();
     fed_area_ = lowering_ < 0 ? drive.area_rod() : drive.area_piston();
     tank_ = c.laws->cylinders[at_].rest_tank;
-    // set so that the usual load still needs some tens of bar of supply pressure to be lowered
+    // The setting is such that lowering the usual load still needs some tens of bar of supply pressure.
     opening_ = slope_ * std::abs(weight) / holding_area_ + c.size * c.draw(25.0, 60.0) * kBar;
   }
   void prepare_crane(CraneLaws& laws) const override {
@@ -125,15 +125,15 @@ class Counterbalance final : public HiddenLaw {
     const double load = std::max(0.0, -c.side * c.force / holding_area_);
     double p = opening_ - slope_ * load;
     if (law_ == 1)
-      p += 0.08 * opening_ * std::tanh(c.flow / 5e-4);  // spool opens against its spring
-    if (law_ == 2) p = opening_ * 0.05 * std::log1p(std::exp(p / (0.05 * opening_)));  // soft knee
+      p += 0.08 * opening_ * std::tanh(c.flow / 5e-4);  // The spool opens against its spring.
+    if (law_ == 2) p = opening_ * 0.05 * std::log1p(std::exp(p / (0.05 * opening_)));  // rounded knee
     c.pilot_pressure = std::max(c.pilot_pressure, std::max(p, 0.0));
     const double static_supply = (c.side * c.force + holding_area_ * c.return_pressure) / fed_area_;
     if (std::abs(c.speed) > kMoving && c.pilot_pressure > std::max(static_supply, tank_))
       rise_.add(c.pilot_pressure - tank_, load);
   }
   std::vector<HiddenParameter> parameters() const override {
-    // beyond the pressure an unloaded chamber has without the valve, as a straight line in the load
+    // Only samples above the pressure of an unloaded chamber without the valve; a line over the load is fitted to them.
     const auto [setting, slope] = rise_.line({opening_ - tank_, -slope_});
     return {{"setting", opening_, "Pa", setting}, {"slope", slope_, "-", -slope}};
   }
@@ -148,7 +148,7 @@ class Counterbalance final : public HiddenLaw {
 class OilTemperature final : public HiddenLaw {
  public:
   explicit OilTemperature(LawContext& c) : law_(c.law), laws_(c.laws) {
-    // viscosity at 30 degC over that at 50 degC
+    // Ratio of the viscosities at 30 and 50 degC.
     const double ratio = 1.0 + c.size * (c.draw(2.2, 3.2) - 1.0);
     beta_ = std::log(ratio) / 20.0;
     for (int i = 0; i < c.machine->cylinder_count(); ++i) {
@@ -157,7 +157,7 @@ class OilTemperature final : public HiddenLaw {
     }
   }
   void prepare_crane(CraneLaws& laws) const override {
-    // long thin return hoses: half of the loss is laminar
+    // Long thin return hoses, where half of the loss is laminar.
     for (std::size_t i = 0; i < laws.cylinders.size(); ++i) {
       for (std::size_t d = 0; d < 2; ++d) {
         DirectionLaws& law = laws.cylinders[i].direction[d];
@@ -176,7 +176,7 @@ class OilTemperature final : public HiddenLaw {
     }
   }
   std::vector<HiddenParameter> parameters() const override {
-    // by kelvin at 40 degC; a table of straight pieces has no curvature there
+    // Slope per kelvin at 40 degC; a piecewise linear table has no curvature there.
     const double middle = std::sinh(10.0 * beta_) / 10.0;
     const double slope = kLaminarLoss * (law_ == 2 ? middle : beta_);
     return {{"beta", beta_, "1/K", law_ == 2 ? 0.0 : beta_},
@@ -188,14 +188,14 @@ class OilTemperature final : public HiddenLaw {
   static constexpr double kLaminarLoss = 16.0 * kBar;  // at full flow and 40 degC
   double viscosity(double oil) const {
     if (law_ == 0) return std::exp(-beta_ * (oil - kReference));
-    if (law_ == 1) {  // Walther: log log viscosity linear in log T; same slope at 40 degC
+    if (law_ == 1) {  // Walther: log log viscosity is linear in log T; same slope at 40 degC.
       const double log_mu = std::log10(46.0 + 0.7);  // ISO VG 46
       const double m =
           beta_ / std::log(10.0) * (273.15 + kReference) * 46.0 / (46.7 * log_mu) * 46.7 / 46.0;
       const double scaled = log_mu * std::pow((273.15 + kReference) / (273.15 + oil), m);
       return (std::pow(10.0, scaled) - 0.7) / 46.0;
     }
-    // table with straight pieces
+    // Piecewise linear table.
     const double at[4] = {10.0, 30.0, 50.0, 80.0};
     for (int k = 0; k < 3; ++k) {
       if (oil <= at[k + 1] || k == 2) {
@@ -236,7 +236,7 @@ std::vector<LawEntry> pressure_laws() {
           {"line_loss",
            HiddenPlace::kCylinder,
            true,
-           {"orifice", "hose and orifice", "orifice with a laminar start"},
+           {"orifice", "hose and orifice", "orifice, laminar at small flow"},
            "k [Pa/(m^3/s)^2] between pump and cylinder (sensors at the cylinder)",
            make_law<LineLoss>,
            fed_by_load_sensing_pump},
@@ -252,7 +252,7 @@ std::vector<LawEntry> pressure_laws() {
           {"oil_temperature",
            HiddenPlace::kMachine,
            true,
-           {"exponential", "Walther (ASTM D341)", "table of straight pieces"},
+           {"exponential", "Walther (ASTM D341)", "piecewise linear table"},
            "beta [1/K], return_slope [Pa/K] fall of every section's laminar loss at full flow and "
            "40 degC",
            make_law<OilTemperature>,

@@ -1,4 +1,4 @@
-/// Pump control.
+/// Hidden effects: pump control.
 #include <algorithm>
 #include <cmath>
 
@@ -23,7 +23,7 @@ class PumpLag final : public HiddenLaw {
                1) {  // second order, overdamped: one slow and one fast pole, the same mean delay
       swash_ += (p.pressure - swash_) * (1.0 - std::exp(-s.h / (0.2 * time_)));
       value_ += (swash_ - value_) * (1.0 - std::exp(-s.h / (0.8 * time_)));
-    } else {  // slower down than up, by a tenth each
+    } else {  // First order, a tenth slower down and a tenth faster up.
       const double tau = time_ * (p.pressure > value_ ? 0.9 : 1.1);
       value_ += (p.pressure - value_) * (1.0 - std::exp(-s.h / tau));
     }
@@ -80,7 +80,7 @@ class FlowMargin final : public HiddenLaw {
 class TorqueLimit final : public HiddenLaw {
  public:
   explicit TorqueLimit(LawContext& c) : at_(static_cast<std::size_t>(c.at)), law_(c.law) {
-    // corner power of usual work: three quarters of the flow at a third of the pressure
+    // Corner power of usual work: three quarters of the largest flow at a third of the largest pressure.
     const double corner = usual_flow(c) * 0.36 * c.pump().max_pressure;
     power_ = corner * (1.0 - c.size * c.draw(0.25, 0.45));
     most_ = usual_flow(c) / 0.7;
@@ -97,7 +97,7 @@ class TorqueLimit final : public HiddenLaw {
  private:
   double limit(double flow) const {
     if (law_ == 0) return power_ / flow;
-    // law 1: two springs give three straight pieces that stay within some per cent of the hyperbola
+    // Law 1: two springs give three straight pieces within a few per cent of the hyperbola.
     const double at[5] = {0.15, 0.3, 0.5, 0.75, 1.05};
     const double r = flow / most_;
     if (r <= at[0] || r >= at[4]) return power_ / flow;

@@ -1,4 +1,4 @@
-/// Sensors.
+/// Hidden effects: sensors.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,11 +16,11 @@ class PressureOffset final : public HiddenLaw {
         side_a_(c.random->chance(0.5)),
         offset_(c.random->sign() * c.size * c.draw(2.5, 5.0) * kBar) {
     if (!side_a_)
-      offset_ = std::abs(offset_);  // a rod side near the tank cannot read less than nothing
+      offset_ = std::abs(offset_);  // A rod side near tank pressure cannot read a negative pressure.
   }
   void sensors(const PlantState&, SensorState& sensors) override {
     double& p = side_a_ ? sensors.pressure_a[at_] : sensors.pressure_b[at_];
-    // law 1: with a gain error of a thousandth
+    // Law 1: with a gain error of a thousandth.
     p += offset_ + (law_ == 1 ? 1e-3 * p : 0.0);
   }
   std::vector<HiddenParameter> parameters() const override {
@@ -90,9 +90,9 @@ class SensorFault final : public HiddenLaw {
     const double level =
         std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, noise->size())));
     const auto n = values->size();
-    if (law_ == 0) {  // noise far above the channel's own
+    if (law_ == 0) {  // Noise far above that of the channel.
       for (double& v : *noise) v *= 1.0 + 9.0 * size_;
-    } else if (law_ == 1) {  // stuck for seconds, several times
+    } else if (law_ == 1) {  // Stuck for seconds, several times.
       const int times = std::max(2, static_cast<int>(static_cast<double>(n) / r.rate / 40.0));
       for (int k = 0; k < times; ++k) {
         const auto from = static_cast<std::size_t>(random.unit() * static_cast<double>(n));
@@ -103,7 +103,7 @@ class SensorFault final : public HiddenLaw {
           (*noise)[i] = 0.0;
         }
       }
-    } else {  // jumps: single wild samples, one in fifty
+    } else {  // Jumps: one sample in fifty is far off.
       for (std::size_t i = 0; i < n; ++i) {
         if (random.chance(0.02))
           (*noise)[i] += random.sign() * random.uniform(20.0, 60.0) * level * size_;
@@ -155,7 +155,7 @@ std::vector<LawEntry> sensor_laws() {
       {"sensor_fault",
        HiddenPlace::kChannel,
        true,
-       {"noise ten times", "stuck for seconds", "wild samples"},
+       {"noise ten times", "stuck for seconds", "single samples far off"},
        "none",
        make_law<SensorFault>}};
 }

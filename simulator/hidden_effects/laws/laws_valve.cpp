@@ -1,4 +1,4 @@
-/// What happens between lever and flow.
+/// Hidden effects: valve, between lever and flow.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -21,7 +21,7 @@ class Deadband final : public HiddenLaw {
     const double u = std::abs(c.opening), gap = c.opening > 0.0 ? extend_ : retract_;
     double open = std::max(0.0, u - gap);
     if (law_ == 1) open = std::max(0.0, u - gap) / (1.0 - gap);
-    if (law_ == 2) {  // smooth knee, a fifth of the band wide
+    if (law_ == 2) {  // Smooth knee, with a width of a fifth of the dead band.
       const double w = 0.1 * gap;
       open += w * std::log1p(std::exp(-std::abs(u - gap) / w));
       if (open < kClosed) open = 0.0;
@@ -67,7 +67,7 @@ class Lag final : public HiddenLaw {
     c.opening = std::abs(spool_) < kClosed ? 0.0 : spool_;
   }
   void demand(PlantState& s) override {
-    // law 0: an electronic pump control that acts on the lever, not on the spool
+    // Law 0: the electronic pump control follows the lever, not the spool.
     CylinderState& c = s.cylinders[at_];
     if (law_ == 0) c.asked = sign_of(c.command);
   }

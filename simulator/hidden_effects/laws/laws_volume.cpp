@@ -1,4 +1,4 @@
-/// Oil that goes elsewhere: leakage and compression.
+/// Hidden effects: leakage and compression of oil.
 #include <algorithm>
 #include <cmath>
 
@@ -18,10 +18,10 @@ class Leakage final : public HiddenLaw {
         conductance_(c.size * c.draw(0.4, 1.0) * kLpm / (100.0 * kBar)) {}
   void drift(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
-    if (c.side != 0 && law_ != 2) return;  // laws 0, 1: past the closed spool
+    if (c.side != 0 && law_ != 2) return;  // Laws 0 and 1 leak past the closed spool.
     const bool on_a = c.force >= 0.0;
     const double load = on_a ? c.force / area_a_ : -c.force / area_b_;
-    // through gaps, laminar; law 1: through an orifice, the same at 100 bar
+    // Laminar through gaps; law 1: through an orifice with the same flow at 100 bar.
     const double flow = law_ == 1 ? conductance_ * 100.0 * kBar * std::sqrt(load / (100.0 * kBar))
                                   : conductance_ * load;
     c.drift += on_a ? -flow / area_a_ : flow / area_b_;
@@ -55,7 +55,7 @@ class Compressibility final : public HiddenLaw {
   }
   void drift(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
-    // the column that carries the load yields; filtered over 40 ms, the line's own time
+    // The loaded oil column is compressed; its pressure is filtered over 40 ms, the time constant of the line.
     const int side = c.side != 0 ? c.side : (c.force >= 0.0 ? 1 : -1);
     const double pressure = side > 0 ? c.pressure_a : c.pressure_b;
     if (side != side_) {
@@ -66,9 +66,9 @@ class Compressibility final : public HiddenLaw {
     const double stroke = std::clamp(c.length - shortest_, 0.0, travel_);
     const double column = side > 0 ? stroke : travel_ - stroke;
     double softness = inverse_modulus_;
-    if (law_ == 1)  // free air: softer at low pressure, the same at 100 bar
+    if (law_ == 1)  // Free air: softer at low pressure, the same at 100 bar.
       softness *= 0.8 + 0.4 / (1.0 + std::max(0.0, pressure) / (100.0 * kBar));
-    // what a jump asks of the column comes at the speed the line lets through: all of it, but later
+    // The line limits the speed: the volume of a pressure step is delivered completely, but later.
     const double give = (column + hose_) * softness;  // [m/Pa]
     const double most = kFastest / give;
     const double slope = std::clamp((pressure - smooth_) / kFilter, -most, most);
@@ -91,7 +91,7 @@ class Compressibility final : public HiddenLaw {
   Equivalent equivalent_;
 };
 
-/// A cylinder about a vertical axis holds no load: nothing presses oil out of it or squeezes it.
+/// Whether a cylinder holds a load; one about a vertical axis does not, so that it neither leaks nor compresses oil.
 bool carries_load(const Machine& machine, int i) {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(i)];
   const Joint& joint = machine.joints[static_cast<std::size_t>(c.joint)];

@@ -1,4 +1,4 @@
-// The split of return line and counterbalance valve on pressures made by the maximum of both laws.
+// The split into return line and counterbalance valve, on pressures that are the maximum of both laws.
 #include "diagnosis/evidence/branches.h"
 
 #include <gtest/gtest.h>
@@ -14,15 +14,15 @@ using Eigen::Index;
 /// Boom-sized cylinder, extending: both laws [Pa], noise 0.3 bar, motions of 2 s at 50 Hz.
 struct Made {
   BranchData data;
-  Mask line;     ///< truth: the return line rules
-  Mask at_kink;  ///< both laws within 1.5 bar: neither answer is wrong
+  Mask line;     ///< truth: the return line sets the pressures
+  Mask at_kink;  ///< both laws are within 1.5 bar: neither answer is wrong
 };
 
 struct Scene {
   double least_load = -20e3, largest_load = 250e3;  ///< [N] opposing
   bool valve = true;
-  double tank_line = 0.0;  ///< [Pa/(m^3/s)^2] on the flow of all
-  double cold = 0.0;  ///< [Pa] at full flow that oil of 20 degC asks for more than oil of 70 degC
+  double tank_line = 0.0;  ///< [Pa/(m^3/s)^2] by the return flow of all cylinders
+  double cold = 0.0;  ///< [Pa] pressure at full flow with oil of 20 degC above that with 70 degC
   unsigned seed = 1;
 };
 
@@ -68,7 +68,7 @@ Made make(const Scene& scene) {
   return m;
 }
 
-/// Shares of the samples away from the kink that were named, and that were named wrongly.
+/// Checks the shares of samples away from the intersection of both laws that were labelled, and labelled wrongly.
 void check(const Made& m, const BranchSplit& split, double least_named) {
   const Mask clear = !m.at_kink;
   const auto count = [](const Mask& mask) { return static_cast<double>(mask.count()); };
@@ -79,13 +79,13 @@ void check(const Made& m, const BranchSplit& split, double least_named) {
   EXPECT_FALSE((split.return_line && split.counterbalance).any());
 }
 
-TEST(Branches, BothAreFoundAlsoWhereTheValveRulesAgainstAnOpposingLoad) {
+TEST(Branches, BothAreFoundAlsoWhereTheValveActsAgainstTheLoad) {
   const Made m = make({});
   ASSERT_GT((!m.line && m.data.force.array() > 0.0).count(), 500);
   check(m, split_branches({m.data}).front(), 0.9);
 }
 
-TEST(Branches, TheShortCallIsTheOneLogCall) {
+TEST(Branches, OverloadForOneLogEqualsTheGeneralOne) {
   Made m = make({});
   m.data.q_return_total.resize(0);
   m.data.oil.resize(0);
@@ -97,7 +97,7 @@ TEST(Branches, TheShortCallIsTheOneLogCall) {
   EXPECT_TRUE((one.counterbalance == several.counterbalance).all());
 }
 
-// 10 bar of back pressure by the other cylinder: a return chamber at 20 bar is still the line's.
+// The other cylinder raises the return pressure by 10 bar: a return chamber at 20 bar still follows the return line.
 TEST(Branches, ASharedTankLineDoesNotLookLikeAValve) {
   Scene scene;
   scene.tank_line = 4e12;
@@ -105,8 +105,8 @@ TEST(Branches, ASharedTankLineDoesNotLookLikeAValve) {
   check(m, split_branches({m.data}).front(), 0.85);
 }
 
-// Cold oil asks 40 bar more of the return line than warm oil: neither is a valve, and the rows are not strays.
-TEST(Branches, OilThatWarmsDoesNotLookLikeAValve) {
+// Cold oil needs 40 bar more in the return line than warm oil: neither is a valve, and the rows are no outliers.
+TEST(Branches, WarmingOilDoesNotLookLikeAValve) {
   Scene scene;
   scene.cold = 40e5;
   check(make(scene), split_branches({make(scene).data}).front(), 0.85);
@@ -118,10 +118,10 @@ TEST(Branches, OilThatWarmsDoesNotLookLikeAValve) {
   EXPECT_EQ(seen.counterbalance.count(), 0);
   m.data.oil.resize(0);
   EXPECT_LT(split_branches({m.data}).front().return_line.count(), seen.return_line.count() - 100)
-      << "the oil's temperature decides nothing here";
+      << "the oil temperature has no influence here";
 }
 
-TEST(Branches, WithoutValveAllIsTheReturnLines) {
+TEST(Branches, WithoutValveAllSamplesFollowTheReturnLine) {
   Scene scene;
   scene.valve = false;
   scene.least_load = 20e3;
@@ -130,7 +130,7 @@ TEST(Branches, WithoutValveAllIsTheReturnLines) {
   EXPECT_EQ(split.counterbalance.count(), 0);
 }
 
-TEST(Branches, UnderHelpingLoadsAllIsTheValves) {
+TEST(Branches, WithOverrunningLoadsAllSamplesFollowTheValve) {
   Scene scene;
   scene.least_load = -200e3;
   scene.largest_load = -50e3;
@@ -139,8 +139,8 @@ TEST(Branches, UnderHelpingLoadsAllIsTheValves) {
   EXPECT_GT(split.counterbalance.count(), 5700);
 }
 
-// One load alone: the valve's slope is not in the log. A second log with other loads brings it.
-TEST(Branches, LogsTogetherKnowMoreThanOneAlone) {
+// With one load alone the log does not contain the slope of the valve's law; a second log with other loads does.
+TEST(Branches, LogsTogetherDetermineMoreThanOneAlone) {
   Scene narrow;
   narrow.least_load = 100e3;
   narrow.largest_load = 130e3;
@@ -151,7 +151,7 @@ TEST(Branches, LogsTogetherKnowMoreThanOneAlone) {
   check(b, splits[1], 0.85);
 }
 
-TEST(Branches, HolesAndTooFewSamplesAreInNeither) {
+TEST(Branches, MissingValuesAndTooFewSamplesAreInNoMask) {
   Made m = make({});
   m.data.p_return.head(1000).setConstant(std::nan(""));
   const BranchSplit split = split_branches({m.data}).front();

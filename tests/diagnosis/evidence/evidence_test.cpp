@@ -55,8 +55,8 @@ valves:
                        "carriage.yaml", "");
 }
 
-/// Forward all the time, with ripples up to what the filter nearly swallows; exact, without noise.
-/// @param force_scale the measured force is that many times what the carriage needs
+/// A motion that is always forward, with ripples up to frequencies that the filter nearly suppresses, without noise.
+/// @param force_scale ratio of the measured force to the one that the carriage needs
 Log rippling_log(double force_scale, double rate) {
   const double amplitude[] = {0.02, 0.02, 0.012}, hz[] = {0.7, 1.9, 3.1};
   std::string text = "t_s,q_axis_m,u_axis,force_axis_N\n";
@@ -77,7 +77,7 @@ Log rippling_log(double force_scale, double rate) {
 
 class MatchedFilters : public testing::TestWithParam<std::pair<double, double>> {};
 
-TEST_P(MatchedFilters, InertiaComesOutAsItWasPutIn) {
+TEST_P(MatchedFilters, InertiaIsRecovered) {
   const auto [window, rate] = GetParam();
   const CraneModel model = CraneModel::untrained(carriage());
   SignalOptions options;
@@ -89,10 +89,10 @@ TEST_P(MatchedFilters, InertiaComesOutAsItWasPutIn) {
   const MatrixXd inertia = e.columns(parse_effect("inertia", model.machine), {}, *force);
   ASSERT_EQ(inertia.cols(), 1);
   const double scale = inertia.col(0).dot(force->y) / inertia.col(0).squaredNorm();
-  // The kernel g has g'' = h exactly on the grid of samples; what is left is the difference between a second
-  // difference and a second derivative, (w dt)^2 / 12: 0.1 % at 3.1 Hz and 50 Hz.
+  // The kernel g has g'' = h exactly on the grid of samples; the error is the difference between a second difference
+  // and a second derivative, (w dt)^2 / 12: 0.1 % at 3.1 Hz and 50 Hz.
   EXPECT_NEAR(scale, 1.3, 0.01 * 1.3);
-  // a test that can fail: unfiltered force against the filtered acceleration is off by far more
+  // the check can fail: the unfiltered force compared with the filtered acceleration has a much larger error
   const CylinderSignals& c = signals.cylinders[0];
   double top = 0.0, bottom = 0.0;
   for (const Index k : force->sample) {
@@ -102,7 +102,7 @@ TEST_P(MatchedFilters, InertiaComesOutAsItWasPutIn) {
   EXPECT_GT(std::abs(top / bottom / 1.3 - 1.0), 0.03);
 }
 
-TEST_P(MatchedFilters, CommandsAgainstSpeeds) {
+TEST_P(MatchedFilters, CommandsMatchSpeeds) {
   const auto [window, rate] = GetParam();
   const CraneModel model = CraneModel::untrained(carriage());
   SignalOptions options;
@@ -115,7 +115,7 @@ TEST_P(MatchedFilters, CommandsAgainstSpeeds) {
   const VectorXd u = flow->baseline.col(0);
   const double gain = u.dot(flow->y) / u.squaredNorm();
   EXPECT_NEAR(gain, kGain, 0.01 * kGain);
-  // ripples of 0.04 m/s are followed to within 2 % of themselves: no lag is seen where there is none
+  // ripples of 0.04 m/s are reproduced to 2 %: no lag appears where there is none
   EXPECT_LT((flow->y - gain * u).norm() / std::sqrt(static_cast<double>(u.size())), 1e-3);
 }
 
@@ -167,7 +167,7 @@ TEST(Evidence, EachMeasuredQuantityHasItsChannel) {
     EXPECT_EQ(c.baseline.rows(), c.rows());
     EXPECT_EQ(static_cast<Index>(c.sample.size()), c.rows());
     EXPECT_EQ(c.log.size(), c.blocks.size());
-    // forces: no learned law stands in the way
+    // force channels have no baseline, because nothing is learned there
     EXPECT_EQ(c.baseline.cols() == 0, c.kind == EvidenceKind::kForce) << c.text;
   }
 }
@@ -203,7 +203,7 @@ TEST(Evidence, RowsAreAboutIndependentOfTheSamplingRate) {
   EXPECT_NEAR(e.stride * e.series[0].step, e.window / 3.0, e.series[0].step);
 }
 
-TEST(Evidence, ReferenceRowsFeelNoEffect) {
+TEST(Evidence, EffectsDoNotActInReferenceRows) {
   const CraneModel model = crane_model();
   const Evidence e = evidence_of(model, {plain_case().train}, {plain_case().reference});
   ASSERT_TRUE(e.has_reference());
@@ -235,10 +235,10 @@ TEST(Evidence, ReferenceRowsFeelNoEffect) {
       EXPECT_GT(suspect, 0.0);
     }
   }
-  EXPECT_GT(acting, 60) << "places where some effect of the catalogue shows";
+  EXPECT_GT(acting, 60) << "channels in which some effect of the catalogue acts";
 }
 
-TEST(Evidence, ATiltsColumnIsTheChordUpToItsAngle) {
+TEST(Evidence, TheColumnOfATiltIsTheSecantUpToItsAngle) {
   const CraneModel model = crane_model();
   const Evidence e = evidence_of(model, {plain_case().train});
   const EffectAt tilt = parse_effect("base_tilt", arm());
@@ -248,29 +248,29 @@ TEST(Evidence, ATiltsColumnIsTheChordUpToItsAngle) {
   for (int i = 0; i < 2; ++i) {
     const EvidenceChannel* c = e.find(EvidenceKind::kForce, i);
     ASSERT_NE(c, nullptr);
-    // Gravity turns in the arm's plane: F(a) + F(-a) - 2 F(0) = 2 F(0) (cos a - 1), which a tangent says is zero.
+    // Gravity turns in the arm's plane: F(a) + F(-a) - 2 F(0) = 2 F(0) (cos a - 1), which is zero for a tangent.
     const VectorXd both = angle * (e.columns(tilt, {}, *c, up) - e.columns(tilt, {}, *c, down));
     const VectorXd& force = e.series[0].cylinders[static_cast<std::size_t>(i)].static_force;
     for (Index r = 0; r < c->rows(); ++r) {
       const double expected =
           2.0 * force[c->sample[static_cast<std::size_t>(r)]] * (std::cos(angle) - 1.0);
-      EXPECT_NEAR(both[r], expected, 0.05 * std::abs(expected) + 20.0);  // the filter's share, N
+      EXPECT_NEAR(both[r], expected, 0.05 * std::abs(expected) + 20.0);  // [N] error of the filter
       ++rows;
     }
   }
   EXPECT_GT(rows, 200);
 }
 
-/// The load's candidate where the log tells of `payload`.
+/// The payload error as a candidate when the log contains `payload` [kg] by sample.
 SearchCandidate load_candidate(const std::function<double(Index)>& payload) {
   const CraneModel model = crane_model();
   Evidence e = evidence_of(model, {plain_case().train});
-  VectorXd& told = e.series[0].payload;
-  for (Index k = 0; k < told.size(); ++k) told[k] = payload(k);
+  VectorXd& logged = e.series[0].payload;
+  for (Index k = 0; k < logged.size(); ++k) logged[k] = payload(k);
   return search_candidates(e, {parse_effect("payload_error", arm())}).at(0);
 }
 
-TEST(Candidates, AScaleInErrorIsPaidForWhereItSaysSomethingOfItsOwn) {
+TEST(Candidates, AScaleErrorHasAPenaltyWhereItsColumnIsIndependent) {
   const auto sizes = [](const EffectDesign& d) {
     VectorXd size = VectorXd::Zero(d.linear);
     for (const MatrixXd& c : d.columns) {
@@ -278,7 +278,7 @@ TEST(Candidates, AScaleInErrorIsPaidForWhereItSaysSomethingOfItsOwn) {
     }
     return size;
   };
-  for (const double steady : {0.0, 500.0}) {  // the mass says it already
+  for (const double steady : {0.0, 500.0}) {  // collinear with the mass
     const SearchCandidate one = load_candidate([&](Index) { return steady; });
     ASSERT_EQ(one.designs.size(), 1U) << steady;
     EXPECT_GT(sizes(one.designs[0])[0], 0.0);
@@ -292,10 +292,10 @@ TEST(Candidates, AScaleInErrorIsPaidForWhereItSaysSomethingOfItsOwn) {
   EXPECT_EQ(sizes(two.designs[0])[1], 0.0);
   EXPECT_GT(sizes(two.designs[1])[1], 0.0);
   EXPECT_DOUBLE_EQ(two.price(two.designs[0]), two.penalty);
-  EXPECT_DOUBLE_EQ(two.price(two.designs[1]), 2.0 * two.penalty) << "two parameters for one";
+  EXPECT_DOUBLE_EQ(two.price(two.designs[1]), 2.0 * two.penalty) << "two parameters instead of one";
 }
 
-TEST(Evidence, WhatTheModelKnowsIsTakenOff) {
+TEST(Evidence, EffectsOfTheModelAreSubtracted) {
   CraneModel model = arm_model();
   const Log log = arm_log_with_friction(5e3);
   const double before = evidence_of(model, {log}).find(EvidenceKind::kForce, 0)->y.norm();
@@ -305,7 +305,7 @@ TEST(Evidence, WhatTheModelKnowsIsTakenOff) {
 }
 
 TEST(Evidence, NoiseFloorIsThatOfTheSensors) {
-  // the arm's law is exact: what is left of the force is the pressure sensors' noise through the filter
+  // the arm's model is exact: the residual of the force is the filtered noise of the pressure sensors
   const CraneModel model = arm_model();
   const Evidence e = evidence_of(model, {arm_log(0.8)});
   const EvidenceChannel* force = e.find(EvidenceKind::kForce, 0);
@@ -314,23 +314,41 @@ TEST(Evidence, NoiseFloorIsThatOfTheSensors) {
   EXPECT_NEAR(force->noise_floor, rms, 0.15 * rms);
 }
 
+TEST(Evidence, NoiseFloorOfSeveralLogsIsTheirMeanInEveryKindOfChannel) {
+  const CraneModel model = arm_model();
+  const Log quiet = arm_log(0.2, 1), noisy = arm_log(0.8, 2);
+  const Evidence one = evidence_of(model, {quiet}), other = evidence_of(model, {noisy}),
+                 both = evidence_of(model, {noisy, quiet});
+  int compared = 0;
+  for (const EvidenceChannel& c : both.channels) {
+    if (c.kind == EvidenceKind::kFlow) continue;  // from speeds at rest, all logs in one sample
+    const EvidenceChannel *a = one.find(c.kind, c.index), *b = other.find(c.kind, c.index);
+    if (a == nullptr || b == nullptr) continue;
+    const double mean = 0.5 * (a->noise_floor + b->noise_floor);
+    // rounding of one sum only: the same readings go through the same filter
+    EXPECT_NEAR(c.noise_floor, mean, 1e-9 * mean) << c.text;
+    ++compared;
+  }
+  EXPECT_GE(compared, 3);  // force, a chamber, the pump
+}
+
 // ---------------------------------------------------------------------------------------- missing columns
 
-TEST(Evidence, SaysWhatCannotBeJudgedAndWhy) {
+TEST(Evidence, NotesNameTheEffectsThatCannotBeJudgedAndWhy) {
   const CraneModel model = arm_model();
   Log log = arm_log(0.8);
   remove_channel(log, "pB_arm");
   Evidence e = evidence_of(model, {log});
   EXPECT_EQ(e.find(EvidenceKind::kForce, 0), nullptr);
   EXPECT_THAT(e.notes, Contains(HasSubstr("force effects cannot be judged")));
-  EXPECT_NE(e.find(EvidenceKind::kFlow, 0), nullptr) << "the rest is";
+  EXPECT_NE(e.find(EvidenceKind::kFlow, 0), nullptr) << "the other channels stay";
 
   log = arm_log(0.8);
   remove_channel(log, "u_arm");
   e = evidence_of(model, {log});
   EXPECT_EQ(e.find(EvidenceKind::kFlow, 0), nullptr);
   EXPECT_THAT(e.notes, Contains(HasSubstr("arm: no command is logged")));
-  EXPECT_EQ(e.find(EvidenceKind::kPump, 0), nullptr) << "what it is asked for is not known";
+  EXPECT_EQ(e.find(EvidenceKind::kPump, 0), nullptr) << "the pump's demand is not known";
   EXPECT_NE(e.find(EvidenceKind::kForce, 0), nullptr);
 
   log = arm_log(0.8);
@@ -340,7 +358,7 @@ TEST(Evidence, SaysWhatCannotBeJudgedAndWhy) {
   EXPECT_THAT(e.notes, Not(Contains(HasSubstr("arm:"))));
 }
 
-TEST(Evidence, PositionsAloneGiveNothingToJudgeAndNoCrash) {
+TEST(Evidence, PositionsAloneGiveNoChannelAndNoCrash) {
   const CraneModel model = arm_model();
   Log log = arm_log(0.8);
   for (const char* name : {"u_arm", "pA_arm", "pB_arm", "p_main", "payload"})

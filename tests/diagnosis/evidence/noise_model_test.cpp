@@ -28,8 +28,8 @@ const std::vector<NoiseModel>& laws() {
   static const std::vector<NoiseModel> all = {
       model_of(0.0, 0.0, 2.0, 0.0),   // white
       model_of(0.9, 0.0, 1.0, 0.0),   // slow
-      model_of(0.9, -0.2, 0.5, 4.0),  // friction-like, motions differ
-      model_of(1.2, -0.8, 1.0, 0.0),  // swings
+      model_of(0.9, -0.2, 0.5, 4.0),  // friction-like, with an offset of each motion
+      model_of(1.2, -0.8, 1.0, 0.0),  // oscillating
       model_of(0.2, 0.6, 3.0, 10.0)};
   return all;
 }
@@ -41,14 +41,14 @@ TEST(NoiseModel, EstimatesWhatItWasDrawnFrom) {
     VectorXd offsets;
     const VectorXd y = draw(truth, blocks, random, &offsets);
     const NoiseModel m = NoiseModel::estimate(y, blocks);
-    // 15 000 rows: the coefficients' standard deviation is at most 1/sqrt(15000) = 0.008; taking the blocks' means
-    // out costs a bias of a few over a block's 250 rows
+    // 15 000 rows: the coefficients' standard deviation is at most 1/sqrt(15000) = 0.008; subtracting the blocks' means
+    // adds a bias of a few / 250 rows of a block
     EXPECT_NEAR(m.phi1, truth.phi1, 0.05) << truth.phi1 << " " << truth.phi2;
     EXPECT_NEAR(m.phi2, truth.phi2, 0.05) << truth.phi1 << " " << truth.phi2;
     // relative deviation sqrt(2/15000) = 1.2 %, and what the coefficients' errors add
     EXPECT_NEAR(m.variance, truth.variance, 0.06 * truth.variance);
-    // against the offsets that were drawn, so that their own chance does not count. A block's mean also has the
-    // autoregression's share: variance / (1 - phi1 - phi2)^2 / 250, and its product with the offset
+    // compared with the offsets that were drawn, so that their own randomness does not count. A block's mean also has
+    // the variance of the autoregression, variance / (1 - phi1 - phi2)^2 / 250, and its product with the offset
     const double gain = 1.0 - truth.phi1 - truth.phi2;
     const double of_mean = truth.variance / (gain * gain) / 250.0;
     const double drawn = offsets.squaredNorm() / 60.0;
@@ -115,8 +115,8 @@ TEST(NoiseModel, WhitenedRowsAreWhiteAndOfUnitSize) {
   }
 }
 
-TEST(NoiseModel, ConstantInsideBlocksIsCheapOnceBlocksHaveOffsets) {
-  // what makes a mass on a level boom no proof: a constant of each motion costs next to nothing
+TEST(NoiseModel, ConstantInsideBlocksIsNoEvidenceOnceBlocksHaveOffsets) {
+  // therefore a mass on a level boom gains little: the noise model explains a constant of each motion
   const std::vector<NoiseBlock> blocks = blocks_of({100, 100, 100, 100});
   MatrixXd without = MatrixXd::Ones(400, 1), with = without;
   model_of(0.5, 0.0, 1.0, 0.0).whiten(blocks, without);
@@ -139,7 +139,7 @@ TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
 }
 
 TEST(NoiseModel, ARampStaysStationary) {
-  // a drift through the log must not become an autoregression that explodes
+  // a drift through the log must not become an unstable autoregression
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(8, 60));
   const NoiseModel m = NoiseModel::estimate(VectorXd::LinSpaced(480, -1.0, 1.0), blocks, false);
   EXPECT_TRUE(std::isfinite(m.deviation()));

@@ -20,7 +20,7 @@ using testing_support::arm_machine;
 using testing_support::arm_model;
 using testing_support::drawn_machine;
 
-/// One pose and one speed only: what grows with the speed or the load and what does not look alike.
+/// A motion with one speed and one load only, on which effects with different dependence on these are indistinguishable.
 Log one_speed_log() {
   const CraneModel model = arm_model();
   MotionRecipe recipe;
@@ -67,7 +67,7 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
       try {
         log = synthesise_motion(model, recipe, 0.02, 30.0);
       } catch (const std::domain_error&) {
-        continue;  // a pose that a linkage cannot take: such a motion is never named
+        continue;  // a linkage cannot take a pose: such a motion is never advised
       }
       for (const Channel& c : log.channels) {
         if (c.role == Role::kJointPosition) {
@@ -83,7 +83,7 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
   }
 }
 
-TEST(BetterMotion, OtherMotionsTellDryFromViscousFriction) {
+TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
   const Case c(one_speed_log());
   const std::vector<EffectAt> rival = {parse_effect("viscous_friction:arm", c.model.machine)};
   const BetterMotion small =
@@ -93,11 +93,11 @@ TEST(BetterMotion, OtherMotionsTellDryFromViscousFriction) {
   EXPECT_THAT(small.apart, SizeIs(1));
   const BetterMotion large =
       better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {800.0}), rival);
-  EXPECT_GT(large.nats_per_minute, small.nats_per_minute) << "what is larger is told sooner";
+  EXPECT_GT(large.nats_per_minute, small.nats_per_minute) << "a larger effect is distinguished sooner";
 }
 
 TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {
-  // on the only joint a mass at the tip and a moment of the link are one machine
+  // on the only joint a mass at the tip and a moment of the link are equivalent
   const Case c(one_speed_log());
   const BetterMotion m =
       better_motion(c.model, c.evidence, c.fit, applied("payload_error", {60.0, 0.0}),
@@ -106,12 +106,12 @@ TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {
 }
 
 TEST(Experiment, SentenceSaysHowLongOrThatNoMotionIsKnown) {
-  const Experiment known{"tells a from b", "arm up and down", 1.5, 0.1};
-  EXPECT_EQ(known.sentence(), "record 3 minutes of: arm up and down (tells a from b)");
-  const Experiment quick{"tells a from b", "arm up and down", 50.0, 0.1};
+  const Experiment known{"distinguishes a from b", "arm up and down", 1.5, 0.1};
+  EXPECT_EQ(known.sentence(), "record 3 minutes of: arm up and down (distinguishes a from b)");
+  const Experiment quick{"distinguishes a from b", "arm up and down", 50.0, 0.1};
   EXPECT_THAT(quick.sentence(), HasSubstr("record 1 minute of"));
-  const Experiment open{"tells a from b", "known loads", 0.0, 0.0};
-  EXPECT_EQ(open.sentence(), "to tell them apart, record: known loads");
+  const Experiment open{"distinguishes a from b", "known loads", 0.0, 0.0};
+  EXPECT_EQ(open.sentence(), "to distinguish them, record: known loads");
 }
 
 TEST(EffectsInReferences, ThoseAddedFromOtherLogsAreNot) {
@@ -135,7 +135,7 @@ TEST(EffectsInReferences, ThoseAddedFromOtherLogsAreNot) {
 }
 
 TEST(EffectsInReferences, EvidenceKeepsKnownEffectsOutOfTheReferences) {
-  // the reference has no friction, the suspect has; the model knows it from the suspect
+  // friction acts in the suspect log and not in the reference; the model has it from the suspect log
   CraneModel model = arm_model();
   model.effects = {applied("coulomb_friction:arm", {5e3})};
   const std::vector<MachineSignals> suspect = {
@@ -145,7 +145,7 @@ TEST(EffectsInReferences, EvidenceKeepsKnownEffectsOutOfTheReferences) {
   const Evidence e = collect_evidence(model, suspect, reference, &none);
   const EvidenceChannel* force = e.find(EvidenceKind::kForce, 0);
   ASSERT_NE(force, nullptr);
-  // filtered sensor noise is some 0.3 kN; a friction put in or left out by mistake is 5 kN
+  // filtered sensor noise is about 0.3 kN; a friction added or omitted by mistake is 5 kN
   EXPECT_LT(force->y.cwiseAbs().maxCoeff(), 2.5e3);
 }
 

@@ -271,7 +271,7 @@ TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
     EXPECT_EQ(a.lower95[p], a.values[p]);
     EXPECT_EQ(a.upper95[p], a.values[p]);
   }
-  EXPECT_THAT(e.notes, ::testing::Each(::testing::Not(HasSubstr("rests on the bound"))));
+  EXPECT_THAT(e.notes, ::testing::Each(::testing::Not(HasSubstr("lies on the bound"))));
 }
 
 TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {

@@ -88,7 +88,7 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
   const VectorXd residual = y - x * dense;
   EXPECT_LT((fit.residual[0] - residual.head(n0)).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_LT((fit.residual[1] - residual.tail(n1)).cwiseAbs().maxCoeff(), 1e-6);
-  // likelihood of each channel with its scale at the maximum
+  // log-likelihood of each channel with its most likely scale
   for (std::size_t k = 0; k < 2; ++k) {
     const std::vector<NoiseBlock>& blocks = c.evidence.channels[k].blocks;
     const MatrixXd shape = dense_covariance(fit.noise[k], blocks) / fit.noise[k].variance;
@@ -105,13 +105,13 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
   EXPECT_FALSE(fit.at_bound);
 }
 
-TEST(EffectFit, BoundsHoldAndTheOthersAreAtTheirBestBeside) {
+TEST(EffectFit, BoundsHoldAndTheOtherParametersAreOptimalBesideThem) {
   FitCase c = make_case(2, Eigen::Vector2d(-0.6, 0.9));
-  c.shared.lower = {0.0};  // the truth is not allowed
+  c.shared.lower = {0.0};  // the true value is outside
   const EffectFit fit = fit_effects(c.evidence, {&c.shared, &c.single});
   EXPECT_TRUE(fit.at_bound);
   EXPECT_EQ(fit.theta[0], 0.0);
-  // with the first at zero the second is as if alone
+  // with the first at zero the second is estimated as if it were alone
   const EffectFit alone = fit_effects(c.evidence, {&c.single});
   EXPECT_NEAR(fit.theta[1], alone.theta[0], 1e-6);
   EXPECT_NEAR(fit.total(), alone.total(), 1e-4);
@@ -120,7 +120,7 @@ TEST(EffectFit, BoundsHoldAndTheOthersAreAtTheirBestBeside) {
 }
 
 TEST(EffectFit, UnitsDoNotMatter) {
-  // parameters of 1e12 Pa/(m^3/s)^2 stand beside parameters of 1e-8 rad/(N m)
+  // parameters of 1e12 Pa/(m^3/s)^2 are estimated together with parameters of 1e-8 rad/(N m)
   FitCase c = make_case(3, Eigen::Vector2d(0.8, -0.5));
   const EffectFit plain = fit_effects(c.evidence, {&c.shared, &c.single});
   for (MatrixXd& m : c.shared.columns) m *= 1e-12;
@@ -149,12 +149,12 @@ TEST(EffectFit, MoreNoisePassesThanNeededChangeNothing) {
   many.noise_passes = 12;
   const EffectFit a = fit_effects(c.evidence, {&c.shared, &c.single}),
                   b = fit_effects(c.evidence, {&c.shared, &c.single}, nullptr, many);
-  // a tenth of a nat decides nothing: penalties are several nats
+  // a tenth of a nat is negligible beside penalties of several nats
   EXPECT_NEAR(a.total(), b.total(), 0.1);
   EXPECT_NEAR(a.theta[0], b.theta[0], 0.01);
 }
 
-TEST(EffectFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(EffectFit, IntervalsHaveTheirNominalCoverage) {
   const Eigen::Vector2d truth(0.8, -0.5);
   FitControl control;
   control.covariance = true;
@@ -169,8 +169,8 @@ TEST(EffectFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
       ++count;
     }
   }
-  // 400 intervals: 95 % known to 1.1 %. Estimated noise makes them a little short, the robust part a little wide;
-  // what is asked of diagnosis is 90 .. 98 %.
+  // 400 intervals: 95 % with a standard error of 1.1 %. Estimated noise makes them a little short, the robust part a
+  // little wide; a diagnosis is required to have 90 .. 98 %.
   EXPECT_GE(held, static_cast<int>(0.90 * count));
   EXPECT_LE(held, static_cast<int>(0.99 * count));
   // no bias: deviations are some 0.06, their mean over 200 cases 0.005
@@ -184,7 +184,7 @@ TEST(EffectFit, NoChannelAndNoEffectIsNoError) {
   EXPECT_EQ(fit.total(), 0.0);
 }
 
-TEST(WhitenedRows, BaselineIsTakenOut) {
+TEST(WhitenedRows, AreOrthogonalToTheBaseline) {
   const FitCase c = make_case(6, Eigen::Vector2d(0.0, 0.0));
   const EvidenceChannel& channel = c.evidence.channels[0];
   MatrixXd columns(channel.rows(), 2);

@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 namespace hand = testing_support;
 
-/// Two parameters whose actions differ by a hundredth, with or without something there.
+/// Two parameters whose actions differ by a hundredth, with or without an effect in the data.
 FoundEffect judged(double size, unsigned seed) {
   static const Machine machine = hand::drawn_machine("loader_crane");
   std::mt19937_64 random(seed);
@@ -33,21 +33,21 @@ FoundEffect judged(double size, unsigned seed) {
   return found[0];
 }
 
-TEST(EffectIntervals, EitherOfTwoAlikeMayBeNothingAndNotBoth) {
+TEST(EffectIntervals, OfTwoCollinearParametersEachAloneMayBeZeroButNotBoth) {
   const FoundEffect f = judged(0.25, 1);
   for (int k = 0; k < 2; ++k) {
-    EXPECT_LT(f.lower95[k], 0.0) << "this seed's case: neither is told from zero";
+    EXPECT_LT(f.lower95[k], 0.0) << "in this seed's case neither alone differs from zero";
     EXPECT_GT(f.upper95[k], 0.0);
   }
-  EXPECT_FALSE(f.could_be_nothing) << "their sum is 0.5 where noise leaves 0.03";
+  EXPECT_FALSE(f.not_significant) << "their sum is 0.5 with a standard error of 0.03";
 }
 
-TEST(EffectIntervals, NothingIsTakenForSomethingOnceInTwenty) {
+TEST(EffectIntervals, JointSignificanceTestHasItsNominalLevel) {
   int something = 0;
   for (unsigned seed = 1; seed <= 400; ++seed)
-    something += judged(0.0, seed).could_be_nothing ? 0 : 1;
-  // Each of two parameters alone and both together: more than 5 % and, as they are alike, far less than 15. The robust
-  // covariance of twenty blocks is small by some percent.
+    something += judged(0.0, seed).not_significant ? 0 : 1;
+  // Three tests, each parameter alone and both together: more than 5 % and, because they are correlated, far less than
+  // 15 %. The robust covariance of twenty blocks is too small by some percent.
   EXPECT_GT(something, 10);
   EXPECT_LT(something, 60);
 }

@@ -1,5 +1,5 @@
-// An effect that only a user's file describes, hidden in a log: found by diagnosis among the whole catalogue, its
-// parameters recovered, added, carried by the model file.
+// An effect that a user's file defines and that acts in a log: the diagnosis finds it among the whole catalogue,
+// recovers its parameters, and the model file contains it after it was added.
 #include "models/effects/formula/user_effect.h"
 
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ using testing_support::arm_machine;
 using testing_support::arm_model;
 using testing_support::channel;
 
-/// A tight spot of the guide: friction around one length of the cylinder.
+/// A tight spot of the guide: friction near one length of the cylinder.
 constexpr const char* kTightSpot = R"yaml(effects:
   - id: tight_spot
     title: Friction at a tight spot
@@ -41,7 +41,7 @@ constexpr const char* kTightSpot = R"yaml(effects:
 )yaml";
 constexpr double kForce = 6e3, kPlace = 1.43, kWidth = 0.03;  // [N], [m], [m]
 
-/// Noise on the angle too: without it a diagnosis sees, rightly, what the filter does to the speed, 0.005 mm/s of it.
+/// The angle has noise too: without it a diagnosis rightly detects the filter's error of the speed, 0.005 mm/s.
 Log noisy_log(unsigned seed) {
   Log log = arm_log(0.8, seed);
   std::mt19937 random(seed);
@@ -64,7 +64,7 @@ Log log_with_tight_spot(unsigned seed) {
   return log;
 }
 
-/// Its effects are gone after each test: other tests search the bare catalogue.
+/// Removes the user's effects after each test, because other tests search the catalogue alone.
 class UserEffect : public testing::Test {
   UserEffectScope scope_;
 };
@@ -75,7 +75,7 @@ const Effect& tight_spot() {
 
 TEST_F(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
   const Effect& effect = tight_spot();
-  // Fb stands last in the file and first here: the law is proportional to it
+  // Fb is last in the file and first here, because the law is proportional to it
   ASSERT_EQ(effect.info().parameters[0].name, "Fb");
   const Diagnosis d = diagnose(arm_model(), {log_with_tight_spot(1)}, {noisy_log(7)});
   ASSERT_EQ(d.verdict, Verdict::kMissing) << d.table();
@@ -83,8 +83,8 @@ TEST_F(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
   EXPECT_EQ(d.effects[0].key(), "tight_spot:arm") << d.table();
   const std::vector<double>& p = d.effects[0].applied.values;
   ASSERT_EQ(p.size(), 3u);
-  // 0.8 bar on 113 cm^2 is 0.9 kN a sample; 16 passes of some 15 samples each: force and width to 3 %, and the
-  // filter over 0.1 s blurs the fast passes
+  // 0.8 bar on 113 cm^2 is 0.9 kN for each sample; 16 passes of about 15 samples give force and width to 3 %, and the
+  // filter of 0.1 s smooths the fast passes
   EXPECT_NEAR(p[0], kForce, 0.1 * kForce);
   EXPECT_NEAR(p[1], kPlace, 0.1 * kWidth);
   EXPECT_NEAR(p[2], kWidth, 0.1 * kWidth);
@@ -99,7 +99,7 @@ TEST_F(UserEffect, IsAddedAndCarriedByTheModelFile) {
   const ExtendResult r =
       extend(model, {effect}, {log_with_tight_spot(1)}, {log_with_tight_spot(2)});
   ASSERT_EQ(r.steps.size(), 1u);
-  // what is left is noise: 6 kN over a tenth of the stroke are gone
+  // the residual is noise: 6 kN over a tenth of the stroke are explained
   EXPECT_LT(r.steps[0].change.own, 0.8);
   const std::string text = model_to_json(r.model);
   const CraneModel read = model_from_json(text, "m.json");
@@ -107,13 +107,13 @@ TEST_F(UserEffect, IsAddedAndCarriedByTheModelFile) {
   ASSERT_EQ(read.user_effects.size(), 1u);  // once, though `effects` has it too
   EXPECT_EQ(read.user_effects[0], effect.effect);
 
-  // carried without being in the model: who reads the file can choose it
+  // the model file contains its definition even if the model does not use it, so that it can be chosen later
   const CraneModel offered = model_from_json(model_to_json(model), "m.json");
   EXPECT_TRUE(offered.effects.empty());
   EXPECT_THAT(offered.user_effects, Contains(effect.effect));
 }
 
-TEST_F(UserEffect, OneDefinitionTwiceIsFineTwoOfOneIdAreNot) {
+TEST_F(UserEffect, TheSameDefinitionTwiceIsAcceptedTwoDefinitionsOfOneIdAreNot) {
   const Effect& effect = tight_spot();
   // another layout, a comment, more effects in the file: the same definition
   std::string text = std::string("# my effects\n") + kTightSpot;
@@ -158,7 +158,7 @@ TEST(UserEffectScope, LeavesTheCatalogueAsItWas) {
   EXPECT_EQ(find_effect("tight_spot"), nullptr);
 }
 
-/// A law of each stage as that stage's evidence sees it (docs/user_effects.md).
+/// The columns of a law at each stage in that stage's evidence (docs/user_effects.md).
 TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
   const Machine machine = arm_machine();
   const MachineSignals signals = make_signals(machine, arm_log());
@@ -187,7 +187,7 @@ TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
     if (side[k] == 0) continue;
     EXPECT_DOUBLE_EQ(flow(k, 0), side[k] > 0 ? 1.0 / c.area_piston() : -1.0 / c.area_rod());
   }
-  // working pressure: itself where a valve sets it, by the areas where the return line does
+  // working pressure: as it is where a valve sets it, times the ratio of areas where the return line does
   EXPECT_NEAR(column("pressure", "Pa", EvidenceKind::kSupplyExtend)(0, 0), 1.0, 1e-12);
   EXPECT_NEAR(column("pressure", "Pa", EvidenceKind::kReturnExtend)(0, 0), ratio, 1e-12);
   EXPECT_NEAR(column("pressure", "Pa", EvidenceKind::kReturnRetract)(0, 0), 1.0 / ratio, 1e-12);

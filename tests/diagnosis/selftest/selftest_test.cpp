@@ -1,4 +1,4 @@
-// What logs could reveal: the formula against closed forms and against the search itself.
+// Which effects logs could reveal: power compared with closed forms and with the search itself.
 #include "diagnosis/selftest/selftest.h"
 
 #include <gmock/gmock.h>
@@ -35,7 +35,7 @@ Selftest test_arm(const Log& log, int check = 0) {
   const CraneModel model = arm_model();
   SelftestOptions options;
   options.check = check;
-  options.search.simulations = 100;  // quantile of the gate within half a nat
+  options.search.simulations = 100;  // threshold of the gain to half a nat
   options.candidates = some_effects(model.machine);
   return selftest(model, {log}, {}, options);
 }
@@ -89,14 +89,14 @@ TEST(DrawNoise, HasTheModelsAutoregressionAndOffsets) {
   EXPECT_NEAR(found.offset_variance, noise.offset_variance, 0.8);
 }
 
-TEST(Selftest, SeesWhatTheMotionProvokes) {
+TEST(Selftest, NamesEffectsThatTheMotionExcites) {
   const Selftest t = test_arm(arm_log(0.8));
   const InjectedEffect& friction = effect_of(t, "coulomb_friction:arm");
   EXPECT_EQ(friction.visibility, Visibility::kSeen);
   EXPECT_GT(friction.power, 0.99);
   EXPECT_LT(friction.times80, 0.5);
   EXPECT_LE(friction.times80, friction.times95);
-  // the value shown is that many times the typical 8 kN
+  // the value shown is this multiple of the typical 8 kN
   ASSERT_EQ(friction.smallest.size(), 1u);
   EXPECT_NEAR(friction.smallest[0].value, friction.times80 * 8e3, 1e-6 * 8e3);
   EXPECT_LT(friction.absorbed, 1e-12);  // forces have no learned law
@@ -133,23 +133,24 @@ TEST(PowerStudy, TwiceTheNoiseNeedsTwiceTheSize) {
   const double once = quiet_study.gain(signature(quiet_study.project(design), theta));
   const double twice = loud_study.gain(signature(loud_study.project(design), theta), 2.0);
   EXPECT_GT(once, 0.0);
-  // the same draws scaled, the same autoregression: only rounding is left
+  // the same draws, scaled, and the same autoregression: only rounding differs
   EXPECT_NEAR(twice, once, 1e-6 * (1.0 + once));
 }
 
 TEST(Selftest, TwiceTheNoiseNeedsTwiceTheSize) {
-  // of effects whose channel holds sensor noise alone, whatever other channels hold: the pump's starts and stops are
-  // larger than its sensor's noise and must not decide what is seen of a force
+  // for effects whose channel has sensor noise alone, independent of other channels: the residual of the pump at starts
+  // and stops exceeds its sensor's noise and must not change the power for a force
   const Selftest quiet = test_arm(arm_log(0.4)), loud = test_arm(arm_log(1.6));
   for (const char* key : {"coulomb_friction:arm", "force_offset:arm", "payload_error"}) {
     const double once = effect_of(quiet, key).times80, more = effect_of(loud, key).times80;
     ASSERT_TRUE(std::isfinite(once) && std::isfinite(more)) << key;
-    // four times; smoothing errors of the motion, which stay, and the gate's spread (100 simulations) leave 15 %
+    // four times; smoothing errors of the motion, which do not scale, and the threshold's error (100 simulations) make
+    // up to 15 %
     EXPECT_NEAR(more / once, 4.0, 0.6) << key;
   }
 }
 
-TEST(Selftest, OneJointCannotTellAMassFromItsPayload) {
+TEST(Selftest, OneJointCannotDistinguishAMassFromItsPayload) {
   const Selftest t = test_arm(arm_log(0.8));
   const InjectedEffect& mass = effect_of(t, "payload_error");
   std::vector<std::string> keys;
@@ -157,7 +158,7 @@ TEST(Selftest, OneJointCannotTellAMassFromItsPayload) {
     keys.push_back(c.key);
     EXPECT_LT(c.nats, 4.0);
   }
-  // one joint feels nothing of either but the moment m x g cos(q)
+  // both act on one joint by the moment m x g cos(q) alone
   EXPECT_THAT(keys, Contains("unmodelled_mass:arm"));
   EXPECT_THAT(t.sets, Contains(Contains("payload_error")));
 }
@@ -170,7 +171,7 @@ TEST(Selftest, SaysWhatToRecordForEachSet) {
     const Experiment& e = t.experiments[k];
     EXPECT_FALSE(e.motion.empty());
     EXPECT_THAT(t.table(), HasSubstr(e.sentence()));
-    // a motion of the menu is worth more than those at hand, which cannot tell the set apart
+    // a motion of the list has a larger gain than the recorded ones, which do not decide between the effects
     if (e.nats_per_minute > 0.0) {
       EXPECT_GT(e.nats_per_minute, e.nats_here);
     }
@@ -203,7 +204,7 @@ TEST(Selftest, EightyPercentMeansEightyPercent) {
   const EffectDesign design = make_design(evidence, friction.effect, {});
   const Eigen::VectorXd theta = Eigen::VectorXd::Constant(1, friction.times80 * 8e3);
   SearchOptions options;
-  options.simulations = 60;  // of each search's own gate
+  options.simulations = 60;  // of the null distribution of each search
   constexpr int kRuns = 40;
   int named = 0;
   for (unsigned seed = 0; seed < kRuns; ++seed) {
@@ -211,7 +212,8 @@ TEST(Selftest, EightyPercentMeansEightyPercent) {
                                seed + 1)
                  .named;
   }
-  // binomial deviation of 40 at 0.8 is 0.063; the gate's own spread and rivals of nearly the same form as much again
+  // the binomial standard deviation of 40 at 0.8 is 0.063; errors of the threshold and rivals of nearly the same form
+  // add as much again
   EXPECT_GE(named, static_cast<int>(0.55 * kRuns));
   EXPECT_LE(named, kRuns);
 }

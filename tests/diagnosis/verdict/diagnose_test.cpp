@@ -308,6 +308,19 @@ TEST(Diagnose, SameLogsSameAnswerAndJsonOfTheContract) {
   EXPECT_EQ(e.at("parameters").at(0).at("ci95").size(), 2u);
 }
 
+TEST(Diagnose, ChanceIsGivenAsABoundWhereTheSimulationsEnd) {
+  Diagnosis d;
+  d.search.simulations = 60;
+  d.p_value = 1.0 / 61.0;
+  EXPECT_EQ(d.p_value_text(), "below 0.016");
+  EXPECT_THAT(d.text(), HasSubstr("below 0.016"));
+  d.p_value = 2.0 / 61.0;
+  EXPECT_EQ(d.p_value_text(), "0.033");
+  d.search.simulations = 300;
+  d.p_value = 1.0 / 301.0;
+  EXPECT_EQ(d.p_value_text(), "below 0.0033");
+}
+
 TEST(Diagnose, NeedsALog) { EXPECT_THROW(diagnose(reference_model(), {}), InputError); }
 
 // ------------------------------------------------------------------------------------------- real logs
@@ -408,7 +421,7 @@ TEST(Diagnose, WhatHappenedOnceIsNoLawButNoNoiseEither) {
   EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.table();
   ASSERT_TRUE(d.unexplained) << d.table();
   EXPECT_TRUE(d.unexplained->few_places) << d.table();
-  EXPECT_THAT(d.headline(), HasSubstr("too seldom to prove a law: force of boom"));
+  EXPECT_THAT(d.headline(), HasSubstr("no law can be tested: force of boom"));
   EXPECT_GT(share_there(d.headline()), 80.0) << d.headline();
   const double when = column("t_s")[from];
   EXPECT_NEAR(std::stod(d.headline().substr(d.headline().find("from ") + 5)), when, 1.0)

@@ -1,4 +1,4 @@
-// What `compare` says beyond its scores: the stage at fault, regimes with intervals, worst motions, bad data.
+// Tests of the stage at fault, errors by regime with intervals, worst motions and bad data.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ using testing_support::arm_model;
 using testing_support::channel;
 constexpr double kNoise = 0.5;  // [bar]
 
-/// Both pressures of a load that weighs `extra` newtons more on the cylinder than the model knows.
+/// @return a log whose load exceeds the model's by `extra` newtons at the cylinder
 Log heavier(double extra) {
   Log log = arm_log(kNoise);
   const CraneModel model = arm_model();
@@ -28,7 +28,7 @@ Log heavier(double extra) {
   const double area_a = model.machine.cylinders[0].area_piston();
   const double area_b = model.machine.cylinders[0].area_rod();
   for (Eigen::Index k = 0; k < log.samples(); ++k) {
-    if (u[k] > 0.0) {  // the plant's law at the larger force: the working side by its slope
+    if (u[k] > 0.0) {  // the plant's laws at the larger force
       a[k] += extra / area_a;
       pump[k] += extra / area_a;
     } else if (u[k] < 0.0) {
@@ -50,7 +50,7 @@ const StageSplit& stage(const CompareResult& r, const std::string& name,
   throw std::logic_error("no stage " + name);
 }
 
-TEST(StageAtFault, AWrongForceIsItsOwnAndThePressuresInheritIt) {
+TEST(StageAtFault, AWrongForceIsNamedAndThePressuresInheritItsError) {
   const CompareResult r = compare(arm_model(), {heavier(20e3)});
   ASSERT_GE(r.fault.fault, 0);
   EXPECT_EQ(r.fault.stages[static_cast<std::size_t>(r.fault.fault)].stage, "force");
@@ -60,15 +60,15 @@ TEST(StageAtFault, AWrongForceIsItsOwnAndThePressuresInheritIt) {
   EXPECT_NEAR(force.own, 20e3, 400.0);
   EXPECT_EQ(force.inherited, 0.0);
   const StageSplit& up = stage(r, "pressure", "extend");
-  // 20 kN over the piston's area, 17.7 bar; own: sensor's noise 0.5 bar and what of it the smoothed force keeps
+  // 20 kN over the piston area are 17.7 bar; own error: the sensor noise of 0.5 bar and its part in the smoothed force
   EXPECT_NEAR(up.inherited, 17.7, 0.3);
   EXPECT_LT(up.own, 0.8);
   const StageSplit& pump = stage(r, "pump", "");
   EXPECT_GT(pump.inherited, 8.0 * pump.own);
 }
 
-// A first fit learns the pressures with the wrong force: they agree, and only the right force would show that they should not.
-TEST(StageAtFault, ALawLearnedWithAWrongForceIsNotBlamedForIt) {
+// A first fit learns the pressures with the wrong force; their errors are small, although the law over the force is wrong.
+TEST(StageAtFault, ALawLearnedWithAWrongForceIsNotAtFault) {
   CraneModel model = arm_model();
   const double area = model.machine.cylinders[0].area_piston();
   model.cylinders[0].extend =
@@ -84,7 +84,7 @@ TEST(StageAtFault, ALawLearnedWithAWrongForceIsNotBlamedForIt) {
   EXPECT_THAT(r.fault.sentence, HasSubstr("working pressure of arm extending was learned with it"));
 }
 
-TEST(StageAtFault, AWrongPressureProcessIsNotTheForces) {
+TEST(StageAtFault, AWrongPressureModelIsNamed) {
   CraneModel model = arm_model();
   model.cylinders[0].extend = testing_support::linear_process(
       14.0 * units::kBar, 1.0 / model.machine.cylinders[0].area_piston());  // 10 bar too much
@@ -96,7 +96,7 @@ TEST(StageAtFault, AWrongPressureProcessIsNotTheForces) {
   EXPECT_LT(f.inherited, 0.5);
 }
 
-TEST(StageAtFault, AWrongMarginIsThePumps) {
+TEST(StageAtFault, AWrongMarginIsAttributedToThePump) {
   CraneModel model = arm_model();
   model.cylinders[0].margin += 12.0 * units::kBar;
   const CompareResult r = compare(model, {arm_log(kNoise)});
@@ -112,7 +112,7 @@ TEST(StageAtFault, NoneWhereTheModelIsRight) {
   EXPECT_TRUE(r.bad_data.empty());
 }
 
-TEST(WhereItFails, AStageThatIsBiasedEverywhereLeads) {
+TEST(WorstRegions, AStageThatIsBiasedEverywhereComesFirst) {
   const CompareResult r = compare(arm_model(), {heavier(20e3)});
   ASSERT_FALSE(r.worst.empty());
   EXPECT_TRUE(r.worst[0].where.empty());
@@ -123,7 +123,7 @@ TEST(WhereItFails, AStageThatIsBiasedEverywhereLeads) {
     EXPECT_THAT(w.sentence, Not(HasSubstr("everywhere")));
 }
 
-TEST(WorstSegments, TheMotionThatFailsIsNamedWithItsTime) {
+TEST(WorstSegments, TheMotionWithTheErrorIsNamedWithItsTime) {
   Log log = arm_log(kNoise);
   channel(log, "pA_arm").values.segment(1260, 60).array() += 30.0 * units::kBar;  // 25.2 to 26.4 s
   const CompareResult r = compare(arm_model(), {log});
@@ -135,7 +135,7 @@ TEST(WorstSegments, TheMotionThatFailsIsNamedWithItsTime) {
   EXPECT_GT(w.share_of_error, 0.9);
 }
 
-TEST(Regimes, IntervalsHoldTheErrorAndTheLoadThatFailsStandsOut) {
+TEST(Regimes, IntervalsContainTheErrorAndTheWrongPayloadIsFound) {
   Log log = arm_log(kNoise);
   const Eigen::VectorXd payload = channel(log, "payload").values;
   Eigen::VectorXd& a = channel(log, "pA_arm").values;
@@ -172,7 +172,7 @@ TEST(CompareJson, HasTheCauses) {
   const std::string table = compare_table(r);
   EXPECT_THAT(table, HasSubstr("stage at fault"));
   EXPECT_THAT(table, HasSubstr("p_main is stuck"));
-  EXPECT_THAT(table, HasSubstr("what repeats in the error"));
+  EXPECT_THAT(table, HasSubstr("systematic errors"));
 }
 
 }  // namespace

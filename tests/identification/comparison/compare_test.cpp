@@ -49,16 +49,16 @@ TEST(Signals, SpeedAloneDecidesWithoutCommands) {
   }
 }
 
-TEST(Signals, MeasuredForceIsThatOfTheChambers) {
+TEST(Signals, MeasuredForceFollowsFromTheChamberPressures) {
   const MachineSignals s = make_signals(arm_machine(), arm_log());
   const CylinderSignals& c = s.cylinders[0];
-  // the log was made in balance; the smoothed pose is off by less than the bumps' curvature allows
+  // The simulated forces are in balance; the remaining error is that of the smoothed pose.
   for (Eigen::Index k = 0; k < s.samples(); ++k) {
     EXPECT_NEAR(c.force[k], c.static_force[k], 30.0) << "0.1 % of the load, sample " << k;
   }
 }
 
-TEST(Signals, StrokesBecomeJointAngles) {
+TEST(Signals, StrokesAreConvertedToJointAngles) {
   const Machine machine = arm_machine();
   Log log = arm_log();
   const Eigen::VectorXd q = channel(log, "q_arm").values;
@@ -112,7 +112,7 @@ TEST(Signals, DurationsAddUpToTheRuns) {
 TEST(Compare, TheRightModelHasNoError) {
   const CompareResult r = compare(arm_model(), {arm_log()});
   ASSERT_NE(r.find("force", "arm"), nullptr);
-  // What remains is the filter's: it flattens the bumps' tops, 0.1 % of load and flow.
+  // The filter reduces the peaks of speed by 0.1 %, which remains as error of load and flow.
   EXPECT_LT(r.find("force", "arm")->rmse, 30.0);
   EXPECT_LT(r.find("pressure", "arm", "extend")->rmse, 0.05 * units::kBar);
   EXPECT_LT(r.find("pressure", "arm", "retract")->rmse, 0.05 * units::kBar);
@@ -128,7 +128,7 @@ TEST(Compare, TheRightModelHasNoError) {
 TEST(Compare, EnergyIsThePumpsPressureTimesFlow) {
   const Log log = arm_log();
   const CompareResult r = compare(arm_model(), {log});
-  // the other way: from the command's exact flow, before any filter
+  // The reference is computed from the command's exact flow without a filter.
   double energy = 0.0;
   const Eigen::VectorXd u = log.find("u_arm")->values, p = log.find("p_main")->values;
   for (Eigen::Index k = 0; k < u.size(); ++k) {
@@ -137,9 +137,9 @@ TEST(Compare, EnergyIsThePumpsPressureTimesFlow) {
   EXPECT_NEAR(r.energy[0].measured / energy, 1.0, 2e-3) << "filter and trapezoidal rule";
 }
 
-TEST(Compare, ScoresMeanWhatTheySay) {
+TEST(Compare, ScoresFollowTheirDefinitions) {
   CraneModel model = arm_model();
-  // Two bars too much wherever it extends.
+  // The model predicts 2 bar too much while extending.
   model.cylinders[0].extend =
       linear_process(6.0 * units::kBar, 1.0 / model.machine.cylinders[0].area_piston());
   const CompareResult r = compare(model, {arm_log()});
@@ -163,18 +163,18 @@ TEST(Compare, ScoresMeanWhatTheySay) {
               1e-6);
 }
 
-TEST(Compare, NoiseIsInsideItsInterval) {
+TEST(Compare, PredictedIntervalsCoverTheNoise) {
   CraneModel model = arm_model();
   GpParameters p = model.cylinders[0].extend.parameters();
   p.noise_std = 0.8 * units::kBar;
-  p.signal_std = 1.0;  // no doubt about the mean
+  p.signal_std = 1.0;  // the mean is certain
   model.cylinders[0].extend = GaussianProcess(p);
   const CompareResult r = compare(model, {arm_log(0.8)});
   // 800 independent samples: the share's own deviation is 0.8 %
   EXPECT_NEAR(r.find("pressure", "arm", "extend")->within_95_percent, 95.0, 3.0);
 }
 
-TEST(Compare, WhatIsNotMeasuredIsNotComparedAndSaidSo) {
+TEST(Compare, UnmeasuredQuantitiesAreNotedAndNotCompared) {
   struct Case {
     const char* removed;
     const char* stage;
@@ -206,7 +206,7 @@ TEST(Compare, WhatIsNotMeasuredIsNotComparedAndSaidSo) {
   EXPECT_TRUE(compare(arm_model(), {log}).energy.empty());
 }
 
-TEST(Compare, AnUnlearnedProcessIsNotCompared) {
+TEST(Compare, AMissingPressureModelIsNotCompared) {
   CraneModel model = arm_model();
   model.cylinders[0].retract = {};
   model.cylinders[0].valve_gain_extend = model.cylinders[0].valve_gain_retract = 0.0;
@@ -218,7 +218,7 @@ TEST(Compare, AnUnlearnedProcessIsNotCompared) {
   EXPECT_THAT(r.notes, Contains(HasSubstr("the model has no valve gain")));
 }
 
-TEST(Compare, SaysWhereAProcessWasAskedBeyondItsData) {
+TEST(Compare, ExtrapolationOfAPressureModelIsNoted) {
   CraneModel model = arm_model();
   GpParameters p = model.cylinders[0].extend.parameters();
   const Log log = arm_log();
@@ -228,7 +228,7 @@ TEST(Compare, SaysWhereAProcessWasAskedBeyondItsData) {
   p.flow_max = 1.0;
   p.force_min = lo;
   p.force_max = 0.5 * (lo + hi);
-  // a tenth of a bar too much below, wrong by slope above: what a process does beyond its data
+  // A wrong slope makes the error grow towards the loads beyond the data, as in an extrapolation.
   p.mean_slope *= 1.3;
   p.mean_constant = extend_pressure(model.machine, lo) - p.mean_slope * lo;
   model.cylinders[0].extend = GaussianProcess(p);
@@ -266,7 +266,7 @@ TEST(Compare, MasksLimitWhatCounts) {
 
 // ---------------------------------------------------------------- worst regions
 
-TEST(WorstRegions, NoiseAloneIsNotBlamedOnAnything) {
+TEST(WorstRegions, NoiseAloneGivesNoRegion) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const CompareResult r = compare(arm_model(), {arm_log(0.8, seed)});
     EXPECT_TRUE(r.worst.empty()) << "seed " << seed << ": " << r.worst[0].sentence;
@@ -301,7 +301,7 @@ TEST(WorstRegions, FindTheAngleAndDirectionOfAnInjectedError) {
   EXPECT_THAT(found->sentence, HasSubstr("bar)"));
 }
 
-TEST(WorstRegions, TwoSignalsWhereItTakesTwo) {
+TEST(WorstRegions, TwoSignalsAreUsedWhereOneDoesNotSuffice) {
   ErrorGroup g;
   g.stage = "pressure";
   g.at = "boom";
@@ -340,7 +340,7 @@ TEST(WorstRegions, TwoSignalsWhereItTakesTwo) {
 
 // ---------------------------------------------------------------- reports
 
-TEST(CompareReport, JsonHasTheKeysScriptsRead) {
+TEST(CompareReport, JsonHasTheDocumentedKeys) {
   Log log = arm_log(0.8);
   Eigen::VectorXd& b = channel(log, "pB_arm").values;
   const Eigen::VectorXd q = channel(log, "q_arm").values;

@@ -19,7 +19,7 @@ using testing_support::arm_log;
 using testing_support::arm_machine;
 using testing_support::arm_model;
 
-/// Compared on a log with sensor noise; something to put errors into.
+/// @return a comparison on a log with sensor noise, into which tests inject errors
 const CompareResult& compared() {
   static const CompareResult result = [] {
     CompareOptions options;
@@ -29,7 +29,7 @@ const CompareResult& compared() {
   return result;
 }
 
-/// The same with another error of one quantity: `size` [SI] times noise of its own in each sample.
+/// @return the comparison with the error of one quantity replaced by white noise of standard deviation `size` [SI]
 CompareResult with_error(CompareResult r, const std::string& stage, double size, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -68,8 +68,8 @@ TEST(ErrorChange, IsTheGeometricMeanWhereItActsAndOverall) {
   EXPECT_DOUBLE_EQ(c.overall, 0.5);  // sqrt(0.25 * 1)
   EXPECT_FALSE(c.worse());
   EXPECT_TRUE((ErrorChange{0.9, 1.02, {}}.worse())) << "not better where it acts";
-  EXPECT_TRUE((ErrorChange{1.05, 0.9, {}}.worse())) << "worse on the whole";
-  EXPECT_FALSE((ErrorChange{1.01, 0.9, {}}.worse())) << "learning again moves as much";
+  EXPECT_TRUE((ErrorChange{1.05, 0.9, {}}.worse())) << "larger overall error";
+  EXPECT_FALSE((ErrorChange{1.01, 0.9, {}}.worse())) << "refitting alone changes as much";
 }
 
 TEST(ErrorChange, GrowthOfAnotherErrorIsHarm) {
@@ -85,8 +85,8 @@ TEST(ErrorChange, GrowthOfAnotherErrorIsHarm) {
   EXPECT_TRUE(c.worse());
 }
 
-TEST(ErrorChange, WhatItTakesFromOnePlaceItActsOnAndGivesToAnotherIsHarm) {
-  // a mass that follows the jib at the boom's cost: less error on the whole, and not what anybody wants
+TEST(ErrorChange, AnErrorMovedFromOnePlaceToAnotherIsHarm) {
+  // A mass may reduce the jib's error and increase the boom's: the overall error falls, but the change is not wanted.
   CompareResult before = compared();
   {
     CompareResult* r = &before;
@@ -123,8 +123,8 @@ TEST(ErrorChange, WhatItTakesFromOnePlaceItActsOnAndGivesToAnotherIsHarm) {
   EXPECT_THAT(little.harmed, IsEmpty());
 }
 
-TEST(ErrorChange, ChanceBetweenMotionsIsNoHarm) {
-  // other noise of the same size: larger or smaller by chance
+TEST(ErrorChange, VariationBetweenMotionsIsNoHarm) {
+  // Other noise of the same size is larger or smaller by chance.
   const CompareResult before = with_error(compared(), "pump", 2e5, 2);
   for (unsigned seed = 10; seed < 20; ++seed) {
     const CompareResult after = with_error(before, "pump", 2e5, seed);
@@ -133,8 +133,8 @@ TEST(ErrorChange, ChanceBetweenMotionsIsNoHarm) {
   }
 }
 
-TEST(ErrorChange, EnergyThatMovesAwayIsHarmAlthoughNoRmsGrew) {
-  // before: an error that cancels; after: a smaller one, always to one side
+TEST(ErrorChange, GrowthOfTheEnergyErrorIsHarmAlthoughNoRmsGrew) {
+  // Before, the error cancels in the energy; afterwards it is smaller but of one sign.
   CompareResult before = with_error(compared(), "pump", 6e5, 2);
   CompareResult after = before;
   for (ComparedSeries& s : after.logs[0].series) {
@@ -149,7 +149,7 @@ TEST(ErrorChange, EnergyThatMovesAwayIsHarmAlthoughNoRmsGrew) {
   EXPECT_GT(c.harmed[0].after, c.harmed[0].before);
 }
 
-TEST(ErrorChange, OutsideWhatWasLearnedAPressureHarmsNothing) {
+TEST(ErrorChange, ExtrapolationErrorsOfAPressureAreNoHarm) {
   CompareResult before = with_error(compared(), "pressure", 1e5, 2);
   CompareResult after = with_error(before, "pressure", 4e5, 3);
   const auto pressure_harmed = [&] {
@@ -164,8 +164,8 @@ TEST(ErrorChange, OutsideWhatWasLearnedAPressureHarmsNothing) {
   EXPECT_FALSE(pressure_harmed());
 }
 
-TEST(ErrorChange, WhatAHandfulOfSamplesShowsIsLeftToChance) {
-  // all but a second of the test log lies outside what was learned: its RMS moves by more than a tenth of itself
+TEST(ErrorChange, TooFewSamplesAreNotTested) {
+  // All but a second of the test log lies outside the training range; the RMS of that second varies by more than a tenth.
   CompareResult before = with_error(compared(), "pressure", 1e5, 2);
   CompareResult after = with_error(before, "pressure", 1.5e5, 3);
   const auto learned_for = [&](double seconds) {
@@ -182,10 +182,10 @@ TEST(ErrorChange, WhatAHandfulOfSamplesShowsIsLeftToChance) {
     return error_change(arm_machine(), before, after, "force", "arm").harmed;
   };
   EXPECT_THAT(learned_for(1.0), IsEmpty());
-  EXPECT_FALSE(learned_for(8.0).empty()) << "pieces of a second tell, too";
+  EXPECT_FALSE(learned_for(8.0).empty()) << "pieces of one second are tested";
 }
 
-TEST(ErrorChange, NoiseOfTheWholeIsThatBetweenMotions) {
+TEST(ErrorChange, OverallDeviationIsTheVariationBetweenMotions) {
   const CompareResult before = with_error(compared(), "pump", 2e5, 2);
   int beyond = 0;
   for (unsigned seed = 10; seed < 30; ++seed) {
@@ -200,7 +200,7 @@ TEST(ErrorChange, NoiseOfTheWholeIsThatBetweenMotions) {
   EXPECT_GT(std::log(grown.overall), 2.0 * grown.overall_deviation);
 }
 
-TEST(ErrorChange, OfSeveralStagesCountsEachAsItsOwn) {
+TEST(ErrorChange, PoolsSeveralStages) {
   CompareResult before = with_error(compared(), "force", 4e3, 1);
   before = with_error(before, "pump", 4e5, 2);
   const CompareResult after = with_error(with_error(before, "force", 2e3, 3), "pump", 1e5, 4);

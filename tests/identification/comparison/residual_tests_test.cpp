@@ -11,8 +11,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Coloured residuals (AR(1), correlation 0.9 a sample: 19 samples' worth) of two quantities in 30 motions of
-/// 100 samples, with three signals that are as coloured and have nothing to do with them.
+/// Autocorrelated residuals (AR(1), correlation 0.9, so 19 samples count as one) of two quantities in 30 motions of
+/// 100 samples, with three autocorrelated signals that are independent of them.
 std::vector<ComparedPart> ar_parts(unsigned seed, double bias = 0.0, double slope = 0.0) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -46,7 +46,7 @@ std::vector<ComparedPart> ar_parts(unsigned seed, double bias = 0.0, double slop
   return parts;
 }
 
-TEST(ResidualTests, FalseAlarmsOnColouredResidualsAreFiveInAHundredAtMost) {
+TEST(ResidualTests, FalseAlarmsOnAutocorrelatedResidualsAreFivePercentAtMost) {
   constexpr int kReplicates = 400;
   int alarms = 0;
   for (unsigned seed = 1; seed <= kReplicates; ++seed) {
@@ -94,7 +94,7 @@ TEST(ResidualTests, ADependenceIsFoundOnItsSignalAlone) {
   }
 }
 
-TEST(ResidualTests, AFewBlocksProveNothing) {
+TEST(ResidualTests, TooFewBlocksAreNotTested) {
   std::vector<ComparedPart> parts = ar_parts(5, 3.0);
   for (int& b : parts[0].block) b %= 5;
   parts.resize(1);
@@ -106,11 +106,11 @@ TEST(ResidualTests, FlipsWithBlocksOfOneSignReachTheSmallestPossibleValue) {
   const Eigen::MatrixXd judged = max_t_sign_flip(sums, 999, 1);
   EXPECT_DOUBLE_EQ(judged(0, 0), std::sqrt(20.0));
   EXPECT_LE(judged(0, 1), 0.002);  // 2^-19 of all flips are as large: none or one of 999
-  // a test of nothing but zeros is no evidence
+  // A test of zeros only is never significant.
   EXPECT_EQ(max_t_sign_flip(Eigen::MatrixXd::Zero(20, 1), 99, 1)(0, 1), 1.0);
 }
 
-TEST(ResidualTests, EffectiveSamplesOfAnAutoregression) {
+TEST(ResidualTests, EffectiveSamplesAreThoseOfAnAutoregression) {
   const ComparedPart part = ar_parts(6)[0];
   // (1 - rho) / (1 + rho) of 3000; cutting the sum at 0.05 and its own scatter leave about a fifth
   EXPECT_NEAR(effective_samples(part.error, part.block), 3000.0 * 0.1 / 1.9, 60.0);

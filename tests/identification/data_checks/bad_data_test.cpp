@@ -32,7 +32,7 @@ std::vector<std::string> names(const std::vector<BadChannel>& bad) {
   return out;
 }
 
-/// The arm with 0.5 bar of noise on its pressures and 0.2 mrad on its angle: third differences of real sensors.
+/// The arm with 0.5 bar of noise on its pressures and 0.2 mrad on its angle, as real sensors have.
 Log noisy_arm(unsigned seed = 1) {
   Log log = arm_log(0.5, seed);
   std::mt19937 random(seed);
@@ -48,23 +48,23 @@ void add_noise(Log& log, const std::string& signal, double deviation, Eigen::Ind
   for (Eigen::Index k = from; k < to; ++k) channel(log, signal).values[k] += normal(random);
 }
 
-TEST(BadData, HealthyLogsAreNotAccused) {
+TEST(BadData, HealthyLogsHaveNoFindings) {
   EXPECT_THAT(names(bad_of(arm_machine(), arm_log())), IsEmpty()) << "without any noise";
   for (unsigned seed = 1; seed <= 20; ++seed) {
     EXPECT_THAT(names(bad_of(arm_machine(), noisy_arm(seed))), IsEmpty()) << seed;
   }
 }
 
-TEST(BadData, NoiseAllAlongIsSeenAgainstTheTwins) {
+TEST(BadData, NoiseThroughoutIsFoundByComparisonWithThePeers) {
   Log log = noisy_arm();
   add_noise(log, "pA_arm", 2.5 * kBar, 0, log.samples());
   const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
   ASSERT_THAT(names(bad), ElementsAre("pA_arm noisy"));
   EXPECT_GT(bad[0].share, 0.9);  // single blocks may fall short of three times
-  EXPECT_THAT(bad[0].evidence, HasSubstr("fellow pressure channels"));
+  EXPECT_THAT(bad[0].evidence, HasSubstr("other pressure channels"));
 }
 
-TEST(BadData, NoiseInAStretchIsPlacedThere) {
+TEST(BadData, NoiseInAStretchIsLocated) {
   Log log = noisy_arm();
   add_noise(log, "pB_arm", 3.0 * kBar, 1000, 1500);  // 20 to 30 s
   const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
@@ -74,14 +74,14 @@ TEST(BadData, NoiseInAStretchIsPlacedThere) {
   EXPECT_NEAR(bad[0].share, 500.0 / 3000.0, 0.04);
 }
 
-TEST(BadData, SensorsTwiceAsNoisyAsTheirTwinsPass) {
+TEST(BadData, SensorsTwiceAsNoisyAsTheirPeersAreAccepted) {
   Log log = noisy_arm();
   add_noise(log, "pA_arm", std::sqrt(3.0) * 0.5 * kBar, 0, log.samples());
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
 TEST(BadData, AnOscillationIsNotNoise) {
-  // 5 Hz of 4 bar, as a boom that swings: ten times what the twins have, but not white
+  // 5 Hz of 4 bar, as an oscillating boom causes it: ten times the noise of the peers, but not white.
   Log log = noisy_arm();
   for (Eigen::Index k = 0; k < log.samples(); ++k) {
     channel(log, "pA_arm").values[k] += 4.0 * kBar * std::sin(2.0 * M_PI * 5.0 * log.time[k]);
@@ -89,14 +89,14 @@ TEST(BadData, AnOscillationIsNotNoise) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, ShakingOfAllPressuresIsTheMachines) {
+TEST(BadData, NoiseOfAllPressuresIsAttributedToTheMachine) {
   Log log = noisy_arm();
   for (const char* signal : {"pA_arm", "pB_arm", "p_main"})
     add_noise(log, signal, 3.0 * kBar, 1000, 1500);
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, AStuckChannelIsFoundWithItsPlaceAndLength) {
+TEST(BadData, AStuckChannelIsFoundWithItsStretch) {
   for (const char* signal : {"pA_arm", "pB_arm", "p_main", "q_arm"}) {
     Log log = noisy_arm();
     Eigen::VectorXd& x = channel(log, signal).values;
@@ -109,14 +109,14 @@ TEST(BadData, AStuckChannelIsFoundWithItsPlaceAndLength) {
   }
 }
 
-TEST(BadData, WithoutNoiseStandingStillIsNotStuckButMovingIs) {
+TEST(BadData, WithoutNoiseAConstantValueIsStuckOnlyDuringMotion) {
   Log log = arm_log();
   Eigen::VectorXd& x = channel(log, "pA_arm").values;
   x.segment(1600, 100).setConstant(x[1600]);  // 2 s of a stroke
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pA_arm stuck"));
 }
 
-TEST(BadData, AChannelThatNeverChangesWhileItsCylinderMoves) {
+TEST(BadData, AChannelThatNeverChangesWhileItsCylinderMovesIsFound) {
   Log log = noisy_arm();
   channel(log, "pB_arm").values.setZero();
   const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
@@ -124,7 +124,7 @@ TEST(BadData, AChannelThatNeverChangesWhileItsCylinderMoves) {
   EXPECT_EQ(bad[0].share, 1.0);
 }
 
-TEST(BadData, JumpsThatComeBack) {
+TEST(BadData, JumpsThatReturnAreFound) {
   for (const char* signal : {"pA_arm", "p_main"}) {
     Log log = noisy_arm();
     for (const Eigen::Index k : {700, 1300, 2200})
@@ -139,8 +139,8 @@ TEST(BadData, JumpsThatComeBack) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("q_arm jumping"));
 }
 
-// A swinging load empties one chamber and fills the other, from the tank's pressure upwards by 10 bar a sample.
-TEST(BadData, AChamberThatFillsDoesNotJump) {
+// An oscillating load empties one chamber and fills the other, from the tank's pressure upwards by 10 bar per sample.
+TEST(BadData, AChamberThatFillsIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200}) {
     for (Eigen::Index i = 0; i < 8; ++i)
@@ -150,14 +150,14 @@ TEST(BadData, AChamberThatFillsDoesNotJump) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, APumpThatAnswersAMovingLeverDoesNotJump) {
+TEST(BadData, APumpThatFollowsAMovingLeverIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200})  // for 2 s, as when a valve leaves its dead band
     channel(log, "p_main").values.segment(k, 100).array() += 12.0 * kBar;
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-// 7 bar at 0.5 bar of noise: small for a pressure, and far from both neighbours again and again.
+// 7 bar at 0.5 bar of noise are small for a pressure, but repeatedly far from both neighbours.
 TEST(BadData, ManyWildSamplesNeedNotBeLarge) {
   Log log = noisy_arm();
   std::mt19937 random(5);
@@ -171,13 +171,13 @@ TEST(BadData, ManyWildSamplesNeedNotBeLarge) {
   const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
   ASSERT_THAT(names(bad), ElementsAre("pA_arm wild"));
   EXPECT_THAT(bad[0].evidence, HasSubstr("single samples"));
-  // one knock in a log is no broken sensor
+  // A single impact in a log is no faulty sensor.
   log = noisy_arm();
   channel(log, "pA_arm").values[log.samples() / 2] += 7.0 * kBar;
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, APressureStepThatAnotherChannelSeesIsNoJump) {
+TEST(BadData, APressureStepThatAnotherChannelShowsIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200}) {
     channel(log, "pA_arm").values.segment(k, 20).array() += 12.0 * kBar;
@@ -186,13 +186,13 @@ TEST(BadData, APressureStepThatAnotherChannelSeesIsNoJump) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, ALevelThatDoesNotComeBackIsNoJump) {
+TEST(BadData, ALevelThatDoesNotReturnIsNoJump) {
   Log log = noisy_arm();
   channel(log, "pA_arm").values.tail(1300).array() += 12.0 * kBar;
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, DropOutsToZeroAndMissingValues) {
+TEST(BadData, DropOutsToZeroAndMissingValuesAreFound) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200})
     channel(log, "pA_arm").values.segment(k, 10).setZero();
@@ -202,7 +202,7 @@ TEST(BadData, DropOutsToZeroAndMissingValues) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pB_arm drop_out"));
 }
 
-TEST(BadData, APressureClippedAtZeroWhereItIsLowAnywayPasses) {
+TEST(BadData, APressureClippedAtZeroIsAcceptedWhereItIsLow) {
   Log log = noisy_arm();
   Eigen::VectorXd& x = channel(log, "pB_arm").values;
   for (Eigen::Index k = 0; k < x.size(); ++k)
@@ -211,7 +211,7 @@ TEST(BadData, APressureClippedAtZeroWhereItIsLowAnywayPasses) {
 }
 
 TEST(BadData, AChamberEmptiedByTheMachineBelowASensorsZeroIsNoDropOut) {
-  // the sensor reads 12 bar too little: whenever the arm stops, what is left in the chamber is below its zero
+  // The sensor reads 12 bar too little, so whenever the arm stops the chamber's pressure is below its zero.
   Log log = noisy_arm();
   const MachineSignals signals = make_signals(arm_machine(), log);
   const Eigen::VectorXi& direction = signals.cylinders[0].direction;
@@ -227,14 +227,14 @@ TEST(BadData, AChamberEmptiedByTheMachineBelowASensorsZeroIsNoDropOut) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
-TEST(BadData, ASensorAtTheEndOfItsRange) {
+TEST(BadData, ASensorAtTheEndOfItsRangeIsSaturated) {
   Log log = noisy_arm();
   Eigen::VectorXd& x = channel(log, "p_main").values;
   x = x.cwiseMin(0.6 * x.maxCoeff());
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("p_main saturated"));
 }
 
-TEST(BadData, ACommandTheMachineDoesNotFollow) {
+TEST(BadData, ACommandThatTheMachineDoesNotFollowIsStuck) {
   Log log = noisy_arm();
   Eigen::VectorXd& u = channel(log, "u_arm").values;
   Eigen::Index at = 0;
@@ -254,7 +254,7 @@ std::vector<std::filesystem::path> logs_below(const std::filesystem::path& folde
   return out;
 }
 
-TEST(BadDataOnCranes, NoRealOrSimulatedLogIsAccused) {
+TEST(BadDataOnCranes, RealAndSimulatedLogsHaveNoFindings) {
   if (!std::filesystem::exists(kLogsBeside / "data")) GTEST_SKIP() << "no logs of cranes here";
   for (const char* name : {"hmf_2020_k4", "emps", "loader_crane"}) {
     const Machine machine =
@@ -267,7 +267,7 @@ TEST(BadDataOnCranes, NoRealOrSimulatedLogIsAccused) {
   }
 }
 
-/// Faults put into every position and pressure channel of the simulated cranes' logs, where its cylinder moves.
+/// Faults are injected into every position and pressure channel of the simulated cranes' logs while all cylinders move.
 TEST(BadDataOnCranes, InjectedFaultsAreFound) {
   if (!std::filesystem::exists(kLogsBeside / "data/loader_crane")) GTEST_SKIP() << "no logs here";
   const Machine machine = load_machine((kLogsBeside / "machines/loader_crane.yaml").string());
@@ -280,7 +280,7 @@ TEST(BadDataOnCranes, InjectedFaultsAreFound) {
     const MachineSignals signals = make_signals(machine, log);
     std::vector<Eigen::Index> moving;
     for (Eigen::Index k = 50; k + 300 < log.samples(); ++k) {
-      bool all = true;  // a place where any channel would have to change
+      bool all = true;  // at this sample every channel should change
       for (const CylinderSignals& c : signals.cylinders) all = all && c.direction[k] != 0;
       if (all) moving.push_back(k);
     }
@@ -327,7 +327,7 @@ TEST(BadDataOnCranes, InjectedFaultsAreFound) {
     }
   }
   EXPECT_GE(found, 0.98 * injected);
-  EXPECT_LE(others, 0.01 * injected) << "channels accused in place of the faulty one";
+  EXPECT_LE(others, 0.01 * injected) << "findings on other channels than the faulty one";
   RecordProperty("injected", injected);
   RecordProperty("found", found);
 }

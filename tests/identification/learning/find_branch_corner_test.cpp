@@ -1,4 +1,4 @@
-// Two branches, one of which takes over from the other: what a smooth process cannot bend to is found from its samples.
+// The corner between two branches of the supply pressure, which a smooth Gaussian process cannot represent, is identified.
 #include "identification/learning/find_branch_corner.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class FindBranchCorner : public ::testing::TestWithParam<int> {
   }
   double truth(double flow, double load) const { return std::max(valve(load), line(flow, load)); }
 
-  /// @param skip of loads, as pressures of the supply [Pa], that no sample has
+  /// @param skip true for loads, as pressures of the supply [Pa], that no sample has
   GpDataset samples(const std::function<bool(double)>& skip,
                     const std::function<double(double, double)>& law) const {
     std::mt19937_64 random(3);
@@ -53,7 +53,7 @@ class FindBranchCorner : public ::testing::TestWithParam<int> {
   GpDataset both(const std::function<bool(double)>& skip) const {
     return samples(skip, [&](double q, double load) { return truth(q, load); });
   }
-  /// Learned as fit does, with the corner or without. Largest error over the loads learned. [Pa]
+  /// Learns a pressure model as `fit` does, with or without the corner. @return largest error over the loads [Pa]
   double worst(const GpDataset& set, const BranchCorner& corner) const {
     GpDataset rest = set;
     for (Eigen::Index k = 0; k < rest.flow.size() && corner.there(); ++k)
@@ -75,16 +75,16 @@ class FindBranchCorner : public ::testing::TestWithParam<int> {
   Cylinder cylinder_;
 };
 
-TEST_P(FindBranchCorner, BetweenLoadsOfEitherBranchIsWhereTheyMeet) {
+TEST_P(FindBranchCorner, IsFoundWithoutSamplesNearIt) {
   const GpDataset set = both([](double load) { return load > 0 && load < 90 * kBarCorner; });
   const BranchCorner corner = find_branch_corner(set, cylinder_, side());
   ASSERT_TRUE(corner.there());
   EXPECT_NEAR(corner.per_force, side() * 0.8 / supply(), 0.04 / supply());
   EXPECT_LT(worst(set, corner), 2.5 * kBarCorner);
-  EXPECT_GT(worst(set, {}), 6 * kBarCorner) << "a smooth law does not know";
+  EXPECT_GT(worst(set, {}), 6 * kBarCorner) << "a smooth law interpolates linearly";
 }
 
-TEST_P(FindBranchCorner, InTheMidstOfSamplesLeavesNoSwing) {
+TEST_P(FindBranchCorner, ReducesTheErrorWithSamplesAroundIt) {
   const GpDataset set = both([](double) { return false; });
   const BranchCorner corner = find_branch_corner(set, cylinder_, side());
   ASSERT_TRUE(corner.there());
@@ -92,7 +92,7 @@ TEST_P(FindBranchCorner, InTheMidstOfSamplesLeavesNoSwing) {
   EXPECT_GT(worst(set, {}), worst(set, corner));
 }
 
-TEST_P(FindBranchCorner, IsNoneInOneBranchOrInASmoothLaw) {
+TEST_P(FindBranchCorner, IsAbsentInOneBranchAndInASmoothLaw) {
   const auto all = [](double) { return false; };
   const GpDataset valves = samples(all, [&](double, double load) { return valve(load); });
   const GpDataset lines = samples(all, [&](double q, double load) { return line(q, load); });
@@ -103,7 +103,7 @@ TEST_P(FindBranchCorner, IsNoneInOneBranchOrInASmoothLaw) {
     EXPECT_FALSE(find_branch_corner(set, cylinder_, side()).there());
 }
 
-TEST_P(FindBranchCorner, OfTooFewSamplesIsNone) {
+TEST_P(FindBranchCorner, IsAbsentWithTooFewSamples) {
   GpDataset set = both([](double) { return false; });
   set.flow.conservativeResize(20);
   set.force.conservativeResize(20);
@@ -113,7 +113,7 @@ TEST_P(FindBranchCorner, OfTooFewSamplesIsNone) {
 
 INSTANTIATE_TEST_SUITE_P(BothSides, FindBranchCorner, ::testing::Values(1, -1));
 
-TEST(Fit, PutsTheCornerBetweenValveAndLoadIntoTheLaws) {
+TEST(Fit, IdentifiesCornersBetweenValveAndStaticBranch) {
   const Machine machine = testing_support::drawn_machine("loader_crane");
   const auto logs = testing_support::hidden_case(machine, {}, 4, 120.0, {}, 60.0);
   const FitResult fitted = fit(machine, {logs.train}, {logs.test});
@@ -126,7 +126,7 @@ TEST(Fit, PutsTheCornerBetweenValveAndLoadIntoTheLaws) {
       ++corners;
       const Cylinder& cylinder = machine.cylinders[i];
       const double area = extend ? cylinder.area_piston() : cylinder.area_rod();
-      const double share = c.per_force * area * (extend ? 1 : -1);  // what the valve's branch lacks
+      const double share = c.per_force * area * (extend ? 1 : -1);  // 1 - valve's share
       EXPECT_GE(share, 0.4 - 1e-9) << cylinder.name;
       EXPECT_LE(share, 1.0 + 1e-9) << cylinder.name;
     }

@@ -17,7 +17,7 @@ using namespace testing_support;
 using testing::Contains;
 using testing::HasSubstr;
 
-// ---------------------------------------------------------------- made-up lift
+// ---------------------------------------------------------------- simulated lift
 
 TEST(Fit, RecoversTheLawOfTheLog) {
   const FitResult r = fit(arm_machine(), {arm_log(0.3, 1)}, {arm_log(0.3, 2)});
@@ -25,7 +25,7 @@ TEST(Fit, RecoversTheLawOfTheLog) {
   // 1700 samples of 0.3 bar noise: the margin's standard error is 0.01 bar, five of them
   EXPECT_NEAR(r.model.cylinders[0].margin, kMargin, 0.05 * units::kBar);
   EXPECT_NEAR(r.model.pumps[0].standby, kStandby, 0.05 * units::kBar);
-  // the filter flattens the bumps' tops by some 0.1 %
+  // The filter reduces the peaks of speed by some 0.1 %.
   EXPECT_NEAR(r.model.cylinders[0].valve_gain_extend / kGainExtend, 1.0, 3e-3);
   EXPECT_NEAR(r.model.cylinders[0].valve_gain_retract / kGainRetract, 1.0, 3e-3);
   const Machine machine = arm_machine();
@@ -77,7 +77,7 @@ TEST(Fit, WithoutTestLogsWholeMotionsAreHeldOut) {
   ASSERT_TRUE(r.held_out.has_value());
   EXPECT_GT(r.held_out->samples, 200);
   EXPECT_LT(r.held_out->samples, 1500);
-  // An honest figure: the law is simple, so it is the noise again, a little more at the edges of the data.
+  // The law is simple, so the error is the noise, and slightly more at the edges of the data.
   EXPECT_NEAR(r.held_out->find("pressure", "arm", "extend")->rmse, 0.3 * units::kBar,
               0.1 * units::kBar);
   EXPECT_THAT(r.brief(), HasSubstr("held-out motions"));
@@ -99,7 +99,7 @@ TEST(Fit, BlocksCoverEveryMotionOnce) {
   }
 }
 
-TEST(Fit, AProcessThatWasNeverSeenSaysWhatToRecord) {
+TEST(Fit, AMissingMotionIsNotedWithWhatToRecord) {
   Log log = arm_log(0.3);
   for (double& u : channel(log, "u_arm").values) u = std::max(u, 0.0);  // lowered by hand
   const FitResult r = fit(arm_machine(), {log});
@@ -112,7 +112,7 @@ TEST(Fit, AProcessThatWasNeverSeenSaysWhatToRecord) {
   EXPECT_EQ(r.model.cylinders[0].valve_gain_retract, 0.0);
 }
 
-TEST(Fit, APressureThatIsNotLoggedIsNamed) {
+TEST(Fit, APressureThatIsNotLoggedIsNoted) {
   Log log = arm_log(0.3);
   remove_channel(log, "pB_arm");
   const FitResult r = fit(arm_machine(), {log});
@@ -158,8 +158,8 @@ TEST(Fit, ADriveWithoutHydraulicsHasItsForceCompared) {
   EXPECT_THAT(r.train.notes, Contains(HasSubstr("the machine has no pump")));
 }
 
-TEST(Fit, MovementsAgainstTheCommandTeachNothing) {
-  // A quarter second in which the command is ahead of the motion and the chamber reads nonsense.
+TEST(Fit, MotionsAgainstTheCommandAreNotUsed) {
+  // For a quarter of a second the command is ahead of the motion and the chamber pressure is invalid.
   Log good = arm_log(0.3), bad = good;
   Eigen::VectorXd& u = channel(bad, "u_arm").values;
   for (Eigen::Index k = 1; k + 12 < u.size(); ++k) {
@@ -203,14 +203,14 @@ TEST(IntegratedAutocorrelation, IsThatOfAFirstOrderProcess) {
       position.push_back(k);
     }
     const double expected = (1.0 + a) / (1.0 - a);
-    // the sum stops at a correlation of 0.05: at most 0.1 / (1 - a) is left out, the rest is chance
+    // The sum ends at a correlation of 0.05, which leaves out at most 0.1 / (1 - a); the rest is statistical error.
     EXPECT_NEAR(integrated_autocorrelation(x, position), expected,
                 0.1 / (1.0 - a) + 0.05 * expected)
         << a;
   }
 }
 
-TEST(IntegratedAutocorrelation, DoesNotReachAcrossGaps) {
+TEST(IntegratedAutocorrelation, UsesNoPairsAcrossGaps) {
   Eigen::VectorXd x(4000);
   std::vector<Eigen::Index> position;
   for (Eigen::Index k = 0; k < x.size(); ++k) {
@@ -220,7 +220,7 @@ TEST(IntegratedAutocorrelation, DoesNotReachAcrossGaps) {
   EXPECT_EQ(integrated_autocorrelation(x, position), 1.0);
 }
 
-TEST(Fit, SamplesThatRepeatEachOtherAreThinned) {
+TEST(Fit, CorrelatedSamplesAreThinned) {
   Log log = arm_log();
   std::mt19937 generator(3);
   std::normal_distribution<double> normal;

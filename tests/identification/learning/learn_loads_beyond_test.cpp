@@ -1,4 +1,4 @@
-// A process that has seen one branch is right on the other: the balance of forces is no matter of data.
+// A pressure model that was learned on one branch extrapolates correctly to the other by the balance of forces.
 #include "identification/learning/learn_loads_beyond.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kBarSeen = 1e5;
 
-/// Bore 120, rod 80 mm; return line 6 bar, counterbalance valve at 40 bar that falls with what helps.
+/// Bore 120, rod 80 mm; return line of some bar, counterbalance valve at 40 bar, lower when moving with the load.
 class LearnLoadsBeyond : public ::testing::TestWithParam<int> {
  protected:
   LearnLoadsBeyond() {
@@ -26,7 +26,7 @@ class LearnLoadsBeyond : public ::testing::TestWithParam<int> {
     const double branch = (load + other() * line) / supply();
     return std::max({branch, 40 * kBarSeen + 0.2 * load / supply(), 2.5 * kBarSeen});
   }
-  /// Learned from loads between these, as pressures of the supply [Pa].
+  /// @return pressure model learned from loads between these, as pressures of the supply [Pa]
   GaussianProcess learned(double lightest, double heaviest) const {
     std::mt19937_64 random(11);
     std::uniform_real_distribution<double> uniform;
@@ -43,7 +43,7 @@ class LearnLoadsBeyond : public ::testing::TestWithParam<int> {
     p.beyond = learn_loads_beyond(p, set, cylinder_, side());
     return GaussianProcess(p);
   }
-  /// Largest error at these loads, as pressures of the supply. [Pa]
+  /// @return largest error [Pa] at these loads, as pressures of the supply [Pa]
   double worst(const GaussianProcess& process, std::initializer_list<double> loads) const {
     double error = 0.0;
     for (const double flow : {2e-4, 5e-4}) {
@@ -58,26 +58,26 @@ class LearnLoadsBeyond : public ::testing::TestWithParam<int> {
   Cylinder cylinder_;
 };
 
-TEST_P(LearnLoadsBeyond, OfTheValveAloneGivesTheLoadsThatItNeverSaw) {
+TEST_P(LearnLoadsBeyond, ExtrapolatesFromTheValveToTheStaticBranch) {
   const GaussianProcess process = learned(-80 * kBarSeen, 10 * kBarSeen);
   GpParameters line = process.parameters();
   line.beyond = {};
   const auto heavier = {60 * kBarSeen, 100 * kBarSeen, 150 * kBarSeen};
-  // what the return line holds at these flows is not known from the valve's samples: 2 bar of 6 times the areas' ratio
+  // The valve's samples do not determine the return line's pressure at these flows; the error scales with the area ratio.
   const double line_unknown = 3 * kBarSeen * other() / supply();
   EXPECT_LT(worst(process, heavier), line_unknown + 4 * kBarSeen);
   EXPECT_GT(worst(GaussianProcess(line), heavier), 50 * kBarSeen);
 }
 
-TEST_P(LearnLoadsBeyond, OfBothBranchesGoesOnAlongEach) {
+TEST_P(LearnLoadsBeyond, ContinuesBothBranches) {
   const GaussianProcess process = learned(-80 * kBarSeen, 120 * kBarSeen);
   EXPECT_LT(worst(process, {150 * kBarSeen, 250 * kBarSeen}), 5 * kBarSeen);
   EXPECT_LT(worst(process, {-120 * kBarSeen, -180 * kBarSeen}), 5 * kBarSeen);
   EXPECT_LT(worst(process, {-400 * kBarSeen}), 5 * kBarSeen);  // the tank
 }
 
-TEST_P(LearnLoadsBeyond, OfOneLoadKeepsWhatTheFlowDoesAndAddsTheBalanceOfForces) {
-  // a slewing cylinder on level ground carries nothing, until friction is added: both must be as before, and more
+TEST_P(LearnLoadsBeyond, WithOneLoadAddsTheBalanceOfForcesToTheLawOfTheFlow) {
+  // A slewing cylinder on level ground has no load until friction is added; the law of the flow must remain.
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> uniform;
   std::normal_distribution<double> noise(0.0, 0.8 * kBarSeen);
@@ -107,11 +107,11 @@ TEST_P(LearnLoadsBeyond, OfOneLoadKeepsWhatTheFlowDoesAndAddsTheBalanceOfForces)
     }
   }
   set.force = Eigen::ArrayXd::LinSpaced(n, 0.0, 10 * kBarSeen * supply());
-  EXPECT_FALSE(alike_loads(set, cylinder_, side())) << "these show a slope";
+  EXPECT_FALSE(alike_loads(set, cylinder_, side())) << "these loads determine a slope";
 }
 
-TEST_P(LearnLoadsBeyond, OfFewLoadsIsNoSteeperThanTheBalanceOfForces) {
-  // friction that grows along a stroke, as on the real crane's jib, is no slope over the load that moves along with it
+TEST_P(LearnLoadsBeyond, WithSimilarLoadsIsNoSteeperThanTheBalanceOfForces) {
+  // Friction that grows along a stroke, as on the real crane's jib, is correlated with the load but no slope over it.
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> uniform;
   std::normal_distribution<double> noise(0.0, 0.5 * kBarSeen);
@@ -134,8 +134,8 @@ TEST_P(LearnLoadsBeyond, OfFewLoadsIsNoSteeperThanTheBalanceOfForces) {
   }
 }
 
-TEST_P(LearnLoadsBeyond, OfFewLoadsTakesTheSlopeThatSamplesShow) {
-  // a valve 25 bar above the load would be taken for level beforehand
+TEST_P(LearnLoadsBeyond, WithSimilarLoadsUsesTheSlopeOfTheSamples) {
+  // By the level alone, a valve's pressure 25 bar above the load would have slope 0.
   constexpr double kShare = 0.5;
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> uniform;
@@ -154,7 +154,7 @@ TEST_P(LearnLoadsBeyond, OfFewLoadsTakesTheSlopeThatSamplesShow) {
     ASSERT_TRUE(loads) << span;
     const double wrong = kShare - side() * loads->slope * supply();
     const double unsure = loads->slope_deviation * supply();
-    EXPECT_LT(wrong, wrong_before) << "more of a slope is seen in " << span << " bar";
+    EXPECT_LT(wrong, wrong_before) << "the slope is better determined in " << span << " bar";
     EXPECT_LT(unsure, unsure_before) << span;
     wrong_before = wrong;
     unsure_before = unsure;
@@ -162,7 +162,7 @@ TEST_P(LearnLoadsBeyond, OfFewLoadsTakesTheSlopeThatSamplesShow) {
   EXPECT_NEAR(wrong_before, 0.0, 0.15);
 }
 
-TEST_P(LearnLoadsBeyond, OfFewLoadsWithoutAnyNoiseIsTheirSlope) {
+TEST_P(LearnLoadsBeyond, WithSimilarLoadsWithoutNoiseIsTheirSlope) {
   constexpr double kShare = 0.3;
   constexpr Eigen::Index n = 50;
   GpDataset set{"", Eigen::ArrayXd::Constant(n, 2e-4), Eigen::ArrayXd(n), Eigen::ArrayXd(n)};
@@ -175,7 +175,7 @@ TEST_P(LearnLoadsBeyond, OfFewLoadsWithoutAnyNoiseIsTheirSlope) {
   set.pressure.setZero();
   loads = alike_loads(set, cylinder_, side());
   ASSERT_TRUE(loads);
-  EXPECT_NEAR(side() * loads->slope * supply(), 0.0, 1e-3) << "no error left at all";
+  EXPECT_NEAR(side() * loads->slope * supply(), 0.0, 1e-3) << "no residual";
 }
 
 INSTANTIATE_TEST_SUITE_P(BothSides, LearnLoadsBeyond, ::testing::Values(1, -1));

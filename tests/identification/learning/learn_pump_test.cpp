@@ -39,7 +39,7 @@ PumpSamples make_samples(const PumpCase& s, Index n, unsigned seed = 4) {
       const std::size_t k = static_cast<std::size_t>(i);
       const double model = s.low[k] + (s.high[k] - s.low[k]) * uniform(random);
       out.active(t, i) = uniform(random) < s.activity;
-      // What the model says of a cylinder at rest must not matter.
+      // The model's pressure of a cylinder at rest must not be used.
       out.working_pressure(t, i) = out.active(t, i) ? model * 1e5 : NAN;
       const double real = model + s.model_error * normal(random);
       if (out.active(t, i)) pressure = std::max(pressure, real + s.margin[k]);
@@ -81,8 +81,8 @@ TEST(LearnPump, FiveCylindersWithOutliers) {
 }
 
 TEST(LearnPump, NearTiesDoNotBiasTheMargins) {
-  // Two cylinders that are nearly always tied, and a model that is 3 bar wrong: the plain fit takes up
-  // most of E max = 3 / sqrt(pi) = 1.7 bar.
+  // Two cylinders are nearly always tied and the model has errors of 3 bar: a fit with all samples absorbs most of
+  // E max = 3 / sqrt(pi) = 1.7 bar.
   PumpCase setup{{15, 15}, {60, 60}, {75, 75}};
   setup.model_error = 3.0;
   setup.activity = 0.9;
@@ -95,13 +95,13 @@ TEST(LearnPump, NearTiesDoNotBiasTheMargins) {
   EXPECT_LT(std::abs(without - 15e5), 0.5 * std::abs(with_ties - 15e5));
 }
 
-TEST(LearnPump, MarginThatIsNeverSeenIsFlaggedAndBounded) {
+TEST(LearnPump, AMarginThatIsNotIdentifiedIsFlaggedAndBounded) {
   // The third cylinder works at 5-15 bar and moves only while the first holds 100 bar.
   PumpSamples samples = make_samples({{14, 18, 10}, {100, 40, 5}, {150, 90, 15}}, 3000);
   for (Index t = 0; t < 3000; ++t) {
     if (!samples.active(t, 0)) samples.active(t, 2) = false;
   }
-  // Taken out of the measured pressure too: it never led.
+  // It is never the leader, so the measured pressure does not contain it.
   const LearnedPump pump = learn_pump(samples);
   EXPECT_TRUE(pump.margins[0].identified);
   EXPECT_FALSE(pump.margins[2].identified);
@@ -113,19 +113,19 @@ TEST(LearnPump, MarginThatIsNeverSeenIsFlaggedAndBounded) {
   ASSERT_FALSE(pump.warnings.empty());
   EXPECT_THAT(pump.warnings[0], HasSubstr("not identified"));
 
-  // The bound holds the assumed margin down where it bites.
+  // The bound limits the assumed margin where it is active.
   PumpSamples tight = make_samples({{14, 18}, {60, 56}, {60, 58}}, 2000);
   for (Index t = 0; t < 2000; ++t) {
     tight.active(t, 1) = tight.active(t, 0);
     if (!tight.active(t, 0)) continue;
-    tight.pressure[t] = 74e5 + 1e3 * static_cast<double>(t % 7);  // the first always leads
+    tight.pressure[t] = 74e5 + 1e3 * static_cast<double>(t % 7);  // the first is always the leader
   }
   const LearnedPump held = learn_pump(tight);
   const LearnedMargin& second = held.margins[1];
   EXPECT_LE(56e5 + second.margin, 74.1e5);
 }
 
-TEST(LearnPump, CylinderThatNeverMoves) {
+TEST(LearnPump, ACylinderThatNeverMovesGetsTheMedianMargin) {
   PumpSamples samples = make_samples({{14, 18}, {50, 40}, {150, 90}}, 1000);
   for (Index t = 0; t < 1000; ++t) samples.active(t, 1) = false;
   for (Index t = 0; t < 1000; ++t) {
@@ -137,12 +137,12 @@ TEST(LearnPump, CylinderThatNeverMoves) {
   EXPECT_TRUE(std::isinf(pump.margins[1].upper_bound));
   EXPECT_EQ(pump.margins[1].margin, pump.margins[0].margin);
   ASSERT_FALSE(pump.warnings.empty());
-  EXPECT_THAT(pump.warnings[0], testing::StartsWith("cylinder 2 leads the pump in 0 of 0"));
+  EXPECT_THAT(pump.warnings[0], testing::StartsWith("cylinder 2 is the load-sensing leader in 0 of 0"));
   samples.names = {"boom", "jib"};
-  EXPECT_THAT(learn_pump(samples).warnings[0], testing::StartsWith("jib leads the pump in 0 of 0"));
+  EXPECT_THAT(learn_pump(samples).warnings[0], testing::StartsWith("jib is the load-sensing leader in 0 of 0"));
 }
 
-TEST(LearnPump, StandbyNeverSeenComesFromTheDataSheet) {
+TEST(LearnPump, WithoutSamplesAtStandbyTheDataSheetIsUsed) {
   PumpCase setup{{14}, {50}, {120}};
   setup.activity = 1.1;
   const PumpSamples samples = make_samples(setup, 800);
@@ -152,7 +152,7 @@ TEST(LearnPump, StandbyNeverSeenComesFromTheDataSheet) {
   EXPECT_FALSE(pump.standby_identified);
   EXPECT_EQ(pump.standby, 22e5);
   EXPECT_NEAR(pump.margins[0].margin, 14e5, 0.12e5);
-  options.data_sheet_standby = 200e5;  // wrong: the pump was seen far below
+  options.data_sheet_standby = 200e5;  // wrong, since far lower pressures were measured
   EXPECT_LT(learn_pump(samples, options).standby, 67e5);
 }
 

@@ -36,7 +36,7 @@ ValveData make_data(Index n, double dead_band, double outliers) {
   return d;
 }
 
-TEST(LearnValve, GainThroughZero) {
+TEST(LearnValve, RecoversTheGainThroughZero) {
   const ValveData d = make_data(1000, 0.0, 0.0);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Standard error 0.01 / sqrt(1000 * mean u^2 = 333) = 0.0005 of the gain; four of them.
@@ -48,17 +48,17 @@ TEST(LearnValve, GainThroughZero) {
   EXPECT_TRUE(valve.warnings.empty());
 }
 
-TEST(LearnValve, OutliersDoNotMoveIt) {
+TEST(LearnValve, IsRobustToOutliers) {
   const ValveData d = make_data(1000, 0.0, 0.1);
   const LearnedValve valve = learn_valve(d.command, d.flow);
   // Huber's influence: 10 % outliers move it by at most 1.4 * 0.1 noise deviations = 0.2 % of the gain.
   EXPECT_NEAR(valve.gain / kValveGain, 1.0, 0.006);
 }
 
-TEST(LearnValve, DeadBandIsReportedNotModelled) {
+TEST(LearnValve, ReportsADeadBandWithoutModellingIt) {
   const ValveData d = make_data(1000, 0.0, 0.0);
   ValveData shifted = d;
-  for (Index i = 0; i < 1000; ++i) {  // moving samples only, as the learner is given
+  for (Index i = 0; i < 1000; ++i) {  // moving samples only, as in `learn_valves`
     shifted.command[i] = -(0.08 + 0.92 * std::abs(d.command[i]));
     shifted.flow[i] = kValveGain * (std::abs(shifted.command[i]) - 0.08) +
                       (d.flow[i] - kValveGain * std::abs(d.command[i]));
@@ -73,7 +73,7 @@ TEST(LearnValve, DeadBandIsReportedNotModelled) {
   EXPECT_THAT(valve.warnings[0], HasSubstr("dead band of 0.08"));
 }
 
-TEST(LearnValve, ExactDataAndConstantCommand) {
+TEST(LearnValve, AcceptsExactDataAndAConstantCommand) {
   const VectorXd u = VectorXd::LinSpaced(50, 0.1, 1.0);
   const LearnedValve exact = learn_valve(u, kValveGain * u);
   EXPECT_NEAR(exact.gain / kValveGain, 1.0, 1e-12);  // rounding
@@ -84,7 +84,7 @@ TEST(LearnValve, ExactDataAndConstantCommand) {
   EXPECT_FALSE(one.affine);
 }
 
-TEST(LearnValve, UnusableSamples) {
+TEST(LearnValve, LeavesOutUnusableSamples) {
   ValveData d = make_data(30, 0.0, 0.0);
   d.command.head(10).setZero();
   d.flow[15] = NAN;

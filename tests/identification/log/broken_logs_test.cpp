@@ -1,4 +1,4 @@
-/// Broken and odd logs, each with the sentence the user gets.
+/// Faulty and unusual logs with the messages that the user gets.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -96,11 +96,11 @@ std::vector<BrokenLog> broken_logs() {
        "log.csv:3: t_s: the samples are 2.3e-07 s apart; if the numbers are days or hours, convert "
        "them in a mapping file, e.g. t_s: \"Time * 86400\""},
       {"one row", kHeader + rows(0, 1),
-       "log.csv:1: t_s: 1 row with a time of its own, expected a log of many"},
-      {"time stands still", kHeader + "1,0.5,1,80\n1,0.5,1,81\n1,0.5,1,82\n",
-       "log.csv:1: t_s: 1 row with a time of its own, expected a log of many"},
+       "log.csv:1: t_s: 1 row with a distinct time, expected at least two"},
+      {"constant time", kHeader + "1,0.5,1,80\n1,0.5,1,81\n1,0.5,1,82\n",
+       "log.csv:1: t_s: 1 row with a distinct time, expected at least two"},
       {"time is empty", kHeader + ",0.5,1,80\n,0.5,1,81\n",
-       "log.csv:1: t_s: 0 rows with a time of its own, expected a log of many"},
+       "log.csv:1: t_s: 0 rows with a distinct time, expected at least two"},
       {"a joint is missing", "t_s,q_boom_rad,pA_boom_bar\n0,0.5,80\n0.02,0.5,81\n",
        "log.csv:1: no position of joint extension: expected column q_extension_m or x_extension_m; "
        "found t_s, q_boom_rad, pA_boom_bar; rename it, or give a mapping file"},
@@ -113,7 +113,7 @@ std::vector<BrokenLog> broken_logs() {
       {"a joint's column is text", "t_s,q_boom_rad,q_extension_m\n0,up,1\n0.02,down,1\n",
        "log.csv:1: no position of joint boom: expected column q_boom_rad or x_boom_m; found t_s, "
        "q_boom_rad, q_extension_m; rename it, or give a mapping file"},
-      {"a unit nobody knows", "t_s,q_boom_grad,q_extension_m\n0,0.5,1\n",
+      {"an unknown unit", "t_s,q_boom_grad,q_extension_m\n0,0.5,1\n",
        "log.csv:1: q_boom_grad: unit \"grad\" is not known for an angle, expected one of: rad, "
        "deg, "
        "mrad"},
@@ -142,19 +142,19 @@ std::vector<BrokenLog> broken_logs() {
   };
 }
 
-TEST_F(LogFiles, BrokenLogsAreRefusedWithASentence) {
+TEST_F(LogFiles, BrokenLogsAreRefusedWithAMessage) {
   EXPECT_GE(broken_logs().size(), 20u);
   for (const BrokenLog& broken : broken_logs()) {
     EXPECT_EQ(error_of(broken.text), broken.message) << broken.name;
   }
 }
 
-TEST_F(LogFiles, AFileThatIsNotThere) {
+TEST_F(LogFiles, AMissingFileIsAnError) {
   EXPECT_EQ(message_of([&] { load_log(path("none.csv"), test::small_crane()); }),
             "none.csv: cannot read: No such file or directory; check the path");
 }
 
-TEST_F(LogFiles, OddLogsAreReadWithAWarning) {
+TEST_F(LogFiles, ImplausibleLogsAreReadWithAWarning) {
   const auto with = [&](const std::string& name, const std::string& values) {
     std::string text = "t_s,q_boom_rad,q_extension_m," + name + "\n";
     for (int i = 0; i < 40; ++i)
@@ -234,7 +234,7 @@ TEST_F(LogFiles, OddLogsAreReadWithAWarning) {
   }
 }
 
-TEST_F(LogFiles, MarksForMissing) {
+TEST_F(LogFiles, MarksForMissingValuesAreRecognised) {
   std::string text = kHeader;
   const char* marks[] = {"",     "-",    "NaN", "nan",  "NAN",     "#N/A", "n/a",
                          "null", "None", "inf", "-inf", "1.#QNAN", "?",    "--"};
@@ -251,7 +251,7 @@ TEST_F(LogFiles, MarksForMissing) {
   EXPECT_THAT(log.warnings, IsEmpty());
 }
 
-TEST_F(LogFiles, NumbersAtTheEdgeOfWhatADoubleHolds) {
+TEST_F(LogFiles, NumbersOutsideTheRangeOfADoubleAreAccepted) {
   const Log log = load(
       "t_s,q_boom_rad,q_extension_m,a,b\n0,0.5,1,1e-400,1\n0.02,0.5,1,-1e-320,1e999\n0.04,.5,1.,5,"
       "3\n");
@@ -259,14 +259,14 @@ TEST_F(LogFiles, NumbersAtTheEdgeOfWhatADoubleHolds) {
   EXPECT_NEAR(log.find("b")->values[1], 2.0, 1e-12);  // too large: missing, filled
 }
 
-TEST_F(LogFiles, ForeignBytesStayPrintable) {
+TEST_F(LogFiles, OtherEncodingsArePrintable) {
   // Latin-1 degree sign in a unit, a stray byte in a text column: messages must be valid UTF-8.
   const Log log = load("t_s;q_boom [\xB0];q_extension_m;note\n0;45;1;\xFF\x01\n0.02;45;1;b\n");
   EXPECT_NEAR(log.find(Role::kJointPosition, 0)->values[0], 0.7853981633974483, 1e-15);
   EXPECT_THAT(log.warnings, ElementsAre("column note left out: it holds text (\"ÿ?\" in line 2)"));
 }
 
-TEST_F(LogFiles, ALoggerThatLostPowerLeavesZeroBytes) {
+TEST_F(LogFiles, ZeroBytesAtTheEndAreLeftOut) {
   const Log log = load(kHeader + rows(0, 200) + std::string(500, '\0'));
   EXPECT_EQ(log.samples(), 200);
   EXPECT_EQ(log.counts.rows_wrong_width, 1);

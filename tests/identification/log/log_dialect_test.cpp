@@ -1,4 +1,4 @@
-/// The same numbers from every dialect of text, and how fast they are read.
+/// Every dialect of text gives the same numbers; the reading speed is measured.
 #include "identification/log/log_dialect.h"
 
 #include <fmt/format.h>
@@ -101,13 +101,13 @@ TEST_F(LogFiles, SameNumbersFromEveryDialect) {
   }
 }
 
-TEST_F(LogFiles, DialectIsSaidInWords) {
+TEST_F(LogFiles, DialectIsDescribedInWords) {
   EXPECT_EQ(load(plain_log()).dialect, "\",\" between values, decimal point");
   EXPECT_EQ(load(replaced(replaced(plain_log(), ",", ";"), ".", ",")).dialect,
             "\";\" between values, decimal comma");
 }
 
-TEST(ReadingSpeed, IsReported) {  // a figure, not a verdict: machines differ
+TEST(ReadingSpeed, IsReported) {  // not asserted, because it depends on the computer
   std::string text = "t_s";
   for (int c = 0; c < 15; ++c) text += fmt::format(",signal_{}", c);
   text += '\n';

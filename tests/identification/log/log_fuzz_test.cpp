@@ -1,4 +1,4 @@
-/// Thousands of damaged files: each is read or refused with an InputError, nothing else happens.
+/// Thousands of damaged files are either read or refused with an InputError.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -114,7 +114,7 @@ void expect_read_or_refused(Load load, const std::string& text, int* read, int* 
   }
 }
 
-TEST_F(LogFiles, DamagedTextLogs) {
+TEST_F(LogFiles, DamagedTextLogsAreReadOrRefused) {
   Random random(20250423);
   int read = 0, refused = 0;
   for (std::size_t i = 0; i < 4000; ++i) {
@@ -122,7 +122,7 @@ TEST_F(LogFiles, DamagedTextLogs) {
     expect_read_or_refused(
         [&] {
           const Log log = load(text);
-          // What is read is sound: time increases, runs cover the samples, marks and values agree.
+          // A log that is read is consistent: time increases, runs cover the samples, marks and values agree.
           for (Eigen::Index k = 1; k < log.samples(); ++k) ASSERT_GT(log.time[k], log.time[k - 1]);
           Eigen::Index covered = 0;
           for (const SampleRange& run : log.runs) covered += run.size();
@@ -137,7 +137,7 @@ TEST_F(LogFiles, DamagedTextLogs) {
   EXPECT_GT(refused, 400);
 }
 
-TEST_F(LogFiles, DamagedMappingFiles) {
+TEST_F(LogFiles, DamagedMappingFilesAreReadOrRefused) {
   Random random(7);
   const std::string seed =
       "columns:\n  t_s: \"t_s * 1\"\n  q_boom_rad: max(q_boom_rad, 0.1) ^ 1\n  a: (u_boom - 2) / "

@@ -1,4 +1,4 @@
-/// Foreign logs through a mapping file; the expressions in it.
+/// Tests of mapping files and their expressions.
 #include "identification/log/log_mapping.h"
 
 #include <fmt/format.h>
@@ -67,7 +67,7 @@ TEST(Expression, Arithmetic) {
   }
 }
 
-TEST(Expression, ColumnsByTheLongestNameThatFits) {
+TEST(Expression, UsesTheLongestMatchingColumnName) {
   EXPECT_EQ(value_of("a"), 2.0);
   EXPECT_EQ(value_of("a+b"), 7.0);
   EXPECT_EQ(value_of("a b"), 7.0);
@@ -87,7 +87,7 @@ TEST(Expression, MissingStaysMissing) {
   }
 }
 
-TEST(Expression, WhatIsWrongIsSaid) {
+TEST(Expression, ErrorsNameTheirPlaceAndCause) {
   const auto error = [](const std::string& expression) -> std::string {
     try {
       value_of(expression);
@@ -128,7 +128,7 @@ TEST(Expression, WhatIsWrongIsSaid) {
   EXPECT_NE(error(std::string(100000, '-')).find("nested too deeply"), std::string::npos);
 }
 
-TEST_F(LogFiles, AForeignLogThroughAMappingFile) {
+TEST_F(LogFiles, AMappingFileConvertsOtherColumnNames) {
   LogOptions options;
   options.mapping_file = write("map.yaml",
                                "columns:\n"
@@ -146,7 +146,7 @@ TEST_F(LogFiles, AForeignLogThroughAMappingFile) {
   EXPECT_DOUBLE_EQ(log.find(Role::kPressureA, 0)->values[0], 80e5);
   EXPECT_DOUBLE_EQ(log.find(Role::kPayload)->values[2], 800.0);
   EXPECT_DOUBLE_EQ(log.find("load factor")->values[2], 5.0);
-  // what an expression reads is known by its new name: under the old one it would explain itself
+  // A column that an expression reads is no candidate signal, because it would explain the mapped channel perfectly.
   EXPECT_EQ(log.find("PT01"), nullptr);
   EXPECT_EQ(log.find("angle-boom"), nullptr);
 }
@@ -157,10 +157,10 @@ TEST_F(LogFiles, AMappedColumnReplacesOneOfItsName) {
   const Log log =
       load("t_s,q_boom_rad,q_extension_m,u_boom\n0,0.5,1,127\n0.02,0.5,1,-127\n", options);
   EXPECT_DOUBLE_EQ(log.find(Role::kCommand, 0)->values[1], -1.0);
-  EXPECT_DOUBLE_EQ(log.find("v")->values[1], -127.0);  // expressions see the file's columns
+  EXPECT_DOUBLE_EQ(log.find("v")->values[1], -127.0);  // expressions use the file's columns
 }
 
-TEST_F(LogFiles, TheMappingFileFixesTheDialect) {
+TEST_F(LogFiles, TheMappingFilePrescribesTheDialect) {
   LogOptions options;
   options.mapping_file =
       write("map.yaml", "skip_rows: 2\ndelimiter: ';'\ndecimal: comma\nmissing: [-999, 'bad']\n");
@@ -174,7 +174,7 @@ TEST_F(LogFiles, TheMappingFileFixesTheDialect) {
   EXPECT_DOUBLE_EQ(log.find("a")->values[2], 5.0);
 }
 
-TEST_F(LogFiles, BrokenMappingFiles) {
+TEST_F(LogFiles, BrokenMappingFilesAreRefusedWithAMessage) {
   const auto error = [&](const std::string& mapping) {
     LogOptions options;
     options.mapping_file = write("map.yaml", mapping);

@@ -1,4 +1,4 @@
-/// .mat files of both formats, in the three shapes people save logs in.
+/// Tests of .mat files of both formats in the three supported shapes.
 #include "identification/log/log_matlab.h"
 
 #include <fmt/format.h>
@@ -87,7 +87,7 @@ class MatlabFiles : public test::LogFiles, public testing::WithParamInterface<ma
   }
 };
 
-TEST_P(MatlabFiles, VectorsByName) {
+TEST_P(MatlabFiles, VectorsAreReadByName) {
   std::vector<Variable> all = vectors();
   const double payload = 800.0;
   all.push_back(matrix("payload_kg", 1, 1, &payload));
@@ -96,7 +96,7 @@ TEST_P(MatlabFiles, VectorsByName) {
   EXPECT_DOUBLE_EQ(log.find(Role::kPayload)->values[kMatlabRows - 1], 800.0);
 }
 
-TEST_P(MatlabFiles, OneStruct) {
+TEST_P(MatlabFiles, AStructIsReadByItsFields) {
   std::vector<Variable> all = vectors();
   std::vector<const char*> names;
   for (const std::string& n : kNames) names.push_back(n.c_str());
@@ -108,7 +108,7 @@ TEST_P(MatlabFiles, OneStruct) {
   expect_signals(load_log(save({log_struct.get()}), test::small_crane()));
 }
 
-TEST_P(MatlabFiles, MatrixWithNames) {
+TEST_P(MatlabFiles, AMatrixIsReadWithNames) {
   const std::vector<double> v = signals();
   const Variable data = matrix("data", kMatlabRows, 4, v.data());
   std::size_t dims[2] = {1, 4};
@@ -119,7 +119,7 @@ TEST_P(MatlabFiles, MatrixWithNames) {
   expect_signals(load_log(save({data.get(), names.get()}), test::small_crane()));
 }
 
-TEST_P(MatlabFiles, MatrixWithNamesInACharMatrixAndARowASignal) {
+TEST_P(MatlabFiles, AMatrixWithSignalsInRowsIsReadWithACharMatrixOfNames) {
   const std::vector<double> v = signals();
   std::vector<double> across(v.size());
   for (std::size_t c = 0; c < 4; ++c) {
@@ -135,7 +135,7 @@ TEST_P(MatlabFiles, MatrixWithNamesInACharMatrixAndARowASignal) {
   expect_signals(load_log(save({data.get(), names.get()}), test::small_crane()));
 }
 
-TEST_P(MatlabFiles, WrongShapesAreSaid) {
+TEST_P(MatlabFiles, WrongShapesAreRefusedWithAMessage) {
   const std::vector<double> v = signals();
   EXPECT_EQ(
       error({matrix("data", kMatlabRows, 4, v.data()).get()}),
@@ -158,7 +158,7 @@ TEST_P(MatlabFiles, WrongShapesAreSaid) {
               ElementsAre("variable comment left out: not a real numeric vector"));
 }
 
-TEST_P(MatlabFiles, TimeThatGoesBackNamesTheRow) {
+TEST_P(MatlabFiles, DecreasingTimeIsRefusedWithItsRow) {
   std::vector<double> v = signals();
   v[30] = 0.0;
   std::vector<Variable> all = vectors();
@@ -168,7 +168,7 @@ TEST_P(MatlabFiles, TimeThatGoesBackNamesTheRow) {
       "log.mat: t_s: time goes back from 0.58 to 0 s in row 31; two logs in one file? Cut it here");
 }
 
-TEST_P(MatlabFiles, ADamagedFile) {
+TEST_P(MatlabFiles, ADamagedFileIsRefused) {
   const std::string name = save(pointers(vectors()));
   const std::string bytes = read_file(name);
   for (const std::size_t keep :

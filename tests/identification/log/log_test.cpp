@@ -1,4 +1,4 @@
-/// What a log becomes: numbers in SI, runs, holes, counts.
+/// Tests of a loaded log: SI values, runs, holes, counts.
 #include "identification/log/log.h"
 
 #include <fmt/format.h>
@@ -57,7 +57,7 @@ TEST_F(LogFiles, PlainLogInSiUnits) {
   EXPECT_TRUE(std::isnan(commands(4, 1)));  // not logged
 }
 
-TEST(LogColumns, EverySpellingOfAUnit) {
+TEST(LogColumns, EverySpellingOfAUnitIsConverted) {
   const Machine machine = test::small_crane();
   struct Case {
     const char* name;
@@ -98,7 +98,7 @@ TEST(LogColumns, EverySpellingOfAUnit) {
   }
 }
 
-TEST(LogColumns, LongestPartNameWins) {
+TEST(LogColumns, TheLongestPartNameIsTaken) {
   Machine machine = test::small_crane();
   machine.joints.push_back(test::joint("boom_2", JointType::kRevolute, {-1.0, 1.0}, 0.1));
   const ColumnMeaning meaning = column_meaning("q_boom_2_rad", "", machine);
@@ -106,7 +106,7 @@ TEST(LogColumns, LongestPartNameWins) {
   EXPECT_EQ(meaning.index, 2);
 }
 
-TEST(LogColumns, UsualNamesMeanWhatTheySay) {
+TEST(LogColumns, StandardNamesHaveTheirMeaning) {
   const Machine machine = test::loader_crane();
   for (const std::string& name : usual_names(machine)) {
     const ColumnMeaning meaning = column_meaning(name, "", machine);
@@ -115,7 +115,7 @@ TEST(LogColumns, UsualNamesMeanWhatTheySay) {
   }
 }
 
-TEST_F(LogFiles, MillisecondsAndDegrees) {
+TEST_F(LogFiles, MillisecondsAndDegreesAreConverted) {
   const Log log = load("t_ms,q_boom_deg,x_extension_mm\n0,90,1000\n20,45,1001\n40,30,1002\n");
   EXPECT_DOUBLE_EQ(log.time[2], 0.04);
   EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[0], std::numbers::pi / 2.0);
@@ -123,7 +123,7 @@ TEST_F(LogFiles, MillisecondsAndDegrees) {
   EXPECT_EQ(log.find(Role::kJointPosition, 1), nullptr);  // the stroke stands in its place
 }
 
-TEST_F(LogFiles, UnknownColumnsAreCandidatesTextIsLeftOut) {
+TEST_F(LogFiles, UnknownColumnsAreCandidatesAndTextIsLeftOut) {
   const Log log = load(
       "state,t_s,q_boom_rad,q_extension_m,rpm,pA_valve_boom_bar,q_boom_raw\n"
       "idle,0.00,0.1,1,900,12,5\nidle,0.02,0.1,1,901,13,6\nrun,0.04,0.1,1,902,14,7\n");
@@ -166,7 +166,7 @@ TEST_F(LogFiles, AGapSplitsTheLog) {
                                         "0.22 s after t = 0.780 s"));
 }
 
-TEST_F(LogFiles, ShortHolesAreFilledLongOnesMarked) {
+TEST_F(LogFiles, ShortHolesAreFilledAndLongOnesMarked) {
   const Log log = load(edited_log([](int i, auto*, auto*, auto* p) {
     if ((i >= 10 && i < 13) || (i >= 50 && i < 60) || i < 2) *p = "nan";
     return true;
@@ -261,7 +261,7 @@ TEST(RealLogs, AreReadWithoutLoss) {
     EXPECT_NE(log.find(Role::kPumpPressure, 0), nullptr);
     EXPECT_EQ(log.find("pA_valve_main")->role, Role::kCandidate);
     EXPECT_EQ(log.counts.cells_missing, 0);
-    // One test's rod-side sensor reads -3.6 bar; nothing else is odd about them.
+    // The rod-side sensor of one test reads -3.6 bar, the only warning.
     EXPECT_THAT(log.warnings, Each(HasSubstr("below vacuum")));
   }
 }

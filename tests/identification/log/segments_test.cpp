@@ -45,7 +45,7 @@ TEST(Segments, ThresholdIsTwoMillimetresASecond) {
   EXPECT_EQ(motion_directions(v, {}), (Eigen::MatrixXi(4, 1) << 0, 1, -1, 0).finished());
 }
 
-TEST(Segments, ACommandThatIsZeroOrMissingJudgesNothing) {
+TEST(Segments, WithZeroOrMissingCommandACylinderRests) {
   const Eigen::MatrixXd v = Eigen::MatrixXd::Constant(4, 2, 0.1);
   Eigen::MatrixXd u(4, 2);
   u.col(0) << 0.3, 0.0, NAN, -0.2;  // the direction is the motion's, not the command's
@@ -53,7 +53,7 @@ TEST(Segments, ACommandThatIsZeroOrMissingJudgesNothing) {
   EXPECT_EQ(motion_directions(v, u), (Eigen::MatrixXi(4, 2) << 1, 1, 0, 1, 0, 1, 1, 1).finished());
 }
 
-TEST(Segments, AReversalDoesNotEndAMotionAPauseDoes) {
+TEST(Segments, APauseEndsAMotionAndAReversalDoesNot) {
   Eigen::MatrixXd v = Eigen::MatrixXd::Constant(300, 1, 0.05);
   v.col(0).segment(100, 9).setZero();   // 0.18 s
   v.col(0).segment(200, 10).setZero();  // 0.2 s
@@ -65,7 +65,7 @@ TEST(Segments, AReversalDoesNotEndAMotionAPauseDoes) {
   EXPECT_DOUBLE_EQ(segments[2].cylinders[0].retracts, 1.0);
 }
 
-TEST(Segments, ATwitchIsRest) {
+TEST(Segments, AVeryShortMotionIsRest) {
   Eigen::MatrixXd v = Eigen::MatrixXd::Zero(100, 1);
   v.col(0).segment(50, 4).setConstant(0.003);
   const auto segments = find_segments(clock_of(100), v, {}, {{0, 100}});
@@ -90,14 +90,14 @@ TEST(Segments, NeverCrossAGapAndCoverEverySample) {
   EXPECT_EQ(next, 200);
 }
 
-TEST(Segments, NothingMovesNothingThere) {
+TEST(Segments, WithoutSamplesOrCylindersNothingMoves) {
   EXPECT_TRUE(find_segments({}, Eigen::MatrixXd(0, 2), {}, {}).empty());
   const auto segments = find_segments(clock_of(10), Eigen::MatrixXd(10, 0), {}, {{0, 10}});
   ASSERT_EQ(segments.size(), 1u);
   EXPECT_FALSE(segments[0].moving);
 }
 
-TEST(Segments, OfARealLogAreTheMotionsOneSees) {
+TEST(Segments, OfARealLogContainTheTestedCylinder) {
   const std::string path = test::shared_file("hmf_2020_k4/MainSTDTest1_270325.csv");
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "real logs are not here";
   const Log log = load_log(path, test::real_crane());

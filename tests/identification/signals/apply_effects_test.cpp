@@ -1,5 +1,5 @@
-// A model's effects on logs: the same numbers as the exact chain's, sample by sample, and a fit that learns
-// everything else around them.
+// Applying a model's effects to logs gives the numbers of the exact chain sample by sample, and a fit learns the rest of
+// the model with their contributions subtracted.
 #include "identification/signals/apply_effects.h"
 
 #include <gtest/gtest.h>
@@ -25,8 +25,8 @@ AppliedEffect typical(const std::string& key, const Machine& machine) {
   return e;
 }
 
-/// The arm's motion with what the exact chain of `truth` says in its pressures. Poses and speeds are the filtered
-/// ones, so that program and plant agree to rounding.
+/// @return the arm's motion with the pressures of the exact chain of `truth`. Poses and speeds are the filtered ones, so
+///   that program and plant agree to rounding.
 Log log_of(const CraneModel& truth, double noise = 0.0, unsigned seed = 1) {
   Log log = arm_log(noise, seed);
   const Log clean = arm_log();
@@ -36,13 +36,13 @@ Log log_of(const CraneModel& truth, double noise = 0.0, unsigned seed = 1) {
   Eigen::VectorXd& pa = channel(log, "pA_arm").values;
   Eigen::VectorXd& pb = channel(log, "pB_arm").values;
   Eigen::VectorXd& pump = channel(log, "p_main").values;
-  pa -= channel(const_cast<Log&>(clean), "pA_arm").values;  // what is left is noise
+  pa -= channel(const_cast<Log&>(clean), "pA_arm").values;  // only the noise remains
   pb -= channel(const_cast<Log&>(clean), "pB_arm").values;
   pump -= channel(const_cast<Log&>(clean), "p_main").values;
   Chain chain(truth);
   for (Index k = 0; k < s.samples(); ++k) {
     const double q = s.q(k, 0), qdd = s.qdd(k, 0);
-    // where the command is zero the filter's rest of speed is no motion
+    // Where the command is zero the small speed that the filter leaves is no motion.
     const double qd = s.cylinders[0].direction[k] == 0 ? 0.0 : s.qd(k, 0);
     const MachineState& state = chain.evaluate(&q, &qd, s.payload[k], false, kRestSpeed, &qdd);
     const CylinderState& x = state.cylinders[0];
@@ -66,7 +66,7 @@ TEST(SetOpenings, AreWhatDeadBandsLeaveOfTheirOwnCylindersCommands) {
   series.cylinders[0].command = series.cylinders[1].command =
       (Eigen::VectorXd(6) << -1.0, -0.3, -0.05, 0.05, 0.3, 1.0).finished();
   AppliedEffect band = typical("valve_deadband:arm", machine);
-  band.values = {0.1, 0.2, 1.0};  // extending, retracting; the gain is nobody's business here
+  band.values = {0.1, 0.2, 1.0};  // extending, retracting; the gain does not matter here
   set_openings({band}, series);
   const Eigen::VectorXd& opening = series.cylinders[0].opening;
   EXPECT_NEAR(opening[0], -0.8, 1e-12);
@@ -108,7 +108,7 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
   EXPECT_GE(checked, 6) << "effects that do something on this arm";
 }
 
-TEST(ApplyEffects, NothingIsLeftWhenTheModelHasThem) {
+TEST(ApplyEffects, ResidualIsZeroWhenTheModelHasThem) {
   CraneModel truth = arm_model();
   for (const char* key : {"coulomb_friction:arm", "unmodelled_mass:arm", "return_back_pressure",
                           "flow_dependent_margin:main"}) {
@@ -127,7 +127,7 @@ TEST(ApplyEffects, NothingIsLeftWhenTheModelHasThem) {
   EXPECT_GT(rmse(without, "pump", "main"), 1e5);
 }
 
-TEST(ApplyEffects, FitLearnsTheRestAroundThem) {
+TEST(ApplyEffects, FitLearnsTheRestOfTheModelWithThem) {
   CraneModel truth = arm_model();
   for (const char* key :
        {"coulomb_friction:arm", "return_back_pressure", "flow_dependent_margin:main"}) {
@@ -149,7 +149,7 @@ TEST(ApplyEffects, FitLearnsTheRestAroundThem) {
   EXPECT_GT(rmse(*blind.test, "force", "arm"), 5.0 * rmse(*r.test, "force", "arm"));
 }
 
-TEST(ApplyEffects, APumpThatLagsIsLearnedInstant) {
+TEST(ApplyEffects, MarginsOfALaggingPumpAreLearned) {
   const CraneModel truth = arm_model();
   Log log = log_of(truth);
   CraneModel model = truth;
@@ -167,7 +167,7 @@ TEST(ApplyEffects, APumpThatLagsIsLearnedInstant) {
   EXPECT_NEAR(r.model.pumps[0].standby, kStandby, 0.05 * units::kBar);
 }
 
-/// Pressures as they are read hold noise; the flow they compress compares with a filtered speed after the same filter.
+/// Measured pressures contain noise, so the compression flow computed from them is filtered like the speed.
 TEST(ApplyEffects, FlowsOfReadingsAreFilteredLikeTheSpeed) {
   CraneModel model = arm_model();
   const AppliedEffect oil = typical("compressibility:arm", model.machine);
@@ -188,10 +188,10 @@ TEST(ApplyEffects, FlowsOfReadingsAreFilteredLikeTheSpeed) {
                 1e-12);
   }
   const Eigen::VectorXd raw = effect_series(oil, e.series[0], EvidenceKind::kFlow, 0);
-  EXPECT_LT(flow.norm(), 0.9 * raw.norm()) << "noise of one sample to the next";
+  EXPECT_LT(flow.norm(), 0.9 * raw.norm()) << "the filter removes noise";
 }
 
-TEST(ApplyEffects, CalledAgainItStartsAfresh) {
+TEST(ApplyEffects, CallingItAgainReplacesEarlierEffects) {
   CraneModel model = arm_model();
   const MachineSignals plain = make_signals(model.machine, arm_log());
   MachineSignals s = plain;

@@ -1,4 +1,4 @@
-/// The filter against closed forms: polynomials, known coefficients, known noise gains, gaps.
+/// Tests of the filter with closed forms: polynomials, known coefficients, known noise gains, gaps.
 #include "identification/signals/smoothing.h"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ SavitzkyGolay filter(const Eigen::VectorXd& time, double window, int order = 3) 
   return {time, {{0, time.size()}}, window, order};
 }
 
-/// Polynomials up to the filter's order come out unchanged with their derivatives, ends included.
+/// Polynomials up to the filter's order and their derivatives are reproduced exactly, also at the ends.
 void expect_polynomials_exact(const Eigen::VectorXd& time, int order) {
   const double middle = time[time.size() / 2];
   const Eigen::ArrayXd s = time.array() - middle;
@@ -46,7 +46,7 @@ void expect_polynomials_exact(const Eigen::VectorXd& time, int order) {
     const Smoothed out = sg.smooth(p);
     const Eigen::VectorXd slope =
         degree >= 1 ? Eigen::VectorXd(degree * s.pow(degree - 1)) : Eigen::VectorXd::Zero(s.size());
-    const Eigen::VectorXd bend = degree >= 2
+    const Eigen::VectorXd curvature = degree >= 2
                                      ? Eigen::VectorXd(degree * (degree - 1) * s.pow(degree - 2))
                                      : Eigen::VectorXd::Zero(s.size());
     const double size = p.cwiseAbs().maxCoeff();
@@ -54,7 +54,7 @@ void expect_polynomials_exact(const Eigen::VectorXd& time, int order) {
     EXPECT_LT((out.value - p).cwiseAbs().maxCoeff(), 1e-13 * size) << degree;
     EXPECT_LT((out.first - slope).cwiseAbs().maxCoeff(), 1e-11 * size) << degree;
     if (order >= 2) {
-      EXPECT_LT((out.second - bend).cwiseAbs().maxCoeff(), 1e-9 * size) << degree;
+      EXPECT_LT((out.second - curvature).cwiseAbs().maxCoeff(), 1e-9 * size) << degree;
     }
   }
 }
@@ -67,7 +67,7 @@ TEST(SavitzkyGolay, PolynomialsAreExactOnUnevenSampling) {
   for (const int order : {1, 2, 3, 4}) expect_polynomials_exact(uneven_time(80, 0.02), order);
 }
 
-TEST(SavitzkyGolay, CoefficientsOfTheOriginalTables) {
+TEST(SavitzkyGolay, CoefficientsAreThoseOfTheOriginalTables) {
   // Savitzky & Golay (1964), tables I and IV: cubic smoothing over 5 points, cubic first derivative over 7.
   const Eigen::VectorXd time = even_time(41, 1.0);
   Eigen::VectorXd pulse = Eigen::VectorXd::Zero(41);
@@ -96,7 +96,7 @@ TEST(SavitzkyGolay, EvenAndUnevenPathsAgree) {
   EXPECT_LT(away(even.second, uneven.second), 1e-8);
 }
 
-TEST(SavitzkyGolay, NoiseGainIsKnown) {
+TEST(SavitzkyGolay, NoiseGainIsThatOfTheClosedForm) {
   const int n = 40000;
   const Eigen::VectorXd time = even_time(n, 0.02);
   const SavitzkyGolay sg = filter(time, 0.24, 2);  // 13 points
@@ -111,7 +111,7 @@ TEST(SavitzkyGolay, NoiseGainIsKnown) {
   EXPECT_NEAR(deviation(out.second) / sg.noise_gain(2), 1.0, 0.065);
 }
 
-TEST(SavitzkyGolay, NeverReachesAcrossAGap) {
+TEST(SavitzkyGolay, WindowsDoNotReachAcrossAGap) {
   Eigen::VectorXd time(200);
   time << even_time(100, 0.02), even_time(100, 0.02, 10.0);
   Eigen::VectorXd v(200);
@@ -122,12 +122,12 @@ TEST(SavitzkyGolay, NeverReachesAcrossAGap) {
   EXPECT_LT((slope.tail(100).array() + 3.0).abs().maxCoeff(), 1e-9);
 }
 
-TEST(SavitzkyGolay, AHoleIsAGapOfThatChannel) {
+TEST(SavitzkyGolay, AHoleActsAsAGapOfItsChannel) {
   const Eigen::VectorXd time = even_time(100, 0.02);
   Eigen::VectorXd v = 2.0 * time;
   v.tail(40).array() += 7.0;
-  v.segment(55, 5).setConstant(NAN);  // the jump hides in the hole
-  v[2] = NAN;                         // two samples are left of it: too few for a cubic
+  v.segment(55, 5).setConstant(NAN);  // the jump lies in the hole
+  v[2] = NAN;                         // two samples before it are too few for a cubic
   const Smoothed out = filter(time, 0.25).smooth(v);
   for (int i = 0; i < 100; ++i) {
     const bool known = i >= 3 && !(i >= 55 && i < 60);
@@ -138,7 +138,7 @@ TEST(SavitzkyGolay, AHoleIsAGapOfThatChannel) {
   }
 }
 
-TEST(SavitzkyGolay, ShortStretchAndCoarseSampling) {
+TEST(SavitzkyGolay, ShortStretchesAndCoarseSamplingAreAccepted) {
   const Eigen::VectorXd four = even_time(4, 0.02);
   EXPECT_NEAR(filter(four, 0.25).apply(four, 1)[0], 1.0, 1e-12);
   EXPECT_TRUE(std::isnan(filter(four.head(3), 0.25).apply(four.head(3), 1)[0]));
@@ -147,13 +147,13 @@ TEST(SavitzkyGolay, ShortStretchAndCoarseSampling) {
   EXPECT_NEAR(filter(coarse, 0.25).apply(coarse.array().square(), 2)[12], 2.0, 1e-9);
 }
 
-TEST(SavitzkyGolay, OneSampleAndNothing) {
+TEST(SavitzkyGolay, OneSampleGivesNaNAndNoSampleNothing) {
   const Eigen::VectorXd one = Eigen::VectorXd::Zero(1);
   EXPECT_TRUE(std::isnan(SavitzkyGolay(one, {{0, 1}}, 0.25).apply(one, 0)[0]));
   EXPECT_EQ(SavitzkyGolay(Eigen::VectorXd(), {}, 0.25).apply(Eigen::VectorXd(), 1).size(), 0);
 }
 
-TEST(ChooseWindow, FollowsTheNoise) {
+TEST(ChooseWindow, GrowsWithTheNoise) {
   const Eigen::VectorXd time = even_time(3000, 0.02);
   const Eigen::VectorXd motion = (time.array() * 8.0).sin() * 0.3;  // 1.3 Hz
   const auto chosen = [&](double noise) {
@@ -167,7 +167,7 @@ TEST(ChooseWindow, FollowsTheNoise) {
   EXPECT_LE(loud, 0.42);
 }
 
-TEST(ChooseWindow, IsCloseToTheBestThereIs) {
+TEST(ChooseWindow, IsCloseToTheOptimum) {
   // The velocity is known here: the error by the chosen window against the smallest of a fine grid.
   const Eigen::VectorXd time = even_time(3000, 0.02);
   const Eigen::ArrayXd t = time.array();
@@ -183,7 +183,7 @@ TEST(ChooseWindow, IsCloseToTheBestThereIs) {
   EXPECT_LT(error(choose_window(time, {{0, 3000}}, measured)), 1.15 * best);
 }
 
-TEST(ChooseWindow, NothingToLearnFrom) {
+TEST(ChooseWindow, HasADefaultWithoutMotion) {
   const Eigen::VectorXd time = even_time(100, 0.02);
   EXPECT_DOUBLE_EQ(choose_window(time, {{0, 100}}, Eigen::MatrixXd(100, 0)), 0.25);
   EXPECT_DOUBLE_EQ(choose_window(time, {{0, 100}}, Eigen::MatrixXd::Constant(100, 2, 3.0)), 0.25);
@@ -222,8 +222,8 @@ TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
   EXPECT_DOUBLE_EQ(sharpest_window(time, {{0, 8000}}, rough, 0.2), 0.2);
 }
 
-/// Starts, goes on steadily, stops: noise of the steady part is what makes an inertia too small.
-TEST(QuietenAcceleration, KeepsStartsAndStopsAndLosesTheNoiseBetween) {
+/// A motion that starts, continues steadily and stops: noise in the steady part makes an estimated inertia too small.
+TEST(QuietenAcceleration, KeepsStartsAndStopsAndReducesTheNoiseBetween) {
   constexpr int kRows = 600;
   constexpr double kRow = 0.02, kDigits = 4.5e-4, kRamp = 0.4, kSpeed = 0.1;
   Eigen::VectorXd time(kRows), smooth(kRows), q(kRows);
@@ -248,13 +248,13 @@ TEST(QuietenAcceleration, KeepsStartsAndStopsAndLosesTheNoiseBetween) {
   const auto rms = [](const auto& v) {
     return std::sqrt(v.squaredNorm() / static_cast<double>(v.size()));
   };
-  // three times the window, to the power 2.5: a fifteenth; up to ten where chance makes the windows differ
+  // Three times the window reduces the noise by 3^2.5, about fifteen; a tenth allows for windows that differ by chance.
   EXPECT_LT(rms(quiet.segment(200, 200)), 0.1 * rms(narrow.segment(200, 200)));
-  // what an inertia is fitted by: its scale against the truth through the same filter
+  // An inertia is estimated by this scale of the acceleration against the truth after the same filter.
   const auto scale = [&](const Eigen::VectorXd& a) { return a.dot(truth) / a.squaredNorm(); };
   EXPECT_LT(scale(narrow), 0.75);
   EXPECT_NEAR(scale(quiet), 1.0, 0.12);
-  // without noise every window says the same or the narrow one stays
+  // Without noise all windows agree, or the narrow one is kept.
   Eigen::VectorXd clean(kRows);
   for (int i = 0; i < kRows; ++i) clean[i] = std::sin(2.0 * time[i]);
   const Eigen::VectorXd before = filter.apply(clean, 2);

@@ -40,7 +40,7 @@ double by_hand(const GpParameters& p, double flow, double force) {
   return pressure;
 }
 
-/// Processes differ by cylinder and direction, so that a mix-up shows.
+/// Processes differ by cylinder and direction, so that a confusion shows.
 CraneModel trained(const Machine& machine) {
   CraneModel model = CraneModel::untrained(machine);
   for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
@@ -55,7 +55,7 @@ CraneModel trained(const Machine& machine) {
 // The vectorised kernel differs from std::exp by less than 1e-14 relative; pressures are some 1e7 Pa.
 constexpr double kPressureTolerance = 1e-5;  // [Pa]
 
-TEST(CraneModel, UntrainedKnowsWhatItMisses) {
+TEST(CraneModel, UntrainedNamesWhatIsMissing) {
   const Machine machine = test_support::loader_crane();
   CraneModel model = CraneModel::untrained(machine);
   EXPECT_FALSE(model.complete());
@@ -108,7 +108,7 @@ TEST(CraneModel, FlowsAndPressuresByHand) {
   EXPECT_NEAR(s.power, demand * total_flow, 1e-9 * s.power);
 }
 
-TEST(CraneModel, TheNeediestMovingCylinderLeads) {
+TEST(CraneModel, TheHighestDemandSetsTheLoadSensingLeader) {
   const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   Random random(1);
@@ -135,14 +135,14 @@ TEST(CraneModel, TheNeediestMovingCylinderLeads) {
     EXPECT_EQ(s.pumps[0].pressure, demand);
     if (leader >= 0) led[leader] = true;
   }
-  EXPECT_TRUE(led[0] && led[1] && led[2]);  // the samples exercise every leader
+  EXPECT_TRUE(led[0] && led[1] && led[2]);  // every cylinder was the leader in some sample
 }
 
-TEST(CraneModel, AtRestNothingFlowsAndThePumpStandsBy) {
+TEST(CraneModel, AtRestFlowIsZeroAndThePumpIsAtStandby) {
   const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   const double q[] = {0.4, -1.1, 2.0}, moving[] = {0.1, 0.1, 0.1}, rest[] = {0, 0, 0};
-  chain.evaluate(q, moving, 500, true);  // leaves values behind that must not survive
+  chain.evaluate(q, moving, 500, true);  // Its values must not survive in the next call.
   const MachineState& s = chain.evaluate(q, rest, 500, true);
   for (const CylinderState& c : s.cylinders) {
     EXPECT_FALSE(c.moving);
@@ -166,11 +166,11 @@ TEST(CraneModel, LowDemandsLeaveThePumpAtStandby) {
   EXPECT_EQ(s.pumps[0].leader, -1);
 }
 
-TEST(CraneModel, ConstantPressureSupplyDoesNotListen) {
+TEST(CraneModel, ConstantPressureSupplyIgnoresDemands) {
   CraneModel model = trained(test_support::knuckle_crane());
   model.pumps[0].standby = 142 * kBar;
   Chain chain(model);
-  // both processes ask for more than the supply gives
+  // Both working pressures are above the supply pressure.
   const double speed[] = {0.05, -0.03}, force[] = {4e5, -4e5};
   const MachineState& s = chain.evaluate_pressures(speed, force);
   EXPECT_GT(s.cylinders[0].pressure, 142 * kBar);
@@ -200,7 +200,7 @@ TEST(CraneModel, PumpPowerIsUsefulPowerPlusThrottling) {
         EXPECT_GE(c.flow, 0.0);
         const Pump& pump = machine.pumps[static_cast<std::size_t>(machine.pump_of_cylinder(i))];
         if (pump.type == PumpType::kLoadSensing) {
-          // a load-sensing pump gives at least the margin over every moving cylinder: no valve makes power
+          // A load-sensing pump is at least the margin above every moving cylinder, so that no valve creates power.
           const double margin = model.cylinders[static_cast<std::size_t>(i)].margin;
           EXPECT_GE(throttled, margin * c.flow * (1 - 1e-12));
         }
@@ -211,7 +211,7 @@ TEST(CraneModel, PumpPowerIsUsefulPowerPlusThrottling) {
   }
 }
 
-TEST(CraneModel, TwoPumpsDoNotFeelEachOther) {
+TEST(CraneModel, TwoPumpsAreIndependent) {
   const Machine machine =
       test_support::swing_crane();  // front feeds swing and jib, rear boom and extension
   const CraneModel model = trained(machine);

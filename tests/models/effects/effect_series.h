@@ -1,6 +1,6 @@
 #pragma once
-/// A small log for the effects' tests: two direct cylinders on one load-sensing pump, made up so that every
-/// regime occurs, without noise.
+/// A small log for tests of effects: two direct cylinders on one load-sensing pump, without noise, constructed so that
+/// every regime occurs.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -59,7 +59,7 @@ inline MachineSeries two_cylinder_series(const Machine& m) {
     c.direction.setZero(n);
     for (Eigen::Index k = 0; k < n; ++k) {
       const double t = s.time[k];
-      // triangles of differing period, clipped, with pauses; a step now and then
+      // clipped triangles of different periods with pauses, and some steps
       double u = 1.3 * std::asin(std::sin(t * (i == 0 ? 0.9 : 1.37) + static_cast<double>(i))) /
                  (0.5 * std::numbers::pi);
       u = std::clamp(u, -1.0, 1.0);
@@ -96,7 +96,7 @@ inline MachineSeries two_cylinder_series(const Machine& m) {
   return s;
 }
 
-/// Plain least squares, columns scaled to one.
+/// Ordinary least squares with columns scaled to one.
 inline Eigen::VectorXd scaled_least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   const Eigen::VectorXd size = x.colwise().norm();
   const Eigen::MatrixXd scaled = x * size.cwiseInverse().asDiagonal();
@@ -110,7 +110,7 @@ inline const Effect& effect_named(const std::string& id) {
 }
 
 /// One instant in SI, two cylinders of `two_direct_cylinders`: lift extends against 50 kN, push retracts with
-/// 10 kN helping.
+/// an overrunning load of 10 kN.
 template <class T>
 Instant<T> two_cylinder_instant(const Machine& m) {
   Instant<T> s = make_instant<T>(m);

@@ -1,5 +1,5 @@
 #pragma once
-/// What tests of effects share: instants with consistent mechanics, as numbers or as Jets, and small logs.
+/// Helpers for tests of effects: instants with consistent mechanics, as numbers or as Jets, and small logs.
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
 #include "models/machine/static_force.h"
@@ -41,7 +41,7 @@ inline Instant<double> instant_at(const Machine& machine, const Eigen::VectorXd&
   return s;
 }
 
-/// The same with derivatives by the stacked joint states.
+/// The same with derivatives with respect to the stacked joint states.
 inline Instant<Jet> jets_at(const Machine& machine, const Eigen::VectorXd& x, double payload) {
   Instant<Jet> s = make_instant<Jet>(machine);
   const int n = machine.joint_count(), count = 3 * n;
@@ -77,7 +77,7 @@ inline Instant<Jet> jets_at(const Machine& machine, const Eigen::VectorXd& x, do
   return s;
 }
 
-/// States that keep off dead centres: near dx/dq = 0 forces and their derivatives grow without bound.
+/// States away from dead centres, because near dx/dq = 0 forces and their derivatives grow without bound.
 inline Eigen::VectorXd usable_state(const Machine& machine, Random& random) {
   const Eigen::Index n = machine.joint_count();
   Eigen::VectorXd q(n), qd(n), qdd(n);

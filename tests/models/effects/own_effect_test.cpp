@@ -16,7 +16,7 @@
 namespace sparflow {
 namespace {
 
-/// Force of a balancing spring beside the cylinder: k (x - x0), from the length at which it is loose.
+/// Force of a balancing spring parallel to the cylinder: k (x - x0) beyond its free length x0.
 class BalanceSpring final : public Effect {
  public:
   const EffectInfo& info() const override {
@@ -26,9 +26,8 @@ class BalanceSpring final : public Effect {
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         // linear ones first: name, unit, SI value of one unit, lower, upper, typical [SI], meaning, linear, grid [SI]
-        .parameters =
-            {{"k", "kN/m", 1e3, 0.0, 200e3, 20e3, "stiffness", true, {}},
-             {"x0", "m", 1.0, 0.5, 3.0, 1.0, "length when loose", false, {0.8, 1.2, 1.6}}},
+        .parameters = {{"k", "kN/m", 1e3, 0.0, 200e3, 20e3, "stiffness", true, {}},
+                       {"x0", "m", 1.0, 0.5, 3.0, 1.0, "free length", false, {0.8, 1.2, 1.6}}},
         .equation = "F = F_static + k max(0, x - x0)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"unmodelled_mass", "force_offset"},

@@ -1,4 +1,4 @@
-// Every way of getting a machine file wrong that we could think of, each with the whole sentence the user sees.
+// Wrong machine files, each with the whole message that the user sees.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -82,7 +82,7 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
 
 class BrokenMachine : public testing::TestWithParam<Broken> {};
 
-TEST_P(BrokenMachine, SaysWhatIsWrongAndWhere) {
+TEST_P(BrokenMachine, IsRefusedWithPlaceAndReason) {
   const Broken& broken = GetParam();
   try {
     parse_machine(edited(broken), "crane.yaml", "");
@@ -92,7 +92,7 @@ TEST_P(BrokenMachine, SaysWhatIsWrongAndWhere) {
   }
 }
 
-TEST(GoodMachine, TheFileThatIsBrokenBelowIsGood) {
+TEST(GoodMachine, TheUneditedFileIsAccepted) {
   std::vector<std::string> warnings;
   EXPECT_NO_THROW(parse_machine(kGood, "crane.yaml", "", &warnings));
   EXPECT_TRUE(warnings.empty());
@@ -106,7 +106,7 @@ const std::vector<Broken> kText = {
     {"two documents", "", kGood + "---\nname: other\n",
      "crane.yaml:35:1: a second document starts here; remove the `---` line"},
     {"tab", "    bore: 0.18\n", "\tbore: 0.18\n",
-     "crane.yaml:14:1: a tab indents this line; YAML wants spaces"},
+     "crane.yaml:14:1: a tab indents this line; YAML needs spaces"},
     {"brace not closed", "xyz: [0, 0, 0]}", "xyz: [0, 0, 0]",
      "crane.yaml:8:1: a `{` opened before here is not closed, or a comma is missing; write {key: "
      "value, key: value}"},
@@ -120,7 +120,7 @@ const std::vector<Broken> kText = {
      "crane.yaml:15:9: a colon where none can stand; check the indentation or put the text in "
      "quotes"},
     {"tab behind a key", "    rod: 0.115\n", "\t    rod: 0.115\n",
-     "crane.yaml:15:1: a tab indents this line; YAML wants spaces"},
+     "crane.yaml:15:1: a tab indents this line; YAML needs spaces"},
     {"first key indented", "name: crane", " name: crane",
      "crane.yaml:2:1: this line is indented less than the first key; check its indentation: every "
      "key of the file starts in the first column"},
@@ -147,7 +147,7 @@ const std::vector<Broken> kText = {
      "crane.yaml:29:62: pumps[main]: unknown key \"max_pressure_Pa\"; did you mean "
      "\"max_pressure_bar\"?"},
     {"duplicate key", "    bore: 0.18\n", "    bore: 0.18\n    bore: 0.2\n",
-     "crane.yaml:15:5: cylinders[boom]: key \"bore\" stands here and on line 14; keep one of them"},
+     "crane.yaml:15:5: cylinders[boom]: key \"bore\" occurs here and on line 14; keep one of them"},
     {"no value", "    bore: 0.18", "    bore:",
      "crane.yaml:14:5: cylinders[boom].bore: has no value; give one or remove the key"},
     {"missing key", ", standby_bar: 22", "",
@@ -226,7 +226,7 @@ const std::vector<Broken> kJoints = {
      "crane.yaml:6:42: joints[ext].parent: got \"boom\", expected jib: the joints stand base to "
      "tip in one serial chain, each on the one before it"},
     {"dh beside axis", "axis: [1, 0, 0]", "axis: [1, 0, 0], dh: {a: 1}",
-     "crane.yaml:6:55: joints[ext].origin: stands beside dh; give either dh or origin and axis"},
+     "crane.yaml:6:55: joints[ext].origin: is given beside dh; give either dh or origin and axis"},
     {"unknown dh key", "origin: {xyz: [3, 0, 0]}, axis: [1, 0, 0]", "dh: {alfa: 1}",
      "crane.yaml:6:52: joints[ext].dh: unknown key \"alfa\"; did you mean \"alpha\"?"},
     {"joint called base", "{name: boom, type", "{name: base, type",
@@ -237,7 +237,7 @@ const std::vector<Broken> kJoints = {
      "`_`, `-` and `.` (it names log columns); replace \" \""},
     {"joint twice", "{name: ext, type: prismatic, parent: jib",
      "{name: jib, type: prismatic, parent: jib",
-     "crane.yaml:6:12: joints[jib].name: the name jib stands twice (first on line 5); give each "
+     "crane.yaml:6:12: joints[jib].name: the name jib occurs twice (first on line 5); give each "
      "its own"},
     {"tip on an unknown joint", "tip: {joint: ext", "tip: {joint: extt",
      "crane.yaml:7:14: tip.joint: got \"extt\", expected a frame of this machine (base, boom, jib, "
@@ -255,10 +255,10 @@ const std::vector<Broken> kJoints = {
      "crane.yaml:10:44: links[stage].slides_with: the link is fixed in a frame that ext moves "
      "already; fix it in the frame that carries ext"},
     {"fraction alone", "slides_with: ext, fraction: 0.5", "fraction: 0.5",
-     "crane.yaml:10:41: links[stage].fraction: stands without slides_with; name the prismatic "
+     "crane.yaml:10:41: links[stage].fraction: is given without slides_with; name the prismatic "
      "joint it is a fraction of"},
     {"link twice", "{name: stage", "{name: inner",
-     "crane.yaml:10:12: links[inner].name: the name inner stands twice (first on line 9); give "
+     "crane.yaml:10:12: links[inner].name: the name inner occurs twice (first on line 9); give "
      "each its own"},
 };
 
@@ -354,7 +354,7 @@ const std::vector<Broken> kCylinders = {
      "crane.yaml:27:5: cylinders[ext].joint: joint boom is driven by boom already; equal cylinders "
      "side by side are one cylinder with `parallel: 2`"},
     {"cylinder twice", "{name: ext, joint: ext, stages", "{name: jib, joint: ext, stages",
-     "crane.yaml:27:5: cylinders[jib]: the name jib stands twice (first on line 17); give each its "
+     "crane.yaml:27:5: cylinders[jib]: the name jib occurs twice (first on line 17); give each its "
      "own"},
 };
 
@@ -372,7 +372,7 @@ const std::vector<Broken> kHydraulics = {
     {"pump twice", "valves:",
      "  - {name: main, feeds: [], max_flow_lpm: 50, max_pressure_bar: 300, standby_bar: "
      "20}\nvalves:",
-     "crane.yaml:30:12: pumps[main].name: the name main stands twice (first on line 29); give each "
+     "crane.yaml:30:12: pumps[main].name: the name main occurs twice (first on line 29); give each "
      "its own"},
     {"unknown pump type", "{name: main, feeds", "{name: main, type: variable, feeds",
      "crane.yaml:29:24: pumps[main].type: got \"variable\", expected one of load_sensing, "
@@ -419,7 +419,7 @@ void PrintTo(const BrokenUrdfFile& broken, std::ostream* out) { *out << broken.w
 
 class BrokenUrdf : public testing::TestWithParam<BrokenUrdfFile> {};
 
-TEST_P(BrokenUrdf, SaysWhatIsWrongAndWhere) {
+TEST_P(BrokenUrdf, IsRefusedWithPlaceAndReason) {
   const auto& [what, machine, urdf, message] = GetParam();
   const std::string folder = testing::TempDir() + "sparflow_urdf_" + std::to_string(::getpid());
   std::filesystem::create_directories(folder);
@@ -445,7 +445,7 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenUrdfFile{"not XML", kUrdfMachine, "boom",
                        "{}/r.urdf: not readable as URDF: Error document empty."},
         BrokenUrdfFile{"joints beside it", kUrdfMachine + "joints: []\n", kGoodUrdf,
-                       "m.yaml:3:9: joints: stands beside kinematics, whose URDF brings the "
+                       "m.yaml:3:9: joints: is given beside kinematics, whose URDF defines the "
                        "joints; remove one"},
         BrokenUrdfFile{"no acceleration", "name: m\nkinematics: {urdf: r.urdf}\n", kGoodUrdf,
                        "{}/r.urdf: joint[boom]: URDF knows no acceleration limit; give it in the "

@@ -1,4 +1,4 @@
-// Models that must be refused, each with the sentence the user reads.
+// Models that must be refused, each with the message that the user sees.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -186,7 +186,7 @@ const BrokenModel kBroken[] = {
 
 class BrokenModels : public testing::TestWithParam<BrokenModel> {};
 
-TEST_P(BrokenModels, IsRefusedInPlainWords) {
+TEST_P(BrokenModels, IsRefusedWithAMessage) {
   const std::string text = GetParam().make(model_to_json(small_model()));
   try {
     model_from_json(text, "broken.json");
@@ -201,7 +201,7 @@ TEST_P(BrokenModels, IsRefusedInPlainWords) {
 INSTANTIATE_TEST_SUITE_P(All, BrokenModels, testing::ValuesIn(kBroken),
                          [](const auto& model) { return std::string(model.param.name); });
 
-// Whatever is cut off or overwritten: an error in words, never a crash and never silence about a cut.
+// Every truncated or overwritten file gives an error message, never a crash, and no truncation goes unnoticed.
 TEST(BrokenModelFiles, EveryCutIsAnError) {
   const std::string good = model_to_json(small_model());
   for (std::size_t length = 0; length + 2 < good.size(); length += 7) {

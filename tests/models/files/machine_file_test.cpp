@@ -126,7 +126,7 @@ TEST(MachineFile, SwingCranePullsItsJibOverTheWholeRange) {
   EXPECT_EQ(m.cylinders[0].parallel, 2);
   // boom pin 0.25 m out and 2.1 m up, boom 3.2, jib 2.2, telescope 0.3: all straight at q = 0
   EXPECT_NEAR((tip(m, {0, 0, 0, 0}) - Eigen::Vector3d(5.95, 0, 2.1)).norm(), 0.0, kFileRounding);
-  // slewed to the left, the boom lifts the straight arm
+  // Slewed to the left, the boom lifts the straight arm.
   const Eigen::Vector3d up = tip(m, {kPi / 2, kPi / 6, 0, 0});
   EXPECT_NEAR((up - Eigen::Vector3d(0, 0.25 + 5.7 * std::cos(kPi / 6), 2.1 + 5.7 * 0.5)).norm(),
               0.0, kFileRounding);
@@ -252,7 +252,7 @@ TEST(UrdfImport, FoldsFixedJointsAndTakesLimits) {
   EXPECT_EQ(m.joints[0].acceleration.hi, 0.5);  // the machine file's
   EXPECT_EQ(m.joints[1].position.lo, -2.2);     // continuous there, given here
   ASSERT_EQ(m.links.size(), 5u);
-  EXPECT_EQ(m.links[0].joint, -1);  // the column stands still
+  EXPECT_EQ(m.links[0].joint, -1);  // the column does not move
   const Link& boom = m.links[1];
   EXPECT_EQ(boom.inertia, 110);  // about the joint's axis, -y
   const Link& toolbox = m.links[2];
@@ -268,7 +268,7 @@ TEST(UrdfImport, FoldsFixedJointsAndTakesLimits) {
   EXPECT_NEAR((m.tip.xyz - Eigen::Vector3d(0.1, 0, -0.05)).norm(), 0, kFileRounding);
 }
 
-TEST(UrdfImport, SourceTextStandsAlone) {
+TEST(UrdfImport, SourceTextIsComplete) {
   const Machine m = load_machine(kMachines + "urdf_crane.yaml");
   EXPECT_EQ(m.source_text.find("urdf:"), std::string::npos);
   const Machine again = parse_machine(m.source_text, "again.yaml", "/nowhere");
@@ -313,7 +313,7 @@ struct Warned {
   std::string expected;
 };
 
-TEST(MachineCheck, WarningsSayWhatIsUnusual) {
+TEST(MachineCheck, WarningsNameWhatIsUnusual) {
   const std::string joint =
       "name: m\njoints:\n  - {name: a, type: revolute, axis: [0, 0, 1], position: [0.5, 2.5], " +
       kRates + "}\ntip: {joint: a, xyz: [1, 0, 0]}\n";

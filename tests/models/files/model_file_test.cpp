@@ -159,7 +159,7 @@ constexpr const char* kSealFriction = R"yaml(effects:
       Fc: {unit: N, bounds: [0, 20000], typical: 3000}
 )yaml";
 
-TEST(ModelFile, CarriesEffectsOfTheUsersOwn) {
+TEST(ModelFile, ContainsUserEffects) {
   const UserEffectScope scope;
   CraneModel model = small_model();
   const Effect* seal = register_user_effects(kSealFriction, "mine.yaml", model.machine).front();
@@ -193,7 +193,7 @@ TEST(ModelFile, CarriesEffectsOfTheUsersOwn) {
   EXPECT_THROW(model_from_json(changed, "m.json"), InputError);
 }
 
-TEST(ModelFile, SaysWhichVersionWroteIt) {
+TEST(ModelFile, NamesTheProgramVersion) {
   EXPECT_THAT(model_to_json(small_model()),
               HasSubstr(std::string("\"program\": \"sparflow ") + program_version()));
   EXPECT_THAT(model_to_json(small_model()), HasSubstr("\"sparflow_model\": 1"));

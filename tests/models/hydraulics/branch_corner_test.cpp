@@ -1,4 +1,4 @@
-// The corner between two branches is part of a process' mean, with exact derivatives.
+// The corner between two branches is part of the mean of a process, with exact derivatives.
 #include "models/hydraulics/branch_corner.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ TEST(BranchCorner, HasExactDerivativesInTheProcess) {
   }
 }
 
-TEST(BranchCorner, TellsWhatOfTheReturnChamberReachesTheSupply) {
+TEST(BranchCorner, GivesTheShareOfReturnPressureThatReachesTheSupply) {
   const GaussianProcess process(with_corner());
   Cylinder cylinder;
   cylinder.bore = 0.12;
@@ -77,7 +77,7 @@ TEST(BranchCorner, TellsWhatOfTheReturnChamberReachesTheSupply) {
   EXPECT_NEAR(rise(39e3, 12e5), ratio * 12e5, 0.5e5);
 }
 
-TEST(BranchCorner, BendsOverLessThanAnEndlessKernel) {
+TEST(BranchCorner, HasASmallerForceScaleThanALongKernel) {
   GpParameters p = with_corner();
   p.length_force = 1e9;
   EXPECT_LT(GaussianProcess(p).force_scale(), 20e3);
@@ -85,7 +85,7 @@ TEST(BranchCorner, BendsOverLessThanAnEndlessKernel) {
   EXPECT_EQ(GaussianProcess(p).force_scale(), 1e9);
 }
 
-TEST(BranchCorner, OfNoNumberIsRefused) {
+TEST(BranchCorner, WithNonFiniteValuesIsRefused) {
   GpParameters p = with_corner();
   p.corner.per_flow = std::nan("");
   EXPECT_THROW(GaussianProcess{p}, InputError);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr KernelIsa kIsas[] = {KernelIsa::kBaseline, KernelIsa::kAvx2, KernelIsa::kAvx512};
 
-/// Runs every test on every instruction set this machine has.
+/// Runs every test with every instruction set that this machine has.
 class GpKernel : public testing::TestWithParam<KernelIsa> {
  protected:
   void SetUp() override {
@@ -29,9 +29,9 @@ class GpKernel : public testing::TestWithParam<KernelIsa> {
   KernelIsa before_ = KernelIsa::kBaseline;
 };
 
-TEST_P(GpKernel, ExponentialIsRightToRounding) {
-  // One centre at 0 and y = 0: the kernel is exp(-x^2/2). The argument is rounded once by everyone, so
-  // the reference takes the rounded argument.
+TEST_P(GpKernel, ExponentialIsExactToRounding) {
+  // One centre at 0 and y = 0: the kernel is exp(-x^2/2). The argument is rounded once by every
+  // method, so that the reference takes the rounded argument.
   const std::vector<double> zero(8, 0.0);
   std::vector<double> out(8);
   double worst = 0.0;
@@ -45,7 +45,7 @@ TEST_P(GpKernel, ExponentialIsRightToRounding) {
   EXPECT_LT(worst, 1e-15);  // truncation 2e-17, the rest rounding: measured 4e-16
 }
 
-TEST_P(GpKernel, UnderflowIsCleanAndNothingIsNaN) {
+TEST_P(GpKernel, UnderflowGivesZeroAndNoNaN) {
   const std::vector<double> zero(8, 0.0), one(8, 1.0);
   const KernelCentres centres{zero.data(), zero.data(), one.data(), 8};
   EXPECT_EQ(kernel_sum(centres, 0.0, 0.0), 8.0);
@@ -54,7 +54,7 @@ TEST_P(GpKernel, UnderflowIsCleanAndNothingIsNaN) {
     const KernelSums s = kernel_sum_derivatives(centres, -x, x);
     for (double value : {s.value, s.d_x, s.d_y, s.d_xx, s.d_xy, s.d_yy}) EXPECT_EQ(value, 0.0) << x;
   }
-  EXPECT_TRUE(std::isnan(kernel_sum(centres, std::nan(""), 0.0)));  // never hidden
+  EXPECT_TRUE(std::isnan(kernel_sum(centres, std::nan(""), 0.0)));  // NaN is passed on
   EXPECT_EQ(kernel_sum({nullptr, nullptr, nullptr, 0}, 1.0, 1.0), 0.0);
 }
 
@@ -98,7 +98,7 @@ TEST_P(GpKernel, SumsMatchLongDouble) {
 INSTANTIATE_TEST_SUITE_P(Isas, GpKernel, testing::ValuesIn(kIsas),
                          [](const auto& tested) { return kernel_isa_name(tested.param); });
 
-/// A process of the size and units of a boom cylinder's; the core need not come from data to be differentiated.
+/// A process of the size and units of a boom cylinder; its variance core need not come from data for derivatives.
 GpParameters example(Eigen::Index n) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
@@ -193,7 +193,7 @@ TEST(GaussianProcess, EmptyProcessIsItsMean) {
   EXPECT_DOUBLE_EQ(process.variance(1.0, 4.0), 1.0);
 }
 
-TEST(GaussianProcess, BrokenParametersAreNamed) {
+TEST(GaussianProcess, InvalidParametersAreNamed) {
   const auto key_of = [](const GpParameters& p) {
     try {
       GaussianProcess process(p);

@@ -1,4 +1,4 @@
-// Loads that a process has not seen: the balance of forces says what it cannot know.
+// Loads beyond those a process has learned, for which the balance of forces continues its law.
 #include "models/hydraulics/loads_beyond.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr double kSupply = 0.01;                       // [m^2]
 constexpr double kLightest = -40e3, kHeaviest = 20e3;  // [N] learned loads
 constexpr double kLevel = 5 * kBarBeyond, kLeast = 2 * kBarBeyond;
 
-/// A process that is a plane, for either side; param: which.
+/// A process that is a plane, for both directions; the test parameter is the direction.
 class LoadsBeyondPlane : public ::testing::TestWithParam<int> {
  protected:
   static int side() { return GetParam(); }
@@ -28,7 +28,7 @@ class LoadsBeyondPlane : public ::testing::TestWithParam<int> {
     p.length_force = 50e3;
     p.mean_constant = at_zero;
     p.mean_slope = side() * share / kSupply;
-    // one centre, so that flow has a say: 3 bar
+    // One centre makes the pressure depend on flow, by 3 bar.
     p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(1);
     p.weight[0] = 3 * kBarBeyond;
     p.force_min = side() > 0 ? kLightest : -kHeaviest;
@@ -37,29 +37,29 @@ class LoadsBeyondPlane : public ::testing::TestWithParam<int> {
     return GaussianProcess(p);
   }
   static double at(const GaussianProcess& process, double load) {
-    return process.mean(1e-2, side() * load);  // so fast that the centre has no say
+    return process.mean(1e-2, side() * load);  // so fast that the centre contributes nothing
   }
 };
 
-TEST_P(LoadsBeyondPlane, HeavierOnesFollowTheStaticBranchOnceItIsAboveTheValve) {
-  // at 40 bar the valve rules up to 35 bar * A_supply = 35 kN; a line through what was seen stays at 40 for ever
+TEST_P(LoadsBeyondPlane, HeavierLoadsFollowTheStaticBranchAboveTheValve) {
+  // At 40 bar the valve is active up to 35 bar * A_supply = 35 kN; a line through the learned loads would stay at 40 bar.
   const GaussianProcess valve = plane(40 * kBarBeyond, 0.0);
   const double corner = 0.5 * loads_beyond::kRounded;
   for (const double load : {20e3, 25e3, 30e3, 35e3, 50e3, 100e3}) {
     const double truth = std::max(40 * kBarBeyond, kLevel + load / kSupply);
-    // what the parabola at the border withholds is in neither branch: corner alone
+    // The transition at the border belongs to neither branch, so only the corner is checked there.
     EXPECT_NEAR(at(valve, load), truth, corner + 1e3) << load;
   }
 }
 
-TEST_P(LoadsBeyondPlane, OnTheStaticBranchItGoesOn) {
+TEST_P(LoadsBeyondPlane, TheStaticBranchContinues) {
   const GaussianProcess branch = plane(kLevel, 1.0);
   for (const double load : {20e3, 22e3, 60e3})
     EXPECT_NEAR(at(branch, load), kLevel + load / kSupply, 1.0) << load;
 }
 
-TEST_P(LoadsBeyondPlane, LighterOnesDoNotFallBelowTheTank) {
-  // from 60 bar at -40 kN by 1 bar a 100 N
+TEST_P(LoadsBeyondPlane, LighterLoadsStayAboveTankPressure) {
+  // from 60 bar at -40 kN by 1 bar for 100 N
   const GaussianProcess branch = plane(100 * kBarBeyond, 1.0);
   for (const double load : {-40e3, -60e3, -90e3, -99e3, -120e3, -400e3}) {
     const double truth = std::max(kLeast, 100 * kBarBeyond + load / kSupply);
@@ -68,7 +68,7 @@ TEST_P(LoadsBeyondPlane, LighterOnesDoNotFallBelowTheTank) {
   EXPECT_NEAR(at(plane(40 * kBarBeyond, 0.0), -1e6), 40 * kBarBeyond, 1.0);
 }
 
-TEST_P(LoadsBeyondPlane, InsideNothingChanges) {
+TEST_P(LoadsBeyondPlane, TheLearnedRangeIsUnchanged) {
   const GaussianProcess with = plane(40 * kBarBeyond, 0.2);
   GpParameters p = with.parameters();
   p.beyond = {};
@@ -81,7 +81,7 @@ TEST_P(LoadsBeyondPlane, InsideNothingChanges) {
 }
 
 TEST_P(LoadsBeyondPlane, DerivativesAreThoseOfTheValues) {
-  // kinks rounded over 2 bar, 2 kN of load: steps of 100 N and 1e-5 m^3/s see them smooth
+  // Kinks are rounded over 2 bar (2 kN of load) and are smooth at steps of 100 N and 1e-5 m^3/s.
   const GaussianProcess process = plane(40 * kBarBeyond, 0.25);
   for (const double load : {-250e3, -165e3, -45e3, 20.5e3, 26e3, 43e3, 80e3}) {
     const double q0 = 4e-4, f0 = side() * load;
@@ -109,7 +109,7 @@ TEST_P(LoadsBeyondPlane, DerivativesAreThoseOfTheValues) {
 
 INSTANTIATE_TEST_SUITE_P(BothSides, LoadsBeyondPlane, ::testing::Values(1, -1));
 
-TEST(LoadsBeyond, BrokenOnesAreNamed) {
+TEST(LoadsBeyond, InvalidParametersAreNamed) {
   GpParameters p;
   p.beyond.side = 1;
   p.beyond.static_slope = 0.0;

@@ -1,4 +1,4 @@
-// What of a higher return pressure reaches the supply: a process that follows max(static branch, valve) knows.
+// Share of a higher return pressure that reaches the supply, from a process that follows max(static branch, valve).
 #include "models/hydraulics/return_rise.h"
 
 #include <gtest/gtest.h>
@@ -18,16 +18,16 @@ using Eigen::MatrixXd;
 constexpr double kBarPa = 1e5;
 constexpr double kFlow = 5e-4;
 
-/// A cylinder whose counterbalance valve rules up to an opposing load of 30 kN, and the process through its law.
+/// A cylinder whose counterbalance valve is active up to a resisting load of 30 kN, and a process fitted to its law.
 class ReturnRise : public ::testing::TestWithParam<int> {
  protected:
   ReturnRise() {
     const double length =
-        6e3;  // [N] shorter than what is asked of it, longer than between the centres
+        6e3;  // [N] shorter than the checked range, longer than the spacing of the centres
     const Index n = 61;
     const ArrayXd load = ArrayXd::LinSpaced(n, -90e3, 90e3);
     GpParameters p;
-    p.length_flow = 1e-2;  // hardly any say
+    p.length_flow = 1e-2;  // so long that flow hardly matters
     p.length_force = length;
     p.signal_std = 50 * kBarPa;
     p.noise_std = 0.01 * kBarPa;
@@ -50,7 +50,7 @@ class ReturnRise : public ::testing::TestWithParam<int> {
   double fed() const { return side() > 0 ? cylinder_.area_piston() : cylinder_.area_rod(); }
   double other() const { return side() > 0 ? cylinder_.area_rod() : cylinder_.area_piston(); }
   double static_branch(double load) const { return (load + 6 * kBarPa * other()) / fed(); }
-  /// Takes a fifth of a larger load.
+  /// The valve's branch takes up a fifth of a larger load.
   double valve(double load) const { return static_branch(30e3) + 0.2 * (load - 30e3) / fed(); }
   double true_rise(double load, double rise) const {
     const double r = rise * other() / fed();
@@ -68,17 +68,17 @@ class ReturnRise : public ::testing::TestWithParam<int> {
   GaussianProcess process_;
 };
 
-TEST_P(ReturnRise, ReachesTheSupplyWhereTheLoadAndNotTheValveRules) {
+TEST_P(ReturnRise, ReachesTheSupplyOnTheStaticBranchOnly) {
   for (const double bar : {-6.0, -2.0, 2.0, 6.0, 15.0}) {
     const double rise = bar * kBarPa, whole = rise * other() / fed();
-    // the process rounds the kink and stands off each branch by a hundredth of a bar; the rounded corner as much
+    // The process rounds the kink and differs from each branch by a hundredth of a bar, as does the rounded corner.
     const double tolerance = 0.02 * std::abs(whole) + 0.05 * kBarPa;
     for (const double load : {-70e3, -30e3, 0.0})
       EXPECT_NEAR(rise_of(kFlow, load, rise), true_rise(load, rise), tolerance)
           << bar << ", " << load;
     for (const double load : {60e3, 70e3})
       EXPECT_NEAR(rise_of(kFlow, load, rise), whole, tolerance) << bar << " bar, load, " << load;
-    // between: never more than the rise, never the other way; below it the valve's fall may be missed
+    // In between the result is never more than the rise and never of the other sign; below, the valve's fall may be missed.
     for (double load = 12e3; load < 60e3; load += 4e3) {
       const double missed = (bar < 0.0 ? 0.2 * std::abs(whole) : 0.0) + tolerance;
       const double rounded = 3.0 * kBarPa;  // a kink of 1.2/A_supply within one length-scale
@@ -87,7 +87,7 @@ TEST_P(ReturnRise, ReachesTheSupplyWhereTheLoadAndNotTheValveRules) {
   }
 }
 
-TEST_P(ReturnRise, NoRiseIsNothingAndSmallOnesAreContinuous) {
+TEST_P(ReturnRise, IsZeroWithoutARiseAndContinuous) {
   for (const double load : {-30e3, 29e3, 60e3}) {
     EXPECT_EQ(rise_of(kFlow, load, 0.0), 0.0);
     EXPECT_NEAR(rise_of(kFlow, load, 1.0), rise_of(kFlow, load, -1.0), 10.0);  // [Pa] of 1 Pa each

@@ -1,4 +1,4 @@
-/// Inertial torques by other paths: Lagrange's equation on numeric kinetic energy, Orocos KDL, the pendulum by hand,
+/// Inertial torques by other methods: Lagrange's equation on numeric kinetic energy, Orocos KDL, the pendulum by hand,
 /// and the balance of energy along a motion.
 #include "models/machine/inertial_torque.h"
 
@@ -22,7 +22,7 @@ VectorXd torque_of(const Machine& machine, const VectorXd& x, double payload) {
   return inertial_torque<double>(machine, x.head(n), x.segment(n, n), x.tail(n), payload);
 }
 
-/// Kinetic energy from numeric velocities of every mass along q + t qd: shares nothing with Newton-Euler.
+/// Kinetic energy from numeric velocities of every mass along q + t qd: it has no code in common with Newton-Euler.
 double kinetic_energy(const Machine& machine, const VectorXd& q, const VectorXd& qd,
                       double payload) {
   const auto speed2 = [&](const auto& position) {
@@ -41,7 +41,7 @@ double kinetic_energy(const Machine& machine, const VectorXd& q, const VectorXd&
                 }
                 return p;
               });
-    // rate about the axis of the last joint that turns
+    // rate about the axis of the last revolute joint
     const auto frames = forward_kinematics<double>(machine, q);
     Eigen::Vector3d rate = Eigen::Vector3d::Zero(), axis = Eigen::Vector3d::Zero();
     for (int k = 0; k <= link.joint; ++k) {
@@ -70,7 +70,7 @@ double kinetic_energy(const Machine& machine, const VectorXd& q, const VectorXd&
   return energy;
 }
 
-/// Link inertias, which the machines of the other tests do without.
+/// Link inertias, which the machines of the other tests do not have.
 Machine with_inertias(Machine machine) {
   double inertia = 40.0;
   for (Link& link : machine.links) link.inertia = inertia += 25.0;

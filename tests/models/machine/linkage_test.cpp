@@ -127,7 +127,7 @@ TEST(Linkage, WhichEndHoldsTheBarrelDoesNotChangeTheLength) {
 }
 
 TEST(Linkage, FourBarClosesOnBothBars) {
-  // The rod pin lies on both circles whatever the pose: the defining property of the linkage.
+  // The rod pin lies on both circles in every pose, which defines the linkage.
   const Machine m = test_support::loader_crane();
   const auto& f = std::get<FourBarLinkage>(m.cylinders[1].linkage);
   Random random(1);
@@ -162,7 +162,7 @@ TEST(Linkage, FourBarFollowsTheLawOfCosines) {
 }
 
 TEST(Linkage, MirroredFourBarHasTheMirroredLength) {
-  // Mirroring the plane in y turns q into -q and the branch over.
+  // Mirroring the plane in y changes the signs of q and of the branch.
   FourBarLinkage f;
   f.barrel = {-1.1, -0.4, 0.05};
   f.rocker = {-0.25, 0.1, 0};
@@ -257,7 +257,7 @@ TEST(Linkage, JointAtStrokeInvertsTheStrokeOverTheRange) {
   }
 }
 
-TEST(Linkage, JointAtStrokeReadsALittlePastTheStops) {
+TEST(Linkage, JointAtStrokeAcceptsSlightlyMoreThanTheRange) {
   const Machine m = test_support::loader_crane();
   const double past = m.joints[0].position.hi + 0.02;
   EXPECT_NEAR(joint_at_stroke(m, 0, stroke_at(m, 0, past)), past, 1e-12);
@@ -271,7 +271,7 @@ TEST(Linkage, LengthAtZeroStrokeIsSubtracted) {
   EXPECT_DOUBLE_EQ(stroke_at(m, 0, 0.3), cylinder_length(m, 0, 0.3) - 1.043);
 }
 
-TEST(Linkage, MassesSitOnTheirMembers) {
+TEST(Linkage, MassesLieOnTheirMembers) {
   const Machine m = test_support::knuckle_crane();
   const auto& f = std::get<FourBarLinkage>(m.cylinders[0].linkage);
   const double q = 0.4;

@@ -228,7 +228,7 @@ TEST(StaticForce, LowerOrdersGiveTheSameValues) {
   EXPECT_EQ(full.force_jacobian(), part.force_jacobian());
 }
 
-TEST(StaticForce, AWorkspaceForgetsThePreviousState) {
+TEST(StaticForce, AWorkspaceKeepsNoPreviousState) {
   const Machine machine = test_support::knuckle_crane();
   Random random(14);
   const Eigen::VectorXd a = random_configuration(machine, random);
@@ -250,7 +250,7 @@ TEST(StaticForce, ForceIsLinearInThePayload) {
   });
 }
 
-TEST(StaticForce, TurningTheWholeMachineAndGravityChangesNothing) {
+TEST(StaticForce, RotatingTheWholeMachineAndGravityChangesNothing) {
   for_random_states([](const Machine& machine, const Eigen::VectorXd& q, double payload) {
     Machine turned = machine;
     const Eigen::Isometry3d turn(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized()));

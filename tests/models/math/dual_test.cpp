@@ -66,7 +66,7 @@ TEST(Dual2, MatchesNumericDerivativesOfEveryFunction) {
       };
       EXPECT_NEAR(d.gradient[0], gradient_x(x, y), kDerivativeTolerance);
       EXPECT_NEAR(d.gradient[1], gradient_y(x, y), kDerivativeTolerance);
-      // Differences of the dual's own gradient, which the lines above have proved.
+      // The reference is differences of the dual's own gradient, which the lines above have checked.
       const auto gradient = [&](double a, double b, std::size_t k) {
         return f.dual(Dual2<2>::variable(a, 0), Dual2<2>::variable(b, 1)).gradient[k];
       };

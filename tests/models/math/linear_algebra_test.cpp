@@ -23,12 +23,12 @@ MatrixXd normal_matrix(Eigen::Index rows, Eigen::Index columns, unsigned seed) {
 }
 
 TEST(LinearAlgebra, LeastNormSolutionsSolveAndLieInTheSpan) {
-  // sizes that make pivoting put the columns in another order, one that is not its own inverse
+  // With these sizes pivoting permutes the columns, by a permutation that is not its own inverse.
   const Eigen::Vector4d size(1.0, 100.0, 1000.0, 10.0);
   const MatrixXd a = normal_matrix(9, 4, 1) * size.asDiagonal(), b = normal_matrix(4, 3, 2);
   const MatrixXd x = least_norm_columns(a, b);
   EXPECT_LT((a.transpose() * x - b).cwiseAbs().maxCoeff(), size.maxCoeff() * kNearOne);
-  // least norm: nothing of x is normal to the columns of A
+  // Least norm means that x has no part normal to the columns of A.
   EXPECT_LT((complement_of(a).transpose() * x).cwiseAbs().maxCoeff(), kNearOne);
 }
 
@@ -46,7 +46,7 @@ TEST(LinearAlgebra, LeastSquaresOfLeastNormWithoutFullRank) {
   }
 }
 
-TEST(LinearAlgebra, OfNothingTheLeastNormIsZero) {
+TEST(LinearAlgebra, LeastNormOfAnEmptySystemIsZero) {
   const VectorXd x = least_squares_of_least_norm(MatrixXd::Zero(4, 3), VectorXd::Ones(4));
   EXPECT_EQ(x, VectorXd::Zero(3));
   const MatrixXd none = least_norm_columns(MatrixXd(5, 0), MatrixXd(0, 2));

@@ -95,11 +95,11 @@ TEST(TimedBound, NoAdmissibleSpeedGainsMoreThanItSays) {
   }
 }
 
-TEST(LargestGain, IsThatOfAFineScanOfPressures) {
+TEST(MaximisedHamiltonian, IsThatOfAFineScanOfPressures) {
   // Most top flows lie between two knots of the demand: there the flow stops growing with the pressure.
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  LargestGain largest;
+  MaximisedHamiltonian largest;
   for (int trial = 0; trial < 300; ++trial) {
     std::vector<TimedMove> moves(3);
     for (std::size_t i = 0; i < moves.size(); ++i) {
@@ -183,7 +183,7 @@ TEST(TimedBound, RampsGainWhatSpeedsThatGrowFromRestGain) {
   shares.price = 3000.0;
   shares.share = Eigen::MatrixX2d::Ones(kJoints, 2);
   std::vector<double> force(forces.length.size()), rate(forces.length.size());
-  LargestGain largest;
+  MaximisedHamiltonian largest;
   for (long node = 0; node < lattice.nodes; node += 7) {
     weights.set_shares(shares);
     forces.at(c.model.machine, lattice, node, force.data(), rate.data());

@@ -250,7 +250,7 @@ Drawn expect_drawn_in(Reach& r, const SeedMotion& seed, double duration, const s
   const std::vector<LimitCheck> checks = check_limits(r.model, r.problem, d.with.motion, 37);
   EXPECT_LE(worst_excess(checks), tolerance) << checks.front().what;
   EXPECT_TRUE(std::any_of(d.with.stages.begin(), d.with.stages.end(), [&](const StageRecord& s) {
-    return s.what.starts_with("modes, limits drawn in") && s.energy_exact > 0.0 &&
+    return s.what.starts_with("modes, limits tightened") && s.energy_exact > 0.0 &&
            s.excess <= tolerance;
   })) << what;
   if (d.without.usable(tolerance)) {

@@ -26,11 +26,11 @@ Eigen::VectorXd values_of(const Tightening& t) {
 class DrawIn : public ::testing::Test {
  protected:
   DrawIn() { tightening_.position.assign(problem_.machine.joints.size(), 0.0); }
-  bool draw_in(const std::string& what, double excess) {
+  bool tighten_bounds(const std::string& what, double excess) {
     LimitCheck c;
     c.what = what;
     c.excess = excess;
-    return tightening_.draw_in(problem_, {c}, 1e-5);
+    return tightening_.tighten_bounds(problem_, {c}, 1e-5);
   }
   /// Expects that one value, and no other, is drawn in.
   void expect_only(const std::string& what, int index, double wanted) {
@@ -39,7 +39,7 @@ class DrawIn : public ::testing::Test {
     tightening_.limit_pressure = true;
     Eigen::VectorXd expected = values_of(tightening_);
     expected[index] = wanted;
-    EXPECT_TRUE(draw_in(what, kExcess)) << what;
+    EXPECT_TRUE(tighten_bounds(what, kExcess)) << what;
     EXPECT_TRUE(values_of(tightening_).isApprox(expected, 1e-12))
         << what << ": " << values_of(tightening_).transpose();
   }
@@ -59,18 +59,18 @@ TEST_F(DrawIn, EachLimitHasItsOwnShare) {
 }
 
 TEST_F(DrawIn, ThePumpsPressureFirstGetsItsRows) {
-  EXPECT_TRUE(draw_in("pressure of pump main", kExcess));
+  EXPECT_TRUE(tighten_bounds("pressure of pump main", kExcess));
   EXPECT_TRUE(tightening_.limit_pressure);
   EXPECT_EQ(tightening_.pressure, 1.0) << "what no row has held yet is not drawn in";
-  EXPECT_TRUE(draw_in("pressure of pump main", kExcess));
+  EXPECT_TRUE(tighten_bounds("pressure of pump main", kExcess));
   EXPECT_NEAR(tightening_.pressure, kDrawnIn, 1e-12);
 }
 
 TEST_F(DrawIn, SharesAddUpAndKeptLimitsAreLeftAlone) {
-  EXPECT_FALSE(draw_in("flow of pump main", 1e-6)) << "within the tolerance";
+  EXPECT_FALSE(tighten_bounds("flow of pump main", 1e-6)) << "within the tolerance";
   EXPECT_EQ(tightening_.flow, 1.0);
-  EXPECT_TRUE(draw_in("flow of pump main", kExcess));
-  EXPECT_TRUE(draw_in("flow of pump main", kExcess));
+  EXPECT_TRUE(tighten_bounds("flow of pump main", kExcess));
+  EXPECT_TRUE(tighten_bounds("flow of pump main", kExcess));
   EXPECT_NEAR(tightening_.flow, kDrawnIn * kDrawnIn, 1e-12);
 }
 

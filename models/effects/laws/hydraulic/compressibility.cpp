@@ -8,7 +8,7 @@
 namespace sparflow {
 namespace {
 
-/// Oil in hose and ports, as a share of the full chamber.
+/// [-] Oil volume in hose and ports as a share of the full chamber.
 constexpr double kDeadVolume = 0.05;
 
 /// Shortest and longest length the joint's range (or the stated stroke) allows. [m]
@@ -28,7 +28,7 @@ class Compressibility final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "compressibility",
-        .title = "oil volume is compressed before the rod moves",
+        .title = "oil compressibility",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kCylinder,
         .parameters =
@@ -36,7 +36,6 @@ class Compressibility final : public Effect {
               "1/GPa",
               1e-9,
               0.3e-9,  // no oil is stiffer than 3 GPa
-
               20e-9,
               1e-9,
               "inverse bulk modulus of oil, hoses and entrained air",
@@ -48,18 +47,19 @@ class Compressibility final : public Effect {
               0.0,
               2.0,
               0.05,
-              "time by which the rod's yielding follows the pressure: the line lets only so "
-              "much oil through",
+              "time constant with which the rod follows the pressure, since the line limits the "
+              "flow",
               false,
               {0.02, 0.12, 0.25, 0.5, 0.9}}},
         .equation =
-            "A dx/dt = Q_valve - V/E dp/dt, V = A (stroke + 5 % of the full stroke), tau late",
+            "A dx/dt = Q_valve - V/E dp/dt, V = A (stroke + 5 % of the full stroke), with "
+            "first-order lag tau",
         .signals = {"chamber pressures", "position", "command"},
         .confused_with = {"valve_lag", "leakage"},
         .separated_by = "load steps at rest and fast starts with and without load",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 2 and 6 (bulk modulus)",
         .form_error = 0.2,
-        .in_motion = "nothing: the compressed volume is taken and given back"};
+        .in_motion = "nothing: the compressed volume is released again"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
@@ -73,7 +73,7 @@ class Compressibility final : public Effect {
     if (kind != EvidenceKind::kFlow || index != at) return false;
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
-    // As measured where a log has it: a filter would mix the pressures before and after a chamber takes over.
+    // Unfiltered pressures are preferred, because a filter mixes samples before and after the supply chamber changes.
     const bool raw = c.measured_a.size() > 0 && c.measured_b.size() > 0;
     const Eigen::VectorXd& a = raw ? c.measured_a : c.pressure_a;
     const Eigen::VectorXd& b = raw ? c.measured_b : c.pressure_b;
@@ -84,10 +84,10 @@ class Compressibility final : public Effect {
     Eigen::VectorXd speed = Eigen::VectorXd::Zero(log.samples());
     for (const auto& [first, last] : log.runs) {
       for (Eigen::Index k = first + 1; k < last; ++k) {
-        // the chamber that is supplied; at rest the one that holds the load
+        // This is the supply chamber; at rest it is the one that holds the load.
         const bool on_piston = c.direction[k] != 0 ? c.direction[k] > 0 : force[k] > 0.0;
         const double height = on_piston ? c.length[k] - range.lo : range.hi - c.length[k];
-        const double squeezed = std::max(0.0, height) + dead;  // volume per area
+        const double squeezed = std::max(0.0, height) + dead;  // [m] volume per area
         const double rise = on_piston ? a[k] - a[k - 1] : b[k] - b[k - 1];
         speed[k] = (on_piston ? -squeezed : squeezed) * rise / (log.time[k] - log.time[k - 1]);
       }

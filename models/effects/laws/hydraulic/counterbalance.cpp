@@ -4,7 +4,7 @@
 namespace sparflow {
 namespace {
 
-/// One valve sits on one side: a cylinder with two of them has the effect's law learned already on the other.
+/// The effect is one valve on one side; where a cylinder has two, its pressure model has learned the other one already.
 /// With pilot ratio R and setting p_set, opening needs p_load + R p_supply + (A_supply/A_hold) p_supply = p_set:
 ///   p_supply = (p_set - p_load) / (R + A_supply/A_hold),
 /// so slope = 1 / (R + A_supply/A_hold) and setting = slope * p_set.
@@ -13,7 +13,7 @@ class Counterbalance final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "counterbalance",
-        .title = "counterbalance valve sets the supply while the load helps",
+        .title = "counterbalance valve",
         .stage = EffectStage::kPressure,
         .place = EffectPlace::kCylinder,
         .parameters = {{"setting",
@@ -22,7 +22,8 @@ class Counterbalance final : public Effect {
                         0.0,
                         200 * units::kBar,
                         40 * units::kBar,
-                        "supply pressure beyond an unloaded chamber's that opens it without load",
+                        "supply pressure that opens the valve without load, above that of an "
+                        "unloaded chamber",
                         true,
                         {}},
                        {"slope",
@@ -31,7 +32,7 @@ class Counterbalance final : public Effect {
                         0.0,
                         1.0,
                         0.2,
-                        "fall of the supply pressure by load pressure, 1 / (pilot ratio + "
+                        "decrease of the supply pressure per load pressure, 1 / (pilot ratio + "
                         "A_supply/A_hold)",
                         true,
                         {}},
@@ -41,7 +42,7 @@ class Counterbalance final : public Effect {
                         -1.0,
                         1.0,
                         -1.0,
-                        "-1 it is lowered against while retracting, 1 while extending",
+                        "-1: the valve acts while retracting, 1: while extending",
                         false,
                         {-1.0, 1.0},
                         true}},
@@ -49,12 +50,12 @@ class Counterbalance final : public Effect {
             "p_supply = max(static branch, setting - slope p_load), p_load = -side F/A_hold",
         .signals = {"both chamber pressures", "position"},
         .confused_with = {"return_back_pressure", "coulomb_friction", "load_friction"},
-        .separated_by = "lower at the same speed with three loads",
+        .separated_by = "lowering at the same speed with three payloads",
         .citation =
             "P. Chapple (2003), Principles of Hydraulic System Design, ch. 4 (over-centre "
             "valves)",
         .form_error = 0.2,
-        .in_motion = "pressure: of the side towards which the load helps"};
+        .in_motion = "pressure: in the direction of the overrunning load"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
@@ -71,17 +72,17 @@ class Counterbalance final : public Effect {
     const int side = s.side[i];
     if (side == 0 || side != side_of(p[2])) return;
     const Cylinder& c = s.machine->cylinders[i];
-    // pressure by which the load helps, in the chamber that holds it; negative when it opposes
+    // [Pa] load pressure in the chamber that holds an overrunning load; negative when the load resists
     const T load = s.force[i] * (-side / return_area(c, side));
     T rise = p[0] - p[1] * load;
-    // an opposing load asks for part of that already
+    // A resisting load requires part of that pressure already.
     const T opposed = s.force[i] * (side / supply_area(c, side));
     if (opposed > T(0.0)) rise = rise - opposed;
     if (rise > T(0.0)) out[i] += rise;
   }
   SPARFLOW_EFFECT_LAW(add_pressure)
 
-  /// The force has passed the filter already; twice, and its own noise would explain the chamber's.
+  /// The force has passed the filter already; filtered twice, its noise would explain that of the chamber pressure.
   bool columns_filtered() const override { return true; }
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
@@ -95,7 +96,7 @@ class Counterbalance final : public Effect {
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       if (c.direction[k] != side) continue;
       columns(k, 0) = 1.0;
-      columns(k, 1) = force[k] * side / area;  // minus the pressure by which the load helps
+      columns(k, 1) = force[k] * side / area;  // minus the pressure of the overrunning load
     }
     return true;
   }

@@ -9,7 +9,7 @@ class FlowDependentMargin final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "flow_dependent_margin",
-        .title = "margin grows with the pump's flow",
+        .title = "flow-dependent load-sensing margin",
         .stage = EffectStage::kPump,
         .place = EffectPlace::kPump,
         .parameters = {{"k",
@@ -18,18 +18,18 @@ class FlowDependentMargin final : public Effect {
                         0.0,
                         0.2 * units::kBarPerLpm2,
                         7e-4 * units::kBarPerLpm2,
-                        "rise of every margin by the square of the pump's flow",
+                        "increase of every margin per squared pump flow",
                         true,
                         {}}},
         .equation = "p_pump = max(standby, P_i + margin_i + k (sum of flows)^2)",
         .signals = {"pump pressure", "working pressures", "commands", "position"},
         .confused_with = {"line_loss", "pump_lag"},
-        .separated_by = "one function slow and fast, then two functions together",
+        .separated_by = "one cylinder slow and fast, then two cylinders together",
         .citation =
             "P. Krus (1988), On Load Sensing Fluid Power Systems, Linkoping (margin and "
             "losses between pump and sensing point)",
         .form_error = 0.05,
-        .in_motion = "pump: what every cylinder of this pump asks for"};
+        .in_motion = "pump: demand of every cylinder of this pump"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {

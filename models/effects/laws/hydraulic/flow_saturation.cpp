@@ -14,44 +14,43 @@ class FlowSaturation final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "flow_saturation",
-        .title = "pump cannot deliver what the valves ask for",
+        .title = "pump flow saturation",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kPump,
-        .parameters =
-            {{"share",
-              "-",
-              1.0,
-              0.7,
-              1.35,
-              1.0,
-              "share of the excess that is missing, about 1",
-              true,
-              {}},
-             {"limit",
-              "l/min",
-              units::kLitrePerMinute,
-              2 * units::kLitrePerMinute,
-              2000 * units::kLitrePerMinute,
-              100 * units::kLitrePerMinute,
-              "largest flow of the pump",
-              false,
-              {10 * units::kLitrePerMinute, 30 * units::kLitrePerMinute,
-               100 * units::kLitrePerMinute, 300 * units::kLitrePerMinute}},
-             {"soft",
-              "-",
-              1.0,
-              0.0,
-              1.0,
-              0.0,
-              "1: the flow nears its limit gradually (power law of exponent 12), 0: at once",
-              false,
-              {0.0, 1.0},
-              true}},
+        .parameters = {{"share",
+                        "-",
+                        1.0,
+                        0.7,
+                        1.35,
+                        1.0,
+                        "share of the excess demand that is not delivered, about 1",
+                        true,
+                        {}},
+                       {"limit",
+                        "l/min",
+                        units::kLitrePerMinute,
+                        2 * units::kLitrePerMinute,
+                        2000 * units::kLitrePerMinute,
+                        100 * units::kLitrePerMinute,
+                        "largest flow of the pump",
+                        false,
+                        {10 * units::kLitrePerMinute, 30 * units::kLitrePerMinute,
+                         100 * units::kLitrePerMinute, 300 * units::kLitrePerMinute}},
+                       {"soft",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        0.0,
+                        "0: hard limit, 1: smooth limit (power law of exponent 12)",
+                        false,
+                        {0.0, 1.0},
+                        true}},
         .equation =
             "Q_i = Q_i(u) min(1, limit / sum of Q(u)), soft: (1 + (sum / limit)^12)^(-1/12)",
         .signals = {"commands", "position"},
         .confused_with = {"torque_limit", "valve_deadband"},
-        .separated_by = "each function at full command alone, then all together",
+        .separated_by = "each cylinder alone at full command, then all together",
         .citation =
             "H. Murrenhoff (2011), Grundlagen der Fluidtechnik, Teil 1: Hydraulik (sections "
             "that share the flow in proportion)",
@@ -97,12 +96,13 @@ class FlowSaturation final : public Effect {
   }
 
  private:
-  /// What the sections ask for. Their gains and the served share depend on each other: in turns until settled.
+  /// Flow that the valve sections demand. Their gains and the delivered share depend on each other; they are computed
+  /// alternately.
   struct Demand {
     bool known = true;
     std::vector<SectionFit> fits;  ///< by cylinder
-    Eigen::VectorXd served;        ///< [samples] 0..1
-    double largest = 0.0;          ///< [m^3/s] sum of what is asked for
+    Eigen::VectorXd served;        ///< [samples] delivered share of the demand, 0..1
+    double largest = 0.0;          ///< [m^3/s] largest total demand
 
     Demand(const MachineSeries& log, int pump, double limit, bool soft) {
       const Machine& machine = *log.machine;
@@ -114,8 +114,8 @@ class FlowSaturation final : public Effect {
                 machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
       }
       if (!known) return;
-      constexpr int kTurns = 12;
-      for (int turn = 0; turn < kTurns; ++turn) {
+      constexpr int kIterations = 12;
+      for (int iteration = 0; iteration < kIterations; ++iteration) {
         Eigen::VectorXd asked = Eigen::VectorXd::Zero(log.samples());
         for (const int i : feeds) {
           const auto c = static_cast<std::size_t>(i);
@@ -134,8 +134,8 @@ class FlowSaturation final : public Effect {
           continue;
         }
         if (!(largest > limit)) return;
-        served =
-            (limit / asked.array()).min(1.0).matrix();  // nothing asked: limit / 0, fully served
+        // Without demand the ratio is infinite and the share one.
+        served = (limit / asked.array()).min(1.0).matrix();
       }
     }
   };

@@ -4,15 +4,15 @@
 namespace sparflow {
 namespace {
 
-/// Where the chamber's sensor sits decides what sees the loss. At the cylinder: the pump must add it while
-/// this cylinder leads. At the valve: the sensor reads it as pressure, so the measured force contains
-/// A_supply times it, and the pump adds nothing. A log shows one of the two, never both.
+/// The position of the chamber's pressure sensor decides which channel shows the loss. With a sensor at the cylinder the
+/// pump pressure contains the loss while this cylinder is the load-sensing leader. With a sensor at the valve the
+/// measured force contains A_supply times the loss, and the pump adds nothing. A log shows one of the two, never both.
 class LineLoss final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "line_loss",
-        .title = "loss of the line between pump and cylinder",
+        .title = "supply-line pressure loss",
         .stage = EffectStage::kPump,
         .place = EffectPlace::kCylinder,
         .parameters = {{"k",
@@ -44,18 +44,20 @@ class LineLoss final : public Effect {
                         {0.0, 1.0},
                         true}},
         .equation =
-            "dp = k Q^2 + k1 Q; p_pump += dp while it leads, or (sensor at the valve) "
-            "p_supply += dp and F += A_supply dp",
+            "dp = k Q^2 + k1 Q; p_pump += dp while the cylinder is the load-sensing leader, or "
+            "(sensor at the valve) p_supply += dp and F += A_supply dp",
         .signals = {"pump pressure or chamber pressures", "commands", "position"},
         .confused_with = {"flow_dependent_margin", "viscous_friction", "oil_temperature"},
-        .separated_by = "steps of this function at three flows, alone and with another that leads",
+        .separated_by =
+            "steps of this cylinder at three flows, alone and while another cylinder is the "
+            "load-sensing leader",
         .citation =
             "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (laminar and turbulent "
             "losses in lines)",
         .form_error = 0.2,
         .in_motion =
-            "pump: what the cylinder asks for (sensors at the cylinder), or force, and "
-            "with it working pressure (at the valve)"};
+            "pump: demand of the cylinder (sensors at the cylinder), or force and with it "
+            "working pressure (sensors at the valve)"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {

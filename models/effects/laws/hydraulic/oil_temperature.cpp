@@ -4,29 +4,29 @@
 namespace sparflow {
 namespace {
 
-/// [degC] the losses that pressure models and margins were learned with belong to this temperature.
+/// [degC] The losses contained in the learned pressure models and margins are referred to this temperature.
 constexpr double kReference = 40.0;
 
-/// Lines are sized for the flow of their section, so that losses at rated flow are alike: one pressure for the
-/// whole machine, scaled by each section's share of its rated flow.
+/// Lines are sized for the flow of their section, so that losses at rated flow are alike. The law therefore has one
+/// pressure for the whole machine, scaled by each section's flow over its rated flow.
 class OilTemperature final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "oil_temperature",
-        .title = "laminar losses follow the oil's viscosity",
+        .title = "temperature-dependent line losses",
         .stage = EffectStage::kPressure,
         .place = EffectPlace::kMachine,
-        // By slope at 40 degC rather than by loss: what warming takes away is what a log shows; how the loss and beta
-        // share it shows only in the curvature.
+        // The parameters are slopes at 40 degC rather than losses, because a log determines how the pressure falls with
+        // temperature; how loss and beta share that shows only in the curvature.
         .parameters = {{"return_slope",
                         "bar/K",
                         units::kBar,
                         0.0,
                         3 * units::kBar,
                         0.3 * units::kBar,
-                        "fall of the loss from cylinder to tank by kelvin, at the section's full "
-                        "flow and 40 degC",
+                        "decrease of the loss from cylinder to tank per kelvin, at the section's "
+                        "full flow and 40 degC",
                         true,
                         {}},
                        {"supply_slope",
@@ -44,13 +44,13 @@ class OilTemperature final : public Effect {
                         0.005,
                         0.1,
                         0.03,
-                        "viscosity falls by this share a kelvin: loss = slope / beta",
+                        "relative decrease of the viscosity per kelvin; loss = slope / beta",
                         false,
                         {0.005, 0.01, 0.02, 0.03, 0.04, 0.055, 0.075}}},
         .equation = "dp = slope Q/Q_full (exp(-beta (T - 40)) - 1) / beta",
         .signals = {"oil temperature", "chamber pressures", "pump pressure"},
-        .confused_with = {"return_back_pressure", "flow_dependent_margin", "drift of a sensor"},
-        .separated_by = "the same motions cold and warm",
+        .confused_with = {"return_back_pressure", "flow_dependent_margin", "sensor drift"},
+        .separated_by = "the same motions with cold and with warm oil",
         .citation =
             "O. Reynolds (1886), Phil. Trans. R. Soc. 177 (mu = mu0 exp(-beta T)); Merritt "
             "(1967), ch. 2",
@@ -105,7 +105,7 @@ class OilTemperature final : public Effect {
   }
 
  private:
-  /// [K] degrees below the reference, bent by beta.
+  /// [K] Temperature below the reference, weighted by the exponential law of viscosity.
   static double factor(double oil, double beta) {
     return std::expm1(-beta * (oil - kReference)) / beta;
   }

@@ -6,7 +6,7 @@
 namespace sparflow {
 namespace {
 
-/// Shares of the two chambers' sensors: one of them is off, `chamber` says which.
+/// Shares of the offset that the sensors of bore side and rod side have; `chamber` chooses the sensor.
 double share_a(double chamber) { return std::clamp(0.5 * (1.0 + chamber), 0.0, 1.0); }
 double share_b(double chamber) { return std::clamp(0.5 * (1.0 - chamber), 0.0, 1.0); }
 
@@ -15,7 +15,7 @@ class PressureOffset final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "pressure_offset",
-        .title = "zero of a chamber's pressure sensor is off",
+        .title = "pressure sensor offset",
         .stage = EffectStage::kSensor,
         .place = EffectPlace::kCylinder,
         .parameters = {{"offset",
@@ -24,7 +24,7 @@ class PressureOffset final : public Effect {
                         -20 * units::kBar,
                         20 * units::kBar,
                         3 * units::kBar,
-                        "reading minus true pressure",
+                        "measured minus true pressure",
                         true,
                         {}},
                        {"chamber",
@@ -33,17 +33,18 @@ class PressureOffset final : public Effect {
                         -1.0,
                         1.0,
                         1.0,
-                        "1 the piston side's sensor (A), -1 the rod side's (B)",
+                        "1: sensor of the bore side (A), -1: sensor of the rod side (B)",
                         false,
                         {1.0, -1.0},
                         true}},
         .equation =
-            "p_A (or p_B) read = true + offset, so measured force + A_A offset (or - A_B offset)",
+            "p_A (or p_B) measured = true + offset; measured force = true + A_A offset (or - A_B "
+            "offset)",
         .signals = {"both chamber pressures"},
         .confused_with = {"force_offset", "unmodelled_mass", "flow_dependent_margin"},
         .separated_by = "a zero check: engine off, hoses relieved, machine on its rest",
         .citation = "Isermann (2011), Fault-Diagnosis Applications, offset faults of sensors",
-        .in_motion = "nothing: the sensor is wrong, not the machine"};
+        .in_motion = "nothing: the error is the sensor's, not the machine's"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
@@ -57,10 +58,11 @@ class PressureOffset final : public Effect {
   bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0) return false;  // a force is measured
+    if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0)
+      return false;  // The force is measured directly.
     const double a = share_a(shape[0]), b = share_b(shape[0]);
     if (kind == EvidenceKind::kPump) {
-      // the pump is compared with what the measured pressure asks for
+      // The pump pressure is compared with the demand of the measured pressures.
       if (log.machine->pump_of_cylinder(at) != index) return false;
       const Eigen::VectorXi& leader = log.pumps[static_cast<std::size_t>(index)].leader;
       if (leader.size() == 0) return false;
@@ -80,7 +82,7 @@ class PressureOffset final : public Effect {
       const int side = supply ? supply_side(kind) : return_side(kind);
       value = (side > 0) == supply ? a : b;
     }
-    // zero in the chamber whose sensor is right: what the other's error does there it does by way of the force
+    // The column is zero in the chamber whose sensor is right: the other's error acts there by way of the force only.
     columns.setConstant(log.samples(), 1, value);
     return true;
   }

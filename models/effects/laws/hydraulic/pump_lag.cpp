@@ -9,17 +9,17 @@ class PumpLag final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "pump_lag",
-        .title = "pump follows its demand late",
+        .title = "pump response lag",
         .stage = EffectStage::kPump,
         .place = EffectPlace::kPump,
-        // one on/off parameter carries the sign, the time constant is searched
+        // The linear parameter switches the effect on or off; the time constant is searched.
         .parameters = {{"share",
                         "-",
                         1.0,
                         0.7,
                         1.35,
                         1.0,
-                        "share of the demand's change that comes late, about 1",
+                        "share of the demand's change that is delayed, about 1",
                         true,
                         {}},
                        {"tau",
@@ -34,12 +34,12 @@ class PumpLag final : public Effect {
         .equation = "tau dp/dt + p = demand",
         .signals = {"pump pressure", "working pressures", "commands"},
         .confused_with = {"sensor_delay"},
-        .separated_by = "steps of one function, several times",
+        .separated_by = "repeated steps of one cylinder",
         .citation = "Kumar, Dasgupta, Ghoshal (2015); first-order lag",
         .form_error = 0.1,
         .in_motion =
-            "nothing: a planned motion's pump is at its demand; late by tenths of a second it "
-            "spends at falls what it saved at rises"};
+            "nothing: a planned motion's pump is at its demand; a lag of tenths of a second costs "
+            "at falling demand what it saves at rising demand"};
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kPump}; }

@@ -9,30 +9,31 @@ class ReturnBackPressure final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "return_back_pressure",
-        .title = "tank line shared by all cylinders",
+        .title = "shared tank-line back pressure",
         .stage = EffectStage::kPressure,
         .place = EffectPlace::kMachine,
-        // 12 bar at 120 l/min; a mini excavator's 20 l/min line reaches 25 bar at 6e-2 bar/(l/min)^2
+        // The typical value gives 12 bar at 120 l/min; the 20 l/min line of a mini excavator reaches 25 bar at
+        // 6e-2 bar/(l/min)^2.
         .parameters = {{"k",
                         "bar/(l/min)^2",
                         units::kBarPerLpm2,
                         0.0,
                         0.1 * units::kBarPerLpm2,
                         8.3e-4 * units::kBarPerLpm2,
-                        "loss of the common tank line, filter and cooler",
+                        "loss coefficient of the common tank line, filter and cooler",
                         true,
                         {}}},
         .equation = "p_return = p_return(own flow) + k (sum of all return flows)^2",
         .signals = {"both chamber pressures", "position"},
         .confused_with = {"oil_temperature", "viscous_friction", "pressure_offset"},
         .separated_by =
-            "move another function at the same time: the chamber that only returns oil "
-            "rises with the other's flow",
+            "moving another cylinder at the same time: the return pressure rises with the "
+            "other's flow",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 3 (turbulent losses)",
         .form_error = 0.07,
         .in_motion =
-            "pressure: as a load larger by A_return times it where the supply follows the load; "
-            "nothing where a counterbalance valve sets the supply"};
+            "pressure: as a load larger by A_return times it where the supply pressure follows "
+            "the load; nothing where a counterbalance valve sets the supply pressure"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override { return whole_circuit(machine); }

@@ -9,17 +9,17 @@
 namespace sparflow {
 namespace {
 
-constexpr double kMostJoints = 30.0;
+constexpr double kMostJoints = 30.0;  ///< The parameter `late` numbers joints up to here.
 
-/// Positions late by d: q_log(t) = q(t - d), so the force carried now is that of the pose logged d later,
-/// F_static(q_log(t + d)), and the logged speed is that of d ago. One position late: the same of that joint alone.
-/// Forces late: the measured force is that of d ago.
+/// With positions late by d, q_log(t) = q(t - d), the force at t is that of the pose logged d later,
+/// F_static(q_log(t + d)), and the logged speed is that at t - d. With one position late this holds for that joint
+/// alone. With forces late the measured force is that at t - d.
 class SensorDelay final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "sensor_delay",
-        .title = "positions and pressures are not of the same instant",
+        .title = "sensor delay",
         .stage = EffectStage::kSensor,
         .place = EffectPlace::kMachine,
         .parameters = {{"share",
@@ -28,7 +28,7 @@ class SensorDelay final : public Effect {
                         0.7,
                         1.35,
                         1.0,
-                        "share of the shift that is seen, about 1",
+                        "share of the shift that shows in the log, about 1",
                         true,
                         {}},
                        {"delay",
@@ -37,7 +37,7 @@ class SensorDelay final : public Effect {
                         0.0,
                         0.5,
                         0.1,
-                        "age of the late channels",
+                        "delay of the late channels",
                         false,
                         {0.015, 0.025, 0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2, 0.25, 0.32}},
                        {"late",
@@ -46,22 +46,23 @@ class SensorDelay final : public Effect {
                         -1.0,
                         kMostJoints + 1.0,
                         1.0,
-                        "1 all positions are late, -1 forces or pressures are late, 2, 3 ... the "
-                        "position of the first, second ... joint alone is late",
+                        "1: all positions are late; -1: forces or pressures are late; 2, 3 ...: "
+                        "only the position of the first, second ... joint is late",
                         false,
                         {1.0, -1.0},
                         true}},
         .equation =
-            "F(t) = F_static(t + late delay); positions late: dx/dt logged is that of delay ago",
+            "F(t) = F_static(t + late delay); positions late: dx/dt logged at t is that at t - "
+            "delay",
         .signals = {"cylinder force or both chamber pressures", "position",
                     "command, for the flow"},
         .confused_with = {"inertia", "viscous_friction", "valve_lag"},
         .separated_by =
-            "reversals at several speeds: a delay follows the speed times the slope of "
-            "the static force, inertia the acceleration",
+            "reversals at several speeds: a delay acts in proportion to speed times slope of "
+            "the static force, inertia to acceleration",
         .citation = "Ljung (1999), System Identification, on unknown time delays",
         .form_error = 0.05,
-        .in_motion = "nothing: the log is late, not the machine"};
+        .in_motion = "nothing: the delay is the sensor's, not the machine's"};
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override {
@@ -98,12 +99,12 @@ class SensorDelay final : public Effect {
   }
 
  private:
-  /// While the command stays as it is there is nothing to be late with: the difference of two measured speeds is their
-  /// noise there, and noise in a regressor makes its share too small.
+  /// Sets the column to zero while the command is constant: the difference of two measured speeds is noise there, and
+  /// noise in a regressor biases its coefficient towards zero.
   static void keep_changes(const MachineSeries& log, const Eigen::VectorXd& command, double delay,
                            Eigen::MatrixXd& columns) {
-    constexpr double kSettled_s = 0.4;  // filters and accelerations reach that far
-    constexpr double kSame = 2e-3;      // of the full command: a logger's digits
+    constexpr double kSettled_s = 0.4;  // Filters and accelerations have settled by then.
+    constexpr double kSame = 2e-3;      // share of the full command: the logger's resolution
     for (const auto& [first, last] : log.runs) {
       Eigen::Index since = first;  // the command has been `level` from here on
       double level = command[first];
@@ -124,7 +125,7 @@ class SensorDelay final : public Effect {
     }
   }
 
-  /// To first order: an angle late by 0.2 s is wrong by some hundredths.
+  /// The delay of one position acts to first order, because an angle 0.2 s late is wrong by some hundredths [rad].
   static bool pose_late_in_one(const MachineSeries& log, const CylinderSeries& c,
                                Eigen::Index joint, double delay, Eigen::MatrixXd& columns) {
     if (joint >= c.static_slope.cols()) return false;
@@ -133,8 +134,8 @@ class SensorDelay final : public Effect {
     return true;
   }
 
-  /// Pump and chambers are late together, but not the commands that choose what a pump follows: it seems to follow
-  /// the choice of `delay` ago.
+  /// Pressures of pump and chambers are late alike, but the commands that decide which cylinders demand flow are not: the
+  /// logged pump pressure follows the commands of `delay` ago.
   static bool switching_late(const MachineSeries& log, std::size_t pump, double delay,
                              Eigen::MatrixXd& columns) {
     const Eigen::VectorXd& demand = log.pumps[pump].demand;

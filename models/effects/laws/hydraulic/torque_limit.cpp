@@ -7,7 +7,7 @@
 namespace sparflow {
 namespace {
 
-/// [s] the demand is averaged over this: clipping a noisy signal leaves a bias that looks like the effect.
+/// [s] Window over which the demand is averaged, because clipping a noisy signal leaves a bias like the effect.
 constexpr double kWindow = 0.3;
 
 class TorqueLimit final : public Effect {
@@ -15,7 +15,7 @@ class TorqueLimit final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "torque_limit",
-        .title = "pump keeps pressure times flow below a power",
+        .title = "pump power limit",
         .stage = EffectStage::kPump,
         .place = EffectPlace::kPump,
         .parameters = {{"share",
@@ -24,7 +24,7 @@ class TorqueLimit final : public Effect {
                         0.7,
                         1.35,
                         1.0,
-                        "share of the excess that is cut off, about 1",
+                        "share of the excess pressure that is cut off, about 1",
                         true,
                         {}},
                        {"power",
@@ -33,7 +33,7 @@ class TorqueLimit final : public Effect {
                         0.2e3,
                         500e3,
                         20e3,
-                        "largest pressure times flow",
+                        "largest product of pressure and flow",
                         false,
                         {1e3, 2e3, 4e3, 8e3, 16e3, 32e3, 64e3, 128e3}}},
         .equation = "p_pump = min(demand, power / sum of flows)",
@@ -68,7 +68,7 @@ class TorqueLimit final : public Effect {
     const Eigen::VectorXd flow = pump_flow(log, at);
     double largest = 0.0;
     for (Eigen::Index k = 0; k < demand.size(); ++k) {
-      if (demand[k] * flow[k] > largest) largest = demand[k] * flow[k];  // NaN never is
+      if (demand[k] * flow[k] > largest) largest = demand[k] * flow[k];  // false for NaN
     }
     if (largest <= 0.0) return {};
     std::vector<double> powers;

@@ -8,15 +8,15 @@
 namespace sparflow {
 namespace {
 
-/// Beyond the dead band the flow lacks gain * u0 against the straight line through zero: proportional to u0. Inside
-/// it lacks everything. Where the knee lies the log's own least squares says (models/effects/valve_flow.h), so
-/// that the column is linear in u0 and few samples inside the dead band suffice.
+/// Beyond the dead band the flow is smaller by gain * u0 than the straight line through zero; inside it there is none.
+/// A least-squares fit to the log gives the dead band's end (models/effects/valve_flow.h), so that the column is linear
+/// in u0 and few samples inside the dead band suffice.
 class ValveDeadband final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "valve_deadband",
-        .title = "dead band of the valve",
+        .title = "valve dead band",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kCylinder,
         .parameters = {{"u0_extend", "-", 1.0, 0.0, 0.4, 0.06, "dead band extending", true, {}},
@@ -27,8 +27,8 @@ class ValveDeadband final : public Effect {
                         0.0,
                         1.0,
                         0.0,
-                        "1: full command still gives full flow, gain / (1 - u0); 0: it gives u0 "
-                        "less",
+                        "1: full command still gives full flow, g = gain / (1 - u0); 0: it gives "
+                        "gain * u0 less",
                         false,
                         {0.0, 1.0},
                         true}},
@@ -38,7 +38,7 @@ class ValveDeadband final : public Effect {
         .separated_by = "slow ramps of the command through zero",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 5 (overlapped spools)",
         .form_error = 0.1,
-        .in_motion = "nothing: a motion prescribes flow; the command that gives it is larger"};
+        .in_motion = "nothing: a motion prescribes the flow; only the command for it is larger"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
@@ -70,7 +70,7 @@ class ValveDeadband final : public Effect {
         continue;
       }
       const double knee = std::clamp(fit.dead_band(command[k]), 1e-3, 0.5);
-      // with full flow kept, the line through zero has the gain g (1 - u0) and meets the law again at u = 1
+      // With full flow at full command the line through zero has the gain g (1 - u0) and meets the law again at u = 1.
       double lack = fit.gain(command[k]);
       if (full_flow) lack *= 1.0 - std::min(u, 1.0);
       if (u < knee) lack = fit.gain(command[k]) * (full_flow ? 1.0 - knee : 1.0) * u / knee;

@@ -11,7 +11,7 @@ class ValveLag final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "valve_lag",
-        .title = "flow follows the command late",
+        .title = "valve response lag",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kCylinder,
         .parameters = {{"share",
@@ -20,7 +20,7 @@ class ValveLag final : public Effect {
                         0.7,
                         1.35,
                         1.0,
-                        "share of the flow's change that comes late, about 1",
+                        "share of the flow's change that is delayed, about 1",
                         true,
                         {}},
                        {"tau",
@@ -29,7 +29,7 @@ class ValveLag final : public Effect {
                         0.01,
                         1.5,
                         0.2,
-                        "time constant, of two stages their sum, or the delay",
+                        "time constant (of two stages their sum), or the pure delay",
                         false,
                         {0.03, 0.05, 0.08, 0.12, 0.16, 0.21, 0.27, 0.35, 0.46, 0.6}},
                        {"delay",
@@ -48,11 +48,12 @@ class ValveLag final : public Effect {
             "Q_valve(u(t - tau))",
         .signals = {"command", "position"},
         .confused_with = {"valve_deadband", "sensor_delay", "compressibility"},
-        .separated_by = "steps of the command, several times",
+        .separated_by = "repeated steps of the command",
         .citation = "H. E. Merritt (1967), Hydraulic Control Systems, ch. 6 and 7 (valve dynamics)",
-        // stages of unequal speed, fitted by equal ones or by one alone
+        // A valve has stages of unequal speed, which two equal ones or a single one approximate.
         .form_error = 0.06,
-        .in_motion = "nothing: a motion prescribes flow; a controller must lead the command"};
+        .in_motion =
+            "nothing: a motion prescribes the flow; only the command for it must come earlier"};
     return info;
   }
   std::vector<int> places(const Machine& machine) const override {
@@ -64,7 +65,7 @@ class ValveLag final : public Effect {
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (kind != EvidenceKind::kFlow || index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    // inside a dead band that the model knows there is nothing to be late with
+    // Inside a dead band that the model contains the command has no flow that could be delayed.
     const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
     if (command.size() == 0) return false;
     const auto late = [&](const Eigen::VectorXd& x) {
@@ -72,7 +73,7 @@ class ValveLag final : public Effect {
       if (shape[1] < 0.25) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
     };
-    // gains from the late command: from the command itself they would come out too small
+    // The gains are fitted to the delayed command; fitted to the command itself they would be biased towards zero.
     const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
     const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
     const SectionFit fit = fit_gains(log, at, late_extend + late_retract);

@@ -14,7 +14,7 @@ class AngleOffset final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "angle_offset",
-        .title = "joint angle off by a constant",
+        .title = "joint angle offset",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kJoint,
         .parameters = {{"offset",
@@ -23,7 +23,7 @@ class AngleOffset final : public Effect {
                         -10 * units::kDegree,
                         10 * units::kDegree,
                         1 * units::kDegree,
-                        "true angle minus the logged one",
+                        "true angle minus logged angle",
                         true,
                         {}}},
         .equation = "F = F_static(q + offset), dx/dt = dx/dq(q + offset) dq/dt",
@@ -31,8 +31,8 @@ class AngleOffset final : public Effect {
                     "command, for the flow"},
         .confused_with = {"base_tilt", "unmodelled_mass", "payload_error"},
         .separated_by =
-            "a sweep of the poses at two loads; of the first joint also slewing, or the "
-            "rod's speed at constant command over the whole stroke",
+            "a sweep of the poses at two payloads; for the first joint also slewing, or the "
+            "rod speed at constant command over the whole stroke",
         .citation =
             "Mooring, Roth, Driels (1991), Fundamentals of Manipulator Calibration; "
             "Khalil & Dombre (2002), ch. 11",
@@ -64,7 +64,7 @@ class AngleOffset final : public Effect {
     }
     const Machine& machine = *log.machine;
     if (machine.cylinders[static_cast<std::size_t>(index)].joint != at) return false;
-    // the rod's speed is computed with the rate at the logged angle: rate(q) qd = true - rate'(q) offset qd
+    // The measured rod speed is dx/dq at the logged angle times dq/dt: the true speed less d2x/dq2 offset dq/dt.
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       const double q = log.q(k, at);
@@ -73,7 +73,7 @@ class AngleOffset final : public Effect {
       try {
         columns(k, 0) = -linkage_rates(machine, index, q).d2 * log.qd(k, at);
       } catch (const std::domain_error&) {
-        continue;  // a four-bar that cannot close
+        continue;  // The four-bar cannot close at this angle.
       }
     }
     return true;

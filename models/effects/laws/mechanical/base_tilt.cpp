@@ -7,7 +7,7 @@
 namespace sparflow {
 namespace {
 
-/// Within 20 degrees of horizontal counts: a crane on a slope still tilts about its boom's pin.
+/// [-] Sine of 20 degrees, within which an axis counts as horizontal, so that a crane on a slope has a luffing joint.
 constexpr double kHorizontal = 0.35;
 
 Eigen::Vector3d luffing_axis(const Machine& machine, int joint) {
@@ -22,7 +22,7 @@ class BaseTilt final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "base_tilt",
-        .title = "the machine does not stand level",
+        .title = "base tilt",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kMachine,
         .parameters = {{"angle",
@@ -31,18 +31,19 @@ class BaseTilt final : public Effect {
                         -15 * units::kDegree,
                         15 * units::kDegree,
                         2 * units::kDegree,
-                        "turn of the base about the first luffing joint's axis; positive raises "
-                        "the arm as that joint would",
+                        "rotation of the base about the first luffing joint's axis, in that "
+                        "joint's positive direction",
                         true,
                         {}}},
-        .equation = "F = F_static(gravity turned by -angle in the base frame)",
+        .equation = "F = F_static(gravity rotated by -angle in the base frame)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"angle_offset", "unmodelled_mass", "payload_error"},
-        .separated_by = "slewing: a tilt follows the sine of the slewing angle, an offset does not",
+        .separated_by =
+            "slewing: a tilt varies with the sine of the slewing angle, an offset does not",
         .citation =
             "Craig (2005), Introduction to Robotics, sec. 6.5: gravity as an acceleration "
             "of the base",
-        // ground that slopes across the arm as well
+        // A base that tilts across the arm as well is part of this error.
         .form_error = 0.04,
         .in_motion = "force"};
     return info;

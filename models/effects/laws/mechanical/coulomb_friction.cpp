@@ -16,7 +16,7 @@ class CoulombFriction final : public Effect {
         .equation = "F = F_static + Fc sign(v)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"load_friction", "stribeck_friction", "presliding"},
-        .separated_by = "slow moves up and down in the same pose",
+        .separated_by = "slow motions up and down through the same poses",
         .citation =
             "C. A. Coulomb (1785); Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica "
             "30(7), sec. 2",

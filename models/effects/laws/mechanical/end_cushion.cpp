@@ -11,8 +11,8 @@
 namespace sparflow {
 namespace {
 
-/// Lengths of the cylinder at the ends of its joint's range [m], if nothing lies beyond them (a linkage that turns round
-/// on the way or cannot close has no stop there).
+/// Lengths of the cylinder at the ends of its joint's range [m]. There are none where the length is not monotonic in
+/// between or the linkage cannot close, because the joint's limits are then no stops of the cylinder.
 std::optional<Range> lengths_at_joint_stops(const Machine& machine, int cylinder) try {
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   const Range& q = machine.joints[static_cast<std::size_t>(c.joint)].position;
@@ -38,7 +38,7 @@ Range length_range(const Machine& machine, int cylinder) {
   return both.hi > both.lo ? both : stroke;
 }
 
-/// Shares of the stroke that a zone may take: cushions take some per cent, soft stops more.
+/// [-] Cushion lengths to search, by stroke: cushions take a few per cent of it, soft stops more.
 constexpr double kShares[] = {0.02, 0.035, 0.06, 0.10, 0.15};
 
 class EndCushion final : public Effect {
@@ -46,29 +46,30 @@ class EndCushion final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "end_cushion",
-        .title = "end cushion",
+        .title = "end-of-stroke cushioning",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
-        .parameters = {{"force", "N", 1.0, 0.0, 2e6, 30e3, "force at the end stop", true, {}},
-                       {"zone",
-                        "mm",
-                        1e-3,
-                        5e-3,
-                        1.5,
-                        0.06,
-                        "length over which it builds up",
-                        false,
-                        {0.02, 0.04, 0.08, 0.15, 0.3, 0.6}},
-                       {"ends",
-                        "-",
-                        1.0,
-                        -1.0,
-                        1.0,
-                        0.0,
-                        "0 at both ends, 1 only where it is extended, -1 only where retracted",
-                        false,
-                        {0.0, 1.0, -1.0},
-                        true}},
+        .parameters =
+            {{"force", "N", 1.0, 0.0, 2e6, 30e3, "force at the end stop", true, {}},
+             {"zone",
+              "mm",
+              1e-3,
+              5e-3,
+              1.5,
+              0.06,
+              "length over which the force builds up",
+              false,
+              {0.02, 0.04, 0.08, 0.15, 0.3, 0.6}},
+             {"ends",
+              "-",
+              1.0,
+              -1.0,
+              1.0,
+              0.0,
+              "0: at both ends, 1: at the extended end only, -1: at the retracted end only",
+              false,
+              {0.0, 1.0, -1.0},
+              true}},
         .equation =
             "F = F_static + force ((zone - distance to the stop)/zone)^2 sign(v) inside the "
             "zone, towards the stop only",
@@ -104,7 +105,7 @@ class EndCushion final : public Effect {
       if (c.direction[k] < 0 && c.length[k] < shortest) shortest = c.length[k];
     }
     const double above = x.hi - longest, below = shortest - x.lo;
-    if (shape_index == 0) {  // zones the log has been in
+    if (shape_index == 0) {  // A log determines only the zones that it has entered.
       std::vector<double> zones;
       for (const double share : kShares) {
         const double zone = std::clamp(share * stroke, 0.01, 0.9 * stroke);

@@ -8,7 +8,7 @@ class ForceOffset final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "force_offset",
-        .title = "constant force",
+        .title = "constant force offset",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters = {{"offset",
@@ -17,13 +17,13 @@ class ForceOffset final : public Effect {
                         -200e3,
                         200e3,
                         6e3,
-                        "force measured where none is expected, at rest or moving",
+                        "measured minus static force, the same at rest and in motion",
                         true,
                         {}}},
         .equation = "F = F_static + offset",
         .signals = {"cylinder force or both chamber pressures"},
         .confused_with = {"pressure_offset", "unmodelled_mass"},
-        .separated_by = "a zero check of the sensors; for a mass, poses from level to steep",
+        .separated_by = "a zero check of the sensors; against a mass, poses from level to steep",
         .citation =
             "Janot, Gautier, Brunot (2019), data set and reference models of EMPS: offset "
             "of the drive force",

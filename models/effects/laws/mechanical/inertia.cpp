@@ -5,8 +5,8 @@
 namespace sparflow {
 namespace {
 
-/// Masses are known to some per cent and inertias to a factor: what accelerates an eighth of them is something else
-/// (a structure that swings).
+/// [-] Masses are known to a few per cent and inertias to a factor; a scale below an eighth has another cause (a
+/// structure that oscillates).
 constexpr double kLeastShare = 0.125;
 
 class Inertia final : public Effect {
@@ -14,7 +14,7 @@ class Inertia final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "inertia",
-        .title = "forces that accelerate the masses",
+        .title = "inertial forces",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kMachine,
         .parameters = {{"scale",
@@ -23,7 +23,7 @@ class Inertia final : public Effect {
                         kLeastShare,
                         2.5,
                         1.0,
-                        "1 = the machine file's masses and inertias",
+                        "1: the machine file's masses and inertias",
                         true,
                         {}}},
         .equation = "F = F_static + scale (M(q) qdd + C(q, qd) qd) / (dx/dq)",

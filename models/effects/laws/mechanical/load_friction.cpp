@@ -10,7 +10,7 @@ class LoadFriction final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "load_friction",
-        .title = "friction that grows with the load",
+        .title = "load-dependent friction",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters = {{"mu",
@@ -19,13 +19,13 @@ class LoadFriction final : public Effect {
                         0.0,
                         0.4,
                         0.05,
-                        "friction by static force of the cylinder",
+                        "friction force per static force of the cylinder",
                         true,
                         {}}},
         .equation = "F = F_static + mu |F_static| sign(v)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"coulomb_friction", "pad_friction", "counterbalance"},
-        .separated_by = "up and down in the same poses at three loads",
+        .separated_by = "motions up and down through the same poses at three payloads",
         .citation =
             "Hamon, Gautier, Garrec (2010), IROS, dynamic identification of robots with a "
             "dry friction model depending on load and velocity",

@@ -7,10 +7,10 @@
 namespace sparflow {
 namespace {
 
-/// [N m] rounds the corner of |moment| off where the moment changes sign; moments are of kN m.
+/// [N m] This rounds |moment| where the moment changes sign; moments are of the order of kN m.
 constexpr double kRounding = 10.0;
 
-/// Distance of a sliding joint's frame from its parent's: the guide lies somewhere along it. [m]
+/// Distance of a sliding joint's frame from its parent's; the guide lies somewhere along it. [m]
 double guide_length(const Machine& machine, int joint) {
   return machine.joints[static_cast<std::size_t>(joint)].origin.translation().norm();
 }
@@ -60,7 +60,7 @@ class PadFriction final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "pad_friction",
-        .title = "friction of a telescope's pads",
+        .title = "telescope pad friction",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters = {{"mu_by_spacing",
@@ -69,7 +69,7 @@ class PadFriction final : public Effect {
                         0.0,
                         2.0,
                         0.1,
-                        "friction coefficient (both pads together) by their distance",
+                        "friction coefficient (both pads together) per distance of the pads",
                         true,
                         {}},
                        {"back",
@@ -84,7 +84,7 @@ class PadFriction final : public Effect {
         .equation = "F = F_static + mu_by_spacing |bending moment about the pad| sign(v)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"coulomb_friction", "load_friction"},
-        .separated_by = "a sweep of the reach at two luffing angles, out and in",
+        .separated_by = "extending and retracting over the whole reach at two luffing angles",
         .citation =
             "statics of a guided beam with Coulomb friction at its pads (C. A. Coulomb 1785)",
         .form_error = 0.1,

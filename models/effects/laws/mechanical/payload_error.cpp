@@ -8,7 +8,7 @@ class PayloadError final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "payload_error",
-        .title = "load at the tip is not what the log says",
+        .title = "payload error",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kMachine,
         .parameters = {{"mass",
@@ -17,7 +17,7 @@ class PayloadError final : public Effect {
                         -2000.0,
                         10e3,
                         80.0,
-                        "at the tip, told by no log: a gear, a rope",
+                        "mass at the tip that the log does not contain: lifting gear, a rope",
                         true,
                         {}},
                        {"scale",
@@ -26,8 +26,8 @@ class PayloadError final : public Effect {
                         -0.1,
                         0.1,
                         0.02,
-                        "true load per logged load, less one; crane scales are told to be right "
-                        "within 1 to 5 %",
+                        "true payload / logged payload - 1; the stated accuracy of crane scales "
+                        "is 1 to 5 %",
                         true,
                         {},
                         false,
@@ -35,7 +35,7 @@ class PayloadError final : public Effect {
         .equation = "F = F_static(payload (1 + scale) + mass)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"unmodelled_mass", "base_tilt", "angle_offset"},
-        .separated_by = "the same poses with two or three weighed loads and a change of reach",
+        .separated_by = "the same poses with two or three weighed payloads and a change of reach",
         .citation =
             "virtual work; Swevers, Verdonck, De Schutter (2007), IEEE Control Systems "
             "Magazine 27(5)",

@@ -6,25 +6,26 @@
 namespace sparflow {
 namespace {
 
-/// P. Dahl (1968): dF/dx = (Fc - F sign(v)) / distance, exact over a step of one direction. Every reversal
-/// takes some distance until the full force stands on the other side; in a motion that only goes on, it is Fc sign(v).
+/// Friction by P. Dahl (1968), dF/dx = (Fc - F sign(v)) / distance, integrated exactly over a step of one direction.
+/// After a reversal the force takes some distance to reach its full value with the other sign; without reversals it is
+/// Fc sign(v).
 class Presliding final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "presliding",
-        .title = "friction that builds up some millimetres after a reversal",
+        .title = "presliding friction (Dahl)",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters =
-            {{"Fc", "N", 1.0, 0.0, 100e3, 8e3, "friction once it slides", true, {}},
+            {{"Fc", "N", 1.0, 0.0, 100e3, 8e3, "friction force in full sliding", true, {}},
              {"distance",
               "mm",
               1e-3,
               0.2e-3,
               50e-3,
               4e-3,
-              "travel after which two thirds (1 - 1/e) of the way to the new force is gone",
+              "travel after a reversal by which 1 - 1/e (63 %) of the change of force is done",
               false,
               {1e-3, 2e-3, 4e-3, 8e-3, 16e-3}}},
         .equation = "F = F_static + z, dz/dx = (Fc - z sign(v)) / distance",
@@ -36,7 +37,7 @@ class Presliding final : public Effect {
             "P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158; "
             "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3)",
         .form_error = 0.3,
-        .in_motion = "force: as Coulomb friction, its memory is over after some millimetres"};
+        .in_motion = "force: as Coulomb friction, since its memory lasts a few millimetres"};
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
@@ -55,7 +56,8 @@ class Presliding final : public Effect {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     columns.setZero(log.samples(), 1);
     for (const auto& [first, last] : log.runs) {
-      double state = 0.0;  // unknown before; forgotten after some distances
+      double state =
+          0.0;  // The state before the run is unknown; its influence decays within a few distances.
       double before = std::nan("");
       for (Eigen::Index k = first; k < last; ++k) {
         const double x = c.length[k];

@@ -5,30 +5,37 @@
 namespace sparflow {
 namespace {
 
-/// The part of breakaway friction that fades with speed; what remains at every speed is Coulomb friction.
+/// This is the part of breakaway friction that decays with speed; the part that remains is Coulomb friction.
 class StribeckFriction final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "stribeck_friction",
-        .title = "friction that fades with speed (Stribeck)",
+        .title = "Stribeck friction",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
-        .parameters =
-            {{"Fs", "N", 1.0, 0.0, 100e3, 10e3, "friction beyond Coulomb at standstill", true, {}},
-             {"vs",
-              "mm/s",
-              1e-3,
-              1e-3,
-              0.1,
-              10e-3,
-              "speed at which a third (1/e) of it is left",
-              false,
-              {2e-3, 4e-3, 8e-3, 15e-3, 30e-3}}},
+        .parameters = {{"Fs",
+                        "N",
+                        1.0,
+                        0.0,
+                        100e3,
+                        10e3,
+                        "friction beyond Coulomb friction at zero speed",
+                        true,
+                        {}},
+                       {"vs",
+                        "mm/s",
+                        1e-3,
+                        1e-3,
+                        0.1,
+                        10e-3,
+                        "speed at which it has decayed to 1/e (37 %)",
+                        false,
+                        {2e-3, 4e-3, 8e-3, 15e-3, 30e-3}}},
         .equation = "F = F_static + Fs sign(v) exp(-|v|/vs)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"coulomb_friction", "presliding", "viscous_friction"},
-        .separated_by = "very slow starts and slow moves at several speeds, both ways",
+        .separated_by = "very slow starts and slow motions at several speeds in both directions",
         .citation =
             "R. Stribeck (1902), Z. VDI 46; Bo & Pavelescu (1982), Wear 82, exponential "
             "form; Armstrong-Helouvry, Dupont, Canudas de Wit (1994)",

@@ -11,7 +11,7 @@
 namespace sparflow {
 namespace {
 
-/// A function of all joints known by value, gradient and Hessian at the joints' plain values.
+/// Evaluates a function of all joints from its value, gradient and Hessian at the joints' plain values.
 double lifted(double value, const auto&, const auto&, const std::vector<double>&) { return value; }
 Jet lifted(double value, const auto& gradient, const auto& hessian, const std::vector<Jet>& q) {
   std::vector<Jet> away;
@@ -40,14 +40,14 @@ std::vector<double> plain_values(const std::vector<Jet>& q) {
   return values;
 }
 
-/// Each joint that turns gives way by kappa times its static torque: F = tau(q') / (dx/dq)(q'') with
+/// Each revolute joint deflects by kappa times its static torque: F = tau(q') / (dx/dq)(q'') with
 /// q' = q - kappa tau(q) and q'' = q - lever kappa tau(q).
 class StructuralFlex final : public Effect {
  public:
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "structural_flex",
-        .title = "arm bends under its load",
+        .title = "structural flexibility",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kMachine,
         .parameters = {{"kappa_first",
@@ -56,7 +56,7 @@ class StructuralFlex final : public Effect {
                         0.0,
                         2 * units::kDegree / 1e3,
                         0.006 * units::kDegree / 1e3,
-                        "sag of the first luffing joint's link by its torque",
+                        "deflection of the first luffing joint's link per torque",
                         true,
                         {}},
                        {"kappa_rest",
@@ -65,7 +65,7 @@ class StructuralFlex final : public Effect {
                         0.0,
                         5 * units::kDegree / 1e3,
                         0.006 * units::kDegree / 1e3,
-                        "the same of every joint beyond that turns",
+                        "the same for every revolute joint behind it",
                         true,
                         {}},
                        {"lever",
@@ -74,17 +74,17 @@ class StructuralFlex final : public Effect {
                         0.0,
                         1.0,
                         0.0,
-                        "0: bends beyond the rod's pin; 1: gives way at the joint, so that the "
-                        "cylinder's lever "
-                        "turns as well",
+                        "0: the link bends beyond the rod pin; 1: the joint deflects, and the "
+                        "cylinder's lever arm dx/dq changes as well",
                         false,
                         {0.0, 1.0},
                         true}},
-        .equation = "F = tau(q') / (dx/dq), q' = q - kappa tau(q): the load bends the arm down",
+        .equation = "F = tau(q') / (dx/dq), q' = q - kappa tau(q)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"unmodelled_mass", "angle_offset", "payload_error"},
         .separated_by =
-            "the same pose with load steps: sag grows with the load, an offset does not",
+            "the same poses at several payloads: the deflection grows with the load, an angle "
+            "offset does not",
         .citation =
             "Spong (1987), J. Dyn. Syst. Meas. Control 109(4), elastic joints; Khalil & "
             "Dombre (2002), ch. 11, joint compliance in calibration",
@@ -145,7 +145,7 @@ class StructuralFlex final : public Effect {
     const Machine& machine = *log.machine;
     const int first = first_luffing_joint(machine);
     columns.setConstant(log.samples(), 2, std::numeric_limits<double>::quiet_NaN());
-    // a chord over about one degree of sag, so that the size that matters is met
+    // The law is not linear in kappa; the column is its secant over about one degree of deflection, a size that matters.
     double largest[2] = {1.0, 1.0};
     StaticForce statics(machine);
     Eigen::VectorXd q(machine.joint_count());
@@ -158,7 +158,7 @@ class StructuralFlex final : public Effect {
       try {
         statics.update(q.data(), log.payload[k], 0);
       } catch (const std::domain_error&) {
-        continue;  // a four-bar that cannot close
+        continue;  // The four-bar cannot close in this pose.
       }
       for (int j = first; j < machine.joint_count(); ++j) {
         const Joint& joint = machine.joints[static_cast<std::size_t>(j)];

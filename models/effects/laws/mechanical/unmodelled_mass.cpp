@@ -8,23 +8,24 @@ class UnmodelledMass final : public Effect {
   const EffectInfo& info() const override {
     static const EffectInfo info = {
         .id = "unmodelled_mass",
-        .title = "mass the machine file does not know",
+        .title = "unmodelled mass",
         .stage = EffectStage::kForce,
         .place = EffectPlace::kJoint,
-        .parameters = {{"mass", "kg", 1.0, 0.0, 2000.0, 60.0, "mass on the link", true, {}},
-                       {"moment",
-                        "kg m",
-                        1.0,
-                        -6000.0,
-                        6000.0,
-                        100.0,
-                        "mass times its centre's distance along the link; distance = moment / mass",
-                        true,
-                        {}}},
+        .parameters =
+            {{"mass", "kg", 1.0, 0.0, 2000.0, 60.0, "mass on the link", true, {}},
+             {"moment",
+              "kg m",
+              1.0,
+              -6000.0,
+              6000.0,
+              100.0,
+              "mass times the distance of its centre along the link; distance = moment / mass",
+              true,
+              {}}},
         .equation = "F = F_static(masses + mass at moment/mass along the link)",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"payload_error", "base_tilt", "force_offset"},
-        .separated_by = "an unloaded sweep of the poses",
+        .separated_by = "a sweep of the poses without payload",
         .citation =
             "virtual work; Khalil & Dombre (2002), Modeling, Identification and Control of Robots, "
             "ch. 12",
@@ -34,8 +35,8 @@ class UnmodelledMass final : public Effect {
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool changes_machine() const override { return true; }
   void change_machine(Machine& machine, int at, std::span<const double> p) const override {
-    // mass and first moment enter the static force linearly: a point mass at the joint and a pure moment would do,
-    // but a link of one mass at one place keeps the machine readable
+    // Mass and first moment enter the static force linearly, so that a point mass at the joint and a pure moment would
+    // do; one link with one mass keeps the machine readable.
     const Eigen::Vector3d along = link_direction(machine, at);
     if (p[0] != 0.0) {
       machine.links.push_back({"unmodelled mass", at, p[0], along * (p[1] / p[0])});

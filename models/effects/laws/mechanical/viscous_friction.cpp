@@ -12,7 +12,7 @@ class ViscousFriction final : public Effect {
         .stage = EffectStage::kForce,
         .place = EffectPlace::kCylinder,
         .parameters =
-            {{"B", "N s/m", 1.0, 0.0, 5e6, 1e5, "friction force by speed of the rod", true, {}}},
+            {{"B", "N s/m", 1.0, 0.0, 5e6, 1e5, "friction force per rod speed", true, {}}},
         .equation = "F = F_static + B v",
         .signals = {"cylinder force or both chamber pressures", "position"},
         .confused_with = {"line_loss", "sensor_delay", "coulomb_friction"},

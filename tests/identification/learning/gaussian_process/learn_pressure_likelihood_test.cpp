@@ -1,12 +1,12 @@
-/// The likelihoods behind learn_pressure: gradients, small cases by hand, sparse against exact.
+/// Tests of the likelihoods used by learn_pressure: gradients, small cases by hand, sparse against exact form.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 #include <random>
 
-#include "identification/learning/gaussian_process/box_bfgs.h"
 #include "identification/learning/gaussian_process/gp_likelihood.h"
+#include "identification/learning/gaussian_process/minimise_bounded.h"
 #include "identification/learning/gaussian_process/sparse_gp.h"
 #include "models/math/linear_algebra.h"
 
@@ -31,7 +31,7 @@ GpPoints example(Index n, int basis = 2, double noise = 0.05) {
              noise * normal(random);
     if (basis == 2) p.basis(i, 1) = p.x2[i];
   }
-  if (basis == 2) {  // constant not known beforehand, slope to 0.7
+  if (basis == 2) {  // flat prior of the constant, standard deviation 0.7 of the slope
     p.basis_precision[1] = 1.0 / 0.49;
   }
   return p;
@@ -39,9 +39,8 @@ GpPoints example(Index n, int basis = 2, double noise = 0.05) {
 
 const GpHyper kHyper(std::log(0.4), std::log(0.6), std::log(0.8), std::log(0.01));
 
-TEST(GpLikelihood, TwoPointsByHand) {
-  // Constant mean integrated out: only the difference d = y1 - y2 counts, which has the variance
-  // 2 (s^2 + n^2 - k); with |H| such that log p = log N(d | 0, .) - log(1/2)/2 ... written out:
+TEST(GpLikelihood, IsThatOfTwoPointsByHand) {
+  // With the constant mean integrated out only the difference d = y1 - y2 counts, whose variance is 2 (s^2 + n^2 - k):
   // log p = -1/2 [d^2 / (2(a-k)) + log(a^2-k^2) + log(2/(a+k)) + log 2 pi], a = s^2 + n^2.
   GpPoints p{ArrayXd(2), ArrayXd(2), VectorXd(2), MatrixXd::Ones(2, 1), VectorXd::Zero(1)};
   p.x1 << 0.0, 0.4;
@@ -90,7 +89,7 @@ void expect_gradient(Function function, const GpHyper& hyper) {
   }
 }
 
-TEST(GpLikelihood, ExactGradient) {
+TEST(GpLikelihood, ExactGradientAgreesWithDifferences) {
   for (int basis : {1, 2}) {
     const GpPoints points = example(60, basis);
     for (const GpHyper& hyper :
@@ -102,7 +101,7 @@ TEST(GpLikelihood, ExactGradient) {
   }
 }
 
-TEST(GpLikelihood, SparseGradient) {
+TEST(GpLikelihood, SparseGradientAgreesWithDifferences) {
   for (int basis : {1, 2}) {
     const GpPoints points = example(120, basis);
     const InducingChoice choice = choose_inducing(points.x1, points.x2, kHyper, 14, 0.0);
@@ -131,7 +130,7 @@ TEST(GpLikelihood, BoundIsBelowAndTightensToTheExactValue) {
   EXPECT_NEAR(before, exact, 1e-3);
 }
 
-/// Mean and variance of a posterior at a place.
+/// @return mean and variance of a posterior at one point
 std::pair<double, double> predict(const GpPosterior& p, const GpHyper& hyper, double x1,
                                   double x2) {
   const Index m = p.weight.size(), b = p.beta.size();
@@ -161,7 +160,7 @@ TEST(GpLikelihood, SparsePredictsLikeExact) {
   }
 }
 
-TEST(GpLikelihood, LeaveOneOutIsLeavingOneOut) {
+TEST(GpLikelihood, LeaveOneOutAgreesWithRefitting) {
   const GpPoints points = example(25);
   const VectorXd residual = leave_one_out_residuals(points, kHyper);
   for (Index i : {0, 7, 24}) {
@@ -176,27 +175,39 @@ TEST(GpLikelihood, LeaveOneOutIsLeavingOneOut) {
   }
 }
 
-TEST(BoxBfgs, FindsTheMinimumOfRosenbrockFreeAndHeld) {
+TEST(MinimiseBounded, FindsTheMinimumOfRosenbrockFreeAndHeld) {
   const auto rosenbrock = [](const VectorXd& x, VectorXd& g) {
     const double a = 1 - x[0], b = x[1] - x[0] * x[0];
     g = Eigen::Vector2d(-2 * a - 400 * x[0] * b, 200 * b);
     return a * a + 100 * b * b;
   };
-  BoxBfgsOptions options;
-  options.gradient_tolerance = 1e-6;  // the curvature is 200: 1e-8 in x
-  options.value_tolerance = 0.0;
-  options.max_iterations = 200;
+  MinimiseOptions options;
+  options.value_tolerance = 1e-15;  // the curvature is 200: 1e-8 in x
   const Eigen::Vector2d start(-1.2, 1.0), lower(-5, -5), upper(5, 5);
-  const BoxBfgsResult free = minimise_in_box(rosenbrock, start, lower, upper, options);
+  const Minimum free = minimise_bounded(rosenbrock, start, lower, upper, options);
   EXPECT_TRUE(free.converged);
   EXPECT_NEAR(free.x[0], 1.0, 1e-7);
   EXPECT_NEAR(free.x[1], 1.0, 1e-7);
   // x0 <= 0.5: on the bound the minimum is at x1 = 0.25.
-  const BoxBfgsResult on_bound =
-      minimise_in_box(rosenbrock, start, lower, Eigen::Vector2d(0.5, 5), options);
+  const Minimum on_bound =
+      minimise_bounded(rosenbrock, start, lower, Eigen::Vector2d(0.5, 5), options);
   EXPECT_TRUE(on_bound.converged);
   EXPECT_EQ(on_bound.x[0], 0.5);
   EXPECT_NEAR(on_bound.x[1], 0.25, 1e-8);
+}
+
+TEST(MinimiseBounded, StepsBackFromWhereTheFunctionIsNotDefined) {
+  const auto with_edge = [](const VectorXd& x, VectorXd& g) {
+    const double root = std::sqrt(x[0] + 0.2);  // NaN left of -0.2
+    g = Eigen::Vector2d(0.5 / root - 2.0 + 4.0 * x[0] * x[0] * x[0], 2.0 * (x[1] - 1.0));
+    return root - 2.0 * x[0] + std::pow(x[0], 4) + (x[1] - 1.0) * (x[1] - 1.0);
+  };
+  const Minimum m = minimise_bounded(with_edge, Eigen::Vector2d(3, 3), Eigen::Vector2d(-5, -5),
+                                     Eigen::Vector2d(5, 5));
+  EXPECT_TRUE(m.converged);
+  VectorXd g(2);
+  with_edge(m.x, g);
+  EXPECT_LT(g.norm(), 1e-2);  // 1e-7 of the value with curvature 6: 1e-3 in x
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 using testing::HasSubstr;
 
-/// What a lifting cylinder asks: load pressure, a quadratic loss, a bend where the load nears zero. [Pa]
+/// Working pressure of a lifting cylinder: load pressure, a quadratic loss and a smooth nonlinear term. [Pa]
 double law(double flow, double force) {
   return 6e5 + force / 0.02 + 1.5e12 * flow * flow + 3e5 * std::sin(force / 6e4);
 }
@@ -40,7 +40,7 @@ Data make_data(Index n, double noise, unsigned seed = 5) {
   return d;
 }
 
-/// RMS error against the law, inside the data's range. [Pa]
+/// @return RMS error against the law inside the data's range [Pa]
 double error_of(const GpParameters& parameters) {
   const GaussianProcess process(parameters);
   double sum = 0.0;
@@ -78,8 +78,8 @@ TEST(LearnPressure, SparseAgreesWithExact) {
   const GaussianProcess a(exact.parameters), b(sparse.parameters);
   for (double flow : {1e-4, 8e-4, 1.5e-3}) {
     for (double force : {-4e4, 1e5, 2.3e5}) {
-      // What the sparse form may leave open is 1 % of the noise variance: a tenth of its deviation, in
-      // places three times that.
+      // The mean conditional variance of the sparse form is at most 1 % of the noise variance, a tenth of its deviation;
+      // locally it may be three times that.
       EXPECT_NEAR(a.mean(flow, force), b.mean(flow, force), 0.3 * 0.8e5);
       EXPECT_NEAR(std::sqrt(a.variance(flow, force)), std::sqrt(b.variance(flow, force)),
                   0.2 * 0.8e5);
@@ -88,7 +88,7 @@ TEST(LearnPressure, SparseAgreesWithExact) {
   options.method = GpMethod::kSubset;
   const LearnedGp subset = learn_gp(d.flow, d.force, d.pressure, options);
   EXPECT_LE(subset.report.centres, 60);
-  EXPECT_LT(error_of(subset.parameters), 3 * 0.8e5);  // a rough one, but no nonsense
+  EXPECT_LT(error_of(subset.parameters), 3 * 0.8e5);  // less accurate, but of the right size
 }
 
 TEST(LearnPressure, RecoversTheHyperparametersOfAGaussianProcess) {
@@ -129,7 +129,7 @@ TEST(LearnPressure, OutliersAreLeftOut) {
   EXPECT_LT(error_of(learned.parameters), 0.16e5);
   EXPECT_NEAR(learned.report.noise_std, 0.8e5, 0.06e5);
 
-  // A fifth of all samples is not a set of outliers; nothing is hidden.
+  // A fifth of all samples is too much for outliers; all are kept with a warning.
   for (Index i = 0; i < 1500; i += 5) d.pressure[i] += 60e5;
   const LearnedGp kept = learn_gp(d.flow, d.force, d.pressure);
   EXPECT_EQ(kept.report.outliers, 0);
@@ -142,8 +142,8 @@ TEST(LearnPressure, VarianceIsSmallInsideAndGrowsOutside) {
   const GpParameters p = learn_gp(d.flow, d.force, d.pressure).parameters;
   const GaussianProcess process(p);
   EXPECT_LT(process.variance(8e-4, 1e5), std::pow(0.3e5, 2));
-  // Ten length-scales away nothing is known but the mean: at least the signal's variance, and more the
-  // further the force goes, by the uncertainty of the slope.
+  // Ten length-scales away only the mean is known: the variance is at least the signal's and grows with the force by the
+  // uncertainty of the slope.
   const double far_flow = process.variance(8e-4 + 10 * p.length_flow, 1e5);
   EXPECT_GE(far_flow, 0.99 * p.signal_std * p.signal_std);
   double before = 0.0;
@@ -153,7 +153,7 @@ TEST(LearnPressure, VarianceIsSmallInsideAndGrowsOutside) {
     before = variance;
   }
   EXPECT_GT(before, p.signal_std * p.signal_std);
-  // And the mean goes on along its line instead of falling to zero.
+  // The mean continues along its line instead of falling to zero.
   const double f1 = p.force_max + 15 * p.length_force, f2 = f1 + 1e5;
   EXPECT_NEAR(process.mean(8e-4, f2) - process.mean(8e-4, f1), p.mean_slope * 1e5, 1.0);
 }
@@ -208,7 +208,7 @@ TEST(LearnPressure, ConstantInputsGiveAValidProcess) {
   EXPECT_NEAR(process.mean(1e-3, 1e5), law(1e-3, 1e5), 0.4e5);
   EXPECT_TRUE(std::isfinite(process.variance(1e-3, 4e5)));
 
-  // Everything constant, not even noise: the constant, everywhere.
+  // Constant data without noise give the constant everywhere.
   const ArrayXd flow = ArrayXd::Constant(20, 1e-3), pressure = ArrayXd::Constant(20, 40e5);
   const LearnedGp all = learn_gp(flow, ArrayXd::Constant(20, 5e4), pressure);
   const GaussianProcess flat(all.parameters);
@@ -216,7 +216,7 @@ TEST(LearnPressure, ConstantInputsGiveAValidProcess) {
   EXPECT_TRUE(std::isfinite(flat.variance(1e-3, 5e4)));
 }
 
-TEST(LearnPressure, SeveralAtOnceAreTheSameAsOneByOne) {
+TEST(LearnPressure, LearningInParallelGivesTheSameAsSequentially) {
   std::vector<GpDataset> datasets;
   for (unsigned seed : {1u, 2u, 3u, 4u}) {
     const Data d = make_data(seed == 3 ? 4 : 400, 0.8e5, seed);

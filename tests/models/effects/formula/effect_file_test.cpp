@@ -1,4 +1,4 @@
-/// User effects from YAML: what is read, and every broken file we could think of with the whole sentence the user sees.
+/// User effects from YAML: what is read, and wrong files with the whole message that the user sees.
 #include "models/effects/formula/effect_file.h"
 
 #include <gmock/gmock.h>
@@ -96,7 +96,7 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
 
   const UserEffectSpec& pump = specs[2];
   EXPECT_EQ(pump.place,
-            UserEffectPlace::kPump);  // where a pump's effect sits unless told otherwise
+            UserEffectPlace::kPump);  // default place of an effect of stage pump
   EXPECT_EQ(pump.equation, "dp grows with the square of the flow");
   EXPECT_EQ(pump.parameters[0].typical, 0.02);
   EXPECT_TRUE(pump.parameters[0].proportional);
@@ -118,7 +118,7 @@ TEST(EffectFile, LawsGiveSiValuesAndDerivatives) {
   EXPECT_DOUBLE_EQ(specs[1].law.evaluate<double>(flow_oil, k_beta), 6e5 * std::exp(0.3));
 }
 
-// Each signal of the table can be named at its stage, gives its unit, and is known where the table says.
+// Each signal of the table can be used at its stage, has its unit, and is known where the table states it.
 TEST(EffectFile, EverySignalOfTheTableIsUnderstood) {
   for (const SignalInfo& info : user_effect_signals()) {
     const bool joint = info.kind >= SignalKind::kJointPosition;
@@ -258,8 +258,8 @@ INSTANTIATE_TEST_SUITE_P(All, BrokenEffectFile, ::testing::Values(
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v / v0\": column 10: this ( is never closed"},
   BrokenEffects{"units do not meet", "Fc * tanh(v / v0)", "Fc + v / v0",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc + v / v0\": column 4: adds \"v / v0\" (no unit) to \"Fc\" [N]; both must have the same unit"},
-  BrokenEffects{"function wants none", "tanh(v / v0)", "tanh(v) * v0",
-    "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v) * v0\": column 11: tanh() wants a number without unit, \"v\" has [m/s]; divide it by a parameter or a number of that unit"},
+  BrokenEffects{"function with a unit", "tanh(v / v0)", "tanh(v) * v0",
+    "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * tanh(v) * v0\": column 11: tanh() needs a number without unit, \"v\" has [m/s]; divide it by a parameter or a number of that unit"},
   BrokenEffects{"unit of the stage", "Fc * tanh(v / v0)", "Fc * v / v0^2",
     "mine.yaml:6:10: effects[rod_friction].law: got \"Fc * v / v0^2\", which gives [N s/m], expected [N], the unit of stage force; it lacks a factor of [m/s]"},
   BrokenEffects{"pressure where a force is due", "unit: kN", "unit: bar",
@@ -313,8 +313,8 @@ INSTANTIATE_TEST_SUITE_P(All, BrokenEffectFile, ::testing::Values(
 ), broken_effect_name);
 // clang-format on
 
-// The page users read: its example is read, its tables say what the program does.
-TEST(EffectFile, TheDocumentIsTrue) {
+// The example of docs/user_effects.md is read, and its tables agree with the program.
+TEST(EffectFile, DocumentationAgreesWithTheProgram) {
   const std::string page = read_file(SPARFLOW_SOURCE_DIR "/docs/user_effects.md");
   const std::size_t begin = page.find("```yaml\n") + 8;
   const std::vector<UserEffectSpec> specs =

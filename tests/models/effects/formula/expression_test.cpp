@@ -1,5 +1,5 @@
-/// Laws of user effects: values against the same formula in C++, derivatives against numeric twins and against each
-/// other, units, linearity, and messages for every way of writing a law wrong.
+/// Laws of user effects: values against the same formula in C++, derivatives against finite differences and against
+/// each other, units, linearity, and messages for wrong laws.
 #include "models/effects/formula/expression.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ Symbol symbol(const std::string& name, const std::string& unit) {
   return {name, parse_unit(unit), true};
 }
 
-/// The words of a friction law, and some more units.
+/// The names of a friction law and of some more units.
 std::vector<Symbol> signals() {
   return {symbol("v", "m/s"), symbol("x", "m"),      symbol("F", "N"), symbol("Q", "m^3/s"),
           symbol("pA", "Pa"), symbol("oil", "degC"), symbol("u", "1"), {"q.*", {}, false}};
@@ -143,7 +143,7 @@ TEST(Expression, ValuesAreThoseOfTheSameFormulaInCpp) {
   }
 }
 
-TEST(Expression, DerivativesMatchNumericTwinsInEveryScalar) {
+TEST(Expression, DerivativesMatchFiniteDifferencesInEveryScalar) {
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
     const Expression law = compiled(twin);
@@ -157,7 +157,7 @@ TEST(Expression, DerivativesMatchNumericTwinsInEveryScalar) {
           in_order(law, Jet::variable(p[0], 0, 2), Jet::variable(p[1], 1, 2)), plain_ab);
       const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(p.data(), 4);
       const auto f = [&](const Eigen::VectorXd& z) { return twin.plain(z[0], z[1], z[2], z[3]); };
-      // duals divide by multiplying with the reciprocal, one rounding more
+      // Duals divide by multiplying with the reciprocal, which is one rounding more.
       EXPECT_NEAR(j.value, law.evaluate<double>(in_order(law, p[0], p[1]), plain_ab),
                   1e-14 * (1.0 + std::abs(j.value)));
       for (int i = 0; i < 4; ++i) {
@@ -269,7 +269,7 @@ TEST(Expression, UnitsOfALawFollowFromItsParts) {
     EXPECT_EQ(law.dimension(), parse_unit(unit).dimension) << law.dimension().text();
     EXPECT_TRUE(law.dimension_known());
   }
-  // a joint that may turn or slide is not judged, what does not touch it still is
+  // Units of a joint that may be revolute or prismatic are not checked; the rest of the law is.
   EXPECT_FALSE(Expression::compile("Fc * q.boom", signals(), parameters()).dimension_known());
   EXPECT_TRUE(Expression::compile("Fc * sin(q.boom)", signals(), parameters()).dimension_known());
   EXPECT_TRUE(
@@ -319,9 +319,9 @@ TEST(Expression, LinearParametersAreFoundOnTheTape) {
   EXPECT_THROW(law.linear_in("c"), std::logic_error);
 }
 
-// What is claimed symbolically holds in numbers: the second derivative by parameters said to be linear vanishes, and
+// The symbolic result holds in numbers: the second derivative by parameters found to be linear vanishes, and
 // the law is the sum of p dlaw/dp over the proportional group.
-TEST(Expression, WhatIsCalledLinearIsLinearInNumbers) {
+TEST(Expression, LinearParametersAreLinearNumerically) {
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
     const Expression law = compiled(twin);
@@ -350,7 +350,7 @@ TEST(Expression, WhatIsCalledLinearIsLinearInNumbers) {
 struct Wrong {
   std::string law;
   int column;
-  std::string message;  ///< whole, or its beginning when it ends in "..."
+  std::string message;  ///< the whole message, or its beginning when it ends in "..."
 };
 
 TEST(Expression, WrongLawsAreExplained) {
@@ -394,17 +394,17 @@ TEST(Expression, WrongLawsAreExplained) {
       {"F - 300", 3,
        "subtracts \"300\" (no unit) from \"F\" [N]; both must have the same unit: write 300[N]"},
       {"Fc * tanh(v)", 11,
-       "tanh() wants a number without unit, \"v\" has [m/s]; divide it by a parameter or a number "
+       "tanh() needs a number without unit, \"v\" has [m/s]; divide it by a parameter or a number "
        "of that unit"},
       {"Fc * exp(-beta * x)", 10,
-       "exp() wants a number without unit, \"-beta * x\" has [m/K]; ..."},
+       "exp() needs a number without unit, \"-beta * x\" has [m/K]; ..."},
       {"max(0, F, v)", 1,
        "max() compares \"0, F\" [N] with \"v\" [m/s]; both must have the same unit"},
       {"Fc * step(v > 0.01)", 13,
        "compares \"v\" [m/s] with \"0.01\" (no unit); both must have the same unit: write "
        "0.01[m/s]"},
       {"F^u", 2, "\"F\" has the unit [N], so its exponent must be a number, not \"u\""},
-      {"2^x", 3, "an exponent wants a number without unit, \"x\" has [m]; ..."},
+      {"2^x", 3, "an exponent needs a number without unit, \"x\" has [m]; ..."},
       {"F^0.3", 2, "[N] to the power 0.3 has no exponents that are whole or half"},
       {"sqrt(sqrt(x))", 1, "the root of \"sqrt(x)\" [m^0.5] has no whole or half exponents"},
       {"beta * oil", 8,
@@ -487,7 +487,7 @@ TEST(Expression, AnyTextIsCompiledOrExplained) {
       EXPECT_NE(std::string(error.what()), "") << law;
     }
   }
-  EXPECT_GT(compiled_count, 500);  // the words do make laws
+  EXPECT_GT(compiled_count, 500);  // enough random texts are valid laws
 }
 
 }  // namespace

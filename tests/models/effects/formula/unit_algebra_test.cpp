@@ -1,4 +1,4 @@
-/// Unit texts: dimension and factor against hand-computed values, and every way of writing them wrong.
+/// Unit texts: dimension and factor against hand-computed values, and messages for wrong ones.
 #include "models/effects/formula/unit_algebra.h"
 
 #include <gmock/gmock.h>
@@ -87,7 +87,7 @@ TEST(UnitAlgebra, EveryListedUnitIsRead) {
   EXPECT_GT(count, 30);
 }
 
-TEST(UnitAlgebra, DimensionsArePrintedTheWayPeopleWriteThem) {
+TEST(UnitAlgebra, DimensionsArePrintedInUsualUnits) {
   const std::vector<std::pair<std::string, std::string>> pairs = {
       {"kN", "N"},
       {"bar", "Pa"},

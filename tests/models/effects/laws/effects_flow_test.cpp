@@ -1,4 +1,4 @@
-// Effects of the flow stage: what their columns recover from a log made by another formula.
+// Effects of the flow stage: their columns recover the parameters of a log that another formula made.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -35,7 +35,7 @@ class FlowEffects : public ::testing::Test {
   }
 };
 
-// u0 differs by direction; the gain is refitted, so that both ways to write the law are one.
+// u0 differs by direction; the gain is fitted again, so that both forms of the law agree.
 TEST_F(FlowEffects, DeadBandIsRecoveredByDirectionAndForBothGains) {
   const double extend = 0.071, retract = 0.126;
   for (const bool full_flow : {false, true}) {
@@ -48,13 +48,13 @@ TEST_F(FlowEffects, DeadBandIsRecoveredByDirectionAndForBothGains) {
       straight[k] = u * (u > 0.0 ? 0.15 : 0.12);
     }
     const MatrixXd lack = columns("valve_deadband", 0, 0, {full_flow ? 1.0 : 0.0});
-    // free gains: both agree. 1 %: the knee is found to 1e-4, the samples inside it are few
+    // With free gains both agree, within 1 %: the dead band is found to 1e-4, and few samples are inside it.
     const VectorXd free = scaled_least_squares(gains_and(lack, 0), c.speed);
     if (!full_flow) {
       EXPECT_NEAR(free[2], extend, 0.01 * extend);
       EXPECT_NEAR(free[3], retract, 0.01 * retract);
     }
-    // gains pinned by a reference without dead band: the form decides
+    // With gains fixed by a reference without dead band the form of the law decides.
     const VectorXd pinned = scaled_least_squares(lack, c.speed - straight);
     EXPECT_NEAR(pinned[0], extend, 0.01 * extend) << full_flow;
     EXPECT_NEAR(pinned[1], retract, 0.01 * retract) << full_flow;
@@ -64,12 +64,12 @@ TEST_F(FlowEffects, DeadBandIsRecoveredByDirectionAndForBothGains) {
 TEST_F(FlowEffects, WithoutDeadBandNoneIsFound) {
   const VectorXd b = scaled_least_squares(gains_and(columns("valve_deadband", 0, 0, {0.0}), 0),
                                           log.cylinders[0].speed);
-  EXPECT_NEAR(b[2], 0.0, 1e-4);  // the search for the knee ends at 1e-4
+  EXPECT_NEAR(b[2], 0.0, 1e-4);  // tolerance of the search for the dead band
   EXPECT_NEAR(b[3], 0.0, 1e-4);
 }
 
-// The lag is made by small explicit steps, the effect's by the exact exponential.
-TEST_F(FlowEffects, LagAndDelayAreToldApartAndMeasured) {
+// The log's lag is integrated in small explicit steps, the effect's by the exact exponential.
+TEST_F(FlowEffects, LagAndDelayAreDistinguishedAndEstimated) {
   CylinderSeries& c = log.cylinders[0];
   const VectorXd flow = c.speed;
   const double tau = 0.21;
@@ -90,8 +90,8 @@ TEST_F(FlowEffects, LagAndDelayAreToldApartAndMeasured) {
   }
 }
 
-// A valve that is late is late with what its dead band leaves of the command, not with the command.
-TEST_F(FlowEffects, LagActsBehindTheDeadBandThatTheModelKnows) {
+// A valve lag acts on the opening that the dead band leaves of the command, not on the command.
+TEST_F(FlowEffects, LagActsBehindTheDeadBandOfTheModel) {
   CylinderSeries& c = log.cylinders[0];
   VectorXd opening = c.command;
   const std::vector<double> band{0.1, 0.15, 0.0};
@@ -118,7 +118,7 @@ TEST_F(FlowEffects, LagActsBehindTheDeadBandThatTheModelKnows) {
   const auto [exact, share] = error_and_share(opening);
   const auto [of_command, other_share] = error_and_share({});
   EXPECT_NEAR(share, 1.0, 0.01);       // Euler at a thousandth of tau
-  EXPECT_LT(3.0 * exact, of_command);  // late with what the dead band takes away as well
+  EXPECT_LT(3.0 * exact, of_command);  // that lag contains what the dead band removes as well
 }
 
 TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
@@ -136,7 +136,7 @@ TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
     const VectorXd b = scaled_least_squares(
         gains_and(columns("flow_saturation", i, 0, {limit}), static_cast<std::size_t>(i)),
         log.cylinders[static_cast<std::size_t>(i)].speed);
-    EXPECT_NEAR(b[2], 1.0, 0.02);  // gains and share settle in turns to about 1 %
+    EXPECT_NEAR(b[2], 1.0, 0.02);  // The alternating fit of gains and share converges to about 1 %.
   }
   const std::vector<double> grid = effect_named("flow_saturation").grid(log, 0, 0);
   ASSERT_FALSE(grid.empty());
@@ -147,7 +147,7 @@ TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
 }
 
 // 0.5 l/min at 100 bar of load pressure lets a 100 mm piston sink by 0.5e-3/60/A.
-TEST_F(FlowEffects, LeakLetsTheLoadSink) {
+TEST_F(FlowEffects, LeakageLowersTheLoad) {
   CylinderSeries& c = log.cylinders[0];
   const double a = machine.cylinders[0].area_piston(), b = machine.cylinders[0].area_rod();
   c.command.setZero();
@@ -157,7 +157,7 @@ TEST_F(FlowEffects, LeakLetsTheLoadSink) {
   const double k = effect_named("leakage").info().parameters[0].si * 0.5;
   EXPECT_NEAR(col(0, 0) * k, -0.5e-3 / 60.0 / a, 1e-12);
   EXPECT_NEAR(col(1999, 0) * k, 0.5e-3 / 60.0 / b, 1e-12);
-  // past the spool it leaks only while that is closed
+  // Oil leaks past the spool only while that is closed.
   c.direction.setZero();
   c.direction.head(1000).setConstant(1);
   const MatrixXd closed = columns("leakage", 0, 0, {0.0});
@@ -166,27 +166,27 @@ TEST_F(FlowEffects, LeakLetsTheLoadSink) {
 }
 
 // A chamber of 1.0 m + 5 % of 2 m at 1 GPa: 10 bar/s take 1.1 mm/s.
-TEST_F(FlowEffects, CompressedOilIsMissing) {
+TEST_F(FlowEffects, CompressedVolumeReducesTheRodSpeed) {
   CylinderSeries& c = log.cylinders[0];
   c.direction.setConstant(1);
   c.length.setConstant(1.0);
   c.pressure_a = 10e5 * log.time;
   const MatrixXd col = columns("compressibility", 0, 0, {0.0});
   EXPECT_NEAR(col(500, 0) * 1e-9, -1.1e-3, 1e-9);
-  EXPECT_EQ(col(log.runs.back().first, 0), 0.0) << "nothing is known across a gap";
+  EXPECT_EQ(col(log.runs.back().first, 0), 0.0) << "there is no rate across a gap";
   c.direction.setConstant(-1);
   c.pressure_b = -10e5 * log.time;
   EXPECT_NEAR(columns("compressibility", 0, 0, {0.0})(500, 0) * 1e-9, -1.1e-3, 1e-9);
 }
 
-// 50 bar more in a chamber of 1.1 m at 1 GPa are 5.5 mm, at once or late; also as the chamber takes over.
-TEST_F(FlowEffects, AJumpOfPressureMovesTheRodAsFarHoweverLate) {
+// 50 bar more in a chamber of 1.1 m at 1 GPa are 5.5 mm with and without lag, also when the supply chamber changes.
+TEST_F(FlowEffects, APressureStepDisplacesTheRodEquallyForEveryLag) {
   CylinderSeries& c = log.cylinders[0];
   c.length.setConstant(1.0);
   c.pressure_a = VectorXd::Constant(log.samples(), 20e5);
   c.pressure_b = VectorXd::Constant(log.samples(), 90e5);
   c.pressure_a.segment(300, log.samples() - 300).setConstant(70e5);
-  // what is measured counts, not what a filter made of it
+  // The unfiltered pressure counts.
   c.measured_a = c.pressure_a;
   c.measured_b = c.pressure_b;
   c.pressure_a.setZero();
@@ -195,14 +195,14 @@ TEST_F(FlowEffects, AJumpOfPressureMovesTheRodAsFarHoweverLate) {
   for (const double tau : {0.0, 0.2}) {
     const MatrixXd col = columns("compressibility", 0, 0, {tau});
     EXPECT_EQ(col(299, 0), 0.0);
-    // a lag sampled every 20 ms moves the sum by less than 1e-3
+    // A lag sampled every 20 ms changes the sum by less than 1e-3.
     EXPECT_NEAR(col.topRows(900).sum() * log.step * 1e-9, -5.5e-3, 6e-6) << tau;
   }
   EXPECT_LT(columns("compressibility", 0, 0, {0.2}).col(0).cwiseAbs().maxCoeff(),
             0.2 * columns("compressibility", 0, 0, {0.0}).col(0).cwiseAbs().maxCoeff());
 }
 
-TEST_F(FlowEffects, SitWhereThereIsOilAndSayNothingWithoutACommand) {
+TEST_F(FlowEffects, ActOnHydraulicCylindersAndNeedACommand) {
   for (const char* id : {"valve_deadband", "valve_lag", "leakage", "compressibility"}) {
     EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{0, 1})) << id;
     MatrixXd c;

@@ -1,5 +1,5 @@
 /// Effects of force and sensors: laws against hand cases, Jets against numeric derivatives over the registry,
-/// columns against the laws, and what an effect must not do.
+/// columns against the laws, and what an effect must leave unchanged.
 #include <gtest/gtest.h>
 
 #include "models/effects/builtin.h"
@@ -40,7 +40,7 @@ VectorXd added(const Effect& e, const Instant<double>& s, int at, std::vector<do
   return out;
 }
 
-/// Every joint swings with its own period, so that poses, speeds and accelerations vary independently.
+/// Every joint oscillates with its own period, so that poses, speeds and accelerations vary independently.
 VectorXd swinging(const Machine& machine, double t) {
   const Index n = machine.joint_count();
   VectorXd q(n), qd(n), qdd(n);
@@ -92,7 +92,7 @@ TEST_F(OneCylinder, FrictionsFollowTheirClosedForms) {
   }
 }
 
-TEST_F(OneCylinder, FrictionTakesPowerAndNeverGivesIt) {
+TEST_F(OneCylinder, FrictionOnlyDissipatesPower) {
   for (const char* id : {"coulomb_friction", "viscous_friction", "stribeck_friction",
                          "load_friction", "presliding"}) {
     const Effect& e = effect(id);
@@ -103,7 +103,7 @@ TEST_F(OneCylinder, FrictionTakesPowerAndNeverGivesIt) {
   }
 }
 
-TEST_F(OneCylinder, CushionStandsWhereStrokeOrJointEndsFirst) {
+TEST_F(OneCylinder, CushionIsAtTheFirstStopOfStrokeOrJoint) {
   Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
   const auto length = [&](double q) { return cylinder_length(machine, 0, q); };
   const bool rises = length(joint.position.hi) > length(joint.position.lo);
@@ -115,11 +115,11 @@ TEST_F(OneCylinder, CushionStandsWhereStrokeOrJointEndsFirst) {
   machine.cylinders[0].stroke.reset();
   EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
   machine.cylinders[0].length_at_zero_stroke = 0.0;
-  machine.cylinders[0].stroke = longest + 0.2;  // never driven out
+  machine.cylinders[0].stroke = longest + 0.2;  // longer than the joint permits
   EXPECT_NEAR(force_at(longest), 20e3, 1e-6);
   machine.cylinders[0].stroke = longest - 0.05;  // ends before the joint does
   EXPECT_NEAR(force_at(longest - 0.05), 20e3, 1e-6);
-  // a joint that takes the cylinder past its longest is no stop
+  // A joint that moves the cylinder beyond its greatest length is no stop.
   machine.cylinders[0].stroke.reset();
   double dead = joint.position.lo;
   for (double q = -M_PI; q < M_PI; q += 0.01) {
@@ -133,7 +133,7 @@ TEST_F(OneCylinder, CushionActsTowardsItsStopOnly) {
   machine.cylinders[0].length_at_zero_stroke = 1.5;
   machine.cylinders[0].stroke = 1.0;
   Joint& joint = machine.joints[static_cast<std::size_t>(machine.cylinders[0].joint)];
-  joint.position = {0.0, 0.0};  // the stroke alone
+  joint.position = {0.0, 0.0};  // only the stroke limits it
   const Effect& e = effect("end_cushion");
   const auto force = [&](double length, int side, double ends) {
     s.length[0] = length;
@@ -158,21 +158,21 @@ TEST(PadFriction, IsTheBeamsMomentByHand) {
       stacked(Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0, 0, 0.1), Eigen::Vector3d::Zero());
   const Instant<double> s = instant_at(machine, x, 100.0);
   const Effect& e = effect("pad_friction");
-  // the rounded corner of |moment| is off by less than its 10 N m
+  // The rounded corner of |moment| differs by less than its 10 N m.
   EXPECT_NEAR(added(e, s, 2, {0.1, 0.0})[2], 0.1 * 100 * 9.81 * 2, 0.1 * 10);
   EXPECT_NEAR(added(e, s, 2, {0.1, 1.0})[2], 0.1 * 100 * 9.81 * 3, 0.1 * 10);
   EXPECT_EQ(e.places(machine), std::vector<int>{2});
   EXPECT_TRUE(e.places(test_support::knuckle_crane()).empty());
 }
 
-TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
+TEST(StructuralFlex, LoadDeflectsTheArmInProportionToTorque) {
   const Machine machine = test_support::loader_crane();
   const VectorXd x = stacked(Eigen::Vector3d(0.4, -0.8, 2), Eigen::Vector3d::Constant(0.1),
                              Eigen::Vector3d::Zero());
   const Instant<double> s = instant_at(machine, x, 500.0);
   const double kappa = 2e-7;
   const double sag = kappa * s.static_torque[0];
-  ASSERT_GT(sag, 0.0);  // the boom's torque lifts, so the load pulls it down
+  ASSERT_GT(sag, 0.0);  // the boom's torque lifts, since the load pulls it down
   VectorXd q = x.head(3);
   q[0] -= sag;
   const VectorXd torque = static_torque<double>(machine, q, 500.0);
@@ -188,7 +188,7 @@ TEST(StructuralFlex, LoadBendsTheArmDownBySagTimesTorque) {
   }
 }
 
-TEST(MachineEffects, AreTheMachineTheyDescribe) {
+TEST(MachineEffects, EqualTheMachineTheyDescribe) {
   const Machine machine = test_support::swing_crane();
   Random random(4);
   const VectorXd q = test_support::usable_state(machine, random).head(4);
@@ -205,7 +205,7 @@ TEST(MachineEffects, AreTheMachineTheyDescribe) {
   turned[2] += 0.02;
   EXPECT_TRUE(near(changed_force(machine, effect("angle_offset"), 2, {0.02}, q, payload),
                    static_force<double>(machine, turned, payload)));
-  // the boom is the first joint to luff: a tilt of the base is an angle of the boom but for the linkage
+  // The boom is the first luffing joint: a tilt of the base equals an angle of the boom except for the linkage.
   const Machine crane = test_support::loader_crane();
   const VectorXd pose = Eigen::Vector3d(0.3, -0.7, 1.0);
   VectorXd raised = pose;
@@ -225,7 +225,7 @@ TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
   ASSERT_TRUE(e.columns(log, EvidenceKind::kFlow, 0, 0, {}, column));
   const double offset = 1e-5;
   for (Index k = 0; k < log.samples(); k += 20) {
-    // computed speed rate(q) qd minus the true one, rate(q + offset) qd
+    // The computed speed is dx/dq(q) qd, the true one dx/dq(q + offset) qd.
     const double q = log.q(k, 0), qd = log.qd(k, 0);
     const double wrong = linkage_rates(machine, 0, q).d1 * qd,
                  right = linkage_rates(machine, 0, q + offset).d1 * qd;
@@ -276,7 +276,7 @@ TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
             for (int a = 0; a < n; ++a) sum += moved[i].gradient(a) * direction[a];
             return sum;
           };
-          // linkages vary over some 0.1 rad: a step of 4e-3 and three levels leave 1e-7
+          // Linkages vary over some 0.1 rad; a step of 4e-3 with three levels leaves an error of 1e-7.
           EXPECT_NEAR(slope, numeric_derivative(value, 0.0, 4e-3), 1e-6 * scale);
           EXPECT_NEAR(curvature, numeric_derivative(jet_slope, 0.0, 4e-3),
                       1e-6 * (scale + std::abs(curvature)));
@@ -309,7 +309,7 @@ TEST(ForceEffects, ZeroParametersChangeNothing) {
   }
 }
 
-/// columns times parameters is the law, at sizes where the law is nearly linear.
+/// Columns times parameters equal the law, at sizes where the law is nearly linear.
 TEST(ForceEffects, ColumnsAreTheLaw) {
   for (const Machine& machine : {test_support::loader_crane(), test_support::swing_crane()}) {
     const MachineSeries log = swinging_log(machine);
@@ -344,7 +344,7 @@ TEST(ForceEffects, ColumnsAreTheLaw) {
             worst = std::max(worst, std::abs(sum - law[i]));
             largest = std::max(largest, std::abs(law[i]));
           }
-          // columns of angles are chords over one or two degrees, the law here a tenth of that
+          // Columns of angles are secants over one or two degrees; the law here is evaluated at a tenth of that.
           EXPECT_LE(worst, 0.05 * largest + 1e-6);
         }
       }
@@ -390,19 +390,19 @@ TEST(PressureOffset, ShowsInForceChambersAndPump) {
   EXPECT_DOUBLE_EQ(column(3, 0), -machine.cylinders[0].area_rod());
   ASSERT_TRUE(e.columns(log, EvidenceKind::kSupplyExtend, 0, 0, a, column));
   EXPECT_EQ(column(3, 0), 1.0);
-  // the chamber whose sensor is right: nothing, but by way of the force (Evidence::columns)
+  // The chamber whose sensor is right shows it only by way of the force (Evidence::columns).
   ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, a, column));
   EXPECT_EQ(column(3, 0), 0.0);
   ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, b, column));
   EXPECT_EQ(column(3, 0), 1.0);
   ASSERT_TRUE(e.columns(log, EvidenceKind::kPump, 0, 0, a, column));
-  for (Index k = 0; k < n; k += 5) {  // the demand follows the wrong reading while it extends
+  for (Index k = 0; k < n; k += 5) {  // the demand follows the wrong measurement while extending
     EXPECT_EQ(column(k, 0), log.cylinders[0].direction[k] > 0 ? -1.0 : 0.0);
   }
   EXPECT_FALSE(e.columns(log, EvidenceKind::kForce, 1, 0, a, column));
 }
 
-/// Positions read late by d: what is left between the true force and that of the logged pose gives d back.
+/// With positions late by d, the difference between the true force and that of the logged pose determines d.
 TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
   const Machine machine = test_support::loader_crane();
   for (const double delay : {0.02, 0.1, 0.2}) {
@@ -422,14 +422,14 @@ TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
         xy += column(k, 0) * left;
         xx += column(k, 0) * column(k, 0);
       }
-      EXPECT_NEAR(xy / xx, 1.0, 0.05);  // the share of the shift that is seen
+      EXPECT_NEAR(xy / xx, 1.0, 0.05);  // the share of the shift that shows
     }
   }
 }
 
-/// One joint's position read late: every cylinder's force is that of a pose with this joint elsewhere, and only its own
-/// cylinder's speed is old.
-TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
+/// With one joint's position late, every cylinder's force is that of a pose with this joint elsewhere, and only its own
+/// cylinder's speed is delayed.
+TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
   const Machine machine = test_support::loader_crane();
   const Index joints = machine.joint_count();
   const Index joint = 1;
@@ -456,7 +456,7 @@ TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
     MatrixXd alone, together;
     ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, one, alone));
     ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, all, together));
-    for (Index k = 0; k + 10 < log.samples(); ++k) {  // what was not recorded yet is not known
+    for (Index k = 0; k + 10 < log.samples(); ++k) {  // samples after the end are not known
       const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
                                .static_force[static_cast<std::size_t>(i)];
       const double y = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
@@ -474,14 +474,14 @@ TEST(SensorDelay, OfOnePositionIsToldFromThatOfAll) {
   EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
 }
 
-/// Where the command stays as it is nothing can be late: two noisy speeds say nothing there but their noise.
+/// While the command is constant a delay shows nothing: the difference of two measured speeds is noise.
 TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
   const Machine machine = test_support::loader_crane();
   MachineSeries log = log_of(
       machine, [&](double t) { return swinging(machine, t); }, 10.0, 0.02, 300.0);
   CylinderSeries& c = log.cylinders[0];
   c.command.setZero(log.samples());
-  c.command.tail(250).setConstant(0.5);  // thrown at 5 s
+  c.command.tail(250).setConstant(0.5);  // step at 5 s
   MatrixXd column;
   ASSERT_TRUE(effect("sensor_delay")
                   .columns(log, EvidenceKind::kFlow, 0, -1, std::vector<double>{0.1, 1.0}, column));
@@ -490,7 +490,7 @@ TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
   EXPECT_GT(column.middleRows(250, 20).cwiseAbs().minCoeff(), 0.0);
 }
 
-// --- words -------------------------------------------------------------------------------------------------------
+// --- texts -------------------------------------------------------------------------------------------------------
 
 TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
   for (const auto& e : effect_catalogue()) {
@@ -519,7 +519,7 @@ TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
   }
 }
 
-TEST(Catalogue, SpeaksOfBadDataAndOfTypingErrors) {
+TEST(Catalogue, ContainsSensorFaultsAndSuggestsNearIds) {
   EXPECT_NE(effect_table().find("sensor_fault:<channel>"), std::string::npos);
   EXPECT_NE(effect_entry(std::string("sensor_fault:pA_boom")).find("bad data"), std::string::npos);
   EXPECT_NE(effect_entry(std::string("coulomb_friction:boom")).find("Coulomb"), std::string::npos);

@@ -1,4 +1,5 @@
-// Effects of pressures and pumps: each law against a closed form, its derivatives, and what its columns recover.
+// Effects of pressures and pumps: each law against a closed form, its derivatives, and the parameters that its columns
+// recover.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -67,10 +68,11 @@ TEST_F(PumpEffects, TankLineIsRecoveredFromTheOthersFlow) {
       (3e5 + 1e9 * own.array() + 2e11 * own.array().square() + k * all.array().square()).matrix();
   MatrixXd x(y.size(), 4);
   x << VectorXd::Ones(y.size()), own, own.cwiseAbs2(), c;
-  EXPECT_NEAR(scaled_least_squares(x, y)[3] / k, 1.0, 1e-9);  // the same law, no noise: rounding
+  EXPECT_NEAR(scaled_least_squares(x, y)[3] / k, 1.0,
+              1e-9);  // the same law without noise: rounding only
 }
 
-TEST_F(PumpEffects, LineLossIsAskedOfThePumpOrReadAsForce) {
+TEST_F(PumpEffects, LineLossAddsToDemandOrToForce) {
   const Instant<double> s = two_cylinder_instant<double>(machine);
   const double k = 2e-3 * kBarPerLpm2, k1 = 0.1 * kBarPerLpm;
   const double q = 0.1 * a, loss = k * q * q + k1 * q;
@@ -97,7 +99,7 @@ TEST_F(PumpEffects, CounterbalanceOpensAtItsBalance) {
   const double slope = 1.0 / (ratio + phi), load = 10e3 / a;
   const double p = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
   EXPECT_NEAR(load + ratio * p + phi * p, set, 1e-3);
-  // continuous through zero load, gone where the load alone asks for more
+  // It is continuous through zero load and vanishes where the load alone requires more.
   s.force[1] = 1e-6;
   const double below = pressure("counterbalance", s, {slope * set, slope, -1.0}, 1)[1];
   s.force[1] = -1e-6;
@@ -119,7 +121,7 @@ TEST_F(PumpEffects, CounterbalanceOpensAtItsBalance) {
   }
 }
 
-TEST_F(PumpEffects, ColdOilCostsMoreAndTheReferenceTemperatureNothing) {
+TEST_F(PumpEffects, ColdOilRaisesLossesAndTheReferenceTemperatureDoesNot) {
   Instant<double> s = two_cylinder_instant<double>(machine);
   // slopes of losses of 4 and 6 bar
   const std::vector<double> p = {0.03 * 4 * kBar, 0.03 * 6 * kBar, 0.03};
@@ -163,7 +165,7 @@ TEST_F(PumpEffects, MarginGrowsWithTheWholeFlowButNotBelowStandby) {
   }
 }
 
-TEST_F(PumpEffects, PowerIsCutAtItsLimit) {
+TEST_F(PumpEffects, PressureIsCutAtThePowerLimit) {
   const Instant<double> s = two_cylinder_instant<double>(machine);
   const double asked = 85e5 * s.pump_flow[0];
   std::vector<double> out(1, 0.0);
@@ -192,7 +194,7 @@ TEST_F(PumpEffects, PowerLimitIsRecoveredAndItsGridCoversTheLog) {
   EXPECT_GT(grid.back(), power);
 }
 
-TEST_F(PumpEffects, PumpEffectsSitOnLoadSensingPumpsOnly) {
+TEST_F(PumpEffects, PumpEffectsActOnLoadSensingPumpsOnly) {
   for (const char* id : {"flow_dependent_margin", "torque_limit"}) {
     EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{0}));
     Machine constant = machine;
@@ -208,7 +210,7 @@ TEST_F(PumpEffects, PumpEffectsSitOnLoadSensingPumpsOnly) {
 }
 
 // Speeds and forces as functions of two variables; jets against central differences, for every law and branch.
-TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
+TEST_F(PumpEffects, JetsAgreeWithNumericDerivatives) {
   struct Case {
     std::string id;
     int at;
@@ -267,7 +269,7 @@ TEST_F(PumpEffects, LawsOfJetsHaveTheDerivativesOfLawsOfNumbers) {
     EXPECT_NEAR(j.hessian(0, 0), numeric_derivative(jx, x), kDerivativeTolerance * size) << law.id;
     EXPECT_NEAR(j.hessian(1, 0), numeric_derivative(jy, y), kDerivativeTolerance * size) << law.id;
 
-    // nothing of the effect changes nothing: every linear parameter zero
+    // With every linear parameter zero the effect changes nothing.
     std::vector<double> none = law.p;
     const auto& parameters = effect.info().parameters;
     for (std::size_t i = 0; i < none.size(); ++i) {

@@ -1,0 +1,82 @@
+// Parts of the evidence that depend on the load-sensing leader.
+#include "diagnosis/evidence/evidence.h"
+#include "identification/signals/load_sensing_leader.h"
+#include "identification/signals/series.h"
+
+namespace sparflow {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd acting_columns(const MatrixXd& baseline) {
+  std::vector<Index> used;
+  for (Index c = 0; c < baseline.cols(); ++c) {
+    if (baseline.col(c).cwiseAbs().maxCoeff() > 0.0) used.push_back(c);
+  }
+  return baseline(Eigen::all, used);
+}
+
+VectorXd Evidence::known(std::size_t log, EvidenceKind kind, int index) const {
+  VectorXd sum = VectorXd::Zero(series[log].samples());
+  for (const AppliedEffect& effect : known_in(log)) {
+    const VectorXd one = effect_series(effect, series[log], kind, index);
+    if (one.size() > 0) sum += one;
+  }
+  return sum;
+}
+
+MatrixXd Evidence::margins(std::size_t log, int pump) const {
+  const auto at = static_cast<std::size_t>(pump);
+  const std::vector<int>& feeds = series[log].machine->pumps[at].feeds;
+  const Eigen::VectorXi& leader = series[log].pumps[at].leader;
+  MatrixXd base(leader.size(), static_cast<Index>(feeds.size()) + 1);
+  for (std::size_t k = 0; k <= feeds.size(); ++k) {
+    const int who = k < feeds.size() ? feeds[k] : -1;
+    base.col(static_cast<Index>(k)) =
+        filter(log, EvidenceKind::kPump, (leader.array() == who).cast<double>().matrix());
+  }
+  return base;
+}
+
+std::optional<Evidence> Evidence::led_by(std::span<const AppliedEffect> found) const {
+  std::vector<std::vector<PumpSeries>> led;
+  bool changed = false;
+  for (std::size_t log = 0; log < series.size(); ++log) {
+    std::vector<AppliedEffect> acting = known_in(log);
+    if (log < suspects) acting.insert(acting.end(), found.begin(), found.end());
+    led.push_back(pumps_led_by(acting, series[log]));
+    for (std::size_t p = 0; p < led.back().size(); ++p)
+      changed = changed || led.back()[p].leader != series[log].pumps[p].leader;
+  }
+  if (!changed) return {};
+  Evidence out = *this;
+  for (std::size_t log = 0; log < series.size(); ++log) out.series[log].pumps = led[log];
+  for (EvidenceChannel& channel : out.channels) {
+    if (channel.kind != EvidenceKind::kPump) continue;
+    const auto p = static_cast<std::size_t>(channel.index);
+    channel.baseline.setZero(channel.rows(), series[0].machine->pumps[p].feeds.size() + 1);
+    for (std::size_t log = 0, seen = 0; log < series.size(); ++log) {
+      const PumpSeries& before = series[log].pumps[p];
+      if (before.demand.size() == 0 || before.pressure.size() == 0) continue;
+      const VectorXd less = before.demand - led[log][p].demand;
+      if (log < suspects && seen < channel.raw.size()) channel.raw[seen++] += less;
+      const VectorXd y = filter(log, channel.kind,
+                                less + known(log, channel.kind, channel.index) -
+                                    out.known(log, channel.kind, channel.index));
+      const MatrixXd base = out.margins(log, channel.index);
+      for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+        if (channel.log[b] != static_cast<int>(log)) continue;
+        for (Index row = channel.blocks[b].first; row < channel.blocks[b].last; ++row) {
+          const Index k = channel.sample[static_cast<std::size_t>(row)];
+          channel.y[row] += y[k];
+          channel.baseline.row(row) = base.row(k);
+        }
+      }
+    }
+    channel.baseline = acting_columns(channel.baseline);
+  }
+  return out;
+}
+
+}  // namespace sparflow

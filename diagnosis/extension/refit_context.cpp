@@ -1,0 +1,202 @@
+#include "diagnosis/extension/refit_context.h"
+
+#include <algorithm>
+
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+std::vector<MachineSignals> signals_of(const Machine& machine, const std::vector<Log>& logs,
+                                       const SignalOptions& options) {
+  std::vector<MachineSignals> out;
+  out.reserve(logs.size());
+  for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
+  return out;
+}
+
+/// Copies from `old` what a refit could not learn because the logs do not show it.
+void keep_what_was_learned(const CraneModel& old, CraneModel& model) {
+  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+    CylinderModel& c = model.cylinders[i];
+    const CylinderModel& was = old.cylinders[i];
+    if (c.extend.empty()) c.extend = was.extend;
+    if (c.retract.empty()) c.retract = was.retract;
+    if (c.margin == 0.0) c.margin = was.margin;
+    if (c.valve_gain_extend == 0.0) c.valve_gain_extend = was.valve_gain_extend;
+    if (c.valve_gain_retract == 0.0) c.valve_gain_retract = was.valve_gain_retract;
+  }
+}
+
+bool learned_from(const CraneModel& model, const Log& log) {
+  return std::any_of(model.data.begin(), model.data.end(), [&](const DataSource& d) {
+    return d.use == "train" && d.sha256 == log.sha256;
+  });
+}
+
+}  // namespace
+
+std::vector<EffectAt> places_of(const std::vector<AppliedEffect>& effects) {
+  std::vector<EffectAt> out;
+  out.reserve(effects.size());
+  for (const AppliedEffect& e : effects) out.push_back({e.effect, e.at});
+  return out;
+}
+
+RefitContext::RefitContext(const CraneModel& model, const std::vector<Log>& logs,
+                           const std::vector<Log>& references, const std::vector<Log>& tests,
+                           const ExtendOptions& options)
+    : machine_(model.machine),
+      logs_(logs),
+      reference_logs_(references),
+      tests_(tests),
+      options_(options) {
+  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
+  const SignalOptions& how = options.fit.signals;
+  signals_ = signals_of(machine_, logs, how);
+  references_ = signals_of(machine_, references, how);
+  if (!references.empty()) in_references_ = effects_in_references(model, references_);
+  test_signals_ = signals_of(machine_, tests, how);
+  if (!tests.empty()) {
+    judged_on_ = "test logs";
+    return;
+  }
+  held_ = held_out_samples(signals_, options.fit);
+  const bool any = std::any_of(held_.begin(), held_.end(), [](const Mask& m) { return m.any(); });
+  judged_on_ = any ? "held-out motions" : "training logs";
+  if (!any) held_.clear();
+}
+
+Judged RefitContext::as_it_is(const CraneModel& model, std::vector<std::string>& notes,
+                              const SearchProgress& progress) const {
+  if (!references_.empty()) return as_references_say(model, notes, progress);
+  const bool knows = std::all_of(logs_.begin(), logs_.end(),
+                                 [&](const Log& log) { return learned_from(model, log); });
+  if (held_.empty() && knows) return {model, judge(model), model.effects};
+  if (!knows) {
+    notes.push_back(
+        "the model was not learned from these logs; \"before\" is the model learned again from "
+        "them without the effect, so that the change shown is due to the effect alone");
+  }
+  Judged again =
+      with({model, {}, model.effects}, places_of(model.effects), Others::kEstimatedAnew, progress);
+  return {model, std::move(again.error), std::move(again.effects_held_out)};
+}
+
+Judged RefitContext::as_references_say(const CraneModel& model, std::vector<std::string>& notes,
+                                       const SearchProgress& progress) const {
+  const auto knows = [&](const Log& log) { return learned_from(model, log); };
+  Judged out{model, {}, model.effects};
+  if (!std::all_of(reference_logs_.begin(), reference_logs_.end(), knows) ||
+      std::any_of(logs_.begin(), logs_.end(), knows)) {
+    notes.push_back(
+        "the model was not learned from the reference logs alone: pressures, margins and gains are "
+        "learned from them first");
+    FitOptions fit_options = options_.fit;
+    fit_options.effects = model.effects;
+    fit_options.hold_out_every = 0;
+    out.model = fit(machine_, reference_logs_, {}, fit_options, progress).model;
+    out.model.steps = model.steps;
+    keep_what_was_learned(model, out.model);
+  }
+  out.error = held_.empty() ? judge(out.model)
+                            : compare_signals(out.model, signals_, held_, compare_options());
+  return out;
+}
+
+EffectEstimate RefitContext::estimate(const CraneModel& model,
+                                      const std::vector<AppliedEffect>& known,
+                                      const std::vector<EffectAt>& effects, Others others,
+                                      const std::vector<Mask>& leave_out,
+                                      const SearchProgress& progress) const {
+  const auto in = [](const auto& list, const auto& e) {
+    return std::any_of(list.begin(), list.end(),
+                       [&](const auto& o) { return o.effect == e.effect && o.at == e.at; });
+  };
+  CraneModel base = model;
+  base.effects = known;
+  // effects of the model that are not in `effects` are removed
+  std::erase_if(base.effects, [&](const AppliedEffect& k) { return !in(effects, k); });
+  std::vector<AppliedEffect> in_references = in_references_;
+  std::erase_if(in_references, [&](const AppliedEffect& k) { return !in(effects, k); });
+  std::vector<EffectAt> wanted = effects;
+  if (others == Others::kKept) wanted = {effects.back()};
+  std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
+  EffectEstimate estimate =
+      estimate_effects(base, wanted, signals_, references_, leave_out, progress, &in_references);
+  std::vector<AppliedEffect> all;
+  for (const EffectAt& e : effects) {
+    for (const auto* list : {&estimate.effects, &base.effects}) {
+      const auto it = std::find_if(list->begin(), list->end(), [&](const AppliedEffect& a) {
+        return a.effect == e.effect && a.at == e.at;
+      });
+      if (it == list->end()) continue;
+      all.push_back(*it);
+      break;
+    }
+  }
+  estimate.effects = std::move(all);
+  return estimate;
+}
+
+Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effects, Others others,
+                          const SearchProgress& progress, std::vector<std::string>* notes) const {
+  const auto part = [&](double first, double width) {
+    return [&progress, first, width](double share, const std::string& what) {
+      if (progress) progress(first + width * share, what);
+    };
+  };
+  EffectEstimate all =
+      estimate(from.model, from.model.effects, effects, others, {}, part(0.0, 0.4));
+  Judged out;
+  out.effects_held_out = held_.empty() ? all.effects
+                                       : estimate(from.model, from.effects_held_out, effects,
+                                                  others, held_, part(0.4, 0.2))
+                                             .effects;
+  if (notes != nullptr) *notes = all.notes;
+  if (!references_.empty()) {
+    out.model = from.model;
+    out.model.effects = all.effects;
+    if (held_.empty()) {
+      out.error = judge(out.model);
+    } else {
+      CraneModel without = from.model;
+      without.effects = out.effects_held_out;
+      out.error = compare_signals(without, signals_, held_, compare_options());
+    }
+    return out;
+  }
+  FitOptions fit_options = options_.fit;
+  fit_options.effects = all.effects;
+  if (held_.empty()) {
+    fit_options.hold_out_every = 0;
+  } else {
+    fit_options.effects_held_out = out.effects_held_out;
+  }
+  FitResult fitted = fit(machine_, logs_, tests_, fit_options, part(0.6, 0.4));
+  out.model = std::move(fitted.model);
+  out.model.steps = from.model.steps;
+  keep_what_was_learned(from.model, out.model);
+  out.error = fitted.held_out ? std::move(*fitted.held_out) : judge(out.model);
+  return out;
+}
+
+std::vector<DataSource> RefitContext::data() const {
+  std::vector<DataSource> out;
+  for (const Log& l : logs_) out.push_back({l.file, l.sha256, l.samples(), "train"});
+  for (const Log& l : tests_) out.push_back({l.file, l.sha256, l.samples(), "test"});
+  return out;
+}
+
+CompareOptions RefitContext::compare_options() const {
+  CompareOptions o;
+  o.signals = options_.fit.signals;
+  o.find_regions = false;
+  return o;
+}
+
+CompareResult RefitContext::judge(const CraneModel& model) const {
+  return compare_signals(model, tests_.empty() ? signals_ : test_signals_, {}, compare_options());
+}
+
+}  // namespace sparflow

@@ -1,0 +1,73 @@
+#pragma once
+/// The refit context: logs, options and held-out motions of one extension, on which models with other effects are
+/// learned and judged. Used by extend.cpp only.
+#include <string>
+#include <vector>
+
+#include "diagnosis/extension/extend.h"
+#include "diagnosis/selection/effect_estimate.h"
+
+namespace sparflow {
+
+/// The model's effects without their values, in its order.
+std::vector<EffectAt> places_of(const std::vector<AppliedEffect>& effects);
+
+/// A model with its error on the data it is judged by.
+struct Judged {
+  CraneModel model;
+  CompareResult error;
+  /// Its effects estimated without the held-out motions; as in the model where nothing is held out.
+  std::vector<AppliedEffect> effects_held_out;
+};
+
+/// What happens to a model's effects when another is added.
+enum class Others { kEstimatedAnew, kKept };
+
+class RefitContext {
+ public:
+  /// @param references when empty, everything is learned again for each model, else only the effects' parameters are
+  RefitContext(const CraneModel& model, const std::vector<Log>& logs,
+               const std::vector<Log>& references, const std::vector<Log>& tests,
+               const ExtendOptions& options);
+
+  const std::string& judged_on() const { return judged_on_; }
+
+  /// The model that a first step is compared with. It is the model as it is when it was learned from these logs and
+  /// test logs judge it, else the model learned again from them with its own effects, so that a change of logs does not
+  /// count as an improvement by an effect. With references, it is the model as it is when it was learned from them and
+  /// not from the logs with the effects, else the model learned from the references.
+  /// @param notes gets a sentence when the model had to be learned again
+  Judged as_it_is(const CraneModel& model, std::vector<std::string>& notes,
+                  const SearchProgress& progress) const;
+
+  /// Estimates these effects and learns everything else with them. What the logs do not show stays as in `from`.
+  /// @param others kKept: only the last of `effects` is estimated, and those before it keep the model's values
+  /// @param notes gets those of the estimate; may be null
+  Judged with(const Judged& from, const std::vector<EffectAt>& effects, Others others,
+              const SearchProgress& progress, std::vector<std::string>* notes = nullptr) const;
+
+  /// Training and test logs, for the record.
+  std::vector<DataSource> data() const;
+
+ private:
+  EffectEstimate estimate(const CraneModel& model, const std::vector<AppliedEffect>& known,
+                          const std::vector<EffectAt>& effects, Others others,
+                          const std::vector<Mask>& leave_out, const SearchProgress& progress) const;
+  Judged as_references_say(const CraneModel& model, std::vector<std::string>& notes,
+                           const SearchProgress& progress) const;
+  CompareOptions compare_options() const;
+  CompareResult judge(const CraneModel& model) const;
+
+  const Machine& machine_;
+  const std::vector<Log>& logs_;
+  const std::vector<Log>& reference_logs_;
+  const std::vector<Log>& tests_;
+  const ExtendOptions& options_;
+  std::vector<MachineSignals> signals_, references_, test_signals_;
+  std::vector<AppliedEffect>
+      in_references_;       // effects that act in the references, whose values stay
+  std::vector<Mask> held_;  // held-out samples, by log; empty: nothing is held out
+  std::string judged_on_;
+};
+
+}  // namespace sparflow

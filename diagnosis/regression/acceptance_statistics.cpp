@@ -1,0 +1,234 @@
+#include "diagnosis/regression/acceptance_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/math/linear_algebra.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Least model-form error of the fitted law of a loss, a valve or a sensor, as a share of the effect. Weights are
+/// exact, and friction laws declare their own model-form error.
+constexpr double kLeastForm = 0.1;
+
+struct Layout {  // of the designs' parameters
+  std::vector<Index> first;
+  Index count = 0;
+  explicit Layout(const std::vector<const EffectDesign*>& designs) {
+    for (const EffectDesign* d : designs) {
+      first.push_back(count);
+      count += d->linear;
+    }
+  }
+};
+
+/// Solves n x = g with a ridge that only matters where the data do not determine x.
+VectorXd solve(MatrixXd n, const VectorXd& g) {
+  if (g.size() == 0) return g;
+  const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  n = scale.asDiagonal() * n * scale.asDiagonal();
+  n.diagonal().array() += 1e-9;
+  return scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
+}
+
+double size_where_it_acts(const VectorXd& action) {
+  return std::sqrt(action.array().pow(4).sum() / action.squaredNorm());
+}
+
+}  // namespace
+
+double form_share(const Effect& effect) {
+  const bool exact = effect.changes_machine() || effect.info().stage == EffectStage::kForce;
+  return exact ? effect.info().form_error : std::max(effect.info().form_error, kLeastForm);
+}
+
+EffectDesign other_power(const EffectDesign& design, const VectorXd& theta) {
+  constexpr double kPower = 0.2;
+  const Effect& effect = *design.effect.effect;
+  EffectDesign result;
+  result.columns.resize(design.columns.size());
+  if (effect.changes_machine() || effect.columns_filtered()) return result;
+  for (std::size_t c = 0; c < design.columns.size(); ++c) {
+    if (!design.touches(c)) continue;
+    const VectorXd action = design.columns[c] * theta;
+    const double size = std::sqrt(
+        action.squaredNorm() / std::max<double>(1.0, (action.array() != 0.0).cast<double>().sum()));
+    if (!(size > 0.0)) continue;
+    result.columns[c] = action.unaryExpr(
+        [&](double a) { return a == 0.0 ? 0.0 : a * std::log(std::abs(a) / size); });
+  }
+  result.linear = 1;
+  result.lower = {-kPower};
+  result.upper = {kPower};
+  return result;
+}
+
+EffectAction effect_action(const Evidence& evidence,
+                           const std::vector<const EffectDesign*>& designs, std::size_t index,
+                           const EffectFit& fit) {
+  const Layout layout(designs);
+  const auto acts_in = [&](std::size_t k, std::size_t c) {
+    return VectorXd(designs[k]->columns[c] *
+                    fit.theta.segment(layout.first[k], designs[k]->linear));
+  };
+  EffectAction action;
+  double whole = 0.0, left = 0.0, most = 0.0, fourth = 0.0, form = 0.0;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    if (!designs[index]->touches(c)) continue;
+    const EvidenceChannel& channel = evidence.channels[c];
+    const double noise = fit.noise[c].deviation();
+    VectorXd own = acts_in(index, c);
+    const double here = own.squaredNorm();
+    whole += here / (noise * noise);
+    if (channel.baseline.cols() > 0) own -= channel.baseline * least_squares(channel.baseline, own);
+    const double squares = own.squaredNorm();
+    left += squares / (noise * noise);
+    if (!(squares > 0.0)) continue;
+    if (squares / (noise * noise) > most) {
+      most = squares / (noise * noise);
+      action.absorbed_where_seen = 1.0 - squares / here;
+    }
+    action.size = std::max(action.size, size_where_it_acts(own) / noise);
+    fourth += own.array().pow(4).sum() / std::pow(noise, 4);
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
+      const VectorXd wrong = form_share(*designs[k]->effect.effect) / noise * acts_in(k, c);
+      form += (wrong.cwiseProduct(own) / noise).squaredNorm();
+    }
+  }
+  action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
+  if (form > 0.0) action.over_form = std::sqrt(fourth / form);
+  return action;
+}
+
+bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>& theta) {
+  for (Index k = 0; k < design.linear; ++k) {
+    const double lo = design.lower[static_cast<std::size_t>(k)];
+    const double hi = design.upper[static_cast<std::size_t>(k)];
+    const double edge = 1e-6 * (hi - lo);
+    if (theta[k] > hi - edge || (lo > 0.0 && theta[k] < lo + edge)) return true;
+  }
+  return false;
+}
+
+HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+                          std::size_t index, const EffectFit& fit, int folds) {
+  const Layout layout(designs);
+  const std::size_t channels = evidence.channels.size();
+  std::vector<MatrixXd> rows(channels);
+  std::vector<std::vector<Index>> owner(channels);
+  const auto count = static_cast<std::size_t>(folds);
+  std::vector<MatrixXd> n(count, MatrixXd::Zero(layout.count, layout.count));
+  std::vector<VectorXd> g(count, VectorXd::Zero(layout.count));
+  std::vector<bool> used(channels, false);
+  for (std::size_t c = 0; c < channels; ++c) {
+    Index width = 0;
+    for (const EffectDesign* d : designs) width += d->columns[c].cols();
+    if (width == 0) continue;
+    used[c] = true;
+    MatrixXd columns(evidence.channels[c].rows(), width);
+    Index at = 0;
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      const Index w = designs[k]->columns[c].cols();
+      if (w > 0) columns.middleCols(at, w) = designs[k]->columns[c];
+      for (Index i = 0; i < w; ++i) owner[c].push_back(layout.first[k] + i);
+      at += w;
+    }
+    rows[c] = whitened_rows(evidence.channels[c], fit.noise[c], columns) /
+              std::sqrt(fit.noise[c].variance);
+    for (std::size_t b = 0; b < evidence.channels[c].blocks.size(); ++b) {
+      const NoiseBlock& block = evidence.channels[c].blocks[b];
+      const MatrixXd part = rows[c].middleRows(block.first, block.last - block.first);
+      const MatrixXd cross = transposed_product(part.leftCols(width), part);
+      for (Index i = 0; i < width; ++i) {
+        const Index oi = owner[c][static_cast<std::size_t>(i)];
+        g[b % count][oi] += cross(i, width);
+        for (Index j = 0; j < width; ++j)
+          n[b % count](oi, owner[c][static_cast<std::size_t>(j)]) += cross(i, j);
+      }
+    }
+  }
+  MatrixXd n_all = MatrixXd::Zero(layout.count, layout.count);
+  VectorXd g_all = VectorXd::Zero(layout.count);
+  for (std::size_t f = 0; f < count; ++f) {
+    n_all += n[f];
+    g_all += g[f];
+  }
+  std::vector<Index> others;
+  for (Index i = 0; i < layout.count; ++i) {
+    if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
+      others.push_back(i);
+  }
+  std::vector<double> gains;
+  for (std::size_t f = 0; f < count; ++f) {
+    const MatrixXd nf = n_all - n[f];
+    const VectorXd gf = g_all - g[f];
+    const VectorXd with = solve(nf, gf);
+    VectorXd without = VectorXd::Zero(layout.count);
+    const VectorXd reduced = solve(nf(others, others), gf(others));
+    for (std::size_t i = 0; i < others.size(); ++i)
+      without[others[i]] = reduced[static_cast<Index>(i)];
+    // squared error on the fold, up to a constant: theta'N theta - 2 g'theta
+    const auto error = [&](const VectorXd& theta) {
+      return theta.dot(n[f] * theta) - 2.0 * g[f].dot(theta);
+    };
+    gains.push_back(0.5 * (error(without) - error(with)));
+  }
+  HeldOutGain result;
+  double squares = 0.0;
+  for (const double v : gains) {
+    result.gain += v;
+    result.improved += v > 0.0 ? 1.0 / static_cast<double>(folds) : 0.0;
+  }
+  const double mean = result.gain / static_cast<double>(folds);
+  for (const double v : gains) squares += (v - mean) * (v - mean);
+  result.error = std::sqrt(squares * static_cast<double>(folds) /
+                           std::max(1.0, static_cast<double>(folds) - 1.0));
+  return result;
+}
+
+std::vector<bool> shape_choices(const Effect& effect) {
+  std::vector<bool> choices;
+  for (const EffectParameter& p : effect.info().parameters) {
+    if (!p.linear) choices.push_back(p.choice);
+  }
+  return choices;
+}
+
+EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
+                               const VectorXd& theta) {
+  EffectDesign result = design;
+  const std::vector<bool> choices = shape_choices(*design.effect.effect);
+  for (std::size_t s = 0; s < design.shape.size(); ++s) {
+    const double h = 0.02 * std::max(std::abs(design.shape[s]), 1e-9);
+    std::vector<double> up = design.shape, down = design.shape;
+    up[s] += h;
+    down[s] -= h;
+    const EffectDesign a = make_design(evidence, design.effect, up),
+                       b = make_design(evidence, design.effect, down);
+    const bool choice = choices[s];
+    for (std::size_t c = 0; c < design.columns.size(); ++c) {
+      if (!design.touches(c)) continue;
+      VectorXd slope = VectorXd::Zero(evidence.channels[c].rows());
+      if (a.touches(c)) slope += a.columns[c] * theta;
+      if (b.touches(c)) slope -= b.columns[c] * theta;
+      slope /= 2.0 * h;
+      if (choice) slope.setZero();
+      MatrixXd wider(slope.size(), result.columns[c].cols() + 1);
+      wider << result.columns[c], slope;
+      result.columns[c] = std::move(wider);
+    }
+    ++result.linear;
+    result.lower.push_back(-std::numeric_limits<double>::max());
+    result.upper.push_back(std::numeric_limits<double>::max());
+  }
+  return result;
+}
+
+}  // namespace sparflow

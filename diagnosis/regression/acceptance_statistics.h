@@ -1,0 +1,56 @@
+#pragma once
+/// Statistics of the acceptance tests of one effect beside its gain: size where it acts, absorbed share, gain on
+/// motions left out; and the derivatives from which nonlinear parameters get an interval.
+#include <vector>
+
+#include "diagnosis/regression/effect_fit.h"
+
+namespace sparflow {
+
+struct EffectAction {
+  /// [-] largest over channels of sqrt(sum c^4 / sum c^2) / noise, c = action of the effect less its projection on the
+  /// baseline. The fourth powers measure the size where the effect acts: a lag shows only for a second after a step.
+  double size = 0.0;
+  double absorbed = 0.0;  ///< 0..1 absorbed share over all channels, each in units of its noise
+  double absorbed_where_seen =
+      1.0;  ///< 0..1 absorbed share in the channel in which most of the effect remains
+  /// [-] size of the effect where it acts, divided by the model-form error of the other effects there (their
+  /// form_error times their action). An effect that is small by this measure compensates model-form error.
+  double over_form = 1e9;
+};
+
+/// @param index the effect's index in `designs`  @param fit of all designs
+EffectAction effect_action(const Evidence& evidence,
+                           const std::vector<const EffectDesign*>& designs, std::size_t index,
+                           const EffectFit& fit);
+
+/// Model-form error as a share of the effect: how much its fitted law may still differ from the machine's, by sample.
+double form_share(const Effect& effect);
+
+/// First-order change of an effect when its law has another exponent: the action times the logarithm of its size, one
+/// column in each channel. The bounds cover the published exponents (friction with v^0.85 instead of v, pipes with
+/// Q^1.75 instead of Q^2). Effects whose law has no free exponent (weights, inertia) get no columns.
+/// @param theta linear parameters of the design [SI]
+EffectDesign other_power(const EffectDesign& design, const Eigen::VectorXd& theta);
+
+/// Whether one of the design's linear parameters lies on its bound. A lower bound of zero does not count: it means that
+/// the effect is absent.
+bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::VectorXd>& theta);
+
+struct HeldOutGain {
+  double gain = 0.0, error = 0.0;  ///< [nats] sum over folds and its standard error
+  double improved = 0.0;           ///< 0..1 share of folds whose error it reduces
+};
+
+/// Gain of one design by cross-validation over blocks of motion, with the noise models of `fit`.
+HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+                          std::size_t index, const EffectFit& fit, int folds);
+
+/// For each nonlinear parameter, whether it is a choice among variants of a law instead of a continuous value.
+std::vector<bool> shape_choices(const Effect& effect);
+
+/// The design with one more column for each nonlinear parameter: d(action)/d(parameter) at `theta` [SI].
+EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
+                               const Eigen::VectorXd& theta);
+
+}  // namespace sparflow

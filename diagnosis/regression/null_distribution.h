@@ -1,0 +1,43 @@
+#pragma once
+/// Null distribution of the largest gain: how large the best gain of a whole search gets when nothing is missing. It is
+/// simulated on the log's own motions and accounts for the number of candidates, their grids and their correlation.
+#include <random>
+#include <vector>
+
+#include "diagnosis/regression/effect_fit.h"
+
+namespace sparflow {
+
+struct NullDistribution {
+  std::vector<double> normal;  ///< [nats] simulated with independent normal innovations, sorted
+  std::vector<double>
+      flipped;  ///< [nats] from the log's residuals with random signs of whole motions, sorted
+  /// By candidate: ratio of its gains on flipped residuals to those on normal innovations, at least one. A residual
+  /// that still contains other effects, or whole motions in error, makes large gains in its own channels; division by
+  /// this ratio keeps them from raising the threshold of candidates in other channels.
+  std::vector<double> scale;
+  std::vector<double> penalty;  ///< [nats] by candidate, as given
+
+  /// Threshold of the scaled, penalised gain for a false-alarm rate `level` (0..1). [nats]
+  double threshold(double level) const;
+  /// p-value of a candidate's penalised gain [nats]: the larger of those by `normal` and by `flipped`.
+  double p_value(double gain, std::size_t candidate) const;
+};
+
+/// One candidate: its designs over the grid of nonlinear parameters, and its penalty.
+struct NullCandidate {
+  const std::vector<EffectDesign>* designs = nullptr;
+  double penalty = 0.0;           ///< [nats]
+  double optional_penalty = 0.0;  ///< [nats] further penalty of designs with optional parameters
+};
+
+/// @param accepted effects already in the fit, which the candidates' columns are made orthogonal to
+/// @param fit with the noise models of the channels
+
+NullDistribution simulate_null_distribution(const Evidence& evidence,
+                                            const std::vector<NullCandidate>& candidates,
+                                            const std::vector<const EffectDesign*>& accepted,
+                                            const EffectFit& fit, int simulations,
+                                            std::mt19937_64& random);
+
+}  // namespace sparflow

@@ -1,0 +1,190 @@
+#include "diagnosis/residual/residual_oscillation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+/// Least ratio of a line to the median of its surroundings. By chance it is exceeded once in a hundred channels of 2000
+/// rows (exponential distribution: 2^-(ratio) for each frequency).
+constexpr double kLineRatio = 18.0;
+
+}  // namespace
+
+Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel) {
+  Oscillation best;
+  for (std::size_t log = 0; log < channel.raw.size(); ++log) {
+    const MachineSeries& s = evidence.series[log];
+    const auto half = static_cast<Index>(std::lround(0.5 / s.step));
+    const auto longest = static_cast<Index>(std::lround(0.7 / s.step)),
+               shortest = std::max<Index>(2, static_cast<Index>(std::lround(0.05 / s.step)));
+    VectorXd c = VectorXd::Zero(longest + 1);
+    double n = 0.0, white = 0.0, differences = 0.0;
+    for (const auto& [first, last] : s.runs) {
+      const Index length = last - first;
+      if (length < 8 * half) continue;
+      const VectorXd x = channel.raw[log].segment(first, length);
+      VectorXd h = VectorXd::Constant(length, std::numeric_limits<double>::quiet_NaN());
+      for (Index i = half; i + half < length; ++i)
+        h[i] = x[i] - x.segment(i - half, 2 * half + 1).mean();
+      // starts and stops of motions are steps, not oscillations: values above five robust deviations are left out
+      std::vector<double> sizes;
+      for (const double v : h) {
+        if (std::isfinite(v)) sizes.push_back(std::abs(v));
+      }
+      if (sizes.size() < 200) continue;
+      const double usual =
+          1.4826 * median(Eigen::Map<VectorXd>(sizes.data(), static_cast<Index>(sizes.size())));
+      for (Index i = 0; i + longest < length; ++i) {
+        if (!(std::abs(h[i]) < 5.0 * usual)) continue;
+        bool whole = true;
+        for (Index l = 0; l <= longest && whole; ++l) whole = std::abs(h[i + l]) < 5.0 * usual;
+        if (!whole) continue;
+        for (Index l = 0; l <= longest; ++l) c[l] += h[i] * h[i + l];
+        n += 1.0;
+      }
+      for (Index i = 3; i < length; ++i) {
+        const double d = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
+        if (!std::isfinite(d)) continue;
+        white += std::min(d * d / 20.0, 25.0 * usual * usual);
+        differences += 1.0;
+      }
+    }
+    if (n < 200.0) continue;
+    c /= n;
+    white /= differences;
+    const double coloured = c[0] - white;
+    if (coloured < 0.5 * white) continue;  // no larger than the noise
+    for (Index l = shortest; l < longest; ++l) {
+      if (c[l] / coloured < best.dip && c[l] <= c[l - 1] && c[l] <= c[l + 1]) {
+        best = {c[l] / coloured, 0.5 / (static_cast<double>(l) * s.step), std::sqrt(coloured),
+                std::sqrt(white)};
+      }
+    }
+  }
+  return best;
+}
+
+std::vector<Index> suspect_rows(const Evidence& evidence, const EvidenceChannel& channel) {
+  std::vector<Index> rows;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
+    for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) rows.push_back(i);
+  }
+  return rows;
+}
+
+Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
+                    const VectorXd& residual) {
+  const std::vector<Index> rows = suspect_rows(evidence, channel);
+  const auto n = static_cast<double>(rows.size());
+  if (n < 100) return {};
+  // phases differ between logs, so power is summed over logs
+  const double step = evidence.stride * evidence.series[0].step;
+  const double span = n * step;
+  const double highest = 0.45 / step;
+  const auto count = static_cast<int>(std::min(4000.0, 2.0 * highest * span));
+  std::vector<double> power(static_cast<std::size_t>(count), 0.0);
+  std::vector<std::vector<Index>> by_log(evidence.suspects);
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
+    for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) {
+      by_log[static_cast<std::size_t>(channel.log[b])].push_back(i);
+    }
+  }
+  const double mean = residual(rows).mean();
+  const double total = (residual(rows).array() - mean).square().sum();
+  if (total <= 0.0) return {};
+  for (int k = 1; k < count; ++k) {
+    const double f = highest * k / count;
+    for (std::size_t log = 0; log < by_log.size(); ++log) {
+      const MachineSeries& s = evidence.series[log];
+      double c = 0.0, d = 0.0;
+      if (by_log[log].size() < 50) continue;
+      for (const Index i : by_log[log]) {
+        const double phase =
+            2.0 * std::numbers::pi * f * s.time[channel.sample[static_cast<std::size_t>(i)]];
+        c += (residual[i] - mean) * std::cos(phase);
+        d += (residual[i] - mean) * std::sin(phase);
+      }
+      power[static_cast<std::size_t>(k)] +=
+          2.0 * (c * c + d * d) / static_cast<double>(by_log[log].size());
+    }
+  }
+  Line best;
+  for (int k = 1; k < count; ++k) {
+    const int half = std::max(20, count / 40);
+    const int lo = std::max(1, k - half), hi = std::min(count, k + half);
+    std::vector<double> around(power.begin() + lo, power.begin() + hi);
+    std::nth_element(around.begin(),
+                     around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
+    const double median = around[around.size() / 2];
+    const double share = power[static_cast<std::size_t>(k)] / total;
+    // less than 20 periods in the log: slow drifts are left to the flexible model
+    if (highest * k / count * span > 20.0 &&
+        power[static_cast<std::size_t>(k)] > kLineRatio * median && share > best.share) {
+      best = {highest * k / count, share};
+    }
+  }
+  return best;
+}
+
+Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
+                      const VectorXd& residual) {
+  constexpr double kSecond = 1.0;
+  constexpr std::size_t kFewest = 20;  // seconds of motion, for a meaningful median
+  struct Second {
+    std::size_t block;
+    Index first, last;
+    double power;
+  };
+  const auto length = std::max<Index>(
+      2, static_cast<Index>(std::lround(kSecond / (evidence.stride * evidence.series[0].step))));
+  std::vector<Second> seconds;
+  double total = 0.0, rows = 0.0;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
+    const NoiseBlock& block = channel.blocks[b];
+    total += residual.segment(block.first, block.last - block.first).squaredNorm();
+    rows += static_cast<double>(block.last - block.first);
+    for (Index i = block.first; i + length <= block.last; i += length) {
+      const double power = residual.segment(i, length).squaredNorm() / static_cast<double>(length);
+      seconds.push_back({b, i, i + length, power});
+    }
+  }
+  if (seconds.size() < kFewest) return {};
+  std::vector<double> powers;
+  powers.reserve(seconds.size());
+  for (const Second& s : seconds) powers.push_back(s.power);
+  const double noise = std::isfinite(channel.noise_floor) ? channel.noise_floor : 0.0;
+  const double usual = std::max(
+      {std::sqrt(median(Eigen::Map<VectorXd>(powers.data(), static_cast<Index>(powers.size())))),
+       noise, 1e-300});
+  auto from = std::max_element(seconds.begin(), seconds.end(),
+                               [](const Second& a, const Second& b) { return a.power < b.power; });
+  Event event;
+  event.times = std::sqrt(from->power) / usual;
+  // neighbouring seconds whose RMS is twice the median or more belong to the event
+  const auto out = [&](const Second& s) { return s.power > 4.0 * usual * usual; };
+  auto to = from;
+  while (from != seconds.begin() && (from - 1)->block == from->block && out(*(from - 1))) --from;
+  while (to + 1 != seconds.end() && (to + 1)->block == to->block && out(*(to + 1))) ++to;
+  if (from == to) return {};  // a short impact: an end stop, a sudden command
+  const double inside = residual.segment(from->first, to->last - from->first).squaredNorm();
+  event.rms = std::sqrt(inside / rows);
+  event.rest = std::sqrt(std::max(0.0, total - inside) / rows);
+  event.log = static_cast<std::size_t>(channel.log[from->block]);
+  const VectorXd& time = evidence.series[event.log].time;
+  event.from = time[channel.sample[static_cast<std::size_t>(from->first)]];
+  event.to = time[channel.sample[static_cast<std::size_t>(to->last - 1)]];
+  return event;
+}
+
+}  // namespace sparflow

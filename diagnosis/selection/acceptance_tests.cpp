@@ -1,0 +1,56 @@
+#include "diagnosis/selection/acceptance_tests.h"
+
+#include <fmt/format.h>
+
+#include "diagnosis/regression/acceptance_statistics.h"
+
+namespace sparflow {
+
+using Eigen::Index;
+
+void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
+                  const std::vector<const EffectDesign*>& designs, std::size_t index,
+                  FoundEffect& found) {
+  const EffectAction action = effect_action(evidence, designs, index, fit);
+  found.size = action.size;
+  found.absorbed = action.absorbed;
+  found.absorbed_where_seen = action.absorbed_where_seen;
+  found.over_form = action.over_form;
+  Index first = 0;
+  for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
+  found.at_bound = rests_on_bound(found.design, fit.theta.segment(first, found.design.linear));
+  const HeldOutGain held = held_out_gain(evidence, designs, index, fit, options.folds);
+  found.held_out = held.gain;
+  found.held_out_error = held.error;
+  found.held_out_share = held.improved;
+}
+
+std::string why_not_named(const FoundEffect& found, const SearchOptions& options) {
+  const EffectStage stage = found.design.effect.effect->info().stage;
+  const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+  if (behind_process && found.absorbed_where_seen > options.largest_absorbed) {
+    return fmt::format(
+        "its absorbed share is {:.0f} % (learning pressure models, margins and gains again would "
+        "take that part over); a reference log would decide",
+        100.0 * found.absorbed_where_seen);
+  }
+  if (found.size < options.smallest_effect) {
+    return fmt::format("where it acts it is {:.2f} times the noise, too small to be named",
+                       found.size);
+  }
+  if (found.at_bound) return "a parameter lies on the bound of its plausible range";
+  if (found.over_form < options.smallest_over_form) {
+    return fmt::format(
+        "it compensates model-form error: it is only {:.1f} times that of the other effects there",
+        found.over_form);
+  }
+  // one standard error above zero or, where a few large steps carry all evidence, positive in nearly all folds
+  if (found.held_out <= found.held_out_error &&
+      !(found.held_out > 0.0 && found.held_out_share > 0.79)) {
+    return fmt::format("its gain on motions left out, {:.1f} +- {:.1f} nats, is not significant",
+                       found.held_out, found.held_out_error);
+  }
+  return {};
+}
+
+}  // namespace sparflow

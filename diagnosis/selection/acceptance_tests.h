@@ -1,0 +1,19 @@
+#pragma once
+/// Acceptance tests of a found effect, and in words which of them it fails. Used by the search only.
+#include <string>
+#include <vector>
+
+#include "diagnosis/selection/effect_search.h"
+
+namespace sparflow {
+
+/// Fills in size, absorbed share, held-out gain and whether a parameter of `found` lies on its bound.
+/// @param fit of all `designs`  @param index of `found` among them
+void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
+                  const std::vector<const EffectDesign*>& designs, std::size_t index,
+                  FoundEffect& found);
+
+/// @return the reason why an effect is not named, as part of a sentence; empty when it passes all acceptance tests
+std::string why_not_named(const FoundEffect& found, const SearchOptions& options);
+
+}  // namespace sparflow

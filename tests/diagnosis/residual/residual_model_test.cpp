@@ -1,0 +1,277 @@
+#include "diagnosis/residual/residual_model.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "diagnosis/residual/residual_oscillation.h"
+#include "models/effects/memory.h"
+#include "tests/diagnosis/evidence_support.h"
+#include "tests/diagnosis/hidden_case.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const CraneModel& model() {
+  static const CraneModel m = [] {
+    CraneModel crane = CraneModel::untrained(testing_support::drawn_machine("loader_crane"));
+    for (auto& c : crane.cylinders) c.margin = 15e5;
+    return crane;
+  }();
+  return m;
+}
+
+/// The motions of a log of 90 s; what its channels measured is replaced by what a test wants to be left over.
+const Evidence& motions() {
+  static const Evidence e = collect_evidence(
+      model(), {make_signals(model().machine,
+                             testing_support::hidden_case(model().machine, {}, 5, 90.0).train)});
+  return e;
+}
+
+/// Noise as machines leave it, unit size, in every channel; before the filter white.
+struct Left {
+  Evidence evidence = motions();
+  EffectFit fit;
+
+  explicit Left(unsigned seed) {
+    std::mt19937_64 random(seed);
+    NoiseModel noise;
+    noise.phi1 = 0.4;
+    noise.variance = 1.0 - 0.16;
+    for (EvidenceChannel& c : evidence.channels) {
+      const double size = c.unit.si;  // newtons, millimetres a second, bars
+      fit.noise.push_back(noise);
+      fit.noise.back().variance *= size * size;
+      fit.residual.push_back(size * testing_support::draw(noise, c.blocks, random));
+      for (VectorXd& raw : c.raw) raw = size * testing_support::white(raw.size(), random);
+    }
+  }
+  std::size_t channel(EvidenceKind kind, int index) const {
+    for (std::size_t k = 0; k < evidence.channels.size(); ++k) {
+      if (evidence.channels[k].kind == kind && evidence.channels[k].index == index) return k;
+    }
+    throw std::logic_error("no such channel");
+  }
+  /// Adds size * of(sample), in the channel's unit.
+  template <class F>
+  void add(std::size_t c, double size, const F& of) {
+    const EvidenceChannel& e = evidence.channels[c];
+    for (Index i = 0; i < e.rows(); ++i)
+      fit.residual[c][i] += e.unit.si * size * of(e.sample[static_cast<std::size_t>(i)]);
+  }
+};
+
+TEST(ResidualModel, NoiseIsNoRiddle) {
+  int unmodelled = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Left left(seed);
+    unmodelled += find_residual_structure(left.evidence, left.fit).empty() ? 0 : 1;
+  }
+  // a tenth of a channel's variance on motions left out: chance does not do that in some ten channels
+  EXPECT_LE(unmodelled, 1) << "of 12 logs with nothing but coloured noise";
+}
+
+TEST(ResidualModel, ASineIsFoundWithItsFrequency) {
+  for (const double hz : {0.8, 1.7}) {
+    Left left(20);
+    const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+    const VectorXd& time = left.evidence.series[0].time;
+    left.add(c, 1.0,
+             [&](Index k) { return std::sin(2.0 * std::numbers::pi * hz * time[k] + 1.0); });
+    const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
+    ASSERT_FALSE(found.empty()) << hz;
+    EXPECT_EQ(found[0].channel, c);
+    // a line is as wide as one over the log's length, 90 s
+    EXPECT_NEAR(found[0].frequency, hz, 0.02);
+    EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("time")));
+    // variance of the sine 0.5 beside 1 of noise; a line's share is known to some 15 %
+    EXPECT_NEAR(found[0].explained, 0.33, 0.12);
+    EXPECT_NEAR(found[0].rms, std::sqrt(0.5) * 1e5, 0.25 * std::sqrt(0.5) * 1e5);
+  }
+}
+
+TEST(ResidualModel, ASwingWhoseFrequencyWandersIsFound) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  Left left(21);
+  const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+  EvidenceChannel& channel = left.evidence.channels[c];
+  const double hz = 1.8;
+  for (std::size_t log = 0; log < channel.raw.size(); ++log) {
+    const double step = left.evidence.series[log].step;
+    double phase = 0.0;
+    for (double& v : channel.raw[log]) {
+      // loses its phase within some two seconds: no line in a periodogram of 90 s
+      phase += 2.0 * std::numbers::pi * hz * step + 1.0 * std::sqrt(step) * normal(random);
+      v += 2.5e5 * std::sin(phase);
+    }
+  }
+  const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_NEAR(found[0].frequency, hz, 0.3 * hz);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("oscillation")));
+}
+
+TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {
+  // Two runs of the same length, the second with three times the noise of the first: variance (1 + 9) / 2.
+  Left left(31);
+  const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+  EvidenceChannel& channel = left.evidence.channels[c];
+  ASSERT_EQ(channel.raw.size(), 1U);
+  MachineSeries& series = left.evidence.series[0];
+  VectorXd& raw = channel.raw[0];
+  const Index middle = raw.size() / 2;
+  series.runs = {{0, middle}, {middle, raw.size()}};
+  std::mt19937_64 random(4);
+  const double size = 0.2e5, hz = 1.8;
+  raw = size * testing_support::white(raw.size(), random);
+  raw.tail(raw.size() - middle) *= 3.0;
+  for (Index i = 0; i < raw.size(); ++i)
+    raw[i] += 2.5e5 * std::sin(2.0 * std::numbers::pi * hz * series.step * static_cast<double>(i));
+  const Swing swing = strongest_swing(left.evidence, channel);
+  EXPECT_NEAR(swing.frequency, hz, 0.1 * hz);
+  // standard error of the variance: some 3 % at 2000 samples a run, twice that with third differences
+  EXPECT_NEAR(swing.noise, size * std::sqrt(5.0), 0.1 * size * std::sqrt(5.0));
+}
+
+TEST(ResidualModel, AFunctionOfASignalIsFoundAndTheSignalNamed) {
+  Left left(22);
+  const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+  const VectorXd q = left.evidence.series[0].q.col(1);
+  const double lo = q.minCoeff(), hi = q.maxCoeff();
+  left.add(c, 1.5,
+           [&](Index k) { return std::sin(2.0 * std::numbers::pi * (q[k] - lo) / (hi - lo)); });
+  const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_EQ(found[0].depends_on.front(), "q_jib");
+  EXPECT_GT(found[0].explained, 0.25);
+  EXPECT_EQ(found[0].frequency, 0.0);
+}
+
+TEST(ResidualModel, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
+  // an engine that slows under load: between the two time constants that are offered
+  Left left(25);
+  const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
+  const MachineSeries& s = left.evidence.series[0];
+  VectorXd power = VectorXd::Zero(s.samples());
+  for (const CylinderSeries& cylinder : s.cylinders) power += cylinder.flow;
+  power = power.cwiseProduct(s.pumps[0].pressure);
+  for (double& p : power) p = std::isfinite(p) ? p : 0.0;
+  const VectorXd late = first_order_lag(s, power, 0.8);
+  const VectorXd& u = s.cylinders[0].command;
+  const double scale = 1.0 / (u.cwiseAbs().maxCoeff() * late.maxCoeff());
+  left.add(c, 8.0, [&](Index k) { return -scale * u[k] * late[k]; });
+  const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("with a lag of")));
+}
+
+TEST(ResidualModel, ASpoolBehindAPlayIsFoundThoughNothingMeasuredTellsIt) {
+  Left left(26);
+  const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
+  const VectorXd& u = left.evidence.series[0].cylinders[0].command;
+  const double width = 0.1;
+  VectorXd side = VectorXd::Zero(u.size());  // -1 .. 1: where in its play the spool stands
+  double spool = 0.0;
+  for (Index k = 0; k < u.size(); ++k) {
+    spool = u[k] == 0.0 ? 0.0 : std::clamp(spool, u[k] - 0.5 * width, u[k] + 0.5 * width);
+    side[k] = (u[k] - spool) / (0.5 * width);
+  }
+  left.add(c, 1.5, [&](Index k) { return -side[k]; });
+  const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("with a backlash of 10 %")));
+}
+
+TEST(ResidualModel, AnEventOfOneMotionIsFoundWithItsTime) {
+  Left left(27);
+  const std::size_t c = left.channel(EvidenceKind::kForce, 0);
+  const EvidenceChannel& e = left.evidence.channels[c];
+  const VectorXd& time = left.evidence.series[0].time;
+  const double row_s = left.evidence.stride * left.evidence.series[0].step;
+  std::size_t longest = 0;
+  for (std::size_t b = 0; b < e.blocks.size(); ++b) {
+    if (e.blocks[b].last - e.blocks[b].first > e.blocks[longest].last - e.blocks[longest].first)
+      longest = b;
+  }
+  const double from = time[e.sample[static_cast<std::size_t>(e.blocks[longest].first)]];
+  ASSERT_GT(row_s * static_cast<double>(e.blocks[longest].last - e.blocks[longest].first), 4.0);
+  // below a thousandth of the largest force nobody cares, and less than the sensors' noise is none
+  const double noise = std::max(e.noise_floor, 2e-3 * e.largest_force) / e.unit.si;
+  // eight times the usual, to and fro as a load that swings: no signal goes along with it
+  const auto swings = [&](double seconds) {
+    Left one = left;
+    one.add(c, 8.0 * std::numbers::sqrt2 * noise, [&](Index k) {
+      const double t = time[k] - from;
+      return t > 0.0 && t < seconds ? std::sin(2.0 * std::numbers::pi * t / 1.3) : 0.0;
+    });
+    one.fit.residual[c] += (noise - 1.0) * left.fit.residual[c];
+    return find_residual_structure(one.evidence, one.fit);
+  };
+  const std::vector<ResidualStructure> found = swings(4.0);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].channel, c);
+  EXPECT_TRUE(found[0].event);
+  EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("times the usual residual from")));
+  for (const ResidualStructure& l : swings(0.9)) EXPECT_FALSE(l.event) << "a knock";
+}
+
+TEST(ResidualModel, ALearnedProcessOwnInputsAreNoRiddle) {
+  // smooth laws of a cylinder's own flow are what its pressure process learns
+  Left left(23);
+  for (std::size_t c = 0; c < left.evidence.channels.size(); ++c) {
+    const EvidenceChannel& e = left.evidence.channels[c];
+    if (e.kind != EvidenceKind::kReturnExtend) continue;
+    const VectorXd& flow =
+        left.evidence.series[0].cylinders[static_cast<std::size_t>(e.index)].return_flow;
+    const double most = flow.maxCoeff();
+    left.add(c, 2.0, [&](Index k) { return std::sqrt(flow[k] / most); });
+    for (const ResidualStructure& l : find_residual_structure(left.evidence, left.fit))
+      EXPECT_NE(l.channel, c);
+  }
+}
+
+TEST(ResidualModel, ReferencesTakeNoPart) {
+  // the same riddle in rows that count as reference is nobody's
+  Left left(24);
+  const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+  const VectorXd& time = left.evidence.series[0].time;
+  left.add(c, 2.0, [&](Index k) { return std::sin(2.0 * std::numbers::pi * time[k]); });
+  left.evidence.suspects = 0;
+  EXPECT_THAT(find_residual_structure(left.evidence, left.fit), IsEmpty());
+}
+
+TEST(ResidualModel, NoSignalSharesItsSensorWithTheChannel) {
+  const auto names = [](EvidenceKind kind, int index) {
+    std::vector<std::string> all;
+    for (const SignalColumn& s : channel_signals(motions(), *motions().find(kind, index)))
+      all.push_back(s.name);
+    return all;
+  };
+  const std::vector<std::string> force = names(EvidenceKind::kForce, 0),
+                                 flow = names(EvidenceKind::kFlow, 0),
+                                 pump = names(EvidenceKind::kPump, 0);
+  EXPECT_THAT(force, testing::Not(Contains("pA_boom")));
+  EXPECT_THAT(force, Contains("v_boom"));
+  EXPECT_THAT(force, Contains("pA_jib"));
+  EXPECT_THAT(flow, testing::Not(Contains("v_boom")));
+  EXPECT_THAT(flow, Contains("pA_boom"));
+  EXPECT_THAT(pump, testing::Not(Contains("pA_boom")));
+  EXPECT_THAT(pump, testing::Not(Contains("p_main")));
+  EXPECT_THAT(pump, Contains("q_boom"));
+}
+
+}  // namespace
+}  // namespace sparflow
