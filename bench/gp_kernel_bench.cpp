@@ -1,6 +1,6 @@
-/// Time of one evaluation of a GP mean (value; value + gradient + Hessian) against the number of centres,
-/// for every instruction set this machine has, beside a plain loop over std::exp.
-/// After Google Benchmark's own table a second one gives the times and the ratio to the plain loop.
+/// Measures the time of one evaluation of a GP mean (value; value + gradient + Hessian) over the number of centres for
+/// every instruction set of this machine, beside a plain loop over std::exp. After Google Benchmark's table a second one
+/// gives the times and their ratio to the plain loop.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -19,7 +19,7 @@ using sparflow::KernelCentres;
 using sparflow::KernelIsa;
 using sparflow::KernelSums;
 
-/// Centres spread over a few length-scales, as a fitted pressure has them, and queries among them.
+/// Centres spread over a few length-scales as in an identified pressure model, and queries among them.
 struct Problem {
   std::vector<double> x, y, weight, query_x, query_y;
   explicit Problem(std::size_t n)
@@ -96,7 +96,7 @@ void add(const std::string& how, KernelIsa isa, std::size_t n) {
   });
 }
 
-/// Google Benchmark's console table, remembering the times for the summary.
+/// Google Benchmark's console table, which also stores the times for the summary.
 class Reporter : public benchmark::ConsoleReporter {
  public:
   void ReportRuns(const std::vector<Run>& runs) override {

@@ -41,7 +41,7 @@ GaussianProcess synthetic_process(double area, bool extend, int centres, unsigne
   for (int i = 0; i < centres; ++i) {
     p.flow[i] = full_flow * unit(random);
     p.force[i] = force_span * (2.0 * unit(random) - 1.0);
-    // some ten bar in all, however many share them
+    // The kernels add some ten bar in all, whatever their number.
     p.weight[i] = (unit(random) - 0.3) * 4e5 * (24.0 / centres) / (p.signal_std * p.signal_std);
   }
   p.flow_max = full_flow;

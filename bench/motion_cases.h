@@ -1,5 +1,5 @@
 #pragma once
-/// Reaches and models the motion benchmarks are run on.
+/// Reaches and models of the motion benchmarks.
 #include <string>
 #include <vector>
 
@@ -8,29 +8,30 @@
 
 namespace sparflow::bench {
 
-/// Learned from the bundled log of the loader crane, as `sparflow fit` does.
+/// Identifies a model from the bundled log of the loader crane, as `sparflow fit` does.
 CraneModel bundled_model();
 
-/// Reaches of the loader crane at fixed durations, nothing in the way.
+/// Reaches of the loader crane at fixed durations, without obstacles.
 std::vector<MotionProblem> loader_crane_reaches();
 
-/// A reach without obstacles. @param goal tip [m]
+/// Makes a reach without obstacles.
+/// @param start posture [rad] or [m]  @param goal tip [m]  @param payload [kg]  @param duration [s]
 MotionProblem reach(const std::string& name, const Machine& machine,
                     const std::vector<double>& start, const Eigen::Vector3d& goal, double payload,
                     double duration);
 
-/// Every joint lifts or sinks a vertical chain of `joints` revolute joints, each with its pinned cylinder, all fed by
-/// one load-sensing pump; lengths and masses fall towards the tip. From posture to posture in 14 s.
+/// Makes a reach of a planar chain of `joints` revolute joints with horizontal axes, each with a pinned cylinder, all fed
+/// by one load-sensing pump; lengths and masses decrease towards the tip. It goes from posture to posture in 14 s.
 MotionProblem chain_problem(int joints);
 
-/// Pressures of a machine nobody has measured: load / area, a flow loss and `centres` kernels on top.
+/// Makes a model with synthetic pressures: force / area, a flow loss, and `centres` kernels in addition.
 CraneModel synthetic_model(const Machine& machine, int centres);
 
-/// The processor's name and how busy the machine is.
+/// Name of the processor, and load average of the machine.
 std::string processor();
 double load_average();
 
-/// Processor time of this program [s], and of the child processes it has waited for.
+/// Processor time [s] of this program, and of the child processes for which it has waited.
 double cpu_seconds();
 double children_cpu_seconds();
 

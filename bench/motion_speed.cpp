@@ -1,7 +1,7 @@
-/// What the motion optimiser's speed rests on, as ratios in one run on one core: phases with exact Hessians against the
-/// single smooth NLP, L-BFGS, finite differences, ADOL-C and dynamic programming; growth with mesh, joints and kernels.
+/// Compares variants of the motion optimiser in one run on one core, as ratios of times: phases with exact Hessians, the
+/// single smooth NLP, L-BFGS, finite differences, ADOL-C, dynamic programming; growth with mesh, joints and kernels.
 ///   build/bench/motion_speed [--json OUT.json] [--only ways|growth] [--reaches 6]
-/// Times are processor times, which other programs on the machine change least. docs/speed.md has the table.
+/// Times are processor times, which depend least on other programs of the machine. docs/speed.md has the tables.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,20 +24,20 @@ namespace {
 using namespace sparflow;
 using namespace sparflow::bench;
 
-constexpr double kEqualEnergy = 1.005;  // what counts as "at equal energy"
+constexpr double kEqualEnergy = 1.005;  // [-] ratio up to which energies count as equal
 
 /// One solve, or one search. [s], [J]
 struct Run {
   bool solved = false;
   std::string message;
-  double cpu = 0.0;                      // all of it, checks of the motion included
-  double solve = 0.0;                    // of it, in Ipopt
-  double callbacks = 0.0, linear = 0.0;  // of that
+  double cpu = 0.0;                      // all, checks of the motion included
+  double solve = 0.0;                    // part of `cpu` in Ipopt
+  double callbacks = 0.0, linear = 0.0;  // parts of `solve`: problem functions, KKT solver
   int iterations = 0;
-  double energy = 0.0;  // exact law
+  double energy = 0.0;  // by the exact law
 };
 
-/// @param work returns the start's result
+/// Times one start. @param work returns the start's result
 template <class Work>
 Run timed(const Work& work) {
   const double cpu = cpu_seconds();
@@ -47,7 +47,7 @@ Run timed(const Work& work) {
   run.cpu = cpu_seconds() - cpu;
   const double wall =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  // the solver's own shares are wall time: brought to processor time by what both are in all
+  // The solver reports wall times, which are scaled to processor time by the ratio of the totals.
   const double share = run.cpu / std::max(wall, 1e-9);
   run.solve = share * r.solve_s;
   run.callbacks = share * r.callbacks_s;
@@ -69,12 +69,13 @@ OptimizeOptions one_solve(int intervals) {
   OptimizeOptions options;
   options.intervals = intervals;
   options.processes = 1;
-  options.max_seconds = 600.0;  // wall time on a machine that may be busy; iterations end a solve
-  options.schedule.clear();     // the seed's own modes and nothing before
+  options.max_seconds =
+      600.0;  // wall time, long because the machine may be busy; the iterations limit a solve
+  options.schedule.clear();  // Only the seed's own modes are solved, without a smooth stage.
   return options;
 }
 
-/// A way to solve the same reach from the same start motion.
+/// A variant that solves the same reach from the same start motion.
 std::vector<Way> ways(const CraneModel& model, const MotionProblem& problem) {
   std::vector<Way> all;
   all.push_back({"phases, exact Hessian", one_solve(100)});
@@ -114,13 +115,13 @@ std::vector<Way> ways(const CraneModel& model, const MotionProblem& problem) {
 struct ReachRuns {
   std::string name, seed;
   std::vector<Run> by_way;
-  Run task;                // optimize() with its defaults
-  double task_wall = 0.0;  // [s] in two processes
-  std::vector<Run> grids;  // energy grid, by size
+  Run task;                // optimize() with default options
+  double task_wall = 0.0;  // [s] wall time with two processes
+  std::vector<Run> grids;  // searches on joint grids, by size
   std::vector<long> nodes;
 };
 
-/// The planner's path rather than the straight line, where there is one.
+/// Chooses the first path of the planner that is not a straight line, else the straight line.
 const SeedMotion* chosen_seed(const std::vector<SeedMotion>& seeds, double duration) {
   const SeedMotion* chosen = nullptr;
   for (const SeedMotion& s : seeds) {
@@ -134,7 +135,8 @@ void run_grids(const CraneModel& model, const MotionProblem& problem, double tar
                ReachRuns& runs) {
   double last = 0.0;
   for (const int nodes : {15000, 60000, 250000, 1000000}) {
-    if (4.5 * last > 12.0) break;  // a search four times larger takes at least four times longer
+    if (4.5 * last > 12.0)
+      break;  // The next search is four times larger and takes at least four times longer.
     const double cpu = cpu_seconds();
     EnergyGrid grid(model, problem, EnergyGridOptions{nodes});
     const GridPath path = grid.path_for_duration(problem.duration.min);
@@ -156,19 +158,19 @@ ReachRuns run_reach(const CraneModel& model, const MotionProblem& problem) {
   const double duration = problem.duration.min;
   const SeedMotion* seed = chosen_seed(seeds, duration);
   if (seed == nullptr)
-    throw InputError({}, problem.name, "no planned path keeps its limits in the given time");
+    throw InputError({}, problem.name, "no planned path keeps the limits in the given time");
   runs.seed = seed->name;
   for (const Way& way : ways(model, problem)) {
     const auto solve = [&] {
       return timed([&] {
         StartResult r = optimize_from(model, problem, *seed, duration, way.options);
-        // a start falls back on its seed, which is no solution of this way's
+        // A start returns its seed when it fails, which is no solution by this variant.
         if (way.phases && !r.modes_held) r.energy_exact = 0.0;
         return r;
       });
     };
     Run run = solve();
-    if (run.cpu < 0.5) {  // the first one warms the caches
+    if (run.cpu < 0.5) {  // The first run only warms the caches.
       const Run again = solve();
       if (again.cpu < run.cpu) run = again;
     }
@@ -198,7 +200,7 @@ GrowthRow growth_row(const std::string& what, int value, const CraneModel& model
   OptimizeOptions options = one_solve(intervals);
   options.phase_iterations = iterations;
   options.tightenings = 0;
-  options.refine = 2;  // the checks of the motion are not what grows here
+  options.refine = 2;  // The growth of the solve is measured, not that of the checks.
   GrowthRow row{what, value, {}};
   row.run =
       timed([&] { return optimize_from(model, problem, seed, problem.duration.min, options); });
@@ -233,7 +235,7 @@ std::vector<GrowthRow> run_growth(const CraneModel& model, const MotionProblem& 
   return rows;
 }
 
-// --- what is printed ------------------------------------------------------------------------------
+// --- output ------------------------------------------------------------------------------
 
 nlohmann::json as_json(const Run& run) {
   return {{"solved", run.solved},          {"cpu_s", run.cpu},
@@ -333,7 +335,7 @@ void print_growth(const std::vector<GrowthRow>& rows) {
   }
 }
 
-/// The taped and the hand-made derivatives of one model, side by side.
+/// Largest relative difference between the derivatives of one model by ADOL-C and by hand.
 double adolc_difference(const CraneModel& model, const MotionProblem& problem) {
   CraneKnotOptions options;
   options.smoothing.pressure = 0.3e5;
@@ -360,7 +362,8 @@ int run(const std::string& json_path, const std::string& only, int reaches) {
     const double difference = adolc_difference(model, problems.front());
     fmt::print("ADOL-C against the derivatives by hand, 300 random points: {:.1e} relative\n",
                difference);
-    if (difference > 1e-9) throw InputError({}, "ADOL-C", "its derivatives differ from ours");
+    if (difference > 1e-9)
+      throw InputError({}, "ADOL-C", "its derivatives differ from those derived by hand");
     if (!std::isnan(difference)) json["adolc_difference"] = difference;
     const std::vector<Way> all = ways(model, problems.front());
     std::vector<ReachRuns> runs;
@@ -397,14 +400,14 @@ int run(const std::string& json_path, const std::string& only, int reaches) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
+  setvbuf(stdout, nullptr, _IOLBF, 0);  // The run takes minutes, so each line is printed at once.
   std::string json, only;
   int reaches = 6;
   bench::ProgramOptions app(
-      "What the motion optimiser's speed rests on, as ratios in one run on one core.");
-  app.add("--json", json, "write the figures here");
-  app.add("--only", only, "ways or growth").one_of({"ways", "growth"});
-  app.add("--reaches", reaches, "so many of the reaches").range(1, 6);
+      "Compares variants of the motion optimiser as ratios of times in one run on one core.");
+  app.add("--json", json, "file for the figures (JSON)");
+  app.add("--only", only, "part to run: ways (variants) or growth").one_of({"ways", "growth"});
+  app.add("--reaches", reaches, "number of reaches").range(1, 6);
   if (const auto code = app.parse(argc, argv)) return *code;
   try {
     return run(json, only, reaches);

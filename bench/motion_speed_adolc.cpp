@@ -33,11 +33,11 @@ struct NumTraits<adouble> : NumTraits<double> {
 
 namespace sparflow::bench {
 
-/// A taped value with its derivative by the one joint coordinate that a linkage depends on.
+/// A taped value with its derivative with respect to the one joint coordinate on which a linkage depends.
 struct Rate {
   adouble value = 0.0, d1 = 0.0;
   Rate() = default;
-  Rate(double v) : value(v) {}  // NOLINT: constants mix freely
+  Rate(double v) : value(v) {}  // NOLINT: implicit, so that constants can be used
   Rate(const adouble& v, const adouble& d) : value(v), d1(d) {}
   Rate& operator+=(const Rate& b) { return *this = *this + b; }
   Rate& operator-=(const Rate& b) { return *this = *this - b; }
@@ -96,7 +96,8 @@ std::vector<adouble> torques(const Machine& machine, const Taped& q, double payl
         const Vector3<adouble> arm = p - frames[i].position;
         const Vector3<adouble>& z = axes[i];
         for (int a = 0; a < 3; ++a) {
-          const int b = (a + 1) % 3, c = (a + 2) % 3;  // Eigen's cross copies ADOL-C's temporaries
+          const int b = (a + 1) % 3,
+                    c = (a + 2) % 3;  // Eigen's cross() would copy ADOL-C's temporaries.
           column[a] = z[b] * arm[c] - z[c] * arm[b];
         }
       }
@@ -152,14 +153,14 @@ adouble learned_mean(const GaussianProcess& process, const adouble& flow, const 
   return sum;
 }
 
-/// max(0, x - gap) with its corner rounded, 0 at x = 0.
+/// max(0, x - gap) with a rounded corner, 0 at x = 0.
 adouble above(const adouble& x, const adouble& gap) {
   constexpr double kSquare = loads_beyond::kRounded * loads_beyond::kRounded;
   const adouble over = x - gap;
   return 0.5 * (over + sqrt(over * over + kSquare)) - 0.5 * (sqrt(gap * gap + kSquare) - gap);
 }
 
-/// What is beyond zero, bent: a tape holds every branch, so that it can be replayed at other loads.
+/// max(0, x), smoothed over 0 <= x <= bend. The tape contains all branches, so that it can be replayed at other loads.
 adouble excess(const adouble& x, double bend) {
   const adouble u = x / bend, none = 0.0;
   const adouble curve = bend * u * u * u * (1.0 - 0.5 * u), line = x - 0.5 * bend;
@@ -169,8 +170,8 @@ adouble excess(const adouble& x, double bend) {
   return out;
 }
 
-/// The process, and beyond the learned loads what models/hydraulics/loads_beyond.h says: both sides at once, since within them either's
-/// share is nothing.
+/// The pressure model, and its extrapolation beyond the learned loads as in models/hydraulics/loads_beyond.h. Both sides
+/// are added at once, since each vanishes within the learned loads.
 adouble mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
   const GpParameters& p = process.parameters();
   const LoadsBeyond& b = p.beyond;
@@ -195,7 +196,7 @@ class Adolc final : public WrappedKnotModel {
       : WrappedKnotModel(std::move(inner)), model_(model), problem_(problem), options_(options) {
     SPARFLOW_CHECK(
         model.effects.empty() && options.modes.rows() > 0 && options.command_weight == 0.0,
-        "taped are phases of a model without effects");
+        "only phases of a model without effects can be taped");
     lower_.resize(static_cast<std::size_t>(size()));
     rows_.resize(lower_.size());
     for (std::size_t i = 0; i < lower_.size(); ++i) {
@@ -240,7 +241,7 @@ class Adolc final : public WrappedKnotModel {
     return tags;
   }
 
-  /// The tape of this interval's modes.
+  /// Returns the tape of this interval's modes.
   short tape(const double* z) {
     short& known = tapes_[static_cast<std::size_t>(interval_)];
     if (known >= 0) return known;
@@ -250,11 +251,11 @@ class Adolc final : public WrappedKnotModel {
           (options_.modes.row(row).array() == options_.modes.row(interval_).array()).all())
         return known = tapes_[k];
     }
-    SPARFLOW_CHECK(!free_tags().empty(), "as many tapes at once are not foreseen");
+    SPARFLOW_CHECK(!free_tags().empty(), "there is no free tape number");
     known = free_tags().back();
     free_tags().pop_back();
     own_.push_back(known);
-    constexpr int kBuffer = 1 << 20;  // values; a tape that fits stays in memory
+    constexpr int kBuffer = 1 << 20;  // number of values up to which a tape stays in memory
     trace_on(known, 0, kBuffer, kBuffer, kBuffer, kBuffer);
     write_tape(z);
     trace_off();
@@ -314,9 +315,9 @@ class Adolc final : public WrappedKnotModel {
   const CraneModel& model_;
   const MotionProblem& problem_;
   CraneKnotOptions options_;
-  std::vector<std::vector<double> > lower_;  // triangle of the Hessian, and how ADOL-C wants it
+  std::vector<std::vector<double> > lower_;  // lower triangle of the Hessian, in ADOL-C's format
   std::vector<double*> rows_;
-  std::vector<short> tapes_, own_;  // by interval; taken by this object
+  std::vector<short> tapes_, own_;  // by interval; used by this object
   int interval_ = 0;
 };
 

@@ -1,12 +1,12 @@
 #pragma once
-/// The crane's law at a knot with derivatives made in other ways than by hand, to measure what those by hand are worth.
+/// The crane's law at a knot with derivatives by other methods, to measure the gain of those derived by hand.
 #include <memory>
 
 #include "optimizer/crane/crane_knot_model.h"
 
 namespace sparflow::bench {
 
-/// Forwards everything to another model.
+/// Forwards all calls to another model.
 class WrappedKnotModel : public KnotModel {
  public:
   explicit WrappedKnotModel(std::shared_ptr<KnotModel> inner) : inner_(std::move(inner)) {}
@@ -39,19 +39,19 @@ class WrappedKnotModel : public KnotModel {
   std::shared_ptr<KnotModel> inner_;
 };
 
-/// Cost and path differenced: central differences for first, four-point ones for mixed second derivatives.
+/// Replaces derivatives of cost and path: central differences for first, four-point ones for second derivatives.
 std::shared_ptr<KnotModel> with_finite_differences(std::shared_ptr<KnotModel> inner);
 
-/// The cost's gradient and Hessian by ADOL-C (Griewank, Juedes and Utke 1996), one tape for each set of modes, taped
-/// when first met and replayed ever after; path rows stay as they are.
-/// @param model without effects; every cylinder's mode is held  @param options of the model to be wrapped
+/// Replaces the cost's gradient and Hessian by those of ADOL-C (Griewank, Juedes and Utke 1996), with one tape for each
+/// set of modes, recorded at its first use and then replayed; derivatives of path rows stay as they are.
+/// @param model without effects; every cylinder's mode is held  @param options of the wrapped model
 /// @return null when the program was built without ADOL-C
 std::shared_ptr<KnotModel> with_adolc(const CraneModel& model, const MotionProblem& problem,
                                       const CraneKnotOptions& options,
                                       std::shared_ptr<KnotModel> inner);
 
-/// Largest difference of two models' cost gradients and Hessians at random points, relative to the largest entry of
-/// each. @param interval whose modes hold
+/// Returns the largest difference of two models' cost gradients and Hessians at random points, relative to the largest
+/// entry of each. @param points number of points
 double largest_difference(KnotModel& a, KnotModel& b, const MotionProblem& problem,
                           const ModeTable& modes, int points);
 

@@ -8,8 +8,8 @@
 namespace sparflow::bench {
 namespace {
 
-// Steps in rad, m and 1/s of them. The soft maximum bends over 0.3 bar, some 3e-3 rad; these balance truncation
-// against rounding there.
+// Steps in rad, m and their rates. The smooth maximum varies over 0.3 bar, some 3e-3 rad; these steps balance
+// truncation and rounding there.
 constexpr double kFirstStep = 1e-6;
 constexpr double kSecondStep = 1e-4;
 

@@ -1,4 +1,4 @@
-// Reading the reference problem: every key is named when it is missing or of the wrong kind.
+// Reads the reference problem; an error names the key that is missing or of the wrong kind.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A value of the file together with where it stands.
+/// A value of the file together with its key.
 class Node {
  public:
   Node(const json& value, std::string file, std::string key)

@@ -18,7 +18,7 @@ constexpr double kBarLpmToKilowatt = 1.0 / 600.0;
 ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
     : problem_(std::move(problem)) {
   const ReferenceProblem& p = *problem_;
-  last_.z.fill(std::nan(""));  // equals no z
+  last_.z.fill(std::nan(""));  // NaN, so that it equals no z
   // tau1 = gS_inner cos th1 + tau2, tau2 = (gS_fixed + gS_slide d) cos phi, tau3 = gS_slide sin phi
   gS_inner_ = p.gravity * (p.m_inner * p.s_inner + (p.m_outer + p.m_tele + p.m_payload) * p.L1);
   gS_fixed_ = p.gravity * (p.m_outer * p.s_outer + p.m_tele * p.s_tele0 + p.m_payload * p.L2);
@@ -28,7 +28,7 @@ ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
     angle_sin_[i] = std::sin(offset[i]);
     angle_cos_[i] = std::cos(offset[i]);
   }
-  // A direction of weight u is left out when that changes nothing at 1e-13 relative: it moves the blended
+  // A direction of weight u is left out when that changes the power by less than 1e-13 relative: it changes the blended
   // pressure by at most u (bound_extend + bound_retract), the log-sum-exp by no more than that, and the pump
   // pressure is never below standby, so u (b_e + b_r) <= 1e-13 standby suffices. In the derivatives the same
   // terms carry (2/eps_v)^k, which is also the scale of the k-th derivative where the direction changes.
@@ -39,7 +39,7 @@ ReferenceKnot::ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem)
 
 const ReferenceKnot::Kinematics& ReferenceKnot::kinematics(const double* z) {
   Kinematics& kin = last_;
-  if (std::equal(kin.z.begin(), kin.z.end(), z)) return kin;  // a NaN never is
+  if (std::equal(kin.z.begin(), kin.z.end(), z)) return kin;  // A NaN never equals.
   const ReferenceProblem& p = *problem_;
   std::copy(z, z + 6, kin.z.begin());
   const std::array<double, 2> a = {p.a1, p.a2}, b = {p.b1, p.b2};
@@ -71,7 +71,7 @@ const ReferenceKnot::Kinematics& ReferenceKnot::kinematics(const double* z) {
 ReferenceKnot::Speed ReferenceKnot::speed(std::size_t i, double v) const {
   const ReferenceProblem& p = *problem_;
   Speed s;
-  // The smaller weight first: 1 - w would lose it. Beyond 2|v|/eps = 40 it is below 5e-18.
+  // The smaller weight is computed first, since 1 - w would cancel. Beyond 2|v|/eps = 40 it is below 5e-18.
   const double argument = 2.0 * std::abs(v) / p.eps_v;
   const double tail = argument < 40.0 ? std::exp(-argument) : 0.0;
   const double small = tail / (1.0 + tail), large = 1.0 / (1.0 + tail);
@@ -99,8 +99,8 @@ std::array<double, 3> ReferenceKnot::forces(const Kinematics& kin) const {
           kToKiloNewton * tau3};
 }
 
-/// Log-sum-exp over standby and the cylinders' demands; the largest term is taken out, so nothing overflows.
-/// Terms below exp(-40) of the largest are under a tenth of the sum's last place.
+/// Log-sum-exp over standby and the cylinders' demands; the largest term is factored out to prevent overflow. Terms
+/// below exp(-40) of the largest are less than a tenth of the sum's last digit.
 /// @param share [3] weights of the softmax (derivatives), may be null
 double ReferenceKnot::pump_pressure(const std::array<double, 3>& demand, double* share) const {
   const ReferenceProblem& p = *problem_;
@@ -109,7 +109,7 @@ double ReferenceKnot::pump_pressure(const std::array<double, 3>& demand, double*
   const auto term = [&](double pressure) {
     const double exponent = (pressure - top) * inverse;
     if (exponent == 0.0) return 1.0;
-    return exponent < -40.0 ? 0.0 : std::exp(exponent);  // a NaN stays one
+    return exponent < -40.0 ? 0.0 : std::exp(exponent);  // A NaN remains a NaN.
   };
   const std::array<double, 3> terms = {term(demand[0]), term(demand[1]), term(demand[2])};
   const double sum = term(p.standby) + terms[0] + terms[1] + terms[2];
@@ -242,11 +242,12 @@ double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double
     force_q.row(i) = inv * d_tau[i].transpose();
     force_q(i, i) += d_inv * tau[i];
     const double lambda = power_f[i];
-    const double bend = lambda * inv * -(i == 2 ? tau[2] : tau2);  // both angles turn phi alike
-    curved(0, 0) += bend;
-    curved(0, 1) += bend;
-    curved(1, 0) += bend;
-    curved(1, 1) += bend;
+    const double curvature =
+        lambda * inv * -(i == 2 ? tau[2] : tau2);  // Both angles change phi equally.
+    curved(0, 0) += curvature;
+    curved(0, 1) += curvature;
+    curved(1, 0) += curvature;
+    curved(1, 1) += curvature;
     if (i == 0) curved(0, 0) -= lambda * inv * inner_cos;
     if (i < 2) {
       const double slide = -lambda * inv * gS_slide_ * sin_phi;
@@ -372,7 +373,7 @@ Transcription reference_transcription(std::shared_ptr<const ReferenceProblem> pr
   spec.joint_names = {"th1", "th2", "d"};
   Transcription nlp(std::move(spec));
 
-  // Straight line in joint space; the rates are its slope, but for rest at both ends.
+  // Straight line in joint space; the rates are its slope, except for rest at both ends.
   const Eigen::VectorXd first = vec(p.q_start), way = vec(p.q_goal_guess) - first;
   Eigen::VectorXd x = Eigen::VectorXd::Zero(nlp.size().variables);
   for (int k = 0; k <= n; ++k) {

@@ -1,7 +1,7 @@
 #pragma once
 /// The reference NLP: one energy-optimal reach of a planar three-cylinder crane in which every number is fixed
-/// (bench/data/reference_problem.json; equations in docs/transcription.md). It smooths activation and direction on
-/// purpose, to be one smooth problem; it is a yardstick for derivative code and speed, not a way to pose a task.
+/// (bench/data/reference_problem.json; equations in docs/transcription.md). Activation and direction are smoothed, so
+/// that it is one smooth problem. It serves to test derivative code and speed, not to compute motions.
 ///
 /// Units of this problem, unlike the rest of the program: flow l/min, force kN, pressure bar, power kW,
 /// energy kJ; angles rad, lengths m, speeds m/s.
@@ -15,12 +15,13 @@
 
 namespace sparflow::bench {
 
-/// Pressure of one cylinder in one direction: sum_j weight_j exp(-1/2 |(Q, F)/l - centre_j|^2) [bar].
+/// Pressure model of one cylinder in one direction: P = sum_j weight_j exp(-1/2 |(Q, F)/l - centre_j|^2) [bar].
 struct ReferenceGp {
   double inverse_length_flow = 0.0;   ///< [min/l]
   double inverse_length_force = 0.0;  ///< [1/kN]
-  std::vector<double> flow, force;  ///< centres divided by the length-scales, padded for the kernel
-  std::vector<double> weight;       ///< [bar] sf2 * alpha
+  std::vector<double> flow,
+      force;                   ///< [-] centres divided by the length-scales, padded for the kernel
+  std::vector<double> weight;  ///< [bar] sf2 * alpha
   /// |P(Q, F)| <= bound everywhere [bar]: the norm sqrt(w^T K w) of P in the kernel's Hilbert space, as
   /// |P(x)| = |<P, k(x, .)>| <= |P| sqrt(k(x, x)) and k(x, x) = 1.
   double bound = 0.0;
@@ -51,18 +52,18 @@ struct ReferenceProblem {
   std::array<std::array<ReferenceGp, 2>, 3> gp;  ///< [cylinder][extend, retract]
 };
 
-/// @throws InputError with file and key when the file cannot be read, is not JSON, or lacks something
+/// Reads the problem file. @throws InputError with file and key when it cannot be read, is not JSON or lacks a key
 ReferenceProblem read_reference_problem(const std::string& path);
 
-/// Power of one instant, z = [th1, th2, d, and their rates], and the total flow as path constraint.
+/// Power [kW] of one instant at z = [th1, th2, d, and their rates], with the total flow as path constraint.
 class ReferenceKnot final : public KnotModel {
  public:
   explicit ReferenceKnot(std::shared_ptr<const ReferenceProblem> problem);
 
-  /// What stands between z and the power, for checks and pages.
+  /// Intermediate quantities between z and the power, for tests.
   struct State {
-    std::array<double, 3> force, flow, pressure;
-    double pump = 0.0, power = 0.0;
+    std::array<double, 3> force, flow, pressure;  ///< [kN], [l/min], [bar]
+    double pump = 0.0, power = 0.0;               ///< [bar], [kW]
   };
   State state(const double* z);
 
@@ -81,7 +82,7 @@ class ReferenceKnot final : public KnotModel {
   struct Rate {
     double ratio = 1.0, d = 0.0, dd = 0.0;
   };
-  /// What follows from one cylinder's speed: direction weights, flow, derivatives with respect to the speed.
+  /// Functions of one cylinder's speed: direction weights and flow, with derivatives with respect to the speed.
   struct Speed {
     double extend, retract;  ///< w and 1 - w, both accurate when tiny
     double d_extend, dd_extend;
@@ -94,7 +95,7 @@ class ReferenceKnot final : public KnotModel {
     std::array<Speed, 3> speed;
     double flow;  ///< [l/min] total
   };
-  /// Pressure blended over the directions, margin included, with respect to (v, F).
+  /// Pressure blended over the directions, margin included, with derivatives with respect to (v, F).
   struct Demand {
     double value, d_v, d_f, d_vv, d_vf, d_ff;
   };
@@ -108,10 +109,10 @@ class ReferenceKnot final : public KnotModel {
   double gS_inner_, gS_fixed_, gS_slide_;        ///< moments of weight [Nm], [Nm], [N]
   std::array<double, 2> angle_sin_, angle_cos_;  ///< of the linkage offsets
   std::array<double, 3> negligible_;  ///< weight below which a direction is not evaluated
-  Kinematics last_;                   ///< of the z asked for last
+  Kinematics last_;                   ///< of the last z
 };
 
-/// The tip at the goal, x and z [m].
+/// Terminal constraint: the tip is at the goal, x and z [m].
 class ReferenceGoal final : public TerminalModel {
  public:
   explicit ReferenceGoal(std::shared_ptr<const ReferenceProblem> problem)
@@ -126,7 +127,7 @@ class ReferenceGoal final : public TerminalModel {
   std::shared_ptr<const ReferenceProblem> problem_;
 };
 
-/// The whole NLP with its initial guess.
+/// Makes the whole NLP with its initial guess.
 Transcription reference_transcription(std::shared_ptr<const ReferenceProblem> problem);
 
 }  // namespace sparflow::bench

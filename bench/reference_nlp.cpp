@@ -1,4 +1,4 @@
-// reference_nlp PROBLEM.json [--json OUT.json]: solves the reference NLP and says where the time went.
+// reference_nlp PROBLEM.json [--json OUT.json]: solves the reference NLP and reports where the time is spent.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -43,7 +43,7 @@ struct Outcome {
   double setup_s = 0.0;  ///< reading the file and laying out the NLP
 };
 
-/// Solves `repeat` times from the same start; the run with the median solve time is reported.
+/// Solves `repeat` times from the same start and reports the run with the median solve time.
 Outcome run(const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
@@ -54,7 +54,7 @@ Outcome run(const Arguments& arguments) {
   outcome.setup_s = std::chrono::duration<double>(Clock::now() - begin).count();
   std::vector<NlpResult> results;
   for (int i = 0; i < arguments.repeat; ++i) {
-    // A fresh transcription, so that no run profits from what the one before it left behind.
+    // Each run has a new transcription, so that it does not use data of the run before.
     Transcription fresh = bench::reference_transcription(problem);
     results.push_back(solve_with_ipopt(fresh, arguments.options));
   }
@@ -133,8 +133,8 @@ int main(int argc, char** argv) {
   bench::ProgramOptions app(
       "Solves the reference NLP (bench/data/reference_problem.json) with Ipopt.");
   app.add("problem", arguments.problem, "the problem file (JSON)").required();
-  app.add("--json", arguments.json, "write the machine-readable result here");
-  app.add("--repeat", arguments.repeat, "solve so many times, report the median run")
+  app.add("--json", arguments.json, "file for the result (JSON)");
+  app.add("--repeat", arguments.repeat, "number of solves, of which the median run is reported")
       .range(1, 10000);
   app.add("--tol", arguments.options.tolerance, "Ipopt's tolerance (default 1e-6)").positive();
   std::string kkt = arguments.options.kkt_solver == KktSolver::kChain ? "chain" : "mumps";

@@ -1,6 +1,6 @@
-/// Energies replayed on a plant that shares no law with the model: optimised motions are driven through the simulator's
-/// crane (its own body forces, return lines, counterbalance valves and pump, simulator/hidden_effects/plant.h), of
-/// which the optimiser has only seen a noisy log.
+/// Replays optimised motions on a plant that shares no law with the model: the simulator's crane with its own body
+/// forces, return lines, counterbalance valves and pump (simulator/hidden_effects/plant.h), of which the model was
+/// identified from a noisy log.
 ///   build/bench/replay [--cranes 2] [--json OUT.json]
 #include <fmt/format.h>
 
@@ -27,17 +27,17 @@ namespace {
 using namespace sparflow;
 using namespace sparflow::bench;
 
-constexpr int kDensity = 16;  // instants an interval of the replay
+constexpr int kDensity = 16;  // steps of the replay in each mesh interval
 constexpr int kOtherDensity =
-    37;  // at which limits are looked at again: one the optimiser has never used
+    37;  // samples of each interval at which limits are also checked; the optimiser never uses this density
 
 struct Replayed {
   double energy = 0.0;        // [J]
   double furthest = 0.0;      // [rad] or [m] largest distance from the motion
-  double top_pressure = 0.0;  // [Pa] of a pump
+  double top_pressure = 0.0;  // [Pa] largest pump pressure
 };
 
-/// Where a motion is at time t.
+/// Positions of a motion at time t [s].
 struct Instant3 {
   Eigen::VectorXd q, qd;
 };
@@ -51,8 +51,8 @@ Instant3 at_time(const Trajectory& motion, double t) {
           motion.qd.row(k) + dt * motion.qdd.row(k)};
 }
 
-/// Levers are moved so that the plant's rods have the motion's speeds; what its positions stray is steered back with
-/// a time constant of half a second. Power is taken at the middle of every step, as speeds jump at knots only.
+/// Drives a motion. The levers give the plant's rods the motion's speeds; deviations of position are corrected with a
+/// time constant of half a second. Power is evaluated in the middle of every step, because speeds jump at knots only.
 Replayed replay(const Machine& machine, const simulator::CraneLaws& laws, const Trajectory& motion,
                 double payload) {
   const auto steps = static_cast<long>(kDensity * (motion.size() - 1));
@@ -92,7 +92,7 @@ Replayed replay(const Machine& machine, const simulator::CraneLaws& laws, const 
   return result;
 }
 
-/// A model of one crane, from a log of its work: ten minutes, nothing hidden.
+/// Identifies a model of one crane from a log of ten minutes of work without hidden effects.
 CraneModel learned(const Machine& machine, std::uint64_t crane) {
   simulator::LogRequest request;
   request.machine = machine;
@@ -114,7 +114,7 @@ Outcome run_reach(const CraneModel& model, const simulator::CraneLaws& laws,
                   const MotionProblem& problem) {
   Outcome outcome{problem.name, {}};
   OptimizeOptions options;
-  options.sequence_rounds = 1;  // near the optimum is near enough to be replayed
+  options.sequence_rounds = 1;  // A motion near the optimum suffices for a replay.
   const OptimizeResult r = optimize(model, problem, planned_seeds(problem, 4, 100), options);
   outcome.status = to_string(r.status);
   if (r.status != OptimizeStatus::kOptimal) return outcome;
@@ -178,14 +178,14 @@ int run(int cranes, const std::string& json_path) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  setvbuf(stdout, nullptr, _IOLBF, 0);  // minutes of work: what is done is shown
+  setvbuf(stdout, nullptr, _IOLBF, 0);  // The run takes minutes, so each line is printed at once.
   int cranes = 2;
   std::string json;
   bench::ProgramOptions app(
       "Optimised motions replayed on a simulated crane that shares no law with the model.");
-  app.add("--cranes", cranes, "cranes of the same drawing, each with laws of its own")
+  app.add("--cranes", cranes, "number of cranes of the same drawing, each with laws of its own")
       .range(1, 100);
-  app.add("--json", json, "write the figures here");
+  app.add("--json", json, "file for the figures (JSON)");
   if (const auto code = app.parse(argc, argv)) return *code;
   try {
     return run(cranes, json);

@@ -1,9 +1,8 @@
-/// Which method should learn the pressures of a long log? Learns every cylinder and direction of one log with
-/// each method, judges on another log and prints centres, seconds, held-out RMSE, NLPD and the cost
-/// of an evaluation.
+/// Compares methods that learn the pressures of a long log. Learns every cylinder and direction of one log with each
+/// method, judges on another log and prints centres, seconds, held-out RMSE, NLPD and the time of an evaluation.
 ///   sparse_gp_table [MACHINE.yaml TRAIN.csv TEST.csv]
-/// Without arguments: the simulated loader crane, logs from ../shared/data/loader_crane/plain of the source tree.
-/// NLPD is the mean of -log p(measurement) with the pressure in bar: what a wrong variance costs.
+/// Without arguments it uses the loader crane, with logs in ../shared/data/loader_crane/plain of the source tree.
+/// NLPD is the mean of -log p(measurement) with the pressure in bar; it also measures errors of the variance.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -30,7 +29,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// One data set for each cylinder and direction that the log drives.
+/// Makes a data set for each cylinder and direction that the log drives.
 std::vector<GpDataset> datasets(const Machine& machine, const std::string& path) {
   const MachineSignals signals = make_signals(machine, load_log(path, machine));
   std::vector<GpDataset> sets;
@@ -79,7 +78,7 @@ Score judge(const GpParameters& parameters, const GpDataset& data) {
   return score;
 }
 
-/// Mean, gradient and Hessian over the test points. [us]
+/// Time [us] of one evaluation of mean, gradient and Hessian, averaged over the test points.
 double microseconds(const GpParameters& parameters, const GpDataset& data) {
   const GaussianProcess process(parameters);
   double sink = 0.0;
@@ -152,7 +151,8 @@ void run(const std::string& machine_file, const std::string& train_file,
     std::fflush(stdout);
   }
   fmt::print(
-      "(centres and microseconds: sums over {} processes; seconds: all of them, side by side)\n\n",
+      "(centres and microseconds: sums over {} pressure models; seconds: all of them in "
+      "parallel)\n\n",
       train.size());
 
   fmt::print("{:<20}{:>7}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8}{:>8}\n", "default, each", "rows",

@@ -1,5 +1,5 @@
 #pragma once
-/// OMPL's view of the machine. Internal to this room: the only headers that show OMPL.
+/// The machine's joint space as an OMPL space. Internal to planners/, which alone includes OMPL.
 #include <ompl/base/SpaceInformation.h>
 #include <ompl/geometric/PathGeometric.h>
 
@@ -10,17 +10,17 @@
 
 namespace sparflow {
 
-/// Real vector space whose coordinates are joint coordinates divided by speed_scale(): OMPL's Euclidean
-/// distance then is the room's metric [s], so planners, informed sampling and the path simplifier (which
-/// looks at path length whatever the objective) all shorten the same thing.
-/// Bounds are the position limits; motions are judged by ClearanceModel::clear_share(), not by sampling at
-/// a fixed resolution. Holds a reference to `clearance`; one a thread, as that is.
+/// Real vector space whose coordinates are joint coordinates divided by speed_scale(). OMPL's Euclidean distance then is
+/// the metric of path_length() [s], so that planners, informed sampling and the path simplifier (which shortens the length
+/// whatever the objective) minimise the same quantity. Bounds are the position limits; motions are checked by
+/// ClearanceModel::clear_share(), not by sampling at a fixed resolution. Holds a reference to `clearance`; each thread
+/// needs its own of both.
 class ConfigurationSpace {
  public:
   ConfigurationSpace(const MotionProblem& problem, ClearanceModel& clearance);
 
   const ompl::base::SpaceInformationPtr& information() const { return information_; }
-  /// Product of the ranges is not zero: informed planners need a volume.
+  /// Whether the product of the ranges is positive, as informed planners need it.
   bool has_volume() const { return has_volume_; }
   void write(const Eigen::VectorXd& q, ompl::base::State* state) const;
   void read(const ompl::base::State* state, double* q) const;

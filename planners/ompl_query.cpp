@@ -25,7 +25,7 @@ std::mutex& ompl_lock() {
   return lock;
 }
 
-/// OMPL talks on the console; silent while we use it, as it was afterwards.
+/// Silences OMPL's console output during its lifetime and restores the log level afterwards.
 class SilentOmpl {
  public:
   SilentOmpl() : level_(ompl::msg::getLogLevel()) { ompl::msg::setLogLevel(ompl::msg::LOG_NONE); }
@@ -37,8 +37,8 @@ class SilentOmpl {
   ompl::msg::LogLevel level_;
 };
 
-/// Shortcuts until a round no longer helps. simplify() and simplifyMax() are left alone: the one is bounded
-/// by time, which is not reproducible, the other smooths with B-splines that add states.
+/// Path simplification by shortcuts until a round no longer shortens the path. simplify() is not used because it is bounded
+/// by time and so not reproducible, simplifyMax() because its B-splines add states.
 void shorten(og::PathSimplifier& simplifier, og::PathGeometric& path, const QueryLimits& limits) {
   constexpr unsigned kSteps = 100;
   double length = path.length();
@@ -66,8 +66,8 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathP
   if (ends.empty()) return std::nullopt;
   const std::scoped_lock guard(ompl_lock());
   const SilentOmpl silent;
-  // Every generator made from here on draws its seed from this one. OMPL's complaint that numbers were
-  // drawn before concerns generators that exist already; none of ours outlives a query.
+  // Every generator created from here on takes its seed from this one. OMPL's warning that numbers were drawn before
+  // concerns existing generators; none of ours outlives a query.
   ompl::RNG::setSeed(seed == 0 ? 1 : seed);
 
   const auto& information = space.information();
@@ -106,7 +106,7 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathP
   shorten(simplifier, *path, limits);
   Eigen::MatrixXd rows = space.rows(*path);
   rows.row(0) = start;
-  // Scaled coordinates round: give the end its own digits back.
+  // Scaling rounds the coordinates, so the end is replaced by the exact goal configuration.
   Eigen::Index nearest = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t e = 0; e < ends.size(); ++e) {

@@ -1,5 +1,5 @@
 #pragma once
-/// One OMPL query: from a start to any of several end postures. Internal to this room.
+/// One OMPL query: from a start to any of several goal configurations. Internal to planners/.
 #include <Eigen/Dense>
 #include <chrono>
 #include <cstdint>
@@ -17,14 +17,14 @@ enum class PathPlanner {
 const char* name(PathPlanner planner);
 
 struct QueryLimits {
-  int iterations = 20000;  ///< of the planner's loop: the limit that keeps results reproducible
-  std::chrono::steady_clock::time_point deadline;  ///< the limit that keeps the user's time
+  int iterations = 20000;  ///< of the planner's loop; this limit keeps results reproducible
+  std::chrono::steady_clock::time_point deadline;  ///< limit of the wall time
   bool* late = nullptr;                            ///< set when the deadline cut a query short
 };
 
-/// Shortened path in joint coordinates [waypoints x joints] from `start` to one of `ends`, clear by
-/// ClearanceModel; nothing when none was found. Same seed and no deadline hit: same path. OMPL's random numbers start
-/// from one process-wide seed, so calls are serialised by a lock.
+/// Simplified path in joint coordinates [waypoints x joints] from `start` to one of `ends`, clear by
+/// ClearanceModel; nullopt when none was found. The same seed gives the same path unless the deadline is hit. OMPL's random
+/// numbers start from one process-wide seed, so calls are serialised by a lock.
 std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathPlanner planner,
                                           const Eigen::VectorXd& start,
                                           const std::vector<Eigen::VectorXd>& ends,

@@ -21,8 +21,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kLimitSlack = 1e-9;  // [rad] or [m] rounding of what the user wrote
-constexpr double kSameEnd = 0.02;     // of every joint's range: ends nearer than this are one
+constexpr double kLimitSlack = 1e-9;  // [rad] or [m] rounding of the user's numbers
+constexpr double kSameEnd =
+    0.02;  // share of every joint's range below which two ends count as equal
 constexpr const char* kStraight = "straight line";
 constexpr int kBitStarShare = 10;      // BIT* gains little after iterations / 10, and is slow
 constexpr int kDeformationSteps = 32;  // pairs of postures tested between two paths
@@ -82,7 +83,7 @@ bool deformable(const MatrixXd& a, const MatrixXd& b, const VectorXd& scale,
   return true;
 }
 
-/// The search, step by step; every step adds to result_.
+/// The search for seed paths; each step adds to result_.
 class Search {
  public:
   Search(const MotionProblem& problem, const SeedOptions& options)
@@ -105,16 +106,17 @@ class Search {
       if (candidates_.empty()) {
         if (result_.message.empty()) {
           fail(SeedStatus::kNoPath,
-               fmt::format("no path found to {} end posture(s) with {} iterations each{}; allow "
-                           "more seconds or check the obstacles",
-                           result_.end_postures, options_.iterations,
-                           result_.out_of_time ? " (time ran out)" : ""));
+               fmt::format(
+                   "no path found to {} goal configuration(s) with {} iterations each{}; allow "
+                   "more seconds or check the obstacles",
+                   result_.end_postures, options_.iterations,
+                   result_.out_of_time ? " (time ran out)" : ""));
         }
       } else {
         select();
         result_.status = SeedStatus::kFound;
         result_.message =
-            fmt::format("{} path(s) to {} end posture(s), shortest {:.2f} s of travel",
+            fmt::format("{} path(s) to {} goal configuration(s), shortest {:.2f} s of travel",
                         result_.paths.size(), result_.end_postures, result_.paths.front().length);
       }
     }
@@ -137,7 +139,7 @@ class Search {
 
   bool start_is_good() {
     SPARFLOW_CHECK(problem_.start.size() == problem_.machine.joint_count(),
-                   "the start has one coordinate a joint");
+                   "the start needs one coordinate for each joint");
     const std::string beyond = beyond_limits(problem_, problem_.start);
     if (!beyond.empty()) {
       fail(SeedStatus::kStartOutOfLimits, "start is outside the limits: " + beyond);
@@ -153,10 +155,10 @@ class Search {
   }
 
   bool sample_goal_region() {
-    tell(0.0, "sampling postures at the goal");
+    tell(0.0, "sampling goal configurations");
     if (const auto* goal = std::get_if<JointGoal>(&problem_.goal)) {
       SPARFLOW_CHECK(goal->q.size() == problem_.machine.joint_count(),
-                     "a joint goal has one coordinate a joint");
+                     "a joint goal needs one coordinate for each joint");
       const std::string beyond = beyond_limits(problem_, goal->q);
       if (!beyond.empty()) {
         fail(SeedStatus::kGoalOutOfLimits, "goal is outside the limits: " + beyond);
@@ -182,7 +184,7 @@ class Search {
     if (goal.postures.empty()) {
       result_.clearance = goal.blocked.distance;
       fail(SeedStatus::kGoalInCollision,
-           fmt::format("no clear posture at the goal; in the least blocked one found {}",
+           fmt::format("no clear goal configuration; in the least blocked one found {}",
                        clearance_.describe(goal.blocked)));
       return false;
     }
@@ -191,7 +193,7 @@ class Search {
     return true;
   }
 
-  /// The nearest posture, those that leave a joint where it is, and spread-out ones.
+  /// Chooses the nearest goal configuration, those that leave a joint at rest, and others far from each other.
   void choose_ends() {
     std::vector<std::size_t> chosen{0};
     const std::size_t wanted = static_cast<std::size_t>(std::max(1, options_.count - 2));
@@ -228,7 +230,7 @@ class Search {
         line.row(1) = end;
         const double length = path_length(line, scale_);
         candidates_.push_back(
-            {std::move(line), kStraight, length});  // ends differ: nothing to merge
+            {std::move(line), kStraight, length});  // their ends differ, so none are duplicates
       } else {
         blocked_.push_back(end);
       }
@@ -242,14 +244,14 @@ class Search {
       std::vector<VectorXd> ends;
     };
     std::vector<Query> queries;
-    // The goal as a region, less the ends that are tried one by one anyway.
+    // One query goes to all goal configurations except the chosen ends, which have queries of their own.
     std::vector<VectorXd> others;
     for (const VectorXd& q : postures_) {
       if (std::find(ends_.begin(), ends_.end(), q) == ends_.end()) others.push_back(q);
     }
     if (!others.empty()) queries.push_back({PathPlanner::kRrtConnect, others});
     if (!blocked_.empty() && space.has_volume()) queries.push_back({PathPlanner::kBitStar, ends_});
-    // Blocked ends one by one, several tries each: other random trees, other homotopy classes.
+    // Each blocked end gets several queries, because other random trees can find other homotopy classes.
     constexpr int kTries = 3;
     for (int t = 0; t < kTries; ++t) {
       for (const VectorXd& end : blocked_) queries.push_back({PathPlanner::kRrtConnect, {end}});
@@ -261,7 +263,7 @@ class Search {
       QueryLimits own = limits;
       if (queries[i].planner == PathPlanner::kBitStar)
         own.iterations = options_.iterations / kBitStarShare;
-      // 2654435761: neighbouring user seeds must not share queries
+      // The factor 2654435761 keeps the queries of neighbouring user seeds apart.
       const auto seed =
           static_cast<std::uint32_t>((options_.random_seed * 2654435761u + i) % 0x7fffffffu);
       auto path = query_path(space, queries[i].planner, problem_.start, queries[i].ends, seed, own);
@@ -290,7 +292,7 @@ class Search {
                                 100.0 * found.furthest));
   }
 
-  /// Best of every end first, then further classes; both by length.
+  /// Selects the shortest path to each end first, then further homotopy classes, both by length.
   void select() {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const SeedPath& a, const SeedPath& b) { return a.length < b.length; });
@@ -312,9 +314,9 @@ class Search {
   ClearanceModel clearance_;
   VectorXd scale_;
   Clock::time_point begin_, deadline_;
-  std::vector<VectorXd> postures_;  ///< all clear ones found at the goal
-  std::vector<VectorXd> ends_;      ///< those to plan to one by one
-  std::vector<VectorXd> blocked_;   ///< those without a clear straight line
+  std::vector<VectorXd> postures_;  ///< all clear goal configurations found
+  std::vector<VectorXd> ends_;      ///< chosen ones, to each of which paths are planned
+  std::vector<VectorXd> blocked_;   ///< chosen ones without a clear straight line
   std::vector<SeedPath> candidates_;
   SeedResult result_;
 };

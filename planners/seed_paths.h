@@ -1,5 +1,5 @@
 #pragma once
-/// Several different ways from start to goal, for an optimiser to start from. Plain data out.
+/// Several different paths from start to goal, as seed paths of an optimisation. The result is plain data.
 #include <Eigen/Dense>
 #include <cstdint>
 #include <functional>
@@ -11,12 +11,14 @@
 namespace sparflow {
 
 struct SeedOptions {
-  int count = 8;         ///< paths wanted at most
-  double seconds = 5.0;  ///< give up looking for more after this; a result cut short says so
-  std::uint64_t random_seed = 1;  ///< same seed and not cut short: same paths
-  int goal_samples = 200;         ///< random starts with which the goal region is sampled
-  int iterations = 20000;         ///< of each sampling planner
-  /// Told the share of the work done and what is being done; may be empty.
+  int count = 8;  ///< largest number of paths
+  double seconds =
+      5.0;  ///< time limit of the search; SeedResult::out_of_time says whether it was hit
+  std::uint64_t random_seed =
+      1;                   ///< the same seed gives the same paths unless the time limit is hit
+  int goal_samples = 200;  ///< random initial postures with which the goal region is sampled
+  int iterations = 20000;  ///< iteration limit of each sampling planner
+  /// Called with the share of the work done and what is being done; may be empty.
   std::function<void(double, const std::string&)> progress;
 };
 
@@ -25,36 +27,38 @@ enum class SeedStatus {
   kStartOutOfLimits,
   kStartInCollision,
   kGoalOutOfLimits,  ///< a joint goal beyond the position limits
-  kGoalInCollision,  ///< every posture found at the goal collides
-  kGoalUnreachable,  ///< the tip cannot get there within the position limits, obstacles or not
-  kNoPath,           ///< none found within iterations and time; no proof that there is none
+  kGoalInCollision,  ///< every goal configuration found collides
+  kGoalUnreachable,  ///< the tip does not reach the goal within the position limits, obstacles apart
+  kNoPath,           ///< none found within iterations and time; a path may still exist
 };
 
 struct SeedPath {
   Eigen::MatrixXd path;  ///< waypoints x joints, first = start, [rad] or [m]; straight between them
   std::string planner;   ///< "straight line", "RRT-Connect", "BIT*", "tip line"
-  double length = 0.0;   ///< path_length() in the room's metric [s]
+  double length = 0.0;   ///< path_length() [s]
 };
 
 struct SeedResult {
   SeedStatus status = SeedStatus::kNoPath;
   std::string message;  ///< one sentence: what was found or what is wrong, where, by how much
-  /// Best of each end posture first (shortest first), then further homotopy classes.
+  /// The shortest path to each goal configuration first, by length, then further homotopy classes.
   std::vector<SeedPath> paths;
-  int end_postures = 0;       ///< clear postures found at the goal
-  bool out_of_time = false;   ///< `seconds` ended the search: another run may find other paths
+  int end_postures = 0;  ///< number of clear goal configurations found
+  bool out_of_time =
+      false;  ///< whether `seconds` ended the search; another run may then find other paths
   Eigen::VectorXd nearest_q;  ///< kGoalUnreachable: the posture that comes nearest
-  Eigen::Vector3d nearest_tip = Eigen::Vector3d::Zero();  ///< and its tip [m]
-  double miss = 0.0;       ///< and the tip's distance from the goal [m]
+  Eigen::Vector3d nearest_tip = Eigen::Vector3d::Zero();  ///< its tip [m]
+  double miss = 0.0;                                      ///< distance of its tip from the goal [m]
   double clearance = 0.0;  ///< collisions: signed distance less the capsule's radius [m]
-  double solve_s = 0.0;    ///< [s]
+  double solve_s = 0.0;    ///< wall time [s]
 };
 
-/// The same leg by leg through the problem's waypoints: the postures at them are those the legs happen to end in, which
-/// whoever optimises may move. Status and message are those of the first leg that cannot be planned.
+/// Seed paths through the problem's waypoints, planned leg by leg. The postures at the waypoints are those in which the
+/// legs end; an optimiser may change them. Status and message are those of the first leg without a path.
 SeedResult find_paths_through_waypoints(const MotionProblem& problem, const SeedOptions& options);
 
-/// @throws nothing for what the user asked for; sizes that do not match the machine are a CHECK
+/// Seed paths of a problem without waypoints. An infeasible problem gives a status and throws nothing; sizes that do not
+/// match the machine are a CHECK.
 SeedResult find_seed_paths(const MotionProblem& problem, const SeedOptions& options = {});
 
 }  // namespace sparflow

@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kConverged = 1e-11;  // [m]
-constexpr double kSame = 1e-3;        // [s] postures nearer than this are one
+constexpr double kSame = 1e-3;        // [s] distance below which two postures count as equal
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -48,7 +48,7 @@ Vector3d TipSolver::tip(const VectorXd& q) const { return tip_position<double>(m
 
 VectorXd TipSolver::step(const MatrixXd& jacobian, const VectorXd& residual, double damping,
                          const VectorXd& q, int frozen) const {
-  // Joints at a limit that the step would push further are taken out, one pass at a time.
+  // Joints at a limit that the step would push further are removed from the step, in repeated passes.
   VectorXd weight = scale_;
   for (Eigen::Index i = 0; i < weight.size(); ++i) {
     if (static_cast<int>(i) == frozen || limits_[at(i)].hi <= limits_[at(i)].lo) weight[i] = 0.0;
@@ -101,7 +101,7 @@ Posture TipSolver::solve(const VectorXd& from, const Vector3d& target, int froze
       if (stalled) break;
     } else {
       damping = std::max(1e-6, damping * 10.0);
-      if (damping > 1e8) break;  // no descent left: a local optimum of the distance
+      if (damping > 1e8) break;  // no descent is possible: a local minimum of the distance
     }
   }
   best.distance = (best.tip - target).norm();
@@ -113,7 +113,7 @@ Posture TipSolver::pull_towards(const Posture& posture, const VectorXd& anchor,
   Posture best = posture;
   double length = distance(best.q, anchor, scale_);
   for (double share = 1.0; share > 1e-3;) {
-    // Wanted: straight to the anchor, less what would move the tip.
+    // The step goes straight to the anchor, less its part that would move the tip.
     const MatrixXd jacobian =
         moving_.transpose() *
         point_jacobian_matrix(machine_, best.q, machine_.tip.joint, machine_.tip.xyz);
@@ -189,7 +189,7 @@ GoalPostures sample_goal(const MotionProblem& problem, ClearanceModel& clearance
     return distance(a, problem.start, scale) < distance(b, problem.start, scale);
   };
   if (solver.redundancy() > 0) {
-    // The nearest posture of all: slide the few nearest samples, whose basins may differ.
+    // Several of the nearest samples are moved towards the start, because their basins may differ.
     std::vector<VectorXd> by_distance = result.postures;
     std::sort(by_distance.begin(), by_distance.end(), nearer);
     by_distance.resize(std::min<std::size_t>(by_distance.size(), 4));

@@ -11,11 +11,11 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kSpacing = 0.1;  // [m] first cut of the line
-constexpr double kOnLine = 1e-6;  // [m] waypoints
-constexpr int kFinest = 2048;     // waypoints
+constexpr double kSpacing = 0.1;  // [m] distance of waypoints in the first division
+constexpr double kOnLine = 1e-6;  // [m] largest distance of a waypoint's tip from the line
+constexpr int kFinest = 2048;     // largest number of waypoints
 
-/// Next posture from the one before, the tip's target and the share of the line done.
+/// Gives the next posture from the one before, the tip's target and the share of the line done.
 using Advance = std::function<Posture(const VectorXd&, const Vector3d&, double)>;
 
 /// The path, or as much of it as could be solved.
@@ -71,7 +71,7 @@ TipLinePaths follow_tip_line(const MotionProblem& problem, const TipSolver& solv
   if (end_is_given || solver.redundancy() > 0) {
     for (const VectorXd& end : ends) {
       ways.push_back([&](const VectorXd& q, const Vector3d& target, double share) {
-        // lean on the straight joint line to this end, then come back to the tip's line along the region
+        // The step is attracted to the straight joint line to this end, then corrected back to the tip's line.
         const VectorXd wanted = problem.start + share * (end - problem.start);
         return solver.pull_towards(solver.solve(q, target), wanted, target);
       });
@@ -83,7 +83,7 @@ TipLinePaths follow_tip_line(const MotionProblem& problem, const TipSolver& solv
     for (int pieces = first; pieces <= kFinest; pieces *= 2) {
       MatrixXd path = walk(problem.start, from, to, pieces, way);
       result.furthest = std::max(result.furthest, static_cast<double>(path.rows() - 1) / pieces);
-      if (path.rows() <= pieces) break;  // a finer cut meets the same limit
+      if (path.rows() <= pieces) break;  // a finer division would meet the same limit
       if (deviation_between(path, solver, from, to) > 0.25 * tolerance && 2 * pieces <= kFinest) {
         continue;
       }

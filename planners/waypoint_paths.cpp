@@ -9,7 +9,7 @@
 namespace sparflow {
 
 SeedResult find_paths_through_waypoints(const MotionProblem& problem, const SeedOptions& options) {
-  constexpr std::size_t kKept = 4;  // partial ways that are led on
+  constexpr std::size_t kKept = 4;  // number of partial paths that are continued
   constexpr int kOfALeg = 3;
   const Eigen::VectorXd scale = speed_scale(problem);
   std::vector<SeedPath> ways(1);

@@ -37,8 +37,9 @@ ClearanceModel::ClearanceModel(const MotionProblem& problem, const ClearanceOpti
       chain_(problem.machine),
       columns_(problem.machine.joints.size()),
       between_(problem.machine.joint_count()) {
-  SPARFLOW_CHECK(limits_.size() == machine_.joints.size(), "one position range a joint");
-  SPARFLOW_CHECK(options.inflation > 0.0, "the inflation of the smooth rows is positive");
+  SPARFLOW_CHECK(limits_.size() == machine_.joints.size(),
+                 "there is one position range for each joint");
+  SPARFLOW_CHECK(options.inflation > 0.0, "the inflation of the smooth rows must be positive");
   build_parts();
   build_rows(options.inflation);
 }
@@ -73,7 +74,7 @@ Vector3d ClearanceModel::position(const Point& point, const double* q) const {
 }
 
 bool ClearanceModel::moves(const Point& point) {
-  // Three unrelated configurations: a point that stays put in all of them lies on every axis that moves it.
+  // A point that no joint moves in three unrelated configurations lies on the axis of every joint before it.
   const int n = machine_.joint_count();
   Vector3d first = Vector3d::Zero();
   for (int trial = 0; trial < 3; ++trial) {
@@ -112,7 +113,7 @@ void ClearanceModel::build_parts() {
   travel_radius_.resize(parts, n);
   part_distance_.resize(parts);
   for (int p = 0; p < parts; ++p) {
-    for (int k = 0; k < n; ++k) {  // a part's points lie between its ends: the larger of the two
+    for (int k = 0; k < n; ++k) {  // the larger of both ends bounds all points of a part
       travel_radius_(p, k) =
           std::max(travel_radius(parts_[at(p)].from, k), travel_radius(parts_[at(p)].to, k));
     }
@@ -123,7 +124,8 @@ double ClearanceModel::travel_radius(const Point& point, int k) const {
   if (k == point.slide) return point.fraction;
   if (k > point.joint) return 0.0;
   if (machine_.joints[at(k)].type == JointType::kPrismatic) return 1.0;
-  double far = point.local.norm();  // from joint k to the point, link by link
+  double far =
+      point.local.norm();  // largest distance from joint k to the point, summed over the links
   for (int j = k + 1; j <= point.joint; ++j) {
     far += machine_.joints[at(j)].origin.translation().norm();
     if (!chain_.revolute[at(j)]) far += largest_travel(limits_[at(j)]);
@@ -169,17 +171,17 @@ void ClearanceModel::build_rows(double inflation) {
     int part;
   };
   std::vector<Sample> samples;
-  const double* q = between_.data();  // chain_ stands at this configuration since build_parts()
+  const double* q = between_.data();  // build_parts() left chain_ at this configuration
   for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) {
     const Obstacle& obstacle = obstacles_[at(o)];
     const bool half_space = std::holds_alternative<HalfSpace>(obstacle.shape);
     const auto* sphere = std::get_if<Sphere>(&obstacle.shape);
-    const double core = sphere ? sphere->radius : 0.0;  // the bound is taken from the centre
+    const double core = sphere ? sphere->radius : 0.0;  // a sphere's bound refers to its centre
     samples.clear();
     for (int p = 0; p < static_cast<int>(parts_.size()); ++p) {
       const Part& part = parts_[at(p)];
       int pieces = 1;
-      double level = radius_;  // half-space: a linear function is least at an end
+      double level = radius_;  // for a half-space, whose linear distance is least at an end
       if (!half_space) {
         const double h = half_piece(part, obstacle, core + radius_, inflation);
         pieces = std::max(1, static_cast<int>(std::ceil(part.length / (2.0 * h))));
@@ -207,8 +209,8 @@ void ClearanceModel::build_rows(double inflation) {
   }
 }
 
-/// A column that stands on the ground is no collision: no motion changes the distance of its immovable end, so
-/// where that end is inside a half-space's zone the other end alone is judged.
+/// Distance of a part from an obstacle. Where the part's immovable end lies inside the clearance of a half-space, only its
+/// other end is checked: a column on the ground is no collision, because no motion changes the distance of its foot.
 double ClearanceModel::part_distance(const Part& part, const Obstacle& obstacle,
                                      const Vector3d& from, const Vector3d& to) const {
   if (std::holds_alternative<HalfSpace>(obstacle.shape)) {
@@ -285,7 +287,7 @@ void ClearanceModel::values(const double* q, double* g) {
 }
 
 int ClearanceModel::update_columns(const Point& point, const Vector3d& p) {
-  // The point rides on link `joint` for all joints up to it; its slide moves it along that joint's axis.
+  // The point moves with link `joint` and all joints before it; its slide joint moves it along that joint's axis.
   for (int k = 0; k <= point.joint; ++k) {
     columns_[at(k)] = point_jacobian(chain_, point.joint, p, k);
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// Distance of the machine to the obstacles: exact for checking, smooth rows for optimising.
+/// Distance of the machine to the obstacles: exact for checking, as smooth rows for optimising.
 #include <Eigen/Dense>
 #include <string>
 #include <vector>
@@ -15,16 +15,17 @@ namespace sparflow {
 double capsule_radius(const MotionProblem& problem);
 
 struct ClearanceOptions {
-  /// How much further than the capsule's radius the smooth rows keep each sample point at most [m]
+  /// Largest excess over the capsule's radius that the smooth rows demand of a sample point [m]
   /// (plus the box's bias, problems/obstacle_distance.h). Smaller = closer passes, more rows.
   double inflation = 0.05;
 };
 
 /// Nearest approach of the machine at one configuration.
 struct Nearest {
-  double distance = 0.0;  ///< signed, less the capsule's radius [m]; +infinity without obstacles
-  int part = -1;          ///< index for part_name(), -1 = no obstacle
-  int obstacle = -1;      ///< index in the problem, -1 = none
+  double distance =
+      0.0;        ///< signed distance less the capsule's radius [m]; +infinity without obstacles
+  int part = -1;  ///< index for part_name(), -1 = no obstacle
+  int obstacle = -1;  ///< index in the problem, -1 = none
 };
 
 /// The machine as capsules of one radius r: each link from its joint to the next one (or to the tip), each
@@ -41,9 +42,9 @@ struct Nearest {
 /// out; next to an immovable point pieces are shortened so that the bound holds without its row,
 /// see cover_complete().
 ///
-/// A part whose immovable end stands in a half-space (a column on the ground) is judged by its other end there.
+/// A part whose immovable end lies in a half-space (a column on the ground) is checked at its other end only.
 ///
-/// A mutable workspace: one a thread. No evaluation allocates.
+/// A mutable workspace; each thread needs its own. No evaluation allocates.
 class ClearanceModel {
  public:
   explicit ClearanceModel(const MotionProblem& problem, const ClearanceOptions& options = {});
@@ -60,19 +61,19 @@ class ClearanceModel {
   bool clear(const double* q) { return nearest(q).distance >= 0.0; }
 
   /// Share of the straight joint line from -> to that is clear, 1 = all of it; negative when `from` is not.
-  /// Conservative advancement, part by part: no point moves further between two tests than its part's distance
-  /// just found, or 2 mm where that is less. What is missed is thus never deeper than 1 mm.
+  /// Conservative advancement by part: between two tests no point moves further than its part's last distance, or 2 mm
+  /// where that is less. A violation that is missed is thus at most 1 mm deep.
   double clear_share(const double* from, const double* to);
   bool motion_clear(const double* from, const double* to) { return clear_share(from, to) >= 1.0; }
   /// The same along a polyline. @param path waypoints x joints
   bool path_clear(const Eigen::MatrixXd& path);
 
-  /// Nearest approach of a motion, every interval tested at `factor` instants. @param when its time [s]
+  /// Nearest approach of a motion, tested at `factor` instants in every interval. @param when set to its time [s]
   Nearest nearest_on(const Trajectory& motion, int factor, double* when = nullptr);
 
   int rows() const { return static_cast<int>(rows_.size()); }
-  /// False when an obstacle is so near to an immovable point that the rows' bound cannot be kept there;
-  /// then rows >= 0 alone do not prove clearance and the exact check must.
+  /// False when an obstacle is so near to an immovable point that the bound of the rows does not hold there; then
+  /// rows >= 0 does not imply clearance, and only the exact check decides.
   bool cover_complete() const { return cover_complete_; }
   /// g [rows], feasible when >= 0. [m]
   void values(const double* q, double* g);
@@ -110,10 +111,10 @@ class ClearanceModel {
   /// Longest allowed half piece h of a part before this obstacle [m].
   double half_piece(const Part& part, const Obstacle& obstacle, double kept, double inflation);
   Eigen::Vector3d position(const Point& point, const double* q) const;
-  /// Columns of the point's Jacobian into columns_; how many joints move it.
+  /// Writes the columns of the point's Jacobian into columns_. @return number of joints that move it
   int update_columns(const Point& point, const Eigen::Vector3d& position);
   bool moves(const Point& point);
-  /// Most that joint `k` moves the point per unit.
+  /// Largest displacement of the point per unit of joint `k`. [m/rad] or [-]
   double travel_radius(const Point& point, int k) const;
   double reach(const Point& point) const;
 

@@ -22,7 +22,7 @@ VectorXd speed_scale(const MotionProblem& problem) {
   for (Eigen::Index j = 0; j < scale.size(); ++j) {
     const Range& v = problem.limits.velocity[at(j)];
     scale[j] = 0.5 * (v.hi - v.lo);
-    SPARFLOW_CHECK(scale[j] > 0.0 && std::isfinite(scale[j]), "every joint has a speed limit");
+    SPARFLOW_CHECK(scale[j] > 0.0 && std::isfinite(scale[j]), "every joint needs a speed limit");
   }
   return scale;
 }

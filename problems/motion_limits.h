@@ -1,5 +1,5 @@
 #pragma once
-/// How much of its limits a motion uses: joint speed, acceleration and position, valve and pump flow.
+/// Ratios of a motion's values to its limits: joint speed, acceleration and position, valve and pump flow.
 #include <Eigen/Dense>
 #include <string>
 
@@ -12,15 +12,15 @@ namespace sparflow {
 /// joints in rad and in m compare. @return [rad/s] or [m/s], by joint
 Eigen::VectorXd speed_scale(const MotionProblem& problem);
 
-/// Ratios of what is asked to what is allowed; 1 = just held. A mutable workspace that refers to `problem`.
+/// Ratios of values to limits [-]; 1 = the limit is just kept. A mutable workspace that refers to `problem`.
 class LimitRatios {
  public:
   explicit LimitRatios(const MotionProblem& problem);
 
-  /// Worst of joint speeds, valve flows (by direction) and pump flows: all proportional to qd.
-  /// @param name gets what is worst, e.g. "flow of pump main"; may be null
+  /// Largest ratio of joint speeds, valve flows (by direction) and pump flows, all of which are proportional to qd.
+  /// @param name set to the quantity with the largest ratio, e.g. "flow of pump main"; may be null
   double speed(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, std::string* name);
-  /// Worst of the joint accelerations.
+  /// Largest ratio of the joint accelerations.
   double acceleration(const Eigen::VectorXd& qdd, std::string* name) const;
 
  private:
@@ -28,8 +28,8 @@ class LimitRatios {
   Eigen::VectorXd pump_flow_;
 };
 
-/// Worst ratio over a motion at `factor` instants an interval, positions included (there the distance from the middle
-/// of the range over half the range, counted only beyond 1). @param limit gets the worst's name; may be null
+/// Largest ratio over a motion at `factor` instants in each interval, positions included (as distance from the middle of
+/// the range over half the range, only if it exceeds 1). @param limit set to the name of that limit; may be null
 double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,
                    std::string* limit = nullptr);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The motion file (CSV) of the contract: what the optimiser found, with everything the exact law says of it.
+/// Motion file (CSV): a motion with its flows, pressures and power by the exact law.
 #include <string>
 
 #include "models/chain/crane_model.h"
@@ -7,10 +7,10 @@
 
 namespace sparflow {
 
-/// t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm and P_*_bar by cylinder, p_*_bar by pump, power_W.
+/// Columns: t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm and P_*_bar by cylinder, p_*_bar by pump, power_W.
 std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload);
 
-/// Reads a motion back (t, q, qd, qdd; other columns are ignored).
+/// Reads a motion (t, q, qd, qdd; other columns are ignored).
 /// @throws InputError with line and column name
 Trajectory load_motion(const std::string& path, const Machine& machine);
 

@@ -53,7 +53,7 @@ double segment_box_distance(const Vector3d& y, const Vector3d& u, const Vector3d
   const double outside = box_distance(y + best * u, half);
   if (outside > 0.0) return outside;
 
-  // The segment enters the box: its depth max_i(|y_i| - a_i) is convex along it, golden section.
+  // The segment enters the box. The depth max_i(|y_i| - a_i) is convex along it, so golden section finds its minimum.
   lo = 0.0;
   hi = 1.0;
   const double golden = 0.5 * (std::sqrt(5.0) - 1.0);

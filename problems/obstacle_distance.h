@@ -1,16 +1,16 @@
 #pragma once
-/// Distances to obstacles: exact ones for checking, smooth ones for optimising. [m], base frame.
+/// Distances to obstacles [m], base frame: exact ones for checking, smooth ones for optimising.
 #include <Eigen/Dense>
 
 #include "problems/problem.h"
 
 namespace sparflow {
 
-/// Exact signed distance of a point; inside, minus the depth below the nearest face.
+/// Exact signed distance of a point; inside it is minus the depth below the nearest face.
 double signed_distance(const Obstacle& obstacle, const Eigen::Vector3d& point);
 
-/// Least signed distance over the segment from `a` to `b`. Exact outside; inside a box, the depth of the
-/// deepest point to 1e-9 of the segment's length.
+/// Least signed distance over the segment from `a` to `b`: exact outside; inside a box it is the depth of the deepest
+/// point, to 1e-9 of the segment's length.
 double segment_distance(const Obstacle& obstacle, const Eigen::Vector3d& a,
                         const Eigen::Vector3d& b);
 
@@ -44,7 +44,7 @@ class SmoothObstacle {
   Eigen::Vector3d center_;    ///< box or sphere centre, half-space point
   Eigen::Vector3d half_;      ///< box: half edges; half-space: normal
   Eigen::Matrix3d rotation_;  ///< box axes
-  double level_ = 0.0;        ///< half-space: level; sphere: D; box: lambda
+  double level_ = 0.0;        ///< level of a half-space, D of a sphere, lambda of a box
   double tau_ = 1.0;
 };
 

@@ -23,8 +23,8 @@ MotionLimits limits_of(const Machine& machine) {
   return limits;
 }
 
-// A direction d stays fixed when every revolute axis is parallel to d and every prismatic one normal to
-// it: then no rotation turns d, so looking at one posture is enough. Joints behind the tip do not count.
+// A direction d is fixed when every revolute axis is parallel to d and every prismatic axis normal to it. Then no rotation
+// turns d, so one posture is enough for the test. Joints behind the tip are ignored.
 std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
   // d is in the null space of this: sum of (I - a a^T) over revolute and a a^T over prismatic axes.
   Eigen::Matrix3d moved = Eigen::Matrix3d::Zero();
@@ -36,7 +36,7 @@ std::vector<Eigen::Vector3d> fixed_tip_directions(const Machine& machine) {
     const Eigen::Matrix3d along = axis * axis.transpose();
     moved += joint.type == JointType::kRevolute ? Eigen::Matrix3d::Identity() - along : along;
   }
-  // squared sine of the angle by which the axes miss parallel: 1e-12 is a millionth of a radian
+  // The tolerance 1e-12 is the squared sine of the angle between the axes: a millionth of a radian.
   const Eigen::MatrixXd still = complement_of(moved, 1e-12);
   std::vector<Eigen::Vector3d> fixed;
   for (Eigen::Index k = 0; k < still.cols(); ++k) {

@@ -11,12 +11,12 @@
 
 namespace sparflow {
 
-/// Where the tip shall end; the end posture is free. [m], base frame.
+/// Goal position of the tip; the goal configuration is free. [m], base frame.
 struct TipGoal {
   Eigen::Vector3d tip = Eigen::Vector3d::Zero();
 };
 
-/// The end posture itself, in the machine's joint order. [rad] or [m]
+/// Goal configuration, in the machine's joint order. [rad] or [m]
 struct JointGoal {
   Eigen::VectorXd q;
 };
@@ -74,8 +74,8 @@ struct TipLine {
 ///        + smoothness * integral of sum_j qdd_j^2 dt, with u_i the command of valve i (1 = full flow).
 struct ObjectiveWeights {
   double energy = 1.0;    ///< [-]
-  double time = 0.0;      ///< [W], with energy 0: the shortest time
-  double commands = 0.0;  ///< [W], with energy 0: the gentlest commands
+  double time = 0.0;      ///< [W]; with energy 0 the shortest duration is sought
+  double commands = 0.0;  ///< [W]; with energy 0 the least squared commands are sought
   std::optional<double>
       smoothness;  ///< [J s^3] for joints in rad; absent: the optimiser's own default
 };
@@ -83,14 +83,14 @@ struct ObjectiveWeights {
 struct MotionProblem {
   std::string name;          ///< `name` in the file, or the file's stem
   std::string file;          ///< as read
-  std::string machine_path;  ///< resolved; empty when the machine was handed in
+  std::string machine_path;  ///< resolved; empty when the machine was given to load_problem()
   std::string model_path;    ///< resolved; empty when the file names none
   Machine machine;
-  std::vector<std::string> machine_warnings;  ///< what load_machine() found unusual
+  std::vector<std::string> machine_warnings;  ///< warnings of load_machine()
   double payload = 0.0;                       ///< [kg], hangs at the tip
   Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
   Goal goal;
-  /// Points the tip passes on the way, in this order, without having to stop [m]. When is free.
+  /// Points that the tip passes in this order without having to stop [m]; the instants are free.
   std::vector<Eigen::Vector3d> waypoints;
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]
@@ -101,7 +101,7 @@ struct MotionProblem {
   ObjectiveWeights objective;
   std::optional<int> knots;  ///< knots of the transcription; absent: the optimiser's choice
 
-  // Defaulted where they are defined: compiled once, not in every file that copies one.
+  // Defaulted in problem.cpp, so that they are not compiled in every file that copies a problem.
   MotionProblem();
   MotionProblem(const MotionProblem&);
   MotionProblem(MotionProblem&&) noexcept;
@@ -110,7 +110,7 @@ struct MotionProblem {
   ~MotionProblem();
 };
 
-/// The machine's own limits, nothing overridden.
+/// The machine's own limits without overrides.
 MotionLimits limits_of(const Machine& machine);
 
 /// Orthonormal directions (base frame) along which the tip cannot move, whatever the joints do: for a

@@ -28,7 +28,7 @@ constexpr Quantity kPower{"power", "W", Sign::kNonNegative};
 constexpr Quantity kFraction{"share of the full flow", "", Sign::kPositive};
 constexpr Quantity kWeight{"weight", "", Sign::kNonNegative};
 
-/// Goals are typed by hand to a millimetre; a tenth of that is rounding.
+/// Goals are given to a millimetre; a tenth of that counts as rounding.
 constexpr double kPlaneTolerance = 1e-4;  // [m]
 
 class ProblemReader {
@@ -81,7 +81,7 @@ class ProblemReader {
   }
 
  private:
-  /// Relative to the problem file.
+  /// Path relative to the problem file's folder.
   std::string resolved(const std::string& given) const {
     return (fs::path(folder_) / given).lexically_normal().string();
   }
@@ -172,7 +172,7 @@ class ProblemReader {
     problem_.goal = TipGoal{read_tip(*map.find("tip"))};
   }
 
-  /// A point the tip can be asked to reach: in the machine's plane, if it has one.
+  /// Reads a tip position, which must lie in the machine's plane if it is planar.
   Eigen::Vector3d read_tip(const YamlValue& tip) const {
     const Eigen::Vector3d goal = tip.vector3(kTipPoint);
     const Eigen::Vector3d now = tip_position<double>(problem_.machine, problem_.start);

@@ -17,12 +17,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kGrid = 600;       // pieces of the whole path in the profile
-constexpr int kLeastPieces = 8;  // of a leg or a rounded corner
-constexpr int kFine = 16;        // instants an interval at which flows and clearance are judged
+constexpr int kLeastPieces = 8;  // least number of pieces of a leg or a rounded corner
+constexpr int kFine = 16;        // instants in an interval at which flows and clearance are checked
 constexpr double kFlowMargin = 1e-4;  // relative, for flow maxima between those instants
-constexpr double kBendShare =
-    0.7;  // of the acceleration limit that bends may take, rest for speeding up
-constexpr double kMissed = 1e-3;         // [m] clearance that a motion check may miss (clear_share)
+constexpr double kCurvatureShare =
+    0.7;  // share of the acceleration limit for the path's curvature, the rest is for the path's acceleration
+constexpr double kMissed = 1e-3;  // [m] violation that a check of a motion may miss (clear_share)
 constexpr double kLeastInterval = 1e-3;  // [s] for paths without length
 
 std::size_t slot(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -33,7 +33,7 @@ double least_acceleration(const MotionProblem& problem, Eigen::Index joint) {
   return std::min(a.hi, -a.lo);
 }
 
-/// Samples of a path, and the nodes at which a stopping motion rests.
+/// Samples of a path, and the nodes at which a motion with stops is at rest.
 struct Grid {
   std::vector<VectorXd> q;
   std::vector<bool> stop;
@@ -83,7 +83,7 @@ Grid sample(const MotionProblem& problem, const std::vector<VectorXd>& waypoints
     const VectorXd& corner = waypoints[k];
     VectorXd a, b;
     bool rounded = false;
-    // Half of both legs at most, so that neighbouring parabolas do not meet.
+    // A parabola covers at most half of both legs, so that neighbouring ones do not meet.
     for (double share = 0.5; round && !rounded && share > 0.005; share *= 0.5) {
       const double before = length(waypoints[k - 1], corner),
                    after = length(corner, waypoints[k + 1]);
@@ -114,7 +114,7 @@ struct Run {
   std::vector<double> speed;  // in lengths of the metric per s
 };
 
-/// The fastest run along the grid.
+/// Minimum-time profile along the grid.
 Run fastest(const MotionProblem& problem, const Grid& grid) {
   LimitRatios limits(problem);
   const std::size_t pieces = grid.q.size() - 1;
@@ -141,7 +141,7 @@ Run fastest(const MotionProblem& problem, const Grid& grid) {
     if (ratio > 0.0) u[i] = 1.0 / (ratio * ratio);
     for (Eigen::Index j = 0; j < bend[i].size(); ++j) {
       const double b = std::abs(bend[i][j]);
-      if (b > 0.0) u[i] = std::min(u[i], kBendShare * least_acceleration(problem, j) / b);
+      if (b > 0.0) u[i] = std::min(u[i], kCurvatureShare * least_acceleration(problem, j) / b);
     }
   }
   const auto gain = [&](std::size_t piece, std::size_t node, double from) {
@@ -164,12 +164,12 @@ Run fastest(const MotionProblem& problem, const Grid& grid) {
   return run;
 }
 
-/// Point of the run at time `when`: constant acceleration along each piece. `piece` only ever grows.
+/// Point of the profile at time `when`, with constant acceleration along each piece. `piece` only increases.
 VectorXd point_at(const Grid& grid, const Run& run, double when, std::size_t& piece) {
   while (piece + 2 < run.t.size() && run.t[piece + 1] < when) ++piece;
   const double span = run.t[piece + 1] - run.t[piece];
   const double tau = std::clamp((when - run.t[piece]) / span, 0.0, 1.0);
-  // In pieces per span the speeds at both ends have the mean 1.
+  // Speeds are scaled so that those at both ends of the piece have the mean 1.
   const double v0 = 2.0 * run.speed[piece] / (run.speed[piece] + run.speed[piece + 1]);
   const double share = std::clamp(v0 * tau + (1.0 - v0) * tau * tau, 0.0, 1.0);
   return grid.q[piece] + share * (grid.q[piece + 1] - grid.q[piece]);
@@ -199,7 +199,7 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
                              const TimingOptions& options) {
   SPARFLOW_CHECK(options.intervals >= 8, "a timed motion has at least 8 intervals");
   SPARFLOW_CHECK(path.rows() >= 1 && path.cols() == problem.machine.joint_count(),
-                 "a path has a row a waypoint and a column a joint");
+                 "a path has one row for each waypoint and one column for each joint");
   const int intervals = options.intervals;
   const VectorXd scale = speed_scale(problem);
   std::vector<VectorXd> waypoints{path.row(0).transpose()};
@@ -223,7 +223,7 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
       control.row(0) = path.row(0);
       control.row(intervals - 1) = path.bottomRows(1);
     }
-    // Ratios at interval 1 s tell by how much time must be stretched.
+    // Ratios at intervals of 1 s give the factor by which time must be stretched.
     const Trajectory unit = spline_motion(control, 1.0);
     LimitRatios limits(problem);
     double interval = kLeastInterval;

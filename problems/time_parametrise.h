@@ -1,5 +1,5 @@
 #pragma once
-/// A joint path made a motion: from rest to rest, within every limit a path can be judged by.
+/// Time parametrisation of a joint path: a motion from rest to rest within the limits that do not need pressures.
 #include <Eigen/Dense>
 #include <string>
 
@@ -10,13 +10,13 @@
 namespace sparflow {
 
 struct TimingOptions {
-  int intervals = 100;  ///< of the motion, equal; at least 8
+  int intervals = 100;  ///< number of equal intervals of the motion, at least 8
 };
 
 enum class TimingStatus {
   kOk,
   kTooShort,   ///< the wanted duration is below `shortest`; the motion takes `shortest`
-  kCollision,  ///< the path meets an obstacle, or so nearly that the motion does; see `clearance`
+  kCollision,  ///< the motion along the path meets an obstacle; see `clearance`
 };
 
 struct TimedMotion {
@@ -24,10 +24,11 @@ struct TimedMotion {
   std::string message;  ///< one sentence
   Trajectory motion;    ///< rest to rest, constant acceleration in each interval
   double shortest =
-      0.0;             ///< shortest duration of this path with this profile [s]: an upper bound of
-                       ///< the path's minimum time, usually a few per cent above it
-  std::string limit;   ///< what sets it, e.g. "flow of pump main"
-  bool stops = false;  ///< corners could not be rounded: the motion stops at each waypoint
+      0.0;            ///< shortest duration of this path with this profile [s]: an upper bound of
+                      ///< the path's minimum time, usually a few per cent above it
+  std::string limit;  ///< the limit that determines it, e.g. "flow of pump main"
+  bool stops =
+      false;  ///< true when corners could not be rounded: the motion stops at each waypoint
   double clearance =
       0.0;  ///< least exact distance less the capsule's radius [m], +infinity without obstacles
 };
@@ -41,16 +42,16 @@ struct TimedMotion {
 ///     polygon's hull (so within position limits), its first two and last two control points equal (rest).
 ///  4. All limits are evaluated on that motion (speed at knots and acceleration per interval, which is
 ///     exact; flows at 16 instants an interval, with a margin for what lies between) and the time is
-///     stretched so that the worst just holds. Stretching
-///     divides speeds and flows by r and accelerations by r^2, so any longer duration holds too.
-///  5. The exact clearance is checked at 16 instants an interval; when rounding costs it, the motion stops
+///     stretched so that the most violated one just holds. Stretching
+///     divides speeds and flows by r and accelerations by r^2, so any longer duration keeps the limits too.
+///  5. The exact clearance is checked at 16 instants an interval; if the rounded motion violates it, the motion stops
 ///     at the waypoints instead.
 /// @param path waypoints x joints, at least one row, within the position limits
 TimedMotion time_parametrise(const MotionProblem& problem, const Eigen::MatrixXd& path,
                              double duration, const TimingOptions& options = {});
 
-/// The uniform quadratic B-spline of control points [intervals x joints], the first and last counted twice: rest at both
-/// ends where the first two and the last two are equal; piecewise constant acceleration. @param h interval [s]
+/// Motion along the uniform quadratic B-spline of control points [intervals x joints], the first and last taken twice. It
+/// is at rest at an end whose two control points are equal; acceleration is piecewise constant. @param h interval [s]
 Trajectory spline_motion(const Eigen::MatrixXd& control, double h);
 
 }  // namespace sparflow

@@ -60,7 +60,7 @@ class RawEvidence {
 /// the references) that a fit on the suspect logs removes, judged on motions left out of that fit. Stages in which the
 /// effect adds less than a tenth to the error are left out.
 struct AbsorbedError {
-  std::string stage;  ///< force, flow, pressure, pump
+  std::string stage;   ///< force, flow, pressure, pump
   double share = 0.0;  ///< [-]
 };
 /// Computes these shares. @param model learned from the references

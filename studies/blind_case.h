@@ -18,10 +18,11 @@ struct BlindCase {
   double seconds = 300.0;  ///< [s] of the training log, at 50 Hz
   double noise = 1.0;      ///< [-] 1 = standard deviations of 0.8 bar, 0.3 mrad, 1 mm
   std::string only;        ///< id of the effect; empty = drawn
-  std::string leave_out;   ///< columns that the logs lack: "rod", "payload", "commands", "oil", "pump"
+  std::string
+      leave_out;  ///< columns that the logs lack: "rod", "payload", "commands", "oil", "pump"
   std::string judge = "ours";  ///< method: ours, truth (is given the ids), bic, gp, correlation
   bool extend = true;          ///< also add the named effects and judge them on the test log
-  std::string folder;          ///< for the case's files (row_seed/train.csv ...); empty = not written
+  std::string folder;  ///< for the case's files (row_seed/train.csv ...); empty = not written
 };
 
 /// An effect that the search found, with its evidence.
@@ -34,13 +35,13 @@ struct NamedEffect {
 struct BlindRun {
   BlindCase asked;
   std::string machine, truth, answer, verdict;
-  std::string left_out;  ///< why the case could not be run; empty = it was run
-  std::string details;   ///< text of the diagnosis, and the true parameters
-  bool top = false;      ///< the first named effect has the true id and place
-  bool in_set = false;   ///< a true effect is named or is a rival of a named one
+  std::string left_out;                   ///< why the case could not be run; empty = it was run
+  std::string details;                    ///< text of the diagnosis, and the true parameters
+  bool top = false;                       ///< the first named effect has the true id and place
+  bool in_set = false;                    ///< a true effect is named or is a rival of a named one
   bool all_found = false, exact = false;  ///< all true effects are named; and no others
-  double set_size = 1.0;                  ///< number of named effects and rivals for each true effect
-  double seconds = 0.0;                   ///< [s] wall time of the diagnosis
+  double set_size = 1.0;  ///< number of named effects and rivals for each true effect
+  double seconds = 0.0;   ///< [s] wall time of the diagnosis
   double rows = 0.0;
   std::vector<NamedEffect> named;
   std::vector<double> errors;           ///< [-] relative errors of parameters
@@ -49,11 +50,11 @@ struct BlindRun {
   // The following are judged on the test log, which took no part; NaN where there is nothing to judge.
   /// [-] RMS with the named effects over RMS with the true effects; geometric mean over quantities.
   double rms_ratio = 0.0;
-  double energy_before = 0.0;            ///< [-] |predicted - measured| / measured, all pumps together
-  double energy_after = 0.0;             ///< [-] the same with the named effects
-  bool changed = false;                  ///< effects were named and added
-  bool made_worse = false;               ///< the error on the test log rose thereby
-  std::string worse_by;                  ///< names the errors that rose
+  double energy_before = 0.0;  ///< [-] |predicted - measured| / measured, all pumps together
+  double energy_after = 0.0;   ///< [-] the same with the named effects
+  bool changed = false;        ///< effects were named and added
+  bool made_worse = false;     ///< the error on the test log rose thereby
+  std::string worse_by;        ///< names the errors that rose
   std::vector<AbsorbedError> absorbed;  ///< of method gp
 
   /// Whether the answer is right for the case's row.

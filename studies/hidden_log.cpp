@@ -74,7 +74,8 @@ int run(int argc, char** argv) {
   app.add("--noise", request.log.noise_factor, "sensor noise, 1 = 0.8 bar");
   app.add("--rate", request.log.rate, "rows per second [Hz], 5..200");
   app.add("--without", without, "columns to leave out: commands, pB, pump, payload, oil");
-  app.flag("--strokes", request.log.channels.strokes, "log strokes x_<cylinder>_m instead of joint positions");
+  app.flag("--strokes", request.log.channels.strokes,
+           "log strokes x_<cylinder>_m instead of joint positions");
   app.flag("--list", list, "print the table of effects and their laws");
   app.add("-o,--out", folder, "case folder");
   if (const auto code = app.parse(argc, argv)) return *code;

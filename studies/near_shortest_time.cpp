@@ -1,5 +1,6 @@
 /// Reaches near their shortest time, where cylinders must move together: do default settings find the shortest time, and
-/// at 1.2 times that the least energy, that more extensive searches find? build/bench/near_shortest_time [--random 44 --seed 1] [--json OUT.json]
+/// at 1.2 times that the least energy, that more extensive searches find?
+///   build/bench/near_shortest_time [--random 44 --seed 1] [--json OUT.json]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -88,7 +89,8 @@ void print_summary(const Excesses& all, double factor) {
   fmt::print("\nno motion found: {} of {}\n", all.unsolved,
              all.unsolved + static_cast<int>(all.time.size()));
   print_excess("shortest time, default over the best found", all.time, 0.02);
-  print_excess("  shortest time named for an infeasible reach over the best found", all.named, 0.02);
+  print_excess("  shortest time named for an infeasible reach over the best found", all.named,
+               0.02);
   print_excess("  best found over the estimated bound", all.time_over_bound, 0.02);
   print_excess(fmt::format("energy at {:g} times, default over the best found", factor).c_str(),
                all.energy, 0.03);
@@ -109,7 +111,8 @@ nlohmann::json found_json(const std::vector<ShortTimeFound>& found) {
 }
 
 int run(int argc, char** argv) {
-  ProgramOptions app("Reaches near their shortest time: default settings against more extensive searches");
+  ProgramOptions app(
+      "Reaches near their shortest time: default settings against more extensive searches");
   int random_count = 0, processes = 2;
   std::uint64_t seed = 1;
   std::string only, json;
@@ -118,12 +121,14 @@ int run(int argc, char** argv) {
   app.add("--random", random_count, "random reaches instead of the bundled ones");
   app.add("--seed", seed, "seed of the first random reach");
   app.add("--only", only, "bundled reaches whose name contains this");
-  app.flag("--open", open,
-           "only reaches without obstacles; each of the others takes many minutes");
-  app.add("--factor", settings.factor, "duration of the energies, as a multiple of the shortest time").positive();
+  app.flag("--open", open, "only reaches without obstacles; each of the others takes many minutes");
+  app.add("--factor", settings.factor,
+          "duration of the energies, as a multiple of the shortest time")
+      .positive();
   app.add("--paths", settings.paths, "seed paths of an extensive search").positive();
   app.add("--intervals", settings.intervals, "mesh intervals of an extensive search").positive();
-  app.add("--searches", settings.seeds, "number of extensive searches, each with random paths of its own");
+  app.add("--searches", settings.seeds,
+          "number of extensive searches, each with random paths of its own");
   app.add("--grid-nodes", settings.grid_nodes, "nodes of the joint grid").positive();
   app.flag("!--no-bound", settings.bounds, "leave out the estimated lower bounds");
   app.add("--json", json, "file for all results (JSON)");

@@ -12,10 +12,11 @@ struct ShortTimeSettings {
   double factor = 1.2;  ///< [-] duration of the energies, as a multiple of the shortest time known
   int paths = 48;       ///< seed paths of an extensive search
   int paths_beside_obstacles = 12;
-  int intervals = 150;     ///< mesh intervals of an extensive search; beside obstacles as by default
-  int seeds = 2;           ///< number of extensive searches, each with random paths of its own
-  int grid_nodes = 60000;  ///< of the joint grid whose cheapest path is driven without further optimisation
-  bool bounds = true;      ///< estimated lower bounds
+  int intervals = 150;  ///< mesh intervals of an extensive search; beside obstacles as by default
+  int seeds = 2;        ///< number of extensive searches, each with random paths of its own
+  int grid_nodes =
+      60000;  ///< of the joint grid whose cheapest path is driven without further optimisation
+  bool bounds = true;  ///< estimated lower bounds
 };
 
 /// Result of one search.

@@ -1,5 +1,6 @@
 /// Solves the bundled reaches or random ones: which are feasible, which limits are named, and how the energies compare
-/// with baselines, bounds and best known energies. build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
+/// with baselines, bounds and best known energies.
+///   build/bench/problem_set [--random 200 --seed 1] [--write problems/best_known.json]
 #include <fmt/format.h>
 
 #include <fstream>
@@ -22,12 +23,13 @@ int run(int argc, char** argv) {
   app.add("--random", random_count, "random reaches instead of the bundled ones");
   app.add("--seed", seed, "seed of the first random reach");
   app.add("--only", only, "bundled reaches whose name contains this");
-  app.add("--write", write, "file of best known energies (JSON), updated where a lower one is found");
+  app.add("--write", write,
+          "file of best known energies (JSON), updated where a lower one is found");
   app.add("--write-optima", keep, "file for energies, times and bounds of this run (JSON)");
-  app.add(
-      "--optima", optima,
-      "file of --write-optima: only the bounds are computed again; with --no-bound --no-grid those of "
-      "the file are printed");
+  app.add("--optima", optima,
+          "file of --write-optima: only the bounds are computed again; with --no-bound --no-grid "
+          "those of "
+          "the file are printed");
   app.add("--intervals", settings.intervals, "mesh intervals");
   app.add("--paths", settings.paths, "largest number of seed paths");
   app.flag("!--no-bound", settings.bound, "leave out the estimated lower bound");

@@ -52,7 +52,7 @@ std::string add_infeasible(const ReachTask& task, const ReachFigures& f, Count& 
   if (!solved && !f.worst.empty()) ++c.named;
   return fmt::format("{:44} infeasible ({}): {}\n", task.problem.name, task.why_not,
                      solved            ? "SOLVED"
-                     : f.worst.empty() ? "NOT NAMED, only said: " + f.named
+                     : f.worst.empty() ? "NO LIMIT NAMED: " + f.named
                                        : f.named);
 }
 
@@ -118,7 +118,7 @@ void print_spread(const char* what, const std::vector<double>& v) {
 
 void print_counts(const Count& c) {
   fmt::print(
-      "\nfeasible {}: solved {} ({:.1f} %)\ninfeasible {}: named {}, solved all the same {}\n",
+      "\nfeasible {}: solved {} ({:.1f} %)\ninfeasible {}: named {}, solved nevertheless {}\n",
       c.feasible, c.solved, 100.0 * c.solved / std::max(1, c.feasible), c.infeasible, c.named,
       c.wrongly_solved);
   fmt::print("optimum above a baseline: {} times\n", c.above_baseline);

@@ -15,8 +15,8 @@ struct ReachFigures {
   double unlimited = 0.0;   ///< [J] cheapest path of the grid at unlimited time, 0 = not computed
   /// [J] the grid's cheapest path driven in the optimum's time (optimizer/grid/driven_grid_path.h); 0 = none keeps all limits
   double grid_path = 0.0;
-  std::string named;  ///< message of an infeasible reach
-  std::string worst;  ///< the constraint that the message names, empty when it names none
+  std::string named;      ///< message of an infeasible reach
+  std::string worst;      ///< the constraint that the message names, empty when it names none
   bool left_out = false;  ///< by ReachSettings::faster_than
   /// The optimum in equal time; null when there is none.
   const StrategyOutcome* optimum() const {
@@ -29,9 +29,10 @@ struct ReachFigures {
 struct ReachSettings {
   int intervals = 100, paths = 4;
   bool grid = true, bound = true, timed = true;
-  double faster_than = 0.0;  ///< [-] reaches slower than this multiple of the shortest time are left out; 0 = none
-  nlohmann::json optima =
-      nlohmann::json::object();  ///< results of an earlier run by problem, which are not solved again
+  double faster_than =
+      0.0;  ///< [-] reaches slower than this multiple of the shortest time are left out; 0 = none
+  nlohmann::json optima = nlohmann::json::
+      object();  ///< results of an earlier run by problem, which are not solved again
 };
 
 /// Solves one reach.

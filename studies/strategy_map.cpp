@@ -1,4 +1,5 @@
-/// Compares sequential, simultaneous and optimal motions over duration, payload, reach and idle power. build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
+/// Compares sequential, simultaneous and optimal motions over duration, payload, reach and idle power.
+///   build/bench/strategy_map -o DIR writes strategy_map.csv, strategy_idle.csv,
 /// summary.txt and strategy_map.svg.
 #include <fmt/format.h>
 
@@ -71,7 +72,8 @@ MapCurve unpack_curve(const std::string& bytes) {
 
 int run(int argc, char** argv) {
   bench::ProgramOptions app(
-      "Map of sequential, simultaneous and optimal motions over duration, payload, reach and idle power");
+      "Map of sequential, simultaneous and optimal motions over duration, payload, reach and idle "
+      "power");
   std::string folder = ".", only;
   int intervals = 80, points = 9, processes = 2, rounds = 1;
   bool ends_only = false;
@@ -116,7 +118,8 @@ int run(int argc, char** argv) {
     optimize.processes = 1;
     optimize.search_intervals = std::min(40, intervals);
     optimize.sequence_rounds = rounds;
-    optimize.mesh_error = 1e-3;  // A single mesh suffices, because the differences of interest are larger.
+    optimize.mesh_error =
+        1e-3;  // A single mesh suffices, because the differences of interest are larger.
     options.strategies.smooth_seeds = 1;
     options.strategies.baselines.intervals = intervals;
     options.strategies.baselines.polished_orders = 1;

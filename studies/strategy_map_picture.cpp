@@ -164,11 +164,13 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
       "\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
       width, height);
   svg += text_at(kLeft, 20, "Sequential against simultaneous in equal time", "start", 13);
-  svg += text_at(kLeft, 36, "energy of the sequential motion over that of the joint line - 1 [%]", "start");
+  svg += text_at(kLeft, 36, "energy of the sequential motion over that of the joint line - 1 [%]",
+                 "start");
   svg += text_at(second, 20, "Moving cylinders in the optimum", "start", 13);
-  svg += text_at(second, 36, "share of its moving time with two or more cylinders moving [%]", "start");
+  svg += text_at(second, 36, "share of its moving time with two or more cylinders moving [%]",
+                 "start");
   svg += text_at(third, 20, "Each at its own best duration", "start", 13);
-  svg += text_at(third, 36, "the same as left, idle energy included [%]", "start");
+  svg += text_at(third, 36, "sequential over joint line - 1, idle energy included [%]", "start");
   for (std::size_t k = 0; k < n; ++k) {
     const std::string label = fmt::format("{:g}", columns()[k]);
     const double x = kCell * static_cast<double>(k);
@@ -215,10 +217,11 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
     }
     y += kRow;
   }
-  svg += text_at(kLeft, y + 24,
-                 "Blue: the sequential motion takes less. Orange: the simultaneous motion takes less. "
-                 "Columns begin at the figure above their left edge.",
-                 "start");
+  svg +=
+      text_at(kLeft, y + 24,
+              "Blue: the sequential motion takes less. Orange: the simultaneous motion takes less. "
+              "Columns begin at the figure above their left edge.",
+              "start");
   svg +=
       text_at(kLeft, y + 42,
               "only sim: no sequential motion of this duration keeps the limits; neither: only the "

@@ -8,8 +8,9 @@ namespace sparflow {
 struct MapPoint {
   double duration = 0.0;                                       // [s]
   double sequential = 0.0, simultaneous = 0.0, optimal = 0.0;  // [J], NaN = none of this duration
-  std::string from;                                            // the start from which the optimum was found
-  std::vector<double> share_moving;                            // [-] of the optimum's duration with 0, 1, 2 ... cylinders moving
+  std::string from;  // the start from which the optimum was found
+  std::vector<double>
+      share_moving;  // [-] of the optimum's duration with 0, 1, 2 ... cylinders moving
 };
 
 struct MapCurve {

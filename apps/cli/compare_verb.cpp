@@ -53,8 +53,9 @@ int run(const CompareArguments& a) {
         "compare: give either --model MODEL.json, or --machine FILE to compare static forces "
         "only");
   }
-  const CraneModel model = a.model.empty() ? CraneModel::untrained(load_machine_with_warnings(a.machine))
-                                           : load_model_with_warnings(a.model);
+  const CraneModel model = a.model.empty()
+                               ? CraneModel::untrained(load_machine_with_warnings(a.machine))
+                               : load_model_with_warnings(a.model);
   const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
   CompareResult result = compare(model, logs);
   if (a.model.empty()) keep_geometric_stages(result);
@@ -69,8 +70,8 @@ int run(const CompareArguments& a) {
 
 void add_compare_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<CompareArguments>();
-  CLI::App* verb =
-      app.add_subcommand("compare", "compare a model with measurements at every stage and show where it fails");
+  CLI::App* verb = app.add_subcommand(
+      "compare", "compare a model with measurements at every stage and show where it fails");
   verb->add_option("--model", a->model, "fitted model")->type_name("MODEL.json");
   verb->add_option("--machine,-m", a->machine,
                    "machine file instead of a model: static forces only")

@@ -76,7 +76,8 @@ CraneModel load_model_with_warnings(const std::string& path) {
 void Outputs::add_to(CLI::App& verb, bool with_report) {
   verb.add_option("--json", json, "write the result to FILE as JSON")->type_name("FILE");
   if (with_report) {
-    verb.add_option("--report", report, "write a page with figures to FILE.html; it needs no network")
+    verb.add_option("--report", report,
+                    "write a page with figures to FILE.html; it needs no network")
         ->type_name("FILE.html");
   }
 }
@@ -147,8 +148,9 @@ void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& 
     if (outputs[i].path.empty()) continue;
     for (std::size_t j = 0; j < i; ++j) {
       if (outputs[j].path.empty() || !same_file(outputs[i].path, outputs[j].path)) continue;
-      throw UsageError(fmt::format("{}: {} and {} name the same file, {}; give each a file of its own", verb,
-                                   outputs[j].option, outputs[i].option, outputs[i].path));
+      throw UsageError(
+          fmt::format("{}: {} and {} name the same file, {}; give each a file of its own", verb,
+                      outputs[j].option, outputs[i].option, outputs[i].path));
     }
     for (const NamedFile& input : inputs) {
       if (input.path.empty() || !same_file(outputs[i].path, input.path)) continue;
@@ -221,9 +223,10 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
     try {
       const std::string own = load_problem(problem_path).machine.name;
       if (own != both.model.machine.name) {
-        warn(fmt::format(
-            "the problem names machine {}, but the model was fitted for {}; the model's machine is used",
-            own, both.model.machine.name));
+        warn(
+            fmt::format("the problem names machine {}, but the model was fitted for {}; the "
+                        "model's machine is used",
+                        own, both.model.machine.name));
       }
     } catch (const InputError&) {
       // A problem needs no machine of its own when the model file has one.

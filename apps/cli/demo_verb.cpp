@@ -45,8 +45,8 @@ int run(const std::string& folder) {
   save_model(fitted.model, in("model.json"));
   fmt::print("   {}\n\n", fitted.brief());
 
-  fmt::print("2. Compare with a test log ({}, {} rows)\n{}\n", test[0].file,
-             test[0].samples(), compare_table(*fitted.test));
+  fmt::print("2. Compare with a test log ({}, {} rows)\n{}\n", test[0].file, test[0].samples(),
+             compare_table(*fitted.test));
 
   const MotionProblem problem =
       load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &machine);
@@ -73,16 +73,18 @@ int run(const std::string& folder) {
 
   Page page("Sparflow demo");
   page.subtitle(
-      "One loader crane: pressure models identified from a log and compared with a test log, and the "
+      "One loader crane: pressure models identified from a log and compared with a test log, and "
+      "the "
       "energy-optimal motion of one reach.");
   const std::string against = against_seeds(result);
-  page.verdict(Tone::kGood,
-               fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
-                           against.empty() ? "" : ": ", against),
-               fmt::format("Learned from {} rows; the energy of the test log is predicted within {:.2f} "
-                           "%. Energies are those of the exact law.",
-                           train[0].samples(),
-                           100.0 * std::abs(fitted.test->energy.front().relative_error)));
+  page.verdict(
+      Tone::kGood,
+      fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
+                  against.empty() ? "" : ": ", against),
+      fmt::format("Learned from {} rows; the energy of the test log is predicted within {:.2f} "
+                  "%. Energies are those of the exact law.",
+                  train[0].samples(),
+                  100.0 * std::abs(fitted.test->energy.front().relative_error)));
   const SeedMotion* straight = baseline_seed(seeds, result);
   const Trajectory timed =
       straight ? with_duration(straight->motion, result.duration) : Trajectory{};

@@ -71,9 +71,11 @@ void add_diagnose_verb(CLI::App& app, int& code) {
   a->inputs.add_model(*verb);
   a->inputs.add_logs(*verb, "logs to diagnose (CSV or MAT)");
   a->inputs.add_references(
-      *verb, "reference logs of the same machine, recorded before the effect; pressure models are learned "
+      *verb,
+      "reference logs of the same machine, recorded before the effect; pressure models are learned "
       "from them");
-  a->inputs.add_tests(*verb, "test logs: the effects found are judged on them, the search does not use them");
+  a->inputs.add_tests(
+      *verb, "test logs: the effects found are judged on them, the search does not use them");
   a->inputs.add_candidates(*verb, "candidate effects");
   verb->add_flag("--skip-data-checks", a->skip_data_checks,
                  "skip the search for stuck, jumping or noisy channels");

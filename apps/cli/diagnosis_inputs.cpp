@@ -60,10 +60,10 @@ void DiagnosisInputs::add_tests(CLI::App& app, const std::string& what) {
 }
 
 void DiagnosisInputs::add_candidates(CLI::App& app, const std::string& what) {
-  app.add_option(
-         "--candidates", candidates_,
-         what +
-             " (ids as in `sparflow effects`; without :AT at all places); absent: the whole catalogue")
+  app.add_option("--candidates", candidates_,
+                 what +
+                     " (ids as in `sparflow effects`; without :AT at all places); absent: the "
+                     "whole catalogue")
       ->type_name("EFFECT[:AT]...");
 }
 

@@ -30,8 +30,7 @@ int run(const EffectsArguments& a) {
 void add_effects_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<EffectsArguments>();
   CLI::App* verb = app.add_subcommand(
-      "effects",
-      "list the catalogue of physical effects: equation, parameters, rivals");
+      "effects", "list the catalogue of physical effects: equation, parameters, rivals");
   verb->add_option("effect", a->effect, "id of one effect, to print its whole entry")
       ->type_name("EFFECT");
   a->own.add_to(*verb);

@@ -49,17 +49,16 @@ void write_extended(const DiagnosisInputs& inputs, const ExtendResult& result) {
 
 void add_extend_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<ExtendArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "extend",
-      "add physical effects to a model, learn the rest again with them, report errors before and after");
+  CLI::App* verb = app.add_subcommand("extend",
+                                      "add physical effects to a model, learn the rest again with "
+                                      "them, report errors before and after");
   a->inputs.add_model(*verb);
-  verb->add_option("--add,-a", a->add, "effects to add, in this order; `sparflow effects` lists them")
+  verb->add_option("--add,-a", a->add,
+                   "effects to add, in this order; `sparflow effects` lists them")
       ->type_name("EFFECT[:AT]...");
-  verb->add_option("--remove", a->remove, "effect to remove instead")
-      ->type_name("EFFECT[:AT]");
+  verb->add_option("--remove", a->remove, "effect to remove instead")->type_name("EFFECT[:AT]");
   a->inputs.add_logs(*verb, "logs to learn from (CSV or MAT)");
-  a->inputs.add_tests(*verb,
-                      "logs to judge the error on; absent: motions of --log are held out");
+  a->inputs.add_tests(*verb, "logs to judge the error on; absent: motions of --log are held out");
   a->inputs.add_output(*verb);
   a->inputs.add_threads(*verb);
   a->inputs.add_rest(*verb);

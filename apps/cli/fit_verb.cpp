@@ -137,8 +137,9 @@ int run(const FitArguments& a) {
                                  lacking));
   }
   if (result.processes.empty()) {
-    note(fmt::format("{} has no hydraulic cylinder: there is nothing to learn, only forces are compared",
-                     machine.name));
+    note(fmt::format(
+        "{} has no hydraulic cylinder: there is nothing to learn, only forces are compared",
+        machine.name));
   }
   a.own.load_into(result.model);
   save_model(result.model, a.output);
@@ -152,15 +153,16 @@ int run(const FitArguments& a) {
 
 void add_fit_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<FitArguments>();
-  CLI::App* verb =
-      app.add_subcommand("fit", "identify pressure models, margins, standby and valve gains from logs");
+  CLI::App* verb = app.add_subcommand(
+      "fit", "identify pressure models, margins, standby and valve gains from logs");
   verb->add_option("--machine,-m", a->machine, "machine file (YAML)")
       ->required()
       ->type_name("FILE");
   verb->add_option("--log,-l", a->logs, "logs to learn from (CSV or MAT)")
       ->required()
       ->type_name("FILE...");
-  verb->add_option("--test,-t", a->tests, "logs to judge the model on; nothing is learned from them")
+  verb->add_option("--test,-t", a->tests,
+                   "logs to judge the model on; nothing is learned from them")
       ->type_name("FILE...");
   verb->add_option("--output,-o", a->output, "model to write (JSON)")
       ->required()

@@ -31,14 +31,15 @@ int run(const ImproveArguments& a) {
 void add_improve_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<ImproveArguments>();
   CLI::App* verb = app.add_subcommand(
-      "improve", "repeat diagnose and extend until no effect is missing; report the error after each step");
+      "improve",
+      "repeat diagnose and extend until no effect is missing; report the error after each step");
   a->inputs.add_model(*verb);
   a->inputs.add_logs(*verb, "logs to diagnose and learn from (CSV or MAT)");
-  a->inputs.add_references(*verb,
-                           "reference logs of the same machine, recorded before the effect; the pressure "
-                           "models learned from them stay as they are");
-  a->inputs.add_tests(*verb,
-                      "logs to judge the error on; absent: motions of --log are held out");
+  a->inputs.add_references(
+      *verb,
+      "reference logs of the same machine, recorded before the effect; the pressure "
+      "models learned from them stay as they are");
+  a->inputs.add_tests(*verb, "logs to judge the error on; absent: motions of --log are held out");
   a->inputs.add_output(*verb);
   verb->add_option("--max-steps", a->max_steps, "largest number of effects to add")
       ->check(CLI::Range(1, 20))

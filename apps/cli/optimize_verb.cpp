@@ -127,7 +127,8 @@ int run(const OptimizeArguments& a) {
 
 void add_optimize_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<OptimizeArguments>();
-  CLI::App* verb = app.add_subcommand("optimize", "compute the energy-optimal motion from start to goal");
+  CLI::App* verb =
+      app.add_subcommand("optimize", "compute the energy-optimal motion from start to goal");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML)")
       ->required()
       ->type_name("FILE");
@@ -149,10 +150,10 @@ void add_optimize_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(1, 256));
   verb->add_flag("--smooth-only", a->smooth_only,
                  "solve the single smooth NLP without modes (for comparison)");
-  verb->add_flag(
-      "--bound", a->bound,
-      "also report the energy found by dynamic programming on a joint grid, the energy at unlimited "
-      "time and an estimated lower bound (docs/energy_bound.md)");
+  verb->add_flag("--bound", a->bound,
+                 "also report the energy found by dynamic programming on a joint grid, the energy "
+                 "at unlimited "
+                 "time and an estimated lower bound (docs/energy_bound.md)");
   verb->add_option("--from", a->from,
                    "start from this motion only (CSV of an earlier run, for another goal or "
                    "payload)")

@@ -77,14 +77,16 @@ int run(const ParetoArguments& a) {
 
 void add_pareto_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<ParetoArguments>();
-  CLI::App* verb = app.add_subcommand("pareto", "compute the least energy as a function of the duration");
+  CLI::App* verb =
+      app.add_subcommand("pareto", "compute the least energy as a function of the duration");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML); its duration is not used")
       ->required()
       ->type_name("FILE");
   verb->add_option("--model", a->model, "fitted model; absent: the one that the problem names")
       ->type_name("MODEL.json");
   verb->add_option("--output,-o", a->output, "curve to write (CSV)")->type_name("CURVE.csv");
-  verb->add_option("--points", a->points, "number of durations, besides those that search for the shortest")
+  verb->add_option("--points", a->points,
+                   "number of durations, besides those that search for the shortest")
       ->check(CLI::Range(3, 200))
       ->capture_default_str();
   verb->add_option("--longest", a->longest, "longest duration, as a multiple of the shortest")

@@ -50,7 +50,8 @@ int run(const PlanArguments& a) {
                          {"paths", nlohmann::json::array()}};
   fmt::print("{}: {}\n", problem.name, seeds.paths.message);
   if (!seeds.motions.empty())
-    fmt::print("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints", "shortest duration");
+    fmt::print("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints",
+               "shortest duration");
   for (std::size_t i = 0; i < seeds.paths.paths.size(); ++i) {
     const SeedPath& path = seeds.paths.paths[i];
     const std::string name = fmt::format("{} {}", path.planner, i + 1);
@@ -88,8 +89,8 @@ int run(const PlanArguments& a) {
 
 void add_plan_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<PlanArguments>();
-  CLI::App* verb =
-      app.add_subcommand("plan", "find collision-free paths from start to goal (OMPL); energy is not considered");
+  CLI::App* verb = app.add_subcommand(
+      "plan", "find collision-free paths from start to goal (OMPL); energy is not considered");
   verb->add_option("--problem,-p", a->problem, "motion problem (YAML)")
       ->required()
       ->type_name("FILE");

@@ -38,14 +38,15 @@ int run(const SelftestArguments& a) {
 
 void add_selftest_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<SelftestArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "selftest",
-      "find what these logs could reveal: inject every effect; report power and indistinguishable sets");
+  CLI::App* verb = app.add_subcommand("selftest",
+                                      "find what these logs could reveal: inject every effect; "
+                                      "report power and indistinguishable sets");
   a->inputs.add_model(*verb);
   a->inputs.add_logs(*verb, "logs whose motions are judged (CSV or MAT)");
   a->inputs.add_references(*verb, "reference logs of the same machine");
   a->inputs.add_candidates(*verb, "effects to inject");
-  verb->add_option("--check", a->check, "number of effects for which the whole search is run on injected data")
+  verb->add_option("--check", a->check,
+                   "number of effects for which the whole search is run on injected data")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   a->inputs.add_rest(*verb);

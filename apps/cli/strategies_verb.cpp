@@ -194,7 +194,8 @@ void add_strategies_verb(CLI::App& app, int& code) {
   verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  verb->add_option("--orders", a->orders, "number of orders of the cylinders whose segments are optimised")
+  verb->add_option("--orders", a->orders,
+                   "number of orders of the cylinders whose segments are optimised")
       ->check(CLI::Range(0, 120))
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
@@ -202,7 +203,8 @@ void add_strategies_verb(CLI::App& app, int& code) {
   verb->add_option("--intervals", a->intervals,
                    "mesh intervals; absent: as the problem's knots, or 100")
       ->check(CLI::Range(10, 5000));
-  verb->add_option("--processes", a->processes, "problems solved in parallel; absent: as many as there are processors")
+  verb->add_option("--processes", a->processes,
+                   "problems solved in parallel; absent: as many as there are processors")
       ->check(CLI::Range(1, 256));
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });

@@ -71,7 +71,7 @@ struct Evidence {
   /// contain. Rows stay the same.
   /// @param found effects with the values near which the signatures are to hold
   /// @return nothing when the leaders do not change
-  std::optional<Evidence> led_by(std::span<const AppliedEffect> found) const;
+  std::optional<Evidence> with_leaders_of(std::span<const AppliedEffect> found) const;
 
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,

@@ -39,19 +39,19 @@ MatrixXd Evidence::margins(std::size_t log, int pump) const {
   return base;
 }
 
-std::optional<Evidence> Evidence::led_by(std::span<const AppliedEffect> found) const {
-  std::vector<std::vector<PumpSeries>> led;
+std::optional<Evidence> Evidence::with_leaders_of(std::span<const AppliedEffect> found) const {
+  std::vector<std::vector<PumpSeries>> pumps;
   bool changed = false;
   for (std::size_t log = 0; log < series.size(); ++log) {
     std::vector<AppliedEffect> acting = known_in(log);
     if (log < suspects) acting.insert(acting.end(), found.begin(), found.end());
-    led.push_back(pumps_led_by(acting, series[log]));
-    for (std::size_t p = 0; p < led.back().size(); ++p)
-      changed = changed || led.back()[p].leader != series[log].pumps[p].leader;
+    pumps.push_back(pumps_led_by(acting, series[log]));
+    for (std::size_t p = 0; p < pumps.back().size(); ++p)
+      changed = changed || pumps.back()[p].leader != series[log].pumps[p].leader;
   }
   if (!changed) return {};
   Evidence out = *this;
-  for (std::size_t log = 0; log < series.size(); ++log) out.series[log].pumps = led[log];
+  for (std::size_t log = 0; log < series.size(); ++log) out.series[log].pumps = pumps[log];
   for (EvidenceChannel& channel : out.channels) {
     if (channel.kind != EvidenceKind::kPump) continue;
     const auto p = static_cast<std::size_t>(channel.index);
@@ -59,7 +59,7 @@ std::optional<Evidence> Evidence::led_by(std::span<const AppliedEffect> found) c
     for (std::size_t log = 0, seen = 0; log < series.size(); ++log) {
       const PumpSeries& before = series[log].pumps[p];
       if (before.demand.size() == 0 || before.pressure.size() == 0) continue;
-      const VectorXd less = before.demand - led[log][p].demand;
+      const VectorXd less = before.demand - pumps[log][p].demand;
       if (log < suspects && seen < channel.raw.size()) channel.raw[seen++] += less;
       const VectorXd y = filter(log, channel.kind,
                                 less + known(log, channel.kind, channel.index) -

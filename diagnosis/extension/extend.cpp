@@ -271,12 +271,12 @@ std::string effect_title(const EffectInfo& info, const Machine& machine, int at)
     case EffectPlace::kMachine:
       break;
     case EffectPlace::kJoint:
-      return info.title + " of " + machine.joints[i].name;
+      return info.title + ", " + machine.joints[i].name;
     case EffectPlace::kCylinder:
-      if (at >= 0) return info.title + " of " + machine.cylinders[i].name;
+      if (at >= 0) return info.title + ", " + machine.cylinders[i].name;
       break;
     case EffectPlace::kPump:
-      return info.title + " of pump " + machine.pumps[i].name;
+      return info.title + ", pump " + machine.pumps[i].name;
   }
   return info.title;
 }

@@ -15,7 +15,7 @@ namespace sparflow {
 struct ExtendStep {
   std::string added;            ///< key of the effect added, "coulomb_friction:boom"
   std::string removed;          ///< key of the effect removed
-  std::string title;            ///< "Coulomb friction of boom"
+  std::string title;            ///< "Coulomb friction, boom"
   std::string stage;            ///< force, flow, pressure, pump, sensor
   AppliedEffect effect;         ///< the effect as estimated in this step
   CompareResult before, after;  ///< errors on the data that `judged_on` names
@@ -76,7 +76,7 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
                        const std::vector<Log>& logs, const std::vector<Log>& tests,
                        const ExtendOptions& options = {}, const SearchProgress& progress = {});
 
-/// "Coulomb friction of boom"
+/// "Coulomb friction, boom"
 std::string effect_title(const EffectInfo& info, const Machine& machine, int at);
 
 }  // namespace sparflow

@@ -111,10 +111,10 @@ class Estimator {
     double log_likelihood = likelihood();
     std::vector<FoundEffect> found = with_intervals();
     for (int turn = 0; turn < kTurns; ++turn) {
-      std::optional<Evidence> led = evidence_.led_by(applied(found));
-      if (!led) break;
-      evidence_ = std::move(*led);
-      designs_ = remade(evidence_, designs_);
+      std::optional<Evidence> updated = evidence_.with_leaders_of(applied(found));
+      if (!updated) break;
+      evidence_ = std::move(*updated);
+      designs_ = rebuilt_designs(evidence_, designs_);
       for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
       log_likelihood = likelihood();
       found = with_intervals();
@@ -290,7 +290,8 @@ class Estimator {
         exact.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
     }
     Evidence left = collect(exact);
-    if (std::optional<Evidence> led = left.led_by(applied(found, false))) left = std::move(*led);
+    if (std::optional<Evidence> updated = left.with_leaders_of(applied(found, false)))
+      left = std::move(*updated);
     if (left.channels.size() != evidence_.channels.size()) return false;
     for (std::size_t c = 0; c < left.channels.size(); ++c) {
       EvidenceChannel& channel = left.channels[c];

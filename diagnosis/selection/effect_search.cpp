@@ -19,7 +19,7 @@ namespace {
 
 class Search {
  public:
-  /// @param follows whether to stop, with `led` set, when a found effect changes the load-sensing leader
+  /// @param follows whether to stop, with `updated_evidence` set, when a found effect changes the load-sensing leader
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
          const SearchOptions& options, const SearchProgress& progress, bool follows)
       : search_(evidence, effects, options, progress), random_(options.seed), follows_(follows) {}
@@ -31,7 +31,7 @@ class Search {
     std::vector<FoundEffect> found;
     for (int round = 0; round < 3; ++round) {
       select(found, current, result);
-      if (result.led) return result;
+      if (result.updated_evidence) return result;
       bool reshaped = false;
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(search_, found, i, current) || reshaped;
@@ -92,7 +92,8 @@ class Search {
       found.push_back(std::move(f));
       EffectFit next = search_.fit(designs_of(found));
       fix_share_at_one(found, next, best.gain);
-      if (follows_ && (result.led = led_by_found(search_, found, next))) return;
+      if (follows_ && (result.updated_evidence = with_leaders_of_found(search_, found, next)))
+        return;
       search_.judge(found, found.size() - 1, next);
       if (tracing()) trace_found(search_, found, next);
       found.back().gain = best.gain;
@@ -216,7 +217,7 @@ class Search {
       with.push_back(&p);
     }
     const double gain = search_.fit(with, &fit).total() - search_.fit(without, &fit).total() -
-                        search_.price_of(one.design);
+                        search_.penalty_of(one.design);
     if (tracing())
       fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n",
                  search_.key(one.design.effect), fmt::join(names, ", "), gain);
@@ -276,26 +277,27 @@ SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt
   constexpr int kTurns =
       3;  // searches, each with the load-sensing leaders that the last one implies
   SearchResult result, first;
-  std::optional<Evidence> led;
+  std::optional<Evidence> updated;
   for (int turn = 0; turn <= kTurns; ++turn) {
-    result = Search(led ? *led : evidence, candidates, options, progress, turn < kTurns).run();
+    result =
+        Search(updated ? *updated : evidence, candidates, options, progress, turn < kTurns).run();
     if (turn == 0) first = result;
-    if (!result.led) break;
+    if (!result.updated_evidence) break;
     if (tracing()) fmt::print(stderr, "  the found effects change the load-sensing leader\n");
-    led = std::move(result.led);
+    updated = std::move(result.updated_evidence);
   }
   // no effect that changes the leader passed the acceptance tests: search again with the former leaders
-  if (led && !adds_demand(*led, result.found)) {
-    led.reset();
+  if (updated && !adds_demand(*updated, result.found)) {
+    updated.reset();
     result = Search(evidence, candidates, options, progress, false).run();
   }
-  if (led) {
+  if (updated) {
     result.null = std::move(first.null);
     result.ranking = std::move(first.ranking);
     result.p_value = first.p_value;
     result.threshold = first.threshold;
     result.simulations = first.simulations;
-    result.led = std::move(led);
+    result.updated_evidence = std::move(updated);
   }
   return result;
 }

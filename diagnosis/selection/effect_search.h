@@ -14,8 +14,8 @@ namespace sparflow {
 
 struct SearchOptions {
   double false_alarm = 0.05;  ///< 0..1 rate of the whole search on logs with nothing missing
-  int max_effects = 8;
-  int simulations = 300;  ///< number of draws of the null distribution of the largest gain
+  int max_effects = 8;        ///< largest number of effects found
+  int simulations = 300;      ///< number of draws of the null distribution of the largest gain
   /// [-] an effect smaller than this multiple of its channel's noise is not named, however significant it is.
   double smallest_effect = 0.15;
   /// [-] a further effect smaller than this multiple of the other effects' model-form error (EffectAction::over_form)
@@ -60,8 +60,8 @@ struct SearchResult {
   std::optional<EffectDesign> once;
   EffectFit null, final;  ///< fits without any effect and with all found ones
   /// The evidence that `found` and `final` belong to, where the found effects change the load-sensing leader
-  /// (Evidence::led_by); empty where they belong to the evidence given.
-  std::optional<Evidence> led;
+  /// (Evidence::with_leaders_of); empty where they belong to the evidence given.
+  std::optional<Evidence> updated_evidence;
   double p_value = 1.0;    ///< of the best candidate in the first step
   double threshold = 0.0;  ///< [nats] of the penalised gain in the first step
   int simulations = 0;     ///< of the null distribution: no p-value is below 1 / (simulations + 1)

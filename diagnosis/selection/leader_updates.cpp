@@ -25,8 +25,8 @@ bool adds_demand(const Evidence& evidence, const std::vector<FoundEffect>& found
   return adds_demand(evidence, std::span<const AppliedEffect>(acting));
 }
 
-std::vector<EffectDesign> remade(const Evidence& evidence,
-                                 const std::vector<EffectDesign>& designs) {
+std::vector<EffectDesign> rebuilt_designs(const Evidence& evidence,
+                                          const std::vector<EffectDesign>& designs) {
   std::vector<EffectDesign> out;
   out.reserve(designs.size());
   for (const EffectDesign& d : designs)
@@ -50,8 +50,9 @@ std::vector<AppliedEffect> applied_effects(const std::vector<EffectDesign>& desi
   return out;
 }
 
-std::optional<Evidence> led_by_found(const SearchState& search,
-                                     const std::vector<FoundEffect>& found, const EffectFit& fit) {
+std::optional<Evidence> with_leaders_of_found(const SearchState& search,
+                                              const std::vector<FoundEffect>& found,
+                                              const EffectFit& fit) {
   constexpr int kTurns = 5;  // a third of the error remains each time where half of the rows change
   std::vector<EffectDesign> designs;
   designs.reserve(found.size());
@@ -59,22 +60,22 @@ std::optional<Evidence> led_by_found(const SearchState& search,
   std::vector<AppliedEffect> acting = applied_effects(designs, fit.theta);
   const Evidence& given = search.evidence;
   if (!adds_demand(given, std::span<const AppliedEffect>(&acting.back(), 1))) return {};
-  std::optional<Evidence> led;
+  std::optional<Evidence> updated;
   double total = fit.total();
   for (int turn = 0; turn < kTurns; ++turn) {
-    std::optional<Evidence> next = (led ? *led : given).led_by(acting);
+    std::optional<Evidence> next = (updated ? *updated : given).with_leaders_of(acting);
     if (!next) break;
-    led = std::move(next);
-    designs = remade(*led, designs);
+    updated = std::move(next);
+    designs = rebuilt_designs(*updated, designs);
     std::vector<const EffectDesign*> pointers;
     pointers.reserve(designs.size());
     for (const EffectDesign& d : designs) pointers.push_back(&d);
-    const EffectFit there = fit_effects(*led, pointers, &fit);
+    const EffectFit there = fit_effects(*updated, pointers, &fit);
     total = there.total();
     acting = applied_effects(designs, there.theta);
   }
-  if (!led || total < fit.total() + search.options.least_gain) return {};
-  return led;
+  if (!updated || total < fit.total() + search.options.least_gain) return {};
+  return updated;
 }
 
 }  // namespace sparflow

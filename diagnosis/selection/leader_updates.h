@@ -10,15 +10,16 @@ namespace sparflow {
 /// Evidence with the load-sensing leaders that follow from the found effects, iterated with their values. Made only
 /// when the last effect adds to a cylinder's demand and the log-likelihood rises by SearchOptions::least_gain or more.
 /// @param fit of all found  @return nothing when the leaders stay
-std::optional<Evidence> led_by_found(const SearchState& search,
-                                     const std::vector<FoundEffect>& found, const EffectFit& fit);
+std::optional<Evidence> with_leaders_of_found(const SearchState& search,
+                                              const std::vector<FoundEffect>& found,
+                                              const EffectFit& fit);
 
 /// Whether any of the effects adds to a cylinder's demand on its pump in the suspect logs.
 bool adds_demand(const Evidence& evidence, const std::vector<FoundEffect>& found);
 
 /// The same effects and nonlinear parameters as designs on other evidence of the same logs and channels.
-std::vector<EffectDesign> remade(const Evidence& evidence,
-                                 const std::vector<EffectDesign>& designs);
+std::vector<EffectDesign> rebuilt_designs(const Evidence& evidence,
+                                          const std::vector<EffectDesign>& designs);
 
 /// Effects with the nonlinear parameters of their designs and the linear ones of a fit of these. [SI]
 std::vector<AppliedEffect> applied_effects(const std::vector<EffectDesign>& designs,

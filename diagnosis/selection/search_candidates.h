@@ -15,7 +15,7 @@ struct SearchCandidate {
   double penalty = 0.0;  ///< [nats] subtracted from its gain
   double optional_penalty = 0.0;  ///< [nats] further penalty of its optional parameters
 
-  double price(const EffectDesign& design) const {
+  double penalty_of(const EffectDesign& design) const {
     return penalty + (design.optional ? optional_penalty : 0.0);
   }
 };

@@ -18,8 +18,8 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(j));
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(i));
   const EffectFit without = search.fit(designs_of(trial));
-  const double price = search.price_of(found[i].design) + search.price_of(found[j].design);
-  const double pair = current.total() - without.total() - price;
+  const double penalty = search.penalty_of(found[i].design) + search.penalty_of(found[j].design);
+  const double pair = current.total() - without.total() - penalty;
   const std::vector<CandidateScore> scores =
       search.scores.beside(designs_of(trial), without, search.skipped(trial));
   if (scores.empty() || scores.front().gain < kBeforeRefined * pair) return false;
@@ -28,7 +28,7 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
   one.p_value = std::min(found[i].p_value, found[j].p_value);
   trial.push_back(one);
   EffectFit fit = search.fit(designs_of(trial));
-  const double gain = fit.total() - without.total() - search.price_of(one.design);
+  const double gain = fit.total() - without.total() - search.penalty_of(one.design);
   if (tracing())
     fmt::print(stderr, "  {} for {} and {}: {:.1f} against {:.1f} nats\n",
                search.key(one.design.effect), search.key(found[i].design.effect),
@@ -49,7 +49,7 @@ void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit
     changed = false;
     for (std::size_t i = 0; i < found.size(); ++i) {
       const EffectFit without = search.fit(designs_of(found, i));
-      found[i].gain = current.total() - without.total() - search.price_of(found[i].design);
+      found[i].gain = current.total() - without.total() - search.penalty_of(found[i].design);
       if (found[i].gain > search.options.least_gain) continue;
       if (tracing())
         fmt::print(stderr, "  dropped {} ({:.1f})\n", search.key(found[i].design.effect),
@@ -118,7 +118,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
   const std::vector<CandidateScore> scores =
       search.scores.instead_of(f.design, others, without, search.skipped(found));
   const double own =
-      search.scores.gain_instead(f.design, f.design, others, without) - search.price_of(f.design);
+      search.scores.gain_instead(f.design, f.design, others, without) - search.penalty_of(f.design);
   f.gain = own;
   const CandidateScore* challenger = nullptr;
   if (!scores.empty() && scores.front().gain > own + 1.0 &&

@@ -98,7 +98,7 @@ std::vector<CandidateScore> SearchScores::beside(const std::vector<const EffectD
     if (skip[i]) return;
     for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
       const double g = gain(base, candidates_[i].designs[k], current) -
-                       candidates_[i].price(candidates_[i].designs[k]);
+                       candidates_[i].penalty_of(candidates_[i].designs[k]);
       if (g > scores[i].gain) scores[i] = {i, k, g};
     }
   });
@@ -119,7 +119,8 @@ std::vector<CandidateScore> SearchScores::instead_of(const EffectDesign& place,
       for (std::size_t ch = 0; ch < touched.size(); ++ch)
         meets = meets || (touched[ch] && c.designs[d].touches(ch));
       if (!meets) return;
-      const double g = gain(others, c.designs[d], without, touched, true) - c.price(c.designs[d]);
+      const double g =
+          gain(others, c.designs[d], without, touched, true) - c.penalty_of(c.designs[d]);
       if (g > scores[k].gain) scores[k] = {k, d, g};
     }
   });

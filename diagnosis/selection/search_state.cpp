@@ -27,9 +27,9 @@ std::string SearchState::key(const EffectAt& e) const {
   return effect_key(e.effect->info(), *evidence.series[0].machine, e.at);
 }
 
-double SearchState::price_of(const EffectDesign& design) const {
+double SearchState::penalty_of(const EffectDesign& design) const {
   for (const SearchCandidate& c : candidates) {
-    if (c.effect == design.effect) return c.price(design);
+    if (c.effect == design.effect) return c.penalty_of(design);
   }
   return 0.0;
 }

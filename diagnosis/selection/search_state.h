@@ -33,7 +33,7 @@ struct SearchState {
   const EffectDesign& design_of(const CandidateScore& score) const {
     return candidates[score.candidate].designs[score.design];
   }
-  double price_of(const EffectDesign& design) const;  ///< [nats] penalty
+  double penalty_of(const EffectDesign& design) const;  ///< [nats] penalty
   /// Whether both act in a common channel.
   bool meet(const EffectDesign& a, const EffectDesign& b) const;
   /// By candidate: whether it was refused before or is found already.

@@ -59,8 +59,8 @@ std::string Selftest::headline() const {
   });
   const int seen = count(Visibility::kSeen);
   return fmt::format(
-      "Of {} effects at their places {} would be seen at their typical size, {} of them by their "
-      "own name; {} only if larger, {} not at all.",
+      "Of {} candidate effects {} would be named at their typical size, {} of them without a "
+      "rival; {} only if larger, {} not at all.",
       effects.size(), seen, alone, count(Visibility::kOnlyLarge), count(Visibility::kNever));
 }
 

@@ -87,14 +87,14 @@ Signature SelftestStudy::typical_signature(std::size_t i) const {
   return signature(projected_[i][sizes_[i].typical], sizes_[i].theta);
 }
 
-double SelftestStudy::price(std::size_t i) const {
+double SelftestStudy::least_gain_of(std::size_t i) const {
   return null_.scale[i] * (threshold_ + candidates_[i].penalty);
 }
 
 /// Probability that a gain with this mean passes the threshold.
 double SelftestStudy::chance(std::size_t i, double gain) const {
   const SearchCandidate& c = candidates_[i];
-  return chance_above(2.0 * price(i), c.linear, 2.0 * gain);
+  return chance_above(2.0 * least_gain_of(i), c.linear, 2.0 * gain);
 }
 
 /// Least multiple of the typical size with this mean gain, and the parameter values there [SI].
@@ -170,17 +170,17 @@ void SelftestStudy::see(std::size_t i) {
   const Signature typical = typical_signature(i);
   out.gain = power_.gain(typical);
   if (behind_learned_law(info.stage) && out.absorbed > options_.largest_absorbed) {
-    out.reason = fmt::format("the absorbed share is {:.0f} %; {}", 100.0 * out.absorbed,
-                             evidence_.has_reference()
-                                 ? "the reference logs have too few of its flows and loads"
-                                 : "give a log without it as --reference");
+    out.reason =
+        fmt::format("the absorbed share is {:.0f} %; {}", 100.0 * out.absorbed,
+                    evidence_.has_reference() ? "the reference logs cover too few flows and loads"
+                                              : "give a log without it as --reference");
     return;
   }
   if (in_too_few_motions(evidence_, typical, options_.folds)) {
     out.reason = "too few motions excite it: repeat them";
     return;
   }
-  const double nats = price(i);
+  const double nats = least_gain_of(i);
   const auto [t80, v80] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.8, c.linear));
   const auto [t95, v95] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.95, c.linear));
   out.times80 = t80;

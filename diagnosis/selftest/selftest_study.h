@@ -30,7 +30,7 @@ class SelftestStudy {
  private:
   Signature typical_signature(std::size_t i) const;
   /// [nats] threshold of the gain without penalty, scaled for this candidate.
-  double price(std::size_t i) const;
+  double least_gain_of(std::size_t i) const;
   double chance(std::size_t i, double gain) const;
   std::pair<double, std::vector<double>> times_for(std::size_t i, const Signature& typical,
                                                    double gain) const;

@@ -176,7 +176,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     }
   }
   d.search = search_effects(d.evidence, candidates_here, options.search, progress);
-  if (d.search.led) d.evidence = *d.search.led;
+  if (d.search.updated_evidence) d.evidence = *d.search.updated_evidence;
   d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
   d.p_value = d.search.p_value;
   for (const auto& [effect, gain] : d.search.ranking) {

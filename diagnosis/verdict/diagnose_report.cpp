@@ -19,7 +19,7 @@ std::string with_interval(const ParameterEstimate& p) {
 
 std::string title_of(const DiagnosedEffect& e) {
   const std::string& title = e.effect.effect->info().title;
-  return e.at.empty() ? title : title + " of " + e.at;
+  return e.at.empty() ? title : title + ", " + e.at;
 }
 
 /// JSON has no NaN.
@@ -104,7 +104,7 @@ std::string Diagnosis::table() const {
     return out;
   }
   for (const DiagnosedEffect& e : effects) {
-    out += fmt::format("  {:32s} {:>3.0f} % sure   stage {}\n", e.key(),
+    out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}\n", e.key(),
                        std::floor(100.0 * e.probability), e.stage);
     for (const ParameterEstimate& p : e.parameters)
       out += fmt::format("      {}\n", with_interval(p));

@@ -38,15 +38,16 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
     acting.push_back({f.design.effect.effect, f.design.effect.at, f.values, {}, {}});
   }
   // without this effect, the load-sensing leader may be another
-  std::optional<Evidence> led;
-  if (d.search.led && index < d.search.found.size()) led = d.evidence.led_by(acting);
-  if (led) others = remade(*led, others);
+  std::optional<Evidence> updated;
+  if (d.search.updated_evidence && index < d.search.found.size())
+    updated = d.evidence.with_leaders_of(acting);
+  if (updated) others = rebuilt_designs(*updated, others);
   std::vector<const EffectDesign*> pointers;
   pointers.reserve(others.size());
   for (const EffectDesign& o : others) pointers.push_back(&o);
   FitControl control;
   control.keep_residuals = true;
-  return fit_effects(led ? *led : d.evidence, pointers, nullptr, control);
+  return fit_effects(updated ? *updated : d.evidence, pointers, nullptr, control);
 }
 
 double same_within(const FoundEffect& found, double same_nats) {
@@ -106,9 +107,8 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
             : ""));
   }
   e.evidence.push_back(
-      fmt::format("estimated on some motions, it predicts the others better: in {:.0f} % of the "
-                  "parts left out, "
-                  "by {:.1f} standard errors",
+      fmt::format("it improves the prediction of motions left out of the estimate, in {:.0f} % of "
+                  "the folds and by {:.1f} standard errors",
                   100.0 * f.held_out_share, e.held_out_gain / std::max(e.held_out_error, 1e-300)));
   return e;
 }

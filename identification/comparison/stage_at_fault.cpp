@@ -179,7 +179,7 @@ std::string describe(const StageAtFault& found) {
     text += fmt::format("; the {} inherits {} of it, its own error is {}", heir->words,
                         amount(heir->inherited, heir->unit), amount(heir->own, heir->unit));
   }
-  // A pressure model that was learned with the wrong force compensates its error; the reader is told so.
+  // A pressure model that was learned with the wrong force compensates its error, and the sentence explains that.
   const StageSplit* compensates = nullptr;
   for (const StageSplit& s : found.stages) {
     const bool next = f.stage == "force" && s.stage == "pressure" && s.at == f.at;

@@ -127,16 +127,16 @@ void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& w
            const LearnGpOptions& options, int threads, bool keep_others, FitPass& pass,
            const std::function<void(int, int, const std::string&)>& progress = {}) {
   std::vector<GpDataset> asked = sets;
-  std::vector<std::optional<AlikeLoads>> alike(sets.size());
+  std::vector<std::optional<SimilarLoads>> similar(sets.size());
   std::vector<BranchCorner> corners(sets.size());
   for (std::size_t k = 0; k < sets.size(); ++k) {
     const ProcessFit& fitted = pass.processes[which[k]];
     const int side = fitted.extend ? 1 : -1;
     const Cylinder& cylinder =
         pass.model.machine.cylinders[static_cast<std::size_t>(fitted.cylinder)];
-    alike[k] = alike_loads(sets[k], cylinder, side);
-    if (alike[k]) {
-      asked[k] = at_one_load(std::move(asked[k]), *alike[k]);
+    similar[k] = similar_loads(sets[k], cylinder, side);
+    if (similar[k]) {
+      asked[k] = at_one_load(std::move(asked[k]), *similar[k]);
       continue;
     }
     corners[k] = find_branch_corner(sets[k], cylinder, side);
@@ -147,8 +147,8 @@ void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& w
     const bool there = learned[k].report.failure.empty();
     if (!there && keep_others) continue;
     learned[k].parameters.corner = corners[k];
-    if (there && alike[k]) {
-      learned[k].parameters = for_any_load(std::move(learned[k].parameters), *alike[k], sets[k]);
+    if (there && similar[k]) {
+      learned[k].parameters = for_any_load(std::move(learned[k].parameters), *similar[k], sets[k]);
     }
     take(pass, which[k], std::move(learned[k]), sets[k]);
   }

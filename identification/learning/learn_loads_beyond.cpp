@@ -19,7 +19,7 @@ constexpr double kBorder = 0.1;
 /// Loads with a smaller span do not determine the law over the load: between slope 0 and the static branch, a corner in the
 /// middle deviates from a straight line by at most an eighth of the span, which is about the sensor noise; any more that a
 /// kernel would fit is friction. [Pa]
-constexpr double kAlike = 8e5;
+constexpr double kSimilar = 8e5;
 /// Largest lowest pressure of a chamber, since anti-cavitation valves keep it near the tank's pressure. [Pa]
 constexpr double kTank = 2e5;
 
@@ -82,26 +82,27 @@ Share together(const Share& a, const Share& b) {
 
 }  // namespace
 
-std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& cylinder,
-                                      int side) {
+std::optional<SimilarLoads> similar_loads(const GpDataset& samples, const Cylinder& cylinder,
+                                          int side) {
   if (samples.force.size() == 0) return {};
   const double supply = supply_area(cylinder, side);
-  if (samples.force.maxCoeff() - samples.force.minCoeff() >= kAlike * supply) return {};
+  if (samples.force.maxCoeff() - samples.force.minCoeff() >= kSimilar * supply) return {};
   constexpr double kSurest = 0.1;  // least deviation, as an error of the force by a tenth causes it
   const double usual = share_on_static(samples, supply, side);
   const Share known{usual, std::max(kSurest, std::sqrt(usual * (1.0 - usual)))};
   const Share share = together(known, share_in(samples, supply, side));
-  return AlikeLoads{median(samples.force.matrix()),
-                    side * std::clamp(share.value, 0.0, 1.0) / supply, share.deviation / supply};
+  return SimilarLoads{median(samples.force.matrix()),
+                      side * std::clamp(share.value, 0.0, 1.0) / supply, share.deviation / supply};
 }
 
-GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads) {
+GpDataset at_one_load(GpDataset samples, const SimilarLoads& loads) {
   samples.pressure -= loads.slope * (samples.force - loads.force);
   samples.force.setConstant(loads.force);
   return samples;
 }
 
-GpParameters for_any_load(GpParameters learned, const AlikeLoads& loads, const GpDataset& samples) {
+GpParameters for_any_load(GpParameters learned, const SimilarLoads& loads,
+                          const GpDataset& samples) {
   // The length-scale exceeds any load, so that the learned dependence on the flow holds at every force.
   constexpr double kEndless = 1e9;  // [N]
   learned.length_force = kEndless;

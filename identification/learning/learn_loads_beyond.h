@@ -12,7 +12,7 @@ namespace sparflow {
 /// near the load it is the static branch, which takes all of it; far above it a valve holds the pressure. This estimate is
 /// averaged with the samples' own slope. The share lies between 0 and 1; a steeper slope is friction that is correlated
 /// with the load.
-struct AlikeLoads {
+struct SimilarLoads {
   double force = 0.0;            ///< [N] median
   double slope = 0.0;            ///< [Pa/N] of the supply over the force
   double slope_deviation = 0.0;  ///< [Pa/N] standard deviation, as the branch is not certain
@@ -20,14 +20,16 @@ struct AlikeLoads {
 
 /// @param samples of one pressure model  @param side +1 extends, -1 retracts
 /// @return nothing where the loads vary enough to learn a slope, or without samples
-std::optional<AlikeLoads> alike_loads(const GpDataset& samples, const Cylinder& cylinder, int side);
+std::optional<SimilarLoads> similar_loads(const GpDataset& samples, const Cylinder& cylinder,
+                                          int side);
 
 /// Corrects the samples to the median load, so that a pressure model of the flow alone can be learned from them.
-GpDataset at_one_load(GpDataset samples, const AlikeLoads& loads);
+GpDataset at_one_load(GpDataset samples, const SimilarLoads& loads);
 
 /// Extends a pressure model that was learned at one load to any load.
 /// @param samples before they were corrected to one load; their range becomes the model's
-GpParameters for_any_load(GpParameters learned, const AlikeLoads& loads, const GpDataset& samples);
+GpParameters for_any_load(GpParameters learned, const SimilarLoads& loads,
+                          const GpDataset& samples);
 
 /// Learns the static level and the slopes for loads heavier and lighter than the samples'.
 /// @param parameters of the pressure model learned from `samples`, with their range

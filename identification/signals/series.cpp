@@ -64,7 +64,7 @@ void demand(const CraneModel& model, const MachineSignals& signals, std::size_t 
     for (Index k = 0; k < n; ++k) {
       if (c.direction[k] == 0) continue;
       out.asked(k, column) = c.working_pressure[k] + margin;
-      if (std::isnan(out.asked(k, column))) out.demand[k] = kNaN;  // nobody knows who leads
+      if (std::isnan(out.asked(k, column))) out.demand[k] = kNaN;  // the leader is unknown
     }
   }
   for (Index k = 0; k < n; ++k) {

@@ -15,8 +15,8 @@ struct CylinderSeries {
   Eigen::VectorXd rate;          ///< dx/dq [m/rad] or [-]
   Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
   Eigen::VectorXd acceleration;  ///< [m/s^2]
-  Eigen::VectorXd
-      static_force;  ///< [N] from the machine file by virtual work, positive when the load pushes the rod in
+  /// [N] from the machine file by virtual work, positive when the load pushes the rod in
+  Eigen::VectorXd static_force;
   Eigen::MatrixXd
       static_slope;  ///< [samples x joints] d static_force / d q, [N/rad] or [N/m]; empty: not computed
   Eigen::VectorXd force;  ///< [N] measured, through the same filter as the position
@@ -27,13 +27,12 @@ struct CylinderSeries {
   /// [-] valve opening that the model's valve effects without memory (a dead band) leave of the command; a valve lag acts
   /// on it. Empty: the command itself.
   Eigen::VectorXd opening;
-  Eigen::VectorXd pressure_a,
-      pressure_b;  ///< [Pa] chambers, through the same filter as the position
+  /// [Pa] pressures of the chambers, through the same filter as the position
+  Eigen::VectorXd pressure_a, pressure_b;
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
   /// Commanded direction: +1 extending, -1 retracting, 0 at rest (identification/signals/signals.h).
   Eigen::VectorXi direction;
-  Eigen::VectorXd
-      flow;  ///< [m^3/s] into the supply chamber of that direction, never negative; 0 at rest
+  Eigen::VectorXd flow;         ///< [m^3/s] into the supply chamber, never negative; 0 at rest
   Eigen::VectorXd return_flow;  ///< [m^3/s] out of the return chamber, never negative; 0 at rest
 };
 

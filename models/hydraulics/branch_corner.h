@@ -2,10 +2,10 @@
 /// Corner of a supply pressure between its two branches.
 ///
 /// The supply pressure is the larger of what a counterbalance valve requires, V, and the static branch
-/// S = (load + A_return p_return)/A_supply (models/hydraulics/return_rise.h): p = max(V, S) = V + max(0, S - V). A Gaussian
-/// process with a smooth kernel rounds such a corner by several bar and oscillates beside it, and where samples lie only
-/// away from the corner it interpolates linearly across it. Therefore the second term, whose slope follows from the
-/// balance of forces, is part of the mean, and the process learns the remainder.
+/// S = (load + A_return p_return)/A_supply (models/hydraulics/return_rise.h): p = max(V, S) = V + max(0, S - V). A
+/// Gaussian process with a smooth kernel rounds such a corner by several bar and oscillates beside it, and where samples
+/// lie only away from the corner it interpolates linearly across it. Therefore the second term, whose slope follows from
+/// the balance of forces, is part of the mean, and the process learns the remainder.
 #include <cmath>
 
 namespace sparflow {

@@ -3,10 +3,10 @@
 ///
 /// The supply pressure is the largest of the static branch S = (load + A_return p_return)/A_supply, the pressure that a
 /// counterbalance valve requires, and that of the tank, from which an anti-cavitation valve admits oil
-/// (models/hydraulics/return_rise.h). Samples of one branch contain nothing about another, and a straight line through two
-/// belongs to neither. The static branch, however, follows from the balance of forces: a load heavier by e adds
-/// e/A_supply to it, and no supply pressure is below it. With a process g of the learned loads, at whose border the active
-/// branch rises by the share s of the static one, the law is
+/// (models/hydraulics/return_rise.h). Samples of one branch contain nothing about another, and a straight line through
+/// two belongs to neither. The static branch, however, follows from the balance of forces: a load heavier by e adds
+/// e/A_supply to it, and no supply pressure is below it. With a process g of the learned loads, at whose border the
+/// active branch rises by the share s of the static one, the law is
 ///   heavier by e:  p = g(border) + max(s e/A_supply, e/A_supply - gap),  gap = g(border) - S(border)
 ///   lighter by e:  p = max(g(border) - s e/A_supply, least)
 /// Corners are rounded, values and both derivatives are continuous, and inside the learned loads nothing changes.

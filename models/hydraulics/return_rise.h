@@ -8,10 +8,11 @@
 /// A_supply/A_return/(R + A_supply/A_return), R the valve's pilot ratio, where a counterbalance valve is active, which is
 /// at most 0.6 for R >= 1. Therefore
 ///   p = H(F) + w(s) r A_return/A_supply,  s = A_supply (H(F + A_return r) - H(F)) / (A_return r),
-/// with w = 0 up to s = 0.6, w = 1 from s = 0.9 and linear between. A valve that is set high, or absent, needs no parameter.
-/// A pressure model that contains the corner between both branches (models/hydraulics/branch_corner.h) needs no w: its S
-/// is higher by r A_return/A_supply. A large rise lifts the static branch above the valve's; what exceeds the gap H - S
-/// (with the usual pressure of a return line in S) then appears in the supply although the valve was active without it.
+/// with w = 0 up to s = 0.6, w = 1 from s = 0.9 and linear between. A valve that is set high, or absent, needs no
+/// parameter. A pressure model that contains the corner between both branches (models/hydraulics/branch_corner.h) needs
+/// no w: its S is higher by r A_return/A_supply. A large rise lifts the static branch above the valve's; what exceeds the
+/// gap H - S (with the usual pressure of a return line in S) then appears in the supply although the valve was active
+/// without it.
 #include <cmath>
 
 #include "models/hydraulics/gaussian_process.h"

@@ -19,7 +19,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kMostLines = 16;  // number of goal configurations to which straight lines are tried
+constexpr std::size_t kMostLines =
+    16;  // number of goal configurations to which straight lines are tried
 
 /// Joint position at which the cylinder has length x, between two positions that enclose it.
 double position_at_length(const Machine& machine, int cylinder, double x, double a, double b) {

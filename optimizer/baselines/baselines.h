@@ -13,7 +13,8 @@ namespace sparflow {
 
 /// Kinds of baseline, the keys of `strategies`' JSON.
 inline constexpr const char* kSequential = "sequential";
-inline constexpr const char* kJointLine = "simultaneous";  ///< to the goal configuration that costs least
+inline constexpr const char* kJointLine =
+    "simultaneous";  ///< to the goal configuration that costs least
 inline constexpr const char* kNearestJointLine =
     "simultaneous_nearest";  ///< to the goal configuration nearest in time
 inline constexpr const char* kActuatorLine =
@@ -38,17 +39,18 @@ struct BaselineOptions {
   int intervals = 100;
   int polished_orders =
       4;  ///< number of orders whose legs are optimised (optimize_with_modes), cheapest first
-  int most_orders = 24;      ///< largest number of orders considered, cheapest first
-  int tip_speed_levels = 2;  ///< number of trapezoidal time laws tried for the tip line of best redundancy
+  int most_orders = 24;  ///< largest number of orders considered, cheapest first
+  int tip_speed_levels =
+      2;  ///< number of trapezoidal time laws tried for the tip line of best redundancy
   double limit_tolerance = 1e-5;  ///< relative overshoot that still counts as kept
-  OptimizeOptions optimize;  ///< for the legs
+  OptimizeOptions optimize;       ///< for the legs
 };
 
 /// A motion along a fixed path at its fastest; driven slower, it keeps the limits of speed and flow, too.
 struct DrivenPath {
   std::string detail;
   std::vector<Trajectory>
-      legs;                 ///< each rest to rest, at its fastest; a single one unless the motion is sequential
+      legs;  ///< each rest to rest, at its fastest; a single one unless the motion is sequential
   std::vector<int> joints;  ///< joint that moves in each leg of a sequential motion, else empty
   double shortest = 0.0;    ///< sum of the legs' durations [s]
 };

@@ -18,8 +18,9 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kStill = 1e-4;    // [rad] or [m] below which a joint counts as at rest throughout
-constexpr double kSameEnd = 1e-3;  // [rad] or [m] below which two goal configurations count as equal
+constexpr double kStill = 1e-4;  // [rad] or [m] below which a joint counts as at rest throughout
+constexpr double kSameEnd =
+    1e-3;  // [rad] or [m] below which two goal configurations count as equal
 constexpr int kRedundancyCuts = 13;  // values of each joint at which goal configurations are sought
 constexpr std::size_t kMostEnds = 120;
 constexpr std::size_t kEndsOfAnOrder = 3;
@@ -211,7 +212,8 @@ void BaselineSet::make_sequences() {
   LimitRatios ratios(problem_);
   std::unique_ptr<ClearanceModel> clearance;
   if (!problem_.obstacles.empty()) clearance = std::make_unique<ClearanceModel>(problem_);
-  no_sequence_ = ends_.empty() ? "no goal configuration was found" : "every order meets an obstacle";
+  no_sequence_ =
+      ends_.empty() ? "no goal configuration was found" : "every order meets an obstacle";
   std::map<std::vector<int>, std::vector<SequenceEstimate>> by_order;
   for (std::size_t e = 0; e < ends_.size(); ++e) {
     std::vector<int> order;

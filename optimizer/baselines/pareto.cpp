@@ -11,7 +11,8 @@
 namespace sparflow {
 namespace {
 
-constexpr double kVerySlow = 30.0;  // multiple of the shortest duration at which flow losses are negligible
+constexpr double kVerySlow =
+    30.0;  // multiple of the shortest duration at which flow losses are negligible
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double energy_or_none(const std::vector<StrategyOutcome>& all, const std::string& kind) {

@@ -34,8 +34,8 @@ struct ParetoCurve {
 };
 
 struct ParetoOptions {
-  int points = 14;                                                ///< number of durations
-  double longest = 6.0;                                           ///< largest duration, in units of the shortest
+  int points = 14;       ///< number of durations
+  double longest = 6.0;  ///< largest duration, in units of the shortest
   std::vector<double> idle_powers = {1e3, 2e3, 5e3, 10e3, 15e3};  ///< [W]
   int grid_nodes = 20000;  ///< nodes of the joint grid for grid_limit; 0 = not computed
   StrategyOptions strategies;

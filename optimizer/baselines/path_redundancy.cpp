@@ -24,7 +24,8 @@ constexpr double kNoCost = std::numeric_limits<double>::infinity();
 constexpr int kFirstStages = 25;  // control points of the first grid
 constexpr double kFirstLineSpacing =
     0.4;  // spacing of the first grid, in stages: at full speed a joint moves 2.5 values in a stage
-constexpr double kSameValue = 1e-9;  // [s at full speed] a smaller step of a joint is Newton's residual
+constexpr double kSameValue =
+    1e-9;  // [s at full speed] a smaller step of a joint is Newton's residual
 constexpr double kFlowMargin =
     2e-3;  // relative, for flows between the knots where limits are judged
 
@@ -229,7 +230,8 @@ class LineProgram {
   void extend(std::size_t k, double h, const std::vector<std::vector<VectorXd>>& states,
               std::vector<std::vector<LineStep>>& steps) {
     const std::vector<VectorXd>& here = states[k - 1];
-    std::vector<std::vector<int>> arriving(here.size());  // steps that end in each posture, cheapest first
+    std::vector<std::vector<int>> arriving(
+        here.size());  // steps that end in each posture, cheapest first
     if (k > 1) {
       const std::vector<LineStep>& before = steps[k - 1];
       for (std::size_t i = 0; i < before.size(); ++i)
@@ -362,7 +364,8 @@ std::string path_redundancy_refusal(const MotionProblem& problem) {
   const int redundant = problem.machine.joint_count() - directions;
   if (redundant != 1) {
     return fmt::format(
-        "{} joints move the tip in {} directions: {} redundant joints, this method needs exactly one",
+        "{} joints move the tip in {} directions: {} redundant joints, this method needs exactly "
+        "one",
         problem.machine.joint_count(), directions, std::max(0, redundant));
   }
   return {};

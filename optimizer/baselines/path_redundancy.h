@@ -32,7 +32,8 @@ struct PathRedundancy {
   Trajectory motion;  ///< rest to rest, keeps all limits; empty when there is none
   std::string why;    ///< why there is no motion
   MotionEnergy energy;
-  double summed_J = 0.0;  ///< energy of the same motion as summed by dynamic programming [J], 0 without grids
+  double summed_J =
+      0.0;  ///< energy of the same motion as summed by dynamic programming [J], 0 without grids
   double top_speed = 0.0;  ///< of the tip, over its mean; 0 = the time law of `line`
   int grids = 0;           ///< number of grids used; 0 = `line` is returned
   double excess = 0.0;     ///< largest relative excess of a limit (worst_excess())

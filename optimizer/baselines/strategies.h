@@ -47,8 +47,9 @@ struct StrategyComparison {
   double shortest = 0.0;    ///< [s] shortest duration in which any strategy keeps all limits
   std::string shortest_of;  ///< key of that strategy
   std::vector<StrategyRow> rows;
-  std::vector<BaselineMotion> orders;  ///< sequential motions of every order at equal duration, trajectories removed
-  double solve_s = 0.0;                ///< wall time [s]
+  std::vector<BaselineMotion>
+      orders;  ///< sequential motions of every order at equal duration, trajectories removed
+  double solve_s = 0.0;  ///< wall time [s]
   const StrategyRow* row(const std::string& name) const;
 };
 
@@ -60,7 +61,7 @@ struct StrategyOptions {
   bool shortest_time =
       true;  ///< optimise the shortest duration, else take that of the baselines and seeds
   bool least_control = true;  ///< solve for the least squared commands at equal duration
-  int smooth_seeds = 2;  ///< seeds of a thorough search, also solved with the smooth law
+  int smooth_seeds = 2;       ///< seeds of a thorough search, also solved with the smooth law
   BaselineOptions baselines;
   OptimizeOptions optimize;
 };

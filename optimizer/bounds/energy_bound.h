@@ -7,9 +7,9 @@
 /// alone. A potential with -W_j- <= d phi/d q_j <= W_j+ everywhere then gives E >= phi(end) - phi(start). It is built on
 /// a grid from the start outwards with edge costs below the weights, and interpolated.
 ///
-/// These steps are proven. That the weights hold inside the cells is not: allowances are estimated from second
-/// differences, and |d phi/d q_j| <= W_j is tested at random postures only; rounding is not enclosed. So the result is
-/// an estimated bound, not a proven one.
+/// These steps are proven. That the weights hold inside the cells is not: their allowances, and those of the tabulated
+/// demands, are estimated from second differences, and |d phi/d q_j| <= W_j is tested at random postures only, with
+/// the same tables; rounding is not enclosed. So the result is an estimated bound, not a proven one.
 #include <string>
 #include <vector>
 

@@ -6,9 +6,10 @@ namespace sparflow {
 
 struct LeastOnGoal {
   bool reachable = false;  ///< false: no box of the grid can hold a posture at the goal
-  double lower = 0.0;      ///< at most the least value over all postures at the goal, rounding aside [J]
-  Eigen::VectorXd q;       ///< middle of the box with that value
-  long boxes = 0;          ///< number of boxes examined
+  double lower =
+      0.0;            ///< at most the least value over all postures at the goal, rounding aside [J]
+  Eigen::VectorXd q;  ///< middle of the box with that value
+  long boxes = 0;     ///< number of boxes examined
 };
 
 /// Best-first branch and bound over boxes of postures. Within a cell the interpolated potential is least at a corner; a

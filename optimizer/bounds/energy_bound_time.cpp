@@ -102,7 +102,8 @@ class TimedSearch {
       double best = guide.solve(price) - price * duration_;
       for (const double factor : {1.6, 1.0 / 1.6}) {
         const double before = best;
-        constexpr int kMost = 4;  // the guide's shortest time may exceed the duration: no price is best then
+        constexpr int kMost =
+            4;  // the guide's shortest time may exceed the duration: no price is best then
         for (int k = 0; k < kMost; ++k) {
           const double next = guide_price * factor, value = guide.solve(next) - next * duration_;
           if (!(value > best)) break;
@@ -176,7 +177,8 @@ class TimedSearch {
     constexpr double kBetweenNodes = 1.02;
     price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
-    const double time = ramp > 0.0 ? price / ramp : 0.0;  // [s] until the Hamiltonian can reach the price
+    const double time =
+        ramp > 0.0 ? price / ramp : 0.0;  // [s] until the Hamiltonian can reach the price
     if (energy_weight_ > 0.0) {
       return least - price * std::max(duration_ - time, 0.5 * duration_);
     }

@@ -85,11 +85,11 @@ struct TimedBoundOptions {
 
 struct TimedBound {
   bool valid = false;
-  std::string message;     ///< why there is no bound
-  double value = 0.0;      ///< [J] or [s]
-  double price_W = 0.0;    ///< lambda of the bound; 0 = the bound of unlimited time is larger
-  Eigen::VectorXd shares;  ///< by joint, the largest 1
-  std::vector<int> lines;  ///< number of lines of the final grid by joint
+  std::string message;         ///< why there is no bound
+  double value = 0.0;          ///< [J] or [s]
+  double price_W = 0.0;        ///< lambda of the bound; 0 = the bound of unlimited time is larger
+  Eigen::VectorXd shares;      ///< by joint, the largest 1
+  std::vector<int> lines;      ///< number of lines of the final grid by joint
   double checked_scale = 1.0;  ///< price / largest Hamiltonian sampled, <= 1
   double seconds = 0.0;        ///< wall time
 };

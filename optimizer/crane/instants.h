@@ -6,8 +6,8 @@
 
 namespace sparflow {
 
-/// Calls visit(q, qd, qdd, step [s]) in the middle of each of `parts` equal parts of every interval: an instant that never falls on a
-/// knot, where cylinders start and stop.
+/// Calls visit(q, qd, qdd, step [s]) in the middle of each of `parts` equal parts of every interval. Such an instant never
+/// falls on a knot, where cylinders start and stop.
 template <class Visit>
 void for_each_instant(const Trajectory& motion, int parts, const Visit& visit) {
   Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());

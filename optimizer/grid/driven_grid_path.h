@@ -8,7 +8,7 @@
 namespace sparflow {
 
 struct DrivenGridPath {
-  double energy = 0.0;       ///< [J] exact law, in the duration asked for; 0 = no path keeps all limits
+  double energy = 0.0;  ///< [J] exact law, in the duration asked for; 0 = no path keeps all limits
   double slow_energy = 0.0;  ///< [J] quasi-static, of the cheapest path at unlimited time; 0 = none
   std::string message;       ///< why there is no `energy`
 };

@@ -98,7 +98,8 @@ class EnergyGrid::Search {
     for (int step = 0; step < kSteps; ++step) {
       const double middle = std::sqrt(lo * hi);
       (offer(middle).first ? hi : lo) = middle;
-      if (enough && step >= 3) break;  // the cheapest path is fast enough: a few alternatives suffice
+      if (enough && step >= 3)
+        break;  // the cheapest path is fast enough: a few alternatives suffice
     }
     return found;
   }

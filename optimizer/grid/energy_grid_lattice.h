@@ -38,7 +38,7 @@ struct LatticeForces {
   Eigen::MatrixXf force;                ///< [cylinders x nodes] static force [N]
   std::vector<Eigen::VectorXd> length;  ///< by cylinder: x at the lines of the joint it drives [m]
   std::vector<Eigen::VectorXd> rate;    ///< by cylinder: dx/dq there
-  std::vector<Range> range;             ///< [N] by cylinder, range of the forces at the nodes, widened by 2 %
+  std::vector<Range> range;  ///< [N] by cylinder, range of the forces at the nodes, widened by 2 %
 
   /// Forces [N] and rates dx/dq by cylinder at one node.
   void at(const Machine& machine, const Lattice& lattice, long node, double* force_there,

@@ -38,7 +38,8 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
   flow_step_ = flow_max / (flows - 1);
   force_step_ = width / (forces - 1);
   demand_.resize(flows, forces);
-  double flow_curve = 0.0, force_curve = 0.0;  // largest positive second derivatives of the pressure model
+  double flow_curve = 0.0,
+         force_curve = 0.0;  // largest positive second derivatives of the pressure model
   for (int f = 0; f < forces; ++f) {
     for (int q = 0; q < flows; ++q) {
       const double flow = q * flow_step_, load = force.lo + f * force_step_;

@@ -9,9 +9,10 @@
 namespace sparflow {
 
 struct LegProfile {
-  Eigen::VectorXd ramp;          ///< [legs] duration of each of the two ramps [s]
-  Eigen::MatrixXd cruise;        ///< [legs x n] speed between the ramps [rad/s] or [m/s]
-  Eigen::MatrixXd corner_speed;  ///< [legs+1 x n] [rad/s] or [m/s], 0 where a joint stops or reverses
+  Eigen::VectorXd ramp;    ///< [legs] duration of each of the two ramps [s]
+  Eigen::MatrixXd cruise;  ///< [legs x n] speed between the ramps [rad/s] or [m/s]
+  Eigen::MatrixXd
+      corner_speed;  ///< [legs+1 x n] [rad/s] or [m/s], 0 where a joint stops or reverses
 };
 
 /// @param corners [legs+1 x n]  @param durations [legs] > 0 [s]

@@ -12,7 +12,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr Eigen::Index kLongestJump = 60;  // largest number of corners skipped between two chosen ones
+constexpr Eigen::Index kLongestJump =
+    60;  // largest number of corners skipped between two chosen ones
 
 struct Jump {
   std::vector<VectorXd> corners;  // without the first

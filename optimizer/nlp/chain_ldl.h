@@ -24,10 +24,9 @@ struct LdlStatistics {
   int largest_front = 0;     ///< rows of the largest dense front, predicted
   long factor_entries = 0;   ///< entries of L, predicted
   double multiply_adds = 0;  ///< of a factorisation, predicted
-  int delayed =
-      0;          ///< delayed pivots (summed over the fronts they left)
-  int pairs = 0;  ///< pivots of two rows
-  int negative = 0;  ///< negative eigenvalues of A
+  int delayed = 0;           ///< delayed pivots (summed over the fronts they left)
+  int pairs = 0;             ///< pivots of two rows
+  int negative = 0;          ///< negative eigenvalues of A
 };
 
 /// A mutable workspace for one matrix pattern and one thread.

@@ -155,7 +155,8 @@ void ChainLdl::make_fronts(const Tree& tree) {
   place_.reserve(rows_.size());
   long room = 0, waiting = 0, most_waiting = 0;
   int most_rows = 0;
-  std::vector<long> from_below(count, 0);  // storage of the contributions that a front takes from the stack
+  std::vector<long> from_below(
+      count, 0);  // storage of the contributions that a front takes from the stack
   for (std::size_t f = 0; f < count; ++f) {
     Front& front = fronts_[f];
     for (int k = 0; k < front.rows; ++k) place[place_at(rows_[place_at(front.first_row + k)])] = k;

@@ -63,8 +63,9 @@ struct ChainLdlRoutines {
         for (int& i : column) --i;
         solver = std::make_unique<ChainLdl>(*n, row, column, a);
         if (solver->statistics().largest_front > kLargestFront) {
-          current_session->refusal_ = fmt::format("the KKT matrix is no chain: it has a front of {} rows",
-                                                  solver->statistics().largest_front);
+          current_session->refusal_ =
+              fmt::format("the KKT matrix is no chain: it has a front of {} rows",
+                          solver->statistics().largest_front);
           info[kFlag] = kFatalFlag;
           return;
         }

@@ -51,7 +51,8 @@ SPARFLOW_INLINE void update_columns(double* f, int stride, int first, int last, 
 SPARFLOW_INLINE void subtract_product(double* f, int stride, int first, int size, const double* l,
                                       const double* w, int count) {
   int column = first;
-  for (; column + 4 <= size; column += 4) {  // entries above the diagonal are written but never read
+  for (; column + 4 <= size;
+       column += 4) {  // entries above the diagonal are written but never read
     double* to = f + static_cast<long>(column) * stride;
     int i = column;
     for (; i + kLanes < size; i += 2 * kLanes) {

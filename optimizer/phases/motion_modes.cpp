@@ -130,7 +130,8 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
 }
 
 void apply_modes(const CraneModel& model, const ModeTable& modes, TranscriptionBounds& bounds) {
-  SPARFLOW_CHECK(modes.rows() == bounds.qdd_lower.rows(), "modes and bounds must have the same mesh");
+  SPARFLOW_CHECK(modes.rows() == bounds.qdd_lower.rows(),
+                 "modes and bounds must have the same mesh");
   for (int c = 0; c < model.machine.cylinder_count(); ++c) {
     const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
     const Range& range = model.machine.joints[static_cast<std::size_t>(j)].position;

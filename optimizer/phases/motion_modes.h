@@ -10,7 +10,8 @@ struct ModeOptions {
   /// A cylinder slower than this share of its full speed creeps under the smoothed activation and is set to rest: no
   /// proportional spool meters less than a few percent of its flow.
   double rest_share = 0.02;
-  double lost_share = 0.05;  ///< share of a cylinder's stroke that may be lost by setting it to rest
+  double lost_share =
+      0.05;  ///< share of a cylinder's stroke that may be lost by setting it to rest
   int shortest_move =
       3;  ///< [intervals] shorter moves are dropped: they are too short to start and stop in
 };

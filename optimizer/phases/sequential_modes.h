@@ -10,7 +10,7 @@
 namespace sparflow {
 
 struct ModeCandidate {
-  std::string name;  ///< "sequential: jib, extension"
+  std::string name;     ///< "sequential: jib, extension"
   ModeTable modes;      ///< [intervals x cylinders]
   Trajectory guess;     ///< a motion with these modes on the same mesh
   double energy = 0.0;  ///< [J] of the initial guess by the exact law

@@ -34,7 +34,8 @@ constexpr double kShortOfTime = 2.0;
 /// Where time is short, mode sequences of motions with these multiples of the duration are tried too.
 constexpr double kSlower[] = {1.25, 1.6};
 
-constexpr double kRoomForTheRows = 0.04;  // [m] inflation of the smooth clearance rows, and sag between two knots
+constexpr double kRoomForTheRows =
+    0.04;  // [m] inflation of the smooth clearance rows, and sag between two knots
 
 /// All solves for one problem in one window of durations.
 class Search {

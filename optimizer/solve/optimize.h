@@ -22,7 +22,8 @@ struct SeedMotion {
   Trajectory motion;  ///< any duration; rest to rest
   /// Shortest duration at which this path keeps all limits [s]; 0 = not known.
   double shortest_duration = 0.0;
-  bool straight_line = false;  ///< whether it is a straight joint-space line, which is reported as baseline
+  bool straight_line =
+      false;  ///< whether it is a straight joint-space line, which is reported as baseline
 };
 
 /// Range of a motion's duration, and the duration at which the search begins. [s]
@@ -33,7 +34,8 @@ struct TimeWindow {
 };
 
 struct OptimizeOptions {
-  int intervals = 100;  ///< of the result's first mesh; refined to at most eight times that, see `mesh_error`
+  int intervals =
+      100;  ///< of the result's first mesh; refined to at most eight times that, see `mesh_error`
   int search_intervals = 50;  ///< of the mesh on which starts and sequences are compared
   double mesh_error =
       1e-4;  ///< |energy of the solve - exact energy| / exact energy, without the smoothing of the maximum
@@ -43,12 +45,14 @@ struct OptimizeOptions {
   /// Iteration limit of a smooth stage; its motion only supplies the modes, so it need not converge.
   int smooth_iterations = 100;
   int phase_iterations = 300;  ///< iteration limit of a solve with phases; half of it in the search
-  int sequential_starts = 6;   ///< sequential motions tried besides the seeds, those with the cheapest guesses
-  int grid_starts = 3;         ///< paths of the joint grid tried as starts (energy_grid.h)
-  int grid_nodes = 15000;      ///< of that grid
-  bool modes = true;  ///< solve with fixed modes at last; false: the smooth NLP alone
+  int sequential_starts =
+      6;  ///< sequential motions tried besides the seeds, those with the cheapest guesses
+  int grid_starts = 3;      ///< paths of the joint grid tried as starts (energy_grid.h)
+  int grid_nodes = 15000;   ///< of that grid
+  bool modes = true;        ///< solve with fixed modes at last; false: the smooth NLP alone
   bool free_phases = true;  ///< durations of phases are variables; false: as in the start
-  double overlap = 0.3;     ///< overlap inserted between two phases, share of the shorter one's duration
+  double overlap =
+      0.3;  ///< overlap inserted between two phases, share of the shorter one's duration
   int phase_intervals = 5;  ///< smallest number of intervals of a phase
   /// Largest number of rounds of the local search over mode sequences (neighbours() of phases.h).
   int sequence_rounds = 3;
@@ -125,7 +129,8 @@ struct OptimizeResult {
   std::string bound_note;         ///< why there is no bound
   double grid_path_energy =
       0.0;  ///< [J] path of the joint grid, driven in the same duration; 0 = none
-  double unlimited_energy = 0.0;  ///< [J] cheapest path of the joint grid at unlimited time; 0 = none
+  double unlimited_energy =
+      0.0;                  ///< [J] cheapest path of the joint grid at unlimited time; 0 = none
   double mesh_error = 0.0;  ///< relative, on the result's last mesh (OptimizeOptions::mesh_error)
   double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
   std::string best_seed_name;

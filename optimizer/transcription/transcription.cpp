@@ -42,7 +42,8 @@ Transcription::Transcription(TranscriptionSpec spec)
     SPARFLOW_CHECK(m->rows() == intervals_ && m->cols() == n_, "bounds of qdd are N x n");
   }
   if (spec_.acceleration_weight.size() == 0) spec_.acceleration_weight = VectorXd::Zero(n_);
-  SPARFLOW_CHECK(spec_.acceleration_weight.size() == n_, "there is one acceleration weight for each joint");
+  SPARFLOW_CHECK(spec_.acceleration_weight.size() == n_,
+                 "there is one acceleration weight for each joint");
 
   check_phases();
   if (phase_count_ > 0) {
@@ -241,7 +242,8 @@ void Transcription::hessian(In x, double objective_factor, In multiplier, Out va
     const Node& node = nodes_[s];
     const double* cost = node_cost_hessian_.data() + s * block;
     const double factor = objective_factor * weight(node, x.data());
-    if (factor != 0.0) {  // in the restoration phase it is zero: only the constraints' part is needed
+    if (factor !=
+        0.0) {  // in the restoration phase it is zero: only the constraints' part is needed
       for (std::size_t i = 0; i < block; ++i) block_[i] = factor * cost[i];
     } else {
       std::fill(block_.begin(), block_.end(), 0.0);

@@ -132,8 +132,9 @@ class Transcription final : public NlpProblem {
   struct Node {
     int knot = 0;
     int interval = -1;  ///< interval whose qdd is used; -1 = the model does not use qdd
-    int before = -1;    ///< interval on the left that contributes half a step to the weight; -1 = none
-    int after = -1;     ///< the same on the right
+    int before =
+        -1;          ///< interval on the left that contributes half a step to the weight; -1 = none
+    int after = -1;  ///< the same on the right
     int first_row = 0;  ///< index in g of this node's first path row
     int law = 0;        ///< interval whose law applies
     /// false: only rows that use the acceleration; another node of the knot has the others

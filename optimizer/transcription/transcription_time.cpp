@@ -18,7 +18,8 @@ void Transcription::check_phases() const {
   }
   SPARFLOW_CHECK(p.lower.size() == phase_count_ && p.upper.size() == phase_count_,
                  "every phase has bounds of its duration");
-  SPARFLOW_CHECK((p.lower.array() > 0.0).all(), "the lower bound of a phase's duration must be positive");
+  SPARFLOW_CHECK((p.lower.array() > 0.0).all(),
+                 "the lower bound of a phase's duration must be positive");
 }
 
 void Transcription::time_gradient(const double* x, Out gradient) const {

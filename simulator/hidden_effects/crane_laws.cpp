@@ -53,7 +53,8 @@ double usual_payload(const Machine& machine, std::uint64_t crane_seed) {
   BodyForces bodies(machine);
   JointLoads empty, loaded;
   std::vector<double> q(machine.joints.size()), allowed;
-  constexpr double kProbe = 100.0;  // [kg] The loads are linear in the payload, so one probe gives the slope.
+  constexpr double kProbe =
+      100.0;  // [kg] The loads are linear in the payload, so one probe gives the slope.
   for (int posture = 0; posture < 80; ++posture) {
     for (std::size_t k = 0; k < q.size(); ++k)
       q[k] = random.uniform(machine.joints[k].position.lo, machine.joints[k].position.hi);

@@ -20,8 +20,9 @@ struct DirectionLaws {
   double return_orifice = 0.0;  ///< [Pa/(m^3/s)^2]
   bool counterbalance = true;
   double pilot_pressure = 0.0;  ///< [Pa] supply pressure that opens the valve without load
-  double pilot_slope = 0.0;  ///< [-] decrease of that pressure with load pressure in the return chamber
-  double pilot_flow = 0.0;   ///< [Pa/(m^3/s)] its increase with supply flow
+  double pilot_slope =
+      0.0;  ///< [-] decrease of that pressure with load pressure in the return chamber
+  double pilot_flow = 0.0;  ///< [Pa/(m^3/s)] its increase with supply flow
 };
 
 struct CylinderLaws {
@@ -34,7 +35,8 @@ struct CraneLaws {
   std::vector<CylinderLaws> cylinders;
   std::vector<double> standby;  ///< [Pa] by pump; of a constant-pressure pump its pressure
   double oil_start = 28.0, oil_end = 55.0, oil_time = 90.0;  ///< [degC], [degC], time constant [s]
-  double operator_deadband_share = 0.8;  ///< [-] of a valve's dead band that the operator's lever skips
+  double operator_deadband_share =
+      0.8;  ///< [-] of a valve's dead band that the operator's lever skips
 };
 
 /// Draws the laws of one crane; the same seed gives the same crane.

@@ -25,7 +25,8 @@ struct StepInput {
   const std::vector<double>& command;  ///< [-] by cylinder
 };
 using StepWatch = std::function<void(const Plant&, const StepInput&)>;  ///< called before each step
-using RowWatch = std::function<void(Plant&, double payload)>;  ///< called at each row of the log; [kg]
+using RowWatch =
+    std::function<void(Plant&, double payload)>;  ///< called at each row of the log; [kg]
 
 /// Drives the crane through the motions of a request. @param before_step may be empty
 void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& before_step,

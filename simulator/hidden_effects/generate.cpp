@@ -10,7 +10,8 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kLongestStep = 0.01;  // [s] of the plant; short compared with every lag that is drawn
+constexpr double kLongestStep =
+    0.01;  // [s] of the plant; short compared with every lag that is drawn
 
 int place_index(const LawEntry& entry, const Machine& machine, const std::string& at) {
   switch (entry.place) {
@@ -176,7 +177,8 @@ void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& befo
           command[i] =
               std::clamp(command[i] * (1.0 - gap) + sign_of(command[i]) * gap * small, -1.0, 1.0);
         }
-        command[i] = std::round(command[i] * 1e4) / 1e4;  // The valve gets the rounded value that is logged.
+        command[i] =
+            std::round(command[i] * 1e4) / 1e4;  // The valve gets the rounded value that is logged.
       }
       const double oil = laws.oil_end - (laws.oil_end - laws.oil_start) *
                                             std::exp(-(s.t + oil_before) / laws.oil_time);

@@ -14,8 +14,8 @@
 namespace sparflow::simulator {
 
 struct HiddenEffect {
-  std::string id;  ///< id in the catalogue, or one of outside_ids()
-  std::string at;      ///< joint, cylinder, pump or channel; empty = drawn among places_of()
+  std::string id;     ///< id in the catalogue, or one of outside_ids()
+  std::string at;     ///< joint, cylinder, pump or channel; empty = drawn among places_of()
   double size = 1.0;  ///< [-] 1 = clear, 1/3 = small; multiplies the drawn strength
   int law = -1;       ///< variant of the law, -1 = drawn
 };
@@ -61,7 +61,7 @@ struct LogRequest {
   double seconds = 240.0;
   double rate = 50.0;         ///< [Hz] 5..200
   double noise_factor = 1.0;  ///< [-] 1 = standard deviations of 0.8 bar, 0.3 mrad, 1 mm
-  bool warm = false;          ///< oil is warm from the start and the payload constant, as in a test log
+  bool warm = false;  ///< oil is warm from the start and the payload constant, as in a test log
   LogChannels channels;
 };
 
@@ -98,7 +98,8 @@ std::vector<std::string> places_of(const std::string& id, const Machine& machine
 
 /// A case: the files reference.csv, train.csv, test.csv, machine.yaml and truth.json in one folder.
 struct CaseRequest {
-  LogRequest log;  ///< seeds, machine, effects; case_logs() sets `warm` and `motion_seed` of each log
+  LogRequest
+      log;  ///< seeds, machine, effects; case_logs() sets `warm` and `motion_seed` of each log
   double test_seconds = 120.0;
 };
 struct GeneratedCase {

@@ -16,11 +16,12 @@ namespace sparflow::simulator {
 struct Recording {
   double rate = 50.0;
   std::vector<double> time, payload, oil;
-  std::vector<std::vector<double>> q;                                      ///< by joint
-  std::vector<std::vector<double>> command;                                ///< by cylinder
-  std::vector<std::vector<double>> pressure_a, pressure_b;                 ///< by cylinder
-  std::vector<std::vector<double>> pump;                                   ///< by pump
-  std::vector<std::vector<double>> noise_a, noise_b, noise_pump, noise_q;  ///< noise that is added at the end
+  std::vector<std::vector<double>> q;                       ///< by joint
+  std::vector<std::vector<double>> command;                 ///< by cylinder
+  std::vector<std::vector<double>> pressure_a, pressure_b;  ///< by cylinder
+  std::vector<std::vector<double>> pump;                    ///< by pump
+  std::vector<std::vector<double>> noise_a, noise_b, noise_pump,
+      noise_q;  ///< noise that is added at the end
 };
 
 /// Quantities from which a law draws its strength.
@@ -60,11 +61,12 @@ class HiddenLaw {
   virtual ~HiddenLaw() = default;
   /// Changes base laws so that the effect can be seen; also applied to the reference crane, which lacks the effect.
   virtual void prepare_crane(CraneLaws& /*laws*/) const {}
-  virtual void change_machine(Machine& /*machine*/) const {}  ///< changes the bodies of body_forces.h
+  virtual void change_machine(Machine& /*machine*/) const {
+  }                                     ///< changes the bodies of body_forces.h
   virtual void payload(PlantState&) {}  ///< changes s.payload to the true payload
   /// Sets the opening of every cylinder's valve, which is preset to the command.
   virtual void opening(PlantState&) {}
-  virtual void flow(PlantState&) {}   ///< sets the flow, which is preset to opening times valve gain
+  virtual void flow(PlantState&) {}  ///< sets the flow, which is preset to opening times valve gain
   virtual void drift(PlantState&) {}  ///< adds to the cylinders' drift
   /// Adds to s.q_load; the joint loads are those of the step before.
   virtual void posture(PlantState&) {}
@@ -112,7 +114,8 @@ const std::vector<LawEntry>& all_laws();
 const LawEntry& law_entry(const std::string& id);
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kMoving = 2e-3;  ///< [m/s] samples from here on count as moving, as in the error measures
+constexpr double kMoving =
+    2e-3;  ///< [m/s] samples from here on count as moving, as in the error measures
 
 /// Area [m^2] that converts a force into a pressure; a typical one for a drive without hydraulics.
 inline double drive_area(const Cylinder& c) { return c.hydraulic() ? c.area_piston() : 0.01; }

@@ -8,9 +8,10 @@
 namespace sparflow::simulator {
 namespace {
 
-constexpr double kStopMargin = 0.03;  // [-] of a joint's range that the operator keeps from its ends
-constexpr double kPumpShare = 0.97;   // [-] of the pump's flow that the operator uses at most
-constexpr double kSlowMoves = 0.12;   // [-] share of slow moves
+constexpr double kStopMargin =
+    0.03;                            // [-] of a joint's range that the operator keeps from its ends
+constexpr double kPumpShare = 0.97;  // [-] of the pump's flow that the operator uses at most
+constexpr double kSlowMoves = 0.12;  // [-] share of slow moves
 
 double smooth_step(double s) {
   s = std::clamp(s, 0.0, 1.0);

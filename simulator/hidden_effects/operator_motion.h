@@ -28,7 +28,8 @@ class OperatorMotion {
     double amplitude = 0.0;         ///< [-] lever, or [rad/s] or [m/s]
     double start = 0.0;             ///< [s] after the block's begin
     double ramp = 0.5, hold = 3.0;  ///< [s]
-    double phase = 0.0;  ///< [s] in its profile; grows slower than time when the pump's flow is limited
+    double phase =
+        0.0;  ///< [s] in its profile; grows slower than time when the pump's flow is limited
     double duration() const { return hold + 2.0 * ramp; }
     double profile() const;
   };

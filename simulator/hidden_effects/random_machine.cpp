@@ -169,8 +169,7 @@ Machine vary_machine(const Machine& drawing, const MachineVariation& variation,
       continue;  // A linkage passes its dead centre, so another machine is drawn.
     }
   }
-  throw InputError({}, "machine",
-                   "no variation of " + drawing.name + " passes check_machine()");
+  throw InputError({}, "machine", "no variation of " + drawing.name + " passes check_machine()");
 }
 
 Machine random_machine(const std::vector<Machine>& drawings, std::uint64_t seed) {

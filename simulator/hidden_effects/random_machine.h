@@ -7,10 +7,11 @@
 namespace sparflow::simulator {
 
 struct MachineVariation {
-  double spread = 0.15;         ///< [-] share by which dimensions, masses, bores and valve flows vary
+  double spread = 0.15;  ///< [-] share by which dimensions, masses, bores and valve flows vary
   bool drop_telescope = false;  ///< a prismatic last joint is fixed at half its stroke
-  bool add_slewing = false;     ///< a slewing joint with rack and pinion is added before the first joint
-  bool two_pumps = false;       ///< a second load-sensing pump takes over some cylinders
+  bool add_slewing =
+      false;               ///< a slewing joint with rack and pinion is added before the first joint
+  bool two_pumps = false;  ///< a second load-sensing pump takes over some cylinders
 };
 
 /// Varies the dimensions of a machine. @return a machine that passes check_machine()

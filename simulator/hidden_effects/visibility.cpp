@@ -21,7 +21,8 @@ constexpr double kMean_s = 0.3;         // [s] over which changes and noise are 
 constexpr double kLeastSize = 1.0;      // [-] standard deviations where the effect acts
 constexpr double kLeastSeconds = 10.0;  // [s] for which an effect of that size must act
 constexpr double kLeastActing_s = 3.0;  // [s] one stroke; no law can be tested on a shorter event
-constexpr double kMostAbsorbed = 0.9;   // [-] a diagnosis need not name an effect with a larger absorbed share
+constexpr double kMostAbsorbed =
+    0.9;  // [-] a diagnosis need not name an effect with a larger absorbed share
 constexpr double kForceShareNoise = 0.01;
 
 /// One measured quantity: its change by the effect, and the basis of a law that may be learned from this log.
@@ -66,7 +67,8 @@ struct DeterminedPressure {
   bool fed_a = false;  // it is the pressure of chamber A
 };
 
-DeterminedPressure determined_pressure(const Cylinder& drive, const CylinderLaws& laws, const CylinderState& c) {
+DeterminedPressure determined_pressure(const Cylinder& drive, const CylinderLaws& laws,
+                                       const CylinderState& c) {
   const double fed = c.side > 0 ? drive.area_piston() : drive.area_rod();
   const double other = c.side > 0 ? drive.area_rod() : drive.area_piston();
   const double least = std::max(c.pilot_pressure, laws.rest_tank);
@@ -185,7 +187,8 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
     const DeterminedPressure ra = determined_pressure(drive, s.crane->laws.cylinders[i], ca);
     const DeterminedPressure rb = determined_pressure(drive, s.crane->laws.cylinders[i], cb);
     double change = ra.pressure - rb.pressure;
-    if (ra.counterbalance != rb.counterbalance)  // The effect changes the branch: the same chamber is compared.
+    if (ra.counterbalance !=
+        rb.counterbalance)  // The effect changes the branch: the same chamber is compared.
       change = ra.fed_a ? ca.pressure_a - cb.pressure_a : ca.pressure_b - cb.pressure_b;
     change += ra.fed_a ? read_a - (ca.pressure_a - cb.pressure_a)
                        : read_b - (ca.pressure_b - cb.pressure_b);
@@ -315,7 +318,8 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
   std::vector<std::size_t> each(request.effects.size());
   std::iota(each.begin(), each.end(), std::size_t{0});
   const auto shadows = drive_beside(request, each);
-  if (learned && reference) {  // Both cranes of the reference log are the same, so that the change is zero there.
+  if (learned &&
+      reference) {  // Both cranes of the reference log are the same, so that the change is zero there.
     const auto beside = drive_beside(*reference, {kNothing});
     const std::vector<Channel*> known = channels_of(*beside.front());
     for (const auto& s : shadows) {
@@ -338,6 +342,8 @@ std::vector<Visibility> visibility(const LogRequest& request, bool learned,
   return all;
 }
 
-bool visible(const Visibility& v) { return shows(v) && v.absorbed <= kMostAbsorbed && !v.equivalent; }
+bool visible(const Visibility& v) {
+  return shows(v) && v.absorbed <= kMostAbsorbed && !v.equivalent;
+}
 
 }  // namespace sparflow::simulator

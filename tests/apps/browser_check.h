@@ -6,9 +6,11 @@
 namespace sparflow::test_support {
 
 struct BrowserReport {
-  bool available = false;           ///< false: there is no chromium on this machine, and the other members are not set
-  int plots_expected = -1;          ///< figures that the page was built with; -1 = not a page of the program
-  int plots_drawn = -1;             ///< figures that have a visible pixel or an SVG with content
+  bool available =
+      false;  ///< false: there is no chromium on this machine, and the other members are not set
+  int plots_expected =
+      -1;                ///< figures that the page was built with; -1 = not a page of the program
+  int plots_drawn = -1;  ///< figures that have a visible pixel or an SVG with content
   std::vector<std::string> errors;  ///< script errors, console errors, refused network requests
   std::string dom;                  ///< the document after its scripts ran
 

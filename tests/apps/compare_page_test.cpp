@@ -70,7 +70,8 @@ TEST(ComparePage, FrictionIsNamedInTheVerdict) {
   EXPECT_EQ(worst_score(judged)->score.stage, "force");
   EXPECT_EQ(worst_score(judged)->tone, Tone::kBad);
   const std::string html = compare_page(model, result).html();
-  EXPECT_THAT(html, HasSubstr("The model misses the force of arm: 4"));  // friction of 40 kN, plus noise
+  EXPECT_THAT(html,
+              HasSubstr("The model misses the force of arm: 4"));  // friction of 40 kN, plus noise
   EXPECT_THAT(html, HasSubstr("kN RMS"));
   EXPECT_THAT(html, HasSubstr("arm.csv, 3000 samples, sha256 0000000000000000"));
 }

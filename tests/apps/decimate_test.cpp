@@ -59,7 +59,8 @@ TEST(DecimateCloud, KeepsTheOutlierAndThinsTheCluster) {
   x[5] = kNaN;
   const auto points = decimate_cloud(x, y, 2000);
   EXPECT_LE(points.size(), 2000u);
-  EXPECT_GE(points.size(), 700u);  // one coarsening of the grid removes at most two thirds of the cells
+  EXPECT_GE(points.size(),
+            700u);  // one coarsening of the grid removes at most two thirds of the cells
   EXPECT_TRUE(contains(points, 31000));
   EXPECT_FALSE(contains(points, 5));
 }

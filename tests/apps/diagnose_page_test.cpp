@@ -96,11 +96,12 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   const std::string html = diagnose_page(model, missing_friction(model)).html();
   EXPECT_THAT(html, HasSubstr("force 5.01 \u00B1 0.12 kN"));
   EXPECT_THAT(html, HasSubstr("force of arm 5.10 \u2192 0.420 kN, sensor noise 0.40"));
-  EXPECT_THAT(html, HasSubstr("Chance of such evidence if no effect were missing: below 0.5 %"));
+  EXPECT_THAT(html, HasSubstr("Chance of such evidence if no effect were missing: below 0.003."));
   EXPECT_THAT(html, HasSubstr("One of: coulomb_friction:arm, load_friction:arm"));
   // 4 nats at 2.5 nats a minute
-  EXPECT_THAT(html, HasSubstr("Record 2 minutes of: arm up and down slowly, with no load and with "
-                              "about 500 kg (distinguishes coulomb_friction:arm from load_friction:arm)."));
+  EXPECT_THAT(
+      html, HasSubstr("Record 2 minutes of: arm up and down slowly, with no load and with "
+                      "about 500 kg (distinguishes coulomb_friction:arm from load_friction:arm)."));
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 

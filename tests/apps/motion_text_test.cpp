@@ -17,9 +17,10 @@ TEST(MotionText, ComparesWithSeedsByName) {
   // A straight line that is also the best seed is named once.
   r.straight_line_energy = r.nearest_line_energy = 100e3;
   r.straight_line_name = r.best_seed_name = "straight line 1";
-  EXPECT_EQ(against_seeds(r),
-            "20 % less than the straight joint line to the nearest goal configuration (100.0 kJ) in the "
-            "same time");
+  EXPECT_EQ(
+      against_seeds(r),
+      "20 % less than the straight joint line to the nearest goal configuration (100.0 kJ) in the "
+      "same time");
   r.straight_line_energy = r.best_seed_energy = 81e3;
   EXPECT_THAT(against_seeds(r),
               testing::EndsWith("and 1.2 % less than the cheapest straight line (81.0 kJ) in the "

@@ -53,7 +53,7 @@ Selftest by_hand(const Machine& machine) {
 TEST(SelftestPage, NamesWhatWouldBeFound) {
   const CraneModel model = arm_model();
   const std::string html = selftest_page(model, by_hand(model.machine)).html();
-  EXPECT_THAT(html, HasSubstr("Of 3 effects at their places 1 would be seen"));
+  EXPECT_THAT(html, HasSubstr("Of 3 candidate effects 1 would be named"));
   EXPECT_THAT(html, HasSubstr("Fc 880 N"));
   EXPECT_THAT(html, HasSubstr("no motion of these logs excites it"));
   EXPECT_THAT(html, HasSubstr("1 of 1 as predicted"));

@@ -10,7 +10,7 @@ failed=0
 fresh() {
   rm -rf "$scratch/tree" && mkdir -p "$scratch/tree/docs"
   cp "$source/docs/arrows.txt" "$scratch/tree/docs/"
-  (cd "$source" && cp -r models identification diagnosis problems planners optimizer simulator apps bench studies "$scratch/tree/")
+  (cd "$source" && cp -r models identification diagnosis problems planners optimizer simulator apps bench studies examples "$scratch/tree/")
 }
 
 expect() { # name of the case, sentence that must be printed; the tree is broken already

@@ -40,7 +40,7 @@ VectorXd vector(const json& list) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<int>(values.size()));
 }
 
-/// Largest difference between two sparse matrices, relative to the largest entry of the expected one.
+/// Largest difference of two sparse matrices, relative to the largest entry of the expected one.
 double difference(const VectorXi& row, const VectorXi& column, const VectorXd& value,
                   const json& expected) {
   std::map<std::pair<int, int>, double> places;
@@ -58,8 +58,8 @@ double difference(const VectorXi& row, const VectorXi& column, const VectorXd& v
 
 class Checkpoint : public testing::TestWithParam<const char*> {};
 
-// Both sides sum 200 kernel terms whose absolute values add up to as much as 4e6 bar for a pressure of some 50,
-// so that pressures agree to about 1e-10 bar, 1e-11 relative to the largest entries; 1e-9 leaves room for the
+// Both sides sum 200 kernel terms whose absolute values add up to as much as 4e6 bar for a pressure of about 50 bar,
+// so that pressures agree to about 1e-10 bar, 1e-11 relative to the largest entries; 1e-9 allows for the
 // factors (2/eps_v)^2 that the direction's blend multiplies into the Hessian.
 constexpr double kAgreement = 1e-9;
 
@@ -82,7 +82,7 @@ TEST_P(Checkpoint, FunctionsAndDerivativesAgree) {
   const VectorXd expected_g = vector(point["g"]);
   ASSERT_EQ(size.constraints, expected_g.size());
   nlp.constraints(x, g);
-  // Two scales: defects and tip are of order 1 (rad, m), flows of order 200 l/min.
+  // There are two scales: defects and tip are of order 1 (rad, m), flows of order 200 l/min.
   EXPECT_LT((g - expected_g).head(482).cwiseAbs().maxCoeff(), kAgreement);
   EXPECT_LT((g - expected_g).tail(81).cwiseAbs().maxCoeff(), kAgreement * 200.0);
 
@@ -105,7 +105,7 @@ TEST_P(Checkpoint, FunctionsAndDerivativesAgree) {
 
 INSTANTIATE_TEST_SUITE_P(ReferenceNlp, Checkpoint, testing::Values("initial_guess", "solution"));
 
-TEST(ReferenceNlp, InitialGuessIsTheCheckpoints) {
+TEST(ReferenceNlp, InitialGuessIsThatOfTheCheckpoints) {
   Transcription nlp = reference_transcription(problem());
   VectorXd x(nlp.size().variables);
   nlp.start(x);
@@ -126,7 +126,7 @@ TEST(ReferenceNlp, IntermediateQuantitiesAgree) {
   const auto near = [](const std::array<double, 3>& got, const std::array<double, 3>& expected) {
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(got[i], expected[i], 1e-9);
   };
-  // Printed with 12 decimals where they were computed (independent implementation, see the top).
+  // Values of the independent implementation, printed with 12 decimals.
   const ReferenceKnot::State first = state(0), middle = state(40);
   near(first.force, {84.841163917837, 17.311881904558, -7.040343643671});
   near(first.flow, {4.853760649796, 4.123340357837, 1.151590057082});
@@ -144,7 +144,7 @@ TEST(ReferenceNlp, EveryInstructionSetGivesTheSameObjective) {
   for (KernelIsa isa : {KernelIsa::kBaseline, KernelIsa::kAvx2, KernelIsa::kAvx512}) {
     if (!set_kernel_isa(isa)) continue;
     Transcription nlp = reference_transcription(problem());
-    // Pressures carry 1e-10 bar of rounding in sums of 4e6 bar: 3e-11 kJ a knot, 1e-9 with all its signs alike.
+    // Pressures have rounding errors of 1e-10 bar in sums of 4e6 bar: 3e-11 kJ at each knot, 1e-9 kJ if all add up.
     EXPECT_NEAR(nlp.objective(x), 150.65622880306853, 1e-9) << kernel_isa_name(isa);
   }
   set_kernel_isa(before);
@@ -153,15 +153,15 @@ TEST(ReferenceNlp, EveryInstructionSetGivesTheSameObjective) {
 TEST(ReferenceNlp, DerivativesMatchDifferences) {
   Transcription nlp = reference_transcription(problem());
   const VectorXd x = vector(checkpoints()["points"]["solution"]["x"]);
-  // The direction blend bends over eps_v = 5e-3 m/s, so steps of 1e-4: truncation (1e-4/5e-3)^4 = 2e-7 of
-  // functions that reach 1e3 in second derivatives at rest.
+  // The direction blend varies over eps_v = 5e-3 m/s, so steps of 1e-4 have a truncation error of (1e-4/5e-3)^4 = 2e-7
+  // of functions whose second derivatives reach 1e3 at rest.
   const DerivativeCheck check = check_derivatives(nlp, x, 1e-4);
   EXPECT_LT(check.gradient_error, 1e-6) << check.worst_gradient;
   EXPECT_LT(check.jacobian_error, 1e-6) << check.worst_jacobian;
   EXPECT_LT(check.hessian_error, 1e-5) << check.worst_hessian;
 }
 
-TEST(ReferenceNlp, BothKktSolversTakeTheSameWay) {
+TEST(ReferenceNlp, BothKktSolversReachTheSameOptimum) {
   NlpOptions options;
   options.kkt_solver = KktSolver::kChain;
   Transcription first = reference_transcription(problem());
@@ -172,20 +172,20 @@ TEST(ReferenceNlp, BothKktSolversTakeTheSameWay) {
   ASSERT_EQ(chain.kkt_solver, KktSolver::kChain) << chain.kkt_note;
   ASSERT_EQ(mumps.kkt_solver, KktSolver::kMumps);
   ASSERT_TRUE(chain.solved() && mumps.solved());
-  // as between tolerances: 3e-8 relative
+  // 3e-8 relative, as between tolerances
   EXPECT_NEAR(chain.objective, mumps.objective, 1e-7 * mumps.objective);
-  EXPECT_NEAR(chain.iterations, mumps.iterations, 10) << "rounding shifts it by a few";
+  EXPECT_NEAR(chain.iterations, mumps.iterations, 10) << "rounding changes the number by a few";
 }
 
 TEST(ReferenceNlp, ReachesTheKnownOptimum) {
   Transcription nlp = reference_transcription(problem());
   const NlpResult result = solve_with_ipopt(nlp);
   ASSERT_EQ(result.status, NlpStatus::kOptimal) << result.brief();
-  // Between tol 1e-6 and 1e-10 the objective moves by 3e-8 relative.
+  // Between tolerances of 1e-6 and 1e-10 the objective changes by 3e-8 relative.
   EXPECT_NEAR(result.objective, 150.656228803, 1e-6 * 150.656);
   EXPECT_NEAR(nlp.model_cost(result.x), 150.648987757, 1e-6 * 150.649);
   EXPECT_LT(result.max_violation, 1e-6);
-  EXPECT_NEAR(result.iterations, 53, 10) << "rounding shifts it by a few";
+  EXPECT_NEAR(result.iterations, 53, 10) << "rounding changes the number by a few";
   const Trajectory motion = nlp.trajectory(result.x);
   EXPECT_NEAR(motion.q(80, 0), 0.93017064, 1e-4);  // the optimum is flat along the redundancy
   EXPECT_NEAR(motion.q(80, 1), -1.16290205, 1e-4);
@@ -217,7 +217,7 @@ TEST(ReferenceNlp, WarmStartAfterTheGoalMovedSavesIterations) {
   RecordProperty("warm_iterations", from_solution.iterations);
 }
 
-/// The problem file with one thing changed, written where tests write.
+/// Writes the problem file with one change into the tests' folder.
 std::string broken(const std::string& name, const std::function<void(json&)>& change) {
   json document = test_support::parsed_json(read_file(kData + "reference_problem.json"));
   change(document);
@@ -226,7 +226,7 @@ std::string broken(const std::string& name, const std::function<void(json&)>& ch
   return path;
 }
 
-TEST(ReferenceNlp, BadFilesAreNamedByKey) {
+TEST(ReferenceNlp, ErrorsInTheFileNameTheKey) {
   const std::pair<const char*, std::function<void(json&)>> cases[] = {
       {"T", [](json& d) { d.erase("T"); }},
       {"N", [](json& d) { d["N"] = 80.5; }},
@@ -265,7 +265,7 @@ TEST(ReferenceNlp, BadFilesAreNamedByKey) {
   }
 }
 
-TEST(ReferenceNlp, ProgramReportsAndExitsAsPromised) {
+TEST(ReferenceNlp, ProgramReportsAndExitsAsDocumented) {
   const std::string program = SPARFLOW_BINARY_DIR "/bench/reference_nlp";
   if (!std::filesystem::exists(program)) GTEST_SKIP() << program << " is not built";
   const std::string out = testing::TempDir() + "reference_out.json";

@@ -68,7 +68,8 @@ TEST_F(CliSays, WhatALogLacksWhenNothingIsLearned) {
   write("log.csv", scaled_log(1.0, none, 29));  // 0.6 s at rest
   Outcome o = run("fit -m " + kCrane + " -l " + at("log.csv") + " -o " + at("m.json"));
   EXPECT_EQ(o.code, 3);
-  EXPECT_THAT(o.err, HasSubstr("nothing was learned, so no model is written: the logs lack motion"));
+  EXPECT_THAT(o.err,
+              HasSubstr("nothing was learned, so no model is written: the logs lack motion"));
   EXPECT_FALSE(fs::exists(at("m.json")));
 
   std::string bare = slurp(kTest);

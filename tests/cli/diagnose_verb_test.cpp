@@ -120,7 +120,8 @@ TEST_F(CliDiagnose, FrictionIsNamedAddedAndRemoved) {
   ASSERT_EQ(o.code, 0) << o.err;
   json c = test_support::parsed_json(slurp(at("c.json")));
   EXPECT_NEAR(c.at("stages").at("force").at("boom").at("rmse").get<double>(),
-              force.at("after").at("rmse").get<double>(), 1.0);  // [N] both verbs run the same computation
+              force.at("after").at("rmse").get<double>(),
+              1.0);  // [N] both verbs run the same computation
 
   o = run("extend --model " + at("m2.json") + " --remove coulomb_friction:boom --log " + log +
           " --test " + test + " -o " + at("m3.json"));

@@ -1,5 +1,5 @@
 #pragma once
-/// Effects as a test puts them into a model: at their typical or at no strength.
+/// Effects applied to a model with typical values times a strength.
 #include <string>
 
 #include "models/chain/crane_model.h"

@@ -1,5 +1,5 @@
 #pragma once
-/// What the tests of crane knots share: numeric twins, states and problems of any machine.
+/// Shared by the tests of crane knots: numeric derivatives, states and problems of any machine.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -62,7 +62,7 @@ inline Vector random_state(const Machine& machine, std::mt19937& random) {
   for (int j = 0; j < n; ++j) {
     const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
     z[j] = joint.position.lo + (0.1 + 0.8 * unit(random)) * (joint.position.hi - joint.position.lo);
-    // every second speed slow enough to sit in the blending zone of the smooth law
+    // About every second speed is so small that it lies in the blending zone of the smooth law.
     const double slow = unit(random) < 0.5 ? 0.02 : 0.7;
     z[n + j] = slow * (2.0 * unit(random) - 1.0) * joint.velocity.hi;
   }

@@ -1,6 +1,6 @@
 #pragma once
-/// A fitted-looking model of any machine without any log: each pressure is load / area plus a flow loss,
-/// with a few kernel bumps on top so that every derivative of the process is exercised.
+/// A synthetic model of any machine that needs no log: each pressure is force / area plus a constant, with some kernel
+/// terms added so that all derivatives of the pressure model differ from zero.
 #include <random>
 
 #include "models/chain/crane_model.h"

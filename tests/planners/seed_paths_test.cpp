@@ -40,7 +40,7 @@ void expect_good_path(const MotionProblem& problem, const SeedPath& seed) {
     EXPECT_EQ(end, std::get<JointGoal>(problem.goal).q);
   }
   EXPECT_NEAR(seed.length, path_length(seed.path, speed_scale(problem)), 1e-9);
-  // Every leg at 500 points by the exact distance: the motion check may miss 1 mm, not more.
+  // Every leg is checked at 500 points by the exact distance; the motion check may miss at most 1 mm.
   ClearanceModel clearance(problem);
   for (Eigen::Index k = 0; k + 1 < seed.path.rows(); ++k) {
     for (int i = 0; i <= 500; ++i) {
@@ -82,7 +82,7 @@ TEST(SeedPaths, FreeSpaceGivesStraightLinesToSeveralPosturesAndOnesWithAJointAtR
 }
 
 TEST(SeedPaths, ShortestStraightLineIsTheNearestPostureOnTheGoalCurve) {
-  // The crane's goal region is a curve; scan it by its extension and compare with what sampling found.
+  // The crane's goal region is a curve; it is scanned by the extension and compared with the samples.
   const MotionProblem problem = crane_reach();
   const SeedResult result = find_seed_paths(problem);
   ASSERT_EQ(result.status, SeedStatus::kFound);
@@ -104,7 +104,7 @@ TEST(SeedPaths, ShortestStraightLineIsTheNearestPostureOnTheGoalCurve) {
   }
   double found = 1e9;
   for (const SeedPath& seed : result.paths) found = std::min(found, seed.length);
-  // the scan steps 0.1 mm: second order about a smooth minimum
+  // The scan's step of 0.1 mm is of second order at a smooth minimum.
   EXPECT_NEAR(found, least, 1e-4 * least);
 }
 
@@ -125,8 +125,8 @@ TEST(SeedPaths, GoesRoundAWallThatBlocksTheStraightLine) {
   }
 }
 
-TEST(SeedPaths, FindsBothWaysRoundAPillarForASlewingCrane) {
-  // A pillar in front: the crane can pull in, or rise over it; slewing passes it either way.
+TEST(SeedPaths, FindsBothPathsAroundAPillarForASlewingCrane) {
+  // A pillar is in front: the crane can retract or rise over it while it slews.
   MotionProblem problem =
       arms::problem(arms::slewing_crane(), vec({-0.8, 0.1, -0.6, 1.5}), TipGoal{{5.0, 5.0, 2.0}});
   problem.obstacles = {arms::box("pillar", {6.0, 0, 2.0}, {0.8, 0.8, 6.0})};
@@ -146,7 +146,7 @@ TEST(SeedPaths, SameSeedSamePathsOtherSeedOtherPaths) {
   MotionProblem problem = crane_reach();
   problem.obstacles = {arms::box("beam", {5.6, 0, 2.6}, {0.5, 2, 0.5})};
   SeedOptions options;
-  options.seconds = 60.0;  // iterations, not time, shall end the search
+  options.seconds = 60.0;  // so that iterations end the search
   const SeedResult a = find_seed_paths(problem, options);
   const SeedResult b = find_seed_paths(problem, options);
   ASSERT_EQ(a.status, SeedStatus::kFound) << a.message;
@@ -182,14 +182,14 @@ TEST(SeedPaths, NamesAnUnreachableGoalWithTheNearestPoint) {
   problem.goal = TipGoal{{20, 0, 2}};
   const SeedResult result = find_seed_paths(problem);
   EXPECT_EQ(result.status, SeedStatus::kGoalUnreachable);
-  // All stretched out at the height of the boom pin: 3.4 + 3 + 6 m.
+  // The arm is stretched out at the height of the boom pin: 3.4 + 3 + 6 m.
   EXPECT_NEAR(result.miss, 20 - 12.4, 1e-4);
   EXPECT_NEAR(result.nearest_tip.x(), 12.4, 1e-4);
   EXPECT_THAT(result.message, HasSubstr("out of reach"));
   EXPECT_THAT(result.message, HasSubstr("7.600 m away"));
   EXPECT_TRUE(result.paths.empty());
 
-  problem.goal = TipGoal{{6, 1, 2}};  // out of the crane's plane: y = 0 is as near as it gets
+  problem.goal = TipGoal{{6, 1, 2}};  // outside the crane's plane, where y = 0 is nearest
   const SeedResult sideways = find_seed_paths(problem);
   EXPECT_EQ(sideways.status, SeedStatus::kGoalUnreachable);
   EXPECT_NEAR(sideways.miss, 1.0, 1e-6);
@@ -222,8 +222,8 @@ TEST(SeedPaths, NamesCollisionsAndLimits) {
   EXPECT_THAT(beyond.message, HasSubstr("extension: got 7 m"));
 }
 
-TEST(SeedPaths, WalledInGivesNoPath) {
-  // A two-link arm folded between two plates it cannot leave; the goal is free on the other side.
+TEST(SeedPaths, AnArmWithoutAWayOutGivesNoPath) {
+  // A two-link arm is folded between two plates that it cannot leave; the goal on the other side is clear.
   MotionProblem problem =
       arms::problem(arms::two_link(), vec({-1.2, 0.0}), JointGoal{vec({1.2, 0.0})});
   problem.obstacles = {arms::half_space("none", {0, 0, -50}, {0, 0, 1}),
@@ -259,7 +259,7 @@ TEST(SeedPaths, TipLineKeepsTheTipOnTheLine) {
   }
 }
 
-TEST(SeedPaths, TellsProgressAndStopsInTime) {
+TEST(SeedPaths, ReportsProgressAndStopsInTime) {
   MotionProblem problem = crane_reach();
   problem.obstacles = {arms::box("beam", {5.6, 0, 2.6}, {0.5, 2, 0.5})};
   SeedOptions options;

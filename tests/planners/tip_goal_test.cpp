@@ -54,7 +54,7 @@ TEST(TipGoal, NearlyAllSamplesConvergeToRounding) {
     ++all;
     sharp += found.distance < 1e-9;
   }
-  EXPECT_GT(sharp, 0.85 * all);  // the rest ends in a corner of the limits: other starts reach it
+  EXPECT_GT(sharp, 0.85 * all);  // the others end in a corner of the limits
 }
 
 TEST(TipGoal, RedundancyCountsOnlyDirectionsTheTipCanMoveIn) {

@@ -23,7 +23,7 @@ inline Joint joint(const std::string& name, JointType type, const Eigen::Vector3
   return j;
 }
 
-/// The loader crane's geometry, cylinders, valves and pump (no masses): planar, one joint to spare.
+/// The loader crane's geometry, cylinders, valves and pump without masses: planar, one redundant joint.
 inline Machine loader_crane() {
   constexpr double kLpm = 1.0 / 6e4;
   Machine m;
@@ -69,7 +69,7 @@ inline Machine loader_crane() {
   return m;
 }
 
-/// The loader crane on a slewing column: four joints, spatial, one to spare.
+/// The loader crane on a slewing column: four joints, spatial, one of them redundant.
 inline Machine slewing_crane() {
   Machine m = loader_crane();
   m.joints[0].origin.translation() = Eigen::Vector3d(0.2, 0, 2);

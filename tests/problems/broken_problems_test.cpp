@@ -1,4 +1,4 @@
-// Every way of getting a problem file wrong that we could think of, each with the whole sentence the user sees.
+// Errors in problem files, each with the complete message.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -57,7 +57,8 @@ TEST_P(BrokenProblem, SaysWhatIsWrongAndWhere) {
   std::string text = kGood;
   const std::size_t at = text.find(broken.find);
   ASSERT_NE(at, std::string::npos) << broken.find;
-  ASSERT_EQ(text.find(broken.find, at + 1), std::string::npos) << "edits two places";
+  ASSERT_EQ(text.find(broken.find, at + 1), std::string::npos)
+      << "the text to be edited occurs twice";
   text.replace(at, broken.find.size(), broken.replace);
   std::string expected = broken.message;
   const std::size_t folder = expected.find("{}");
@@ -70,7 +71,7 @@ TEST_P(BrokenProblem, SaysWhatIsWrongAndWhere) {
   }
 }
 
-TEST(GoodProblem, TheFileThatIsBrokenBelowIsGood) {
+TEST(GoodProblem, TheUnchangedFileIsRead) {
   EXPECT_NO_THROW(parse_problem(kGood, "lift.yaml", kFolder));
 }
 

@@ -30,7 +30,7 @@ class Dice {
     }
     return q;
   }
-  /// A box (often thin, turned), a sphere or a half-space somewhere in the working area.
+  /// A random box (often thin, rotated), sphere or half-space in the working area.
   Obstacle obstacle(double spread) {
     const int kind = static_cast<int>(in(0, 3));
     const Vector3d c = Vector3d(4, 0, 2) + point(spread);
@@ -70,7 +70,7 @@ TEST(ObstacleDistance, SegmentsAgreeWithDenseSampling) {
     EXPECT_GE(exact, sampled - (b - a).norm() / 800.0 - 1e-9);
     inside += exact < 0.0;
   }
-  EXPECT_GT(inside, 200);  // both branches were seen
+  EXPECT_GT(inside, 200);  // both branches were reached
 }
 
 TEST(ObstacleDistance, KnownDistances) {
@@ -82,7 +82,7 @@ TEST(ObstacleDistance, KnownDistances) {
   EXPECT_NEAR(segment_distance(b, {-5, 0.5, 0}, {5, 0.5, 0}), -0.5, 1e-8);
 }
 
-TEST(ObstacleDistance, SmoothValueNeverPromisesTooMuchAndStatesItsBias) {
+TEST(ObstacleDistance, SmoothValueNeverExceedsTheDistanceAndKeepsItsBias) {
   Dice dice(2);
   double worst_bias = 0.0;
   for (int trial = 0; trial < 100; ++trial) {
@@ -178,7 +178,7 @@ TEST(Clearance, NonNegativeRowsImplyExactClearance) {
   }
   EXPECT_GT(judged, 10000);
   EXPECT_GT(covered, judged / 4);
-  EXPECT_LT(tight, judged / 10);  // the rows rarely refuse what is clear
+  EXPECT_LT(tight, judged / 10);  // the rows rarely exclude a clear posture
   // inflation 0.05 m plus the box's 17 % of a level of at most 0.45 m
   EXPECT_LT(widest_gap, 0.05 + 0.17 * 0.45 + 1e-3);
 }
@@ -202,9 +202,9 @@ TEST(Clearance, WallBetweenTwoFreePostures) {
   EXPECT_THAT(model.describe(nearest), testing::HasSubstr("inside wall"));
 }
 
-TEST(Clearance, ImmovableColumnAndUnreachableObstaclesMakeNoRows) {
+TEST(Clearance, ImmovableColumnAndUnreachableObstaclesHaveNoRows) {
   const Machine m = arms::slewing_crane();
-  // The column stands in a platform and the far ball is out of reach (15.1 m): neither concerns a motion.
+  // The column stands in a platform and the far ball is out of reach (15.1 m), so neither restricts a motion.
   MotionProblem p = with_obstacles(m, {arms::sphere("far", {40, 0, 0}, 1.0)}, 0.1);
   ClearanceModel far(p);
   EXPECT_EQ(far.rows(), 0);
@@ -218,7 +218,7 @@ TEST(Clearance, ImmovableColumnAndUnreachableObstaclesMakeNoRows) {
 }
 
 TEST(Clearance, AColumnOnTheGroundIsNoCollision) {
-  // The slewing column stands on the ground that is also the obstacle: only what moves is judged.
+  // The slewing column stands on the ground, which is also an obstacle: only moving parts are checked.
   Machine machine = arms::loader_crane();
   machine.joints[0].origin.translation() =
       Eigen::Vector3d(0.0, 0.0, 0.0);  // boom pivot at ground level
@@ -232,7 +232,7 @@ TEST(Clearance, AColumnOnTheGroundIsNoCollision) {
   ClearanceModel clearance(problem);
   EXPECT_TRUE(clearance.clear(problem.start.data()));
   EXPECT_TRUE(clearance.cover_complete());
-  const Eigen::Vector3d low(0.6, -2.2, 3.0);  // the jib hangs into the ground: still found
+  const Eigen::Vector3d low(0.6, -2.2, 3.0);  // the jib is below the ground, which must be found
   EXPECT_FALSE(clearance.clear(low.data()));
 }
 

@@ -106,7 +106,7 @@ TEST(ProblemFile, FreeDurationWithIdlePower) {
   EXPECT_FALSE(p.duration.fixed());
 }
 
-TEST(ProblemFile, MachineHandedInStandsForTheFilesOwn) {
+TEST(ProblemFile, AGivenMachineReplacesTheFilesOwn) {
   Machine machine = load_machine(bundled_file("machines/loader_crane.yaml"));
   machine.pumps[0].max_flow = 0.001;
   const std::string text =

@@ -38,7 +38,7 @@ MatrixXd random_path(std::mt19937& engine, int waypoints) {
   return path;
 }
 
-/// From rest to rest, and q, qd what the accelerations alone integrate to.
+/// Expects rest at both ends, and q and qd as integrated from the accelerations.
 void expect_consistent(const Trajectory& m, const MatrixXd& path) {
   const Eigen::Index last = m.size() - 1;
   EXPECT_EQ(m.q.row(0), path.row(0));
@@ -69,10 +69,10 @@ TEST(TimeParametrise, KeepsEveryLimitAtSixteenTimesTheDensity) {
     ASSERT_EQ(fast.motion.size(), options.intervals + 1);
     EXPECT_DOUBLE_EQ(fast.motion.duration(), fast.shortest);
     expect_consistent(fast.motion, path);
-    // 48 = 3 x 16: instants the code itself did not look at
+    // 48 = 3 x 16: most of these instants are not used by the code itself.
     const double ratio = limit_ratio(problem, fast.motion, 48);
     EXPECT_LE(ratio, 1.0 + 1e-9);
-    EXPECT_GT(ratio, 0.99);  // the shortest holds some limit just so
+    EXPECT_GT(ratio, 0.99);  // the shortest duration just keeps a limit
 
     const TimedMotion slow = time_parametrise(problem, path, 1.7 * fast.shortest, options);
     ASSERT_EQ(slow.status, TimingStatus::kOk);
@@ -137,14 +137,14 @@ TEST(TimeParametrise, RoundingACornerDoesNotCutIntoAnObstacle) {
   EXPECT_GT(clearance.nearest_on(timed.motion, 64).distance, -2e-3);
   EXPECT_LE(limit_ratio(problem, timed.motion, 48), 1.0 + 1e-9);
 
-  path.row(1) << 0.0, 0.6;  // through the ball: no timing helps
+  path.row(1) << 0.0, 0.6;  // through the ball, which no timing avoids
   const TimedMotion through = time_parametrise(problem, path, 0.0);
   EXPECT_EQ(through.status, TimingStatus::kCollision);
   EXPECT_LT(through.clearance, 0.0);
   EXPECT_THAT(through.message, testing::HasSubstr("ball"));
 }
 
-TEST(TimeParametrise, RestIsAMotionToo) {
+TEST(TimeParametrise, APathOfOnePostureGivesAMotionAtRest) {
   const TimedMotion timed = time_parametrise(crane(), rows({{0.2, -1.6, 0.8}}), 5.0);
   ASSERT_EQ(timed.status, TimingStatus::kOk);
   EXPECT_DOUBLE_EQ(timed.motion.duration(), 5.0);

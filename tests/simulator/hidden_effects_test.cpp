@@ -66,7 +66,8 @@ class HiddenEffectTest : public ::testing::TestWithParam<std::string> {};
 TEST_P(HiddenEffectTest, TouchesItsChannelsOnly) {
   const std::string id = GetParam();
   LogRequest base = quiet_request(machine_named("loader_crane"), 120.0);
-  if (id == "sensor_fault") base.noise_factor = 1.0;  // This effect multiplies the channel's noise, so there must be some.
+  if (id == "sensor_fault")
+    base.noise_factor = 1.0;  // This effect multiplies the channel's noise, so there must be some.
   const auto& all = effect_descriptions();
   const auto description =
       std::find_if(all.begin(), all.end(), [&](const auto& e) { return e.id == id; });
@@ -89,8 +90,8 @@ TEST_P(HiddenEffectTest, TouchesItsChannelsOnly) {
       if (name.rfind("pA_", 0) == 0 || name.rfind("pB_", 0) == 0)
         pressures = std::max(pressures, d);
       // Payloads change in pauses, whose times shift when the motions differ.
-      const bool told = name == "payload_kg" && expectations().at(id) != Changes::kMotion;
-      if (told || name == "oil_C" || name == "t_s") {
+      const bool shifted = name == "payload_kg" && expectations().at(id) != Changes::kMotion;
+      if (shifted || name == "oil_C" || name == "t_s") {
         EXPECT_EQ(d, 0.0) << name;
       }
     }

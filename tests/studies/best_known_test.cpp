@@ -57,7 +57,7 @@ class BestKnown : public ::testing::Test {
 TEST_F(BestKnown, KeepsTheLeastEnergyTheLargestBoundAndTheShortestTime) {
   lift_after(figures_of(80e3, 16.0, 70e3, 7.4));
   nlohmann::json entry = lift_after(figures_of(82e3, 16.0, 78e3, 7.3));
-  EXPECT_EQ(entry.at("energy_J"), 80e3) << "dearer";
+  EXPECT_EQ(entry.at("energy_J"), 80e3) << "the new energy is higher";
   EXPECT_EQ(entry.at("lower_bound_J"), 78e3) << "the larger bound";
   EXPECT_EQ(entry.at("shortest_s"), 7.3);
   entry = lift_after(figures_of(90e3, 12.0, 85e3, 7.5));
@@ -88,7 +88,7 @@ TEST_F(BestKnown, EntriesNameTheirModelAndAreDroppedForAnotherModel) {
   EXPECT_EQ(first.at("program"), std::string("sparflow ") + program_version());
   tasks_[0].mark.sha256 = "def";
   const nlohmann::json again = lift_after(figures_of(90e3, 16.0, 60e3, 7.5));
-  EXPECT_EQ(again.at("energy_J"), 90e3) << "dearer, but of the present model";
+  EXPECT_EQ(again.at("energy_J"), 90e3) << "higher, but of the present model";
   EXPECT_EQ(again.at("lower_bound_J"), 60e3);
   EXPECT_EQ(again.at("shortest_s"), 7.5);
   EXPECT_EQ(again.at("model").at("sha256"), "def");

@@ -30,8 +30,8 @@ TEST(ProblemSetReport, DoesNotCountAMessageWithoutALimitAsNamed) {
   named.named = "infeasible. Worst: flow of pump main at t=0.26 s";
   named.worst = "flow of pump main at t=0.26 s";
   const std::string text = printed({said, named});
-  EXPECT_THAT(text, HasSubstr("NOT NAMED, only said: no way tried"));
-  EXPECT_THAT(text, HasSubstr("infeasible 2: named 1, solved all the same 0"));
+  EXPECT_THAT(text, HasSubstr("NO LIMIT NAMED: no way tried"));
+  EXPECT_THAT(text, HasSubstr("infeasible 2: named 1, solved nevertheless 0"));
 }
 
 /// An optimum of 100 kJ that takes `times` the shortest time, `above` [-] over the slow path, its bound 1 % below it.

@@ -190,7 +190,8 @@ json chart_json(const ScatterChart& chart, Index most_points) {
   out["of"] = total;
   if (chart.trend) {
     out["trends"] = json::array();
-    for (const ScatterGroup& group : chart.groups) {  // The medians are of all points, so they are computed before decimation.
+    for (const ScatterGroup& group :
+         chart.groups) {  // The medians are of all points, so they are computed before decimation.
       const BinnedMedian trend = binned_median(group.x, group.y, 24);
       out["trends"].push_back(
           {{"x", numbers(trend.x, kValueDigits)}, {"y", numbers(trend.y, kValueDigits)}});
@@ -243,7 +244,8 @@ json chart_json(const CraneDrawing& chart, Index /*most_points*/) {
   out["payload"] = chart.payload;
   out["goal"] = chart.goal ? flat({*chart.goal}) : json(nullptr);
   out["ground"] = chart.ground ? metre(*chart.ground) : json(nullptr);
-  out["kinds"] = json::array();  // The parts are the same at every instant, so their kinds are written once.
+  out["kinds"] =
+      json::array();  // The parts are the same at every instant, so their kinds are written once.
   out["frames"] = json::array();
   for (const DrawingFrame& frame : chart.frames) {
     if (out["kinds"].empty()) {

@@ -22,7 +22,8 @@ enum class FigureWidth { kFull, kHalf };  ///< two halves stand side by side on 
 /// Members that all figures have.
 struct Figure {
   std::string title;
-  std::string note;  ///< one or two sentences below the figure: what it shows, where the data is from
+  std::string
+      note;  ///< one or two sentences below the figure: what it shows, where the data is from
   FigureWidth width = FigureWidth::kFull;
   int height = 0;     ///< [px] of the drawing, 0 = default of its kind
   std::string group;  ///< charts over time and crane drawings of one group share cursor and zoom

@@ -192,7 +192,7 @@ DrawingPlane drawing_plane(const Machine& machine, const VectorXd& q) {
   if (plane.turns) {
     const Vector3d on_axis = frames[static_cast<std::size_t>(arm.swing)].position;
     plane.origin = horizontal_part(on_axis, plane.up);
-    // The sign is that at mid-range, not of this posture, so that an arm that leans back over its column is drawn behind it.
+    // The sign is that at mid-range, not of this posture, so that an arm leaning back is drawn behind its column.
     const Frames middle = forward_kinematics<double>(machine, mid_range(machine));
     const Vector3d reach = point_in_base(middle, machine.tip.joint, machine.tip.xyz) - plane.origin;
     if (reach.dot(direction(middle, arm)) < 0.0) plane.horizontal = -plane.horizontal;

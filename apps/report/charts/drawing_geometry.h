@@ -37,7 +37,7 @@ struct DrawingPlane {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< [m]
   Eigen::Vector3d horizontal = Eigen::Vector3d::UnitX();  ///< unit vector
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();          ///< unit vector, against gravity
-  bool turns = false;                                     ///< whether a swing joint turns the plane with the arm
+  bool turns = false;                 ///< whether a swing joint turns the plane with the arm
   std::string horizontal_name = "x";  ///< "radius" when it turns, else the base axis it lies along
   std::string vertical_name = "z";    ///< "height" when gravity is not along -z
 

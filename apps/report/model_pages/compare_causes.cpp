@@ -34,7 +34,8 @@ void add_stages(Page& page, const CompareResult& result) {
   BarChart chart;
   chart.title = "Own and inherited error of each stage";
   chart.note =
-      "Mean squared error as a share of the measured quantity's variance; at 100 % a constant would "
+      "Mean squared error as a share of the measured quantity's variance; at 100 % a constant "
+      "would "
       "predict as well. Own: the error beyond the sensor's noise when the input from the stage "
       "before is the measured one. Inherited: the change when that input is the predicted one. A "
       "quantity that varies little has a large share of noise, which is no fault of the model.";
@@ -75,10 +76,11 @@ void add_tests(Page& page, const CompareResult& result) {
   const ResidualTests& tests = result.tests;
   if (tests.tests.empty()) return;
   if (tests.smallest_p() > kAlarm) {
-    page.paragraph(fmt::format(
-        "No part of the error is systematic: {} tests of bias and of dependence on signals, over {} "
-        "blocks of motion, found no more than autocorrelated noise would show.",
-        tests.tested, tests.blocks));
+    page.paragraph(
+        fmt::format("No part of the error is systematic: {} tests of bias and of dependence on "
+                    "signals, over {} "
+                    "blocks of motion, found no more than autocorrelated noise would show.",
+                    tests.tested, tests.blocks));
     return;
   }
   Table table;
@@ -100,7 +102,8 @@ void add_tests(Page& page, const CompareResult& result) {
     shares.push_back(100.0 * t.share_explained);
   }
   table.note = fmt::format(
-      "The signs of whole blocks of motion are flipped at random ({} blocks, {} tests together); the "
+      "The signs of whole blocks of motion are flipped at random ({} blocks, {} tests together); "
+      "the "
       "chance that noise alone, whatever its autocorrelation, gives even one line of this table is "
       "{:.0f} %.",
       tests.blocks, tests.tested, 100.0 * kAlarm);

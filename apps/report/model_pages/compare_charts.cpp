@@ -16,7 +16,8 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostCurveCharts = 40;  // keeps the page readable and small
 const char* const kCurvesExplained =
     "Only samples that count in the scores are drawn. Bands: \u00B12 standard deviations of one "
-    "measurement. Shaded: the regions named above. Drag to zoom; all charts of a log zoom together.";
+    "measurement. Shaded: the regions named above. Drag to zoom; all charts of a log zoom "
+    "together.";
 
 bool compared(const ComparedSeries& s) { return s.measured.array().isFinite().any(); }
 
@@ -217,7 +218,8 @@ void add_working_area(Page& page, const Machine& machine, const CompareResult& r
     if (!heading) {
       page.section(heading_prefix + "Error over the working area");
       page.paragraph(
-          "Root mean square of predicted \u2212 measured over the positions of the tip. The crane is "
+          "Root mean square of predicted \u2212 measured over the positions of the tip. The crane "
+          "is "
           "drawn where the error is largest.");
       heading = true;
     }

@@ -60,7 +60,8 @@ void add_tiles(Page& page, const CompareResult& result, const std::vector<Judged
          std::isfinite(e.relative_error)
              ? fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
                            display_number(e.measured / 1e3, 4))
-             : fmt::format("the pump delivered nothing in {:.1f} s: no cylinder is driven", e.duration),
+             : fmt::format("the pump delivered nothing in {:.1f} s: no cylinder is driven",
+                           e.duration),
          judge_energy(e)});
   }
   if (!tiles.empty()) page.tiles(std::move(tiles));
@@ -97,12 +98,8 @@ void add_energy(Page& page, const CompareResult& result) {
   if (result.energy.empty()) return;
   Table table;
   table.title = "Pump energy";
-  table.columns = {{"pump"},
-                   {"measured", "kJ", 5},
-                   {"predicted", "kJ", 5},
-                   {"error", "%", 3},
-                   {"from commands only", "kJ", 5},
-                   {"time", "s", 4}};
+  table.columns = {{"pump"},          {"measured", "kJ", 5},           {"predicted", "kJ", 5},
+                   {"error", "%", 3}, {"from commands only", "kJ", 5}, {"time", "s", 4}};
   for (const EnergyScore& e : result.energy) {
     table.rows.push_back(
         {e.pump, e.measured / 1e3, e.predicted / 1e3, rounded(100.0 * e.relative_error, 0.01),
@@ -110,7 +107,8 @@ void add_energy(Page& page, const CompareResult& result) {
          e.duration});
   }
   table.note =
-      "Integral of pressure times flow. Measured and predicted use the flow of the measured speeds; "
+      "Integral of pressure times flow. Measured and predicted use the flow of the measured "
+      "speeds; "
       "\"from commands only\" uses commands and valve gains instead.";
   page.table(std::move(table));
 }
@@ -119,7 +117,8 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
   page.section(prefix + "Where it fails");
   if (result.worst.empty()) {
     page.paragraph(
-        "No region stands out: the error is spread evenly over postures, speeds and loads, as noise "
+        "No region stands out: the error is spread evenly over postures, speeds and loads, as "
+        "noise "
         "is.");
     return;
   }
@@ -132,7 +131,8 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
                           100.0 * w.share_of_samples, w.rmse, w.unit});
   }
   table.note =
-      "Shares are of the squared error. There is at most one region for each cylinder and direction; "
+      "Shares are of the squared error. There is at most one region for each cylinder and "
+      "direction; "
       "the curves below are shaded where the log passes through one.";
   page.table(std::move(table));
 }
@@ -164,7 +164,8 @@ std::string where_it_fails(const CompareResult& result, const StageScore& worst)
   const auto region = std::find_if(
       result.worst.begin(), result.worst.end(),
       [&](const WorstRegion& w) { return w.stage == worst.stage && w.at == worst.at; });
-  if (region != result.worst.end()) return text + "Its error is largest here: " + region->sentence + ". ";
+  if (region != result.worst.end())
+    return text + "Its error is largest here: " + region->sentence + ". ";
   text += "Its error is spread over all postures, speeds and loads. ";
   if (!result.worst.empty()) text += "Elsewhere: " + result.worst.front().sentence + ". ";
   return text;
@@ -210,8 +211,7 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
       headline += fmt::format(", {:.0f} % explained", std::max(0.0, s.fit_percent));
     text = where_it_fails(result, s);
   } else {
-    if (tone != Tone::kGood)
-      headline = "The model follows the measurements, except for the energy";
+    if (tone != Tone::kGood) headline = "The model follows the measurements, except for the energy";
     text = result.worst.empty()
                ? "No region of postures, speeds or loads stands out. "
                : "The error is largest here: " + result.worst.front().sentence + ". ";
@@ -245,7 +245,8 @@ void add_comparison(Page& page, const CraneModel& model, const CompareResult& re
   add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");
   page.paragraph(
-      "For each quantity: its error against the signals that explain most of it, with the median of "
+      "For each quantity: its error against the signals that explain most of it, with the median "
+      "of "
       "each direction. A median that differs from zero is a systematic error, so the model lacks a "
       "physical effect. Two medians with a constant difference indicate friction. A cloud about "
       "zero is noise.");

@@ -15,7 +15,8 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kStretchSeconds = 30.0;  // [s] length of a stretch in which curves can still be compared by eye
+constexpr double kStretchSeconds =
+    30.0;  // [s] length of a stretch in which curves can still be compared by eye
 constexpr std::size_t kMostRanked = 10, kFewestRanked = 3;
 constexpr std::size_t kMostChannels = 2;  // drawn of an effect that acts in several
 
@@ -59,8 +60,8 @@ std::string shows_against(const Effect& effect) {
 }
 
 /// Chooses a signal of the preferred kind where it explains at least half as much as the best signal, else the best.
-const ExplainingSignal* choose(const std::vector<ExplainingSignal>& signals, const VectorXd& residual,
-                            const std::string& preferred) {
+const ExplainingSignal* choose(const std::vector<ExplainingSignal>& signals,
+                               const VectorXd& residual, const std::string& preferred) {
   const ExplainingSignal* best = nullptr;
   const ExplainingSignal* own = nullptr;
   double most = -1.0, most_own = -1.0;
@@ -175,12 +176,12 @@ ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const Explai
   };
   if (both) chart.groups.push_back({"without the effect", column(x), column(without)});
   chart.groups.push_back({both ? "with it" : "residual", column(x), column(with)});
-  chart.note = fmt::format("Lines: medians in bins. {} explains {:.0f} % of the residual's variance{}.",
-                           capitalised(signal.words),
-                           100.0 * share_explained(column(x), column(both ? without : with)),
-                           both ? fmt::format(" without the effect, {:.0f} % with it",
-                                              100.0 * share_explained(column(x), column(with)))
-                                : "");
+  chart.note = fmt::format(
+      "Lines: medians in bins. {} explains {:.0f} % of the residual's variance{}.",
+      capitalised(signal.words), 100.0 * share_explained(column(x), column(both ? without : with)),
+      both ? fmt::format(" without the effect, {:.0f} % with it",
+                         100.0 * share_explained(column(x), column(with)))
+           : "");
   return chart;
 }
 
@@ -235,9 +236,10 @@ void add_effect_pictures(Page& page, const Diagnosis& d, std::size_t effect) {
   }
 }
 
-void add_unexplained_residual(Page& page, const Diagnosis& d, const std::string& stage, const std::string& at,
-                   bool swings) {
-  constexpr double kLeastShare = 0.03;  // [-] of the residual's variance, for a chart against a signal
+void add_unexplained_residual(Page& page, const Diagnosis& d, const std::string& stage,
+                              const std::string& at, bool swings) {
+  constexpr double kLeastChartShare =
+      0.03;  // [-] of the residual's variance, for a chart against a signal
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = d.evidence.channels[c];
     if (channel.at != at || evidence_stage(channel.kind) != stage) continue;
@@ -251,7 +253,7 @@ void add_unexplained_residual(Page& page, const Diagnosis& d, const std::string&
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     for (std::size_t i = 0; i < std::min<std::size_t>(2, ranked.size()); ++i) {
-      if (swings && ranked[i].first < kLeastShare) continue;
+      if (swings && ranked[i].first < kLeastChartShare) continue;
       ScatterChart chart = residuals(d, p, *ranked[i].second, false);
       chart.width = FigureWidth::kHalf;
       page.plot(std::move(chart));
@@ -270,7 +272,7 @@ void add_remaining_residuals(Page& page, const Diagnosis& d) {
   Table table;
   table.title = "Residual of each quantity";
   table.columns = {{"quantity"}, {"residual, RMS", "", 3}, {"sensor noise", "", 3},
-                   {"unit"},     {"strongest signal"}, {"it explains", "%", 2}};
+                   {"unit"},     {"strongest signal"},     {"it explains", "%", 2}};
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = d.evidence.channels[c];
     if (channel.rows() == 0) continue;
@@ -295,7 +297,8 @@ void add_remaining_residuals(Page& page, const Diagnosis& d) {
   page.section("Residuals");
   table.note =
       "Residual of the model after its pressure models were fitted to these logs, filtered as the "
-      "evidence is. Strongest signal: the one that explains most of the variance in bins; a few per "
+      "evidence is. Strongest signal: the one that explains most of the variance in bins; a few "
+      "per "
       "cent are chance.";
   page.table(std::move(table));
   std::stable_sort(left.begin(), left.end(),

@@ -38,7 +38,7 @@ void add_effect_pictures(Page& page, const Diagnosis& diagnosis, std::size_t eff
 /// Appends the residual at a place against the two signals that explain most of it.
 /// @param swings the residual oscillates: it is also drawn over time, and against signals only where these explain some
 void add_unexplained_residual(Page& page, const Diagnosis& diagnosis, const std::string& stage,
-                   const std::string& at, bool swings);
+                              const std::string& at, bool swings);
 
 /// Appends, for a diagnosis without missing effects, each quantity's residual beside its sensors' noise, and charts of
 /// the residuals of which a signal explains most, so that the reader can check that no structure is left.

@@ -155,7 +155,8 @@ void add_sets(Page& page, const Diagnosis& d) {
     page.paragraph(capitalised(sentence(e.sentence())));
     if (!(e.nats_per_minute > 0.0)) continue;
     page.paragraph(fmt::format(
-        "A minute of that motion lowers the log-likelihood of the wrong effects of the set by {:.2g} "
+        "A minute of that motion lowers the log-likelihood of the wrong effects of the set by "
+        "{:.2g} "
         "nats, a minute of these logs by {:.2g}. Effects count as distinguished from 4 nats on.",
         e.nats_per_minute, e.nats_here));
   }
@@ -164,8 +165,7 @@ void add_sets(Page& page, const Diagnosis& d) {
 void add_unexplained(Page& page, const Diagnosis& d) {
   if (!d.unexplained) return;
   const Unexplained& u = *d.unexplained;
-  page.section(u.few_places ? "Isolated event"
-                            : "Unmodelled structure in the residual");
+  page.section(u.few_places ? "Isolated event" : "Unmodelled structure in the residual");
   page.paragraph(sentence(u.sentence));
   if (u.rmse > 0.0 && u.unit.si > 0.0) {
     const auto [rmse, name] = readable_error(u.rmse, u.unit);
@@ -173,8 +173,8 @@ void add_unexplained(Page& page, const Diagnosis& d) {
         fmt::format("At the {} stage of {} the residual is {} {} RMS", u.stage,
                     u.at.empty() ? "the machine" : u.at, display_number(rmse, 3), name);
     if (std::isfinite(u.noise_floor))
-      text += fmt::format(", the sensors' noise {}",
-                          display_number(u.noise_floor * rmse / u.rmse, 2));
+      text +=
+          fmt::format(", the sensors' noise {}", display_number(u.noise_floor * rmse / u.rmse, 2));
     page.paragraph(text + ".");
   }
   if (!u.depends_on.empty() && !u.few_places)

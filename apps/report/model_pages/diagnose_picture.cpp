@@ -105,7 +105,7 @@ ChannelPicture channel_picture(const Diagnosis& d, int effect, std::size_t chann
 }
 
 std::vector<ExplainingSignal> explaining_signals(const Evidence& evidence,
-                                           const EvidenceChannel& channel) {
+                                                 const EvidenceChannel& channel) {
   std::vector<ExplainingSignal> out;
   const Machine& machine = *evidence.series.front().machine;
   const auto add = [&](const char* id, const std::string& words, const std::string& unit,

@@ -58,7 +58,8 @@ void add_processes(Page& page, const FitResult& r) {
          std::string(gp_method_name(f.report.method))});
   }
   table.note =
-      "RMSE: of the samples used. Noise: learned standard deviation of one measurement. Samples are "
+      "RMSE: of the samples used. Noise: learned standard deviation of one measurement. Samples "
+      "are "
       "thinned where neighbours carry the same information. Flow and load: the range of the data, "
       "beyond which a model extrapolates.";
   page.table(std::move(table));
@@ -69,7 +70,8 @@ void add_supplies(Page& page, const FitResult& r) {
   Table table;
   table.title = "Pumps: standby and margins";
   table.columns = {
-      {"pump"}, {"term"}, {"pressure", "bar", 3}, {"\u00B1", "bar", 2}, {"samples as leader"}, {""}};
+      {"pump"}, {"term"}, {"pressure", "bar", 3}, {"\u00B1", "bar", 2}, {"samples as leader"},
+      {""}};
   for (std::size_t p = 0; p < r.pumps.size(); ++p) {
     if (!r.pumps[p]) continue;
     const Pump& pump = machine.pumps[p];
@@ -82,14 +84,15 @@ void add_supplies(Page& page, const FitResult& r) {
                                           : "not in the logs: from the machine file")});
     for (std::size_t f = 0; f < pump.feeds.size() && f < r.pumps[p]->margins.size(); ++f) {
       const LearnedMargin& m = r.pumps[p]->margins[f];
-      table.rows.push_back(
-          {pump.name, "margin of " + cylinder_name(r, pump.feeds[f]), m.margin / kBar,
-           m.identified ? m.standard_error / kBar : kNaN, static_cast<double>(m.leading),
-           std::string(m.identified ? "learned" : "assumed: leader too rarely")});
+      table.rows.push_back({pump.name, "margin of " + cylinder_name(r, pump.feeds[f]),
+                            m.margin / kBar, m.identified ? m.standard_error / kBar : kNaN,
+                            static_cast<double>(m.leading),
+                            std::string(m.identified ? "learned" : "assumed: leader too rarely")});
     }
   }
   table.note =
-      "The pump pressure is the largest of the standby and, for each moving cylinder, working pressure "
+      "The pump pressure is the largest of the standby and, for each moving cylinder, working "
+      "pressure "
       "plus margin. The cylinder that sets it is the load-sensing leader.";
   if (!table.rows.empty()) page.table(std::move(table));
 }
@@ -115,7 +118,8 @@ void add_valves(Page& page, const FitResult& r) {
          v.valve.affine ? std::round(1000.0 * v.valve.dead_band) / 10.0 : kNaN});
   }
   table.note =
-      "Gain: flow at full command, by a line through zero. Largest command: of the samples used. Dead "
+      "Gain: flow at full command, by a line through zero. Largest command: of the samples used. "
+      "Dead "
       "band: estimate by a line with an offset, for information only.";
   page.table(std::move(table));
 }

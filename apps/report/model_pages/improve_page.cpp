@@ -17,7 +17,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr double kLeastChange = 0.02;  // [-] of an error's logarithm, for the error to be drawn
-constexpr double kCurveSeconds = 30;   // [s] length of a stretch in which curves can still be compared by eye
+constexpr double kCurveSeconds =
+    30;  // [s] length of a stretch in which curves can still be compared by eye
 constexpr std::size_t kMostErrorCharts = 12;
 
 /// One error over the steps; entry 0 is before the first step, entry i after step i.
@@ -91,7 +92,8 @@ void add_overview(Page& page, const ExtendResult& result, const std::vector<Erro
   chart.title = "Error after each step";
   chart.markers = step_markers(result);
   chart.note = fmt::format(
-      "RMS error on the {}, relative to its value before the first step. Quantities whose error did "
+      "RMS error on the {}, relative to its value before the first step. Quantities whose error "
+      "did "
       "not change are left out.",
       result.steps.front().judged_on);
   chart.y_axis = {"RMS error", "% of before"};
@@ -288,7 +290,8 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
     page.section(heading_prefix + "Error after each step");
     Table table = steps_table("Steps", result.steps);
     table.note = fmt::format(
-        "Errors on the {}: RMS after the step relative to before; overall is the geometric mean over all "
+        "Errors on the {}: RMS after the step relative to before; overall is the geometric mean "
+        "over all "
         "compared quantities.",
         result.steps.front().judged_on);
     page.table(std::move(table));
@@ -298,7 +301,8 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
       now.columns = {{"effect"}, {"parameters, 95 % interval"}};
       for (const AppliedEffect& e : result.model.effects)
         now.rows.push_back({e.key(result.model.machine), parameters_text(estimates_of(e))});
-      now.note = "All are estimated together, so that each step changes the values of the earlier ones.";
+      now.note =
+          "All are estimated together, so that each step changes the values of the earlier ones.";
       page.table(std::move(now));
     }
     add_overview(page, result, traces);

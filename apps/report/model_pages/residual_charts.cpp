@@ -14,7 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr std::size_t kCharts = 2, kChartsOfTheFirst = 6;
-constexpr double kLeastShare = 0.01;  // [-] of the variance that a signal must explain to be drawn
+constexpr double kLeastDrawnShare =
+    0.01;  // [-] of the variance that a signal must explain to be drawn
 
 /// Residuals of a quantity over all logs, one row for each compared sample, with all signals that any log has.
 struct ResidualTable {
@@ -113,8 +114,9 @@ std::vector<std::pair<double, const RegimeSignal*>> chosen(const ComparedQuantit
   std::stable_sort(rest.begin(), rest.end(), better);
   rest.resize(std::min(rest.size(), most - std::min(most, out.size())));
   out.insert(out.end(), rest.begin(), rest.end());
-  const auto explains_little = [](const auto& signal) { return signal.first < kLeastShare; };
-  out.erase(std::remove_if(out.begin() + (out.empty() ? 0 : 1), out.end(), explains_little), out.end());
+  const auto explains_little = [](const auto& signal) { return signal.first < kLeastDrawnShare; };
+  out.erase(std::remove_if(out.begin() + (out.empty() ? 0 : 1), out.end(), explains_little),
+            out.end());
   return out;
 }
 

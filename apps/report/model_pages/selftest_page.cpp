@@ -37,7 +37,8 @@ void add_power_chart(Page& page, const Selftest& t) {
   BarChart chart;
   chart.title = "Smallest size at which each effect would be found";
   chart.note =
-      "Size at which an effect would be named with 80 % power, in decades below its typical size: 1 "
+      "Size at which an effect would be named with 80 % power, in decades below its typical size: "
+      "1 "
       "is a tenth of the typical size, 0 the typical size, and below 0 the effect is found only if "
       "it is larger than typical.";
   chart.value_axis = {"decades below the typical size", ""};
@@ -108,7 +109,8 @@ void add_sets(Page& page, const Selftest& t) {
     table.rows.push_back({keys, motions});
   }
   table.note =
-      "The effects of a set differ by less than 4 nats of log-likelihood on these logs, with the other "
+      "The effects of a set differ by less than 4 nats of log-likelihood on these logs, with the "
+      "other "
       "effects fitted again.";
   page.table(std::move(table));
 }
@@ -117,7 +119,8 @@ void add_checks(Page& page, const Selftest& t) {
   if (t.checks.empty()) return;
   page.section("Checked by injection");
   page.paragraph(
-      "The figures above are calculated. For this check the effects were added to newly drawn noise, "
+      "The figures above are calculated. For this check the effects were added to newly drawn "
+      "noise, "
       "and the search of `diagnose` was run on the result.");
   Table table;
   table.title = "Injected and named effects";
@@ -146,8 +149,8 @@ Page selftest_page(const CraneModel& model, const Selftest& t) {
   if (!t.checks.empty())
     text = fmt::format("Checked by injection: {} of {} as predicted. ", right, t.checks.size());
   if (!t.sets.empty())
-    text += fmt::format("{} set{} of effects cannot be distinguished on these motions.", t.sets.size(),
-                        t.sets.size() == 1 ? "" : "s");
+    text += fmt::format("{} set{} of effects cannot be distinguished on these motions.",
+                        t.sets.size(), t.sets.size() == 1 ? "" : "s");
   page.verdict(!all_right                        ? Tone::kWarning
                : t.count(Visibility::kNever) > 0 ? Tone::kNeutral
                                                  : Tone::kGood,

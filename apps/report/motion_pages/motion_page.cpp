@@ -88,7 +88,8 @@ void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
   CraneDrawing drawing;
   drawing.title = "The motion";
   drawing.note =
-      "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the tip" +
+      "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the "
+      "tip" +
       (baseline != nullptr ? "; dashed: its path along " + baseline_name : std::string()) + ".";
   drawing.group = "motion";
   const DrawingPlane plane = drawing_plane(machine, problem.start);
@@ -131,7 +132,8 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
   LineChart flow = chart("Flows", "flow", "l/min");
   LineChart pressure = chart("Pressures", "pressure", "bar");
   pressure.note =
-      "Working pressure of each moving cylinder, and pump pressure. Their difference is the pressure "
+      "Working pressure of each moving cylinder, and pump pressure. Their difference is the "
+      "pressure "
       "drop that each valve throttles.";
   // Pumps come first: where one cylinder moves alone, its flow is drawn over that of its pump.
   for (int p = 0; p < machine.pump_count(); ++p) {
@@ -165,7 +167,8 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
   bars.title = "Useful energy and throttling loss";
   bars.value_axis = {"energy", "kJ"};
   bars.note =
-      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, times "
+      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, "
+      "times "
       "flow; another cylinder, the margin or standby sets the pump pressure.";
   std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
   if (baseline != nullptr)
@@ -235,11 +238,13 @@ void add_tables(Page& page, const OptimizeResult& result) {
                     {"solver", "s", 3},
                     {"note"}};
   starts.note =
-      "Energies by the exact law. \"Initial guess\" is the energy of the seed path driven in the same "
+      "Energies by the exact law. \"Initial guess\" is the energy of the seed path driven in the "
+      "same "
       "time, blank where that breaks a limit.";
   if (result.motion.size() < 2) {
     starts.note +=
-        " A defect is a step between knots that a joint cannot make within its speed and acceleration "
+        " A defect is a step between knots that a joint cannot make within its speed and "
+        "acceleration "
         "limits: the time is too short, or the path is blocked.";
   }
   for (std::size_t i = 0; i < result.starts.size(); ++i) {
@@ -291,7 +296,8 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
         "potential energy gained", "end minus start"}});
   if (result.energy.impossible()) {
     page.paragraph(
-        "Warning: the pump delivers less energy than machine and payload gain. The working pressures are "
+        "Warning: the pump delivers less energy than machine and payload gain. The working "
+        "pressures are "
         "extrapolated to loads beyond the data; fit the model to logs with such loads.");
   }
   if (result.energy.moving_share_outside_data > 0.02) {

@@ -163,14 +163,14 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   against("best seed path", r.best_seed_energy, r.best_seed_name);
   if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
   if (r.unlimited_energy > 0.0) {
-    add(fmt::format("  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly",
-                    r.unlimited_energy / 1e3));
+    add(fmt::format(
+        "  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly",
+        r.unlimited_energy / 1e3));
   }
   if (r.lower_bound > 0.0) {
     const std::string which =
-        r.lower_bound_time > 0.0
-            ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
-            : "of motions of any duration";
+        r.lower_bound_time > 0.0 ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
+                                 : "of motions of any duration";
     add(fmt::format("  estimated bound      {:9.2f} kJ   {}: {:.1f} % below this one",
                     r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total)));
   } else if (!r.bound_note.empty()) {
@@ -189,7 +189,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
     if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
       continue;
     add(fmt::format(
-        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} {} at "
+        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} "
+        "{} at "
         "{:.2f} s",
         margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time));
     break;
@@ -203,9 +204,11 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   if (const std::string why = constant_pressure_note(model); !why.empty())
     add("  note                 " + why);
   if (r.energy.impossible()) {
-    add("  WARNING              the pump delivers less energy than machine and payload gain: working "
+    add("  WARNING              the pump delivers less energy than machine and payload gain: "
+        "working "
         "pressures\n"
-        "                       are extrapolated to loads beyond the data; fit the model to logs with "
+        "                       are extrapolated to loads beyond the data; fit the model to logs "
+        "with "
         "such loads");
   }
   int usable = 0, distinct = 0;

@@ -29,7 +29,8 @@ LineChart energy_chart(const ParetoCurve& curve) {
   chart.title = "Pump energy against time";
   chart.note =
       "Each point is a motion that keeps all limits. Horizontal dashed lines: energy at unlimited "
-      "time. Falling dashed lines: equal cost of pump energy and idle power; such a line touches the "
+      "time. Falling dashed lines: equal cost of pump energy and idle power; such a line touches "
+      "the "
       "curve at the best duration, which is marked.";
   chart.x_axis = {"duration", "s"};
   chart.y_axis = {"pump energy", "kJ"};
@@ -116,8 +117,11 @@ Page pareto_page(const CraneModel& model, const MotionProblem& problem, const Pa
   page.plot(moving_chart(curve));
   Table idle;
   idle.title = "Best duration for each idle power";
-  idle.columns = {
-      {"idle power", "kW"}, {"duration", "s"}, {"pump energy", "kJ"}, {"with idling", "kJ"}, {"note"}};
+  idle.columns = {{"idle power", "kW"},
+                  {"duration", "s"},
+                  {"pump energy", "kJ"},
+                  {"with idling", "kJ"},
+                  {"note"}};
   for (const IdleChoice& c : curve.idle) {
     idle.rows.push_back({c.idle_power / 1e3, c.duration, c.energy / 1e3,
                          (c.energy + c.idle_power * c.duration) / 1e3,

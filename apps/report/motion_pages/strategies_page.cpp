@@ -29,7 +29,8 @@ BarChart energy_bars(const StrategyRow& row, double idle_power, const Machine& m
   bars.title = row_title(row);
   bars.value_axis = {"energy", "kJ"};
   bars.note =
-      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, times "
+      "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, "
+      "times "
       "flow; another cylinder, the margin or standby sets the pump pressure.";
   std::vector<double> useful, idle;
   std::vector<std::vector<double>> lost(machine.cylinders.size());
@@ -60,16 +61,12 @@ Table row_table(const StrategyRow& row, double idle_power) {
   Table table;
   table.title = row_title(row);
   table.note =
-      "Throttling: throttling loss. Potential: energy gained by machine and payload, part of the useful "
+      "Throttling: throttling loss. Potential: energy gained by machine and payload, part of the "
+      "useful "
       "energy. Peak, mean: pump pressure.";
-  table.columns = {{"strategy"},
-                   {"pump energy", "kJ"},
-                   {"duration", "s"},
-                   {"throttling", "kJ", 3},
-                   {"idling", "kJ", 3},
-                   {"potential", "kJ", 3},
-                   {"peak", "bar", 3},
-                   {"mean", "bar", 3}};
+  table.columns = {
+      {"strategy"},        {"pump energy", "kJ"},  {"duration", "s"},  {"throttling", "kJ", 3},
+      {"idling", "kJ", 3}, {"potential", "kJ", 3}, {"peak", "bar", 3}, {"mean", "bar", 3}};
   for (const StrategyOutcome& o : row.outcomes) {
     std::vector<TableCell> cells{strategy_title(o.kind)};
     if (!o.found()) {
@@ -172,7 +169,8 @@ void add_orders(Page& page, const StrategyComparison& c) {
   Table table;
   table.title = "Sequential motions in every order of the cylinders";
   table.note =
-      "A joint that is not named stays at rest. The goal configuration is the cheapest one for that "
+      "A joint that is not named stays at rest. The goal configuration is the cheapest one for "
+      "that "
       "order. The segments of the cheapest orders are optimised.";
   table.columns = {{"order"}, {"energy", "kJ"}, {"shortest", "s"}, {"note"}};
   for (const BaselineMotion& m : c.orders) {
@@ -265,7 +263,9 @@ Table summary_table(const std::vector<StrategyComparison>& all, const std::strin
 ScatterChart pairs_chart(const std::vector<StrategyComparison>& all, const std::string& name) {
   ScatterChart chart;
   chart.title = "Energy against the optimum, problem by problem";
-  chart.note = "One point for each problem. On the diagonal a strategy takes as much as the optimum, above it more.";
+  chart.note =
+      "One point for each problem. On the diagonal a strategy takes as much as the optimum, above "
+      "it more.";
   chart.x_axis = {"energy-optimal", "kJ"};
   chart.y_axis = {"this strategy", "kJ"};
   chart.diagonal = true;
@@ -332,7 +332,8 @@ void set_verdict(Page& page, const std::vector<StrategyComparison>& all) {
                   all.size() > 1 ? " (medians)" : "", text(sequential, "sequential"),
                   text(line, "simultaneous to the best goal configuration"),
                   text(tip, "tip on a straight line")),
-      "Every motion keeps all limits at 16 samples per mesh interval; energies are those of the exact "
+      "Every motion keeps all limits at 16 samples per mesh interval; energies are those of the "
+      "exact "
       "law. Which strategy takes least energy depends on the duration and on the idle power, so "
       "every energy is given with its duration.");
 }

@@ -34,7 +34,8 @@ class Vibration final : public HiddenLaw {
     deflection_ += s.h * rate_;
     double f = -stiffness_ * deflection_;
     if (law_ == 1)
-      f *= std::min(1.0, 0.4 + std::abs(f) / (8.0 * kBar * drive()));  // Play in the pins reduces small forces.
+      f *= std::min(1.0, 0.4 + std::abs(f) / (8.0 * kBar *
+                                              drive()));  // Play in the pins reduces small forces.
     c.force += f;
   }
   std::vector<HiddenParameter> parameters() const override {

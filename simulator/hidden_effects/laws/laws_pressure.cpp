@@ -126,7 +126,8 @@ class Counterbalance final : public HiddenLaw {
     double p = opening_ - slope_ * load;
     if (law_ == 1)
       p += 0.08 * opening_ * std::tanh(c.flow / 5e-4);  // The spool opens against its spring.
-    if (law_ == 2) p = opening_ * 0.05 * std::log1p(std::exp(p / (0.05 * opening_)));  // rounded knee
+    if (law_ == 2)
+      p = opening_ * 0.05 * std::log1p(std::exp(p / (0.05 * opening_)));  // rounded knee
     c.pilot_pressure = std::max(c.pilot_pressure, std::max(p, 0.0));
     const double static_supply = (c.side * c.force + holding_area_ * c.return_pressure) / fed_area_;
     if (std::abs(c.speed) > kMoving && c.pilot_pressure > std::max(static_supply, tank_))

@@ -16,7 +16,8 @@ class PressureOffset final : public HiddenLaw {
         side_a_(c.random->chance(0.5)),
         offset_(c.random->sign() * c.size * c.draw(2.5, 5.0) * kBar) {
     if (!side_a_)
-      offset_ = std::abs(offset_);  // A rod side near tank pressure cannot read a negative pressure.
+      offset_ =
+          std::abs(offset_);  // A rod side near tank pressure cannot read a negative pressure.
   }
   void sensors(const PlantState&, SensorState& sensors) override {
     double& p = side_a_ ? sensors.pressure_a[at_] : sensors.pressure_b[at_];

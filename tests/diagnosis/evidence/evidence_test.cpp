@@ -291,8 +291,9 @@ TEST(Candidates, AScaleErrorHasAPenaltyWhereItsColumnIsIndependent) {
   EXPECT_EQ(two.linear, 1);
   EXPECT_EQ(sizes(two.designs[0])[1], 0.0);
   EXPECT_GT(sizes(two.designs[1])[1], 0.0);
-  EXPECT_DOUBLE_EQ(two.price(two.designs[0]), two.penalty);
-  EXPECT_DOUBLE_EQ(two.price(two.designs[1]), 2.0 * two.penalty) << "two parameters instead of one";
+  EXPECT_DOUBLE_EQ(two.penalty_of(two.designs[0]), two.penalty);
+  EXPECT_DOUBLE_EQ(two.penalty_of(two.designs[1]), 2.0 * two.penalty)
+      << "two parameters instead of one";
 }
 
 TEST(Evidence, EffectsOfTheModelAreSubtracted) {

@@ -76,17 +76,18 @@ TEST(PumpLeaders, ALossIsExactWithTheLeaderThatFollowsFromIt) {
   ASSERT_GT(crane.moved, 50) << "the case must contain changes of the leader";
   const Evidence plain = collect_evidence(crane.model, {crane.signals});
   EXPECT_GT(largest_left(plain, crane.loss), 2e5) << "with the leaders without it";
-  const std::optional<Evidence> led = plain.led_by({&crane.loss, 1});
-  ASSERT_TRUE(led.has_value());
-  EXPECT_LT(largest_left(*led, crane.loss), 1.0) << "[Pa] of hundreds of bar, by rounding";
-  EXPECT_FALSE(led->led_by({&crane.loss, 1}).has_value()) << "the leaders do not change any more";
+  const std::optional<Evidence> updated = plain.with_leaders_of({&crane.loss, 1});
+  ASSERT_TRUE(updated.has_value());
+  EXPECT_LT(largest_left(*updated, crane.loss), 1.0) << "[Pa] of hundreds of bar, by rounding";
+  EXPECT_FALSE(updated->with_leaders_of({&crane.loss, 1}).has_value())
+      << "the leaders do not change any more";
   const EvidenceChannel *before = plain.find(EvidenceKind::kPump, 0),
-                        *after = led->find(EvidenceKind::kPump, 0);
-  const VectorXd moved = after->raw[0] + led->series[0].pumps[0].demand - before->raw[0] -
+                        *after = updated->find(EvidenceKind::kPump, 0);
+  const VectorXd moved = after->raw[0] + updated->series[0].pumps[0].demand - before->raw[0] -
                          plain.series[0].pumps[0].demand;
   EXPECT_LT(moved.array().isFinite().select(moved, 0.0).cwiseAbs().maxCoeff(), 1.0)
       << "the measured pressure stays";
-  const std::optional<Evidence> back = led->led_by({});
+  const std::optional<Evidence> back = updated->with_leaders_of({});
   ASSERT_TRUE(back.has_value());
   const EvidenceChannel* again = back->find(EvidenceKind::kPump, 0);
   EXPECT_LT((before->y - again->y).cwiseAbs().maxCoeff(), 1.0);
@@ -97,10 +98,10 @@ TEST(PumpLeaders, ReferencesKeepTheirLeadersAndThoseOfTheModelIncludeItsOwnLoss)
   const LossyCrane& crane = lossy();
   const LossyCrane other(5);
   const Evidence e = collect_evidence(crane.model, {crane.signals}, {other.signals});
-  const std::optional<Evidence> led = e.led_by({&crane.loss, 1});
-  ASSERT_TRUE(led.has_value());
-  EXPECT_EQ(led->series[1].pumps[0].leader, e.series[1].pumps[0].leader);
-  EXPECT_NE(led->series[0].pumps[0].leader, e.series[0].pumps[0].leader);
+  const std::optional<Evidence> updated = e.with_leaders_of({&crane.loss, 1});
+  ASSERT_TRUE(updated.has_value());
+  EXPECT_EQ(updated->series[1].pumps[0].leader, e.series[1].pumps[0].leader);
+  EXPECT_NE(updated->series[0].pumps[0].leader, e.series[0].pumps[0].leader);
   CraneModel knows = crane.model;
   knows.effects = {crane.loss};
   const Evidence known = collect_evidence(knows, {crane.signals});
@@ -135,12 +136,12 @@ TEST(PumpLeaders, ASearchUpdatesThem) {
   const SearchResult r = search_effects(e, pump_effects(crane.machine));
   ASSERT_EQ(r.found.size(), 1u);
   EXPECT_EQ(r.found[0].design.effect.at, crane.loss.at);
-  ASSERT_TRUE(r.led.has_value());
-  EXPECT_FALSE(r.led->led_by({&crane.loss, 1}).has_value());
+  ASSERT_TRUE(r.updated_evidence.has_value());
+  EXPECT_FALSE(r.updated_evidence->with_leaders_of({&crane.loss, 1}).has_value());
   EXPECT_NEAR(r.found[0].values[0], kLoss, 0.01 * kLoss);
   // null fit and ranking belong to the leaders without the effect
   EXPECT_NEAR(r.null.total(), without_effects(e).total(), 1.0);
-  EXPECT_GT(std::abs(without_effects(*r.led).total() - r.null.total()), 5.0);
+  EXPECT_GT(std::abs(without_effects(*r.updated_evidence).total() - r.null.total()), 5.0);
 }
 
 TEST(PumpLeaders, AnEffectThatIsNotNamedDoesNotChangeThem) {
@@ -150,7 +151,7 @@ TEST(PumpLeaders, AnEffectThatIsNotNamedDoesNotChangeThem) {
   options.smallest_effect = 1e300;  // every effect is too small to be named
   const SearchResult r = search_effects(e, pump_effects(crane.machine), options);
   EXPECT_TRUE(r.found.empty());
-  EXPECT_FALSE(r.led.has_value());
+  EXPECT_FALSE(r.updated_evidence.has_value());
   EXPECT_NEAR(r.final.total(), without_effects(e).total(), 1.0);
 }
 

@@ -20,7 +20,8 @@ using testing_support::arm_machine;
 using testing_support::arm_model;
 using testing_support::drawn_machine;
 
-/// A motion with one speed and one load only, on which effects with different dependence on these are indistinguishable.
+/// A motion with one speed and one load only, on which effects that differ in their dependence on these are
+/// indistinguishable.
 Log one_speed_log() {
   const CraneModel model = arm_model();
   MotionRecipe recipe;
@@ -93,7 +94,8 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
   EXPECT_THAT(small.apart, SizeIs(1));
   const BetterMotion large =
       better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {800.0}), rival);
-  EXPECT_GT(large.nats_per_minute, small.nats_per_minute) << "a larger effect is distinguished sooner";
+  EXPECT_GT(large.nats_per_minute, small.nats_per_minute)
+      << "a larger effect is distinguished sooner";
 }
 
 TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {

@@ -27,7 +27,7 @@ constexpr double kFriction = 5e3;  // [N]
 
 EffectAt coulomb() { return parse_effect("coulomb_friction:arm", arm_machine()); }
 
-/// Learned from a log with friction, without knowing of it.
+/// A model learned from a log with friction, without that effect.
 const CraneModel& ignorant_model() {
   static const CraneModel model = fit(arm_machine(), {arm_log_with_friction(kFriction, 1)}).model;
   return model;
@@ -42,13 +42,13 @@ const ExtendResult& extended() {
 
 double force_error(const CompareResult& r) { return r.find("force", "arm")->rmse; }
 
-TEST(EstimateEffects, FindsTheForceThatWasPutIn) {
+TEST(EstimateEffects, RecoversTheForce) {
   const CraneModel model = arm_model();
   const std::vector<MachineSignals> signals = {
       make_signals(model.machine, arm_log_with_friction(kFriction))};
   const EffectEstimate e = estimate_effects(model, {coulomb()}, signals);
   ASSERT_THAT(e.effects, SizeIs(1));
-  // 0.8 bar on 113 cm^2 is 0.9 kN a sample, some hundred independent ones: 2 % of 5 kN is two deviations
+  // 0.8 bar on 113 cm^2 is 0.9 kN for each of about a hundred independent samples: 2 % of 5 kN is two deviations
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.03 * kFriction);
   EXPECT_LT(e.effects[0].lower95[0], e.effects[0].values[0]);
   EXPECT_LT(e.effects[0].upper95[0] - e.effects[0].lower95[0], 0.2 * kFriction);
@@ -56,23 +56,23 @@ TEST(EstimateEffects, FindsTheForceThatWasPutIn) {
 }
 
 TEST(EstimateEffects, AllEffectsTogether) {
-  // a mass the file does not know and friction at once: each alone would be wrong
+  // an unmodelled mass and friction together: each alone would be estimated wrongly
   CraneModel model = arm_model();
-  model.machine.links[0].mass -= 60.0;  // the log was made with it
+  model.machine.links[0].mass -= 60.0;  // the log was made with this mass
   const std::vector<MachineSignals> signals = {
       make_signals(model.machine, arm_log_with_friction(kFriction))};
   const EffectEstimate e = estimate_effects(
       model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, signals);
   ASSERT_THAT(e.effects, SizeIs(2));
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
-  // its moment is what one joint can tell: 60 kg at 1.5 m
+  // one joint determines only its moment: 60 kg at 1.5 m
   EXPECT_NEAR(e.effects[1].values[1], 90.0, 9.0);
 }
 
 TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
   const CraneModel model = arm_model();
   Log log = arm_log_with_friction(kFriction);
-  // the second half has another friction; left out, it must not be seen
+  // the second half has another friction, which must have no influence when it is left out
   const Eigen::Index n = log.time.size(), half = n / 2;
   const Eigen::VectorXd& u = testing_support::channel(log, "u_arm").values;
   const double area = arm_machine().cylinders[0].area_piston();
@@ -87,7 +87,7 @@ TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
 }
 
-TEST(EstimateEffects, SaysWhatTheLogsLack) {
+TEST(EstimateEffects, AnErrorNamesTheSignalsThatTheLogsLack) {
   Log log = arm_log();
   testing_support::remove_channel(log, "pA_arm");
   testing_support::remove_channel(log, "pB_arm");
@@ -116,7 +116,7 @@ TEST(Extend, ErrorFallsOnTestLogsAndNothingElseRises) {
   for (const StageScore& after : step.after.scores) {
     const StageScore* before = step.before.find(after.stage, after.at, after.regime);
     ASSERT_NE(before, nullptr);
-    // the processes are learned again from the same samples around other forces
+    // the pressure models are learned again from the same samples with other forces
     EXPECT_LT(after.rmse, 1.05 * before->rmse) << after.stage << " " << after.regime;
   }
 }
@@ -191,7 +191,7 @@ TEST(TakeBack, RestoresTheErrorAndKeepsTheRecord) {
   ASSERT_THAT(r.model.steps, SizeIs(2));
   EXPECT_EQ(r.model.steps[1].removed, "coulomb_friction:arm");
   EXPECT_TRUE(r.model.steps[1].added.empty());
-  // the same logs without the effect give what they gave before it came
+  // without the effect, the same logs give the same model as before it was added
   EXPECT_NEAR(force_error(r.steps[0].after), force_error(extended().steps[0].before), 1.0);
   EXPECT_TRUE(r.steps[0].change.worse());
 }
@@ -210,7 +210,7 @@ TEST(Improve, AddsTheFrictionAndStops) {
   for (const ExtendStep& s : r.steps) EXPECT_FALSE(s.change.worse()) << s.added;
   EXPECT_FALSE(r.stopped_because.empty());
   ASSERT_NE(r.last, nullptr);
-  // its evidence still refers to a machine that lives
+  // its evidence still refers to an existing machine
   EXPECT_EQ(r.last->evidence.series.front().machine->name, "lift");
   EXPECT_EQ(r.model.steps.back().stopped_because, r.stopped_because);
 }
@@ -218,7 +218,7 @@ TEST(Improve, AddsTheFrictionAndStops) {
 TEST(Improve, AddsNothingWhereNothingIsMissing) {
   const CraneModel model = fit(arm_machine(), {arm_log(0.8, 4)}).model;
   ExtendOptions options;
-  // the log's positions are exact: what a valve effect would explain of them is rounding, not physics
+  // the log's positions are exact, so a valve effect would explain rounding only
   for (const char* key : {"coulomb_friction:arm", "viscous_friction:arm", "unmodelled_mass:arm"})
     options.diagnose.candidates.push_back(parse_effect(key, model.machine));
   const ExtendResult r = improve(model, {arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)}, options);
@@ -227,10 +227,10 @@ TEST(Improve, AddsNothingWhereNothingIsMissing) {
   EXPECT_THAT(r.stopped_because, HasSubstr("nothing more is missing"));
 }
 
-TEST(Diagnose, PrintsWhatExtendPutsIntoTheModel) {
-  // one effect that is another machine, one that is not: the same values and intervals from both doors
+TEST(Diagnose, ReportsTheValuesThatExtendPutsIntoTheModel) {
+  // one effect that changes the machine and one that does not: both have the same values and intervals in both results
   CraneModel model = arm_model();
-  model.machine.links[0].mass -= 60.0;  // the log was made with it
+  model.machine.links[0].mass -= 60.0;  // the log was made with this mass
   const Log log = arm_log_with_friction(kFriction, 1);
   DiagnoseOptions options;
   options.candidates = {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)};
@@ -244,7 +244,7 @@ TEST(Diagnose, PrintsWhatExtendPutsIntoTheModel) {
     const AppliedEffect& a = d.effects[i].applied;
     const AppliedEffect& b = r.model.effects[i];
     for (std::size_t p = 0; p < a.values.size(); ++p) {
-      // one regression over the same rows; the second step starts from what the first left, which rounding sees
+      // one regression over the same rows; the second step starts from the result of the first, with rounding errors
       const double width = a.upper95[p] - a.lower95[p];
       EXPECT_NEAR(a.values[p], b.values[p], 0.02 * width) << d.effects[i].key() << " " << p;
       EXPECT_NEAR(a.lower95[p], b.lower95[p], 0.02 * width) << d.effects[i].key() << " " << p;
@@ -254,7 +254,7 @@ TEST(Diagnose, PrintsWhatExtendPutsIntoTheModel) {
 }
 
 TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
-  // a law's variant is a whole number: nothing lies between them and they have no interval
+  // the variant of a law is an integer: there is no value between two of them, and no interval
   const CraneModel model = arm_model();
   Log log = arm_log(0.8, 6);
   testing_support::channel(log, "pA_arm").values.array() += 4e5;  // [Pa]
@@ -264,7 +264,8 @@ TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     const AppliedEffect& a = e.effects[0];
     if (!parameters[p].choice) {
-      EXPECT_NEAR(a.values[p], 4e5, 0.1e5);  // 0.8 bar a sample, some hundred independent ones
+      EXPECT_NEAR(a.values[p], 4e5,
+                  0.1e5);  // 0.8 bar for each of about a hundred independent samples
       continue;
     }
     EXPECT_EQ(a.values[p], std::round(a.values[p]));
@@ -275,7 +276,7 @@ TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
 }
 
 TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {
-  // the test log is of a machine without the friction: whatever the diagnosis says, it must not come in
+  // the test log is of a machine without friction, so an effect must not be kept whatever the diagnosis names
   ExtendOptions options;
   options.diagnose.candidates = {coulomb()};
   const ExtendResult r = improve(ignorant_model(), {arm_log_with_friction(kFriction, 1)}, {},
@@ -289,7 +290,7 @@ TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {
 }
 
 TEST(Extend, BeforeIsLearnedFromTheSameLogs) {
-  // the model comes from other logs, of a machine with other margins: what refitting alone changes is no gain
+  // the model was learned from logs of a machine with other margins: a change by refitting alone is no improvement
   CraneModel other = ignorant_model();
   other.cylinders[0].margin += 20e5;
   other.data.clear();
@@ -297,7 +298,7 @@ TEST(Extend, BeforeIsLearnedFromTheSameLogs) {
                                 {arm_log_with_friction(kFriction, 2)});
   EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("not learned from these logs")));
   const double before = r.steps[0].before.find("pump", "main")->rmse;
-  EXPECT_LT(before, 5e5);  // [Pa] not the 20 bar of the foreign margin
+  EXPECT_LT(before, 5e5);  // [Pa] not the 20 bar of the other machine's margin
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Real logs; they are not part of the project, so these tests skip where they are absent.
+// Tests on real logs, which are not part of the project; they are skipped where the logs are absent.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,11 +36,11 @@ class RealCrane : public testing::Test {
 
 TEST_F(RealCrane, StaticForceFromCadIsOffByTwentyKilonewton) {
   const CompareResult r = compare(CraneModel::untrained(machine), logs);
-  // Published with the logs: 20 347 N on |dx/dt| > 2 mm/s. The filter's choice moves it by some 10 N.
+  // Published with the logs: 20 347 N on |dx/dt| > 2 mm/s. The choice of filter changes it by about 10 N.
   EXPECT_NEAR(r.find("force", "main")->rmse, 20347.0, 30.0);
-  // The jib's, by the same computation done apart with the same speed threshold: 5458 N.
+  // For the jib, an independent computation with the same speed threshold gives 5458 N.
   EXPECT_NEAR(r.find("force", "jib")->rmse, 5458.0, 0.01 * 5458.0);
-  // Whether a command is asked for too changes less than a newton.
+  // A further condition on the command changes it by less than a newton.
   for (Log& log : logs)
     std::erase_if(log.channels, [](const Channel& c) { return c.role == Role::kCommand; });
   EXPECT_NEAR(compare(CraneModel::untrained(machine), logs).find("force", "main")->rmse, 20347.0,
@@ -58,19 +58,19 @@ TEST_F(RealCrane, StrokesBecomeAnglesByTheFourBars) {
   }
 }
 
-TEST_F(RealCrane, FitsAndSaysWhereItFails) {
+TEST_F(RealCrane, FitsAndNotesTheDeadBands) {
   const FitResult r = fit(machine, logs);
-  EXPECT_TRUE(r.model.complete()) << "four processes: two cylinders, both ways";
+  EXPECT_TRUE(r.model.complete()) << "four pressure models: two cylinders, both directions";
   ASSERT_TRUE(r.held_out.has_value());
   // Constant-pressure supply of 134 to 151 bar over the days.
   EXPECT_GT(r.model.pumps[0].standby, 134.0 * units::kBar);
   EXPECT_LT(r.model.pumps[0].standby, 151.0 * units::kBar);
   EXPECT_LT(r.train.find("pressure", "main", "extend")->rmse, 1.5 * units::kBar);
   EXPECT_LT(std::abs(r.train.energy[0].relative_error), 0.03);
-  EXPECT_GT(r.processes[0].step, 1) << "friction and dynamics make neighbouring errors alike";
+  EXPECT_GT(r.processes[0].step, 1) << "friction and dynamics correlate neighbouring errors";
   EXPECT_FALSE(r.train.worst.empty());
-  // Whole motions the figure's own model never saw: 4.0 bar over main both ways and jib extending. A quarter more
-  // is what another split of the motions into blocks may cost; noise alone is below 1 bar.
+  // On whole motions that were held out the error was 4.0 bar over main in both directions and jib extending. Another
+  // split of the motions into blocks may increase it by a quarter; noise alone is below 1 bar.
   double squares = 0.0, n = 0.0;
   for (const StageScore& s : r.held_out->scores) {
     if (s.stage != "pressure") continue;
@@ -85,7 +85,7 @@ TEST_F(RealCrane, FitsAndSaysWhereItFails) {
   EXPECT_LT(std::abs(r.held_out->energy[0].relative_error), 0.03);
   EXPECT_GT(r.held_out->find("pressure", "main", "retract")->rmse,
             r.train.find("pressure", "main", "retract")->rmse)
-      << "data that was learned from is not held out";
+      << "training data is not held out";
   // The crane's valves have dead bands (authors: 0.07 and 0.13 for the main section).
   EXPECT_THAT(r.notes, Contains(HasSubstr("dead band")));
 }
@@ -97,7 +97,7 @@ const AppliedEffect* effect_of(const CraneModel& model, const std::string& key) 
   return nullptr;
 }
 
-/// Position of a step in the order they were taken; the number of steps when it is none.
+/// Index of the step that added an effect; the number of steps when there is none.
 std::size_t step_of(const ExtendResult& r, const std::string& key) {
   for (std::size_t i = 0; i < r.steps.size(); ++i) {
     if (r.steps[i].added == key) return i;
@@ -111,8 +111,8 @@ std::string steps_text(const ExtendResult& r) {
   return text;
 }
 
-/// The published work on these logs: a mass the CAD does not know, Coulomb friction of 4000 N (main) and 3900 N (jib),
-/// no viscous friction.
+/// Published with these logs: a mass that is missing in the CAD model, Coulomb friction of 4000 N (main) and 3900 N
+/// (jib), no viscous friction.
 void expect_published(const ExtendResult& r) {
   const std::string steps = steps_text(r);
   ASSERT_FALSE(r.steps.empty());
@@ -121,7 +121,7 @@ void expect_published(const ExtendResult& r) {
   const AppliedEffect* main = effect_of(r.model, "coulomb_friction:main");
   ASSERT_NE(main, nullptr) << steps;
   EXPECT_NEAR(main->values[0], 4000.0, 400.0);
-  // next on the main cylinder: no other effect of that cylinder's force before it
+  // friction is the first effect on the main cylinder's force
   for (std::size_t i = 0; i < step_of(r, "coulomb_friction:main"); ++i) {
     if (r.steps[i].stage == "force") {
       EXPECT_THAT(r.steps[i].added, Not(testing::EndsWith(":main"))) << steps;
@@ -132,7 +132,7 @@ void expect_published(const ExtendResult& r) {
   EXPECT_NEAR(jib->values[0], 3900.0, 390.0);
 }
 
-/// By the run left out of everything: learned from the other three.
+/// The parameter is the log that is left out of everything; the other three are the training logs.
 class RealCraneImproved : public RealCrane, public testing::WithParamInterface<int> {};
 
 TEST_P(RealCraneImproved, NamesMassAndDryFrictionAndPredictsTheRunLeftOut) {
@@ -140,14 +140,14 @@ TEST_P(RealCraneImproved, NamesMassAndDryFrictionAndPredictsTheRunLeftOut) {
   logs.erase(logs.begin() + GetParam());
   const CraneModel model = fit(machine, logs).model;
   ExtendOptions options;
-  options.max_steps = 6;  // all that is asked for, and a few more
+  options.max_steps = 6;  // the effects that are checked, and a few more
   const ExtendResult r = improve(model, logs, {}, test, options);
   expect_published(r);
   const double before = r.steps.front().before.find("force", "main")->rmse;
   const double after = r.steps.back().after.find("force", "main")->rmse;
   EXPECT_LT(after, before / 5.0) << steps_text(r);
-  // Beside its twin a value means nothing (with the sine run left out a load error came beside the jib's mass, and both
-  // were then known to 36 000 t): such an effect is refused.
+  // An effect that is indistinguishable from one in the model is not kept: without the sine log, a payload error was
+  // once added beside the jib's mass, and both had intervals of 36 000 t.
   for (const AppliedEffect& e : r.model.effects) {
     for (std::size_t k = 0; k < e.lower95.size(); ++k) {
       if (e.effect->info().parameters[k].choice) continue;
@@ -208,7 +208,7 @@ TEST(RealDrive, OnlyTheForceIsCompared) {
   ASSERT_EQ(r.train.scores.size(), 1u);
   EXPECT_EQ(r.train.scores[0].stage, "force");
   EXPECT_GT(r.train.scores[0].n, 20000);
-  // A level carriage has no static load: what is measured is friction and inertia, some 54 N RMS.
+  // A level carriage has no static force: the measured force is friction and inertia, about 54 N RMS.
   EXPECT_NEAR(r.train.scores[0].rmse, 54.1, 1.0);
   EXPECT_THAT(r.train.notes, Contains(HasSubstr("flow and pressures of axis: not compared")));
   EXPECT_THAT(r.train.notes, Contains(HasSubstr("the machine has no pump")));

@@ -186,7 +186,8 @@ TEST(NullDistribution, PValueIsTheLargerOfBothDistributions) {
   EXPECT_DOUBLE_EQ(distribution.p_value(1e9, 0), 0.01) << "never zero: 1/(n+1)";
   EXPECT_DOUBLE_EQ(distribution.p_value(-1.0, 0), 1.0);
   EXPECT_DOUBLE_EQ(distribution.p_value(97.5, 0), 0.51) << "50 of the flipped ones are as large";
-  EXPECT_DOUBLE_EQ(distribution.p_value(4.0 * (97.5 + 2.0) - 2.0, 1), 0.51) << "scaled, but not its penalty";
+  EXPECT_DOUBLE_EQ(distribution.p_value(4.0 * (97.5 + 2.0) - 2.0, 1), 0.51)
+      << "scaled, but not its penalty";
   EXPECT_DOUBLE_EQ(distribution.threshold(0.05), 186.0) << "95 % of the flipped ones";
   // a gain above the threshold of a level has a p-value of at most about that level
   EXPECT_LE(distribution.p_value(distribution.threshold(0.05) + 1e-9, 0), 0.06);

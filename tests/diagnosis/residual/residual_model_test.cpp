@@ -28,7 +28,7 @@ const CraneModel& model() {
   return m;
 }
 
-/// The motions of a log of 90 s; what its channels measured is replaced by what a test wants to be left over.
+/// The motions of a log of 90 s; tests replace the residuals of its channels.
 const Evidence& motions() {
   static const Evidence e = collect_evidence(
       model(), {make_signals(model().machine,
@@ -36,7 +36,7 @@ const Evidence& motions() {
   return e;
 }
 
-/// Noise as machines leave it, unit size, in every channel; before the filter white.
+/// Coloured noise of unit size in every channel, and white noise before the filter.
 struct Left {
   Evidence evidence = motions();
   EffectFit fit;
@@ -47,7 +47,7 @@ struct Left {
     noise.phi1 = 0.4;
     noise.variance = 1.0 - 0.16;
     for (EvidenceChannel& c : evidence.channels) {
-      const double size = c.unit.si;  // newtons, millimetres a second, bars
+      const double size = c.unit.si;  // N, mm/s, bar
       fit.noise.push_back(noise);
       fit.noise.back().variance *= size * size;
       fit.residual.push_back(size * testing_support::draw(noise, c.blocks, random));
@@ -69,13 +69,13 @@ struct Left {
   }
 };
 
-TEST(ResidualModel, NoiseIsNoRiddle) {
+TEST(ResidualModel, NoiseHasNoStructure) {
   int unmodelled = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
     const Left left(seed);
     unmodelled += find_residual_structure(left.evidence, left.fit).empty() ? 0 : 1;
   }
-  // a tenth of a channel's variance on motions left out: chance does not do that in some ten channels
+  // by chance no residual model explains a tenth of the variance on motions left out in about ten channels
   EXPECT_LE(unmodelled, 1) << "of 12 logs with nothing but coloured noise";
 }
 
@@ -89,16 +89,16 @@ TEST(ResidualModel, ASineIsFoundWithItsFrequency) {
     const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
     ASSERT_FALSE(found.empty()) << hz;
     EXPECT_EQ(found[0].channel, c);
-    // a line is as wide as one over the log's length, 90 s
+    // the width of a line is 1 / 90 s, the length of the log
     EXPECT_NEAR(found[0].frequency, hz, 0.02);
     EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("time")));
-    // variance of the sine 0.5 beside 1 of noise; a line's share is known to some 15 %
+    // the sine has a variance of 0.5 and the noise of 1; the share of a line is estimated to about 15 %
     EXPECT_NEAR(found[0].explained, 0.33, 0.12);
     EXPECT_NEAR(found[0].rms, std::sqrt(0.5) * 1e5, 0.25 * std::sqrt(0.5) * 1e5);
   }
 }
 
-TEST(ResidualModel, ASwingWhoseFrequencyWandersIsFound) {
+TEST(ResidualModel, AnOscillationOfVaryingFrequencyIsFound) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   Left left(21);
@@ -109,7 +109,7 @@ TEST(ResidualModel, ASwingWhoseFrequencyWandersIsFound) {
     const double step = left.evidence.series[log].step;
     double phase = 0.0;
     for (double& v : channel.raw[log]) {
-      // loses its phase within some two seconds: no line in a periodogram of 90 s
+      // the phase is lost within about two seconds: no line in a periodogram of 90 s
       phase += 2.0 * std::numbers::pi * hz * step + 1.0 * std::sqrt(step) * normal(random);
       v += 2.5e5 * std::sin(phase);
     }
@@ -137,10 +137,10 @@ TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {
   raw.tail(raw.size() - middle) *= 3.0;
   for (Index i = 0; i < raw.size(); ++i)
     raw[i] += 2.5e5 * std::sin(2.0 * std::numbers::pi * hz * series.step * static_cast<double>(i));
-  const Swing swing = strongest_swing(left.evidence, channel);
-  EXPECT_NEAR(swing.frequency, hz, 0.1 * hz);
+  const Oscillation oscillation = strongest_oscillation(left.evidence, channel);
+  EXPECT_NEAR(oscillation.frequency, hz, 0.1 * hz);
   // standard error of the variance: some 3 % at 2000 samples a run, twice that with third differences
-  EXPECT_NEAR(swing.noise, size * std::sqrt(5.0), 0.1 * size * std::sqrt(5.0));
+  EXPECT_NEAR(oscillation.noise, size * std::sqrt(5.0), 0.1 * size * std::sqrt(5.0));
 }
 
 TEST(ResidualModel, AFunctionOfASignalIsFoundAndTheSignalNamed) {
@@ -158,8 +158,8 @@ TEST(ResidualModel, AFunctionOfASignalIsFoundAndTheSignalNamed) {
   EXPECT_EQ(found[0].frequency, 0.0);
 }
 
-TEST(ResidualModel, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
-  // an engine that slows under load: between the two time constants that are offered
+TEST(ResidualModel, SpeedThatFallsWithLaggedPowerIsFound) {
+  // an engine that slows under load, with a time constant between the two of the signals
   Left left(25);
   const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
   const MachineSeries& s = left.evidence.series[0];
@@ -177,12 +177,12 @@ TEST(ResidualModel, SpeedThatFallsWithThePowerOfAWhileAgoIsFound) {
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("with a lag of")));
 }
 
-TEST(ResidualModel, ASpoolBehindAPlayIsFoundThoughNothingMeasuredTellsIt) {
+TEST(ResidualModel, ASpoolWithBacklashIsFoundThoughNoMeasuredSignalContainsIt) {
   Left left(26);
   const std::size_t c = left.channel(EvidenceKind::kFlow, 0);
   const VectorXd& u = left.evidence.series[0].cylinders[0].command;
   const double width = 0.1;
-  VectorXd side = VectorXd::Zero(u.size());  // -1 .. 1: where in its play the spool stands
+  VectorXd side = VectorXd::Zero(u.size());  // -1 .. 1: position inside the backlash
   double spool = 0.0;
   for (Index k = 0; k < u.size(); ++k) {
     spool = u[k] == 0.0 ? 0.0 : std::clamp(spool, u[k] - 0.5 * width, u[k] + 0.5 * width);
@@ -195,7 +195,7 @@ TEST(ResidualModel, ASpoolBehindAPlayIsFoundThoughNothingMeasuredTellsIt) {
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("with a backlash of 10 %")));
 }
 
-TEST(ResidualModel, AnEventOfOneMotionIsFoundWithItsTime) {
+TEST(ResidualModel, AnIsolatedEventIsFoundWithItsTime) {
   Left left(27);
   const std::size_t c = left.channel(EvidenceKind::kForce, 0);
   const EvidenceChannel& e = left.evidence.channels[c];
@@ -208,10 +208,10 @@ TEST(ResidualModel, AnEventOfOneMotionIsFoundWithItsTime) {
   }
   const double from = time[e.sample[static_cast<std::size_t>(e.blocks[longest].first)]];
   ASSERT_GT(row_s * static_cast<double>(e.blocks[longest].last - e.blocks[longest].first), 4.0);
-  // below a thousandth of the largest force nobody cares, and less than the sensors' noise is none
+  // larger than the noise floor and than a thousandth of the largest force, below which nothing is reported
   const double noise = std::max(e.noise_floor, 2e-3 * e.largest_force) / e.unit.si;
-  // eight times the usual, to and fro as a load that swings: no signal goes along with it
-  const auto swings = [&](double seconds) {
+  // eight times the usual residual, oscillating as with a swinging load, which depends on no signal
+  const auto oscillating = [&](double seconds) {
     Left one = left;
     one.add(c, 8.0 * std::numbers::sqrt2 * noise, [&](Index k) {
       const double t = time[k] - from;
@@ -220,16 +220,16 @@ TEST(ResidualModel, AnEventOfOneMotionIsFoundWithItsTime) {
     one.fit.residual[c] += (noise - 1.0) * left.fit.residual[c];
     return find_residual_structure(one.evidence, one.fit);
   };
-  const std::vector<ResidualStructure> found = swings(4.0);
+  const std::vector<ResidualStructure> found = oscillating(4.0);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].channel, c);
   EXPECT_TRUE(found[0].event);
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("times the usual residual from")));
-  for (const ResidualStructure& l : swings(0.9)) EXPECT_FALSE(l.event) << "a knock";
+  for (const ResidualStructure& l : oscillating(0.9)) EXPECT_FALSE(l.event) << "a short impact";
 }
 
-TEST(ResidualModel, ALearnedProcessOwnInputsAreNoRiddle) {
-  // smooth laws of a cylinder's own flow are what its pressure process learns
+TEST(ResidualModel, AFunctionOfThePressureModelsInputsIsNoStructure) {
+  // a pressure model learns smooth laws of its cylinder's own flow
   Left left(23);
   for (std::size_t c = 0; c < left.evidence.channels.size(); ++c) {
     const EvidenceChannel& e = left.evidence.channels[c];
@@ -244,7 +244,7 @@ TEST(ResidualModel, ALearnedProcessOwnInputsAreNoRiddle) {
 }
 
 TEST(ResidualModel, ReferencesTakeNoPart) {
-  // the same riddle in rows that count as reference is nobody's
+  // the same structure in rows of a reference log is not reported
   Left left(24);
   const std::size_t c = left.channel(EvidenceKind::kPump, 0);
   const VectorXd& time = left.evidence.series[0].time;

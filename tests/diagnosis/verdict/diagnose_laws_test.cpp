@@ -1,5 +1,5 @@
-/// Effects that no real log at hand shows, each hidden by several laws that the catalogue does not know, found with
-/// a log of the healthy machine and without. The same by the dozen: docs/blind_test.md.
+/// Effects that no available real log shows, each simulated by several laws that are not in the catalogue and found
+/// with a reference log and without. docs/blind_test.md has many more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,15 +22,15 @@ struct HiddenLaw {
   const char* id;
   const char* at;
   int law;
-  const char* form;                     ///< a name for the test
-  std::vector<const char*> parameters;  ///< that have a true value
+  const char* form;                     ///< name of the law in the test's name
+  std::vector<const char*> parameters;  ///< those with a true value
 };
 
 void PrintTo(const HiddenLaw& law, std::ostream* out) { *out << law.id << ", " << law.form; }
 
 class HiddenByALaw : public ::testing::TestWithParam<HiddenLaw> {
  protected:
-  /// The right id and place, nothing else, and every parameter inside its interval or within 10 %.
+  /// Checks that only the right effect is named and every parameter is inside its interval or within 10 %.
   static void expect_found(const Diagnosis& d, const HiddenCase& logs) {
     const HiddenLaw& law = GetParam();
     const std::string key = *law.at == '\0' ? law.id : std::string(law.id) + ":" + law.at;
@@ -54,7 +54,7 @@ class HiddenByALaw : public ::testing::TestWithParam<HiddenLaw> {
   }
 };
 
-/// Leaks show in pauses of a second: two minutes hold enough of them.
+/// [s] Leaks show in pauses of a second, of which two minutes contain enough.
 constexpr double kLogSeconds = 150.0;
 constexpr std::uint64_t kLogSeed = 7;
 
@@ -76,7 +76,7 @@ TEST_P(HiddenByALaw, IsFoundWithAndWithoutAReference) {
   }
 }
 
-/// What is named is also what improve adds first, and it helps where it acts on motions that took no part.
+/// improve first adds the effect that is named, which reduces the error where it acts on motions that took no part.
 TEST_P(HiddenByALaw, IsAddedFirst) {
   const HiddenLaw& law = GetParam();
   const Machine machine = drawn_machine("loader_crane");
@@ -93,9 +93,9 @@ TEST_P(HiddenByALaw, IsAddedFirst) {
             *law.at == '\0' ? std::string(law.id) : std::string(law.id) + ":" + law.at);
 }
 
-/// On the test log a counterbalance valve sets the boom's supply while the load opposes, too: what the return chamber
-/// has less must not be taken off there.
-TEST(OilTemperatureByALaw, DoesNoHarmWhereAValveRulesAgainstTheLoad) {
+/// On the test log a counterbalance valve sets the boom's supply pressure even while it moves against the load. A lower
+/// return pressure must not lower the supply pressure there.
+TEST(OilTemperatureByALaw, DoesNoHarmWhereAValveActsAgainstTheLoad) {
   const Machine machine = drawn_machine("loader_crane");
   for (const int law : {0, 1, 2}) {
     SCOPED_TRACE(law);
@@ -109,7 +109,7 @@ TEST(OilTemperatureByALaw, DoesNoHarmWhereAValveRulesAgainstTheLoad) {
     const ExtendResult r = extend(healthy, {parse_effect("oil_temperature", machine)}, {logs.train},
                                   {logs.test}, options);
     const ErrorChange& change = r.steps.front().change;
-    // a supply that a valve holds says nothing of the return line: nothing is to win, nothing must be lost
+    // a supply pressure that a valve sets does not depend on the return line, so the error must not change
     EXPECT_LT(change.overall, 1.01);
     EXPECT_LT(change.own, 1.01);
     for (const HarmedError& h : change.harmed) ADD_FAILURE() << h.sentence;
@@ -145,8 +145,8 @@ TEST(ValveOfTheRealCrane, DeadBandsByDirection) {
   FitOptions options;
   options.hold_out_every = 0;
   const Diagnosis d = diagnose(fit(machine, logs, {}, options).model, logs);
-  // Its authors: 0.071 and 0.126 (main), 0.037 and 0.126 (jib), by another way (slow ramps); least squares by hand on
-  // these logs 0.055 and 0.12, 0.04 and 0.105.
+  // Its authors found 0.071 and 0.126 (main), 0.037 and 0.126 (jib) from slow ramps; least squares by hand on these
+  // logs gives 0.055 and 0.12, 0.04 and 0.105.
   std::map<std::string, std::vector<double>> found;
   for (const DiagnosedEffect& e : d.effects) found[e.key()] = e.applied.values;
   for (const char* at : {"main", "jib"}) {

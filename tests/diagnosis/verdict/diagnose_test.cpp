@@ -1,4 +1,4 @@
-/// Diagnosis end to end: logs with a hidden effect in, a verdict out.
+/// Diagnosis end to end, from logs with a simulated effect to a verdict.
 #include "diagnosis/verdict/diagnose.h"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ using testing_support::hidden_case;
 using testing_support::HiddenCase;
 
 constexpr double kSeconds = 100.0;
-/// Of this crane every hidden strength and base law follows.
+/// The crane and its seed, from which every simulated effect and base law follows.
 constexpr std::uint64_t kSeed = 7;
 
 const Machine& crane() {
@@ -43,7 +43,7 @@ CraneModel learned(const Machine& machine, const Log& log) {
   return fit(machine, {log}, {}, options).model;
 }
 
-/// Of the same crane with nothing hidden: what a user has who logged it when it was new.
+/// A model learned from a reference log of the same crane, in which no effect acts.
 const CraneModel& reference_model() {
   static const CraneModel model =
       learned(crane(), hidden_case(crane(), {}, kSeed, kSeconds).reference);
@@ -80,14 +80,14 @@ struct Answer {
   }
 };
 
-/// With the reference log, as a user has who logged the machine before it changed.
+/// A diagnosis with the reference log.
 Answer with_reference(const std::vector<HiddenEffect>& effects) {
   Answer a{hidden_case(crane(), effects, kSeed, kSeconds), {}};
   a.diagnosis = diagnose(reference_model(), {a.logs.train}, {a.logs.reference});
   return a;
 }
 
-/// From suspect logs only.
+/// A diagnosis from the suspect log alone.
 Answer alone(const std::vector<HiddenEffect>& effects, const LogChannels& channels = {}) {
   Answer a{hidden_case(crane(), effects, kSeed, kSeconds, channels), {}};
   a.diagnosis = diagnose(learned(crane(), a.logs.train), {a.logs.train});
@@ -112,9 +112,9 @@ TEST(Diagnose, NothingIsMissingWhereNothingIs) {
   }
 }
 
-// Parameters within 10 %: what is asked of a clear effect in five minutes of motion, from less than two minutes here.
+// Parameters within 10 %, as required for a clear effect in five minutes of motion, here from less than two minutes.
 TEST(Diagnose, CoulombFriction) {
-  const Answer& a = friction_of_bristles();  // not a sign, the catalogue's law
+  const Answer& a = friction_of_bristles();  // not the sign function, which is the catalogue's law
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing);
   ASSERT_THAT(a.keys(), ElementsAre("coulomb_friction:boom"));
   EXPECT_LT(a.error("coulomb_friction:boom", "Fc"), 0.1);
@@ -123,7 +123,7 @@ TEST(Diagnose, CoulombFriction) {
   EXPECT_GE(e.probability, 0.5);
   EXPECT_LT(e.parameters[0].lower95, e.parameters[0].value);
   EXPECT_GT(e.parameters[0].upper95, e.parameters[0].value);
-  EXPECT_LT(e.absorbed, 1e-9) << "no learned law stands before the force";
+  EXPECT_LT(e.absorbed, 1e-9) << "nothing is learned at the force stage";
   ASSERT_FALSE(e.channels.empty());
   EXPECT_LT(e.channels[0].rmse_after, 0.7 * e.channels[0].rmse_before);
 }
@@ -136,7 +136,7 @@ TEST(Diagnose, Mass) {
   std::vector<std::string> set = {e.key()};
   for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
   EXPECT_THAT(set, Contains("unmodelled_mass:jib"))
-      << "a mass on the next joint may stand in for it, but then it says so";
+      << "a mass on the next joint may be named if the set contains this one";
   EXPECT_THAT(a.diagnosis.effects, testing::SizeIs(1));
   if (e.key() == "unmodelled_mass:jib") {
     EXPECT_LT(a.error(e.key(), "mass"), 0.1);
@@ -144,14 +144,14 @@ TEST(Diagnose, Mass) {
   }
 }
 
-/// A gear that no log tells of, and a scale that shows 1 % too little.
-TEST(Diagnose, AScaleInErrorBesideAnUntoldLoad) {
+/// A load attachment that the log does not contain, and a scale that reads 1 % too little.
+TEST(Diagnose, AScaleErrorBesideAnUnloggedLoad) {
   const Answer a = alone({{"payload_error", "", 1.0, 1}});
   ASSERT_THAT(a.diagnosis.effects, testing::SizeIs(1)) << a.diagnosis.table();
   const DiagnosedEffect& e = a.diagnosis.effects[0];
   EXPECT_EQ(e.key(), "payload_error");
   EXPECT_LT(a.error(e.key(), "mass"), 0.1);
-  EXPECT_NEAR(a.value(e.key(), "scale"), 0.01, 0.005) << "of the load";
+  EXPECT_NEAR(a.value(e.key(), "scale"), 0.01, 0.005) << "share of the load";
 }
 
 TEST(Diagnose, PumpLag) {
@@ -180,17 +180,17 @@ TEST(Diagnose, DeadBand) {
   }
 }
 
-// The rod side's sensor is wrong, so the force is: while extending the piston side's chamber seems to disagree with it,
-// and no valve on that side does that.
-TEST(Diagnose, AChambersZeroIsNoValveOnTheOtherSide) {
+// The rod side's sensor has an offset, and so has the measured force. While extending, the bore side's pressure then
+// seems inconsistent with the force, but no valve on that side causes it.
+TEST(Diagnose, APressureSensorsOffsetIsNoValveOnTheOtherSide) {
   const Answer a = with_reference({{"pressure_offset", "jib", 1.0 / 3.0, 0}});
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
   ASSERT_THAT(a.keys(), ElementsAre("pressure_offset:jib"));
   EXPECT_LT(a.error("pressure_offset:jib", "offset"), 0.1);
 }
 
-// The pump follows a spool that closes late: the error there is large, and hardly a late pump's.
-TEST(Diagnose, ALateValveIsNoLatePump) {
+// The pump follows a spool that closes late, so its error is large, but a pump lag explains little of it.
+TEST(Diagnose, AValveLagIsNoPumpLag) {
   const Answer a = with_reference({{"valve_lag", "boom", 1.0, 0}});
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
   EXPECT_THAT(a.keys(), ElementsAre("valve_lag:boom"));
@@ -224,7 +224,7 @@ TEST(Diagnose, RippleOfThePumpIsNotInTheCatalogue) {
 }
 
 TEST(Diagnose, ADriftingSensorIsNotInTheCatalogue) {
-  // what looks like an effect in pressures and pump is the smaller half of a riddle in the force, from the same sensor
+  // the apparent effect in pressures and pump is the smaller part of a structure in the force, from the same sensor
   for (const int law : {0, 1}) {
     const Answer a = with_reference({{"pressure_drift", "boom", 1.0, law}});
     EXPECT_EQ(a.diagnosis.verdict, Verdict::kUnknown) << a.diagnosis.table();
@@ -244,7 +244,7 @@ TEST(Diagnose, ABrokenSensorIsBadData) {
   }
 }
 
-TEST(Diagnose, MissingColumnsAreSaidAndTheRestIsJudged) {
+TEST(Diagnose, MissingColumnsAreNotedAndTheRestIsJudged) {
   LogChannels few;
   few.pumps = false;
   few.oil = false;
@@ -313,7 +313,7 @@ TEST(Diagnose, ChanceIsGivenAsABoundWhereTheSimulationsEnd) {
   d.search.simulations = 60;
   d.p_value = 1.0 / 61.0;
   EXPECT_EQ(d.p_value_text(), "below 0.016");
-  EXPECT_THAT(d.text(), HasSubstr("below 0.016"));
+  EXPECT_THAT(d.table(), HasSubstr("below 0.016"));
   d.p_value = 2.0 / 61.0;
   EXPECT_EQ(d.p_value_text(), "0.033");
   d.search.simulations = 300;
@@ -339,7 +339,7 @@ TEST(DiagnoseRealCrane, MassThenCoulombNeverViscous) {
   FitOptions options;
   options.hold_out_every = 0;
   const Diagnosis d = diagnose(fit(machine, logs, {}, options).model, logs);
-  std::vector<std::string> in_order;  // as they were found
+  std::vector<std::string> in_order;  // in the order in which they were found
   double coulomb = NAN;
   for (const FoundEffect& f : d.search.found) {
     in_order.push_back(effect_key(f.design.effect.effect->info(), machine, f.design.effect.at));
@@ -355,7 +355,7 @@ TEST(DiagnoseRealCrane, MassThenCoulombNeverViscous) {
   EXPECT_LT(mass, position("coulomb_friction:main")) << d.table();
   EXPECT_LT(position("coulomb_friction:main"), in_order.size()) << d.table();
   EXPECT_EQ(position("viscous_friction"), in_order.size()) << d.table();
-  EXPECT_NEAR(coulomb, 4000.0, 400.0) << "as the crane's own authors measured it";
+  EXPECT_NEAR(coulomb, 4000.0, 400.0) << "as measured by the crane's authors";
 }
 
 TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
@@ -373,15 +373,15 @@ TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
                                          "coulomb_friction:axis", "force_offset:axis"))
       << d.table();
   // published: 203.50 N s/m, 20.394 N, -3.165 N, 95.109 kg (the machine file's 95.11)
-  // 2 %: they come out 1.4 % apart. The drive's friction is no exact straight line in speed, so both depend on the
-  // filter: with the publication's own (100 Hz, starts and stops kept) the same regression gives 204.3 and 20.32.
+  // 2 %, because they differ by 1.4 %. The drive's friction is not exactly linear in speed, so both depend on the
+  // filter: with that of the publication (100 Hz, starts and stops kept) the same regression gives 204.3 and 20.32.
   EXPECT_NEAR(value["viscous_friction"], 203.5, 0.02 * 203.5);
   EXPECT_NEAR(value["coulomb_friction"], 20.394, 0.02 * 20.394);
   EXPECT_NEAR(value["force_offset"], -3.165, 0.05 * 3.165);
   EXPECT_NEAR(value["inertia"], 1.0, 0.01);
 }
 
-/// The mass found first stands for both causes; when the tilt is known, two masses mend what the true one says alone.
+/// The mass found first explains both causes; once the tilt is found, two masses explain what the true one does alone.
 TEST(Diagnose, OneMassForTwo) {
   const HiddenCase logs = hidden_case(
       crane(), {{"unmodelled_mass", "jib", 1.0, 0}, {"base_tilt", "", 1.0, 0}}, 3, kSeconds);
@@ -391,14 +391,14 @@ TEST(Diagnose, OneMassForTwo) {
   EXPECT_THAT(keys, UnorderedElementsAre("unmodelled_mass:jib", "base_tilt")) << d.table();
 }
 
-/// "..., where 93 % of it is; ..." -> 93
+/// "..., where 93 % of what ..." -> 93
 double share_there(const std::string& sentence) {
   const std::size_t at = sentence.find("where ");
   return at == std::string::npos ? 0.0 : std::stod(sentence.substr(at + 6));
 }
 
-/// In one short stroke the boom is held back as if by friction, never again.
-TEST(Diagnose, WhatHappenedOnceIsNoLawButNoNoiseEither) {
+/// In one short stroke only, the boom is held back as if by friction.
+TEST(Diagnose, AnIsolatedEventIsNeitherALawNorNoise) {
   HiddenCase logs = hidden_case(crane(), {}, kSeed, kSeconds);
   simulator::GeneratedLog& train = logs.logs.train;
   const auto column = [&](const std::string& name) -> std::vector<double>& {

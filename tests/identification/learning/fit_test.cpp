@@ -253,15 +253,15 @@ TEST(Fit, LoaderCraneWithNothingMissing) {
     for (const char* side : {"extend", "retract"}) {
       const StageScore* s = r.test->find("pressure", c.name, side);
       ASSERT_NE(s, nullptr) << c.name << side;
-      // asked for: 1.5 bar; the sensors' noise is 0.8, so 1.0 leaves 0.6 for the model
+      // The requirement is 1.5 bar; with a sensor noise of 0.8 bar, 1.0 bar leaves 0.6 bar for the model.
       EXPECT_LT(s->rmse, 1.0 * units::kBar) << c.name << " " << side;
       EXPECT_LT(std::abs(s->bias), 0.2 * units::kBar) << c.name << " " << side;
       EXPECT_NEAR(s->within_95_percent, 95.0, 3.0) << c.name << " " << side;
     }
   }
-  EXPECT_LT(r.test->find("pump", "main")->rmse, 1.0 * units::kBar) << "asked for: 2 bar";
+  EXPECT_LT(r.test->find("pump", "main")->rmse, 1.0 * units::kBar) << "requirement: 2 bar";
   ASSERT_EQ(r.test->energy.size(), 1u);
-  EXPECT_LT(std::abs(r.test->energy[0].relative_error), 5e-3) << "asked for: 2 %";
+  EXPECT_LT(std::abs(r.test->energy[0].relative_error), 5e-3) << "requirement: 2 %";
   EXPECT_NEAR(r.model.pumps[0].standby, 22.0 * units::kBar, 0.5 * units::kBar);
   for (const CylinderModel& c : r.model.cylinders) {
     EXPECT_GT(c.margin, 5.0 * units::kBar);

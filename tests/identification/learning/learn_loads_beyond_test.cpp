@@ -88,7 +88,7 @@ TEST_P(LearnLoadsBeyond, WithOneLoadAddsTheBalanceOfForcesToTheLawOfTheFlow) {
     set.flow[k] = 1e-4 + 5e-4 * uniform(random);
     set.pressure[k] = line(set.flow[k]) + noise(random);
   }
-  const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  const std::optional<SimilarLoads> loads = similar_loads(set, cylinder_, side());
   ASSERT_TRUE(loads);
   const GpDataset at_one = at_one_load(set, *loads);
   const GpParameters fitted = learn_gp(at_one.flow, at_one.force, at_one.pressure).parameters;
@@ -107,7 +107,7 @@ TEST_P(LearnLoadsBeyond, WithOneLoadAddsTheBalanceOfForcesToTheLawOfTheFlow) {
     }
   }
   set.force = Eigen::ArrayXd::LinSpaced(n, 0.0, 10 * kBarSeen * supply());
-  EXPECT_FALSE(alike_loads(set, cylinder_, side())) << "these loads determine a slope";
+  EXPECT_FALSE(similar_loads(set, cylinder_, side())) << "these loads determine a slope";
 }
 
 TEST_P(LearnLoadsBeyond, WithSimilarLoadsIsNoSteeperThanTheBalanceOfForces) {
@@ -126,7 +126,7 @@ TEST_P(LearnLoadsBeyond, WithSimilarLoadsIsNoSteeperThanTheBalanceOfForces) {
         set.pressure[k] =
             65 * kBarSeen + 2e10 * set.flow[k] + steep * (load - 14 * kBarSeen) + noise(random);
       }
-      const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+      const std::optional<SimilarLoads> loads = similar_loads(set, cylinder_, side());
       ASSERT_TRUE(loads) << span;
       EXPECT_GE(side() * loads->slope * supply(), 0.0) << span << " " << steep;
       EXPECT_LE(side() * loads->slope * supply(), 1.0) << span << " " << steep;
@@ -150,7 +150,7 @@ TEST_P(LearnLoadsBeyond, WithSimilarLoadsUsesTheSlopeOfTheSamples) {
       set.force[k] = side() * load * supply();
       set.pressure[k] = 30 * kBarSeen + 3e10 * set.flow[k] + kShare * load + noise(random);
     }
-    const std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+    const std::optional<SimilarLoads> loads = similar_loads(set, cylinder_, side());
     ASSERT_TRUE(loads) << span;
     const double wrong = kShare - side() * loads->slope * supply();
     const double unsure = loads->slope_deviation * supply();
@@ -169,11 +169,11 @@ TEST_P(LearnLoadsBeyond, WithSimilarLoadsWithoutNoiseIsTheirSlope) {
   const Eigen::ArrayXd load = Eigen::ArrayXd::LinSpaced(n, 10 * kBarSeen, 15 * kBarSeen);
   set.force = side() * supply() * load;
   set.pressure = 40 * kBarSeen + kShare * load;
-  std::optional<AlikeLoads> loads = alike_loads(set, cylinder_, side());
+  std::optional<SimilarLoads> loads = similar_loads(set, cylinder_, side());
   ASSERT_TRUE(loads);
   EXPECT_NEAR(side() * loads->slope * supply(), kShare, 1e-3);
   set.pressure.setZero();
-  loads = alike_loads(set, cylinder_, side());
+  loads = similar_loads(set, cylinder_, side());
   ASSERT_TRUE(loads);
   EXPECT_NEAR(side() * loads->slope * supply(), 0.0, 1e-3) << "no residual";
 }

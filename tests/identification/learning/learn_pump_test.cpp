@@ -137,9 +137,11 @@ TEST(LearnPump, ACylinderThatNeverMovesGetsTheMedianMargin) {
   EXPECT_TRUE(std::isinf(pump.margins[1].upper_bound));
   EXPECT_EQ(pump.margins[1].margin, pump.margins[0].margin);
   ASSERT_FALSE(pump.warnings.empty());
-  EXPECT_THAT(pump.warnings[0], testing::StartsWith("cylinder 2 is the load-sensing leader in 0 of 0"));
+  EXPECT_THAT(pump.warnings[0],
+              testing::StartsWith("cylinder 2 is the load-sensing leader in 0 of 0"));
   samples.names = {"boom", "jib"};
-  EXPECT_THAT(learn_pump(samples).warnings[0], testing::StartsWith("jib is the load-sensing leader in 0 of 0"));
+  EXPECT_THAT(learn_pump(samples).warnings[0],
+              testing::StartsWith("jib is the load-sensing leader in 0 of 0"));
 }
 
 TEST(LearnPump, WithoutSamplesAtStandbyTheDataSheetIsUsed) {

@@ -120,7 +120,7 @@ TEST_F(LogFiles, MillisecondsAndDegreesAreConverted) {
   EXPECT_DOUBLE_EQ(log.time[2], 0.04);
   EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[0], std::numbers::pi / 2.0);
   EXPECT_DOUBLE_EQ(log.find(Role::kStroke, 1)->values[2], 1.002);
-  EXPECT_EQ(log.find(Role::kJointPosition, 1), nullptr);  // the stroke stands in its place
+  EXPECT_EQ(log.find(Role::kJointPosition, 1), nullptr);  // the log has its stroke
 }
 
 TEST_F(LogFiles, UnknownColumnsAreCandidatesAndTextIsLeftOut) {

@@ -59,7 +59,7 @@ double rmse(const CompareResult& r, const std::string& stage, const std::string&
   return score == nullptr ? std::nan("") : score->rmse;
 }
 
-TEST(SetOpenings, AreWhatDeadBandsLeaveOfTheirOwnCylindersCommands) {
+TEST(SetOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
   const Machine machine = testing_support::arm_machine();
   MachineSeries series;
   series.cylinders.resize(2);
@@ -83,7 +83,7 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
   int checked = 0;
   for (const EffectAt& place : candidates(bare.machine)) {
     const EffectInfo& info = place.effect->info();
-    // presliding remembers where it turned; the chain, which knows no past, says what it is when slid
+    // Presliding friction depends on the last reversal; the chain, which has no memory, gives its sliding value.
     if (info.stage != EffectStage::kForce || info.id == "presliding") continue;
     CraneModel model = bare;
     const std::string key = effect_key(info, bare.machine, place.at);
@@ -101,11 +101,11 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
       largest = std::max(
           largest, std::abs(force - without.evaluate(&q, &qd, s.payload[k]).cylinders[0].force));
     }
-    // rounding of forces of 10 kN; flex is not quite proportional to its parameters, which logs take it to be
+    // Rounding of forces of 10 kN; on logs flex is taken as proportional to its parameters, which is an approximation.
     EXPECT_LT(difference, info.id == "structural_flex" ? 5e-2 * largest : 1e-4) << key;
     if (largest > 1.0) ++checked;
   }
-  EXPECT_GE(checked, 6) << "effects that do something on this arm";
+  EXPECT_GE(checked, 6) << "effects that act on this arm";
 }
 
 TEST(ApplyEffects, ResidualIsZeroWhenTheModelHasThem) {

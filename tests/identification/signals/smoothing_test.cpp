@@ -46,9 +46,9 @@ void expect_polynomials_exact(const Eigen::VectorXd& time, int order) {
     const Smoothed out = sg.smooth(p);
     const Eigen::VectorXd slope =
         degree >= 1 ? Eigen::VectorXd(degree * s.pow(degree - 1)) : Eigen::VectorXd::Zero(s.size());
-    const Eigen::VectorXd curvature = degree >= 2
-                                     ? Eigen::VectorXd(degree * (degree - 1) * s.pow(degree - 2))
-                                     : Eigen::VectorXd::Zero(s.size());
+    const Eigen::VectorXd curvature =
+        degree >= 2 ? Eigen::VectorXd(degree * (degree - 1) * s.pow(degree - 2))
+                    : Eigen::VectorXd::Zero(s.size());
     const double size = p.cwiseAbs().maxCoeff();
     // Rounding of the samples (1e-16 of their size) grows by 1/step for each derivative (step 0.02 s).
     EXPECT_LT((out.value - p).cwiseAbs().maxCoeff(), 1e-13 * size) << degree;

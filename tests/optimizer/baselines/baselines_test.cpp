@@ -1,4 +1,4 @@
-// Motions to compare with: their geometry in closed form, their limits, and that none is cheaper than the optimum.
+// Baselines: their geometry in closed form, their limits, and that none is cheaper than the optimum.
 #include "optimizer/baselines/baselines.h"
 
 #include <gmock/gmock.h>
@@ -50,7 +50,7 @@ TEST(Baselines, ActuatorLineStrokesAreInProportion) {
     const double x0 = linkage_rates(c.problem.machine, cylinder, from[j]).value,
                  x1 = linkage_rates(c.problem.machine, cylinder, to[j]).value;
     for (int k = 0; k <= 10; ++k) {
-      // 60 bisections of a range of about one: rounding alone is left
+      // 60 bisections of a range of about one leave rounding only.
       EXPECT_NEAR(linkage_rates(c.problem.machine, cylinder, path(k, j)).value,
                   x0 + 0.1 * k * (x1 - x0), 1e-12);
     }
@@ -69,15 +69,15 @@ TEST(Baselines, PseudoInverseKeepsTheTipOnItsLine) {
     const Eigen::Vector3d wanted = first + (goal - first) * (k / 20.0);
     EXPECT_LT((tip_position<double>(c.problem.machine, q) - wanted).norm(), 1e-7);
   }
-  // least joint motion: a small step lies in the row space of the weighted jacobian. Of a planar arm with three joints one
-  // direction moves the tip nowhere, the step must have none of it (second order in the step, hence 2 %).
+  // A step of least joint motion lies in the row space of the weighted Jacobian. One direction of a planar arm with three
+  // joints does not move the tip; the step must have no component along it (to second order in the step, hence 2 %).
   const VectorXd q0 = path.row(0), step = path.row(1) - path.row(0);
   const VectorXd speed = speed_scale(c.problem);
   const Eigen::Matrix3Xd weighted =
       point_jacobian_matrix(c.problem.machine, q0, c.problem.machine.tip.joint,
                             c.problem.machine.tip.xyz) *
       speed.asDiagonal();
-  // the weighted jacobian without its row across the arm's plane has two rows
+  // The weighted Jacobian has two rows without the one normal to the arm's plane.
   Eigen::MatrixXd in_plane(3, 2);
   in_plane << weighted.row(0).transpose(), weighted.row(2).transpose();
   const VectorXd null = complement_of(in_plane).col(0);
@@ -85,7 +85,7 @@ TEST(Baselines, PseudoInverseKeepsTheTipOnItsLine) {
   EXPECT_LT(std::abs(null.dot(scaled)), 0.02 * scaled.norm());
 }
 
-TEST(Baselines, PseudoInverseSaysHowFarItCame) {
+TEST(Baselines, PseudoInverseSaysHowFarItGot) {
   const BaselineCase c;
   double share = 1.0;
   pseudo_inverse_line(c.problem.machine, c.problem, {14.0, 0.0, 3.0}, &share);
@@ -93,13 +93,13 @@ TEST(Baselines, PseudoInverseSaysHowFarItCame) {
   EXPECT_GT(share, 0.3);  // the telescope reaches 12.4 m
 }
 
-TEST(Baselines, SharedTimeAddsUpAndIsBestAmongSplits) {
+TEST(Baselines, SharedTimeAddsUpAndIsTheBestSplit) {
   const BaselineCase c;
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   const BaselineMotion m = set.at(kSequential, 25.0);
   ASSERT_TRUE(m.found()) << m.why;
   EXPECT_NEAR(m.motion.duration(), 25.0, 1e-9);
-  // one cylinder at a time, that is what it says
+  // Only one cylinder moves at a time.
   double alone = 0.0;
   for (std::size_t k = 0; k <= 1; ++k) alone += m.energy.share_moving[k];
   EXPECT_NEAR(alone, 1.0, 1e-9);
@@ -120,15 +120,15 @@ TEST(Baselines, EveryKindKeepsAllLimitsBetweenTheKnotsOrSaysWhyNot) {
     EXPECT_FALSE(none.found()) << kind;
     EXPECT_THAT(none.why, HasSubstr("needs")) << kind;
   }
-  // the pseudo-inverse's postures are among the choices
+  // The postures of the pseudo-inverse are among the candidates.
   EXPECT_LE(set.at(kBestTipLine, 16.0).energy.total,
             set.at(kTipLine, 16.0).energy.total * (1 + 1e-12));
-  // the best end posture is at least as cheap as the nearest
+  // The best goal configuration is at least as cheap as the nearest.
   EXPECT_LE(set.at(kJointLine, 16.0).energy.total,
             set.at(kNearestJointLine, 16.0).energy.total * (1 + 1e-12));
 }
 
-TEST(Baselines, OwnBestTimeIsShorterTheMoreIdlingCosts) {
+TEST(Baselines, OwnBestDurationIsShorterWithMoreIdlePower) {
   const BaselineCase c;
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
   const BaselineMotion fast = set.at_own_best(kJointLine, 0.0);
@@ -139,12 +139,12 @@ TEST(Baselines, OwnBestTimeIsShorterTheMoreIdlingCosts) {
   const auto cost = [](const BaselineMotion& m, double idle) {
     return m.energy.total + idle * m.duration;
   };
-  // each is better under its own price than the other; golden section ends within 3 % of the time
+  // Each duration is the better one at its own idle power; golden section ends within 3 % of the duration.
   EXPECT_LE(cost(cheap, 50.0), cost(dear, 50.0) * 1.001);
   EXPECT_LE(cost(dear, 5000.0), cost(cheap, 5000.0) * 1.001);
 }
 
-TEST(Baselines, NothingReachesBeyondTheTelescope) {
+TEST(Baselines, NoBaselineReachesBeyondTheTelescope) {
   BaselineCase c;
   c.problem.goal = TipGoal{{14.0, 0.0, 3.0}};
   const BaselineSet set(c.model, c.problem, {}, few_intervals());
@@ -175,13 +175,13 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
     if (!o.found() || o.kind == kMinimumTime) continue;
     EXPECT_LE(best->energy.total, o.energy.total) << o.kind;
   }
-  // the fastest motion is faster than any line, and dearer than the optimum with more time
+  // The fastest motion is faster than any line and costs more than the optimum of a longer duration.
   const StrategyOutcome* fastest = row->find(kMinimumTime);
   ASSERT_NE(fastest, nullptr);
   EXPECT_LT(fastest->duration, row->find(kJointLine)->shortest);
   EXPECT_LE(worst_excess(check_limits(c.model, c.problem, fastest->motion, 16)), 1e-5);
   EXPECT_LE(best->energy.total, fastest->energy.total);
-  // what travels through a pipe is what was sent
+  // Packing and unpacking returns the same comparison.
   const StrategyComparison again = unpacked_comparison(packed(r));
   EXPECT_EQ(again.rows.size(), r.rows.size());
   EXPECT_EQ(again.rows[0].find(kOptimal)->energy.total, best->energy.total);
@@ -189,9 +189,9 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
   EXPECT_EQ(again.orders.size(), r.orders.size());
 }
 
-TEST(Strategies, TooShortATimeNamesTheLimitThatIsBroken) {
+TEST(Strategies, TooShortADurationNamesTheViolatedLimit) {
   BaselineCase c;
-  c.problem.duration = {3.0, 3.0};  // the pump alone asks for more than twice that
+  c.problem.duration = {3.0, 3.0};  // the pump's flow alone needs more than twice that
   StrategyOptions options;
   options.baselines = few_intervals();
   options.optimize = options.baselines.optimize;

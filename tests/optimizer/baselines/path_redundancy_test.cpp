@@ -1,4 +1,4 @@
-// The tip line of best redundancy: its geometry, its sum against the exact law, an answer known beforehand, refusals.
+// The tip line of best redundancy: its geometry, its sum against the exact law, a known optimum, refusals.
 #include "optimizer/baselines/path_redundancy.h"
 
 #include <gmock/gmock.h>
@@ -55,8 +55,8 @@ TEST(PathRedundancy, TipStaysOnItsLineAndLimitsHold) {
   ASSERT_TRUE(r.found()) << r.why;
   EXPECT_NEAR(r.motion.duration(), 16.0, 1e-12);
   EXPECT_LE(worst_excess(check_limits(c.model, c.problem, r.motion, 16)), 1e-5);
-  // Control points are on the line, the spline between two of them is a chord that bulges by at most angle^2 r / 8 and
-  // angle * extension / 4, with the largest steps of an interval of 0.16 s. Twice that: bends of the chord's ends.
+  // Control points are on the line; between two of them the tip deviates from the chord by at most angle^2 r / 8 and
+  // angle * extension / 4, with the largest steps of an interval of 0.16 s. Twice that allows for the rounded corners.
   const double h = 0.16;
   const double angle = h * (r.motion.qd.col(0) + r.motion.qd.col(1)).cwiseAbs().maxCoeff(),
                jib = h * r.motion.qd.col(1).cwiseAbs().maxCoeff(),
@@ -67,7 +67,7 @@ TEST(PathRedundancy, TipStaysOnItsLineAndLimitsHold) {
   EXPECT_LT(bulge, 2e-3);
 }
 
-TEST(PathRedundancy, IsNeverDearerThanThePseudoInverse) {
+TEST(PathRedundancy, NeverCostsMoreThanThePseudoInverse) {
   for (const auto& [name, duration] : {std::pair{"loader_crane_lift.yaml", 16.0},
                                        {"loader_crane_unfold.yaml", 20.0},
                                        {"loader_crane_lower.yaml", 18.0},
@@ -80,8 +80,8 @@ TEST(PathRedundancy, IsNeverDearerThanThePseudoInverse) {
     ASSERT_TRUE(r.found()) << name << ": " << r.why;
     EXPECT_LE(r.energy.total, least_motion) << name;
     EXPECT_GT(r.grids, 0) << name << ": the grid itself found nothing better";
-    // Two sums of one integral: powers at 100 knots against 1600 midpoints. They differ where a cylinder starts or
-    // stops within an interval; ten such among 100 intervals, half counted, each worth at most a fifth of the power.
+    // The integral is summed from powers at 100 knots and at 1600 midpoints. The sums differ where a cylinder starts or
+    // stops within an interval: ten such among 100 intervals, half counted, each at most a fifth of the power.
     EXPECT_NEAR(r.summed_J, r.energy.total, 0.01 * r.energy.total) << name;
   }
 }
@@ -96,7 +96,7 @@ TEST(PathRedundancy, FinerGridsChangeLittle) {
   const PathRedundancy coarse = best_redundancy_line(c.model, c.problem, 16.0, line),
                        best = best_redundancy_line(c.model, c.problem, 16.0, line, fine);
   ASSERT_TRUE(coarse.found() && best.found());
-  // refining ends at changes of 0.5 %; twice that for all finer grids together
+  // Refinement ends at changes of 0.5 %; all finer grids together are allowed twice that.
   EXPECT_NEAR(coarse.energy.total, best.energy.total, 0.01 * best.energy.total);
 }
 
@@ -106,14 +106,14 @@ TEST(PathRedundancy, TelescopeAloneWhereEveryOtherCylinderWouldRaiseThePressure)
   VectorXd end = c.problem.start;
   end[2] = 3.0;
   c.problem.goal = TipGoal{tip_position<double>(c.problem.machine, end)};
-  // each of the other two would add 150 bar to the pressure of all the oil as soon as it moves
+  // Each of the other two would raise the pump pressure by 150 bar as soon as it moves.
   c.model.cylinders[0].margin = c.model.cylinders[1].margin = 150e5;
   c.problem.limits.pump_max_pressure.assign(1, 600e5);
   const Trajectory line = c.pseudo_inverse(20.0);
   const PathRedundancy r = best_redundancy_line(c.model, c.problem, 20.0, line);
   ASSERT_TRUE(r.found()) << r.why;
   for (Eigen::Index j = 0; j < 2; ++j) {
-    // Newton's rounding is taken out of a step, so what rests rests; 1e-8 rad for its sum over 100 steps
+    // Newton's residual is removed from each step, so a joint at rest stays there; 1e-8 rad covers the sum of 100 steps.
     EXPECT_LT((r.motion.q.col(j).array() - c.problem.start[j]).abs().maxCoeff(), 1e-8);
     EXPECT_LT(r.motion.qd.col(j).cwiseAbs().maxCoeff(), 1e-9);
   }
@@ -121,7 +121,7 @@ TEST(PathRedundancy, TelescopeAloneWhereEveryOtherCylinderWouldRaiseThePressure)
   EXPECT_LT(r.energy.total, 0.8 * exact_total_energy(c.model, line, c.problem.payload));
 }
 
-TEST(PathRedundancy, RefusesWhatHasNoSingleRedundantJoint) {
+TEST(PathRedundancy, RefusesMachinesWithoutASingleRedundantJoint) {
   const LineCase two_joints("hmf_lift.yaml");
   EXPECT_THAT(path_redundancy_refusal(two_joints.problem),
               HasSubstr("2 joints move the tip in 2 directions"));
@@ -148,7 +148,7 @@ TEST(PathRedundancy, IsAsFastAsThePseudoInverse) {
             set.at(kTipLine, duration).energy.total * (1 + 1e-12));
 }
 
-TEST(PathRedundancy, SaysHowFarItComesInTooShortATime) {
+TEST(PathRedundancy, SaysHowFarItGetsInTooShortADuration) {
   const LineCase c;
   const PathRedundancy r = best_redundancy_line(c.model, c.problem, 3.0, {});
   EXPECT_FALSE(r.found());

@@ -43,7 +43,7 @@ TEST(SignedRank, TiesShareTheirRankAndZerosAreLeftOut) {
   EXPECT_DOUBLE_EQ(t.p_value, 2.0 * 3.0 / 8.0);
 }
 
-TEST(SignedRank, NoDifferenceIsNoEvidence) {
+TEST(SignedRank, WithoutDifferencesThePValueIsOne) {
   EXPECT_DOUBLE_EQ(signed_rank_test({}).p_value, 1.0);
   EXPECT_DOUBLE_EQ(signed_rank_test({0.0, 0.0}).p_value, 1.0);
 }
@@ -54,7 +54,7 @@ TEST(SignedRank, NormalApproximationJoinsTheExactOne) {
     for (int i = 1; i <= n; ++i) d.push_back(i % 3 == 0 ? -i : i);
     return signed_rank_test(d);
   };
-  // Wilcoxon's mean and variance without ties, and half a step for continuity
+  // Wilcoxon's mean and variance without ties, with the continuity correction of half a step.
   const auto by_hand = [](const SignedRank& t) {
     const double n = t.n;
     const double z =

@@ -1,4 +1,4 @@
-// The lower bound is one: against closed forms, random motions, the inequality it rests on, and searches of the goal.
+// The estimated bound lies below closed forms and random motions; its inequality and its goal search are sampled.
 #include "optimizer/bounds/energy_bound.h"
 
 #include <gmock/gmock.h>
@@ -81,12 +81,12 @@ TEST(EnergyBound, IsPressureTimesVolumeAtConstantPressure) {
                (dx > 0.0 ? cylinder.area_piston() : cylinder.area_rod());
     }
     EXPECT_LE(bound.lower_bound_J, exact * (1.0 + 1e-9));
-    // the two directions' areas differ, and single precision is rounded down; nothing else is lost
+    // Only the rounding of single precision and the different areas of both directions make it loose.
     EXPECT_NEAR(bound.lower_bound_J, exact, 2e-5 * exact);
   }
 }
 
-/// Two sleds on one rail with constant demands: the cheaper one should go first and as far as it can.
+/// Two sleds on one rail with constant demands: in the optimum the cheaper one moves as far as it can.
 TEST(EnergyBound, IsExactWhenTheDemandsAreConstant) {
   const Machine machine = parse_machine(
       "name: rails\njoints:\n"
@@ -107,7 +107,7 @@ TEST(EnergyBound, IsExactWhenTheDemandsAreConstant) {
   problem.start = Eigen::Vector2d(0.0, 0.0);
   problem.goal = TipGoal{{1.0, 0.0, 1.0}};
   CraneModel model = CraneModel::untrained(machine);
-  const double pressure[2] = {100e5, 10e5};  // the second below standby
+  const double pressure[2] = {100e5, 10e5};  // the second is below standby
   for (std::size_t i = 0; i < 2; ++i) {
     GpParameters p;
     p.mean_constant = pressure[i];
@@ -140,7 +140,8 @@ TEST(EnergyBound, NoRandomMotionCostsLess) {
       corners.row(0) = c.problem.start.transpose();
       for (Eigen::Index k = 1; k < corners.rows(); ++k) {
         corners.row(k) = c.random_posture(random).transpose();
-        for (Eigen::Index j = 0; j < n; ++j) {  // often few joints move: those come near the bound
+        for (Eigen::Index j = 0; j < n;
+             ++j) {  // mostly few joints move: such motions come near the bound
           if (unit(random) < 0.6) corners(k, j) = corners(k - 1, j);
         }
       }
@@ -152,15 +153,15 @@ TEST(EnergyBound, NoRandomMotionCostsLess) {
           c.model, c.problem, path, path.leg_durations.sum() * (1.0 + 5.0 * unit(random)));
       const double energy = exact_energy(c.model, motion, c.problem.payload, 32).total;
       const double bound = potential.value(corners.bottomRows(1).transpose());
-      // 1e-3: the midpoint rule of the exact energy on whole ramps
+      // 1e-3 is the error of the midpoint rule of the exact energy on whole ramps.
       EXPECT_LE(bound, energy * (1.0 + 1e-3) + 1.0) << reach << ", trial " << trial;
       if (bound > 0.0) tightest = std::min(tightest, energy / bound);
     }
-    EXPECT_LT(tightest, 1.25) << reach << ": the bound says something";
+    EXPECT_LT(tightest, 1.25) << reach << ": the bound is not trivial";
   }
 }
 
-TEST(EnergyBound, ItsSlopesStayBelowThePricesOfMoving) {
+TEST(EnergyBound, SlopesStayBelowThePricesAtRandomPostures) {
   for (const char* reach : {"loader_crane_lift", "hmf_reach", "excavator_dump"}) {
     const BoundCase c(reach);
     MoveWeights weights = c.weights();
@@ -177,7 +178,7 @@ TEST(EnergyBound, ItsSlopesStayBelowThePricesOfMoving) {
         ASSERT_LE(std::abs(slope[j]), most * (1.0 + 1e-3) + 1e-6)
             << reach << ", joint " << j << " at " << q.transpose();
       }
-      // the gradient is the value's: by differences inside a cell
+      // The gradient agrees with differences of the value.
       VectorXd shifted = q;
       shifted[i % n] += 1e-7;
       const double difference = (potential.value(shifted) - potential.value(q)) / 1e-7;
@@ -208,7 +209,7 @@ TEST(EnergyBound, PricesAreTheLeastOfSingleMoves) {
           least = std::min(least, power);
         }
         EXPECT_LE(price(j, direction), least * (1.0 + 1e-9));
-        // flows beyond the valve's are not tried by the price; else half a percent for safety and sampling
+        // 1 % covers the allowance of the table and the sampling of speeds.
         EXPECT_GE(price(j, direction), least * 0.99);
       }
     }

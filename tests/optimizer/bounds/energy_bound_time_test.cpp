@@ -1,4 +1,4 @@
-// Bounds at a given time and of the time itself: the inequality behind them, closed forms, and motions that keep all limits.
+// Estimated bounds at a given duration and of the duration itself: their inequality, closed forms, and feasible motions.
 #include "optimizer/bounds/energy_bound_time.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ TimedBoundOptions quick_bound() {
   return options;
 }
 
-TEST(TimedBound, NoAdmissibleSpeedGainsMoreThanItSays) {
+TEST(TimedBound, NoAdmissibleSpeedExceedsTheMaximisedHamiltonian) {
   for (const char* reach : {"loader_crane_lift", "swing_crane_load", "excavator_dump"}) {
     const TimedCase c(reach);
     const int n = c.model.machine.joint_count();
@@ -71,7 +71,7 @@ TEST(TimedBound, NoAdmissibleSpeedGainsMoreThanItSays) {
         const Range& r = c.problem.limits.position[static_cast<std::size_t>(j)];
         q[j] = r.lo + (r.hi - r.lo) * unit(random);
       }
-      // slopes around the prices of moving alone, so that who should move is not obvious
+      // Slopes are near the prices of moving alone, so that the best set of joints is not obvious.
       plain.at(q, price);
       for (int j = 0; j < n; ++j) {
         const int direction = unit(random) < 0.5 ? 0 : 1;
@@ -91,12 +91,12 @@ TEST(TimedBound, NoAdmissibleSpeedGainsMoreThanItSays) {
         if (said > 100.0) nearest = std::max(nearest, gain / said);
       }
     }
-    EXPECT_GT(nearest, 0.9) << reach << ": the largest gain is nearly met";
+    EXPECT_GT(nearest, 0.9) << reach << ": random speeds come near the maximum";
   }
 }
 
-TEST(MaximisedHamiltonian, IsThatOfAFineScanOfPressures) {
-  // Most top flows lie between two knots of the demand: there the flow stops growing with the pressure.
+TEST(MaximisedHamiltonian, AgreesWithAFineScanOfPressures) {
+  // Most top flows lie between two knots of the demand, where the flow stops growing with the pressure.
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   MaximisedHamiltonian largest;
@@ -136,7 +136,7 @@ TEST(MaximisedHamiltonian, IsThatOfAFineScanOfPressures) {
   }
 }
 
-TEST(TimedBound, NoCornerOfABoxGainsMoreThanThePriceWhateverTheShares) {
+TEST(TimedBound, NoCornerOfABoxExceedsThePriceForAnyShares) {
   const TimedCase c("loader_crane_lift");
   constexpr int kJoints = 3;
   const Lattice lattice = bound_lattice(c.problem, std::vector<int>(kJoints, 6));
@@ -159,7 +159,7 @@ TEST(TimedBound, NoCornerOfABoxGainsMoreThanThePriceWhateverTheShares) {
     }
     Eigen::MatrixX2d price;
     weights.at(q, price);
-    double most = 0.0;  // one of the corners uses the price up
+    double most = 0.0;  // reaches the price at one of the corners
     for (unsigned corner = 0; corner < 1u << kJoints; ++corner) {
       VectorXd p(kJoints);
       for (int j = 0; j < kJoints; ++j) {
@@ -173,7 +173,7 @@ TEST(TimedBound, NoCornerOfABoxGainsMoreThanThePriceWhateverTheShares) {
   EXPECT_GT(least, 0.99 * shares.price);
 }
 
-TEST(TimedBound, RampsGainWhatSpeedsThatGrowFromRestGain) {
+TEST(TimedBound, RampGainAgreesWithSpeedsThatGrowFromRest) {
   const TimedCase c("loader_crane_lift");
   constexpr int kJoints = 3;
   const Lattice lattice = bound_lattice(c.problem, std::vector<int>(kJoints, 6));
@@ -190,7 +190,7 @@ TEST(TimedBound, RampsGainWhatSpeedsThatGrowFromRestGain) {
     const VectorXd q = lattice.posture(node);
     Eigen::MatrixX2d price(kJoints, 2);
     weights.prices(q.data(), force.data(), rate.data(), price);
-    constexpr double kTime = 1e-4;  // short: flows ask for hardly more than none does
+    constexpr double kTime = 1e-4;  // so short that flows and the demands they add are negligible
     std::vector<TimedMove> moves;
     moves.reserve(2 * kJoints);
     for (int j = 0; j < kJoints; ++j) {
@@ -208,7 +208,7 @@ TEST(TimedBound, RampsGainWhatSpeedsThatGrowFromRestGain) {
   }
 }
 
-TEST(TimedBound, OneSledTakesDistanceOverSpeedAndARamp) {
+TEST(TimedBound, LeastDurationOfOneSledIsDistanceOverSpeedAndARamp) {
   const Machine machine = parse_machine(
       "name: sled\njoints:\n"
       "  - {name: far, type: prismatic, parent: base, axis: [1, 0, 0], position: [0, 2], "
@@ -233,7 +233,7 @@ TEST(TimedBound, OneSledTakesDistanceOverSpeedAndARamp) {
   ASSERT_TRUE(time.valid) << time.message;
   const double exact = 1.0 / 0.2 + 0.2 / 0.5;
   EXPECT_LE(time.value, exact);
-  EXPECT_NEAR(time.value, exact, 0.01 * exact);  // 2 % of the ramp is kept back
+  EXPECT_NEAR(time.value, exact, 0.01 * exact);  // ramp_gain is raised by 2 %
   const double energy = 80e5 * machine.cylinders[0].area_piston();
   for (const double duration : {1.02 * exact, 2.0 * exact}) {
     const TimedBound bound = energy_bound_at(model, problem, duration, quick_bound());
@@ -243,8 +243,8 @@ TEST(TimedBound, OneSledTakesDistanceOverSpeedAndARamp) {
   }
 }
 
-TEST(TimedBound, OnePinnedJointTakesAngleOverSpeedAndARamp) {
-  // Its price of time is the same at every angle, so only the curve of the cylinder's length over the angle asks for lines.
+TEST(TimedBound, LeastDurationOfOnePinnedJointIsAngleOverSpeedAndARamp) {
+  // The price of time is the same at every angle, so only the curvature of the cylinder's length over the angle matters.
   MotionProblem problem;
   problem.machine = parse_machine(
       "name: mast\njoints:\n"
@@ -268,7 +268,7 @@ TEST(TimedBound, OnePinnedJointTakesAngleOverSpeedAndARamp) {
   EXPECT_GE(time.value, 0.99 * exact);
 }
 
-TEST(TimedBound, IsBelowEveryMotionFoundAndAboveNothingLess) {
+TEST(TimedBound, IsBelowEveryMotionFoundAndNotBelowTheUnlimitedBound) {
   for (const char* reach : {"loader_crane_lift", "loader_crane_lower"}) {
     const TimedCase c(reach);
     EnergyGrid grid(c.model, c.problem, {12000, 4});
@@ -295,9 +295,9 @@ TEST(TimedBound, IsBelowEveryMotionFoundAndAboveNothingLess) {
   }
 }
 
-TEST(TimedBound, IsNeverBelowThatOfAnyTime) {
-  // A price of time is charged for every second. A search of forty steps lets it fall with the time there is
-  // (under a milliwatt for an hour); one that is cut short leaves it where an hour costs more than it tells.
+TEST(TimedBound, IsNeverBelowTheBoundOfUnlimitedTime) {
+  // The price of time is charged for every second. A search of forty steps lowers it as the duration grows (below a
+  // milliwatt for an hour); a search of one step leaves it so high that an hour is charged with more than V.
   const TimedCase c("loader_crane_lift");
   TimedBoundOptions options = quick_bound();
   options.evaluations = 1;
@@ -312,8 +312,8 @@ TEST(TimedBound, IsNeverBelowThatOfAnyTime) {
   EXPECT_EQ(hour.checked_scale, any.checked_scale);
 }
 
-/// Sleds on one level rail, one upon the other: no loads, so a motion's energy is a matter of flows alone. Ramps take no
-/// time worth speaking of.
+/// Sleds on one level rail, one upon the other: there are no loads, so a motion's energy depends on flows only. Ramps are
+/// negligibly short.
 struct Rail {
   MotionProblem problem;
   CraneModel model;
@@ -341,7 +341,7 @@ struct Rail {
     problem.start = VectorXd::Zero(sleds);
     model = CraneModel::untrained(problem.machine);
     const double area = problem.machine.cylinders[0].area_piston();
-    for (int k = 0; k < sleds; ++k) {  // from 40 or 55 bar up by half as much again at full flow
+    for (int k = 0; k < sleds; ++k) {  // 40 or 55 bar, rising by half at full flow
       GpParameters p;
       p.mean_constant = (40.0 + 15.0 * k) * 1e5;
       p.signal_std = 10e5;
@@ -356,7 +356,7 @@ struct Rail {
   }
 };
 
-TEST(TimeGuide, KnowsWhatOneSledCostsWithItsTime) {
+TEST(TimeGuide, GivesTheCostOfOneSledWithItsTime) {
   Rail rail(1);
   rail.problem.goal = JointGoal{VectorXd::Constant(1, 1.0)};
   const Lattice coarse = bound_lattice(rail.problem, {4});
@@ -377,20 +377,20 @@ TEST(TimeGuide, KnowsWhatOneSledCostsWithItsTime) {
     }
     EXPECT_NEAR(guide.solve(price), best, 0.01 * best) << price;
     const TimeShares found = guide.shares(one);
-    EXPECT_NEAR(found.share(0, 0), 1.0, 0.01) << "it alone uses the price up";
-    EXPECT_EQ(found.share(0, 1), 0.0) << "it never goes back";
+    EXPECT_NEAR(found.share(0, 0), 1.0, 0.01) << "the only joint has all of the price";
+    EXPECT_EQ(found.share(0, 1), 0.0) << "it never retracts";
     EXPECT_LT(found.tilt.cwiseAbs().maxCoeff(), 0.02) << "the same everywhere";
   }
 }
 
-TEST(TimedBound, KnowsThePriceOfHasteOfOneCylinder) {
+TEST(TimedBound, RisesAsTheDurationOfOneCylinderShrinks) {
   Rail rail(1);
   rail.problem.goal = JointGoal{VectorXd::Constant(1, 1.0)};
   const double area = rail.problem.machine.cylinders[0].area_piston();
   const GaussianProcess& process = rail.model.cylinders[0].extend;
   const double slow = area * process.mean(0.0, 0.0);
   for (const double duration : {5.1, 6.0, 8.0, 12.0, 40.0}) {
-    // the least of a mixture of two speeds that takes this time: all pairs on a fine grid
+    // The least energy in this duration is that of a mixture of two speeds, sought over all pairs of a fine grid.
     constexpr int kSpeeds = 400;
     std::vector<double> cost(kSpeeds), pace(kSpeeds);
     for (int k = 0; k < kSpeeds; ++k) {
@@ -409,24 +409,24 @@ TEST(TimedBound, KnowsThePriceOfHasteOfOneCylinder) {
     const TimedBound bound = energy_bound_at(rail.model, rail.problem, duration, quick_bound());
     ASSERT_TRUE(bound.valid) << bound.message;
     EXPECT_LE(bound.value, exact * (1.0 + 1e-3)) << duration;  // 400 speeds
-    // ten straight pieces of a demand that rises by half, and the price is searched in steps: 1.9 % at the most
+    // The demand has ten linear pieces and the price is searched in steps: together 1.9 % at most.
     EXPECT_GE(bound.value, 0.975 * exact) << duration;
     if (duration < 7.0) {
-      EXPECT_GT(bound.value, 1.1 * slow) << "haste costs here";
+      EXPECT_GT(bound.value, 1.1 * slow) << "a short duration costs energy here";
     }
   }
 }
 
-TEST(TimedBound, IsBelowDynamicProgrammingInTimeOfTwoCylindersAndNearIt) {
+TEST(TimedBound, IsCloselyBelowDynamicProgrammingInTimeOfTwoCylinders) {
   Rail rail(2);
-  constexpr int kWay = 60;  // steps of way that each sled goes
+  constexpr int kWay = 60;  // number of steps of each sled's travel
   const double way[2] = {0.8, 0.5};
   rail.problem.goal = JointGoal{Eigen::Vector2d(way[0], way[1])};
   Chain chain(rail.model);
   for (const double duration : {5.5, 7.0, 9.0, 14.0}) {
     constexpr int kSteps = 12;
     const double dt = duration / kSteps;
-    // the exact law's energy of a step in which the sleds go a and b steps of way; flows within the limits
+    // Energy by the exact law of a time step in which the sleds move a and b steps, within the limits of flow.
     LimitRatios ratios(rail.problem);
     Eigen::MatrixXd stage(kWay + 1, kWay + 1);
     for (int a = 0; a <= kWay; ++a) {
@@ -459,12 +459,12 @@ TEST(TimedBound, IsBelowDynamicProgrammingInTimeOfTwoCylindersAndNearIt) {
     const TimedBound bound = energy_bound_at(rail.model, rail.problem, duration, quick_bound());
     ASSERT_TRUE(bound.valid) << bound.message;
     EXPECT_LE(bound.value, found * (1.0 + 1e-9)) << duration;
-    // whole steps of way cost some percent more than free ones; prices and shares are searched in steps
+    // Whole steps of travel cost some percent more than free ones; prices and shares are searched in steps.
     EXPECT_GE(bound.value, 0.96 * found) << duration;
   }
 }
 
-TEST(TimedBound, NoEnergyKnownOfABundledReachIsBelowIt) {
+TEST(TimedBound, IsBelowTheBestKnownEnergyOfEveryBundledReach) {
   std::ifstream in(bundled_file("best_known.json"));
   std::stringstream text;
   text << in.rdbuf();

@@ -131,7 +131,7 @@ TEST_P(EveryMachine, GoalDerivativesMatchFiniteDifferences) {
   const Vector goal_tip = std::get<TipGoal>(problem.goal).tip;
   Vector at_goal(rows);
   goal.bounds(at_goal.data(), at_goal.data());
-  for (int r = 0; r < rows; ++r) {  // each row is called by the coordinate it rules
+  for (int r = 0; r < rows; ++r) {  // each row is named after the coordinate it constrains
     const std::string name = goal.name(r);
     const std::size_t axis = std::string("xyz").find(name[0]);
     if (name.substr(1, 11) != " of the tip") {
@@ -171,7 +171,7 @@ TEST_P(EveryMachine, GoalDerivativesMatchFiniteDifferences) {
 }
 
 TEST_P(EveryMachine, ModesAgreeWithTheExactLaw) {
-  // With the true modes held there is no blending left: only the soft maximum differs, by beta log(n+1) at most.
+  // With the true modes fixed there is no blending; only the smoothed maximum differs, by beta log(n+1) at most.
   const MotionProblem problem = problem_for(model_.machine, 9);
   CraneKnotOptions options;
   options.smoothing = {2e-3, 1e3};  // 0.01 bar
@@ -199,8 +199,8 @@ TEST_P(EveryMachine, ModesAgreeWithTheExactLaw) {
 }
 
 TEST_P(EveryMachine, WholeEnergyOfATrajectoryMatchesFiniteDifferences) {
-  // The energy integral as the solver sees it: every knot's posture and speed, all limits, the goal; free and
-  // with modes held that change at a knot (two one-sided laws there).
+  // The energy integral of the NLP: every knot's posture and speed, all limits, the goal; without modes and with fixed
+  // modes that change at a knot (which has two one-sided laws).
   const MotionProblem problem = problem_for(model_.machine, 13);
   const int n = model_.machine.joint_count(), m = model_.machine.cylinder_count(), intervals = 5;
   std::mt19937 random(41);

@@ -151,7 +151,7 @@ TEST_P(EffectsOnMachine, SmoothLawTendsToTheExactOne) {
         knot.begin_node(0, 0);
         double flow = 0.0;
         for (const CylinderState& c : exact.cylinders) flow += c.flow;
-        // the soft maximum's surplus, twice as much where an effect multiplies pressures; rounding of the blend
+        // The tolerance is the error of the smoothed maximum, doubled for effects that multiply pressures, and rounding.
         const double tolerance =
             2e3 * std::log(m + 1.0) * flow / 1e3 + 1e-9 * std::abs(exact.power) / 1e3 + 1e-12;
         EXPECT_NEAR(knot.cost(z.data()), exact.power / 1e3, tolerance)
@@ -161,7 +161,7 @@ TEST_P(EffectsOnMachine, SmoothLawTendsToTheExactOne) {
   }
 }
 
-TEST_P(EffectsOnMachine, NoStrengthChangesNothing) {
+TEST_P(EffectsOnMachine, AnEffectOfZeroStrengthChangesNothing) {
   const MotionProblem problem = problem_for(bare_.machine, 9);
   const int n = bare_.machine.joint_count();
   CraneKnotOptions options;
@@ -199,7 +199,7 @@ TEST_P(EffectsOnMachine, NoStrengthChangesNothing) {
   }
 }
 
-TEST_P(EffectsOnMachine, WhatAMotionDoesNotSeeHasNoLaw) {
+TEST_P(EffectsOnMachine, EffectsWithoutInfluenceOnAMotionHaveNoLaw) {
   std::mt19937 random(3);
   Instant<double> s = make_instant(bare_.machine);
   const auto m = static_cast<std::size_t>(bare_.machine.cylinder_count());
@@ -255,12 +255,12 @@ TEST(EffectsInKnots, OnlyInertiaNeedsAccelerations) {
   EXPECT_EQ(knot.size(), 9);
 }
 
-TEST(EffectsInKnots, OtherMassesAloneKeepTheFastLaw) {
+TEST(EffectsInKnots, EffectsOnMassesAloneKeepTheFastLaw) {
   CraneModel model = loader();
   model.effects = {applied("unmodelled_mass:boom", model.machine),
                    applied("pump_lag:main", model.machine)};
   EXPECT_FALSE(SmoothEffects::needed(model));
-  // and it is the law of a machine that has that mass in its file
+  // The law equals that of a machine with this mass in its file.
   CraneModel heavier = model;
   heavier.effects.clear();
   heavier.machine = *effective_machine(model.machine, model.effects);
@@ -270,12 +270,13 @@ TEST(EffectsInKnots, OtherMassesAloneKeepTheFastLaw) {
   CraneKnotModel without(bare, problem, {});
   std::mt19937 random(5);
   double largest = 0.0;
-  for (int trial = 0; trial < 20; ++trial) {  // the boom does not lead in every state
+  for (int trial = 0; trial < 20;
+       ++trial) {  // the boom is not the load-sensing leader in every state
     const Vector z = random_state(model.machine, random);
     EXPECT_EQ(a.cost(z.data()), b.cost(z.data()));
     largest = std::max(largest, std::abs(a.cost(z.data()) - without.cost(z.data())));
   }
-  EXPECT_GT(largest, 1e-3);  // [kW] 60 kg are seen
+  EXPECT_GT(largest, 1e-3);  // [kW] effect of 60 kg
 }
 
 TEST(EffectsInKnots, SaturationLowersThePumpsFlowLimit) {
@@ -298,7 +299,7 @@ TEST(EffectsInKnots, SaturationLowersThePumpsFlowLimit) {
   EXPECT_EQ(effect_flow_limit(model.machine, {}, 0, 0.0), 0.0);
 }
 
-TEST(EffectsInKnots, TooManyJointsAreSaid) {
+TEST(EffectsInKnots, TooManyJointsAreRefused) {
   Machine machine = loader().machine;
   const Joint joint = machine.joints.back();
   for (int extra = 0; extra < 5; ++extra) {

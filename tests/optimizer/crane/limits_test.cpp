@@ -1,5 +1,5 @@
-// Limits and energies of motions small enough to know by hand: what a wrong sign, a look at the knots alone or a
-// mode that is not held would change.
+// Limits and energies of motions with closed forms, which a wrong sign, a check at the knots alone or a mode that is not
+// kept would change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -69,8 +69,8 @@ struct Slide {
   }
 };
 
-TEST(Limits, AreSeenBetweenTheKnots) {
-  // At rest at 1.9 m at both knots, half-way at 1.9 + 0.25 m: beyond the end at 2 m, seen by no knot.
+TEST(Limits, AreCheckedBetweenTheKnots) {
+  // The sled is at 1.9 m at both knots and half-way at 1.9 + 0.25 m, beyond its limit of 2 m between the knots only.
   Slide s;
   Trajectory m = s.hop(1.9, 0.0);
   m.t = (VectorXd(2) << 0.0, 1.0).finished();
@@ -78,7 +78,7 @@ TEST(Limits, AreSeenBetweenTheKnots) {
   m.qd = (Eigen::MatrixXd(2, 1) << 1.0, -1.0).finished();
   m.qdd = Eigen::MatrixXd::Constant(2, 1, -2.0);
   const LimitCheck c = s.check(m, "position of joint x");
-  EXPECT_NEAR(c.value, 2.15, 1e-12);  // the top lies on one of sixteen parts
+  EXPECT_NEAR(c.value, 2.15, 1e-12);  // the maximum lies on one of the sixteen samples
   EXPECT_NEAR(c.time, 0.5, 1e-12);
   EXPECT_NEAR(c.excess, 0.15 / 2.0, 1e-12);
   EXPECT_LT(s.check(m, "position of joint x", 1).excess, 0.0);
@@ -98,7 +98,7 @@ TEST(Limits, EachDirectionHasItsOwnValveLimit) {
   EXPECT_GT(in.excess, 0.7);
 }
 
-TEST(Limits, EndsInThePlaceThatWasAskedFor) {
+TEST(Limits, StartAndGoalAreChecked) {
   Slide s;
   const Trajectory m = s.hop(0.5, 0.5);
   EXPECT_LE(s.check(m, "distance from the goal posture").excess, 0.0);
@@ -113,10 +113,10 @@ TEST(Limits, EndsInThePlaceThatWasAskedFor) {
   EXPECT_NEAR(s.check(m, "distance of the tip from its goal").excess, 0.3, 1e-4);
 }
 
-TEST(Limits, ObstaclesAndPressureCount) {
+TEST(Limits, ObstaclesAndPressureAreChecked) {
   Slide s;
   const Trajectory m = s.hop(0.5, 0.5);
-  s.problem.limits.pump_max_pressure[0] = 40e5;  // the pump gives 50 bar
+  s.problem.limits.pump_max_pressure[0] = 40e5;  // the pump needs 50 bar
   EXPECT_NEAR(s.check(m, "pressure of pump main").excess, 0.25, 1e-9);
   s.problem.obstacles.push_back({"post", Sphere{{1.0, 0.0, 1.0}, 0.2}});
   EXPECT_GT(s.check(m, "clearance beyond the required distance").excess, 0.1);
@@ -129,16 +129,17 @@ TEST(ExactEnergy, SharesOfPumpsUsefulWorkAndDataAddUp) {
   const Trajectory m = s.hop(0.5, 0.5);
   const MotionEnergy e = exact_energy(s.model, m, 0.0);
   EXPECT_NEAR(e.pump[0], e.total, 1e-9 * e.total);
-  EXPECT_NEAR(e.useful[0], e.total, 1e-9 * e.total);  // one cylinder, no margin: nothing throttled
+  EXPECT_NEAR(e.useful[0], e.total,
+              1e-9 * e.total);  // one cylinder without margin has no throttling loss
   EXPECT_EQ(e.moving_share_outside_data, 0.0);
   GpParameters p = s.model.cylinders[0].extend.parameters();
-  // half the highest speed: exceeded in the middle half of a triangle of speed
+  // The data end at half the highest speed, which a triangular profile exceeds in its middle half.
   p.flow_max = 0.25 * s.problem.machine.cylinders[0].area_piston();
   s.model.cylinders[0].extend = GaussianProcess(p);
   EXPECT_NEAR(exact_energy(s.model, m, 0.0).moving_share_outside_data, 0.5, 1e-12);
 }
 
-/// The bundled lift under a known model, with straight lines to two end postures.
+/// The bundled lift with a synthetic model and straight lines to two goal configurations.
 struct Lift {
   MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   CraneModel model = test_support::synthetic_model(problem.machine);
@@ -178,7 +179,7 @@ TEST(ExactEnergy, PotentialEnergyIsThatOfTheLift) {
 TEST(Optimize, BaselinesAreTheCheapestOfTheirKind) {
   Lift c;
   c.options.sequential_starts = 0;
-  c.options.smooth_iterations = 5;  // the baselines do not depend on how well it is solved
+  c.options.smooth_iterations = 5;  // the baselines do not depend on the solve
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
   double cheapest = INFINITY, nearest = 0.0;
   for (const SeedMotion& s : c.seeds) {
@@ -188,15 +189,15 @@ TEST(Optimize, BaselinesAreTheCheapestOfTheirKind) {
     if (&s == &c.seeds.front()) nearest = energy;
     cheapest = std::min(cheapest, energy);
   }
-  EXPECT_GT(std::abs(nearest - cheapest), 0.01 * cheapest) << "the case cannot tell them apart";
+  EXPECT_GT(std::abs(nearest - cheapest), 0.01 * cheapest) << "the two lines must differ in energy";
   EXPECT_EQ(r.straight_line_energy, cheapest);
   EXPECT_EQ(r.best_seed_energy, cheapest);
   EXPECT_EQ(r.nearest_line_energy, nearest);
 }
 
-TEST(Optimize, HeldModesAreKeptBySolver) {
-  // Without overlaps offered, the solver may shift, stretch and reshape the legs of a one-by-one motion, never drive
-  // two cylinders at once.
+TEST(Optimize, FixedModesAreKeptBySolver) {
+  // Without overlaps the solver may shift and stretch the legs of a sequential motion, but never move two cylinders at
+  // once.
   Lift c;
   c.options.overlap = 0.0;
   const VectorXd times = VectorXd::LinSpaced(41, 0.0, 16.0);
@@ -226,7 +227,7 @@ TEST(Optimize, AnInterruptedSearchSaysSoAndKeepsWhatItHas) {
   EXPECT_LE(worst_excess(r.checks), 1e-5);
 }
 
-TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
+TEST(Optimize, TheFeasibleDurationNamedIsThatOfTheShortestSeed) {
   Lift c;
   c.problem.duration = {2.0, 2.0};
   c.options.sequential_starts = 0;
@@ -236,7 +237,7 @@ TEST(Optimize, TheFeasibleDurationNamedIsTheShortestSeeds) {
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, c.options);
   EXPECT_EQ(r.status, OptimizeStatus::kInfeasible);
   EXPECT_THAT(r.message, HasSubstr("keeps all limits in 11.2 s"));
-  // what it names is of the start that came nearest, and what hydraulics cannot give before what follows from it
+  // The message names a limit of the start with the smallest violation, and a flow rather than what follows from it.
   double nearest = INFINITY;
   for (const StartResult& start : r.starts)
     if (start.motion.size() > 1) nearest = std::min(nearest, start.excess);

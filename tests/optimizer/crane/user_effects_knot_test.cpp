@@ -1,5 +1,5 @@
-// Effects that a user's file describes, in the optimiser: exact derivatives of the whole energy and of all limits, one
-// law of each stage that a motion sees.
+// User effects from a file in the optimiser: exact derivatives of the whole energy and of all limits, with one law of each
+// stage that influences a motion.
 #include <gtest/gtest.h>
 
 #include "models/effects/formula/user_effect.h"

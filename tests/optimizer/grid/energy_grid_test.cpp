@@ -1,4 +1,4 @@
-// Grid paths against closed forms, the exact law's verdict and the limits.
+// Grid paths against closed forms, the exact law and the limits.
 #include "optimizer/grid/energy_grid.h"
 
 #include <gmock/gmock.h>
@@ -53,7 +53,7 @@ TEST(EnergyGrid, EndsAtTheGoalWithinAllLimitsAtItsShortestDurationAndAnyLonger) 
         const Trajectory motion =
             timed_grid_path(c.model, c.problem, path, slower * path.duration_s);
         for (const LimitCheck& check : check_limits(c.model, c.problem, motion, 23)) {
-          // pump pressure is only looked at along whole moves; clearance of ramps not at all
+          // The grid checks pump pressure along whole moves only, and no clearance during ramps.
           if (check.what.starts_with("pressure")) continue;
           const double slack = check.what.starts_with("clearance") ? 0.02 : 1e-4;
           EXPECT_LE(check.excess, slack) << reach << ", price " << price << ": " << check.what;
@@ -63,7 +63,7 @@ TEST(EnergyGrid, EndsAtTheGoalWithinAllLimitsAtItsShortestDurationAndAnyLonger) 
   }
 }
 
-TEST(EnergyGrid, ConstantPressureCostsPressureTimesVolumeWhateverTheWay) {
+TEST(EnergyGrid, ConstantPressureCostsPressureTimesVolumeOnEveryPath) {
   GridCase c("hmf_reach");
   ASSERT_EQ(c.problem.machine.pumps[0].type, PumpType::kConstantPressure);
   const VectorXd start = c.problem.start;
@@ -90,7 +90,7 @@ TEST(EnergyGrid, ConstantPressureCostsPressureTimesVolumeWhateverTheWay) {
   }
 }
 
-TEST(EnergyGrid, IsCheaperThanTheStraightLineAndCheaperTheMoreTimeThereIs) {
+TEST(EnergyGrid, IsCheaperThanTheStraightLineAndCheaperInLongerDurations) {
   const GridCase c("loader_crane_lift");
   EnergyGrid grid(c.model, c.problem);
   const GridPath slow = grid.cheapest_path(0.0);
@@ -101,7 +101,7 @@ TEST(EnergyGrid, IsCheaperThanTheStraightLineAndCheaperTheMoreTimeThereIs) {
       exact_energy(c.model, timed_grid_path(c.model, c.problem, slow, 60.0), c.problem.payload)
           .total;
   EXPECT_LT(timed, straight);
-  // at unlimited time each leg has its own best speed, at 60 s all have one: a bar or two of fifty
+  // At unlimited time each leg has its own best speed, in 60 s all share one: one or two bar of fifty.
   EXPECT_NEAR(timed, slow.slow_energy_J, 0.03 * timed);
   const GridPath fast = grid.cheapest_path(1e6);
   ASSERT_TRUE(fast.found);
@@ -171,8 +171,8 @@ TEST(EnergyGrid, SaysWhyThereIsNoPath) {
   EXPECT_THAT(none.message, ::testing::HasSubstr("no posture"));
 }
 
-TEST(EnergyGrid, FindsAnEndPostureWhenTheWayThereLeadsAlongAJointsLimit) {
-  // Beside the column and far below it: from this start the telescope is at its end long before the booms hang down.
+TEST(EnergyGrid, FindsAGoalConfigurationAlongAJointsLimit) {
+  // The goal is beside the column and far below it: the telescope reaches its limit long before the booms point down.
   GridCase c("loader_crane_fold");
   c.problem.obstacles.clear();
   c.problem.start = Eigen::Vector3d(0.537784, -1.03959, 2.14803);
@@ -189,22 +189,22 @@ TEST(EnergyGrid, FindsAnEndPostureWhenTheWayThereLeadsAlongAJointsLimit) {
   EXPECT_TRUE(path.found) << path.message;
 }
 
-TEST(EnergyGrid, DrivenAsItIsCostsMoreThanSlowlyAndSaysWhyNot) {
+TEST(EnergyGrid, DrivenPathCostsMoreThanAtUnlimitedTimeOrSaysWhyThereIsNone) {
   GridCase c("loader_crane_lift");
   const EnergyGridOptions small{12000, 4};
-  const DrivenGridPath hurried = driven_grid_path(c.model, c.problem, 10.0, small),
+  const DrivenGridPath fast = driven_grid_path(c.model, c.problem, 10.0, small),
                        slow = driven_grid_path(c.model, c.problem, 60.0, small);
   ASSERT_GT(slow.energy, 0.0) << slow.message;
-  EXPECT_GT(slow.energy, slow.slow_energy) << "flow losses";
+  EXPECT_GT(slow.energy, slow.slow_energy) << "a finite duration has flow losses";
   EXPECT_LT(slow.energy, 1.05 * slow.slow_energy);
-  EXPECT_EQ(hurried.slow_energy, slow.slow_energy) << "of no duration";
-  if (hurried.energy > 0.0) {
-    EXPECT_GT(hurried.energy, slow.energy);
+  EXPECT_EQ(fast.slow_energy, slow.slow_energy) << "it does not depend on the duration";
+  if (fast.energy > 0.0) {
+    EXPECT_GT(fast.energy, slow.energy);
   }
   const DrivenGridPath never = driven_grid_path(c.model, c.problem, 1.0, small);
   EXPECT_EQ(never.energy, 0.0);
   EXPECT_THAT(never.message, ::testing::HasSubstr("this fast"));
-  c.problem.limits.pressure_std = 1e3;  // what a grid does not look at
+  c.problem.limits.pressure_std = 1e3;  // a limit that the grid does not know
   const DrivenGridPath unsure = driven_grid_path(c.model, c.problem, 60.0, small);
   EXPECT_EQ(unsure.energy, 0.0);
   EXPECT_THAT(unsure.message, ::testing::HasSubstr("standard deviation of the pressure"));
@@ -214,10 +214,10 @@ TEST(EnergyGrid, DrivenAsItIsCostsMoreThanSlowlyAndSaysWhyNot) {
   EXPECT_THAT(none.message, ::testing::HasSubstr("waypoints"));
 }
 
-TEST(DemandTable, MatchesTheProcessAndItsLeastIsBelowItEverywhere) {
+TEST(DemandTable, MatchesThePressureModelAndItsLeastIsBelowItOnAFineGrid) {
   const GaussianProcess process = test_support::synthetic_process(0.02, true, 2e-3, 3e5, 5);
   const DemandTable table(process, 7e5, 2e-3, {-2e5, 2.5e5});
-  EXPECT_LT(table.allowance(), 0.5e5);  // half a bar of some hundred
+  EXPECT_LT(table.allowance(), 0.5e5);  // half a bar, of pressures of some hundred
   for (double force = -2e5; force <= 2.5e5; force += 1.37e3) {
     double least = 1e12;
     for (double flow = 1e-6; flow <= 2e-3; flow += 1.3e-5) {
@@ -226,7 +226,7 @@ TEST(DemandTable, MatchesTheProcessAndItsLeastIsBelowItEverywhere) {
       least = std::min(least, exact);
     }
     EXPECT_LE(table.least(force), least);
-    EXPECT_GE(table.least(force), least - 0.1e5);  // the price of safety, of some hundred bar
+    EXPECT_GE(table.least(force), least - 0.1e5);  // the allowance makes it at most 0.1 bar too low
   }
 }
 

@@ -19,7 +19,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A symmetric matrix as triplets of its lower triangle, and whole.
+/// A symmetric matrix as triplets of its lower triangle and as a dense matrix.
 struct Symmetric {
   explicit Symmetric(int order) : dense(MatrixXd::Zero(order, order)) {}
   void add(int i, int j, double v) {
@@ -81,7 +81,7 @@ class ChainKkt {
     return s.knots * 2 * s.states + s.border + 2 * s.knots * s.rows + (s.knots - 1) * s.states;
   }
   double normal() { return std::normal_distribution<>(0.0, 1.0)(random_); }
-  /// What a barrier makes of the distance to a bound: from nearly nothing to very much.
+  /// Barrier terms of the distance to a bound, over many decades.
   double sigma() {
     return barrier_ * std::pow(10.0, std::uniform_real_distribution<>(-8.0, 6.0)(random_));
   }
@@ -127,7 +127,7 @@ TEST(ChainLdl, InertiaAndSolutionOfRandomChains) {
     const Symmetric& m = kkt.matrix();
     ChainLdl ldl = analysed(m);
     const Inertia truth = inertia_of(m.dense);
-    // the dense eigenvalues' own signs are certain only well above rounding
+    // The signs of the dense eigenvalues are reliable only well above rounding.
     if (truth.nearest < 1e-11) continue;
     ASSERT_EQ(ldl.factorise(m.value.data(), 1e-4), LdlOutcome::kRegular) << trial;
     EXPECT_EQ(ldl.statistics().negative, truth.negative) << trial << " nearest " << truth.nearest;
@@ -142,7 +142,7 @@ TEST(ChainLdl, InertiaAndSolutionOfRandomChains) {
     x += r;
     EXPECT_LT(backward_error(m.dense, x, b), 1e-9) << trial;
   }
-  // the cases that make a symmetric indefinite solver hard were there
+  // The samples must contain delayed pivots and pivots of two rows.
   EXPECT_GT(delayed, 0);
   EXPECT_GT(pairs, 0);
 }
@@ -180,7 +180,7 @@ TEST(ChainLdl, DependentRowsAreSingularOrGiveTheWrongInertia) {
     ChainLdl ldl(static_cast<int>(m.dense.rows()), m.row, m.column, m.value.data());
     const bool is_singular = ldl.factorise(m.value.data(), 1e-4) == LdlOutcome::kSingular;
     singular += is_singular ? 1 : 0;
-    // where rounding leaves something in the place of zero, its sign is a coin's
+    // A pivot that is zero but for rounding can have either sign.
     if (!is_singular) {
       EXPECT_GE(ldl.statistics().negative, 0);
     }
@@ -188,8 +188,8 @@ TEST(ChainLdl, DependentRowsAreSingularOrGiveTheWrongInertia) {
   EXPECT_GE(singular, kTrials * 95 / 100);
 }
 
-TEST(ChainLdl, WhatCannotBeFactorisedIsSingular) {
-  // an unknown that nothing touches; a value that is no number; and the same object afterwards
+TEST(ChainLdl, AMatrixThatCannotBeFactorisedIsSingular) {
+  // An unknown without entries, a value that is NaN, and then regular values in the same object.
   const std::vector<int> row = {0, 1, 1, 2}, column = {0, 0, 1, 2};
   std::vector<double> value = {2.0, 1.0, -3.0, 0.0};
   ChainLdl ldl(3, row, column, value.data());
@@ -209,7 +209,7 @@ TEST(ChainLdl, WhatCannotBeFactorisedIsSingular) {
   EXPECT_NEAR(x[2], -2.0, 1e-15);
 }
 
-TEST(ChainLdl, PlacesNamedTwiceAreSumsInEitherTriangle) {
+TEST(ChainLdl, ValuesWithEqualIndicesAreAddedInEitherTriangle) {
   const std::vector<int> row = {0, 0, 1, 0, 1}, column = {0, 0, 0, 1, 1};
   const std::vector<double> value = {1.0, 2.0, 0.5, 1.5, 4.0};  // (3, 2; 2, 4)
   ChainLdl ldl(2, row, column, value.data());
@@ -233,8 +233,8 @@ TEST(ChainLdl, WorkGrowsWithTheChainAndFrontsDoNot) {
   EXPECT_LT(a.factor_entries, 25L * a.order);
 }
 
-TEST(ChainLdl, FactorsAreThoseOfTheValuesWhateverWasAnalysed) {
-  // the order comes from the first values; later ones may be of quite another kind
+TEST(ChainLdl, FactorsAreThoseOfTheValuesWhateverValuesWereAnalysed) {
+  // The order is found with the first values; later ones may differ completely.
   std::mt19937 random(4);
   for (int trial = 0; trial < 40; ++trial) {
     const ChainSize size{6, 2, 2, 2};
@@ -322,7 +322,7 @@ TEST(ChainLdl, InertiaAndSolutionOfACranesMotion) {
   }
 }
 
-/// Least 1/2 x^T Q x - sum x under one row, Q dense: no chain.
+/// Minimise 1/2 x^T Q x - sum x under one row with Q dense, which is no chain.
 class Dense final : public NlpProblem {
  public:
   explicit Dense(int n) : n_(n) {}
@@ -365,7 +365,7 @@ class Dense final : public NlpProblem {
   int n_;
 };
 
-TEST(KktSolver, MumpsTakesOverWhereThereIsNoChain) {
+TEST(KktSolver, MumpsReplacesItWhereTheMatrixIsNoChain) {
   Dense problem(400);
   const NlpResult result = solve_with_ipopt(problem);
   EXPECT_EQ(result.status, NlpStatus::kOptimal);
@@ -379,14 +379,14 @@ TEST(KktSolver, MumpsTakesOverWhereThereIsNoChain) {
   EXPECT_EQ(solve_with_ipopt(small).kkt_solver, KktSolver::kChain);
 }
 
-TEST(KktSolver, IsWhatWasAskedFor) {
+TEST(KktSolver, IsTheRequestedOne) {
   Dense problem(20);
   NlpOptions options;
   EXPECT_EQ(solve_with_ipopt(problem, options).kkt_solver, KktSolver::kChain);
   options.kkt_solver = KktSolver::kMumps;
   EXPECT_EQ(solve_with_ipopt(problem, options).kkt_solver, KktSolver::kMumps);
   options.kkt_solver = KktSolver::kChain;
-  options.more = {{"linear_solver", "mumps"}};  // a solver named to Ipopt itself goes before
+  options.more = {{"linear_solver", "mumps"}};  // a linear solver set as Ipopt option has priority
   EXPECT_EQ(solve_with_ipopt(problem, options).kkt_solver, KktSolver::kMumps);
 }
 

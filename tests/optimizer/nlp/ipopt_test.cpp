@@ -112,7 +112,7 @@ TEST(Ipopt, SolvesHockSchittkowski71) {
   EXPECT_GE(result.solve_s, result.linear_solver_s);
   EXPECT_GT(result.linear_solver_s, 0.0);
   EXPECT_EQ(result.kkt_solver, KktSolver::kChain);
-  EXPECT_EQ(result.options_used.at("linear_solver"), "ma27");  // the door ChainLdl comes in by
+  EXPECT_EQ(result.options_used.at("linear_solver"), "ma27");  // the interface that ChainLdl uses
   EXPECT_EQ(result.options_used.at("tol"), "9.9999999999999995e-07");
 }
 
@@ -125,8 +125,8 @@ TEST(Ipopt, MultipliersMakeTheLagrangianStationary) {
   for (int i = 0; i < 8; ++i) slope[i % 4] += result.multipliers.constraint[i / 4] * values[i];
   slope += result.multipliers.upper - result.multipliers.lower;
   EXPECT_LT(slope.cwiseAbs().maxCoeff(), 1e-5) << "signs as documented in NlpMultipliers";
-  EXPECT_LT(result.multipliers.constraint[0], 0.0) << "the product's lower bound pushes";
-  EXPECT_GT(result.multipliers.lower[0], 0.1) << "x0 sits on its lower bound";
+  EXPECT_LT(result.multipliers.constraint[0], 0.0) << "the product's lower bound is active";
+  EXPECT_GT(result.multipliers.lower[0], 0.1) << "x0 is at its lower bound";
 }
 
 TEST(Ipopt, HandWrittenTestDerivativesAreRight) {
@@ -142,7 +142,7 @@ TEST(Ipopt, DerivativeCheckFindsAWrongEntryAndNamesIt) {
   class Wrong : public HockSchittkowski71 {
     void hessian_structure(OutIndex row, OutIndex column) const override {
       HockSchittkowski71::hessian_structure(row, column);
-      column[3] = 1;  // 2,0 went to 2,1
+      column[3] = 1;  // entry (2, 0) is put at (2, 1)
     }
   } problem;
   VectorXd x(4);
@@ -189,7 +189,7 @@ TEST(Ipopt, CrossedBoundsAreInfeasibleAndNamed) {
   EXPECT_NE(result.message.find("x[0] must lie in [3.5, 3]"), std::string::npos) << result.message;
 }
 
-TEST(Ipopt, NothingFreeIsJudgedWithoutASolve) {
+TEST(Ipopt, AProblemWithoutFreeVariablesIsEvaluatedWithoutASolve) {
   class Fixed : public HockSchittkowski71 {
     void bounds(Out x_lower, Out x_upper, Out g_lower, Out g_upper) const override {
       HockSchittkowski71::bounds(x_lower, x_upper, g_lower, g_upper);
@@ -206,7 +206,7 @@ TEST(Ipopt, NothingFreeIsJudgedWithoutASolve) {
 }
 
 TEST(Ipopt, ValueOutsideTheDomainShortensTheStep) {
-  LogBarrier problem;  // a full Newton step from 2.9 lands left of 1, where the log is NaN
+  LogBarrier problem;  // a full Newton step from 2.9 ends below 1, where the log is NaN
   const NlpResult result = solve_with_ipopt(problem);
   ASSERT_EQ(result.status, NlpStatus::kOptimal) << result.brief();
   EXPECT_NEAR(result.x[0], 2.0, 1e-6);
@@ -221,7 +221,7 @@ TEST(Ipopt, LimitsAndInterruptionAreStatuses) {
   options.max_seconds = 0.0;
   const NlpResult late = solve_with_ipopt(problem, options);
   EXPECT_EQ(late.status, NlpStatus::kTimeLimit);
-  EXPECT_EQ(late.x.size(), 4) << "the best so far is kept";
+  EXPECT_EQ(late.x.size(), 4) << "the last iterate is kept";
   options.max_seconds = 1e9;
   int seen = -1;
   options.on_iteration = [&](const NlpIteration& now) {
@@ -254,7 +254,7 @@ TEST(Ipopt, ExceptionsOfCallbacksArriveUnchanged) {
   NlpOptions options;
   options.on_iteration = [](const NlpIteration&) -> bool { throw std::length_error("full"); };
   EXPECT_THROW(solve_with_ipopt(problem, options), std::length_error);
-  // A solve within a solve would wait for itself for ever.
+  // A solve within a solve would be a deadlock.
   options.on_iteration = [&](const NlpIteration&) {
     HockSchittkowski71 inner;
     return solve_with_ipopt(inner).solved();
@@ -279,7 +279,7 @@ TEST(Ipopt, UnknownOptionIsAUsageError) {
 }
 
 TEST(Ipopt, TwoThreadsSolveAtOnceAndBothAreRight) {
-  // Without the lock MUMPS' module variables mix: nearly every such run failed or ended the process.
+  // Without the lock both solves share MUMPS' module variables, and nearly every such run fails or crashes.
   constexpr int kSolves = 60;
   std::atomic<int> wrong{0};
   const auto work = [&](double least_product, double expected) {

@@ -1,5 +1,5 @@
-// Optima known by hand on machines of one and two cylinders, one limit deciding at a time: what a limit that is
-// moved, forgotten or only kept at the knots would change.
+// Optima in closed form on machines of one and two cylinders, each determined by one limit; a limit that is shifted,
+// forgotten or kept at the knots only would change them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,8 +29,8 @@ GaussianProcess constant_pressure(double pressure) {
   return GaussianProcess(p);
 }
 
-/// Two sleds on one level rail, the second on the first; the tip is the second's. The first works at 100 bar, the
-/// second, which has half a metre only, at 50 bar, whatever the flow: the second should do what it can, alone.
+/// Two sleds on one level rail, the second on the first; the tip is on the second. The first works at 100 bar and the
+/// second, which has half a metre only, at 50 bar at any flow. In the optimum the second moves alone as far as it can.
 struct Rails {
   MotionProblem problem;
   CraneModel model;
@@ -82,28 +82,28 @@ struct Rails {
   double least_energy() const { return area * (0.5 * 50e5 + 0.5 * 100e5); }
 };
 
-TEST(KnownOptimum, TheCheapCylinderGoesToItsEndAndNotBeyond) {
+TEST(KnownOptimum, TheCheaperCylinderMovesToItsLimitAndNotBeyond) {
   Rails r;
   OptimizeOptions options = Rails::options();
-  options.tightenings = 0;  // nothing may hide bounds that are not the joints' own
+  options.tightenings = 0;  // tightening must not hide bounds other than the joints' own
   const OptimizeResult found = optimize(r.model, r.problem, {r.line_to(0.8, 0.2)}, options);
   ASSERT_EQ(found.status, OptimizeStatus::kOptimal) << found.message;
-  // 1e-3: the soft maximum of the finish (0.3 bar) and the acceleration term, which prefers even speeds
+  // 1e-3 covers the smoothed maximum (0.3 bar) and the acceleration term, which prefers even speeds.
   EXPECT_NEAR(found.energy.total, r.least_energy(), 1e-3 * r.least_energy());
   const double near = found.motion.q(found.motion.size() - 1, 1);
   EXPECT_NEAR(near, 0.5, 1e-3);
   EXPECT_LE(near, 0.5 + 1e-6);
 }
 
-TEST(KnownOptimum, TheFinishSmoothsByItsOwnWidthOnly) {
-  // Log-sum-exp of n demands lies between their maximum and the maximum + beta log(n + 1), so the law the finish was
-  // solved under lies above the exact energy by at most beta log(n + 1) times the volume pumped, and not below it.
+TEST(KnownOptimum, TheSolveWithFixedModesIsSmoothedByItsOwnWidthOnly) {
+  // Log-sum-exp of n demands lies between their maximum and the maximum + beta log(n + 1), so the energy of the solve lies
+  // above the exact one by at most beta log(n + 1) times the volume pumped, and not below it.
   Rails r;
   r.model.cylinders[1].extend = r.model.cylinders[1].retract = constant_pressure(99.5e5);
   r.problem.limits.pump_max_flow.assign(1, 0.0);
   r.problem.goal = JointGoal{VectorXd::Constant(2, 0.5)};
   OptimizeOptions options = Rails::options();
-  // near alone, both together, far alone; each way smooth and within its limits
+  // First the near sled moves, then both, then the far one; each travel is smooth and within its limits.
   ModeCandidate candidate;
   candidate.name = "overlapping";
   candidate.modes.setConstant(options.intervals, 2, CylinderMode::kRest);
@@ -129,13 +129,13 @@ TEST(KnownOptimum, TheFinishSmoothsByItsOwnWidthOnly) {
   const double volume = r.area * 2.0 * way;
   const auto above_exact = [&](double beta) {
     options.pressure_in_modes = beta;
-    options.free_phases = false;  // the overlap stays as long as it is
+    options.free_phases = false;  // the duration of the overlap is fixed
     const StartResult found = optimize_with_modes(r.model, r.problem, candidate, options);
     EXPECT_TRUE(found.usable(options.limit_tolerance)) << found.message;
     EXPECT_TRUE(found.modes_held) << "the guess was kept";
     return found.energy_smooth - found.energy_exact;
   };
-  // 2e-4 of 78 kJ: speeds too small to count as moving, near the starts and stops
+  // 2e-4 of 78 kJ covers speeds too small to count as moving, near starts and stops.
   const double rounding = 2e-4 * 100e5 * volume;
   const double finish = OptimizeOptions().pressure_in_modes;
   const auto bound = [&](double beta) { return beta * std::log(3.0) * volume; };
@@ -144,14 +144,14 @@ TEST(KnownOptimum, TheFinishSmoothsByItsOwnWidthOnly) {
     const double above = above_exact(beta);
     EXPECT_GE(above, -rounding);
     EXPECT_LE(above, bound(beta) + rounding);
-    // the wider one shows that the bound of the finish can be broken
+    // The wider smoothing shows that this bound can be violated.
     if (beta > finish) {
       EXPECT_GT(above, 2.0 * bound(finish));
     }
   }
 }
 
-TEST(KnownOptimum, OneByOneGuessesKnowEveryLimitOfSpeed) {
+TEST(KnownOptimum, SequentialGuessesKeepEveryLimitOfSpeed) {
   // Two legs of 0.5 m at v = 0.12 m/s and 1 m/s^2 take 2 (0.5 / v + v) = 8.573 s, whatever sets v.
   constexpr double kSpeed = 0.12, kShortest = 2.0 * (0.5 / kSpeed + kSpeed);
   for (const bool outwards : {true, false}) {
@@ -173,12 +173,12 @@ TEST(KnownOptimum, OneByOneGuessesKnowEveryLimitOfSpeed) {
         return sequential_candidates(r.model, r.problem, times, {}, 10);
       };
       EXPECT_TRUE(guesses(0.99 * kShortest).empty());
-      // 5 %: two intervals a leg are lost by starting and stopping at knots
+      // 5 %: each leg loses two intervals by starting and stopping at knots.
       const std::vector<ModeCandidate> found = guesses(1.05 * kShortest);
       ASSERT_EQ(found.size(), 2u) << "either order";
       for (const ModeCandidate& c : found) {
         const std::vector<LimitCheck> checks = check_limits(r.model, r.problem, c.guess);
-        // 0.5 %: the trapezoid, looked at at the knots, is scaled to cover the way exactly
+        // 0.5 %: the trapezoid, sampled at the knots, is scaled to cover the travel exactly.
         EXPECT_LE(worst_excess(checks), 5e-3) << c.name << ": " << checks.front().what;
         const MotionEnergy e = exact_energy(r.model, c.guess, 0.0);
         EXPECT_NEAR(e.total, flow / kSpeed * (0.5 * 50e5 + 0.5 * 100e5), 1e-9 * e.total);
@@ -187,8 +187,8 @@ TEST(KnownOptimum, OneByOneGuessesKnowEveryLimitOfSpeed) {
   }
 }
 
-/// A bundled reach of the loader crane under a known model, from the straight joint line to an end posture with the
-/// boom free or at rest.
+/// A bundled reach of the loader crane with a synthetic model, started from the straight joint line to a goal
+/// configuration with the boom free or at rest.
 struct Reach {
   MotionProblem problem;
   CraneModel model;
@@ -197,7 +197,7 @@ struct Reach {
   explicit Reach(const std::string& name)
       : problem(load_problem(bundled_file("reaches/" + name))),
         model(test_support::synthetic_model(problem.machine)) {
-    options.intervals = 12;  // coarse: much may happen between two knots
+    options.intervals = 12;  // coarse, so that limits are violated between knots
     options.processes = 1;
   }
 
@@ -213,9 +213,9 @@ struct Reach {
   }
 };
 
-TEST(KnownOptimum, AStartKeepsTheCheapestMotionItSaw) {
-  // The modes of the seed (boom at rest, one joint after the other) are the best here; what the smooth law leads to
-  // afterwards costs some per cent more and must not replace it.
+TEST(KnownOptimum, AStartKeepsItsCheapestMotion) {
+  // The modes of the seed (boom at rest, one joint after the other) are the best here; the motion of the smooth law that
+  // follows costs some percent more and must not replace it.
   Reach r("loader_crane_lift.yaml");
   const StartResult found = optimize_from(r.model, r.problem, r.line(false), 16.0, r.options);
   double cheapest = INFINITY, last = 0.0;
@@ -224,16 +224,16 @@ TEST(KnownOptimum, AStartKeepsTheCheapestMotionItSaw) {
     cheapest = std::min(cheapest, s.energy_exact);
     last = s.energy_exact;
   }
-  ASSERT_GT(last, 1.001 * cheapest) << "the case cannot tell the best from the last";
+  ASSERT_GT(last, 1.001 * cheapest) << "the last motion must differ from the best";
   EXPECT_EQ(found.energy_exact, cheapest);
   EXPECT_EQ(exact_energy(r.model, found.motion, r.problem.payload).total, cheapest);
 }
 
 struct Drawn {
-  StartResult without, with;  ///< limits left as they are, drawn in
+  StartResult without, with;  ///< without and with bound tightening
 };
 
-/// Solves with and without drawing in what is broken between the knots, and expects `what` to be broken without.
+/// Solves with and without bound tightening, and expects limit `what` to be violated without.
 Drawn expect_drawn_in(Reach& r, const SeedMotion& seed, double duration, const std::string& what) {
   Drawn d;
   r.options.tightenings = 0;
@@ -245,7 +245,7 @@ Drawn expect_drawn_in(Reach& r, const SeedMotion& seed, double duration, const s
     return s.what == "modes" && s.excess > 3.0 * tolerance;
   };
   EXPECT_TRUE(std::any_of(d.without.stages.begin(), d.without.stages.end(), broken))
-      << what << ": nothing is broken between the knots, the case shows nothing";
+      << what << ": the limit must be violated between the knots for this test";
   EXPECT_TRUE(d.with.usable(tolerance)) << d.with.message;
   const std::vector<LimitCheck> checks = check_limits(r.model, r.problem, d.with.motion, 37);
   EXPECT_LE(worst_excess(checks), tolerance) << checks.front().what;
@@ -259,13 +259,13 @@ Drawn expect_drawn_in(Reach& r, const SeedMotion& seed, double duration, const s
   return d;
 }
 
-TEST(KnownOptimum, PumpFlowIsDrawnIn) {
+TEST(KnownOptimum, PumpFlowIsTightened) {
   Reach r("loader_crane_lift.yaml");
   const SeedMotion seed = r.line(true);
   expect_drawn_in(r, seed, 1.1 * seed.shortest_duration, "flow of pump");
 }
 
-TEST(KnownOptimum, ValveFlowIsDrawnIn) {
+TEST(KnownOptimum, ValveFlowIsTightened) {
   Reach r("loader_crane_lift.yaml");
   r.problem.limits.pump_max_flow.assign(1, 0.0);
   r.problem.limits.valve_fraction = 0.5;
@@ -273,7 +273,7 @@ TEST(KnownOptimum, ValveFlowIsDrawnIn) {
   expect_drawn_in(r, seed, 1.1 * seed.shortest_duration, "flow through valve");
 }
 
-TEST(KnownOptimum, PumpPressureIsDrawnIn) {
+TEST(KnownOptimum, PumpPressureIsTightened) {
   Reach r("loader_crane_lift.yaml");
   const SeedMotion seed = r.line(true);
   const StartResult free = optimize_from(r.model, r.problem, seed, 16.0, r.options);
@@ -282,19 +282,19 @@ TEST(KnownOptimum, PumpPressureIsDrawnIn) {
     if (c.what == "pressure of pump main") most = c.value * units::kBar;
   }
   ASSERT_GT(most, 50e5);
-  // Its rows are only there once it was broken; then they are drawn in.
+  // Its rows are added after a violation; then they are tightened.
   r.problem.limits.pump_max_pressure[0] = 0.97 * most;
   expect_drawn_in(r, seed, 16.0, "pressure of pump");
 }
 
-TEST(KnownOptimum, TheTipsDistanceFromItsLineIsDrawnIn) {
+TEST(KnownOptimum, TheTipsDistanceFromItsLineIsTightened) {
   Reach r("loader_crane_line.yaml");
   expect_drawn_in(r, r.line(false), 16.0, "distance of the tip from its line");
 }
 
 TEST(KnownOptimum, ClearanceRowsThatAreLeftOutAreFarOnes) {
-  // Two balls beside the way of the tip, early and late: the rows chosen for the seed must tell the least clearance
-  // of every posture on it where that is small, as all rows together do.
+  // Two balls are beside the tip's path, early and late. The rows chosen for the seed must give the same least clearance
+  // as all rows in every posture in which it is small.
   Reach r("loader_crane_lift.yaml");
   const SeedMotion seed = r.line(false);
   const Eigen::Index knots = seed.motion.size();
@@ -306,7 +306,7 @@ TEST(KnownOptimum, ClearanceRowsThatAreLeftOutAreFarOnes) {
   CraneKnotOptions some;
   some.near_postures = seed.motion.q;
   CraneKnotModel chosen(r.model, r.problem, some), all(r.model, r.problem, {});
-  ASSERT_LT(chosen.path_count(), all.path_count()) << "nothing is left out";
+  ASSERT_LT(chosen.path_count(), all.path_count()) << "some rows must be left out";
   const auto least = [](CraneKnotModel& model, const VectorXd& q) {
     VectorXd z = VectorXd::Zero(model.size()), g(model.path_count());
     z.head(q.size()) = q;
@@ -329,7 +329,7 @@ TEST(KnownOptimum, ClearanceRowsThatAreLeftOutAreFarOnes) {
 }
 
 TEST(KnownOptimum, ThePumpsLimitIsTheProblems) {
-  // The row itself, not only the motion: drawing limits in would in the end also keep one that is set too wide.
+  // The row itself is checked, because bound tightening would also keep a limit that is set too wide.
   Reach r("loader_crane_lift.yaml");
   const double limit = 0.4 * r.problem.machine.pumps[0].max_flow;
   r.problem.limits.pump_max_flow[0] = limit;
@@ -346,21 +346,21 @@ TEST(KnownOptimum, ThePumpsLimitIsTheProblems) {
 }
 
 TEST(KnownOptimum, ThrottlingIsThatOfTheCheaperCylinder) {
-  // Both sleds move at once, the pump at the dearer one's 100 bar: the other's valve takes 50 of them, its own none.
+  // Both sleds move at once and the pump works at 100 bar for the first: the second one's valve throttles 50 bar.
   const Rails r;
   const MotionEnergy e = exact_energy(r.model, r.line_to(0.5, 0.5).motion, 0.0);
   const double volume = 0.5 * r.area;
-  // 1e-3: at the first and last instants a cylinder is slower than what counts as moving
+  // 1e-3: at the first and last instants a cylinder is too slow to count as moving.
   EXPECT_NEAR(e.throttling[0], 0.0, 1e-3 * e.total);
   EXPECT_NEAR(e.throttling[1], 50e5 * volume, 1e-3 * e.total);
   EXPECT_NEAR(e.useful[0], 100e5 * volume, 1e-3 * e.total);
   EXPECT_NEAR(e.useful[1], 50e5 * volume, 1e-3 * e.total);
 }
 
-TEST(KnownOptimum, ClearanceIsDrawnIn) {
+TEST(KnownOptimum, ClearanceIsTightened) {
   Reach r("loader_crane_lift.yaml");
   const SeedMotion seed = r.line(false);
-  // Beside the way of the tip; the optimum without it passes 0.2 m deep through it.
+  // The obstacle is beside the seed's tip path; the optimum without it passes 0.2 m deep through it.
   r.problem.obstacles = {{"ball", Sphere{{6.9, 0.0, -0.3}, 0.5}}};
   expect_drawn_in(r, seed, 16.0, "clearance");
 }

@@ -44,26 +44,26 @@ TEST(Phases, IntervalsOfEqualModesAreOnePhase) {
   EXPECT_NEAR(p.durations[2], 0.4, 1e-15);
 }
 
-TEST(Phases, OverlapsAreOfferedWhereNothingMovesBothWays) {
+TEST(Phases, OverlapsAreInsertedUnlessACylinderMovesBothWays) {
   const PhasePlan p = with_overlaps(plan({{kE, kO}, {kO, kR}, {kR, kO}}, {2.0, 1.0, 4.0}), 0.4);
   ASSERT_EQ(p.count(), 5);
   EXPECT_EQ(p.modes(1, 0), kE);
   EXPECT_EQ(p.modes(1, 1), kR);
-  EXPECT_NEAR(p.durations[1], 0.4, 1e-15) << "of the shorter neighbour";
+  EXPECT_NEAR(p.durations[1], 0.4, 1e-15) << "a share of the shorter neighbour";
   EXPECT_NEAR(p.durations[0], 1.8, 1e-15);
   EXPECT_NEAR(p.total(), 7.0, 1e-14);
   EXPECT_EQ(with_overlaps(plan({{kE, kO}, {kR, kO}}, {1.0, 1.0}), 0.4).count(), 2);
   EXPECT_EQ(with_overlaps(plan({{kE, kO}, {kE, kE}}, {1.0, 1.0}), 0.4).count(), 2)
-      << "the second holds the first already";
+      << "the second phase contains the moves of the first";
 }
 
-TEST(Phases, ShortOnesGiveTheirTimeToTheOthers) {
+TEST(Phases, ShortPhasesGiveTheirDurationToTheOthers) {
   const PhasePlan p = without_short(plan({{kE, kO}, {kE, kR}, {kE, kO}}, {1.0, 0.01, 2.0}), 0.02);
   ASSERT_EQ(p.count(), 1) << "equal neighbours are joined";
   EXPECT_NEAR(p.total(), 3.01, 1e-14);
 }
 
-TEST(Phases, NeighboursExchangeJoinAndShiftButLoseNoMove) {
+TEST(Phases, NeighboursExchangeMergeAndShiftButLoseNoMove) {
   const PhasePlan from = plan({{kE, kO}, {kO, kR}}, {1.0, 3.0});
   const std::vector<PhasePlan> all = neighbours(from);
   EXPECT_TRUE(has(all, plan({{kO, kR}, {kE, kO}}, {1.0, 1.0})));
@@ -78,7 +78,7 @@ TEST(Phases, NeighboursExchangeJoinAndShiftButLoseNoMove) {
   EXPECT_FALSE(has(all, from));
 }
 
-TEST(Phases, AllTogetherHasNeighboursInWhichOneBeginsLaterOrEndsEarlier) {
+TEST(Phases, APhaseOfAllCylindersHasNeighboursInWhichOneStartsLaterOrStopsEarlier) {
   const std::vector<PhasePlan> all = neighbours(plan({{kE, kR}}, {4.0}));
   EXPECT_EQ(all.size(), 4u);
   EXPECT_TRUE(has(all, plan({{kO, kR}, {kE, kR}}, {2.0, 2.0})));
@@ -91,19 +91,19 @@ TEST(Phases, AllTogetherHasNeighboursInWhichOneBeginsLaterOrEndsEarlier) {
   }
   for (const PhasePlan& p : neighbours(plan({{kE, kO}, {kE, kR}}, {1.0, 4.0}))) {
     if (p.count() != 3) continue;
-    EXPECT_NEAR(p.durations[0], 1.0, 1e-12) << "the phase that is not cut keeps its time";
+    EXPECT_NEAR(p.durations[0], 1.0, 1e-12) << "the phase that is not halved keeps its duration";
     EXPECT_NEAR(p.durations[2], 2.0, 1e-12);
   }
-  // only the longest such phase is cut
+  // Only the longest such phase is halved.
   EXPECT_FALSE(has(neighbours(plan({{kE, kR}, {kE, kO}, {kE, kR}}, {1.0, 1.0, 4.0})),
                    plan({{kO, kR}, {kE, kR}, {kE, kO}, {kE, kR}}, {0.5, 0.5, 1.0, 4.0})));
 }
 
-TEST(Phases, ThoseThatPassAWaypointHaveNoNeighbours) {
+TEST(Phases, PlansWithWaypointsHaveNoNeighbours) {
   PhasePlan through = plan({{kE, kO}, {kO, kR}}, {1.0, 3.0});
   ASSERT_FALSE(neighbours(through).empty());
   through.waypoint_after = {0};
-  EXPECT_TRUE(neighbours(through).empty()) << "none knows after which phase the waypoint lies";
+  EXPECT_TRUE(neighbours(through).empty()) << "the waypoint's phase would be undefined";
 }
 
 TEST(Phases, AMeshHasAKnotAtEveryChangeAndKeepsTheShares) {
@@ -116,7 +116,7 @@ TEST(Phases, AMeshHasAKnotAtEveryChangeAndKeepsTheShares) {
   EXPECT_TRUE(durations_of(mesh, mesh.times).isApprox(p.durations, 1e-12));
 }
 
-TEST(Phases, StretchesOfAMotionAreDrivenInTheirNewTimes) {
+TEST(Phases, SectionsOfAMotionTakeTheirNewDurations) {
   Trajectory m;
   m.t = Eigen::VectorXd::LinSpaced(5, 0.0, 4.0);
   m.q = Eigen::VectorXd::LinSpaced(5, 0.0, 1.0);
@@ -129,7 +129,7 @@ TEST(Phases, StretchesOfAMotionAreDrivenInTheirNewTimes) {
   EXPECT_NEAR(d.qd(3, 0), 0.5, 1e-15);
 }
 
-TEST(Phases, TextNamesWhatMoves) {
+TEST(Phases, TextNamesTheMovingCylinders) {
   const Machine machine = load_machine(bundled_file("machines/loader_crane.yaml"));
   const PhasePlan p = plan({{kE, kO, kO}, {kO, kR, kE}, {kO, kO, kO}}, {1.0, 1.0, 1.0});
   EXPECT_EQ(plan_text(machine, p), "boom + | jib -, extension + | rest");

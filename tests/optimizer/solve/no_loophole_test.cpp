@@ -1,5 +1,5 @@
-// What is reported does not depend on how the law was smoothed on the way, and creeping under the smoothed activation
-// gains nothing.
+// The reported energy does not depend on the smoothing of the law, and creeping under the smoothed activation saves
+// nothing.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ struct Slow {
   Slow()
       : problem(load_problem(bundled_file("reaches/loader_crane_lift.yaml"))),
         model(test_support::synthetic_model(problem.machine)) {
-    problem.duration = {40.0, 40.0};  // time enough to creep
+    problem.duration = {40.0, 40.0};  // long enough for creeping
     Eigen::VectorXd end = problem.start;
     EXPECT_TRUE(solve_end_posture(problem.machine, problem.limits,
                                   std::get<TipGoal>(problem.goal).tip, {true, true, true}, end));
@@ -67,13 +67,13 @@ TEST(NoLoophole, EnergiesDoNotChangeWithTheSmoothing) {
       most = std::max(most, r.energy.total);
     }
   }
-  // what a maximum 1 bar softer moves the optimum by, of some 60 bar
+  // The tolerance is the change of the optimum when the maximum is smoothed by 1 bar more, of some 60 bar.
   EXPECT_LT(most, 1.005 * least);
 }
 
 TEST(NoLoophole, CreepingGainsNothing) {
-  // The motion that looks cheapest under a wide activation creeps; judged by the exact law it is dearer than what is
-  // reported, and what is reported costs as much as its own law says.
+  // The cheapest motion under a wide activation creeps. By the exact law it costs more than the reported motion, whose
+  // smooth and exact energies agree.
   Slow s;
   constexpr double kWide = 50e-3;
   OptimizeOptions smooth = s.options;
@@ -85,8 +85,9 @@ TEST(NoLoophole, CreepingGainsNothing) {
   const OptimizeResult found = optimize(s.model, s.problem, s.seeds, s.options);
   ASSERT_EQ(found.status, OptimizeStatus::kOptimal) << found.message;
   const double looks = s.smoothed_energy(creeping.motion, kWide);
-  EXPECT_LT(looks, 0.7 * creeping.energy.total) << "the exploit is there to be closed";
-  EXPECT_LT(looks, 0.9 * found.energy.total) << "and would be worth taking";
+  EXPECT_LT(looks, 0.7 * creeping.energy.total)
+      << "the smooth law must be exploitable for this test";
+  EXPECT_LT(looks, 0.9 * found.energy.total) << "and the exploit must look cheaper than the result";
   EXPECT_GT(creeping.energy.total, found.energy.total);
   EXPECT_NEAR(found.energy_smooth, found.energy.total, 0.02 * found.energy.total);
 }

@@ -1,5 +1,5 @@
-// The whole optimisation on machines whose pressures are known: cheaper than where it started, limits kept
-// between knots, and honest when it cannot be done.
+// The whole optimisation on machines with synthetic models: the result is cheaper than the seeds and keeps its limits
+// between knots, and infeasible problems are reported.
 #include "optimizer/solve/optimize.h"
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ struct Case {
   std::vector<SeedMotion> seeds;
 };
 
-/// Straight joint lines to the end posture nearest to the start and to one with the first joint at rest.
+/// Straight joint lines to the goal configuration nearest to the start and to one with the first joint at rest.
 Case lift_case() {
   Case c;
   c.problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
@@ -66,14 +66,14 @@ TEST(Optimize, UsesLessExactEnergyThanSeedAndStraightLineAndKeepsAllLimits) {
   ASSERT_GT(r.straight_line_energy, 0.0);
   EXPECT_LT(r.energy.total, r.straight_line_energy);
   EXPECT_LT(r.energy.total, r.best_seed_energy);
-  // 16 times the knots' density, as promised, and at a density the optimiser never looked at
+  // Limits are checked at 16 samples per mesh interval, as the optimiser does, and at a density that it does not use.
   for (const int refine : {16, 37}) {
     const std::vector<LimitCheck> checks = check_limits(c.model, c.problem, r.motion, refine);
     EXPECT_LE(worst_excess(checks), 1e-5) << checks.front().what << " at " << checks.front().time;
   }
 }
 
-/// Energy by a second path: Simpson on 40 parts an interval, states nudged inside, where activity cannot change.
+/// Energy by a second method: Simpson's rule on 40 parts of each interval, with end states moved slightly inside the interval.
 double simpson_energy(const Case& c, const Trajectory& motion) {
   Chain chain(c.model);
   double energy = 0.0;
@@ -100,7 +100,7 @@ TEST(Optimize, EnergyIsThatOfTheExactLawByASecondIntegration) {
   const Case c = lift_case();
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
   ASSERT_EQ(r.status, OptimizeStatus::kOptimal);
-  // midpoint on 16 parts: error (h/16)^2/24 of the curvature of a power that varies over whole intervals
+  // The midpoint rule on 16 parts has the error (h/16)^2/24 times the curvature of the power.
   const double energy = simpson_energy(c, r.motion);
   EXPECT_NEAR(r.energy.total, energy, 2e-4 * energy);
 }
@@ -113,7 +113,7 @@ TEST(Optimize, WithEffectsTheReportedEnergyIsTheExactChains) {
                           "flow_dependent_margin:main"}) {
     c.model.effects.push_back(test_support::applied(key, machine));
   }
-  // friction of 8 kN, 12 bar of tank line and a margin that grows: the same motion costs clearly more
+  // With friction of 8 kN, a return pressure of 12 bar and a growing margin the same motion costs clearly more.
   EXPECT_GT(exact_energy(c.model, c.seeds.front().motion, c.problem.payload).total, 1.03 * without);
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
   ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
@@ -121,12 +121,12 @@ TEST(Optimize, WithEffectsTheReportedEnergyIsTheExactChains) {
   EXPECT_LT(r.energy.total, r.best_seed_energy);
   EXPECT_LE(worst_excess(check_limits(c.model, c.problem, r.motion, 37)), 1e-5);
   EXPECT_NEAR(r.energy.total, simpson_energy(c, r.motion), 2e-4 * r.energy.total);
-  // the law must know its effects to do better than a motion optimised without them
+  // With the effects in its law the optimum is better than a motion optimised without them.
   CraneModel bare = c.model;
   bare.effects.clear();
   const OptimizeResult blind = optimize(bare, c.problem, c.seeds, quick());
   ASSERT_EQ(blind.status, OptimizeStatus::kOptimal);
-  // 0.2 %: both are local optima of a 60-interval mesh
+  // 0.2 %: both are local optima on a mesh of 60 intervals.
   EXPECT_LE(r.energy.total, 1.002 * exact_energy(c.model, blind.motion, c.problem.payload).total);
 }
 
@@ -134,7 +134,7 @@ TEST(Optimize, WithInertiaAccelerationsAreInTheLaw) {
   Case c = lift_case();
   c.model.effects = {test_support::applied("inertia", c.model.machine)};
   c.seeds.resize(1);
-  // A search as small as it gets: what is asked is the law of the energy, not the best of all sequences.
+  // The search is as small as possible, because only the law of the energy is tested.
   OptimizeOptions options = quick();
   options.search_intervals = 30;
   options.sequential_starts = 1;
@@ -147,9 +147,9 @@ TEST(Optimize, WithInertiaAccelerationsAreInTheLaw) {
   EXPECT_NEAR(r.energy.total, simpson_energy(c, r.motion), 2e-4 * r.energy.total);
 }
 
-TEST(Optimize, CreepFoolsTheSmoothLawButNotTheReport) {
-  // A motion 200 times slower: every cylinder creeps far below the smoothed activation's 20 mm/s, whose energy
-  // all but vanishes. The exact law, which alone is reported, still charges the whole pressure.
+TEST(Optimize, CreepingIsCheapByTheSmoothLawOnly) {
+  // In a motion 200 times slower every cylinder creeps far below the smoothed activation's 20 mm/s, and the smooth energy
+  // almost vanishes. The exact law, by which energies are reported, still contains the whole pressure.
   const Case c = lift_case();
   Trajectory creep = with_duration(c.seeds.front().motion, 3200.0);
   const double exact = exact_energy(c.model, creep, c.problem.payload).total;
@@ -164,12 +164,12 @@ TEST(Optimize, CreepFoolsTheSmoothLawButNotTheReport) {
   }
   const double brisk = exact_energy(c.model, with_duration(creep, 16.0), c.problem.payload).total;
   EXPECT_LT(smooth, 0.2 * exact);
-  EXPECT_GT(exact, 0.5 * brisk);  // slower costs less flow loss, never an order less
+  EXPECT_GT(exact, 0.5 * brisk);  // a slower motion saves flow losses only
 }
 
-TEST(Optimize, OneByOneIsTriedDownToTheShortestTimeItNeeds) {
-  // In the shortest time a one-by-one motion needs (closed form: way / speed + speed / acceleration a leg) plus the
-  // mesh's own loss of two intervals a leg, the optimiser must not be dearer than that motion.
+TEST(Optimize, SequentialMotionsAreTriedDownToTheirShortestTime) {
+  // In the shortest duration of a sequential motion (travel / speed + speed / acceleration for each leg) plus the loss of
+  // two intervals of the mesh for each leg, the optimum must not cost more than that motion.
   Case c = lift_case();
   c.seeds.resize(1);
   OptimizeOptions options = quick();
@@ -185,7 +185,7 @@ TEST(Optimize, OneByOneIsTriedDownToTheShortestTimeItNeeds) {
   }
 }
 
-TEST(Optimize, WhereTimeIsShortSlowerSequencesAreSqueezed) {
+TEST(Optimize, WhereTimeIsShortSequencesOfSlowerMotionsAreTried) {
   Case c = lift_case();
   c.seeds.resize(1);
   for (const double times_shortest : {1.3, 1.9, 2.1}) {
@@ -208,17 +208,17 @@ TEST(Optimize, TooShortATimeIsNamedWithTheLimitAndAFeasibleDuration) {
   EXPECT_THAT(r.message, HasSubstr("infeasible"));
   EXPECT_THAT(r.message, HasSubstr("The shortest motion found takes"));
   EXPECT_GT(r.shortest_duration, 2.0);
-  // in 2 % more than that it works, in 2 % less it does not
+  // A duration of 2 % more is feasible, one of 2 % less is not.
   c.problem.duration = {1.02 * r.shortest_duration, 1.02 * r.shortest_duration};
   EXPECT_EQ(optimize(c.model, c.problem, c.seeds, quick()).status, OptimizeStatus::kOptimal);
   c.problem.duration = {0.98 * r.shortest_duration, 0.98 * r.shortest_duration};
   EXPECT_EQ(optimize(c.model, c.problem, c.seeds, quick()).status, OptimizeStatus::kInfeasible);
 }
 
-TEST(Optimize, AStartThatConvergedToAMotionThatBreaksALimitSaysWhichLimit) {
+TEST(Optimize, AConvergedStartWhoseMotionViolatesALimitNamesIt) {
   Case c = lift_case();
   c.problem.payload =
-      9e3;  // more than the pump's pressure lifts: no solve has a row for it at first
+      9e3;  // more than the pump's pressure can lift; the first solve has no row for that limit
   const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
   ASSERT_EQ(r.status, OptimizeStatus::kInfeasible) << r.message;
   EXPECT_THAT(r.message, HasSubstr("Worst: pressure of pump"));
@@ -244,7 +244,7 @@ TEST(Optimize, IdlePowerShortensAFreeMotion) {
   ASSERT_EQ(patient.status, OptimizeStatus::kOptimal) << patient.message;
   ASSERT_EQ(hurried.status, OptimizeStatus::kOptimal) << hurried.message;
   EXPECT_LT(hurried.duration, patient.duration);
-  // each is no worse than the other at its own price of time, up to the search's 2 % of duration
+  // Each duration is the better one at its own idle power, up to the search's 2 % of the duration.
   EXPECT_LE(hurried.energy.total + 20e3 * hurried.duration,
             1.02 * (patient.energy.total + 20e3 * patient.duration));
 }
@@ -318,7 +318,7 @@ TEST(Modes, CreepIsPutToRestAndMovesKeepTheirSign) {
 }
 
 TEST(ExactEnergy, OneHorizontalCylinderByHand) {
-  // p = 50 bar whatever the flow, margin 10 bar, no load: E = 60 bar * A * way; all but 50 bar of it throttled
+  // p = 50 bar at any flow, margin 10 bar, no load: E = 60 bar * A * travel, of which 10 bar are throttled.
   const Machine machine = parse_machine(
       "name: slide\njoints:\n  - {name: x, type: prismatic, parent: base, axis: [1, 0, 0], "
       "position: [0, 2], velocity: [-1, 1], "
@@ -341,7 +341,8 @@ TEST(ExactEnergy, OneHorizontalCylinderByHand) {
   m.qdd = (Eigen::MatrixXd(3, 1) << 0.5, -0.5, -0.5).finished();
   const MotionEnergy e = exact_energy(model, m, 0.0);
   const double volume = machine.cylinders[0].area_piston() * 0.5;
-  EXPECT_NEAR(e.total, 60e5 * volume, 1e-9 * e.total);  // linear power: the midpoint rule is exact
+  EXPECT_NEAR(e.total, 60e5 * volume,
+              1e-9 * e.total);  // the midpoint rule is exact for linear power
   EXPECT_NEAR(e.throttling[0], 10e5 * volume, 1e-9 * e.total);
   EXPECT_NEAR(e.useful[0] + e.throttling[0], e.total, 1e-9 * e.total);
   EXPECT_NEAR(e.share_moving[1], 1.0, 1e-12);

@@ -1,4 +1,4 @@
-// Rows of the trust region and the cost of commands: derivatives, and what they do to a motion.
+// Rows of the trust region and the cost of commands: their derivatives and their influence on a motion.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ using test_support::random_state;
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-/// A synthetic model whose processes know where their centres are: the variance falls near them.
+/// A synthetic model whose pressure variance is smaller near the centres of the data.
 CraneModel model_with_variance(const Machine& machine) {
   CraneModel model = test_support::synthetic_model(machine);
   for (CylinderModel& c : model.cylinders) {
@@ -77,7 +77,7 @@ TEST_P(TrustRows, DerivativesMatchFiniteDifferencesInHeldModes) {
           },
           z, 2e-5);
       const double scale = std::max(1.0, jacobian_t.col(r).cwiseAbs().maxCoeff());
-      // the step's truncation and rounding as in crane_knot_model_test
+      // Truncation and rounding of the step are as in crane_knot_model_test.
       EXPECT_LT((jacobian_t.col(r) - numeric).cwiseAbs().maxCoeff(), 1e-6 * scale)
           << knot.path_name(r);
     }
@@ -148,13 +148,13 @@ TEST(TrustRegion, IsKeptBetweenTheKnotsAndCostsEnergy) {
   const OptimizeResult trusted = optimize(r.model, r.problem, r.seeds, r.options);
   ASSERT_EQ(trusted.status, OptimizeStatus::kOptimal) << trusted.message;
   EXPECT_LE(trusted.energy.largest_pressure_std, r.problem.limits.pressure_std * (1.0 + 1e-5));
-  // a smaller feasible set cannot be cheaper; 0.1 % for what different local searches may find
+  // A smaller feasible set cannot be cheaper; 0.1 % allows for different local optima.
   EXPECT_GE(trusted.energy.total, 0.999 * free.energy.total);
 }
 
 TEST(Commands, LeastEffortHasItsClosedFormOnOneJoint) {
-  // Bring the extension out with everything else fixed: u = v / v_full, least integral of u^2 over T is
-  // (d / v_full)^2 / T when acceleration is free; limited acceleration can only raise it.
+  // The extension moves out and all other joints are fixed. With u = v / v_full the least integral of u^2 over T is
+  // (d / v_full)^2 / T for unlimited acceleration; limited acceleration can only raise it.
   Reach r;
   const auto extension = static_cast<Eigen::Index>(r.problem.machine.joint_index("extension"));
   Vector end = r.problem.start;

@@ -1,4 +1,4 @@
-// Points the tip passes on the way: read, planned, kept.
+// Waypoints of the tip are read, planned and passed.
 #include <gtest/gtest.h>
 
 #include "optimizer/solve/optimize.h"
@@ -25,12 +25,12 @@ double nearest(const MotionProblem& problem, const Trajectory& motion, const Vec
   return best;
 }
 
-TEST(Waypoints, ArePassedInOrderAtTheOptimisersTimes) {
+TEST(Waypoints, ArePassedInOrderAtOptimisedInstants) {
   MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
   problem.waypoints = {Vector3d(5.0, 0.0, 3.0), Vector3d(6.5, 0.0, 4.3)};
   problem.duration = {20.0, 20.0};
   const CraneModel model = test_support::synthetic_model(problem.machine);
-  const Eigen::MatrixXd path = [&] {  // a path without the planner's room: through solved postures
+  const Eigen::MatrixXd path = [&] {  // a path through solved postures, without planners/
     Eigen::MatrixXd p(4, 3);
     Eigen::VectorXd q = problem.start;
     p.row(0) = q.transpose();
@@ -51,18 +51,18 @@ TEST(Waypoints, ArePassedInOrderAtTheOptimisersTimes) {
       optimize(model, problem, {{"through", timed.motion, timed.shortest, false}}, options);
   ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
   double first = 0.0, second = 0.0;
-  // the solver's tolerance on the goal rows, in metres
+  // The tolerance is that of the solver on the goal rows, in metres.
   EXPECT_LT(nearest(problem, r.motion, problem.waypoints[0], &first), 1e-5);
   EXPECT_LT(nearest(problem, r.motion, problem.waypoints[1], &second), 1e-5);
   EXPECT_LT(first, second);
   EXPECT_GT(first, 0.0);
   EXPECT_LT(second, 20.0);
-  // free of the points it is cheaper
+  // Without waypoints the optimum is cheaper.
   problem.waypoints.clear();
   const OptimizeResult free =
       optimize(model, problem, {{"through", timed.motion, timed.shortest, false}}, options);
   EXPECT_LT(free.energy.total, r.energy.total);
-  // and a motion that does not pass them is told so
+  // A motion that does not pass them violates a limit.
   problem.waypoints = {Vector3d(5.0, 0.0, 3.0)};
   const std::vector<LimitCheck> checks = check_limits(model, problem, free.motion);
   EXPECT_EQ(checks.front().what, "distance of the tip from waypoint 1");

@@ -17,7 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-/// No cost of its own: only the acceleration term counts.
+/// A model without cost, so that only the acceleration term remains.
 class Nothing final : public KnotModel {
  public:
   explicit Nothing(int joints) : joints_(joints) {}
@@ -33,7 +33,7 @@ class Nothing final : public KnotModel {
   int joints_;
 };
 
-/// Two joints, everything coupled, hand-derived. With s the law of the interval (1, or 2 for odd ones if `laws`):
+/// Two coupled joints with derivatives by hand. With s the law of the interval (1, or 2 for odd ones if `laws`):
 ///   c  = s (1 + q0^2) qd0^2 + q1 qd0 qd1 [+ qdd0^2 q1 + qd1 qdd1]
 ///   g0 = q0^2 qd1 [+ q1 qdd0^2]      g1 = q0 q1^2 (positions only)
 class Coupled final : public KnotModel {
@@ -213,11 +213,11 @@ TEST_P(EveryVariant, ObjectiveIsTheTrapezoidWrittenOut) {
     expected += h * (0.3 * std::pow(motion.qdd(k, 0), 2) + 0.05 * std::pow(motion.qdd(k, 1), 2));
   }
   if (GetParam().free_times) expected += 0.7 * motion.duration();
-  // The same sum in another order: a few units in the last place of terms of order 1.
+  // The sums differ in order only: a few units in the last place of terms of order 1.
   EXPECT_NEAR(problem.objective(x), expected, 1e-13);
 }
 
-TEST_P(EveryVariant, NoPlaceOfTheHessianIsNamedTwiceAndAllAreLower) {
+TEST_P(EveryVariant, EntriesOfTheHessianAreUniqueAndLower) {
   Transcription problem = coupled(GetParam().acceleration, GetParam().laws, GetParam().free_times);
   Eigen::VectorXi row(problem.size().hessian_nonzeros), column(row.size());
   problem.hessian_structure(row, column);
@@ -228,7 +228,7 @@ TEST_P(EveryVariant, NoPlaceOfTheHessianIsNamedTwiceAndAllAreLower) {
   }
 }
 
-TEST_P(EveryVariant, AnswersDoNotDependOnTheOrderOfTheQuestions) {
+TEST_P(EveryVariant, ResultsDoNotDependOnTheOrderOfTheCalls) {
   const bool times = GetParam().free_times;
   const VectorXd a = random_point(coupled(false, false, times), 4),
                  b = random_point(coupled(false, false, times), 5);
@@ -258,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(Transcription, EveryVariant,
                                          Variant{false, false, true}, Variant{false, true, true},
                                          Variant{true, true, true}));
 
-TEST(Transcription, FreeTimesKeepSharesAndSayWhatTheyAre) {
+TEST(Transcription, FreeTimesKeepSharesAndHaveNames) {
   Transcription problem = coupled(false, true, true);
   VectorXd x = random_point(problem, 3);
   x.tail(3) << 0.8, 2.4, 0.6;
@@ -374,7 +374,8 @@ TEST(Transcription, LeastAccelerationMotionHasItsClosedForm) {
   const double expected = d * d / h.dot(s.cwiseAbs2());
   EXPECT_NEAR(result.objective, expected, 1e-6 * expected);
   const Trajectory motion = problem.trajectory(result.x);
-  EXPECT_NEAR(motion.qdd(2, 0) / motion.qdd(1, 0), s[2] / s[1], 1e-5) << "the shape as well";
+  EXPECT_NEAR(motion.qdd(2, 0) / motion.qdd(1, 0), s[2] / s[1], 1e-5)
+      << "the shape must agree as well";
 }
 
 TEST(Transcription, ShortestTimeIsWhereFeasibilityEnds) {
@@ -384,8 +385,8 @@ TEST(Transcription, ShortestTimeIsWhereFeasibilityEnds) {
   const NlpResult feasible = solve_with_ipopt(ample);
   ASSERT_TRUE(feasible.solved()) << feasible.brief();
   const Trajectory motion = ample.trajectory(feasible.x);
-  EXPECT_GT(motion.qdd(2, 0), 0.98 * A) << "nearly bang";
-  EXPECT_LT(motion.qdd(17, 0), -0.98 * A) << "nearly bang";
+  EXPECT_GT(motion.qdd(2, 0), 0.98 * A) << "nearly bang-bang";
+  EXPECT_LT(motion.qdd(17, 0), -0.98 * A) << "nearly bang-bang";
   Transcription tight = rest_to_rest(VectorXd::LinSpaced(21, 0.0, 0.99 * shortest), d, A);
   const NlpResult infeasible = solve_with_ipopt(tight);
   EXPECT_EQ(infeasible.status, NlpStatus::kInfeasible) << infeasible.brief();
@@ -405,19 +406,19 @@ TEST(Transcription, FrozenJointsDropTheirEmptyRows) {
   TranscriptionBounds bounds = wide(12, 3);
   bounds.rest_to_rest(VectorXd::Zero(3));
   for (MatrixXd* m : {&bounds.qd_lower, &bounds.qd_upper, &bounds.qdd_lower, &bounds.qdd_upper}) {
-    m->rightCols(2).setZero();  // joints 1 and 2 stay where they are all the time
+    m->rightCols(2).setZero();  // joints 1 and 2 are at rest all the time
   }
   bounds.q_lower(12, 0) = bounds.q_upper(12, 0) = 1.0;
-  bounds.qd_lower.col(0).setZero();  // and joint 0 never turns back
+  bounds.qd_lower.col(0).setZero();  // joint 0 never reverses
   Transcription problem = three_joints(bounds);
-  // 36 position rows; of the 36 velocity rows the 24 of frozen joints hold no free variable.
+  // There are 36 position rows; of the 36 velocity rows the 24 of joints at rest have no free variable.
   EXPECT_EQ(problem.size().constraints, 36 + 12);
   const NlpResult result = solve_with_ipopt(problem);
   ASSERT_EQ(result.status, NlpStatus::kOptimal) << result.brief();
   const Trajectory motion = problem.trajectory(result.x);
   EXPECT_LT(motion.q.rightCols(2).cwiseAbs().maxCoeff(), 1e-8);
   EXPECT_NEAR(result.objective, 12.0 / (64.0 * (1.0 - 1.0 / 144.0)), 1e-6);
-  // All free again: multipliers by meaning survive the change of rows.
+  // With all joints free again, multipliers by meaning survive the change of rows.
   const TranscriptionMultipliers multipliers = problem.multipliers(result.multipliers);
   EXPECT_EQ(multipliers.qd_defect.col(1).cwiseAbs().maxCoeff(), 0.0);
   TranscriptionBounds loose = wide(12, 3);
@@ -438,7 +439,7 @@ TEST(Transcription, ContradictingFixedValuesStayAndAreInfeasible) {
   bounds.rest_to_rest(VectorXd::Zero(3));
   for (int knot : {4, 5}) bounds.fix_qd(knot, VectorXd::Constant(3, 0.1 * knot));
   bounds.qdd_lower.row(4).setZero();
-  bounds.qdd_upper.row(4).setZero();  // but 0.4 -> 0.5 takes an acceleration
+  bounds.qdd_upper.row(4).setZero();  // a change from 0.4 to 0.5 needs an acceleration
   Transcription problem = three_joints(bounds);
   EXPECT_EQ(problem.size().constraints, 72);
   const NlpResult result = solve_with_ipopt(problem);
@@ -459,7 +460,7 @@ TEST(Transcription, StartIsClippedToItsBounds) {
   EXPECT_EQ(x[problem.qd_index(2, 0)], 10.0) << "limited";
 }
 
-TEST(Transcription, WrongShapesAreDefectsOfTheCaller) {
+TEST(Transcription, WrongShapesAreErrorsOfTheCaller) {
   TranscriptionSpec spec;
   spec.t = uneven_times();
   spec.knot = std::make_shared<Nothing>(1);

@@ -134,7 +134,7 @@ class SensorDelay final : public Effect {
     return true;
   }
 
-  /// Pressures of pump and chambers are late alike, but the commands that decide which cylinders demand flow are not: the
+  /// Pressures of pump and chambers are equally late, but the commands that decide which cylinders demand flow are not: the
   /// logged pump pressure follows the commands of `delay` ago.
   static bool switching_late(const MachineSeries& log, std::size_t pump, double delay,
                              Eigen::MatrixXd& columns) {
