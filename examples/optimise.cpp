@@ -27,6 +27,7 @@ std::vector<SeedMotion> seeds_of(const MotionProblem& problem) {
     if (timed.motion.size() < 2) continue;
     seeds.push_back({path.planner, timed.motion, timed.shortest, path.planner == "straight line"});
   }
+  if (seeds.empty()) throw InputError({problem.file, 0, 0}, "", "no path keeps the limits");
   return seeds;
 }
 

@@ -60,6 +60,9 @@ void run(int argc, char** argv) {
 
   const ExtendResult result = extend(fit(machine, {log}).model, {effect}, {log}, {test});
   fmt::print("{}", result.table());
+  const AppliedEffect& found = result.model.effects.front();
+  fmt::print("{}: Fc = {:.0f} N, 95 % interval {:.0f} .. {:.0f}\n", found.key(machine),
+             found.values[0], found.lower95[0], found.upper95[0]);
 }
 
 }  // namespace

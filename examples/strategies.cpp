@@ -27,6 +27,7 @@ std::vector<SeedMotion> seeds_of(const MotionProblem& problem) {
     if (timed.motion.size() < 2) continue;
     seeds.push_back({path.planner, timed.motion, timed.shortest, path.planner == "straight line"});
   }
+  if (seeds.empty()) throw InputError({problem.file, 0, 0}, "", "no path keeps the limits");
   return seeds;
 }
 
@@ -44,12 +45,12 @@ int run(int argc, char** argv) {
   options.optimize.sequence_rounds = 1;
   options.optimize.intervals = options.baselines.intervals = 50;
   const StrategyComparison result = compare_strategies(model, problem, seeds_of(problem), options);
-  if (result.rows.empty()) {
-    fmt::print(stderr, "{}: {}\n", problem.name, result.message);
+  const StrategyRow row = result.rows.empty() ? StrategyRow{} : result.rows.front();
+  const StrategyOutcome* best = row.find(kOptimal);
+  if (best == nullptr || !best->found()) {
+    fmt::print(stderr, "{}: no motion. {}\n", problem.name, best ? best->why : result.message);
     return 4;
   }
-  const StrategyRow& row = result.rows.front();
-  const StrategyOutcome* best = row.find(kOptimal);
   fmt::print("{}, {:.2f} s\n", result.problem, row.duration);
   for (const char* kind : {kSequential, kJointLine, kOptimal}) {
     const StrategyOutcome* o = row.find(kind);

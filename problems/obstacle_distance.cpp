@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/math/error.h"
+#include "models/math/golden_section.h"
 
 namespace sparflow {
 namespace {
@@ -54,28 +55,9 @@ double segment_box_distance(const Vector3d& y, const Vector3d& u, const Vector3d
   if (outside > 0.0) return outside;
 
   // The segment enters the box. The depth max_i(|y_i| - a_i) is convex along it, so golden section finds its minimum.
-  lo = 0.0;
-  hi = 1.0;
-  const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
-  double s1 = hi - golden * (hi - lo), s2 = lo + golden * (hi - lo);
   const auto depth = [&](double s) { return ((y + s * u).cwiseAbs() - half).maxCoeff(); };
-  double f1 = depth(s1), f2 = depth(s2);
-  for (int iteration = 0; iteration < 45; ++iteration) {
-    if (f1 <= f2) {
-      hi = s2;
-      s2 = s1;
-      f2 = f1;
-      s1 = hi - golden * (hi - lo);
-      f1 = depth(s1);
-    } else {
-      lo = s1;
-      s1 = s2;
-      f1 = f2;
-      s2 = lo + golden * (hi - lo);
-      f2 = depth(s2);
-    }
-  }
-  return std::min({f1, f2, outside});
+  constexpr int kSections = 45;  // 0.618^45: a bracket of 4e-10 of the segment
+  return std::min(golden_section(0.0, 1.0, kSections, depth).value, outside);
 }
 
 }  // namespace

@@ -24,13 +24,10 @@ constexpr double kRowsAWindow = 3.0;
 
 /// Standard deviation of a raw channel's white noise from third differences (robust, so that motion does not count).
 double raw_noise(const VectorXd& x) {
-  std::vector<double> d;
-  for (Index i = 3; i < x.size(); ++i) {
-    const double v = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
-    if (std::isfinite(v)) d.push_back(v);
-  }
+  std::vector<double> d = third_differences(x, 0, x.size());
   if (d.size() < 20) return kNaN;
-  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) / std::sqrt(20.0);
+  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) /
+         kThirdDifferenceNoise;
 }
 
 /// Noise floor of a channel over several logs: the mean of those in which it is measured.

@@ -50,10 +50,9 @@ Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChanne
         for (Index l = 0; l <= longest; ++l) c[l] += h[i] * h[i + l];
         n += 1.0;
       }
-      for (Index i = 3; i < length; ++i) {
-        const double d = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
-        if (!std::isfinite(d)) continue;
-        white += std::min(d * d / 20.0, 25.0 * usual * usual);
+      for (const double d : third_differences(x, 0, length)) {
+        const double noise = d / kThirdDifferenceNoise;
+        white += std::min(noise * noise, 25.0 * usual * usual);
         differences += 1.0;
       }
     }

@@ -12,6 +12,7 @@
 #include "diagnosis/selection/search_candidates.h"
 #include "identification/signals/series.h"
 #include "models/math/error.h"
+#include "models/math/golden_section.h"
 
 namespace sparflow {
 namespace {
@@ -241,29 +242,16 @@ class Estimator {
   }
 
   void refine(std::size_t d) {
-    const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
     const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect);
     for (std::size_t s = 0; s < designs_[d].shape.size(); ++s) {
       if (choices[s]) continue;  // the grid contains all variants
-      auto [a, b] = bracket(d, s);
+      const auto [a, b] = bracket(d, s);
       if (!(b > a)) continue;
       const double start = designs_[d].shape[s], at_start = likelihood();
-      double x1 = b - golden * (b - a), x2 = a + golden * (b - a);
-      double f1 = likelihood_at(d, s, x1), f2 = likelihood_at(d, s, x2);
-      for (int i = 0; i < kSections; ++i) {
-        if (f1 > f2) {
-          b = x2, x2 = x1, f2 = f1;
-          x1 = b - golden * (b - a);
-          f1 = likelihood_at(d, s, x1);
-        } else {
-          a = x1, x1 = x2, f1 = f2;
-          x2 = a + golden * (b - a);
-          f2 = likelihood_at(d, s, x2);
-        }
-      }
-      const double best = f1 > f2 ? x1 : x2;
+      const GoldenSection found =
+          golden_section(a, b, kSections, [&](double x) { return -likelihood_at(d, s, x); });
       std::vector<double> shape = designs_[d].shape;
-      shape[s] = std::max(f1, f2) > at_start ? best : start;
+      shape[s] = -found.value > at_start ? found.x : start;
       designs_[d] = make_design(evidence_, designs_[d].effect, std::move(shape));
     }
   }

@@ -4,6 +4,7 @@
 
 #include "identification/log/log_time.h"
 #include "identification/signals/smoothing.h"
+#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {
@@ -28,16 +29,16 @@ double noise_of(const Eigen::VectorXd& values, const std::vector<SampleRange>& r
       if (!std::isfinite(values[i])) continue;
       lo = std::min(lo, values[i]);
       hi = std::max(hi, values[i]);
-      if (i < run.begin + 3) continue;
-      const double d = values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3];
+    }
+    for (const double d : third_differences(values, run.begin, run.end)) {
       // Exact zeros occur when a sensor rests within one digit; they carry no information about its noise.
-      if (std::isfinite(d) && d != 0.0) size.push_back(std::abs(d));
+      if (d != 0.0) size.push_back(std::abs(d));
     }
   }
   if (size.empty()) return 0.0;
   const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
   std::nth_element(size.begin(), middle, size.end());
-  return std::max(*middle / (0.6745 * std::sqrt(20.0)), 1e-9 * (hi - lo));
+  return std::max(*middle / (0.6745 * kThirdDifferenceNoise), 1e-9 * (hi - lo));
 }
 
 /// @return evenly spread blocks of the runs with about kEnough samples in total; the runs themselves if they have fewer

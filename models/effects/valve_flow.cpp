@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "models/effects/hydraulics.h"
+#include "models/math/golden_section.h"
 
 namespace sparflow {
 namespace {
@@ -66,21 +67,12 @@ double best_dead_band(const Samples& s) {
     const double c = cost(most * k / kSteps);
     if (c < lowest) lowest = c, best = k;
   }
-  double lo = most * std::max(0, best - 1) / kSteps,
-         hi = most * std::min(kSteps, best + 1) / kSteps;
-  constexpr double kGolden = 0.618033988749895;
-  double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
-  double fa = cost(a), fb = cost(b);
-  while (hi - lo > 1e-4) {
-    if (fa < fb) {
-      hi = b, b = a, fb = fa;
-      a = hi - kGolden * (hi - lo), fa = cost(a);
-    } else {
-      lo = a, a = b, fa = fb;
-      b = lo + kGolden * (hi - lo), fb = cost(b);
-    }
-  }
-  return 0.5 * (lo + hi);
+  constexpr int kMostSections = 40;  // the width ends it first
+  constexpr double kFinest = 1e-4;   // of the command: far below what a log resolves
+  const double lo = most * std::max(0, best - 1) / kSteps,
+               hi = most * std::min(kSteps, best + 1) / kSteps;
+  const GoldenSection found = golden_section(lo, hi, kMostSections, cost, kFinest);
+  return 0.5 * (found.lo + found.hi);
 }
 
 }  // namespace

@@ -26,6 +26,17 @@ double quantile(Eigen::VectorXd values, double at) {
   return begin[i];
 }
 
+std::vector<double> third_differences(const Eigen::Ref<const Eigen::VectorXd>& x, Index first,
+                                      Index last) {
+  std::vector<double> differences;
+  differences.reserve(static_cast<std::size_t>(std::max<Index>(last - first, 0)));
+  for (Index i = first + 3; i < last; ++i) {
+    const double d = x[i] - 3.0 * x[i - 1] + 3.0 * x[i - 2] - x[i - 3];
+    if (std::isfinite(d)) differences.push_back(d);
+  }
+  return differences;
+}
+
 double robust_std(const Eigen::Ref<const Eigen::VectorXd>& residuals) {
   return 1.4826 * median(residuals.cwiseAbs());
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// Small robust statistics shared by the learners. Source: Huber & Ronchetti (2009), ch. 1, 4, 7.
 #include <Eigen/Dense>
+#include <vector>
 
 namespace sparflow {
 
@@ -12,6 +13,12 @@ double quantile(Eigen::VectorXd values, double at);
 
 /// 1.4826 times the median absolute value: the standard deviation of normal residuals, robust against outliers.
 double robust_std(const Eigen::Ref<const Eigen::VectorXd>& residuals);
+
+/// x_i - 3 x_(i-1) + 3 x_(i-2) - x_(i-3), the finite ones of rows first ... last - 1. Smooth motion hardly shows in them;
+/// white noise does with kThirdDifferenceNoise times its standard deviation.
+std::vector<double> third_differences(const Eigen::Ref<const Eigen::VectorXd>& x,
+                                      Eigen::Index first, Eigen::Index last);
+inline constexpr double kThirdDifferenceNoise = 4.47213595499958;  ///< sqrt(1 + 9 + 9 + 1)
 
 /// Residuals count fully up to this many standard deviations: 95 % efficiency on normal data.
 inline constexpr double kHuberStds = 1.345;

@@ -9,6 +9,7 @@
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
+#include "models/math/golden_section.h"
 #include "models/math/linear_algebra.h"
 #include "problems/motion_limits.h"
 #include "problems/time_parametrise.h"
@@ -296,30 +297,9 @@ BaselineMotion BaselineSet::at_own_best(const std::string& kind, double idle_pow
       break;
     }
   }
-  double a = std::max(first, best / step), b = best * step;
-  constexpr double kGoldenShare = 0.6180339887498949;
-  double x1 = b - kGoldenShare * (b - a), x2 = a + kGoldenShare * (b - a);
-  double f1 = cost(x1), f2 = cost(x2);
-  for (int i = 0; i < 7; ++i) {
-    if (f1 < f2) {
-      b = x2;
-      x2 = x1;
-      f2 = f1;
-      f1 = cost(x1 = b - kGoldenShare * (b - a));
-    } else {
-      a = x1;
-      x1 = x2;
-      f1 = f2;
-      f2 = cost(x2 = a + kGoldenShare * (b - a));
-    }
-  }
-  for (const auto& [t, value] : {std::pair{x1, f1}, std::pair{x2, f2}}) {
-    if (value < least) {
-      least = value;
-      best = t;
-    }
-  }
-  return cheapest(kind, best, true);
+  // Seven sections shrink the bracket of 30 % to 1 % of the duration.
+  const GoldenSection found = golden_section(std::max(first, best / step), best * step, 7, cost);
+  return cheapest(kind, found.value < least ? found.x : best, true);
 }
 
 }  // namespace sparflow

@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <mutex>
-#include <thread>
 
 #include "identification/learning/gaussian_process/gp_likelihood.h"
 #include "identification/learning/gaussian_process/gp_screening.h"
@@ -16,6 +13,7 @@
 #include "identification/learning/gaussian_process/sparse_gp.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {
@@ -344,16 +342,12 @@ std::vector<LearnedGp> learn_gps(const std::vector<GpDataset>& datasets,
                                  int threads) {
   const int total = static_cast<int>(datasets.size());
   std::vector<LearnedGp> learned(datasets.size());
-  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  std::atomic<int> next{0};
   int done = 0;
   std::mutex mutex;
-  std::exception_ptr defect;  // any exception except InputError
-  const auto work = [&] {
-    for (int i = next++; i < total; i = next++) {
-      const std::size_t at = static_cast<std::size_t>(i);
-      const GpDataset& data = datasets[at];
-      try {
+  parallel(
+      datasets.size(),
+      [&](std::size_t at) {
+        const GpDataset& data = datasets[at];
         try {
           learned[at] = learn_gp(data.flow, data.force, data.pressure, options);
         } catch (const InputError& error) {
@@ -362,18 +356,8 @@ std::vector<LearnedGp> learn_gps(const std::vector<GpDataset>& datasets,
         const std::lock_guard lock(mutex);
         ++done;
         if (progress) progress(done, total, data.name);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        defect = std::current_exception();
-        next = total;
-      }
-    }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < std::min(threads, total); ++i) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
-  if (defect) std::rethrow_exception(defect);
+      },
+      threads);
   return learned;
 }
 
