@@ -48,7 +48,7 @@ int run(int argc, char** argv) {
   const StrategyRow row = result.rows.empty() ? StrategyRow{} : result.rows.front();
   const StrategyOutcome* best = row.find(kOptimal);
   if (best == nullptr || !best->found()) {
-    fmt::print(stderr, "{}: no motion. {}\n", problem.name, best ? best->why : result.message);
+    fmt::print(stderr, "{}\n", best ? best->why : result.message);
     return 4;
   }
   fmt::print("{}, {:.2f} s\n", result.problem, row.duration);

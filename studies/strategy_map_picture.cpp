@@ -16,11 +16,11 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double of_way(const MapPoint& p, MapWay way) {
   switch (way) {
-    case MapWay::kSequential:
+    case MapWay::kSequentialMotion:
       return p.sequential;
-    case MapWay::kSimultaneous:
+    case MapWay::kSimultaneousMotion:
       return p.simultaneous;
-    case MapWay::kOptimal:
+    case MapWay::kOptimalMotion:
       break;
   }
   return p.optimal;
@@ -142,7 +142,8 @@ std::string idle_csv(const std::vector<MapCurve>& curves, const std::vector<doub
   for (const MapCurve& c : curves) {
     for (const double idle : idle_powers) {
       text += fmt::format("{},{:g},{:g}", c.reach, c.payload, idle);
-      for (const MapWay way : {MapWay::kSequential, MapWay::kSimultaneous, MapWay::kOptimal}) {
+      for (const MapWay way :
+           {MapWay::kSequentialMotion, MapWay::kSimultaneousMotion, MapWay::kOptimalMotion}) {
         const BestTime b = best_time(c, way, idle);
         text += b.duration > 0.0 ? fmt::format(",{:.3f},{:.1f}", b.duration, b.cost) : ",,";
       }
@@ -207,8 +208,8 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
                      "middle", 11, overlap(*p) > 0.6 ? "#fff" : "#222");
     }
     for (std::size_t k = 0; k < idle_powers.size(); ++k) {
-      const BestTime seq = best_time(c, MapWay::kSequential, idle_powers[k]),
-                     sim = best_time(c, MapWay::kSimultaneous, idle_powers[k]);
+      const BestTime seq = best_time(c, MapWay::kSequentialMotion, idle_powers[k]),
+                     sim = best_time(c, MapWay::kSimultaneousMotion, idle_powers[k]);
       if (seq.duration <= 0.0 || sim.duration <= 0.0) continue;
       const double share = seq.cost / sim.cost - 1.0, x = third + kCell * static_cast<double>(k);
       svg += box_at(x, y, kCell, kRow, colour(share));
@@ -278,9 +279,9 @@ std::string map_summary(const std::vector<MapCurve>& curves,
     std::vector<double> share, time;
     int wins = 0;
     for (const MapCurve& c : curves) {
-      const BestTime seq = best_time(c, MapWay::kSequential, idle),
-                     sim = best_time(c, MapWay::kSimultaneous, idle),
-                     opt = best_time(c, MapWay::kOptimal, idle);
+      const BestTime seq = best_time(c, MapWay::kSequentialMotion, idle),
+                     sim = best_time(c, MapWay::kSimultaneousMotion, idle),
+                     opt = best_time(c, MapWay::kOptimalMotion, idle);
       if (opt.duration > 0.0) time.push_back(opt.duration / c.shortest);
       if (seq.duration <= 0.0 || sim.duration <= 0.0) continue;
       share.push_back(seq.cost / sim.cost - 1.0);

@@ -27,7 +27,7 @@ struct BestTime {
   double duration = 0.0;  // [s], 0 = none
   double cost = 0.0;      // [J]
 };
-enum class MapWay { kSequential, kSimultaneous, kOptimal };
+enum class MapWay { kSequentialMotion, kSimultaneousMotion, kOptimalMotion };
 BestTime best_time(const MapCurve& curve, MapWay way, double idle_power);
 
 /// The tables as CSV, the picture as SVG; idle powers in [W].
