@@ -17,12 +17,12 @@ struct DiagnoseArguments {
 };
 
 /// Adds the effects found to the model, one after the other, and judges each step on the test logs.
-/// @return nothing when there are no test logs or no effect is at least 50 % probable
+/// @return nothing when there are no test logs or no effect is probable enough
 std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
                                            const Diagnosis& diagnosis) {
   std::vector<EffectAt> found;
   for (const DiagnosedEffect& e : diagnosis.effects) {
-    if (e.probability >= 0.5) found.push_back(e.effect);
+    if (diagnosis.probable(e)) found.push_back(e.effect);
   }
   if (files.tests.empty() || found.empty()) return std::nullopt;
   ExtendOptions options;

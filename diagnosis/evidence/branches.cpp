@@ -16,23 +16,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kFewest = 60;
-/// Least samples of one branch: fewer do not determine a law with four or five coefficients.
-constexpr Index kFewestOfOne = 30;
-/// Samples within the filter's width are correlated, so that more than this make the fit slower, not better.
-constexpr Index kMostFitted = 3000;
-constexpr double kOutliers = 0.02;  ///< prior share of samples that follow neither law
-constexpr double kSharpest = 0.3;  ///< [bar] least standard deviation of a law, that of the sensors
-constexpr double kSure = 0.95;     ///< least posterior probability of a member
-/// A member of one branch lies this many standard deviations above the other law; nearer is their intersection.
-constexpr double kClear = 3.0;
-/// The supply pressure carries all of a load (slope 1) where the return line sets the pressures, and a share of
-/// 1/(1 + R A_hold/A_supply) < 0.6 where a counterbalance valve of pilot ratio R > 1 does.
-constexpr double kSteepest = 0.75;
-constexpr Index kGuard = 2;          ///< samples dropped on both sides of a change of branch
-constexpr double kAlikeRows = 10.0;  ///< neighbouring samples that count as one independent sample
-/// [nats] least gain of separate laws for two states of a machine over common laws.
-constexpr double kApart = 10.0;
+/// Quantiles between which the range of a pressure is measured: single samples beyond do not count.
+constexpr double kLow = 0.01, kHigh = 0.99;
+/// Quantiles of the return pressure below which samples are initially on the return line's branch.
+constexpr double kInitialLevels[] = {0.1, 0.25, 0.5, 0.75, 0.9};
+/// The expectation maximisation ends when a step gains less than this for each sample. [nat]
+constexpr double kConverged = 1e-4;
+constexpr int kFewestSteps = 5, kMostSteps = 60;  // of the expectation maximisation
 
 /// Rows of all logs; pressures are in bar, and regressors are scaled to the order of one.
 struct Rows {
@@ -52,8 +42,8 @@ bool usable(const BranchData& d, Index k) {
 
 /// [degC] range of the oil temperature if it is known everywhere and changes: return pressure depends on it.
 std::optional<Range> oil_range(const std::vector<BranchData>& logs,
-                               const std::vector<std::pair<int, Index>>& where) {
-  constexpr double kChanges = 2.0;  // [degC]
+                               const std::vector<std::pair<int, Index>>& where,
+                               const BranchOptions& options) {
   Range range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (const auto& [l, k] : where) {
     const VectorXd& oil = logs[static_cast<std::size_t>(l)].oil;
@@ -61,11 +51,11 @@ std::optional<Range> oil_range(const std::vector<BranchData>& logs,
     range.lo = std::min(range.lo, oil[k]);
     range.hi = std::max(range.hi, oil[k]);
   }
-  if (!(range.hi - range.lo > kChanges)) return std::nullopt;
+  if (!(range.hi - range.lo > options.least_oil_range)) return std::nullopt;
   return range;
 }
 
-Rows gather(const std::vector<BranchData>& logs) {
+Rows gather(const std::vector<BranchData>& logs, const BranchOptions& options) {
   Rows r;
   double q_return = 0.0, q_supply = 0.0, q_total = 0.0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
@@ -79,11 +69,11 @@ Rows gather(const std::vector<BranchData>& logs) {
     }
   }
   const auto n = static_cast<Index>(r.where.size());
-  if (n < kFewest || !(q_return > 0.0) || !(q_supply > 0.0)) return {};
+  if (n < options.fewest_samples || !(q_return > 0.0) || !(q_supply > 0.0)) return {};
   r.p_return.resize(n);
   r.p_supply.resize(n);
   VectorXd force(n);
-  const std::optional<Range> oil = oil_range(logs, r.where);
+  const std::optional<Range> oil = oil_range(logs, r.where, options);
   const auto first_oil = 3 + static_cast<Index>(logs.size());
   r.line.setZero(n, first_oil + (oil ? 2 : 0));
   r.valve.setOnes(n, 5);
@@ -120,14 +110,16 @@ struct Law {
   double deviation = 1.0;  ///< [bar]
   double share = 0.0;
 
-  void fit(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
+  void fit(const MatrixXd& x, const VectorXd& y, const VectorXd& weight,
+           const BranchOptions& options) {
     const double total = weight.sum();
     MatrixXd normal = weighted_gram(x, weight);
     // a ridge that is small beside the regressors: it holds coefficients that the samples do not determine at zero
     normal.diagonal().array() += 1e-6 * total + 1e-12;
     coefficients = solve_symmetric(normal, x.transpose() * weight.cwiseProduct(y));
     const VectorXd r = y - x * coefficients;
-    deviation = std::max(kSharpest, std::sqrt(weight.dot(r.cwiseAbs2()) / std::max(total, 1e-9)));
+    deviation = std::max(options.least_deviation,
+                         std::sqrt(weight.dot(r.cwiseAbs2()) / std::max(total, 1e-9)));
     share = total / static_cast<double>(y.size());
   }
 };
@@ -135,7 +127,9 @@ struct Law {
 double above(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
 double density(double z) { return std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI); }
 
-double spread(const VectorXd& v) { return std::max(10.0, quantile(v, 0.99) - quantile(v, 0.01)); }
+double spread(const VectorXd& v, const BranchOptions& options) {
+  return std::max(options.least_pressure_range, quantile(v, kHigh) - quantile(v, kLow));
+}
 
 struct Mixture {
   Law line, valve;
@@ -143,7 +137,7 @@ struct Mixture {
   double likelihood = -std::numeric_limits<double>::infinity();
 
   /// Computes the posterior weights of both laws [rows] and the log-likelihood.
-  void expect(const Rows& r, VectorXd& on_line, VectorXd& on_valve) {
+  void expect(const Rows& r, const BranchOptions& options, VectorXd& on_line, VectorXd& on_valve) {
     const Index n = r.count();
     const VectorXd e1 = line.share > 0.0 ? VectorXd(r.p_return - r.line * line.coefficients)
                                          : VectorXd::Constant(n, 1e9);
@@ -152,7 +146,7 @@ struct Mixture {
     on_line.resize(n);
     on_valve.resize(n);
     likelihood = 0.0;
-    const double outlier = kOutliers / (range_return * range_supply);
+    const double outlier = options.outlier_share / (range_return * range_supply);
     for (Index i = 0; i < n; ++i) {
       const double z1 = e1[i] / line.deviation, z2 = e2[i] / valve.deviation;
       const double a = line.share * density(z1) / line.deviation * above(z2) / range_supply;
@@ -165,36 +159,39 @@ struct Mixture {
   }
 
   /// Expectation maximisation from initial weights [rows].
-  void maximise(const Rows& r, VectorXd on_line, VectorXd on_valve) {
+  void maximise(const Rows& r, const BranchOptions& options, VectorXd on_line, VectorXd on_valve) {
     double before = -std::numeric_limits<double>::infinity();
-    constexpr int kMostSteps = 60;
     for (int step = 0; step < kMostSteps; ++step) {
       line.share = valve.share = 0.0;
-      const double few = static_cast<double>(kFewestOfOne) * static_cast<double>(r.count()) /
-                         static_cast<double>(std::max(r.count(), kMostFitted));
-      if (on_line.sum() > few) line.fit(r.line, r.p_return, on_line);
-      if (on_valve.sum() > few) valve.fit(r.valve, r.p_supply, on_valve);
+      const double few = static_cast<double>(options.fewest_of_branch) *
+                         static_cast<double>(r.count()) /
+                         static_cast<double>(std::max<Index>(r.count(), options.most_fitted));
+      if (on_line.sum() > few) line.fit(r.line, r.p_return, on_line, options);
+      if (on_valve.sum() > few) valve.fit(r.valve, r.p_supply, on_valve, options);
       // a "valve" whose supply pressure carries all of the load is the return line again
-      if (valve.share > 0.0 && slope(r, on_valve) > kSteepest) {
+      if (valve.share > 0.0 && slope(r, on_valve, options) > options.largest_load_share) {
         likelihood = -std::numeric_limits<double>::infinity();
         return;
       }
-      expect(r, on_line, on_valve);
-      if (likelihood - before < 1e-4 * static_cast<double>(r.count()) && step > 4) break;
+      expect(r, options, on_line, on_valve);
+      if (likelihood - before < kConverged * static_cast<double>(r.count()) && step >= kFewestSteps)
+        break;
       before = likelihood;
     }
-    // penalty of each law's coefficients (Schwarz), for a tenth of the samples as independent ones
-    const double cost = 0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / kAlikeRows));
+    // penalty of each law's coefficients (Schwarz), for the independent ones among the samples
+    const double cost =
+        0.5 * std::log(std::max(2.0, static_cast<double>(r.count()) / options.samples_alike));
     if (line.share > 0.0) likelihood -= cost * static_cast<double>(line.coefficients.size() + 1);
     if (valve.share > 0.0) likelihood -= cost * static_cast<double>(valve.coefficients.size() + 1);
   }
 
   /// Share of the load that the supply pressure carries by the valve's law.
-  double slope(const Rows& r, const VectorXd& weight) const {
+  double slope(const Rows& r, const VectorXd& weight, const BranchOptions& options) const {
     const double mean_load = weight.dot(r.load) / weight.sum();
     const VectorXd d = r.load.array() - mean_load;
     const double variance = weight.dot(d.cwiseAbs2());
-    if (variance < weight.sum()) return 0.0;  // the load varies by less than 1 bar: not known
+    const double least = options.least_load_deviation;
+    if (variance < least * least * weight.sum()) return 0.0;  // not known
     const VectorXd by_load = r.valve.rightCols(2) * valve.coefficients.tail(2);
     return weight.dot(d.cwiseProduct(by_load)) / variance;
   }
@@ -211,8 +208,8 @@ Rows chosen(const Rows& all, const std::vector<Index>& keep) {
   return r;
 }
 
-Rows thinned(const Rows& all) {
-  const Index stride = (all.count() + kMostFitted - 1) / kMostFitted;
+Rows thinned(const Rows& all, const BranchOptions& options) {
+  const Index stride = (all.count() + options.most_fitted - 1) / options.most_fitted;
   if (stride <= 1) return all;
   std::vector<Index> keep;
   for (Index i = 0; i < all.count(); i += stride) keep.push_back(i);
@@ -230,29 +227,31 @@ Rows of_logs(const Rows& all, int first, int last) {
 }
 
 /// @param range_return, range_supply [bar] of all samples, so that likelihoods of subsets are comparable
-Mixture most_likely(const Rows& r, double range_return, double range_supply) {
+Mixture most_likely(const Rows& r, const BranchOptions& options, double range_return,
+                    double range_supply) {
   const Index n = r.count();
   const VectorXd none = VectorXd::Zero(n), every = VectorXd::Ones(n);
   Mixture fresh;
   fresh.range_return = range_return;
   fresh.range_supply = range_supply;
   Mixture best = fresh;
-  best.maximise(r, every, none);
+  best.maximise(r, options, every, none);
   const auto consider = [&](const VectorXd& on_line, const VectorXd& on_valve) {
     Mixture m = fresh;
-    m.maximise(r, on_line, on_valve);
+    m.maximise(r, options, on_line, on_valve);
     if (m.likelihood > best.likelihood) best = m;
   };
   Mixture valve_alone = fresh;
-  valve_alone.maximise(r, none, every);
+  valve_alone.maximise(r, options, none, every);
   if (valve_alone.likelihood > best.likelihood) best = valve_alone;
   if (valve_alone.valve.share >
       0.0) {  // outliers above it may be a return line under high return pressure
     const VectorXd e = r.p_supply - r.valve * valve_alone.valve.coefficients;
-    const VectorXd high = (e.array() > kClear * valve_alone.valve.deviation).cast<double>();
+    const VectorXd high =
+        (e.array() > options.clear_deviations * valve_alone.valve.deviation).cast<double>();
     consider(high, every - high);
   }
-  for (const double level : {0.1, 0.25, 0.5, 0.75, 0.9}) {
+  for (const double level : kInitialLevels) {
     const double threshold = quantile(r.p_return, level);
     const VectorXd low = (r.p_return.array() < threshold).cast<double>();
     consider(low, every - low);
@@ -261,20 +260,22 @@ Mixture most_likely(const Rows& r, double range_return, double range_supply) {
 }
 
 /// Appends a label for each row: 1 return line, 2 counterbalance valve, 0 undecided.
-void label_rows(const Rows& rows, Mixture& laws, std::vector<int>& label) {
+void label_rows(const Rows& rows, const BranchOptions& options, Mixture& laws,
+                std::vector<int>& label) {
   VectorXd on_line, on_valve;
-  laws.expect(rows, on_line, on_valve);
+  laws.expect(rows, options, on_line, on_valve);
   const bool both = laws.line.share > 0.0 && laws.valve.share > 0.0;
   for (Index i = 0; i < rows.count(); ++i) {
-    int own = on_line[i] > kSure ? 1 : (on_valve[i] > kSure ? 2 : 0);
+    const double sure = options.least_probability;
+    int own = on_line[i] > sure ? 1 : (on_valve[i] > sure ? 2 : 0);
     if (both) {
       const double above_line =
           (rows.p_return[i] - rows.line.row(i).dot(laws.line.coefficients)) / laws.line.deviation;
       const double above_valve =
           (rows.p_supply[i] - rows.valve.row(i).dot(laws.valve.coefficients)) /
           laws.valve.deviation;
-      if (own == 1 && above_valve < kClear) own = 0;
-      if (own == 2 && above_line < kClear) own = 0;
+      if (own == 1 && above_valve < options.clear_deviations) own = 0;
+      if (own == 2 && above_line < options.clear_deviations) own = 0;
     }
     label.push_back(own);
   }
@@ -283,32 +284,36 @@ void label_rows(const Rows& rows, Mixture& laws, std::vector<int>& label) {
 }  // namespace
 
 std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
-                                        std::size_t first_machine) {
+                                        std::size_t first_machine, const BranchOptions& options) {
   std::vector<BranchSplit> splits;
   for (const BranchData& d : logs) {
     const Mask none = Mask::Constant(d.moving.size(), false);
     splits.push_back({none, none});
   }
-  const Rows rows = gather(logs);
+  const Rows rows = gather(logs, options);
   if (rows.count() == 0) return splits;
-  const double range_return = spread(rows.p_return), range_supply = spread(rows.p_supply);
-  const auto laws_of = [&](const Rows& r) { return most_likely(r, range_return, range_supply); };
-  const Rows some = thinned(rows);
+  const double range_return = spread(rows.p_return, options),
+               range_supply = spread(rows.p_supply, options);
+  const auto laws_of = [&](const Rows& r) {
+    return most_likely(r, options, range_return, range_supply);
+  };
+  const Rows some = thinned(rows, options);
   Mixture laws = laws_of(some);
   std::vector<int> label;
   const auto cut = static_cast<int>(std::min(first_machine, logs.size()));
   const Rows before = of_logs(some, 0, cut),
              after = of_logs(some, cut, static_cast<int>(logs.size()));
-  bool apart = before.count() >= kFewest && after.count() >= kFewest;
+  bool apart = before.count() >= options.fewest_samples && after.count() >= options.fewest_samples;
   if (apart) {
     Mixture one = laws_of(before), other = laws_of(after);
-    apart = one.likelihood + other.likelihood > laws.likelihood + kApart * kAlikeRows;
+    apart = one.likelihood + other.likelihood >
+            laws.likelihood + options.separate_laws_gain * options.samples_alike;
     if (apart) {
-      label_rows(of_logs(rows, 0, cut), one, label);
-      label_rows(of_logs(rows, cut, static_cast<int>(logs.size())), other, label);
+      label_rows(of_logs(rows, 0, cut), options, one, label);
+      label_rows(of_logs(rows, cut, static_cast<int>(logs.size())), options, other, label);
     }
   }
-  if (!apart) label_rows(rows, laws, label);
+  if (!apart) label_rows(rows, options, laws, label);
   // near a change of branch the filter mixes both laws
   for (std::size_t i = 0; i < label.size(); ++i) {
     const auto& [log, sample] = rows.where[i];
@@ -317,7 +322,9 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
       for (std::size_t j = i; steady;) {
         if ((step < 0 && j == 0) || (step > 0 && j + 1 == label.size())) break;
         j = step < 0 ? j - 1 : j + 1;
-        if (rows.where[j].first != log || std::abs(rows.where[j].second - sample) > kGuard) break;
+        if (rows.where[j].first != log ||
+            std::abs(rows.where[j].second - sample) > options.guard_samples)
+          break;
         steady = label[j] == 0 || label[j] == label[i];
       }
     }
@@ -327,7 +334,7 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
   }
   for (BranchSplit& split : splits) {
     for (Mask* mask : {&split.return_line, &split.counterbalance}) {
-      if (mask->count() < kFewestOfOne) mask->setConstant(false);
+      if (mask->count() < options.fewest_of_branch) mask->setConstant(false);
     }
   }
   return splits;

@@ -13,6 +13,7 @@
 /// N. M. Laird, D. B. Rubin, J. R. Stat. Soc. B 39 (1977) 1-38.
 #include <vector>
 
+#include "diagnosis/evidence/evidence_options.h"
 #include "identification/signals/signals.h"
 
 namespace sparflow {
@@ -40,9 +41,10 @@ struct BranchData {
 /// @param first_machine number of leading logs of the machine in one state; the others (references) are of another
 ///        state, between which a valve may have been changed. Each state gets its own laws if these are clearly more
 ///        likely.
-/// @return one split for each log; masks are empty where fewer than 60 samples are usable
+/// @return one split for each log; masks are empty where fewer than BranchOptions::fewest_samples are usable
 std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
-                                        std::size_t first_machine = 0);
+                                        std::size_t first_machine = 0,
+                                        const BranchOptions& options = {});
 
 /// The same for one log alone.
 BranchSplit split_branches(const Eigen::VectorXd& p_return, const Eigen::VectorXd& p_supply,

@@ -11,9 +11,9 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kShortestBlock_s = 0.3;
-/// Longer motions are cut, because blocks are the units that are held out and resampled.
-constexpr double kLongestBlock_s = 8.0;
+/// Quantiles of the law's pressure from which the search for the limit starts.
+constexpr double kInitialLevels[] = {0.15, 0.4, 0.7};
+constexpr int kTurns = 25;  // of the alternating assignment
 
 /// The lower limit of a chamber's pressure by its anti-cavitation valve; below it the law of flow and force ends.
 struct CavitationFloor {
@@ -27,15 +27,13 @@ struct CavitationFloor {
 };
 
 /// Fits max(law, level) by alternating assignment; empty where that is not much better than the law alone.
-CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y) {
-  constexpr Index kFewestOfPiece = 20;
-  constexpr double kMuchLess = 0.8;  // largest ratio of the sums of squares with and without limit
-  constexpr int kTurns = 25;
+CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd& y,
+                                 const CavitationOptions& options) {
   CavitationFloor best;
-  if (y.size() < 3 * kFewestOfPiece) return best;
+  if (y.size() < options.fewest_rows) return best;
   const VectorXd plain = least_squares(baseline, y);
-  double least = kMuchLess * (y - baseline * plain).squaredNorm();
-  for (const double start : {0.15, 0.4, 0.7}) {
+  double least = options.largest_error_ratio * (y - baseline * plain).squaredNorm();
+  for (const double start : kInitialLevels) {
     CavitationFloor f{plain, quantile(VectorXd(baseline * plain), start)};
     for (int turn = 0; turn < kTurns; ++turn) {
       const VectorXd by_law = baseline * f.law;
@@ -43,7 +41,8 @@ CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd
       on_law.reserve(static_cast<std::size_t>(y.size()));
       held.reserve(static_cast<std::size_t>(y.size()));
       for (Index i = 0; i < y.size(); ++i) (by_law[i] < f.level ? held : on_law).push_back(i);
-      if (static_cast<Index>(std::min(on_law.size(), held.size())) < kFewestOfPiece) break;
+      if (static_cast<Index>(std::min(on_law.size(), held.size())) < options.fewest_rows_of_piece)
+        break;
       f.law = least_squares(baseline(on_law, Eigen::all), y(on_law));
       f.level = y(held).mean();
       const double squares = (y - baseline * f.law - f.held(baseline)).squaredNorm();
@@ -57,7 +56,8 @@ CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd
 }
 
 /// Adds a column for the limit to a supply channel's baseline; it is learned from the references if there are any.
-CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects) {
+CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspects,
+                                     const EvidenceOptions& options) {
   std::vector<Index> rows;
   for (const bool references : {true, false}) {
     rows.clear();
@@ -65,10 +65,10 @@ CavitationFloor add_cavitation_floor(EvidenceChannel& channel, std::size_t suspe
       if (references && static_cast<std::size_t>(channel.log[b]) < suspects) continue;
       for (Index i = channel.blocks[b].first; i < channel.blocks[b].last; ++i) rows.push_back(i);
     }
-    if (static_cast<Index>(rows.size()) >= 2 * kFewestRows) break;
+    if (static_cast<Index>(rows.size()) >= options.fewest_reference_rows) break;
   }
   const CavitationFloor floor =
-      cavitation_floor(channel.baseline(rows, Eigen::all), channel.y(rows));
+      cavitation_floor(channel.baseline(rows, Eigen::all), channel.y(rows), options.cavitation);
   if (floor.law.size() == 0) return floor;
   Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + 1);
   wider << channel.baseline, floor.held(channel.baseline) * 1e-5;
@@ -82,8 +82,10 @@ void ChannelBuilder::add(std::size_t log, const Eigen::Array<bool, Eigen::Dynami
                          const VectorXd& values, const Eigen::MatrixXd& base, Index margin) {
   const MachineSeries& s = evidence_.series[log];
   const Index stride = evidence_.stride;
-  const auto longest = std::max<Index>(4 * stride, static_cast<Index>(kLongestBlock_s / s.step));
-  const auto shortest = static_cast<Index>(kShortestBlock_s / s.step);
+  const EvidenceOptions& options = evidence_.options;
+  const auto longest = std::max<Index>(options.rows_of_longest_block * stride,
+                                       static_cast<Index>(options.longest_block / s.step));
+  const auto shortest = static_cast<Index>(options.shortest_block / s.step);
   for (const auto& [run_first, run_last] : s.runs) {
     for (Index i = run_first; i < run_last;) {
       if (!mask[i]) {
@@ -94,7 +96,7 @@ void ChannelBuilder::add(std::size_t log, const Eigen::Array<bool, Eigen::Dynami
       while (end < run_last && mask[end]) ++end;
       const Index first = i + margin, last = end - margin;
       i = end;
-      if (last - first < std::max<Index>(shortest, 2 * stride)) continue;
+      if (last - first < std::max<Index>(shortest, options.fewest_rows_of_block * stride)) continue;
       const Index pieces = std::max<Index>(1, (last - first + longest - 1) / longest);
       for (Index piece = 0; piece < pieces; ++piece) {
         block(log, first + (last - first) * piece / pieces,
@@ -130,7 +132,10 @@ void ChannelBuilder::close(std::size_t log, const NoiseBlock& b) {
 
 bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   const auto n = static_cast<Index>(y_.size());
-  if (n < kFewestRows || channel.blocks.size() < 2) return false;
+  const EvidenceOptions& options = evidence_.options;
+  if (n < options.fewest_rows ||
+      channel.blocks.size() < static_cast<std::size_t>(options.fewest_blocks))
+    return false;
   channel.y = Eigen::Map<VectorXd>(y_.data(), n);
   channel.baseline.resize(n, rows_.front().size());
   for (Index i = 0; i < n; ++i)
@@ -140,10 +145,11 @@ bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   return true;
 }
 
-void set_force_slope(EvidenceChannel& channel, std::size_t suspects) {
+void set_force_slope(EvidenceChannel& channel, std::size_t suspects,
+                     const EvidenceOptions& options) {
   channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
-  const CavitationFloor floor = add_cavitation_floor(channel, suspects);
+  const CavitationFloor floor = add_cavitation_floor(channel, suspects, options);
   const auto flow = channel.baseline.col(1).array();
   const VectorXd b = least_squares(channel.baseline, channel.y);
   channel.force_slope = (b[3] + b[4] * flow) / kBaselineForce;

@@ -8,12 +8,11 @@ namespace sparflow {
 
 /// [m^3/s], [N] scales of flow and force in a baseline, so that its columns are of order one.
 inline constexpr double kBaselineFlow = 1e-3, kBaselineForce = 1e5;
-inline constexpr Eigen::Index kFewestRows = 30;  ///< a channel with fewer rows is dropped
 
 /// Cuts the stretches in which a mask is true, shortened by `margin` samples at both ends, into blocks.
 class ChannelBuilder {
  public:
-  /// @param evidence with series and stride; must outlive this
+  /// @param evidence with series, stride and options; must outlive this
   explicit ChannelBuilder(const Evidence& evidence) : evidence_(evidence) {}
 
   EvidenceChannel channel;  ///< the caller sets kind, place, unit and noise floor
@@ -36,6 +35,7 @@ class ChannelBuilder {
 
 /// Sets the derivative of a supply channel's baseline by the measured force; its columns are 1, Q, Q^2, F, Q F in the
 /// scales above. Where an anti-cavitation valve limits the pressure from below, a column for that limit is added first.
-void set_force_slope(EvidenceChannel& channel, std::size_t suspects);
+void set_force_slope(EvidenceChannel& channel, std::size_t suspects,
+                     const EvidenceOptions& options);
 
 }  // namespace sparflow

@@ -19,13 +19,10 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-/// Rows a third of the filter's width apart are nearly independent; more rows would cost time and add no information.
-constexpr double kRowsAWindow = 3.0;
-
 /// Standard deviation of a raw channel's white noise from third differences (robust, so that motion does not count).
-double raw_noise(const VectorXd& x) {
+double raw_noise(const VectorXd& x, int fewest_differences) {
   std::vector<double> d = third_differences(x, 0, x.size());
-  if (d.size() < 20) return kNaN;
+  if (d.size() < static_cast<std::size_t>(fewest_differences)) return kNaN;
   return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) /
          kThirdDifferenceNoise;
 }
@@ -33,9 +30,11 @@ double raw_noise(const VectorXd& x) {
 /// Noise floor of a channel over several logs: the mean of those in which it is measured.
 class MeanNoise {
  public:
+  explicit MeanNoise(const EvidenceOptions& options) : fewest_(options.fewest_differences) {}
+
   /// @param gain of the channel's filter on white noise
   void add(const VectorXd& raw, double gain) {
-    const double noise = raw_noise(raw);
+    const double noise = raw_noise(raw, fewest_);
     if (!std::isfinite(noise)) return;
     sum_ += noise * gain;
     ++logs_;
@@ -44,6 +43,7 @@ class MeanNoise {
   double value() const { return logs_ > 0 ? sum_ / logs_ : kNaN; }
 
  private:
+  int fewest_;  // differences
   double sum_ = 0.0;
   int logs_ = 0;
 };
@@ -75,7 +75,8 @@ std::vector<BranchSplit> branches_of(const Evidence& e,
   if (data.empty()) return result;
   const auto suspects =
       std::count_if(owner.begin(), owner.end(), [&](std::size_t log) { return log < e.suspects; });
-  std::vector<BranchSplit> splits = split_branches(data, static_cast<std::size_t>(suspects));
+  std::vector<BranchSplit> splits =
+      split_branches(data, static_cast<std::size_t>(suspects), e.options.branches);
   for (std::size_t k = 0; k < owner.size(); ++k) result[owner[k]] = std::move(splits[k]);
   return result;
 }
@@ -204,8 +205,10 @@ std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
 
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                           const std::vector<MachineSignals>& references,
-                          const std::vector<AppliedEffect>* in_references, bool whole_motions) {
+                          const std::vector<AppliedEffect>* in_references,
+                          const EvidenceOptions& options) {
   Evidence e;
+  e.options = options;
   const Machine& machine = model.machine;
   std::vector<const MachineSignals*> signals;
   signals.reserve(suspects.size() + references.size());
@@ -225,16 +228,17 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     k.force = low_pass_of(s->step, s->window, order, 2);
     k.speed = low_pass_of(s->step, s->window, order, 1);
     k.pressure = low_pass_of(s->step, s->window, order, 0);
-    if (whole_motions) k.force = k.speed = k.pressure = VectorXd::Ones(1);
+    if (options.whole_motions) k.force = k.speed = k.pressure = VectorXd::Ones(1);
     gain_force.push_back(k.force.norm());
     gain_pressure.push_back(k.pressure.norm());
     e.kernels_.push_back(std::move(k));
     e.window = std::max(e.window, s->window);
-    e.stride =
-        std::max(e.stride, static_cast<int>(std::lround(s->window / s->step / kRowsAWindow)));
+    e.stride = std::max(e.stride,
+                        static_cast<int>(std::lround(s->window / s->step / options.rows_a_window)));
   }
+  // half the filter's width, so that a row contains samples of its own motion only
   const auto margin_of = [&](std::size_t log) -> Index {
-    if (whole_motions) return 0;
+    if (options.whole_motions) return 0;
     return static_cast<Index>(std::lround(0.5 * signals[log]->window / signals[log]->step));
   };
 
@@ -244,7 +248,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     {  // force
       ChannelBuilder b(e);
       b.channel.kind = EvidenceKind::kForce;
-      MeanNoise noise;
+      MeanNoise noise(options);
       for (std::size_t log = 0; log < signals.size(); ++log) {
         const CylinderSignals& c = signals[log]->cylinders[at];
         if (!c.has_force()) continue;
@@ -291,7 +295,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
       b.channel.at = name;
       b.channel.unit = {"mm/s", 1e-3};
       b.channel.noise_floor =
-          still.size() > 50
+          still.size() > static_cast<std::size_t>(options.fewest_samples_at_rest)
               ? robust_std(Eigen::Map<VectorXd>(still.data(), static_cast<Index>(still.size())))
               : kNaN;
       b.channel.text = evidence_text(b.channel.kind, name);
@@ -310,7 +314,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
                       : (side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract);
         ChannelBuilder b(e);
         b.channel.kind = kind;
-        MeanNoise noise;
+        MeanNoise noise(options);
         for (std::size_t log = 0; log < signals.size(); ++log) {
           const CylinderSignals& c = signals[log]->cylinders[at];
           const CylinderSeries& s = e.series[log].cylinders[at];
@@ -337,7 +341,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         b.channel.unit = {"bar", 1e5};
         b.channel.noise_floor = noise.value();
         b.channel.text = evidence_text(kind, name);
-        if (b.finish(e.channels) && !returning) set_force_slope(e.channels.back(), e.suspects);
+        if (b.finish(e.channels) && !returning)
+          set_force_slope(e.channels.back(), e.suspects, options);
       }
     }
   }
@@ -345,7 +350,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     const auto at = static_cast<std::size_t>(p);
     ChannelBuilder b(e);
     b.channel.kind = EvidenceKind::kPump;
-    MeanNoise noise;
+    MeanNoise noise(options);
     for (std::size_t log = 0; log < signals.size(); ++log) {
       const PumpSignals& s = signals[log]->pumps[at];
       const PumpSeries& series = e.series[log].pumps[at];

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/evidence/evidence_options.h"
 #include "diagnosis/evidence/noise_model.h"
 #include "identification/comparison/compare.h"
 #include "models/effects/registry.h"
@@ -54,6 +55,7 @@ struct Evidence {
   std::vector<std::string> notes;  ///< which effects cannot be judged, and why; whole sentences
   int stride = 1;                  ///< samples between rows
   double window = 0.0;             ///< [s] width of the filter
+  EvidenceOptions options;         ///< that it was collected with; fits on it use the same
 
   bool has_reference() const { return series.size() > suspects; }
   const EvidenceChannel* find(EvidenceKind kind, int index) const;
@@ -76,7 +78,7 @@ struct Evidence {
  private:
   friend Evidence collect_evidence(const CraneModel&, const std::vector<MachineSignals>&,
                                    const std::vector<MachineSignals>&,
-                                   const std::vector<AppliedEffect>*, bool);
+                                   const std::vector<AppliedEffect>*, const EvidenceOptions&);
   struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
   };
@@ -98,12 +100,10 @@ Eigen::MatrixXd acting_columns(const Eigen::MatrixXd& baseline);
 
 /// @param model its effects are part of every channel's model; its margins give the first estimate of pump demand
 /// @param in_references effects that act in the references; null: those of the model
-/// @param whole_motions uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
-///        (sharpest_window) that it distorts nothing
 Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                           const std::vector<MachineSignals>& references = {},
                           const std::vector<AppliedEffect>* in_references = nullptr,
-                          bool whole_motions = false);
+                          const EvidenceOptions& options = {});
 
 /// Effects of the model that acted when the references were recorded: all except those which a step of the model's
 /// record added from other logs.

@@ -6,8 +6,8 @@
 namespace sparflow {
 namespace {
 
-/// Reflection coefficients nearer to one would explain any slow effect as noise.
-constexpr double kLargestReflection = 0.97;
+/// Passes of the moment estimate: means are shrunken by the offset variance of the pass before.
+constexpr int kPasses = 3;
 
 struct Reflection {
   double k1 = 0.0, k2 = 0.0;
@@ -26,7 +26,9 @@ double NoiseModel::deviation() const {
 }
 
 NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                const std::vector<NoiseBlock>& blocks, bool offsets) {
+                                const std::vector<NoiseBlock>& blocks, bool offsets,
+                                const NoiseOptions& options) {
+  const double largest = options.largest_reflection;
   NoiseModel m;
   double tau2 = 0.0;
   Eigen::VectorXd means(static_cast<Eigen::Index>(blocks.size()));
@@ -34,7 +36,7 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
     const Eigen::Index n = blocks[b].last - blocks[b].first;
     means[static_cast<Eigen::Index>(b)] = n > 0 ? residual.segment(blocks[b].first, n).mean() : 0.0;
   }
-  for (int pass = 0; pass < 3; ++pass) {
+  for (int pass = 0; pass < kPasses; ++pass) {
     double c0 = 0.0, c1 = 0.0, c2 = 0.0;
     double n0 = 0.0, n1 = 0.0, n2 = 0.0;
     for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -42,7 +44,8 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
       const auto n = static_cast<double>(last - first);
       if (n < 1) continue;
       const double sd = m.deviation();
-      const double shrink = tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / 4.0)) : 0.0;
+      const double shrink =
+          tau2 > 0.0 ? tau2 / (tau2 + sd * sd / std::max(1.0, n / options.rows_alike)) : 0.0;
       const double mean = shrink * means[static_cast<Eigen::Index>(b)];
       const auto lost = shrink / std::max(1.0, n);  // subtracting a mean reduces the variance
       for (Eigen::Index t = first; t < last; ++t) {
@@ -60,14 +63,15 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
       return m;
     }
     const double g0 = c0 / n0, g1 = n1 > 0 ? c1 / n1 : 0.0, g2 = n2 > 0 ? c2 / n2 : 0.0;
-    const double k1 = std::clamp(g1 / g0, -kLargestReflection, kLargestReflection);
+    const double k1 = std::clamp(g1 / g0, -largest, largest);
     const double e1 = g0 * (1.0 - k1 * k1);
-    const double k2 = std::clamp((g2 - k1 * g1) / e1, -kLargestReflection, kLargestReflection);
+    const double k2 = std::clamp((g2 - k1 * g1) / e1, -largest, largest);
     m.phi1 = k1 * (1.0 - k2);
     m.phi2 = k2;
     m.variance = std::max(e1 * (1.0 - k2 * k2), 1e-300);
     m.offset_variance = 0.0;
-    if (!offsets || blocks.size() < 4) return m;
+    if (!offsets || blocks.size() < static_cast<std::size_t>(options.fewest_blocks_for_offsets))
+      return m;
     // variance of a block's mean by the autoregression alone: spectral density at zero frequency / n
     const double gain = 1.0 - m.phi1 - m.phi2;
     const double at_zero = m.variance / (gain * gain);

@@ -6,6 +6,8 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "diagnosis/evidence/evidence_options.h"
+
 namespace sparflow {
 
 /// Rows [first, last) of a series, evenly spaced in time.
@@ -22,7 +24,8 @@ struct NoiseModel {
   /// offset variance is the variance of block means beyond what the autoregression explains.
   /// @param offsets whether blocks may have offsets
   static NoiseModel estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                             const std::vector<NoiseBlock>& blocks, bool offsets = true);
+                             const std::vector<NoiseBlock>& blocks, bool offsets = true,
+                             const NoiseOptions& options = {});
 
   /// Log-likelihood up to a constant, with both variances scaled by their most likely common factor. [nats]
   double log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,

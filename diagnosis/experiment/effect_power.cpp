@@ -13,10 +13,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Number of noise draws over which gains are averaged. Each is used with both signs of the signature, so that the term
-/// linear in the signature cancels.
-constexpr int kDraws = 2;
-
 /// Upper tail of the central chi-square, by its closed recursion over the degrees of freedom.
 double central_tail(double x, int freedom) {
   if (x <= 0.0) return 1.0;
@@ -137,10 +133,11 @@ Signature left_by(const Signature& effect, const ProjectedDesign& rival) {
   return left;
 }
 
-PowerStudy::PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned seed)
+PowerStudy::PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned seed,
+                       const PowerOptions& options)
     : evidence_(evidence), noise_(fit.noise) {
   std::mt19937_64 random(seed);
-  for (int d = 0; d < kDraws; ++d) {
+  for (int d = 0; d < options.draws; ++d) {
     drawn_.emplace_back();
     drawn_likelihood_.emplace_back();
     for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
@@ -174,7 +171,7 @@ ProjectedDesign PowerStudy::project(const EffectDesign& design) const {
 
 double PowerStudy::log_likelihood(std::size_t channel, const VectorXd& residual) const {
   const std::vector<NoiseBlock>& blocks = evidence_.channels[channel].blocks;
-  const NoiseModel noise = NoiseModel::estimate(residual, blocks);
+  const NoiseModel noise = NoiseModel::estimate(residual, blocks, true, evidence_.options.noise);
   MatrixXd white = residual;
   const double determinant = noise.whiten(blocks, white);
   const auto n = static_cast<double>(residual.size());

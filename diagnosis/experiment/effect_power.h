@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "diagnosis/experiment/experiment_options.h"
 #include "diagnosis/selection/search_candidates.h"
 
 namespace sparflow {
@@ -42,7 +43,8 @@ Signature left_by(const Signature& effect, const ProjectedDesign& rival);
 class PowerStudy {
  public:
   /// @param evidence must outlive this  @param fit with the noise models of the channels
-  PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned seed);
+  PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned seed,
+             const PowerOptions& options = {});
 
   ProjectedDesign project(const EffectDesign& design) const;
   /// Mean gain [nats] of `times` the signature; the noise model is estimated without and with it.

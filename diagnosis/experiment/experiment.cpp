@@ -13,12 +13,7 @@ namespace {
 
 /// [s] Motions are synthesised for a minute; the operator is asked for a multiple of it.
 constexpr double kMinute = 60.0;
-constexpr double kFallbackLoad = 500.0;  ///< [kg] when the logs carry none
-
-/// [nats/min] least gain of an advised motion: with less, effects stay indistinguishable for a quarter of an hour.
-constexpr double kLeastNats = 0.3;
-/// [-] least ratio of that gain to the one of the recorded motions.
-constexpr double kBetterThanHere = 1.5;
+constexpr unsigned kSeed = 1;  ///< of the noise draws, so that results repeat
 
 /// The found effect on this evidence; no columns where it does not act.
 EffectDesign design_of(const Evidence& evidence, const AppliedEffect& found,
@@ -34,12 +29,13 @@ EffectDesign design_of(const Evidence& evidence, const AppliedEffect& found,
 
 /// By rival: gain of the found effect over it on this evidence if the found effect is the true one. [nats]
 std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
-                                const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
+                                const AppliedEffect& found, const std::vector<EffectAt>& rivals,
+                                const PowerOptions& options) {
   std::vector<double> nats(rivals.size(), 0.0);
   Eigen::VectorXd theta;
   const EffectDesign design = design_of(evidence, found, theta);
   if (!design.acts()) return nats;
-  const PowerStudy study(evidence, fit, 1);
+  const PowerStudy study(evidence, fit, kSeed, options);
   const Signature truth = signature(study.project(design), theta);
   for (std::size_t r = 0; r < rivals.size(); ++r) {
     nats[r] = study.gain(truth);  // for a rival that does not act on this evidence
@@ -70,7 +66,8 @@ EffectFit noise_of(Evidence& motion, const Evidence& evidence, const EffectFit& 
 }  // namespace
 
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
+                           const ExperimentOptions& options) {
   BetterMotion best;
   if (rivals.empty()) return best;
   double heaviest = 0.0, minutes = 0.0;
@@ -80,31 +77,36 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
       if (p > heaviest) heaviest = p;  // false for NaN
     minutes += s.step * static_cast<double>(s.samples()) / 60.0;
   }
-  if (heaviest < 50.0) heaviest = kFallbackLoad;
-  const std::vector<MotionRecipe> menu = motion_menu(model.machine, heaviest);
+  if (heaviest < options.lightest_load) heaviest = options.fallback_load;
+  const std::vector<MotionRecipe> menu = motion_menu(model.machine, heaviest, options.motion);
   CraneModel plain = model;  // the machine of the file, without effects
   plain.effects.clear();
-  SignalOptions options;
-  options.smoothing.window_s = evidence.window;
+  SignalOptions signals;
+  signals.smoothing.window_s = evidence.window;
   std::vector<std::vector<double>> nats(menu.size());  // [motions][rivals] a minute
   for (std::size_t m = 0; m < menu.size(); ++m) {
     nats[m].assign(rivals.size(), 0.0);
     Evidence motion;
     try {
       motion = collect_evidence(
-          plain, {make_signals(plain.machine,
-                               synthesise_motion(plain, menu[m], evidence.series[0].step, kMinute),
-                               options)});
+          plain,
+          {make_signals(
+              plain.machine,
+              synthesise_motion(plain, menu[m], evidence.series[0].step, kMinute, options.motion),
+              signals)},
+          {}, nullptr, evidence.options);
     } catch (const std::domain_error&) {
       continue;  // the motion has poses that the machine cannot take
     }
     const EffectFit noise = noise_of(motion, evidence, fit);
-    if (!motion.channels.empty()) nats[m] = separations(motion, noise, found, rivals);
+    if (!motion.channels.empty())
+      nats[m] = separations(motion, noise, found, rivals, options.power);
   }
-  std::vector<double> here = separations(evidence, fit, found, rivals);
+  std::vector<double> here = separations(evidence, fit, found, rivals, options.power);
   for (double& h : here) h /= std::max(minutes, 1e-3);
   const auto worth = [&](std::size_t m, std::size_t r) {
-    return nats[m][r] >= kLeastNats && nats[m][r] >= kBetterThanHere * here[r];
+    return nats[m][r] >= options.least_nats_per_minute &&
+           nats[m][r] >= options.better_than_here * here[r];
   };
   // rivals that no motion distinguishes are left out; the best motion is that with the largest least gain of the others
   std::vector<std::size_t> open;
@@ -135,19 +137,18 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
 
 std::string Experiment::sentence() const {
   if (!(nats_per_minute > 0.0)) return fmt::format("to distinguish them, record: {}", motion);
-  // as SearchOptions::same_nats: odds of e^4 = 55
-  constexpr double kSeparationNats = 4.0;
-  const double minutes = std::max(1.0, std::ceil(kSeparationNats / nats_per_minute));
+  const double minutes = std::max(1.0, std::ceil(decisive_nats / nats_per_minute));
   return fmt::format("record {:.0f} minute{} of: {} ({})", minutes, minutes > 1.0 ? "s" : "",
                      motion, reason);
 }
 
 Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals) {
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
+                           const ExperimentOptions& options) {
   const auto name = [&](const Effect& effect, int at) {
     return effect_key(effect.info(), model.machine, at);
   };
-  const BetterMotion motion = better_motion(model, evidence, fit, found, rivals);
+  const BetterMotion motion = better_motion(model, evidence, fit, found, rivals, options);
   std::vector<std::string> apart;
   for (const EffectAt& e : motion.words.empty() ? rivals : motion.apart)
     apart.push_back(name(*e.effect, e.at));

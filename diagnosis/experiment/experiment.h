@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/experiment/experiment_options.h"
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/selection/effect_search.h"
 
 namespace sparflow {
 
@@ -27,13 +29,14 @@ struct MotionRecipe {
 
 /// Motions that may be worth recording on this machine.
 /// @param heaviest [kg] the larger of two payloads
-std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest);
+std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest,
+                                      const MotionOptions& options = {});
 
 /// A synthetic log of the recipe: joint positions, commands, chamber pressures, pump pressures, payload and oil
 /// temperature of the model's machine, quasi-static and without noise.
 /// @param step [s]  @param duration [s]
 Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
-                      double duration = 60.0);
+                      double duration = 60.0, const MotionOptions& options = {});
 
 struct BetterMotion {
   std::string words;             ///< empty: no motion of the list distinguishes them
@@ -46,7 +49,8 @@ struct BetterMotion {
 /// @param fit with the noise models of the evidence's channels; quantities not measured there are left out
 /// @param found effect with its values  @param rivals effects that explain the evidence as well
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals);
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
+                           const ExperimentOptions& options = {});
 
 /// What to record next to decide between the effects of an indistinguishable set.
 struct Experiment {
@@ -55,6 +59,8 @@ struct Experiment {
   /// Gain of the effect over its rivals in a minute of that motion, and in a minute of the present logs [nats]; 0 = no
   /// motion of the list distinguishes them, and `motion` is the catalogue's general advice for the effect.
   double nats_per_minute = 0.0, nats_here = 0.0;
+  /// [nats] gain that decides, from which the number of minutes follows: that of the search.
+  double decisive_nats = SearchOptions{}.same_nats;
 
   std::string sentence() const;  ///< with the number of minutes, without a full stop
 };
@@ -62,6 +68,7 @@ struct Experiment {
 /// What to record next to distinguish a found effect from its rivals; where no motion of the list does, the catalogue's
 /// general advice for the effect.
 Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals);
+                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
+                           const ExperimentOptions& options = {});
 
 }  // namespace sparflow

@@ -15,13 +15,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kLow = 0.2, kHigh = 0.8;  ///< shares of a joint's range, clear of its ends
-constexpr double kFlowShare = 0.9;         ///< share of pump and valve flow, so that none saturates
-/// [Pa] Return pressure at rest, of the order of cranes; its value has little influence on the comparison.
-constexpr double kReturnPressure = 4.0 * units::kBar;
-constexpr double kReturnLoss = 3.0 * units::kBar / (1e-3 * 1e-3);  ///< [Pa/(m^3/s)^2]
-constexpr double kLeastSupply =
-    15.0 * units::kBar;  ///< [Pa] supply pressure with an overrunning load
+/// [-] Peak acceleration of a half cosine, by way over time squared: pi^2 / 2, rounded up.
+constexpr double kHalfCosinePeak = 4.94;
+constexpr double kFewestSteps = 4.0;  ///< samples that a leg takes at least
+constexpr double kMoving = 1e-7;      ///< [m/s] a smaller speed is rounding
 
 double middle(const Joint& j, double share) {
   return j.position.lo + share * (j.position.hi - j.position.lo);
@@ -38,18 +35,19 @@ double progress(double t, bool steps, double rise) {
 }
 
 /// Flow of a cylinder's valve at full command. [m^3/s]
-double full_flow(const CraneModel& model, int cylinder, bool extend) {
+double full_flow(const CraneModel& model, int cylinder, bool extend, const MotionOptions& options) {
   const CylinderModel& c = model.cylinders[static_cast<std::size_t>(cylinder)];
   const double learned = extend ? c.valve_gain_extend : c.valve_gain_retract;
   if (learned > 0.0) return learned;
   for (const Valve& v : model.machine.valves) {
     if (v.cylinder == cylinder) return extend ? v.max_flow_extend : v.max_flow_retract;
   }
-  return 1e-3;  // 60 l/min
+  return options.unknown_valve_flow;
 }
 
 /// Mean joint speed that limits, valve and pump allow when `count` joints move together. [rad/s, m/s]
-double fastest(const CraneModel& model, int joint, std::size_t count) {
+double fastest(const CraneModel& model, int joint, std::size_t count,
+               const MotionOptions& options) {
   const Machine& m = model.machine;
   const auto at = static_cast<std::size_t>(joint);
   double speed = std::min(std::abs(m.joints[at].velocity.lo), std::abs(m.joints[at].velocity.hi));
@@ -60,12 +58,12 @@ double fastest(const CraneModel& model, int joint, std::size_t count) {
   for (int i = 0; i < m.cylinder_count(); ++i) {
     const Cylinder& c = m.cylinders[static_cast<std::size_t>(i)];
     if (c.joint != joint || !c.hydraulic()) continue;
-    double flow = std::min(full_flow(model, i, true), full_flow(model, i, false));
+    double flow = std::min(full_flow(model, i, true, options), full_flow(model, i, false, options));
     const int pump = m.pump_of_cylinder(i);
     if (pump >= 0 && m.pumps[static_cast<std::size_t>(pump)].max_flow > 0.0)
       flow = std::min(
           flow, m.pumps[static_cast<std::size_t>(pump)].max_flow / static_cast<double>(count));
-    for (const double share : {kLow, 0.5, kHigh}) {
+    for (const double share : {options.low, 0.5, options.high}) {
       q[joint] = middle(m.joints[at], share);
       try {
         statics.update(q.data(), 0.0, 0);
@@ -73,7 +71,7 @@ double fastest(const CraneModel& model, int joint, std::size_t count) {
         continue;  // a four-bar that cannot close with the others in the middle
       }
       const double rate = std::abs(statics.length(i).d1);
-      if (rate > 0.0) speed = std::min(speed, kFlowShare * flow / (c.area_piston() * rate));
+      if (rate > 0.0) speed = std::min(speed, options.flow_share * flow / (c.area_piston() * rate));
     }
   }
   return speed * 2.0 / std::numbers::pi;  // mean of a half sine with that peak
@@ -81,12 +79,13 @@ double fastest(const CraneModel& model, int joint, std::size_t count) {
 
 std::vector<MotionLeg> up_and_down(const std::vector<int>& joints,
                                    const std::vector<double>& speeds,
-                                   const std::vector<double>& payloads) {
+                                   const std::vector<double>& payloads,
+                                   const MotionOptions& options) {
   std::vector<MotionLeg> legs;
   for (const double payload : payloads) {
     for (const double speed : speeds) {
-      legs.push_back({joints, kHigh, speed, 1.0, payload});
-      legs.push_back({joints, kLow, speed, 1.0, payload});
+      legs.push_back({joints, options.high, speed, 1.0, payload});
+      legs.push_back({joints, options.low, speed, 1.0, payload});
     }
   }
   return legs;
@@ -94,7 +93,8 @@ std::vector<MotionLeg> up_and_down(const std::vector<int>& joints,
 
 }  // namespace
 
-std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
+std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest,
+                                      const MotionOptions& options) {
   std::vector<MotionRecipe> menu;
   std::vector<int> all;
   const auto at_two_loads = [&](const std::string& name) {
@@ -111,16 +111,17 @@ std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
     const std::string& name = machine.joints[static_cast<std::size_t>(j)].name;
     const std::vector<int> own = {j};
     menu.push_back({fmt::format("{} alone, slowly out and back over its range", name),
-                    up_and_down(own, {0.1}, {0.0}), false, false});
+                    up_and_down(own, {0.1}, {0.0}, options), false, false});
     menu.push_back({fmt::format("{} alone, fast out and back over its range", name),
-                    up_and_down(own, {1.0}, {0.0}), false, false});
+                    up_and_down(own, {1.0}, {0.0}, options), false, false});
     menu.push_back({fmt::format("{} alone, out and back at three speeds: slow, half, full", name),
-                    up_and_down(own, {0.1, 0.4, 1.0}, {0.0}), false, false});
-    menu.push_back({at_two_loads(name), up_and_down(own, {0.25}, {0.0, heaviest}), false, false});
+                    up_and_down(own, {0.1, 0.4, 1.0}, {0.0}, options), false, false});
+    menu.push_back(
+        {at_two_loads(name), up_and_down(own, {0.25}, {0.0, heaviest}, options), false, false});
     menu.push_back({fmt::format("{} alone, out and back with a sudden command that is held, "
                                 "rests of two seconds between",
                                 name),
-                    {{own, kHigh, 0.8, 2.0, 0.0}, {own, kLow, 0.8, 2.0, 0.0}},
+                    {{own, options.high, 0.8, 2.0, 0.0}, {own, options.low, 0.8, 2.0, 0.0}},
                     true,
                     false});
     menu.push_back({fmt::format("{} alone, short moves back and forth about one pose", name),
@@ -142,11 +143,11 @@ std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
                     false});
   }
   if (all.size() > 1) {
-    menu.push_back(
-        {"all joints together, fast out and back", up_and_down(all, {1.0}, {0.0}), false, false});
+    menu.push_back({"all joints together, fast out and back",
+                    up_and_down(all, {1.0}, {0.0}, options), false, false});
     std::vector<MotionLeg> turns;
     for (const double payload : {0.0, heaviest}) {
-      for (const double others : {kLow, kHigh}) {
+      for (const double others : {options.low, options.high}) {
         for (const int j : all) {
           turns.push_back({{j}, others, 0.5, 0.5, payload});
           turns.push_back({{j}, 1.0 - others, 0.5, 0.5, payload});
@@ -159,12 +160,12 @@ std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest) {
                     std::move(turns), false, false});
   }
   menu.push_back({"the same few moves from cold until the oil is warm",
-                  up_and_down(all, {0.6}, {0.0}), false, true});
+                  up_and_down(all, {0.6}, {0.0}, options), false, true});
   return menu;
 }
 
 Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
-                      double duration) {
+                      double duration, const MotionOptions& options) {
   const Machine& m = model.machine;
   const auto joints = static_cast<Index>(m.joint_count());
   const auto cylinders = static_cast<std::size_t>(m.cylinder_count());
@@ -191,19 +192,19 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
   for (std::size_t turn = 0; k < n; ++turn) {
     const MotionLeg& leg = recipe.legs[turn % recipe.legs.size()];
     goal = here;
-    double seconds = 4.0 * step;
+    double seconds = kFewestSteps * step;
     for (const int j : leg.joints) {
       const auto at = static_cast<std::size_t>(j);
       goal[j] = middle(m.joints[at], leg.to);
-      const double mean = leg.speed * fastest(model, j, leg.joints.size());
+      const double mean = leg.speed * fastest(model, j, leg.joints.size(), options);
       const double way = std::abs(goal[j] - here[j]);
       const double brake =
           std::min(std::abs(m.joints[at].acceleration.lo), std::abs(m.joints[at].acceleration.hi));
       seconds = std::max(seconds, way / std::max(mean, 1e-9));
-      // peak acceleration of the half cosine: way pi^2 / (2 T^2)
-      if (brake > 0.0) seconds = std::max(seconds, std::sqrt(way * 4.94 / brake));
+      if (brake > 0.0) seconds = std::max(seconds, std::sqrt(way * kHalfCosinePeak / brake));
     }
-    const double rise = std::clamp(0.3 / seconds, 0.02, 0.4);
+    const double rise =
+        std::clamp(options.ramp / seconds, options.shortest_ramp, options.longest_ramp);
     for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
       q.row(k) = here + progress(t / seconds, recipe.steps, rise) * (goal - here);
       payload[k] = leg.payload;
@@ -245,7 +246,7 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
       const Index before = std::max<Index>(0, i - 1), after = std::min<Index>(n - 1, i + 1);
       const double v = (length(after, at) - length(before, at)) /
                        (step * static_cast<double>(std::max<Index>(1, after - before)));
-      const bool extends = v >= 0.0, moves = std::abs(v) > 1e-7;
+      const bool extends = v >= 0.0, moves = std::abs(v) > kMoving;
       if (!cylinder.hydraulic()) {
         u[i] = moves ? (extends ? 1.0 : -1.0) : 0.0;
         continue;
@@ -254,13 +255,14 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
       const double supply_area = extends ? a : b, return_area = extends ? b : a;
       const double flow = supply_area * std::abs(v), back = return_area * std::abs(v);
       if (moves)
-        u[i] = (extends ? 1.0 : -1.0) * flow / full_flow(model, static_cast<int>(c), extends);
+        u[i] =
+            (extends ? 1.0 : -1.0) * flow / full_flow(model, static_cast<int>(c), extends, options);
       // the return line sets the return pressure unless a valve must hold an overrunning load
-      double p_return = kReturnPressure + kReturnLoss * back * back;
+      double p_return = options.return_pressure + options.return_loss * back * back;
       const double load = extends ? force(i, at) : -force(i, at);  // against the motion
       double p_supply = (load + p_return * return_area) / supply_area;
-      if (p_supply < kLeastSupply) {
-        p_supply = kLeastSupply;
+      if (p_supply < options.least_supply) {
+        p_supply = options.least_supply;
         p_return = (p_supply * supply_area - load) / return_area;
       }
       pa[i] = extends ? p_supply : p_return;
@@ -281,8 +283,8 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
     add(Role::kPumpPressure, p, "p_" + m.pumps[static_cast<std::size_t>(p)].name, asked.col(p));
   add(Role::kPayload, -1, "payload", payload);
   add(Role::kOilTemperature, -1, "oil",
-      recipe.warms_up ? VectorXd(VectorXd::LinSpaced(n, 20.0, 60.0))
-                      : VectorXd(VectorXd::Constant(n, 45.0)));
+      recipe.warms_up ? VectorXd(VectorXd::LinSpaced(n, options.cold_oil, options.hot_oil))
+                      : VectorXd(VectorXd::Constant(n, options.oil)));
   return log;
 }
 

@@ -15,9 +15,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How many steps `improve` may reject before it stops, because each may need another diagnosis.
-constexpr std::size_t kMostRejected = 8;
-
 ModelStep record_of(const ExtendStep& step, const RefitContext& context, const std::string& date) {
   ModelStep record;
   record.added = step.added;
@@ -55,7 +52,8 @@ void set_errors(const RefitContext& context, const Machine& machine, const Effec
   step.before = before;
   step.after = after;
   step.judged_on = context.judged_on();
-  step.change = error_change(machine, before, after, step.stage, place_name(machine, e));
+  step.change = error_change(machine, before, after, {{step.stage}, place_name(machine, e)},
+                             context.options().change);
 }
 
 /// Adds one effect to `current`. @return the step and the model with it, which the caller may keep or not
@@ -104,10 +102,9 @@ std::string percent_text(double ratio) {
 }
 
 /// Title of an effect of the model from which the last one is indistinguishable; empty: none. Such an effect has a
-/// parameter whose interval was smaller than its value and is now larger, and twenty times as wide as before (effects
-/// that are distinguishable widen each other's intervals by a few times at most).
-std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
-  constexpr double kBlurred = 20.0;
+/// parameter whose interval was smaller than its value and is now larger, and much wider than before.
+/// @param times [-] by how much at least
+std::string blurred_by_last(const CraneModel& before, const CraneModel& after, double times) {
   const auto half = [](const AppliedEffect& e, std::size_t k) {
     return 0.5 * (e.upper95[k] - e.lower95[k]);
   };
@@ -117,7 +114,7 @@ std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
     for (std::size_t k = 0; k < was.values.size(); ++k) {
       const bool blurred = half(was, k) < std::abs(was.values[k]) &&
                            half(is, k) > std::abs(is.values[k]) &&
-                           half(is, k) > kBlurred * half(was, k);
+                           half(is, k) > times * half(was, k);
       if (blurred) return effect_title(was.effect->info(), after.machine, was.at);
     }
   }
@@ -125,11 +122,11 @@ std::string blurred_by_last(const CraneModel& before, const CraneModel& after) {
 }
 
 /// Why a step is not kept, as part of a sentence about it.
-std::string against(const ExtendStep& step) {
+std::string against(const ExtendStep& step, const ErrorChangeOptions& options) {
   if (!step.same_as.empty())
     return fmt::format("on these logs it is indistinguishable from {}, which is in the model",
                        step.same_as);
-  if (step.change.own > 1.0) {
+  if (step.change.own > options.largest_own) {
     return fmt::format("with it, the error on the {} is {} where it acts", step.judged_on,
                        percent_text(step.change.own));
   }
@@ -176,7 +173,7 @@ std::vector<const DiagnosedEffect*> to_add(const Diagnosis& d, const CraneModel&
     const bool has = std::any_of(model.effects.begin(), model.effects.end(), [&](const auto& o) {
       return o.effect == e.effect.effect && o.at == e.effect.at;
     });
-    if (!has && (d.verdict == Verdict::kMissing || e.probability >= 0.5)) out.push_back(&e);
+    if (!has && (d.verdict == Verdict::kMissing || d.probable(e))) out.push_back(&e);
   }
   std::stable_sort(out.begin(), out.end(), [](const auto* a, const auto* b) {
     return times_smaller(*a) > times_smaller(*b);
@@ -230,7 +227,7 @@ bool shapes_opening(const AppliedEffect& e) {
 }
 
 /// Appends each effect that was not kept in the end, and why, to `stopped_because`.
-void name_rejected(ExtendResult& result) {
+void name_rejected(const ErrorChangeOptions& options, ExtendResult& result) {
   std::erase_if(result.rejected, [&](const ExtendStep& r) {
     return std::any_of(result.steps.begin(), result.steps.end(),
                        [&](const ExtendStep& s) { return s.added == r.added; });
@@ -247,7 +244,8 @@ void name_rejected(ExtendResult& result) {
   }
   result.rejected = std::move(once);
   for (const ExtendStep& r : result.rejected)
-    result.stopped_because += fmt::format("; {} was tried and not kept: {}", r.title, against(r));
+    result.stopped_because +=
+        fmt::format("; {} was tried and not kept: {}", r.title, against(r, options));
 }
 
 /// Candidate effects: those in the options or the whole catalogue, without those set aside and those of the model.
@@ -307,10 +305,10 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
     auto [step, next] =
         one_step(context, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
     add_notes(std::move(notes), result);
-    if (step.change.worse()) {
+    if (step.change.worse(options.change)) {
       result.notes.push_back(
           fmt::format("{} is in the model as asked, but the data contradict it: {}", step.title,
-                      against(step)));
+                      against(step, options.change)));
     }
     keep(std::move(step), std::move(next), context, options.date, current, result);
   }
@@ -401,18 +399,18 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       std::vector<std::string> notes;
       auto [step, next] =
           one_step(context, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
-      if (step.change.worse() && !current.model.effects.empty()) {
+      if (step.change.worse(options.change) && !current.model.effects.empty()) {
         notes.clear();
         std::tie(step, next) =
             one_step(context, current, e->effect, Others::kKept, notes, round(0.15));
       }
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
-      step.same_as = blurred_by_last(current.model, next.model);
-      if (step.change.worse() || !step.same_as.empty()) {
+      step.same_as = blurred_by_last(current.model, next.model, options.blurred);
+      if (step.change.worse(options.change) || !step.same_as.empty()) {
         aside.push_back(e->effect);
         // it helps where it acts but harms elsewhere: its rivals would do the same and are set aside, too
-        if (step.change.own < 1.0 && step.same_as.empty())
+        if (step.change.own < options.change.largest_own && step.same_as.empty())
           add_indistinguishable(*diagnosis, e->effect, aside);
         ++tried;
         result.rejected.push_back(std::move(step));
@@ -424,10 +422,10 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       keep(std::move(step), std::move(next), context, options.date, current, result);
       if (shapes_opening(current.model.effects.back())) break;
     }
-    if (tried > kMostRejected && result.stopped_because.empty())
+    if (tried > options.most_rejected && result.stopped_because.empty())
       result.stopped_because = "the effects found do not improve data that took no part";
   }
-  name_rejected(result);
+  name_rejected(options.change, result);
   finish(std::move(current), start, result);
   return result;
 }

@@ -43,13 +43,26 @@ struct ExtendResult {
 };
 
 struct ExtendOptions {
-  FitOptions fit;            ///< its `effects` are not used
-  DiagnoseOptions diagnose;  ///< used by `improve` only
+  FitOptions fit;             ///< its `effects` are not used
+  DiagnoseOptions diagnose;   ///< used by `improve` only
+  ErrorChangeOptions change;  ///< whether a step is kept
   /// Logs of the same machine without the effects: what the model has learned then stays as it is, and only the
   /// parameters of effects are estimated. `improve` ignores this and has a parameter of its own.
   std::vector<Log> references;
-  int max_steps = 8;  ///< used by `improve` only
-  std::string date;   ///< "2025-03-14" for the record; empty = not recorded
+  /// Largest number of steps that `improve` keeps.
+  /// @threshold [steps] 0..; chosen: as many effects as a diagnosis may find
+  /// (SearchOptions::max_effects).
+  int max_steps = 8;
+  /// Steps that `improve` may reject before it stops.
+  /// @threshold [steps] 0..; chosen: as many as it may keep, because each may need another
+  /// diagnosis.
+  std::size_t most_rejected = 8;
+  /// Factor by which an interval of an earlier effect widens when a new effect is indistinguishable
+  /// from it.
+  /// @threshold [1] 1..; chosen: effects that are distinguishable widen each other's intervals by a
+  /// few times at most.
+  double blurred = 20.0;
+  std::string date;  ///< "2025-03-14" for the record; empty = not recorded
 };
 
 /// @param add effects in the order they are added, one step each; none that the model has already

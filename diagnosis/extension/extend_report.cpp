@@ -46,13 +46,17 @@ std::string parameters_text(const AppliedEffect& e) {
 
 /// Whether a pressure error comes mostly from extrapolation beyond the training logs.
 bool mostly_extrapolated(const StageScore& s) {
-  return s.extrapolated_percent >= 5.0 && s.extrapolated_error_percent > 50.0 &&
-         s.extrapolated_error_percent > 1.25 * s.extrapolated_percent;
+  // ExtendResult::table() should pass them, from options that the result does not carry
+  static const CompareNoteOptions options;
+  constexpr double kMostly = 50.0;  // [%] the larger part
+  return s.extrapolated_percent >= options.extrapolated_percent &&
+         s.extrapolated_error_percent > kMostly &&
+         s.extrapolated_error_percent > options.extrapolated_ratio * s.extrapolated_percent;
 }
 
 /// Rows of one step: the scores that changed by more than 1 %, the largest change first.
 std::string step_table(const ExtendStep& step) {
-  constexpr double kMoved = 0.01;
+  constexpr double kMoved = 0.01;  // a smaller change is not shown
   struct Row {
     const StageScore* before;
     const StageScore* after;

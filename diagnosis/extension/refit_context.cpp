@@ -122,8 +122,10 @@ EffectEstimate RefitContext::estimate(const CraneModel& model,
   std::vector<EffectAt> wanted = effects;
   if (others == Others::kKept) wanted = {effects.back()};
   std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
-  EffectEstimate estimate =
-      estimate_effects(base, wanted, signals_, references_, leave_out, progress, &in_references);
+  EstimateOptions how;
+  how.evidence = options_.diagnose.evidence;
+  EffectEstimate estimate = estimate_effects(base, wanted, signals_, references_, leave_out,
+                                             progress, &in_references, how);
   std::vector<AppliedEffect> all;
   for (const EffectAt& e : effects) {
     for (const auto* list : {&estimate.effects, &base.effects}) {

@@ -31,6 +31,7 @@ class RefitContext {
                const ExtendOptions& options);
 
   const std::string& judged_on() const { return judged_on_; }
+  const ExtendOptions& options() const { return options_; }
 
   /// The model that a first step is compared with. It is the model as it is when it was learned from these logs and
   /// test logs judge it, else the model learned again from them with its own effects, so that a change of logs does not

@@ -13,9 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Least model-form error of the fitted law of a loss, a valve or a sensor, as a share of the effect. Weights are
-/// exact, and friction laws declare their own model-form error.
-constexpr double kLeastForm = 0.1;
+/// Half of the difference by which an action is differentiated, relative to the nonlinear parameter.
+constexpr double kSlopeStep = 0.02;
 
 struct Layout {  // of the designs' parameters
   std::vector<Index> first;
@@ -43,13 +42,14 @@ double size_where_it_acts(const VectorXd& action) {
 
 }  // namespace
 
-double form_share(const Effect& effect) {
+double form_share(const Effect& effect, const RegressionOptions& options) {
   const bool exact = effect.changes_machine() || effect.info().stage == EffectStage::kForce;
-  return exact ? effect.info().form_error : std::max(effect.info().form_error, kLeastForm);
+  return exact ? effect.info().form_error
+               : std::max(effect.info().form_error, options.least_form_error);
 }
 
-EffectDesign other_power(const EffectDesign& design, const VectorXd& theta) {
-  constexpr double kPower = 0.2;
+EffectDesign other_power(const EffectDesign& design, const VectorXd& theta,
+                         const RegressionOptions& options) {
   const Effect& effect = *design.effect.effect;
   EffectDesign result;
   result.columns.resize(design.columns.size());
@@ -64,14 +64,14 @@ EffectDesign other_power(const EffectDesign& design, const VectorXd& theta) {
         [&](double a) { return a == 0.0 ? 0.0 : a * std::log(std::abs(a) / size); });
   }
   result.linear = 1;
-  result.lower = {-kPower};
-  result.upper = {kPower};
+  result.lower = {-options.largest_power_change};
+  result.upper = {options.largest_power_change};
   return result;
 }
 
 EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
-                           const EffectFit& fit) {
+                           const EffectFit& fit, const RegressionOptions& options) {
   const Layout layout(designs);
   const auto acts_in = [&](std::size_t k, std::size_t c) {
     return VectorXd(designs[k]->columns[c] *
@@ -98,7 +98,8 @@ EffectAction effect_action(const Evidence& evidence,
     fourth += own.array().pow(4).sum() / std::pow(noise, 4);
     for (std::size_t k = 0; k < designs.size(); ++k) {
       if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
-      const VectorXd wrong = form_share(*designs[k]->effect.effect) / noise * acts_in(k, c);
+      const VectorXd wrong =
+          form_share(*designs[k]->effect.effect, options) / noise * acts_in(k, c);
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
   }
@@ -111,7 +112,7 @@ bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>
   for (Index k = 0; k < design.linear; ++k) {
     const double lo = design.lower[static_cast<std::size_t>(k)];
     const double hi = design.upper[static_cast<std::size_t>(k)];
-    const double edge = 1e-6 * (hi - lo);
+    const double edge = kOnBound * (hi - lo);
     if (theta[k] > hi - edge || (lo > 0.0 && theta[k] < lo + edge)) return true;
   }
   return false;
@@ -206,7 +207,7 @@ EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& des
   EffectDesign result = design;
   const std::vector<bool> choices = shape_choices(*design.effect.effect);
   for (std::size_t s = 0; s < design.shape.size(); ++s) {
-    const double h = 0.02 * std::max(std::abs(design.shape[s]), 1e-9);
+    const double h = kSlopeStep * std::max(std::abs(design.shape[s]), 1e-9);
     std::vector<double> up = design.shape, down = design.shape;
     up[s] += h;
     down[s] -= h;

@@ -4,8 +4,12 @@
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/regression/regression_options.h"
 
 namespace sparflow {
+
+/// Distance from a bound within which a parameter lies on it, as a share of its range: that of rounding.
+inline constexpr double kOnBound = 1e-6;
 
 struct EffectAction {
   /// [-] largest over channels of sqrt(sum c^4 / sum c^2) / noise, c = action of the effect less its projection on the
@@ -22,16 +26,17 @@ struct EffectAction {
 /// @param index the effect's index in `designs`  @param fit of all designs
 EffectAction effect_action(const Evidence& evidence,
                            const std::vector<const EffectDesign*>& designs, std::size_t index,
-                           const EffectFit& fit);
+                           const EffectFit& fit, const RegressionOptions& options = {});
 
 /// Model-form error as a share of the effect: how much its fitted law may still differ from the machine's, by sample.
-double form_share(const Effect& effect);
+double form_share(const Effect& effect, const RegressionOptions& options = {});
 
 /// First-order change of an effect when its law has another exponent: the action times the logarithm of its size, one
 /// column in each channel. The bounds cover the published exponents (friction with v^0.85 instead of v, pipes with
 /// Q^1.75 instead of Q^2). Effects whose law has no free exponent (weights, inertia) get no columns.
 /// @param theta linear parameters of the design [SI]
-EffectDesign other_power(const EffectDesign& design, const Eigen::VectorXd& theta);
+EffectDesign other_power(const EffectDesign& design, const Eigen::VectorXd& theta,
+                         const RegressionOptions& options = {});
 
 /// Whether one of the design's linear parameters lies on its bound. A lower bound of zero does not count: it means that
 /// the effect is absent.

@@ -94,12 +94,13 @@ VectorXd own_part(const Evidence& evidence, const EffectDesign& design, Index k)
 /// (a point mass on the joint's own axis, beside its moment) or is collinear with the parameters before it (a scale
 /// error where the load never changes). Its estimate would be determined by rounding alone.
 void drop_negligible(const Evidence& evidence, EffectDesign& design) {
-  constexpr double kNegligible = 0.05;  // of the sensors' noise
   if (!design.acts()) return;
   for (Index k = 0; k < design.linear; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const double most = std::max(std::abs(design.lower[at]), std::abs(design.upper[at]));
-    if (!(own_part(evidence, design, k).cwiseAbs().maxCoeff() * most < kNegligible)) continue;
+    if (!(own_part(evidence, design, k).cwiseAbs().maxCoeff() * most <
+          evidence.options.negligible_action))
+      continue;
     for (MatrixXd& c : design.columns) {
       if (c.cols() > 0) c.col(k).setZero();
     }
@@ -265,7 +266,8 @@ EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDe
         if (!last) {
           // the more likely of the former model and the moment estimate, so that no pass makes the fit worse
           const NoiseModel& before = fit.noise[c];
-          const NoiseModel next = NoiseModel::estimate(r, channel.blocks);
+          const NoiseModel next =
+              NoiseModel::estimate(r, channel.blocks, true, evidence.options.noise);
           const bool better = first_pass || next.log_likelihood(r, channel.blocks) >
                                                 before.log_likelihood(r, channel.blocks);
           fit.noise[c] = better ? next : before.scaled_to(r, channel.blocks);

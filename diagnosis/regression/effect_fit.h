@@ -21,6 +21,7 @@ struct EffectDesign {
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 
+/// A linear parameter whose action is negligible (EvidenceOptions::negligible_action) gets columns of zeros.
 /// @param shape nonlinear parameters [SI]  @param about see Evidence::columns
 /// @param optional whether the optional parameters get columns
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
@@ -43,7 +44,7 @@ struct EffectFit {
 };
 
 struct FitControl {
-  int noise_passes = 3;
+  int noise_passes = 3;  ///< estimates of the noise models, each from the residuals of the last fit
   bool keep_residuals = false;
   bool covariance = false;
   /// Ordinary least squares, in which every row has the same weight. Where model errors exceed the noise, a fit with

@@ -3,15 +3,8 @@
 #include <cmath>
 
 namespace sparflow {
-namespace {
 
 using Eigen::VectorXd;
-/// Least advantage as a share of the rows: an effect that contains another is never worse, because its further
-/// parameters explain a few motions by chance.
-constexpr double kLeastShare = 0.05;
-constexpr double kStandardErrors = 2.0;
-
-}  // namespace
 
 LeastSquaresResidual least_squares_residual(const Evidence& evidence,
                                             const std::vector<const EffectDesign*>& base,
@@ -35,7 +28,7 @@ LeastSquaresResidual least_squares_residual(const Evidence& evidence,
 }
 
 double least_squares_advantage(const Evidence& evidence, const LeastSquaresResidual& other,
-                               const LeastSquaresResidual& one) {
+                               const LeastSquaresResidual& one, const RegressionOptions& options) {
   std::vector<double> differences;
   double rows = 0.0, sum = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
@@ -56,10 +49,11 @@ double least_squares_advantage(const Evidence& evidence, const LeastSquaresResid
     }
   }
   const auto count = static_cast<double>(differences.size());
-  if (count < 2.0 || sum < kLeastShare * rows) return 0.0;
+  if (count < 2.0 || sum < options.least_advantage * rows) return 0.0;
   double squares = 0.0;
   for (const double d : differences) squares += (d - sum / count) * (d - sum / count);
-  return sum > kStandardErrors * std::sqrt(squares * count / (count - 1.0)) ? sum : 0.0;
+  return sum > options.advantage_standard_errors * std::sqrt(squares * count / (count - 1.0)) ? sum
+                                                                                              : 0.0;
 }
 
 }  // namespace sparflow

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/regression/regression_options.h"
 
 namespace sparflow {
 
@@ -24,8 +25,10 @@ LeastSquaresResidual least_squares_residual(const Evidence& evidence,
                                             const std::vector<bool>& active);
 
 /// Sum of squares of `one` less that of `other` over the channels where both act, each in units of the mean square of
-/// `one` there [rows]. Zero unless it exceeds two standard errors over motions and a twentieth of that of `one`.
+/// `one` there [rows]. Zero unless it exceeds RegressionOptions::advantage_standard_errors over motions and
+/// RegressionOptions::least_advantage of that of `one`.
 double least_squares_advantage(const Evidence& evidence, const LeastSquaresResidual& other,
-                               const LeastSquaresResidual& one);
+                               const LeastSquaresResidual& one,
+                               const RegressionOptions& options = {});
 
 }  // namespace sparflow

@@ -17,9 +17,9 @@ double p_of(const std::vector<double>& sorted, double gain) {
   return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(sorted.size()));
 }
 
-/// The value exceeded by one tenth of `v`.
-double upper_decile(VectorXd v) {
-  const auto at = v.data() + static_cast<Index>(0.9 * static_cast<double>(v.size()));
+/// The value below which a share `level` of `v` lies, without interpolation.
+double value_at(VectorXd v, double level) {
+  const auto at = v.data() + static_cast<Index>(level * static_cast<double>(v.size()));
   std::nth_element(v.data(), at, v.data() + v.size());
   return *at;
 }
@@ -60,7 +60,8 @@ NullDistribution simulate_null_distribution(const Evidence& evidence,
                                             const std::vector<NullCandidate>& candidates,
                                             const std::vector<const EffectDesign*>& accepted,
                                             const EffectFit& fit, int simulations,
-                                            std::mt19937_64& random) {
+                                            std::mt19937_64& random,
+                                            const RegressionOptions& options) {
   const std::size_t channels = evidence.channels.size();
   std::vector<MatrixXd> noise(channels), signs(channels), fixed(channels);
   std::vector<VectorXd> residual(channels);
@@ -133,9 +134,11 @@ NullDistribution simulate_null_distribution(const Evidence& evidence,
           0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum().transpose();
       best = best.cwiseMax((gains.array() - besides).matrix());
     }
-    const double usual = upper_decile(best.head(simulations));
+    const double usual = value_at(best.head(simulations), options.scale_quantile);
     const double scale =
-        usual > 0.0 ? std::max(1.0, upper_decile(best.tail(simulations)) / usual) : 1.0;
+        usual > 0.0
+            ? std::max(1.0, value_at(best.tail(simulations), options.scale_quantile) / usual)
+            : 1.0;
     out.scale.push_back(scale);
     out.penalty.push_back(candidate.penalty);
     best.tail(simulations) /= scale;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/regression/regression_options.h"
 
 namespace sparflow {
 
@@ -33,11 +34,11 @@ struct NullCandidate {
 
 /// @param accepted effects already in the fit, which the candidates' columns are made orthogonal to
 /// @param fit with the noise models of the channels
-
 NullDistribution simulate_null_distribution(const Evidence& evidence,
                                             const std::vector<NullCandidate>& candidates,
                                             const std::vector<const EffectDesign*>& accepted,
                                             const EffectFit& fit, int simulations,
-                                            std::mt19937_64& random);
+                                            std::mt19937_64& random,
+                                            const RegressionOptions& options = {});
 
 }  // namespace sparflow

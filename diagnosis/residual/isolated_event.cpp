@@ -14,10 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kWindow_s = 0.5;
-constexpr double kBeside =
-    0.1;  // neighbours with this share of the largest window's gain belong to it
-
 struct Window {
   std::size_t block;
   Index first, last;
@@ -25,9 +21,11 @@ struct Window {
 };
 
 std::vector<Window> windows_of(const Evidence& evidence, const EvidenceChannel& channel,
-                               const VectorXd& before, const VectorXd& after) {
+                               const VectorXd& before, const VectorXd& after,
+                               const IsolatedEventOptions& options) {
   const auto length = std::max<Index>(
-      2, static_cast<Index>(std::lround(kWindow_s / (evidence.stride * evidence.series[0].step))));
+      2, static_cast<Index>(
+             std::lround(options.window / (evidence.stride * evidence.series[0].step))));
   std::vector<Window> windows;
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
     if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
@@ -42,16 +40,17 @@ std::vector<Window> windows_of(const Evidence& evidence, const EvidenceChannel& 
 }
 
 IsolatedEvent in_channel(const Evidence& evidence, std::size_t index, const VectorXd& before,
-                         const VectorXd& after, double& inside) {
+                         const VectorXd& after, const IsolatedEventOptions& options,
+                         double& inside) {
   const EvidenceChannel& channel = evidence.channels[index];
-  const std::vector<Window> windows = windows_of(evidence, channel, before, after);
+  const std::vector<Window> windows = windows_of(evidence, channel, before, after, options);
   inside = 0.0;
   if (windows.empty()) return {};
   double all = 0.0;  // decreases only: a wrong effect may increase the error elsewhere
   for (const Window& w : windows) all += std::max(0.0, w.gain);
   auto from = std::max_element(windows.begin(), windows.end(),
                                [](const Window& a, const Window& b) { return a.gain < b.gain; });
-  const double least = kBeside * from->gain;
+  const double least = options.beside * from->gain;
   auto to = from;
   while (from != windows.begin() && (from - 1)->block == from->block && (from - 1)->gain > least)
     --from;
@@ -73,12 +72,13 @@ IsolatedEvent in_channel(const Evidence& evidence, std::size_t index, const Vect
 }  // namespace
 
 IsolatedEvent locate_isolated_event(const Evidence& evidence, const EffectFit& null,
-                                    const EffectFit& with) {
+                                    const EffectFit& with, const IsolatedEventOptions& options) {
   IsolatedEvent best;
   double most = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     double inside = 0.0;
-    const IsolatedEvent here = in_channel(evidence, c, null.residual[c], with.residual[c], inside);
+    const IsolatedEvent here =
+        in_channel(evidence, c, null.residual[c], with.residual[c], options, inside);
     const double floor = evidence.channels[c].noise_floor;
     const double noises = inside / (floor > 0.0 ? floor * floor : 1.0);
     if (!(noises > most)) continue;

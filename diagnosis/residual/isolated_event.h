@@ -5,6 +5,7 @@
 #include <string>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/residual/residual_options.h"
 
 namespace sparflow {
 
@@ -21,7 +22,7 @@ struct IsolatedEvent {
 /// @param null, with fits of the same evidence without and with the effect
 /// @return share = 0 when the effect reduces no error
 IsolatedEvent locate_isolated_event(const Evidence& evidence, const EffectFit& null,
-                                    const EffectFit& with);
+                                    const EffectFit& with, const IsolatedEventOptions& options);
 
 /// Sentence without full stop. @param key of the effect that would explain the event
 std::string isolated_event_sentence(const Evidence& evidence, const IsolatedEvent& isolated_event,

@@ -20,14 +20,15 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-constexpr int kHats = 6;
-constexpr int kFourier = 60;
+constexpr unsigned kFourierSeed = 7;      ///< of the random features, so that results repeat
+constexpr std::size_t kNamedSignals = 4;  ///< at most so many signals are named in a sentence
 
 /// Hat functions with knots at quantiles, so that all have about the same number of rows. [rows x knots]
-MatrixXd hats(const VectorXd& x) {
+MatrixXd hats(const VectorXd& x, const ResidualModelOptions& options) {
   std::vector<double> knots;
-  for (int k = 0; k < kHats; ++k) {
-    const double v = quantile(x, 0.01 + 0.98 * k / (kHats - 1));
+  const double within = 1.0 - 2.0 * options.outermost_hat;
+  for (int k = 0; k < options.hats; ++k) {
+    const double v = quantile(x, options.outermost_hat + within * k / (options.hats - 1));
     if (knots.empty() || v > knots.back() + 1e-9 * (1.0 + std::abs(v))) knots.push_back(v);
   }
   const auto m = static_cast<Index>(knots.size());
@@ -52,11 +53,12 @@ struct Ridge {
 };
 
 Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<int>& fold,
-                      int folds) {
+                      const ResidualModelOptions& options) {
+  const auto folds = static_cast<std::size_t>(options.folds);
   const Index m = x.cols();
-  std::vector<MatrixXd> gram(static_cast<std::size_t>(folds), MatrixXd::Zero(m, m));
-  std::vector<VectorXd> cross(static_cast<std::size_t>(folds), VectorXd::Zero(m));
-  std::vector<std::vector<Index>> rows(static_cast<std::size_t>(folds));
+  std::vector<MatrixXd> gram(folds, MatrixXd::Zero(m, m));
+  std::vector<VectorXd> cross(folds, VectorXd::Zero(m));
+  std::vector<std::vector<Index>> rows(folds);
   for (Index i = 0; i < y.size(); ++i)
     rows[static_cast<std::size_t>(fold[static_cast<std::size_t>(i)])].push_back(i);
   MatrixXd all = MatrixXd::Zero(m, m);
@@ -70,7 +72,7 @@ Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<in
   }
   Ridge best;
   const double scale = all.diagonal().mean();
-  for (const double strength : {0.003, 0.03, 0.3}) {
+  for (const double strength : options.ridge) {
     VectorXd prediction(y.size());
     for (std::size_t f = 0; f < rows.size(); ++f) {
       MatrixXd n = all - gram[f];
@@ -96,7 +98,7 @@ std::vector<int> folds_of(const EvidenceChannel& channel, int folds) {
 
 /// Products of hat functions of own flow and own measured force.
 MatrixXd own_process_basis(const Evidence& evidence, const EvidenceChannel& channel,
-                           const std::vector<Index>& rows) {
+                           const std::vector<Index>& rows, const ResidualModelOptions& options) {
   VectorXd flow(channel.rows()), force(channel.rows());
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
     const CylinderSeries& c = evidence.series[static_cast<std::size_t>(channel.log[b])]
@@ -107,7 +109,7 @@ MatrixXd own_process_basis(const Evidence& evidence, const EvidenceChannel& chan
       force[i] = c.force.size() > k ? c.force[k] : c.static_force[k];
     }
   }
-  const MatrixXd a = hats(flow(rows)), b = hats(force(rows));
+  const MatrixXd a = hats(flow(rows), options), b = hats(force(rows), options);
   if (a.cols() == 0 || b.cols() == 0) return MatrixXd::Ones(static_cast<Index>(rows.size()), 1);
   MatrixXd basis(static_cast<Index>(rows.size()), a.cols() * b.cols());
   for (Index i = 0; i < a.cols(); ++i) {
@@ -117,11 +119,11 @@ MatrixXd own_process_basis(const Evidence& evidence, const EvidenceChannel& chan
   return basis;
 }
 
-/// [SI] Structure of smaller RMS is not reported, however regular: 0.05 bar, 0.05 mm/s, 0.1 % of the largest force.
-double smallest_of_interest(const EvidenceChannel& channel) {
-  if (channel.kind == EvidenceKind::kFlow) return 5e-5;
-  if (channel.kind != EvidenceKind::kForce) return 5e3;
-  return 1e-3 * channel.largest_force;
+/// [SI] Structure of smaller RMS is not reported, however regular.
+double smallest_of_interest(const EvidenceChannel& channel, const ResidualModelOptions& options) {
+  if (channel.kind == EvidenceKind::kFlow) return options.smallest_speed;
+  if (channel.kind != EvidenceKind::kForce) return options.smallest_pressure;
+  return options.smallest_force_share * channel.largest_force;
 }
 
 struct ResidualModelFit {
@@ -132,7 +134,8 @@ struct ResidualModelFit {
 /// The flexible model: hat functions of every signal and random Fourier features of all together.
 ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
                                          const std::vector<MatrixXd>& hat, const VectorXd& y,
-                                         const std::vector<int>& fold, int folds) {
+                                         const std::vector<int>& fold,
+                                         const ResidualModelOptions& options) {
   MatrixXd standard(y.size(), static_cast<Index>(values.size()));
   for (std::size_t s = 0; s < values.size(); ++s) {
     const VectorXd& v = values[s];
@@ -140,38 +143,40 @@ ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
     standard.col(static_cast<Index>(s)) =
         sd > 0.0 ? VectorXd((v.array() - v.mean()) / sd) : VectorXd::Zero(v.size());
   }
-  std::mt19937 random(7);
+  std::mt19937 random(kFourierSeed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 2.0 * std::numbers::pi);
-  MatrixXd fourier(standard.rows(), kFourier);
-  for (int k = 0; k < kFourier; ++k) {
+  MatrixXd fourier(standard.rows(), options.fourier);
+  for (int k = 0; k < options.fourier; ++k) {
     VectorXd w = VectorXd::Zero(standard.cols());
-    for (int pick = 0; pick < 4; ++pick)
-      w[static_cast<Index>(random() % static_cast<unsigned>(w.size()))] = 0.7 * normal(random);
+    for (int pick = 0; pick < options.fourier_signals; ++pick)
+      w[static_cast<Index>(random() % static_cast<unsigned>(w.size()))] =
+          options.fourier_width * normal(random);
     fourier.col(k) = ((standard * w).array() + uniform(random)).cos();
   }
   fourier.rowwise() -= fourier.colwise().mean().eval();
   ResidualModelFit model;
-  Index width = kFourier;
+  Index width = options.fourier;
   for (const MatrixXd& h : hat) {
     model.parts.push_back(h);
     if (h.cols() > 0) model.parts.back().rowwise() -= h.colwise().mean().eval();
     width += h.cols();
   }
   MatrixXd x(y.size(), width);
-  x.leftCols(kFourier) = 0.5 * fourier;
-  Index at = kFourier;
+  x.leftCols(options.fourier) = options.fourier_weight * fourier;
+  Index at = options.fourier;
   for (const MatrixXd& p : model.parts) {
     x.middleCols(at, p.cols()) = p;
     at += p.cols();
   }
-  model.ridge = cross_validated(x, y, fold, folds);
+  model.ridge = cross_validated(x, y, fold, options);
   return model;
 }
 
 /// The driven model: sign of the speed (forces) or command (speeds), times the hat functions of every signal.
 ResidualModelFit driven_residual_model(const VectorXd& driver, const std::vector<MatrixXd>& hat,
-                                       const VectorXd& y, const std::vector<int>& fold, int folds) {
+                                       const VectorXd& y, const std::vector<int>& fold,
+                                       const ResidualModelOptions& options) {
   ResidualModelFit model;
   Index width = 0;
   for (const MatrixXd& h : hat) {
@@ -184,7 +189,7 @@ ResidualModelFit driven_residual_model(const VectorXd& driver, const std::vector
     x.middleCols(at, p.cols()) = p;
     at += p.cols();
   }
-  model.ridge = cross_validated(x, y, fold, folds);
+  model.ridge = cross_validated(x, y, fold, options);
   return model;
 }
 
@@ -207,19 +212,22 @@ VectorXd driver_of(const Evidence& evidence, const EvidenceChannel& channel,
   return all(rows);
 }
 
-/// Names of the signals that explain a fifth or more of the structure alone, held out.
+/// Names of the signals that explain enough of the structure alone, held out.
 std::vector<std::string> strongest(const ResidualModelFit& model,
                                    const std::vector<SignalColumn>& signals, const VectorXd& y,
-                                   const std::vector<int>& fold, int folds) {
+                                   const std::vector<int>& fold,
+                                   const ResidualModelOptions& options) {
   std::vector<std::pair<double, std::string>> alone;
   for (std::size_t s = 0; s < signals.size(); ++s) {
     if (model.parts[s].cols() == 0) continue;
-    alone.emplace_back(cross_validated(model.parts[s], y, fold, folds).explained, signals[s].name);
+    alone.emplace_back(cross_validated(model.parts[s], y, fold, options).explained,
+                       signals[s].name);
   }
   std::sort(alone.rbegin(), alone.rend());
   std::vector<std::string> names;
   for (const auto& [share, name] : alone) {
-    if (share < 0.2 * model.ridge.explained || names.size() >= 4) break;
+    if (share < options.least_share_alone * model.ridge.explained || names.size() >= kNamedSignals)
+      break;
     names.push_back(name);
   }
   if (names.empty()) names.emplace_back("several signals together");
@@ -228,14 +236,14 @@ std::vector<std::string> strongest(const ResidualModelFit& model,
 
 /// The residual in suspect rows; where a pressure model is learned, less a smooth function of that model's inputs.
 VectorXd to_explain(const Evidence& evidence, const EvidenceChannel& channel, const VectorXd& whole,
-                    const std::vector<Index>& rows) {
+                    const std::vector<Index>& rows, const ResidualModelOptions& options) {
   VectorXd y = whole(rows).array() - whole(rows).mean();
   if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow &&
       channel.kind != EvidenceKind::kPump) {
     // a pressure model learns any smooth law of the cylinder's own flow and force, so that is explained
-    const MatrixXd own = own_process_basis(evidence, channel, rows);
+    const MatrixXd own = own_process_basis(evidence, channel, rows, options);
     MatrixXd gram = transposed_product(own, own);
-    gram.diagonal().array() += 1e-3 * gram.diagonal().mean();
+    gram.diagonal().array() += options.own_ridge * gram.diagonal().mean();
     y -= own * solve_symmetric(gram, own.transpose() * y);
     y.array() -= y.mean();
   }
@@ -249,8 +257,9 @@ std::optional<ResidualStructure> event_of(const Evidence& evidence, std::size_t 
                                           const ResidualModelOptions& options) {
   const EvidenceChannel& channel = evidence.channels[index];
   if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow) return {};
-  const Event event = strongest_event(evidence, channel, residual);
-  if (event.times < options.least_event || event.rms < smallest_of_interest(channel)) return {};
+  const Event event = strongest_event(evidence, channel, residual, options);
+  if (event.times < options.least_event || event.rms < smallest_of_interest(channel, options))
+    return {};
   ResidualStructure left;
   left.channel = index;
   left.event = true;
@@ -268,34 +277,34 @@ std::optional<ResidualStructure> residual_structure_of(const Evidence& evidence,
                                                        const ResidualModelOptions& options) {
   const EvidenceChannel& channel = evidence.channels[index];
   const std::vector<Index> rows = suspect_rows(evidence, channel);
-  if (rows.size() < 80 || whole.size() == 0) return {};
-  const VectorXd y = to_explain(evidence, channel, whole, rows);
+  if (std::ssize(rows) < options.fewest_rows || whole.size() == 0) return {};
+  const VectorXd y = to_explain(evidence, channel, whole, rows, options);
   const std::vector<int> all_folds = folds_of(channel, options.folds);
   std::vector<int> fold;
   fold.reserve(rows.size());
   for (const Index i : rows) fold.push_back(all_folds[static_cast<std::size_t>(i)]);
-  const std::vector<SignalColumn> signals = channel_signals(evidence, channel);
+  const std::vector<SignalColumn> signals = channel_signals(evidence, channel, options);
   std::vector<VectorXd> values;
   std::vector<MatrixXd> hat;
   for (const SignalColumn& s : signals) {
     values.emplace_back(s.values(rows));
-    hat.push_back(hats(values.back()));
+    hat.push_back(hats(values.back(), options));
   }
-  ResidualModelFit model = additive_residual_model(values, hat, y, fold, options.folds);
+  ResidualModelFit model = additive_residual_model(values, hat, y, fold, options);
   const VectorXd driver = driver_of(evidence, channel, rows);
   if (driver.size() > 0 && driver.squaredNorm() > 0.0) {
-    ResidualModelFit driven = driven_residual_model(driver, hat, y, fold, options.folds);
+    ResidualModelFit driven = driven_residual_model(driver, hat, y, fold, options);
     if (driven.ridge.explained > std::max(model.ridge.explained, options.least_share_driven))
       model = std::move(driven);
   }
   ResidualStructure left;
   left.channel = index;
   const double variance = y.squaredNorm() / static_cast<double>(y.size());
-  const Line line = strongest_line(evidence, channel, whole);
+  const Line line = strongest_line(evidence, channel, whole, options);
   left.explained = std::max(model.ridge.explained, line.share);
   left.rms = std::sqrt(std::max(0.0, left.explained) * variance);
   left.noise = std::sqrt(std::max(0.0, 1.0 - left.explained) * variance);
-  const Oscillation oscillation = strongest_oscillation(evidence, channel);
+  const Oscillation oscillation = strongest_oscillation(evidence, channel, options);
   if (oscillation.dip < options.deepest_dip && left.explained < options.least_share) {
     left.explained = oscillation.rms * oscillation.rms /
                      (oscillation.rms * oscillation.rms + oscillation.noise * oscillation.noise);
@@ -306,15 +315,15 @@ std::optional<ResidualStructure> residual_structure_of(const Evidence& evidence,
         fmt::format("time, an oscillation near {:.1f} Hz", oscillation.frequency));
     return left;
   }
-  if (left.rms < smallest_of_interest(channel) || left.explained < options.least_share ||
+  if (left.rms < smallest_of_interest(channel, options) || left.explained < options.least_share ||
       left.rms < options.least_size * left.noise) {
     return event_of(evidence, index, whole, options);
   }
-  if (line.share > 0.5 * left.explained) {
+  if (line.share > options.least_line_share * left.explained) {
     left.frequency = line.frequency;
     left.depends_on.push_back(fmt::format("time, {:.2f} Hz", line.frequency));
   }
-  for (std::string& name : strongest(model, signals, y, fold, options.folds)) {
+  for (std::string& name : strongest(model, signals, y, fold, options)) {
     if (left.depends_on.empty() || name != "several signals together")
       left.depends_on.push_back(std::move(name));
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/residual/residual_options.h"
 
 namespace sparflow {
 
@@ -27,16 +28,6 @@ struct ResidualStructure {
   bool event = false;                   ///< whether it is an isolated event
 };
 
-struct ResidualModelOptions {
-  double least_share = 0.10;  ///< 0..1 of the residual's variance, on motions left out
-  /// 0..1 the same for the driven model: small irregularities of valves and seals have that form, too.
-  double least_share_driven = 0.3;
-  double least_size = 0.35;   ///< [-] RMS of the explained part / standard deviation of the rest
-  double least_event = 4.0;   ///< [-] RMS of an event's second / RMS of the median second
-  double deepest_dip = -0.3;  ///< [-] autocorrelation of the fast part below which it oscillates
-  int folds = 5;              ///< of the cross-validation over blocks of motion
-};
-
 /// Channels with unmodelled structure in the residual, the largest relative to noise first. @param fit with residuals
 std::vector<ResidualStructure> find_residual_structure(const Evidence& evidence,
                                                        const EffectFit& fit,
@@ -47,6 +38,7 @@ struct SignalColumn {
   std::string name;
   Eigen::VectorXd values;  ///< [rows]
 };
-std::vector<SignalColumn> channel_signals(const Evidence& evidence, const EvidenceChannel& channel);
+std::vector<SignalColumn> channel_signals(const Evidence& evidence, const EvidenceChannel& channel,
+                                          const ResidualModelOptions& options = {});
 
 }  // namespace sparflow

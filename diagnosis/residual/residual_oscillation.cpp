@@ -12,55 +12,57 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-/// Least ratio of a line to the median of its surroundings. By chance it is exceeded once in a hundred channels of 2000
-/// rows (exponential distribution: 2^-(ratio) for each frequency).
-constexpr double kLineRatio = 18.0;
+/// Ratio of the standard deviation to the median absolute value of a normal distribution.
+constexpr double kNormalDeviation = 1.4826;
 
 }  // namespace
 
-Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel) {
+Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel,
+                                  const ResidualModelOptions& options) {
   Oscillation best;
   for (std::size_t log = 0; log < channel.raw.size(); ++log) {
     const MachineSeries& s = evidence.series[log];
-    const auto half = static_cast<Index>(std::lround(0.5 / s.step));
-    const auto longest = static_cast<Index>(std::lround(0.7 / s.step)),
-               shortest = std::max<Index>(2, static_cast<Index>(std::lround(0.05 / s.step)));
+    const auto half = static_cast<Index>(std::lround(options.oscillation_half_width / s.step));
+    const auto longest = static_cast<Index>(std::lround(options.longest_lag / s.step)),
+               shortest = std::max<Index>(
+                   2, static_cast<Index>(std::lround(options.shortest_lag / s.step)));
     VectorXd c = VectorXd::Zero(longest + 1);
     double n = 0.0, white = 0.0, differences = 0.0;
     for (const auto& [first, last] : s.runs) {
       const Index length = last - first;
-      if (length < 8 * half) continue;
+      if (length < options.shortest_run * half) continue;
       const VectorXd x = channel.raw[log].segment(first, length);
       VectorXd h = VectorXd::Constant(length, std::numeric_limits<double>::quiet_NaN());
       for (Index i = half; i + half < length; ++i)
         h[i] = x[i] - x.segment(i - half, 2 * half + 1).mean();
-      // starts and stops of motions are steps, not oscillations: values above five robust deviations are left out
+      // starts and stops of motions are steps, not oscillations: large values are left out
       std::vector<double> sizes;
       for (const double v : h) {
         if (std::isfinite(v)) sizes.push_back(std::abs(v));
       }
-      if (sizes.size() < 200) continue;
-      const double usual =
-          1.4826 * median(Eigen::Map<VectorXd>(sizes.data(), static_cast<Index>(sizes.size())));
+      if (std::ssize(sizes) < options.fewest_samples) continue;
+      const double usual = kNormalDeviation * median(Eigen::Map<VectorXd>(
+                                                  sizes.data(), static_cast<Index>(sizes.size())));
+      const double largest = options.outlier * usual;
       for (Index i = 0; i + longest < length; ++i) {
-        if (!(std::abs(h[i]) < 5.0 * usual)) continue;
+        if (!(std::abs(h[i]) < largest)) continue;
         bool whole = true;
-        for (Index l = 0; l <= longest && whole; ++l) whole = std::abs(h[i + l]) < 5.0 * usual;
+        for (Index l = 0; l <= longest && whole; ++l) whole = std::abs(h[i + l]) < largest;
         if (!whole) continue;
         for (Index l = 0; l <= longest; ++l) c[l] += h[i] * h[i + l];
         n += 1.0;
       }
       for (const double d : third_differences(x, 0, length)) {
         const double noise = d / kThirdDifferenceNoise;
-        white += std::min(noise * noise, 25.0 * usual * usual);
+        white += std::min(noise * noise, options.outlier * options.outlier * usual * usual);
         differences += 1.0;
       }
     }
-    if (n < 200.0) continue;
+    if (n < options.fewest_samples) continue;
     c /= n;
     white /= differences;
     const double coloured = c[0] - white;
-    if (coloured < 0.5 * white) continue;  // no larger than the noise
+    if (coloured < options.least_oscillation * white) continue;  // no larger than the noise
     for (Index l = shortest; l < longest; ++l) {
       if (c[l] / coloured < best.dip && c[l] <= c[l - 1] && c[l] <= c[l + 1]) {
         best = {c[l] / coloured, 0.5 / (static_cast<double>(l) * s.step), std::sqrt(coloured),
@@ -81,15 +83,16 @@ std::vector<Index> suspect_rows(const Evidence& evidence, const EvidenceChannel&
 }
 
 Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
-                    const VectorXd& residual) {
+                    const VectorXd& residual, const ResidualModelOptions& options) {
   const std::vector<Index> rows = suspect_rows(evidence, channel);
   const auto n = static_cast<double>(rows.size());
-  if (n < 100) return {};
+  if (n < options.fewest_rows_line) return {};
   // phases differ between logs, so power is summed over logs
   const double step = evidence.stride * evidence.series[0].step;
   const double span = n * step;
-  const double highest = 0.45 / step;
-  const auto count = static_cast<int>(std::min(4000.0, 2.0 * highest * span));
+  const double highest = options.highest_frequency / step;
+  const auto count =
+      static_cast<int>(std::min(options.most_frequencies, options.oversampling * highest * span));
   std::vector<double> power(static_cast<std::size_t>(count), 0.0);
   std::vector<std::vector<Index>> by_log(evidence.suspects);
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
@@ -106,7 +109,7 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
     for (std::size_t log = 0; log < by_log.size(); ++log) {
       const MachineSeries& s = evidence.series[log];
       double c = 0.0, d = 0.0;
-      if (by_log[log].size() < 50) continue;
+      if (by_log[log].size() < options.fewest_rows_of_log) continue;
       for (const Index i : by_log[log]) {
         const double phase =
             2.0 * std::numbers::pi * f * s.time[channel.sample[static_cast<std::size_t>(i)]];
@@ -119,16 +122,16 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
   }
   Line best;
   for (int k = 1; k < count; ++k) {
-    const int half = std::max(20, count / 40);
+    const int half = std::max(options.fewest_around, count / options.surroundings);
     const int lo = std::max(1, k - half), hi = std::min(count, k + half);
     std::vector<double> around(power.begin() + lo, power.begin() + hi);
     std::nth_element(around.begin(),
                      around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
     const double median = around[around.size() / 2];
     const double share = power[static_cast<std::size_t>(k)] / total;
-    // less than 20 periods in the log: slow drifts are left to the flexible model
-    if (highest * k / count * span > 20.0 &&
-        power[static_cast<std::size_t>(k)] > kLineRatio * median && share > best.share) {
+    // lines with few periods in the log are slow drifts, which are left to the flexible model
+    if (highest * k / count * span > options.fewest_periods &&
+        power[static_cast<std::size_t>(k)] > options.line_ratio * median && share > best.share) {
       best = {highest * k / count, share};
     }
   }
@@ -136,16 +139,15 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
 }
 
 Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
-                      const VectorXd& residual) {
-  constexpr double kSecond = 1.0;
-  constexpr std::size_t kFewest = 20;  // seconds of motion, for a meaningful median
+                      const VectorXd& residual, const ResidualModelOptions& options) {
   struct Second {
     std::size_t block;
     Index first, last;
     double power;
   };
   const auto length = std::max<Index>(
-      2, static_cast<Index>(std::lround(kSecond / (evidence.stride * evidence.series[0].step))));
+      2, static_cast<Index>(
+             std::lround(options.event_length / (evidence.stride * evidence.series[0].step))));
   std::vector<Second> seconds;
   double total = 0.0, rows = 0.0;
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
@@ -158,7 +160,7 @@ Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
       seconds.push_back({b, i, i + length, power});
     }
   }
-  if (seconds.size() < kFewest) return {};
+  if (seconds.size() < options.fewest_seconds) return {};
   std::vector<double> powers;
   powers.reserve(seconds.size());
   for (const Second& s : seconds) powers.push_back(s.power);
@@ -170,8 +172,9 @@ Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
                                [](const Second& a, const Second& b) { return a.power < b.power; });
   Event event;
   event.times = std::sqrt(from->power) / usual;
-  // neighbouring seconds whose RMS is twice the median or more belong to the event
-  const auto out = [&](const Second& s) { return s.power > 4.0 * usual * usual; };
+  // neighbouring seconds of large RMS belong to the event
+  const double beside = options.event_beside * options.event_beside * usual * usual;
+  const auto out = [&](const Second& s) { return s.power > beside; };
   auto to = from;
   while (from != seconds.begin() && (from - 1)->block == from->block && out(*(from - 1))) --from;
   while (to + 1 != seconds.end() && (to + 1)->block == to->block && out(*(to + 1))) ++to;

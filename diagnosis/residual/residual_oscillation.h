@@ -8,14 +8,15 @@ namespace sparflow {
 std::vector<Eigen::Index> suspect_rows(const Evidence& evidence, const EvidenceChannel& channel);
 
 /// An oscillation of varying frequency, which has no line in the periodogram: the lowest minimum of the autocorrelation
-/// between lags of 0.05 and 0.7 s, of the part that is faster than a second. White noise has no such minimum, and a
+/// between a shortest and a longest lag, of the part that is faster than a second. White noise has no such minimum, and a
 /// step decays without one.
 struct Oscillation {
   double dip = 0.0;        ///< [-] autocorrelation at the minimum, of what exceeds white noise
   double frequency = 0.0;  ///< [Hz] the minimum is at half a period
   double rms = 0.0, noise = 0.0;  ///< [SI] of the oscillation, of white noise
 };
-Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel);
+Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel,
+                                  const ResidualModelOptions& options);
 
 struct Line {
   double frequency = 0.0;  ///< [Hz]
@@ -25,7 +26,7 @@ struct Line {
 /// Strongest line in the periodogram of the residual over time; share = 0 when none is significant.
 /// @param residual [rows, SI]
 Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
-                    const Eigen::VectorXd& residual);
+                    const Eigen::VectorXd& residual, const ResidualModelOptions& options);
 
 /// A residual that is much larger at one place in time than everywhere else. Other motions do not show it, so no law
 /// learned from them can explain it.
@@ -42,6 +43,6 @@ struct Event {
 /// that is a single second (an end stop) or when there are too few seconds of motion for a median.
 /// @param residual [rows, SI]
 Event strongest_event(const Evidence& evidence, const EvidenceChannel& channel,
-                      const Eigen::VectorXd& residual);
+                      const Eigen::VectorXd& residual, const ResidualModelOptions& options);
 
 }  // namespace sparflow

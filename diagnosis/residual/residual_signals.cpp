@@ -14,13 +14,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 namespace {
-/// [s] Time constants of lagged pump power. A first-order lag between them is nearly a linear combination of both.
-constexpr double kLate[] = {0.3, 1.5};
-
-/// [-] Widths of a backlash, as share of full command. A sticking spool or a worn lever follows the command with
-/// backlash; the residual then depends on the side from which the command came, which no measured signal contains.
-constexpr double kPlays[] = {0.05, 0.1, 0.2};
-
 /// Position of the command inside the backlash, -1 .. 1; springs centre the spool where there is no command. [samples]
 VectorXd side_of_play(const VectorXd& command, Index samples, double width) {
   VectorXd side = VectorXd::Zero(samples);
@@ -36,8 +29,8 @@ VectorXd side_of_play(const VectorXd& command, Index samples, double width) {
 }
 }  // namespace
 
-std::vector<SignalColumn> channel_signals(const Evidence& evidence,
-                                          const EvidenceChannel& channel) {
+std::vector<SignalColumn> channel_signals(const Evidence& evidence, const EvidenceChannel& channel,
+                                          const ResidualModelOptions& options) {
   std::vector<SignalColumn> out;
   const Machine& machine = *evidence.series[0].machine;
   // A signal from a sensor of the channel itself is left out, because it would explain that sensor's noise.
@@ -135,7 +128,7 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
     };
     const std::string name = "power of " + machine.pumps[p].name;
     add_power(name, power);
-    for (const double late : kLate) {
+    for (const double late : options.power_lags) {
       std::vector<VectorXd> lagged;
       lagged.reserve(power.size());
       for (std::size_t l = 0; l < power.size(); ++l)
@@ -144,7 +137,7 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
     }
   }
   if (channel.kind == EvidenceKind::kFlow) {
-    for (const double width : kPlays) {
+    for (const double width : options.backlashes) {
       std::vector<VectorXd> side;
       side.reserve(evidence.series.size());
       for (const MachineSeries& s : evidence.series)
@@ -178,7 +171,7 @@ std::vector<SignalColumn> channel_signals(const Evidence& evidence,
   add("time", [&](const MachineSeries& s, Index k, const NoiseBlock&, Index) { return s.time[k]; });
   add("time since the motion's start",
       [&](const MachineSeries&, Index, const NoiseBlock& b, Index i) {
-        return std::min(20.0, static_cast<double>(i - b.first));
+        return std::min(options.start_rows, static_cast<double>(i - b.first));
       });
   return out;
 }

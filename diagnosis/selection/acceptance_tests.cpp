@@ -11,7 +11,7 @@ using Eigen::Index;
 void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
                   const std::vector<const EffectDesign*>& designs, std::size_t index,
                   FoundEffect& found) {
-  const EffectAction action = effect_action(evidence, designs, index, fit);
+  const EffectAction action = effect_action(evidence, designs, index, fit, options.regression);
   found.size = action.size;
   found.absorbed = action.absorbed;
   found.absorbed_where_seen = action.absorbed_where_seen;
@@ -44,9 +44,8 @@ std::string why_not_named(const FoundEffect& found, const SearchOptions& options
         "it compensates model-form error: it is only {:.1f} times that of the other effects there",
         found.over_form);
   }
-  // one standard error above zero or, where a few large steps carry all evidence, positive in nearly all folds
-  if (found.held_out <= found.held_out_error &&
-      !(found.held_out > 0.0 && found.held_out_share > 0.79)) {
+  if (found.held_out <= options.held_out_errors * found.held_out_error &&
+      !(found.held_out > 0.0 && found.held_out_share > options.improved_share)) {
     return fmt::format("its gain on motions left out, {:.1f} +- {:.1f} nats, is not significant",
                        found.held_out, found.held_out_error);
   }

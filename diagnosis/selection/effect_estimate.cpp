@@ -21,10 +21,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 /// Linearisations: the error falls by the share of the nonlinearity each time, a tenth for angles of a few degrees.
 constexpr int kChords = 3;
-constexpr int kTurns = 5;             // updates of the load-sensing leaders
-constexpr int kSections = 10;         // golden sections, which reduce a bracket to 1 %
-constexpr double kMuchSharper = 0.5;  // largest ratio of window widths for which it is worthwhile
-constexpr int kSweeps = 2;            // over all nonlinear parameters
+constexpr int kSections = 10;  // golden sections, which reduce a bracket to 1 %
+constexpr int kSweeps = 2;     // over all nonlinear parameters
 
 std::vector<double> shape_of(const AppliedEffect& e) {
   std::vector<double> shape;
@@ -81,8 +79,9 @@ class Estimator {
   Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted,
             const std::vector<MachineSignals>& suspects,
             const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
-            const std::vector<AppliedEffect>* in_references)
+            const std::vector<AppliedEffect>* in_references, const EstimateOptions& options)
       : base_(model),
+        options_(options),
         known_(model.effects),
         suspects_(suspects),
         references_(references),
@@ -111,7 +110,7 @@ class Estimator {
     }
     double log_likelihood = likelihood();
     std::vector<FoundEffect> found = with_intervals();
-    for (int turn = 0; turn < kTurns; ++turn) {
+    for (int turn = 0; turn < kLeaderTurns; ++turn) {
       std::optional<Evidence> updated = evidence_.with_leaders_of(applied(found));
       if (!updated) break;
       evidence_ = std::move(*updated);
@@ -139,7 +138,7 @@ class Estimator {
   /// Whether positions are measured so finely in every log that a much shorter window than the search's suffices.
   bool can_sharpen(const std::vector<MachineSignals>& logs) const {
     return std::all_of(logs.begin(), logs.end(), [&](const MachineSignals& s) {
-      return sharp_window(s) < kMuchSharper * s.window;
+      return sharp_window(s) < options_.much_sharper * s.window;
     });
   }
   static double sharp_window(const MachineSignals& s) {
@@ -152,7 +151,9 @@ class Estimator {
   }
 
   Evidence collect(const CraneModel& model) const {
-    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, sharp_);
+    EvidenceOptions how = options_.evidence;
+    how.whole_motions = how.whole_motions || sharp_;
+    Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, how);
     // a lag keeps the valve openings of the dead band known before, also while both are estimated
     for (MachineSeries& s : evidence.series) set_openings(known_, s);
     if (leave_out_.empty()) return evidence;
@@ -237,8 +238,8 @@ class Estimator {
       if (v < x - 1e-9 * std::abs(x)) lo = std::max(lo, v);
       if (v > x + 1e-9 * std::abs(x)) hi = std::min(hi, v);
     }
-    // never beyond half and twice the value, which limits it beyond the ends of the grid
-    return {std::max(lo, x > 0.0 ? 0.5 * x : lo), std::min(hi, x > 0.0 ? 2.0 * x : hi)};
+    const double step = options_.largest_step;
+    return {std::max(lo, x > 0.0 ? x / step : lo), std::min(hi, x > 0.0 ? step * x : hi)};
   }
 
   void refine(std::size_t d) {
@@ -308,7 +309,8 @@ class Estimator {
         const EffectParameter& parameter = e.effect->info().parameters[p];
         if (parameter.choice) continue;
         const double span = parameter.upper - parameter.lower, v = e.values[p];
-        if (v > parameter.lower + 1e-6 * span && v < parameter.upper - 1e-6 * span) continue;
+        if (v > parameter.lower + kOnBound * span && v < parameter.upper - kOnBound * span)
+          continue;
         out.notes.push_back(fmt::format(
             "{} of {} lies on the bound of its plausible range, {:.4g} {}: another effect may act, "
             "or it does not act at all",
@@ -318,6 +320,7 @@ class Estimator {
   }
 
   CraneModel base_;
+  EstimateOptions options_;
   std::vector<AppliedEffect> known_;  ///< all effects of the model
   std::vector<MachineSignals> suspects_, references_;
   bool sharp_ = false;  // shorter windows than the search's, with rows up to the ends of motions
@@ -335,10 +338,12 @@ EffectEstimate estimate_effects(const CraneModel& model, const std::vector<Effec
                                 const std::vector<MachineSignals>& suspects,
                                 const std::vector<MachineSignals>& references,
                                 const std::vector<Mask>& leave_out, const SearchProgress& progress,
-                                const std::vector<AppliedEffect>* in_references) {
+                                const std::vector<AppliedEffect>* in_references,
+                                const EstimateOptions& options) {
   if (wanted.empty()) return {};
   SPARFLOW_CHECK(!suspects.empty(), "effects need a log to be estimated from");
-  return Estimator(model, wanted, suspects, references, leave_out, in_references).run(progress);
+  return Estimator(model, wanted, suspects, references, leave_out, in_references, options)
+      .run(progress);
 }
 
 }  // namespace sparflow

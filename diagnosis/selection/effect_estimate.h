@@ -11,6 +11,17 @@
 
 namespace sparflow {
 
+struct EstimateOptions {
+  EvidenceOptions evidence;  ///< those of the diagnosis, so that both see the same rows
+  /// Ratio of the sharpest window of a log to the search's below which values are estimated in it.
+  /// @threshold [1] 0..1; chosen: a window that is hardly narrower discounts starts and stops alike
+  /// and is noisier
+  double much_sharper = 0.5;
+  /// Factor by which a nonlinear parameter may leave its value on the grid, up or down.
+  /// @threshold [1] 1..; chosen: limits it beyond the ends of the grid, where no neighbour does
+  double largest_step = 2.0;
+};
+
 struct EffectEstimate {
   std::vector<AppliedEffect> effects;  ///< in the order of `wanted`, with 95 % intervals
   std::vector<std::string> notes;      ///< which parameters lie on their bounds; whole sentences
@@ -30,6 +41,7 @@ EffectEstimate estimate_effects(const CraneModel& model, const std::vector<Effec
                                 const std::vector<MachineSignals>& references = {},
                                 const std::vector<Mask>& leave_out = {},
                                 const SearchProgress& progress = {},
-                                const std::vector<AppliedEffect>* in_references = nullptr);
+                                const std::vector<AppliedEffect>* in_references = nullptr,
+                                const EstimateOptions& options = {});
 
 }  // namespace sparflow

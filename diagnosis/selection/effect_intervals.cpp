@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-constexpr double kTwoSided95 = 1.96;
+constexpr double kTwoSided95 = 1.96;  ///< normal quantile of the 95 % intervals
 
 FitControl all_rows_alike() {
   FitControl control;
@@ -33,7 +33,7 @@ bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
   for (Index k = 0; k < design.linear; ++k) {
     const double lo = design.lower[static_cast<std::size_t>(k)];
     const double hi = design.upper[static_cast<std::size_t>(k)];
-    if (lo > 0.0 && theta[k] < lo + 1e-6 * (hi - lo)) return true;
+    if (lo > 0.0 && theta[k] < lo + kOnBound * (hi - lo)) return true;
   }
   return false;
 }

@@ -29,7 +29,7 @@ class Search {
     EffectFit current = search_.fit({});
     result.null = current;
     std::vector<FoundEffect> found;
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < search_.options.rounds; ++round) {
       select(found, current, result);
       if (result.updated_evidence) return result;
       bool reshaped = false;
@@ -54,8 +54,9 @@ class Search {
  private:
   /// Adds the best candidate while one passes the threshold and the acceptance tests.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
-    for (int step = 0; static_cast<int>(found.size()) < search_.options.max_effects &&
-                       step < 3 * search_.options.max_effects;) {
+    const int most_steps = search_.options.steps_per_effect * search_.options.max_effects;
+    for (int step = 0;
+         static_cast<int>(found.size()) < search_.options.max_effects && step < most_steps;) {
       search_.report(found.size(), "searching");
       const std::vector<const EffectDesign*> base = designs_of(found);
       std::vector<CandidateScore> scores =
@@ -69,9 +70,11 @@ class Search {
       for (const SearchCandidate& c : search_.candidates)
         null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
       const NullDistribution null = simulate_null_distribution(
-          search_.evidence, null_candidates, base, current, search_.options.simulations, random_);
-      const double level =
-          found.empty() ? search_.options.false_alarm : 0.5 * search_.options.false_alarm;
+          search_.evidence, null_candidates, base, current, search_.options.simulations, random_,
+          search_.options.regression);
+      const double level = found.empty()
+                               ? search_.options.false_alarm
+                               : search_.options.further_false_alarm * search_.options.false_alarm;
       const CandidateScore best = chosen(search_, scores, null, level, base);
       const double p = null.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(search_, step, scores, null);
@@ -82,7 +85,8 @@ class Search {
         result.simulations = search_.options.simulations;
       }
       if (p >= level || best.gain < search_.options.least_gain) {
-        if (found.empty() && best.gain > kSurelySomething * search_.options.least_gain)
+        if (found.empty() &&
+            best.gain > search_.options.surely_something * search_.options.least_gain)
           result.once = search_.scores.refined(base, best, current);
         break;
       }
@@ -104,7 +108,7 @@ class Search {
                                            search_.key(found.back().design.effect), why));
         if (tracing()) fmt::print(stderr, "  refused: {}\n", result.notes.back());
         if (found.back().at_bound && found.back().size >= search_.options.smallest_effect &&
-            best.gain > kSurelySomething * search_.options.least_gain) {
+            best.gain > search_.options.surely_something * search_.options.least_gain) {
           result.unnamed.push_back(found.back());
         }
         found.pop_back();
@@ -135,9 +139,8 @@ class Search {
   /// observable, and likewise share and excess of a limit that is hardly reached. Where the share lies on its bound, a
   /// share of one with another time or limit explains nearly the same and is plausible.
   void fix_share_at_one(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
-    constexpr double kSame = 3.0, kSameShare = 0.05;  // largest loss [nats]; as share of the gain
-    constexpr double kReaches[] = {1.05, 1.2,
-                                   2.0};  // factors; a limit beyond all flows has no effect
+    // factors within which the share may cross one, and halvings of that interval; a limit beyond all flows has no effect
+    constexpr double kReaches[] = {1.05, 1.2, 2.0};
     constexpr int kHalvings = 9;
     EffectDesign& design = found.back().design;
     const EffectParameter& share = design.effect.effect->info().parameters.front();
@@ -172,7 +175,8 @@ class Search {
     shape[0] *= std::sqrt(a * b);
     design = make_design(search_.evidence, before.effect, std::move(shape), {}, before.optional);
     EffectFit whole = search_.fit(designs_of(found));
-    const double least = fit.total() - std::max(kSame, kSameShare * gain);
+    const double least = fit.total() - std::max(search_.options.share_at_one_loss,
+                                                search_.options.share_at_one_loss_share * gain);
     if (tracing()) {
       fmt::print(stderr, "  share fixed at one with [{:.4g}]: {:.1f} nats\n",
                  fmt::join(design.shape, " "), whole.total() - fit.total());
@@ -199,13 +203,13 @@ class Search {
       const Eigen::VectorXd theta = fit.theta.segment(first, other.design.linear);
       first += other.design.linear;
       if (i == index || other.gain < one.gain || !meets(other.design)) continue;
-      const double form = form_share(*other.design.effect.effect);
+      const double form = form_share(*other.design.effect.effect, search_.options.regression);
       if (one.gain <= form * form * other.gain) {
         return fmt::format(
             "its gain of {:.0f} nats compensates model-form error of {}, whose gain is {:.0f}",
             one.gain, search_.key(other.design.effect), other.gain);
       }
-      EffectDesign power = other_power(other.design, theta);
+      EffectDesign power = other_power(other.design, theta, search_.options.regression);
       if (!power.acts() || !meets(power)) continue;
       powers.push_back(std::move(power));
       names.push_back(search_.key(other.design.effect));
@@ -233,7 +237,8 @@ class Search {
       if (why.empty()) why = compensates_model_form(found, i, current);
       // for an effect that refines no other, a clear gain on motions left out outweighs the joint significance test
       const bool refinement = !found[i].design.effect.effect->info().refines.empty();
-      const bool proven = !refinement && found[i].held_out > 2.0 * found[i].held_out_error;
+      const bool proven = !refinement && found[i].held_out > search_.options.proven_errors *
+                                                                 found[i].held_out_error;
       if (why.empty() && found[i].not_significant && !proven) {
         why = "it fails the joint significance test: its 95 % region contains zero";
       }
@@ -253,7 +258,7 @@ class Search {
 
   /// Swap moves and indistinguishable sets, then the statistics of the acceptance tests.
   void finish(std::vector<FoundEffect>& found, EffectFit& current) {
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < search_.options.swap_rounds; ++round) {
       bool swapped = false;
       for (std::size_t i = 0; i < found.size(); ++i) {
         search_.report(found.size(),
@@ -274,13 +279,12 @@ class Search {
 
 SearchResult search_effects(const Evidence& evidence, const std::vector<EffectAt>& candidates,
                             const SearchOptions& options, const SearchProgress& progress) {
-  constexpr int kTurns =
-      3;  // searches, each with the load-sensing leaders that the last one implies
   SearchResult result, first;
   std::optional<Evidence> updated;
-  for (int turn = 0; turn <= kTurns; ++turn) {
-    result =
-        Search(updated ? *updated : evidence, candidates, options, progress, turn < kTurns).run();
+  for (int turn = 0; turn <= options.leader_searches; ++turn) {
+    result = Search(updated ? *updated : evidence, candidates, options, progress,
+                    turn < options.leader_searches)
+                 .run();
     if (turn == 0) first = result;
     if (!result.updated_evidence) break;
     if (tracing()) fmt::print(stderr, "  the found effects change the load-sensing leader\n");

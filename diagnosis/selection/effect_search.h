@@ -9,25 +9,111 @@
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
+#include "diagnosis/regression/regression_options.h"
 
 namespace sparflow {
 
+/// Sizes are those of EffectAction, gains are penalised ones.
 struct SearchOptions {
-  double false_alarm = 0.05;  ///< 0..1 rate of the whole search on logs with nothing missing
-  int max_effects = 8;        ///< largest number of effects found
-  int simulations = 300;      ///< number of draws of the null distribution of the largest gain
-  /// [-] an effect smaller than this multiple of its channel's noise is not named, however significant it is.
+  RegressionOptions regression;
+
+  /// Rate at which a search on logs with nothing missing names an effect.
+  /// @threshold [1] 0..1; chosen: the usual 5 % of a test
+  double false_alarm = 0.05;
+  /// False-alarm rate of every further effect, as a share of that of the first.
+  /// @threshold [1] 0..1; chosen: each further step is one more occasion for a false alarm
+  double further_false_alarm = 0.5;
+  /// Largest number of effects found.
+  /// @threshold [effects] 1..; chosen: stands for several faults of one machine at once; ends the
+  /// search
+  int max_effects = 8;
+  /// Steps of the search for each of max_effects, added or refused, after which it ends.
+  /// @threshold [steps] 1..; chosen: bounds the time of a search that refuses one effect after
+  /// another
+  int steps_per_effect = 3;
+  /// Rounds of adding, exchanging and dropping after which a search ends.
+  /// @threshold [rounds] 1..; chosen: ends a search in which an effect is added and dropped in turn
+  int rounds = 3;
+  /// Rounds in which every found effect is compared with its rivals.
+  /// @threshold [rounds] 1..; chosen: the second one sees the effects exchanged by the first
+  int swap_rounds = 2;
+  /// Further searches on evidence with the load-sensing leaders that the last search implies.
+  /// @threshold [searches] 0..; chosen: ends a search in which two leaders alternate
+  int leader_searches = 3;
+  /// Number of draws of the null distribution of the largest gain.
+  /// @threshold [draws] 20..; derived: a p-value of 5 % then has a standard error of 1.3 %
+  int simulations = 300;
+  /// Size below which an effect is not named, as a multiple of its channel's noise, however
+  /// significant it is.
+  /// @threshold [1] 0..; chosen: significance grows with the length of the log, importance does not
   double smallest_effect = 0.15;
-  /// [-] a further effect smaller than this multiple of the other effects' model-form error (EffectAction::over_form)
-  /// compensates that error and is not named.
+  /// Size below which a further effect is not named, as a multiple of the other effects' model-form
+  /// error (EffectAction::over_form).
+  /// @threshold [1] 0..; chosen: a smaller effect may compensate that error
   double smallest_over_form = 1.5;
-  double largest_absorbed = 0.9;  ///< 0..1 an effect with a larger absorbed share is not named
-  /// [nats] least penalised gain of an effect, even where the threshold is lower: the null distribution simulates the
-  /// noise model, and the error of that model makes gains of a few nats in long logs. Present effects gain tens.
+  /// Absorbed share of a pressure or pump effect above which it is not named.
+  /// @threshold [1] 0..1; chosen: learning the pressure models again would take over all but a
+  /// tenth
+  double largest_absorbed = 0.9;
+  /// Least gain of an effect, even where the threshold of the null distribution is lower. Present
+  /// effects gain tens.
+  /// @threshold [nat] 0..; tuned: without it more than 5 % of fresh logs with nothing missing
+  /// passed (docs/history/diagnosis.md). The null distribution simulates the noise model, and the
+  /// error of that model makes gains of a few nats in long logs
   double least_gain = 10.0;
-  double same_nats = 4.0;  ///< [nats] effects whose gains differ by less are indistinguishable
-  int folds = 5;           ///< of the cross-validation over motions
-  unsigned seed = 1;       ///< of the null distribution
+  /// Multiple of least_gain beyond which evidence counts as significant although no effect is named
+  /// for it: one that fits only with implausible parameters, or an isolated event.
+  /// @threshold [1] 1..; tuned: the largest gain that is not significant is 5.6 nats in 60 logs
+  /// with nothing missing (docs/history/diagnosis.md)
+  double surely_something = 3.0;
+  /// Difference of gains below which two effects are indistinguishable.
+  /// @threshold [nat] 0..; derived: odds of e^4 = 55
+  double same_nats = 4.0;
+  /// Difference of gains above which a rival or another variant of a law replaces a found effect.
+  /// @threshold [nat] 0..; chosen: a smaller one would exchange equals, back and forth
+  double least_swap_gain = 1.0;
+  /// Difference of gains up to which a rival is listed in FoundEffect::alternatives.
+  /// @threshold [nat] 0..; chosen: far beyond same_nats, so that all indistinguishable ones are
+  /// listed
+  double largest_alternative_loss = 50.0;
+  /// Share of a refining effect's gain above which the plainer effect is chosen first.
+  /// @threshold [1] 0..1; chosen: it then explains most of the same; later steps decide whether the
+  /// refinement is needed
+  double plainer_share = 0.5;
+  /// Share of a pair's gain that one effect must have at a grid point, else it is not tried
+  /// instead.
+  /// @threshold [1] 0..1; chosen: refining its nonlinear parameters may add the rest
+  double merge_share = 0.9;
+  /// Loss of log-likelihood up to which a share is fixed at one (fix_share_at_one in
+  /// effect_search.cpp).
+  /// @threshold [nat] 0..; chosen: below same_nats, so that both laws are indistinguishable
+  double share_at_one_loss = 3.0;
+  /// The same as a share of the effect's gain; the larger of both counts.
+  /// @threshold [1] 0..1; chosen: a large effect reveals the error of its law's form, which is no
+  /// statement about the share
+  double share_at_one_loss_share = 0.05;
+  /// Number of folds of the cross-validation over motions.
+  /// @threshold [folds] 2..; chosen: each fit keeps four fifths of the motions
+  int folds = 5;
+  /// Gain on motions left out that an effect must exceed, in its standard errors over folds.
+  /// @threshold [1] 0..; chosen: a mild test of an effect that has passed the threshold already
+  double held_out_errors = 1.0;
+  /// Share of the folds beyond which a positive gain on motions left out is enough.
+  /// @threshold [1] 0..1; derived: four of five folds less rounding. A few large steps may carry
+  /// all evidence, and the gains of the folds then differ widely
+  double improved_share = 0.79;
+  /// Gain on motions left out, in its standard errors, beyond which an effect that refines no other
+  /// needs no joint significance.
+  /// @threshold [1] 0..; derived: a normal error exceeds two standard errors in 2.3 % of cases
+  double proven_errors = 2.0;
+  /// Variance of the block offsets, as a share of the noise's variance, above which the noise model
+  /// may contain a slow effect. The effect is then also fitted from white noise.
+  /// @threshold [1] 0..1; chosen: an effect that offsets could imitate must show in them
+  double hiding_offsets = 0.2;
+  /// Correlation of neighbouring rows above which the noise model may contain a slow effect, too.
+  /// @threshold [1] 0..1; chosen: such noise changes as slowly as a motion does
+  double hiding_correlation = 0.85;
+  unsigned seed = 1;  ///< of the null distribution
 };
 
 /// An effect that the search names as missing.

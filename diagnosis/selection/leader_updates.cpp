@@ -53,7 +53,6 @@ std::vector<AppliedEffect> applied_effects(const std::vector<EffectDesign>& desi
 std::optional<Evidence> with_leaders_of_found(const SearchState& search,
                                               const std::vector<FoundEffect>& found,
                                               const EffectFit& fit) {
-  constexpr int kTurns = 5;  // a third of the error remains each time where half of the rows change
   std::vector<EffectDesign> designs;
   designs.reserve(found.size());
   for (const FoundEffect& f : found) designs.push_back(f.design);
@@ -62,7 +61,7 @@ std::optional<Evidence> with_leaders_of_found(const SearchState& search,
   if (!adds_demand(given, std::span<const AppliedEffect>(&acting.back(), 1))) return {};
   std::optional<Evidence> updated;
   double total = fit.total();
-  for (int turn = 0; turn < kTurns; ++turn) {
+  for (int turn = 0; turn < kLeaderTurns; ++turn) {
     std::optional<Evidence> next = (updated ? *updated : given).with_leaders_of(acting);
     if (!next) break;
     updated = std::move(next);

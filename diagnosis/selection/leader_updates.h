@@ -7,6 +7,9 @@
 
 namespace sparflow {
 
+/// Updates of leaders and values in turn. A third of the error remains each time where half of the rows change.
+inline constexpr int kLeaderTurns = 5;
+
 /// Evidence with the load-sensing leaders that follow from the found effects, iterated with their values. Made only
 /// when the last effect adds to a cylinder's demand and the log-likelihood rises by SearchOptions::least_gain or more.
 /// @param fit of all found  @return nothing when the leaders stay

@@ -39,6 +39,12 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
   return points;
 }
 
+/// Guards the logarithm of the penalty where there is no evidence; channels have more rows.
+constexpr double kLeastRows = 10.0;
+/// Least square of a column and least singular value of scaled columns, relative to the largest ones: below, only
+/// rounding is left.
+constexpr double kRoundingOfColumn = 1e-12, kRoundingOfRank = 1e-6;
+
 /// Largest number of linear parameters with independent columns. A mass on the first link, for example, acts by its
 /// moment alone, so one of its two columns is not independent.
 int independent_columns(const std::vector<EffectDesign>& designs) {
@@ -51,9 +57,9 @@ int independent_columns(const std::vector<EffectDesign>& designs) {
     const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     Index here = 0;
     for (Index i = 0; i < d.linear; ++i)
-      here += gram(i, i) > 1e-12 * gram.diagonal().maxCoeff() ? 1 : 0;
+      here += gram(i, i) > kRoundingOfColumn * gram.diagonal().maxCoeff() ? 1 : 0;
     const MatrixXd correlation = scale.asDiagonal() * gram * scale.asDiagonal();
-    here = std::min(here, rank(correlation, 1e-6));
+    here = std::min(here, rank(correlation, kRoundingOfRank));
     linear = std::max(linear, here);
   }
   return static_cast<int>(linear);
@@ -63,7 +69,7 @@ int independent_columns(const std::vector<EffectDesign>& designs) {
 
 std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
                                                const std::vector<EffectAt>& effects) {
-  double rows = 10.0;
+  double rows = kLeastRows;
   for (const EvidenceChannel& c : evidence.channels)
     rows = std::max(rows, static_cast<double>(c.rows()));
   std::vector<SearchCandidate> all(effects.size());

@@ -19,8 +19,8 @@ const CandidateScore* best_by_least_squares(const SearchState& search,
   parallel(rivals.size(), [&](std::size_t i) {
     const EffectDesign& d = search.design_of(*rivals[i]);
     if (search.meet(d, best))
-      advantage[i] =
-          least_squares_advantage(search.evidence, search.scores.least_squares(base, d), one);
+      advantage[i] = least_squares_advantage(search.evidence, search.scores.least_squares(base, d),
+                                             one, search.options.regression);
   });
   const auto most = std::max_element(advantage.begin(), advantage.end());
   return most == advantage.end() || *most <= 0.0
@@ -49,7 +49,8 @@ bool better_by_least_squares(const SearchState& search,
                              const std::vector<const EffectDesign*>& base, const EffectDesign& one,
                              const EffectDesign& other) {
   return least_squares_advantage(search.evidence, search.scores.least_squares(base, one),
-                                 search.scores.least_squares(base, other)) > 0.0;
+                                 search.scores.least_squares(base, other),
+                                 search.options.regression) > 0.0;
 }
 
 CandidateScore chosen(const SearchState& search, const std::vector<CandidateScore>& scores,
@@ -74,7 +75,7 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
   for (const CandidateScore* s : passing) {
     const EffectAt& e = search.candidates[s->candidate].effect;
     if (e.at != best.at || e.effect->info().id != best.effect->info().refines) continue;
-    if (s->gain > 0.5 * first->gain ||
+    if (s->gain > search.options.plainer_share * first->gain ||
         !better_by_least_squares(search, base, search.design_of(*first), search.design_of(*s))) {
       return shaped(search, base, *s);
     }

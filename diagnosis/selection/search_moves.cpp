@@ -13,7 +13,6 @@ namespace {
 
 bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
                std::size_t j, EffectFit& current) {
-  constexpr double kBeforeRefined = 0.9;  // least share of the pair's gain at grid points
   std::vector<FoundEffect> trial = found;
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(j));
   trial.erase(trial.begin() + static_cast<std::ptrdiff_t>(i));
@@ -22,7 +21,7 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
   const double pair = current.total() - without.total() - penalty;
   const std::vector<CandidateScore> scores =
       search.scores.beside(designs_of(trial), without, search.skipped(trial));
-  if (scores.empty() || scores.front().gain < kBeforeRefined * pair) return false;
+  if (scores.empty() || scores.front().gain < search.options.merge_share * pair) return false;
   FoundEffect one;
   one.design = search.scores.refined(designs_of(trial), scores.front(), without);
   one.p_value = std::min(found[i].p_value, found[j].p_value);
@@ -78,7 +77,8 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
   if (std::find(choices.begin(), choices.end(), true) == choices.end()) return false;
   const std::vector<const EffectDesign*> others = designs_of(found, i);
   const EffectFit without = fit_effects(search.evidence, others, &current, {});
-  double most = search.scores.gain(others, found[i].design, without) + 1.0;
+  double most =
+      search.scores.gain(others, found[i].design, without) + search.options.least_swap_gain;
   const CandidateScore* best = nullptr;
   std::vector<CandidateScore> variants;
   for (std::size_t c = 0; c < search.candidates.size(); ++c) {
@@ -121,7 +121,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
       search.scores.gain_instead(f.design, f.design, others, without) - search.penalty_of(f.design);
   f.gain = own;
   const CandidateScore* challenger = nullptr;
-  if (!scores.empty() && scores.front().gain > own + 1.0 &&
+  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain &&
       !better_by_least_squares(search, others, f.design, search.design_of(scores.front()))) {
     challenger = &scores.front();
   }
@@ -144,7 +144,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
   }
   f.alternatives.clear();
   for (const CandidateScore& s : scores) {
-    if (s.gain < own - 50.0) break;
+    if (s.gain < own - search.options.largest_alternative_loss) break;
     f.alternatives.emplace_back(search.candidates[s.candidate].effect, own - s.gain);
   }
   return false;

@@ -9,6 +9,12 @@
 namespace sparflow {
 namespace {
 
+/// Few, because every candidate is fitted in every step; the fits of found effects go to convergence.
+constexpr int kPasses = 2;
+/// Golden-section search of a nonlinear parameter; it ends at an interval of this share of the value.
+constexpr double kGolden = 0.381966, kNarrow = 2e-3;
+constexpr int kSections = 14;
+
 std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
   std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });
   std::sort(scores.begin(), scores.end(),
@@ -43,13 +49,12 @@ std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>
 /// wrong mass) can be explained as offsets of motions. The likelihood then has two maxima, and a fit that starts from
 /// white noise finds the one with the effect.
 bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) const {
-  constexpr double kOffsets = 0.2,
-                   kSlow = 0.85;  // share of the variance; correlation of neighbours
   for (std::size_t c = 0; c < current.noise.size(); ++c) {
     if (!d.touches(c)) continue;
     const NoiseModel& noise = current.noise[c];
     const double whole = noise.deviation() * noise.deviation();
-    if (noise.offset_variance > kOffsets * whole || noise.phi1 > kSlow * (1.0 - noise.phi2))
+    if (noise.offset_variance > options_.hiding_offsets * whole ||
+        noise.phi1 > options_.hiding_correlation * (1.0 - noise.phi2))
       return true;
   }
   return false;
@@ -61,7 +66,7 @@ double SearchScores::gain(const std::vector<const EffectDesign*>& base, const Ef
   FitControl c;
   c.active = connected(base, d);
   for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
-  c.noise_passes = 2;
+  c.noise_passes = kPasses;
   std::vector<const EffectDesign*> with;
   for (const EffectDesign* b : base) {
     bool needed = false;
@@ -155,12 +160,11 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
     if (here == values.end()) continue;
     double lo = here == values.begin() ? *here : *(here - 1);
     double hi = here + 1 == values.end() ? *here : *(here + 1);
-    const double golden = 0.381966;
-    for (int i = 0; i < 14 && hi - lo > 2e-3 * std::max(std::abs(hi), 1e-12); ++i) {
+    for (int i = 0; i < kSections && hi - lo > kNarrow * std::max(std::abs(hi), 1e-12); ++i) {
       const bool right = hi - d.shape[k] > d.shape[k] - lo;
       EffectDesign trial = d;
-      const double x =
-          right ? d.shape[k] + golden * (hi - d.shape[k]) : d.shape[k] - golden * (d.shape[k] - lo);
+      const double x = right ? d.shape[k] + kGolden * (hi - d.shape[k])
+                             : d.shape[k] - kGolden * (d.shape[k] - lo);
       std::vector<double> shape = d.shape;
       shape[k] = x;
       trial = make_design(evidence_, d.effect, shape, {}, d.optional);

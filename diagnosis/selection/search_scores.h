@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "diagnosis/regression/least_squares_comparison.h"
+#include "diagnosis/selection/effect_search.h"
 #include "diagnosis/selection/search_candidates.h"
 
 namespace sparflow {
@@ -16,9 +17,10 @@ struct CandidateScore {
 
 class SearchScores {
  public:
-  /// Both must outlive this.
-  SearchScores(const Evidence& evidence, const std::vector<SearchCandidate>& candidates)
-      : evidence_(evidence), candidates_(candidates) {}
+  /// All must outlive this.
+  SearchScores(const Evidence& evidence, const std::vector<SearchCandidate>& candidates,
+               const SearchOptions& options)
+      : evidence_(evidence), candidates_(candidates), options_(options) {}
 
   /// Every candidate added to `base`, best first.
   /// @param current fit of `base`  @param skip by candidate: whether to leave it out
@@ -60,6 +62,7 @@ class SearchScores {
 
   const Evidence& evidence_;
   const std::vector<SearchCandidate>& candidates_;
+  const SearchOptions& options_;
 };
 
 }  // namespace sparflow

@@ -9,6 +9,12 @@
 #include "diagnosis/selection/acceptance_tests.h"
 
 namespace sparflow {
+namespace {
+
+/// Progress that a fit makes later would count as another effect's gain.
+constexpr int kPassesToConvergence = 12;
+
+}  // namespace
 
 SearchState::SearchState(const Evidence& e, const std::vector<EffectAt>& effects,
                          const SearchOptions& o, const SearchProgress& p)
@@ -16,7 +22,7 @@ SearchState::SearchState(const Evidence& e, const std::vector<EffectAt>& effects
       options(o),
       progress(p),
       candidates(search_candidates(e, effects)),
-      scores(e, candidates),
+      scores(e, candidates, o),
       refused(candidates.size(), false) {}
 
 void SearchState::report(std::size_t found, const std::string& what) const {
@@ -60,8 +66,7 @@ EffectFit SearchState::fit(const std::vector<const EffectDesign*>& designs,
                            const EffectFit* start) const {
   FitControl c;
   c.keep_residuals = true;
-  c.noise_passes =
-      12;  // to convergence: later progress would otherwise count as another effect's gain
+  c.noise_passes = kPassesToConvergence;
   c.covariance = true;
   return fit_effects(evidence, designs, start, c);
 }

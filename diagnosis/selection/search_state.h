@@ -10,10 +10,6 @@
 
 namespace sparflow {
 
-/// Multiple of SearchOptions::least_gain beyond which evidence counts as significant although no effect is named for
-/// it: one that fits only with implausible parameters, or an isolated event.
-inline constexpr double kSurelySomething = 3.0;
-
 struct SearchState {
   /// All must outlive this.
   SearchState(const Evidence& evidence, const std::vector<EffectAt>& effects,

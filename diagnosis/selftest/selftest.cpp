@@ -14,9 +14,6 @@
 namespace sparflow {
 namespace {
 
-/// Ratio of residual to noise floor above which an effect is probably missing already.
-constexpr double kSuspiciousNoise = 3.0;
-
 /// Result for an effect that acts on no channel of these logs: signals are missing, or no motion excites it.
 InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
                               const EffectAt& effect) {
@@ -48,9 +45,10 @@ InjectedEffect without_action(const Evidence& evidence, const Machine& machine,
 
 /// Indices of effects to inject, drawn at random from those with a clear prediction: the stages in turn, those that
 /// should be named first.
-std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects, int count,
-                                     unsigned seed) {
-  std::mt19937_64 random(seed);
+std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects,
+                                     const SelftestOptions& options) {
+  const int count = options.check;
+  std::mt19937_64 random(options.search.seed);
   std::vector<std::vector<std::size_t>> groups;
   for (const bool seen : {true, false}) {
     for (const char* stage : {"force", "flow", "pressure", "pump", "sensor"}) {
@@ -58,7 +56,8 @@ std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects,
       for (std::size_t i = 0; i < effects.size(); ++i) {
         const InjectedEffect& e = effects[i];
         const bool clear =
-            seen ? e.power > 0.97 && e.times95 < 0.8 : e.power < 0.03 && !e.typical.empty();
+            seen ? e.power > options.clearly_seen && e.times95 < options.clearly_seen_times
+                 : e.power < options.clearly_unseen && !e.typical.empty();
         if (e.stage == stage && clear) groups.back().push_back(i);
       }
       std::shuffle(groups.back().begin(), groups.back().end(), random);
@@ -74,7 +73,7 @@ std::vector<std::size_t> draw_checks(const std::vector<InjectedEffect>& effects,
   for (bool any = true; any;) {
     any = false;
     for (std::size_t p = 0; p < 5; ++p) any = take(p) || any;
-    for (std::size_t p = 5; p < 10 && count > 3;
+    for (std::size_t p = 5; p < 10 && count > options.checks_of_seen_only;
          ++p) {  // in each round one that should not be named
       if (!take(p)) continue;
       any = true;
@@ -108,7 +107,8 @@ std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>&
 std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evidence,
                                     const EffectFit& fit,
                                     const std::vector<InjectedEffect>& effects,
-                                    const std::vector<std::vector<std::string>>& sets) {
+                                    const std::vector<std::vector<std::string>>& sets,
+                                    const SelftestOptions& options) {
   const auto named = [&](const std::string& key) {
     return std::find_if(effects.begin(), effects.end(),
                         [&](const InjectedEffect& e) { return e.key() == key; });
@@ -128,7 +128,8 @@ std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evi
     for (const std::string& key : sets[k]) {
       if (key != first.key()) rivals.push_back(named(key)->effect);
     }
-    out.push_back(next_experiment(model, evidence, fit, typical, rivals));
+    out.push_back(next_experiment(model, evidence, fit, typical, rivals, options.experiment));
+    out.back().decisive_nats = options.search.same_nats;
   }
   return out;
 }
@@ -156,8 +157,10 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   out.logs = logs.size();
   out.references = references.size();
   out.false_alarm = options.search.false_alarm;
-  const Evidence evidence = collect_evidence(model, suspects, pinned);
-  const Evidence alone = references.empty() ? Evidence{} : collect_evidence(model, suspects);
+  const Evidence evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
+  const Evidence alone = references.empty()
+                             ? Evidence{}
+                             : collect_evidence(model, suspects, {}, nullptr, options.evidence);
   out.notes = evidence.notes;
 
   std::vector<EffectAt> wanted = options.candidates;
@@ -174,7 +177,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = evidence.channels[c];
     const double ratio = fit.noise[c].deviation() / channel.noise_floor;
-    if (!(ratio > kSuspiciousNoise)) continue;
+    if (!(ratio > options.suspicious_noise)) continue;
     out.notes.push_back(fmt::format(
         "{}: the residual is {:.0f} times the noise floor and counts as noise here; `diagnose` may "
         "find its cause, and more effects can then be named",
@@ -194,15 +197,16 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   for (const SearchCandidate& c : all)
     null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
   std::mt19937_64 random(options.search.seed);
-  const NullDistribution null = simulate_null_distribution(evidence, null_candidates, {}, fit,
-                                                           options.search.simulations, random);
+  const NullDistribution null =
+      simulate_null_distribution(evidence, null_candidates, {}, fit, options.search.simulations,
+                                 random, options.search.regression);
   out.threshold = null.threshold(options.search.false_alarm);
   report(0.5, "power and rivals");
   SelftestStudy study(model, evidence, references.empty() ? nullptr : &alone, fit, std::move(all),
-                      null, options.search);
+                      null, options);
   const std::vector<InjectedEffect> seen = study.run();
 
-  const std::vector<std::size_t> drawn = draw_checks(seen, options.check, options.search.seed);
+  const std::vector<std::size_t> drawn = draw_checks(seen, options);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const std::size_t i = drawn[k];
     report(0.6 + 0.35 * static_cast<double>(k) / static_cast<double>(drawn.size()),
@@ -210,14 +214,14 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
     const SearchCandidate& c = study.candidate(i);
     InjectionCheck check =
         inject_and_search(evidence, fit, c.designs[study.size(i).typical], study.size(i).theta,
-                          wanted, options.search, options.search.seed + static_cast<unsigned>(k));
+                          wanted, options, options.search.seed + static_cast<unsigned>(k));
     check.power = seen[i].power;
     check.predicted = seen[i].visibility == Visibility::kSeen;
     out.checks.push_back(std::move(check));
   }
   out.sets = sets_of(seen);
   report(0.97, "motions that would distinguish the effects");
-  out.experiments = motions_for(model, evidence, fit, seen, out.sets);
+  out.experiments = motions_for(model, evidence, fit, seen, out.sets, options);
   out.effects.insert(out.effects.end(), seen.begin(), seen.end());
   const auto place = [&](const InjectedEffect& e) {
     return std::find_if(wanted.begin(), wanted.end(),

@@ -87,8 +87,52 @@ struct Selftest {
 
 struct SelftestOptions {
   SignalOptions signals;
+  EvidenceOptions evidence;
   SearchOptions search;
+  ExperimentOptions experiment;
   int check = 6;  ///< number of effects checked by injection
+  /// Probability to be named at its typical size from which an effect counts as seen.
+  /// @threshold [1] 0..1; chosen: the usual power of a test that is planned, four of five.
+  double power_seen = 0.8;
+  /// Quantile of the normal distribution for that power, for the condition that the estimated size
+  /// exceeds the smallest that is named.
+  /// @threshold [1] -3..3; derived: normal quantile of power_seen, 0.8416.
+  double quantile_seen = 0.84;
+  /// Probability to be named for which the second size is given.
+  /// @threshold [1] 0..1; chosen: nineteen of twenty, the other usual power.
+  double power_sure = 0.95;
+  /// Quantile of the normal distribution for that power.
+  /// @threshold [1] -3..3; derived: normal quantile of power_sure, 1.645.
+  double quantile_sure = 1.64;
+  /// Largest multiple of the typical size that is looked at where an effect has no bound.
+  /// @threshold [1] 1..; chosen: a thousand times the typical size is plausible for no effect.
+  double largest_times = 1e3;
+  /// Share of an effect's signature that a candidate must explain to be a rival.
+  /// @threshold [1] 0..1; chosen: where it explains less, the rest of a significant gain exceeds
+  /// SearchOptions::same_nats.
+  double least_confusion = 0.2;
+  /// Residual over noise floor from which a note says that an effect is probably missing already.
+  /// @threshold [1] 1..; chosen: three times the sensors' noise, a ninth of the power of the
+  /// residual.
+  double suspicious_noise = 3.0;
+  /// Power above which an effect may be drawn for a check as one that should be named.
+  /// @threshold [1] 0..1; chosen: six effects of such power are all named with a probability above
+  /// 0.83.
+  double clearly_seen = 0.97;
+  /// Multiple of the typical size with power_sure up to which it may be drawn so.
+  /// @threshold [1] 0..; chosen: a fifth of reserve in the size, as the power is computed for a
+  /// noise model that is known.
+  double clearly_seen_times = 0.8;
+  /// Power below which an effect may be drawn for a check as one that should not be named.
+  /// @threshold [1] 0..1; chosen: the counterpart of clearly_seen.
+  double clearly_unseen = 0.03;
+  /// Number of checks up to which only effects are drawn that should be named.
+  /// @threshold [1] 0..; chosen: few checks are better spent on what can be named.
+  int checks_of_seen_only = 3;
+  /// Largest number of effects that the search of a check may find.
+  /// @threshold [effects] 1..; chosen: it may need three steps to replace a plainer effect by its
+  /// refinement.
+  int most_effects = 3;
   /// Candidate effects; empty = the whole catalogue on this machine except those of the model.
   std::vector<EffectAt> candidates;
 };
@@ -104,6 +148,6 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
 InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
                                  const EffectDesign& design, const Eigen::VectorXd& theta,
                                  const std::vector<EffectAt>& candidates,
-                                 const SearchOptions& options, unsigned seed);
+                                 const SelftestOptions& options, unsigned seed);
 
 }  // namespace sparflow

@@ -8,7 +8,7 @@ namespace sparflow {
 InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
                                  const EffectDesign& design, const Eigen::VectorXd& theta,
                                  const std::vector<EffectAt>& candidates,
-                                 const SearchOptions& options, unsigned seed) {
+                                 const SelftestOptions& options, unsigned seed) {
   const Machine& machine = *evidence.series[0].machine;
   std::mt19937_64 random(seed);
   Evidence injected = evidence;
@@ -20,9 +20,8 @@ InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
                 design.columns[c] * theta;
     injected.channels.push_back(std::move(channel));
   }
-  SearchOptions few = options;
-  few.max_effects =
-      3;  // the search may need three steps to replace a plainer effect by its refinement
+  SearchOptions few = options.search;
+  few.max_effects = options.most_effects;
   const SearchResult result = search_effects(injected, candidates, few);
 
   InjectionCheck check;
@@ -36,7 +35,7 @@ InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
     check.answer += (check.answer.empty() ? "" : ", ") + key;
     check.named = check.named || key == check.key;
     for (const auto& [rival, worse] : f.alternatives) {
-      if (worse >= options.same_nats) continue;
+      if (worse >= options.search.same_nats) continue;
       check.named = check.named || key_of(rival) == check.key;
       check.answer += " or " + key_of(rival);
     }

@@ -7,8 +7,6 @@
 namespace sparflow {
 namespace {
 
-constexpr double kLargestTimes = 1e3;
-
 double distance(double value, double typical) {
   return value > 0.0 && typical > 0.0 ? std::abs(std::log(value / typical))
                                       : std::abs(value - typical);
@@ -22,13 +20,13 @@ double whole_action(const EffectDesign& d) {
 
 }  // namespace
 
-EffectSize size_effect(const SearchCandidate& candidate) {
+EffectSize size_effect(const SearchCandidate& candidate, double largest_times) {
   const EffectInfo& info = candidate.effect.effect->info();
   std::vector<const EffectParameter*> shapes;
   std::vector<double> theta;
   bool share = false;
   EffectSize out;
-  out.largest = kLargestTimes;
+  out.largest = largest_times;
   for (const EffectParameter& p : info.parameters) {
     if (!p.linear) {
       shapes.push_back(&p);

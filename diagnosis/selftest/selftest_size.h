@@ -21,6 +21,7 @@ struct EffectSize {
   std::vector<SizeLevel> levels;  ///< weakest first; empty: the effect is proportional to theta
 };
 
-EffectSize size_effect(const SearchCandidate& candidate);
+/// @param largest_times [-] largest multiple of the typical size where the effect has no bound
+EffectSize size_effect(const SearchCandidate& candidate, double largest_times);
 
 }  // namespace sparflow

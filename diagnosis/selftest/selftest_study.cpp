@@ -15,6 +15,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSmallestTimes = 1e-4;  ///< [-] where bisection for a size starts
 
 std::vector<ShownValue> shown(const EffectInfo& info, const std::vector<double>& values) {
   std::vector<ShownValue> out;
@@ -34,7 +35,10 @@ EffectFit noise_only(const EffectFit& fit, const VectorXd& theta) {
 
 /// Whether too few motions excite an effect for the acceptance test on motions left out: that test's rule, applied to
 /// the expected gains of the folds without noise.
-bool in_too_few_motions(const Evidence& evidence, const Signature& s, int folds) {
+bool in_too_few_motions(const Evidence& evidence, const Signature& s,
+                        const SearchOptions& options) {
+  constexpr double kNothing = 1e-6;  // a share of the gain that is rounding
+  const int folds = options.folds;
   VectorXd gains = VectorXd::Zero(folds);
   for (std::size_t c = 0; c < s.white.size(); ++c) {
     if (s.white[c].size() == 0) continue;
@@ -46,8 +50,9 @@ bool in_too_few_motions(const Evidence& evidence, const Signature& s, int folds)
   }
   const double n = folds,
                error = std::sqrt((gains.array() - gains.mean()).square().sum() * n / (n - 1.0));
-  const auto positive = (gains.array() > 1e-6 * gains.sum()).count();
-  return gains.sum() <= error && static_cast<double>(positive) < 0.79 * n;
+  const auto positive = (gains.array() > kNothing * gains.sum()).count();
+  return gains.sum() <= options.held_out_errors * error &&
+         static_cast<double>(positive) < options.improved_share * n;
 }
 
 }  // namespace
@@ -59,21 +64,22 @@ bool behind_learned_law(EffectStage stage) {
 SelftestStudy::SelftestStudy(const CraneModel& model, const Evidence& evidence,
                              const Evidence* alone, const EffectFit& fit,
                              std::vector<SearchCandidate> candidates, NullDistribution null,
-                             const SearchOptions& options)
+                             const SelftestOptions& options)
     : machine_(model.machine),
       evidence_(evidence),
       alone_(alone),
       fit_(fit),
       options_(options),
+      search_(options.search),
       null_(std::move(null)),
-      threshold_(std::max(null_.threshold(options.false_alarm), options.least_gain)),
-      power_(evidence, fit, options.seed),
+      threshold_(std::max(null_.threshold(options.search.false_alarm), options.search.least_gain)),
+      power_(evidence, fit, options.search.seed, options.experiment.power),
       candidates_(std::move(candidates)),
       sizes_(candidates_.size()),
       projected_(candidates_.size()),
       result_(candidates_.size()) {
   parallel(candidates_.size(), [&](std::size_t i) {
-    sizes_[i] = size_effect(candidates_[i]);
+    sizes_[i] = size_effect(candidates_[i], options.largest_times);
     for (const EffectDesign& d : candidates_[i].designs) projected_[i].push_back(power_.project(d));
   });
 }
@@ -104,7 +110,7 @@ std::pair<double, std::vector<double>> SelftestStudy::times_for(std::size_t i,
   const EffectSize& s = sizes_[i];
   const SearchCandidate& c = candidates_[i];
   if (s.levels.empty()) {
-    double lo = std::log(1e-4), hi = std::log(s.largest);
+    double lo = std::log(kSmallestTimes), hi = std::log(s.largest);
     if (power_.gain(typical, s.largest) < gain) return {kInfinity, {}};
     for (int k = 0; k < 22; ++k) {  // to 3e-6 of the range of logarithms
       const double middle = 0.5 * (lo + hi);
@@ -147,7 +153,7 @@ double SelftestStudy::absorbed_alone(const SearchCandidate& c, const EffectSize&
         fit.noise.back() = fit_.noise[k];
     }
   }
-  return d.acts() ? effect_action(*alone_, {&d}, 0, fit).absorbed : 1.0;
+  return d.acts() ? effect_action(*alone_, {&d}, 0, fit, search_.regression).absorbed : 1.0;
 }
 
 void SelftestStudy::see(std::size_t i) {
@@ -163,26 +169,29 @@ void SelftestStudy::see(std::size_t i) {
   out.stage = effect_stage_name(info.stage);
   out.separated_by = info.separated_by;
   out.typical = shown(info, parameter_values(*c.effect.effect, s.theta, design.shape));
-  const EffectAction action = effect_action(evidence_, {&design}, 0, noise_only(fit_, s.theta));
+  const EffectAction action =
+      effect_action(evidence_, {&design}, 0, noise_only(fit_, s.theta), search_.regression);
   out.size = action.size;
   out.absorbed = out.absorbed_alone = action.absorbed;
   if (alone_ != nullptr) out.absorbed_alone = absorbed_alone(c, s);
   const Signature typical = typical_signature(i);
   out.gain = power_.gain(typical);
-  if (behind_learned_law(info.stage) && out.absorbed > options_.largest_absorbed) {
+  if (behind_learned_law(info.stage) && out.absorbed > search_.largest_absorbed) {
     out.reason =
         fmt::format("the absorbed share is {:.0f} %; {}", 100.0 * out.absorbed,
                     evidence_.has_reference() ? "the reference logs cover too few flows and loads"
                                               : "give a log without it as --reference");
     return;
   }
-  if (in_too_few_motions(evidence_, typical, options_.folds)) {
+  if (in_too_few_motions(evidence_, typical, search_)) {
     out.reason = "too few motions excite it: repeat them";
     return;
   }
   const double nats = least_gain_of(i);
-  const auto [t80, v80] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.8, c.linear));
-  const auto [t95, v95] = times_for(i, typical, 0.5 * noncentrality_for(nats, 0.95, c.linear));
+  const auto [t80, v80] =
+      times_for(i, typical, 0.5 * noncentrality_for(nats, options_.power_seen, c.linear));
+  const auto [t95, v95] =
+      times_for(i, typical, 0.5 * noncentrality_for(nats, options_.power_sure, c.linear));
   out.times80 = t80;
   out.times95 = t95;
   std::vector<double> values = v80;
@@ -190,25 +199,25 @@ void SelftestStudy::see(std::size_t i) {
   const double squares = typical.squares();
   const double deviation = squares > 0.0 ? 1.0 / std::sqrt(squares) : kInfinity;
   const auto large_enough = [&](double quantile) {
-    return options_.smallest_effect / std::max(out.size, 1e-12) + quantile * deviation;
+    return search_.smallest_effect / std::max(out.size, 1e-12) + quantile * deviation;
   };
   if (s.levels.empty()) {
-    if (large_enough(0.84) > out.times80) {
-      out.times80 = large_enough(0.84);
+    if (large_enough(options_.quantile_seen) > out.times80) {
+      out.times80 = large_enough(options_.quantile_seen);
       values = parameter_values(*c.effect.effect, out.times80 * s.theta, design.shape);
     }
-    out.times95 = std::max(out.times95, large_enough(1.64));
+    out.times95 = std::max(out.times95, large_enough(options_.quantile_sure));
     if (out.times80 > s.largest) out.times80 = kInfinity;
     if (out.times95 > s.largest) out.times95 = kInfinity;
   }
   out.power = chance(i, out.gain);
   if (std::isfinite(deviation)) {
-    const double beyond = (1.0 - options_.smallest_effect / std::max(out.size, 1e-12)) / deviation;
+    const double beyond = (1.0 - search_.smallest_effect / std::max(out.size, 1e-12)) / deviation;
     out.power *= 0.5 * std::erfc(-beyond / std::sqrt(2.0));
   }
-  out.visibility = out.power >= 0.8             ? Visibility::kSeen
-                   : std::isfinite(out.times80) ? Visibility::kOnlyLarge
-                                                : Visibility::kNever;
+  out.visibility = out.power >= options_.power_seen ? Visibility::kSeen
+                   : std::isfinite(out.times80)     ? Visibility::kOnlyLarge
+                                                    : Visibility::kNever;
   if (std::isfinite(out.times80)) out.smallest = shown(info, values);
   if (out.visibility == Visibility::kOnlyLarge)
     out.reason = fmt::format("{:.2f} times the noise where it acts", out.size);
@@ -228,8 +237,7 @@ void SelftestStudy::confuse(std::size_t i) {
     if (k == i) continue;
     const EffectInfo& rival = candidates_[k].effect.effect->info();
     // an effect that fails the acceptance tests is no rival
-    if (behind_learned_law(rival.stage) && result_[k].absorbed > options_.largest_absorbed)
-      continue;
+    if (behind_learned_law(rival.stage) && result_[k].absorbed > search_.largest_absorbed) continue;
     Confusion worst{effect_key(rival, machine_, candidates_[k].effect.at), kInfinity, 0.0};
     Signature left;
     for (const ProjectedDesign& p : projected_[k]) {
@@ -243,9 +251,9 @@ void SelftestStudy::confuse(std::size_t i) {
       worst.share = share;
       left = std::move(here);
     }
-    if (worst.share < 0.2) continue;  // the rest of a significant gain then exceeds same_nats
+    if (worst.share < options_.least_confusion) continue;
     worst.nats = std::min(power_.gain(left), 0.5 * left.squares());
-    if (worst.nats < options_.same_nats) out.confused_with.push_back(std::move(worst));
+    if (worst.nats < search_.same_nats) out.confused_with.push_back(std::move(worst));
   }
   std::sort(out.confused_with.begin(), out.confused_with.end(),
             [](const Confusion& a, const Confusion& b) { return a.nats < b.nats; });

@@ -21,7 +21,7 @@ class SelftestStudy {
   /// All references and pointers must outlive this.
   SelftestStudy(const CraneModel& model, const Evidence& evidence, const Evidence* alone,
                 const EffectFit& fit, std::vector<SearchCandidate> candidates,
-                NullDistribution null, const SearchOptions& options);
+                NullDistribution null, const SelftestOptions& options);
 
   std::vector<InjectedEffect> run();
   const EffectSize& size(std::size_t i) const { return sizes_[i]; }
@@ -42,7 +42,8 @@ class SelftestStudy {
   const Evidence& evidence_;
   const Evidence* alone_;
   const EffectFit& fit_;
-  const SearchOptions& options_;
+  const SelftestOptions& options_;
+  const SearchOptions& search_;
   NullDistribution null_;
   double threshold_;
   PowerStudy power_;

@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 
 /// Fit in which the laws of the found effects may have another exponent (a cushion with x^2.5): what that explains is
 /// model-form error and no unmodelled structure.
-EffectFit fit_with_other_powers(const Diagnosis& d) {
+EffectFit fit_with_other_powers(const Diagnosis& d, const RegressionOptions& options) {
   std::vector<EffectDesign> powers;
   powers.reserve(d.search.found.size());
   std::vector<const EffectDesign*> designs;
@@ -31,7 +31,8 @@ EffectFit fit_with_other_powers(const Diagnosis& d) {
   Index first = 0;
   for (const FoundEffect& f : d.search.found) {
     designs.push_back(&f.design);
-    powers.push_back(other_power(f.design, d.search.final.theta.segment(first, f.design.linear)));
+    powers.push_back(
+        other_power(f.design, d.search.final.theta.segment(first, f.design.linear), options));
     first += f.design.linear;
   }
   for (const EffectDesign& p : powers) {
@@ -47,7 +48,6 @@ EffectFit fit_with_other_powers(const Diagnosis& d) {
 /// late or at its limit, and the sensor is not faulty.
 bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& bad,
                    std::size_t log) {
-  constexpr double kAlike = 3.0;  // largest RMS inside the jumps, in robust standard deviations
   // a jump that is shorter than the filter is hardly visible after it
   const bool brief = std::any_of(bad.stretches.begin(), bad.stretches.end(), [&](const auto& jump) {
     return jump.second - jump.first < d.evidence.window;
@@ -70,7 +70,8 @@ bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& b
         n += 1.0;
       }
     }
-    return n > 0.0 && std::sqrt(squares / n) < kAlike * robust_std(fit.residual[i]);
+    return n > 0.0 &&
+           std::sqrt(squares / n) < d.thresholds.largest_in_jumps * robust_std(fit.residual[i]);
   }
   return false;
 }
@@ -118,13 +119,15 @@ void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
 /// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets.
 void set_joint_estimates(const CraneModel& model, const std::vector<MachineSignals>& suspects,
                          const std::vector<MachineSignals>& references,
-                         std::vector<FoundEffect>& found) {
+                         const EvidenceOptions& evidence, std::vector<FoundEffect>& found) {
   std::vector<EffectAt> wanted;
   wanted.reserve(found.size());
   for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
   const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
+  EstimateOptions options;
+  options.evidence = evidence;
   const EffectEstimate all =
-      estimate_effects(model, wanted, suspects, references, {}, {}, &in_references);
+      estimate_effects(model, wanted, suspects, references, {}, {}, &in_references, options);
   for (std::size_t i = 0; i < found.size(); ++i) {
     found[i].values = all.effects[i].values;
     found[i].lower95 = all.effects[i].lower95;
@@ -133,10 +136,10 @@ void set_joint_estimates(const CraneModel& model, const std::vector<MachineSigna
 }
 
 /// The rivals that form an indistinguishable set with a found effect.
-std::vector<EffectAt> rivals_of(const FoundEffect& found, double same_nats) {
+std::vector<EffectAt> rivals_of(const FoundEffect& found, const SearchOptions& options) {
   std::vector<EffectAt> rivals;
   for (const auto& [rival, worse] : found.alternatives) {
-    if (worse < same_within(found, same_nats)) rivals.push_back(rival);
+    if (worse < same_within(found, options)) rivals.push_back(rival);
   }
   return rivals;
 }
@@ -162,9 +165,10 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
                            const DiagnoseOptions& options, const SearchProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   Diagnosis d;
+  d.thresholds = options.verdict;
   if (progress) progress(0.02, "collecting the evidence");
   const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
-  d.evidence = collect_evidence(model, suspects, references, &in_references);
+  d.evidence = collect_evidence(model, suspects, references, &in_references, options.evidence);
   d.notes = d.evidence.notes;
   std::vector<EffectAt> candidates_here = options.candidates;
   if (candidates_here.empty()) {
@@ -183,8 +187,8 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
   if (progress) progress(0.92, "searching for unmodelled structure in the residual");
-  const std::vector<ResidualStructure> left =
-      find_residual_structure(d.evidence, fit_with_other_powers(d));
+  const std::vector<ResidualStructure> left = find_residual_structure(
+      d.evidence, fit_with_other_powers(d, options.search.regression), options.residual);
   std::vector<ResidualStructure> unmodelled;
   bool in_touched = false;
   for (const ResidualStructure& l : left) {
@@ -192,7 +196,9 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
     const double share = unmodelled_share(d, l);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
-    if (share < (l.event ? kLargestEventShare : kLargestUnmodelledShare)) continue;
+    if (share <
+        (l.event ? d.thresholds.largest_event_share : d.thresholds.largest_unmodelled_share))
+      continue;
     if (!d.unexplained || (touched && !in_touched))
       d.unexplained = describe_residual_structure(d.evidence, l);
     in_touched = in_touched || touched;
@@ -202,9 +208,10 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     d.unexplained = describe_unnamed(d);
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
-    d.unexplained = describe_isolated_event(d);
+    d.unexplained = describe_isolated_event(d, options.isolated_event);
   drop_minor_effects(d, options.search);
-  if (!d.search.found.empty()) set_joint_estimates(model, suspects, references, d.search.found);
+  if (!d.search.found.empty())
+    set_joint_estimates(model, suspects, references, options.evidence, d.search.found);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe_effect(d, i, options.search));
   // One effect without unmodelled structure at its place is enough for a verdict of a missing effect.
@@ -226,13 +233,14 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     std::vector<std::string> set = {e.key()};
     for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
     d.indistinguishable.push_back(std::move(set));
-    d.experiments.push_back(
-        next_experiment(model, d.evidence, d.search.final, e.applied,
-                        rivals_of(d.search.found[i], options.search.same_nats)));
+    d.experiments.push_back(next_experiment(model, d.evidence, d.search.final, e.applied,
+                                            rivals_of(d.search.found[i], options.search),
+                                            options.experiment));
+    d.experiments.back().decisive_nats = options.search.same_nats;
   }
-  // They stay in the order in which they were found, except that those of a probability below one half come last.
+  // They stay in the order in which they were found, except that those that are not probable come last.
   std::stable_partition(d.effects.begin(), d.effects.end(),
-                        [](const DiagnosedEffect& e) { return e.probability >= 0.5; });
+                        [&](const DiagnosedEffect& e) { return d.probable(e); });
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (progress) progress(1.0, "done");
   return d;
@@ -249,7 +257,7 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
   for (const Log& log : logs) {
     suspects.push_back(make_signals(model.machine, log, options.signals));
     if (!options.check_data) continue;
-    for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back()))
+    for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back(), options.bad_data))
       bad.push_back(std::move(b));
     log_of.resize(bad.size(), suspects.size() - 1);
   }
@@ -267,8 +275,9 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
     return d;
   }
   Diagnosis d;
+  d.thresholds = options.verdict;
   d.verdict = Verdict::kBadData;
-  d.evidence = collect_evidence(model, suspects, pinned);
+  d.evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
   d.notes = d.evidence.notes;
   d.bad = std::move(bad);
   return d;

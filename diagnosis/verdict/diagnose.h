@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/experiment/experiment.h"
+#include "diagnosis/residual/residual_options.h"
 #include "diagnosis/selection/effect_search.h"
 #include "identification/data_checks/bad_data.h"
 
@@ -60,7 +61,47 @@ struct Unexplained {
       false;  ///< whether it is an isolated event, which an effect would explain (isolated_event.h)
 };
 
+/// Thresholds by which a verdict follows from effects found and unmodelled structure.
+struct VerdictOptions {
+  /// Unmodelled share of a channel (unmodelled_structure.h) above which a cause is not in the
+  /// catalogue.
+  /// @threshold [1] 0..1; chosen: a twentieth of the squared error that effects and residual model
+  /// explain together, that is a fifth of its amplitude.
+  double largest_unmodelled_share = 0.05;
+  /// The same share for an isolated event.
+  /// @threshold [1] 0..1; chosen: larger than for other structure, because the model-form error of
+  /// an effect is also concentrated where the effect acts most.
+  double largest_event_share = 0.25;
+  /// Error at an effect's place over the sensors' noise there, above which the effect may be a
+  /// minor one.
+  /// @threshold [1] 1..; tuned: in 72 tuning logs with one or two effects (seeds from 700 on) no
+  /// true effect leaves more than 4.6 times the noise, and the one name above five times was false
+  /// (docs/history/diagnosis.md).
+  double far_above_noise = 5.0;
+  /// Share of the squared error beyond noise that all effects must explain where an effect's place
+  /// keeps a large error, else the effect is a minor one.
+  /// @threshold [1] 0..1; chosen: four fifths; what stays has less than half the amplitude of what
+  /// was there. On the tuning logs no true effect comes as far as this test
+  /// (docs/history/diagnosis.md).
+  double least_explained_share = 0.8;
+  /// RMS of a pump pressure's error inside its jumps over the robust standard deviation of the
+  /// rest, up to which known physics explains the jumps and the sensor is not faulty.
+  /// @threshold [1] 1..; chosen: three standard deviations.
+  double largest_in_jumps = 3.0;
+  /// Probability from which an effect is one to report by itself and to add to a model, and not
+  /// only a member of a set.
+  /// @threshold [1] 0..1; derived: more probable than chance and all rivals together.
+  double least_probability = 0.5;
+  /// Factor by which an effect must reduce a channel's error for that to be stated as evidence.
+  /// @threshold [1] 1..; chosen: two percent; a smaller change is no evidence to a reader.
+  double least_reduction = 1.02;
+  /// Absorbed share above which the table states it.
+  /// @threshold [1] 0..1; chosen: a twentieth; the table states what matters.
+  double least_absorbed_stated = 0.05;
+};
+
 struct Diagnosis {
+  VerdictOptions thresholds;  ///< by which it was made
   Verdict verdict = Verdict::kNone;
   double p_value = 1.0;                  ///< of the best candidate if nothing is missing
   std::vector<DiagnosedEffect> effects;  ///< most probable first; all found, see `named`
@@ -78,6 +119,10 @@ struct Diagnosis {
   Evidence evidence;    ///< for the charts of pages
   SearchResult search;  ///< raw numbers; `final.residual` belongs to `evidence.channels`
 
+  /// Whether an effect is probable enough to be reported by itself.
+  bool probable(const DiagnosedEffect& e) const {
+    return e.probability >= thresholds.least_probability;
+  }
   std::string headline() const;  ///< one sentence
   /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
   std::string p_value_text() const;
@@ -93,15 +138,15 @@ struct Diagnosis {
   ~Diagnosis();
 };
 
-/// 0..1 unmodelled share of a channel (unmodelled_structure.h) above which a cause is not in the catalogue.
-inline constexpr double kLargestUnmodelledShare = 0.05;
-/// 0..1 the same for an isolated event. It is larger because the model-form error of an effect is also concentrated
-/// where the effect acts most.
-inline constexpr double kLargestEventShare = 0.25;
-
 struct DiagnoseOptions {
   SignalOptions signals;
+  BadDataOptions bad_data;
+  EvidenceOptions evidence;
   SearchOptions search;
+  ResidualModelOptions residual;
+  IsolatedEventOptions isolated_event;
+  VerdictOptions verdict;
+  ExperimentOptions experiment;
   bool check_data = true;
   /// Candidate effects; empty = the whole catalogue on this machine.
   std::vector<EffectAt> candidates;

@@ -111,7 +111,7 @@ std::string Diagnosis::table() const {
     for (std::size_t i = 0; i < std::min<std::size_t>(4, e.evidence.size()); ++i) {
       out += fmt::format("      {}\n", e.evidence[i]);
     }
-    if (e.absorbed > 0.05) {
+    if (e.absorbed > thresholds.least_absorbed_stated) {
       out += fmt::format(
           "      absorbed share {:.0f} %: learning the pressure models again would take it over\n",
           100.0 * e.absorbed);
@@ -150,13 +150,12 @@ std::string Diagnosis::json() const {
       {"verdict", verdict_name(verdict)}, {"p_value", p_value}, {"headline", headline()}};
   j["effects"] = nlohmann::json::array();
   for (const DiagnosedEffect& e : effects) {
-    if (verdict == Verdict::kMissing && e.probability >= 0.5)
-      j["effects"].push_back(json_of(e, evidence));
+    if (verdict == Verdict::kMissing && probable(e)) j["effects"].push_back(json_of(e, evidence));
   }
-  // members of an indistinguishable set, none of which has a probability of one half
+  // members of an indistinguishable set, none of which is probable enough by itself
   if (verdict == Verdict::kMissing) {
     for (const DiagnosedEffect& e : effects) {
-      if (e.probability >= 0.5) continue;
+      if (probable(e)) continue;
       nlohmann::json one = json_of(e, evidence);
       j["one_of_a_set"].push_back(one);
     }

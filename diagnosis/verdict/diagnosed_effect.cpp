@@ -50,9 +50,9 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   return fit_effects(updated ? *updated : d.evidence, pointers, nullptr, control);
 }
 
-double same_within(const FoundEffect& found, double same_nats) {
-  const double form = form_share(*found.design.effect.effect);
-  return std::max(same_nats, form * form * found.gain);
+double same_within(const FoundEffect& found, const SearchOptions& options) {
+  const double form = form_share(*found.design.effect.effect, options.regression);
+  return std::max(options.same_nats, form * form * found.gain);
 }
 
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
@@ -78,7 +78,7 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   e.held_out_error = f.held_out_error;
   e.absorbed = f.absorbed;
   double odds = 0.0;
-  const double same = same_within(f, options.same_nats);
+  const double same = same_within(f, options);
   for (const auto& [rival, worse] : f.alternatives) {
     odds += std::exp(-std::max(0.0, worse) * options.same_nats / same);
     if (worse < same)
@@ -98,7 +98,7 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   });
   for (const ChannelGain& g : e.channels) {
     const EvidenceChannel& c = d.evidence.channels[g.channel];
-    if (g.rmse_before < 1.02 * g.rmse_after) continue;
+    if (g.rmse_before < d.thresholds.least_reduction * g.rmse_after) continue;
     e.evidence.push_back(fmt::format(
         "{}: error {} -> {} {}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
         plain_number(g.rmse_after / c.unit.si, 3), c.unit.name,

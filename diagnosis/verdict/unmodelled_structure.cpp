@@ -70,17 +70,15 @@ bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
 }
 
 double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
-  constexpr double kFarAbove = 5.0;  // times the sensors' noise
   const ChannelGain& g = e.channels.front();
-  if (!(g.rmse_after > kFarAbove * g.noise_floor)) return 1.0;
+  if (!(g.rmse_after > d.thresholds.far_above_noise * g.noise_floor)) return 1.0;
   const double before = suspect_rms(d.evidence, g.channel, d.search.null.residual[g.channel]);
   const double noise = g.noise_floor * g.noise_floor;
   return (before * before - g.rmse_after * g.rmse_after) / (before * before - noise);
 }
 
 bool is_minor_effect(const Diagnosis& d, const DiagnosedEffect& e) {
-  constexpr double kMost = 0.8;
-  return explained_share(d, e) < kMost;
+  return explained_share(d, e) < d.thresholds.least_explained_share;
 }
 
 Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffect& e) {
@@ -149,12 +147,13 @@ Unexplained describe_unnamed(const Diagnosis& d) {
   return u;
 }
 
-Unexplained describe_isolated_event(const Diagnosis& d) {
+Unexplained describe_isolated_event(const Diagnosis& d, const IsolatedEventOptions& options) {
   const EffectDesign& design = *d.search.once;
   FitControl control;
   control.keep_residuals = true;
   const EffectFit with = fit_effects(d.evidence, {&design}, nullptr, control);
-  const IsolatedEvent isolated_event = locate_isolated_event(d.evidence, d.search.null, with);
+  const IsolatedEvent isolated_event =
+      locate_isolated_event(d.evidence, d.search.null, with, options);
   const EvidenceChannel& c = d.evidence.channels[isolated_event.channel];
   Unexplained u;
   u.stage = evidence_stage(c.kind);

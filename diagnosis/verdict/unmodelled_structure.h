@@ -35,6 +35,6 @@ Unexplained describe_residual_structure(const Evidence& evidence, const Residual
 Unexplained describe_unnamed(const Diagnosis& d);
 
 /// Describes an isolated event that an effect would explain although no law can be tested on it.
-Unexplained describe_isolated_event(const Diagnosis& d);
+Unexplained describe_isolated_event(const Diagnosis& d, const IsolatedEventOptions& options);
 
 }  // namespace sparflow

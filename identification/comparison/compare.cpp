@@ -18,6 +18,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// Half width of the 95 % interval of a normal distribution. [standard deviations]
+constexpr double kNormal95 = 1.959964;
+
 /// Scores one quantity over all logs.
 StageScore score(const std::vector<LogComparison>& logs, const std::string& stage,
                  const std::string& at, const std::string& regime) {
@@ -50,7 +53,7 @@ StageScore score(const std::vector<LogComparison>& logs, const std::string& stag
         }
         if (s.deviation.size() > 0) {
           ++judged;
-          if (std::abs(e) <= 1.959964 * s.deviation[k]) ++inside;
+          if (std::abs(e) <= kNormal95 * s.deviation[k]) ++inside;
         }
       }
     }
@@ -74,11 +77,11 @@ StageScore score(const std::vector<LogComparison>& logs, const std::string& stag
 
 /// Notes pressures with large errors outside the training data, where an error says nothing about the law.
 void extrapolation_notes(const CraneModel& model, const std::vector<StageScore>& scores,
-                         std::set<std::string>& notes) {
+                         const CompareNoteOptions& options, std::set<std::string>& notes) {
   for (const StageScore& s : scores) {
-    // A note is given where extrapolation is frequent and its error is above average.
-    if (!(s.extrapolated_percent >= 5.0)) continue;
-    if (!(s.extrapolated_error_percent > 1.25 * s.extrapolated_percent)) continue;
+    if (!(s.extrapolated_percent >= options.extrapolated_percent)) continue;
+    if (!(s.extrapolated_error_percent > options.extrapolated_ratio * s.extrapolated_percent))
+      continue;
     const bool extend = s.regime == "extend";
     const auto i = static_cast<std::size_t>(model.machine.cylinder_index(s.at));
     const CylinderModel& c = model.cylinders[i];
@@ -199,16 +202,17 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
 
 /// @return quantities with a bias of one sign nearly everywhere, as regions without bounds
 std::vector<WorstRegion> biased_everywhere(const std::vector<ComparedPart>& parts,
-                                           const ResidualTests& tests) {
-  constexpr double kShare = 0.5;     // of the squared error that is the mean's
-  constexpr double kOneSided = 0.9;  // of the samples
+                                           const ResidualTests& tests,
+                                           const CompareNoteOptions& options) {
   std::vector<WorstRegion> out;
   for (const ResidualTest& t : tests.tests) {
-    if (!t.depends_on.empty() || t.p_value > kAlarm || t.share_explained < kShare) continue;
+    if (!t.depends_on.empty() || t.p_value > tests.alarm ||
+        t.share_explained < options.offset_share)
+      continue;
     for (const ComparedPart& part : parts) {
       if (part.stage != t.stage || part.at != t.at || part.regime != t.regime) continue;
       const auto positive = (part.error.array() > 0.0).cast<double>().mean();
-      if (std::max(positive, 1.0 - positive) < kOneSided) continue;
+      if (std::max(positive, 1.0 - positive) < options.one_sided_share) continue;
       WorstRegion w;
       w.stage = t.stage;
       w.at = t.at;
@@ -274,7 +278,7 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
     result.logs.push_back(std::move(log));
   }
   result.scores = scores(model.machine, result.logs);
-  extrapolation_notes(model, result.scores, notes);
+  extrapolation_notes(model, result.scores, options.notes, notes);
   for (EnergyScore& e : energy) {
     if (e.duration <= 0.0) continue;
     e.relative_error = e.measured > 0.0 ? (e.predicted - e.measured) / e.measured : kNaN;
@@ -284,13 +288,13 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
     result.worst = worst_regions(error_groups(model.machine, result), options.regions);
   }
   if (options.find_regions && options.find_causes) {
-    const std::vector<CompareBlock> blocks = compare_blocks(result);
+    const std::vector<CompareBlock> blocks = compare_blocks(result, options.tests.blocks.longest_s);
     const std::vector<ComparedPart> parts = compare_parts(model.machine, result, blocks);
     result.tests = test_residuals(parts, static_cast<int>(blocks.size()), options.tests);
-    result.fault = find_stage_at_fault(model, result);
-    result.regimes = errors_by_regime(result, parts, blocks);
-    result.segments = worst_segments(model.machine, result, parts, blocks);
-    const std::vector<WorstRegion> biased = biased_everywhere(parts, result.tests);
+    result.fault = find_stage_at_fault(model, result, options.fault);
+    result.regimes = errors_by_regime(result, parts, blocks, options.segments);
+    result.segments = worst_segments(model.machine, result, parts, blocks, options.segments);
+    const std::vector<WorstRegion> biased = biased_everywhere(parts, result.tests, options.notes);
     result.worst.insert(result.worst.begin(), biased.begin(), biased.end());
   }
   result.notes.assign(notes.begin(), notes.end());
@@ -304,7 +308,7 @@ CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
   std::vector<BadChannelOfLog> bad;
   for (const Log& log : logs) {
     signals.push_back(make_signals(model.machine, log, options.signals));
-    for (BadChannel& b : find_bad_channels(model.machine, log, signals.back()))
+    for (BadChannel& b : find_bad_channels(model.machine, log, signals.back(), options.bad_data))
       bad.push_back({log.file, std::move(b)});
   }
   CompareResult result = compare_signals(model, std::move(signals), {}, options);

@@ -80,13 +80,33 @@ struct LogComparison {
   std::vector<ComparedSeries> series;
 };
 
+/// Thresholds of the notes and of offsets that need no region.
+struct CompareNoteOptions {
+  /// Least percentage of samples outside the training data for a note on extrapolation.
+  /// @threshold [%] 0..100; chosen: extrapolation is frequent
+  double extrapolated_percent = 5.0;
+  /// Least share of the squared error of these samples over their share of the samples.
+  /// @threshold [1] 1..10; chosen: their error is above average
+  double extrapolated_ratio = 1.25;
+  /// Least share of the squared error that is the mean's, for an offset everywhere.
+  /// @threshold [1] 0..1; chosen: the offset is the larger part
+  double offset_share = 0.5;
+  /// Least share of the samples whose error has the offset's sign.
+  /// @threshold [1] 0.5..1; chosen: nearly everywhere
+  double one_sided_share = 0.9;
+};
+
 struct CompareOptions {
   SignalOptions signals;
+  BadDataOptions bad_data;
   RegionOptions regions;
   bool find_regions = true;
   /// Residual tests, stage at fault, errors by regime, worst segments; requires `find_regions`.
   bool find_causes = true;
-  ResidualTestOptions tests;
+  ResidualTestOptions tests;  ///< its blocks are those of all statements on motions
+  StageAtFaultOptions fault;
+  WorstSegmentOptions segments;
+  CompareNoteOptions notes;
 };
 
 /// A bad channel and the log it is in.
@@ -135,9 +155,6 @@ std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSi
 
 /// @param data "train", "test" or "held out"  @return the scores in the form of the model file
 std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data);
-
-/// Significance level: a residual test with a smaller p-value is an alarm.
-inline constexpr double kAlarm = 0.05;
 
 /// Machine-readable result; keys as in docs/fit_and_compare.md.
 std::string compare_json(const CompareResult& result);

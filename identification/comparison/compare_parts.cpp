@@ -100,14 +100,14 @@ ComparedPart gather(const Machine& machine, const CompareResult& result,
 
 }  // namespace
 
-std::vector<CompareBlock> compare_blocks(const CompareResult& result, double longest) {
+std::vector<CompareBlock> compare_blocks(const CompareResult& result, double longest_s) {
   std::vector<CompareBlock> out;
   for (std::size_t l = 0; l < result.logs.size(); ++l) {
     const MachineSignals& s = result.logs[l].signals;
     for (const Segment& segment : s.segments) {
       if (!segment.moving) continue;
       const double seconds = s.time[segment.samples.end - 1] - s.time[segment.samples.begin];
-      const auto parts = static_cast<Index>(std::max(1.0, std::ceil(seconds / longest - 1e-9)));
+      const auto parts = static_cast<Index>(std::max(1.0, std::ceil(seconds / longest_s - 1e-9)));
       for (Index p = 0; p < parts; ++p) {
         const SampleRange range = {
             segment.samples.begin + segment.samples.size() * p / parts,
@@ -140,15 +140,15 @@ std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareRes
   return out;
 }
 
-Range block_interval(const VectorXd& numerator, const VectorXd& denominator, bool root) {
-  constexpr int kFewest = 5, kResamples = 400;
+Range block_interval(const VectorXd& numerator, const VectorXd& denominator, bool root,
+                     const BlockOptions& options) {
   std::vector<Index> used;
   for (Index b = 0; b < denominator.size(); ++b) {
     if (denominator[b] > 0.0) used.push_back(b);
   }
-  if (static_cast<int>(used.size()) < kFewest) return {kNaN, kNaN};
+  if (static_cast<int>(used.size()) < options.fewest) return {kNaN, kNaN};
   std::mt19937 random(12345);
-  VectorXd ratio(kResamples);
+  VectorXd ratio(options.resamples);
   for (double& r : ratio) {
     double top = 0.0, bottom = 0.0;
     for (std::size_t i = 0; i < used.size(); ++i) {

@@ -12,15 +12,26 @@ namespace sparflow {
 struct CompareResult;
 struct Machine;
 
-/// A stretch of one motion, at most about `longest` seconds of it.
+/// A stretch of one motion, at most about BlockOptions::longest_s of it.
 struct CompareBlock {
   std::size_t log = 0;  ///< index into CompareResult::logs
   SampleRange samples;
 };
 
-/// @param longest [s] longer motions are cut into equal parts; it exceeds the correlation time of errors in a motion
+struct BlockOptions {
+  /// Longest block; longer motions are cut into equal parts.
+  /// @threshold [s] 2..60; chosen: exceeds the correlation time of errors in a motion
+  double longest_s = 8.0;
+  /// Least number of blocks for an interval by bootstrap.
+  /// @threshold [blocks] 3..50; chosen: resampling fewer blocks hardly varies
+  int fewest = 5;
+  /// Number of bootstrap samples of an interval; a property of the computation, no threshold.
+  int resamples = 400;
+};
+
+/// @param longest_s longer motions are cut into equal parts
 /// @return the motions of all logs in order of time; rests belong to no block
-std::vector<CompareBlock> compare_blocks(const CompareResult& result, double longest = 8.0);
+std::vector<CompareBlock> compare_blocks(const CompareResult& result, double longest_s);
 
 /// One compared quantity over all logs, with one entry for each compared sample inside a block.
 struct ComparedPart {
@@ -41,9 +52,9 @@ std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareRes
                                         const std::vector<CompareBlock>& blocks);
 
 /// 95 % interval of a ratio of sums over blocks, sum(numerator) / sum(denominator), by the percentile bootstrap of whole
-/// blocks (Efron & Tibshirani 1993, ch. 13). NaN with fewer than 5 blocks. Deterministic.
+/// blocks (Efron & Tibshirani 1993, ch. 13). NaN with fewer blocks than the options require. Deterministic.
 /// @param root true for the root of the ratio, as for an RMSE
 Range block_interval(const Eigen::VectorXd& numerator, const Eigen::VectorXd& denominator,
-                     bool root);
+                     bool root, const BlockOptions& options = {});
 
 }  // namespace sparflow

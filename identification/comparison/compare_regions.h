@@ -55,16 +55,28 @@ struct WorstRegion {
 };
 
 struct RegionOptions {
-  int bins = 10;                 ///< quantiles of each signal between which intervals are tried
-  double least_share = 0.02;     ///< of the pool's samples, for a region
-  double least_severity = 0.02;  ///< pools of which less is unexplained are not searched
-  double least_error = 0.10;     ///< of the pool's squared error, for a region
-  /// A region's RMSE is at least this many times the pool's: it holds twice its share of the squared error.
-  /// Pure noise stays below 1.3 in the smallest region of a log of 10 000 samples, all regions tried.
+  /// Number of quantiles of each signal between which intervals are tried.
+  /// @threshold [1] 3..50; chosen: resolution of a tenth of the samples
+  int bins = 10;
+  /// Least share of the pool's samples in a region.
+  /// @threshold [1] 0..0.5; chosen: a smaller region is a single motion, which worst_segments finds
+  double least_share = 0.02;
+  /// Pools of which a smaller share is unexplained are not searched.
+  /// @threshold [1] 0..0.5; chosen: such a model is good everywhere
+  double least_severity = 0.02;
+  /// Least share of the pool's squared error in a region.
+  /// @threshold [1] 0..1; chosen: with less, removing the region's error would hardly help
+  double least_error = 0.10;
+  /// Least RMSE of a region over the pool's: it holds twice its share of the squared error.
+  /// @threshold [1] 1.3..5; derived: pure noise stays below 1.3 in the smallest region of a log of
+  /// 10 000 samples, all regions tried
   double contrast = 1.41;
-  /// A further signal must raise the score by this factor, so that descriptions stay short.
+  /// Factor by which a further signal must raise the score.
+  /// @threshold [1] 1..3; chosen: keeps descriptions short
   double gain_per_signal = 1.25;
-  int most = 6;  ///< regions reported
+  /// Largest number of regions reported.
+  /// @threshold [regions] 1..100; chosen: as many as a screen shows and a reader compares
+  int most = 6;
 };
 
 /// @return at most one region for each group, the worst first; none where the error is spread evenly

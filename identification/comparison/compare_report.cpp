@@ -178,12 +178,12 @@ std::string systematic_errors_text(const CompareResult& result) {
   if (tests.tests.empty()) return "";
   std::string text = "\nsystematic errors";
   text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
-                      tests.tested, tests.blocks, 100.0 * kAlarm);
-  if (tests.smallest_p() > kAlarm)
+                      tests.tested, tests.blocks, 100.0 * tests.alarm);
+  if (tests.smallest_p() > tests.alarm)
     return text + "  none: no significant bias, no significant dependence on a signal\n";
   std::size_t shown = 0, alarms = 0;
   for (const ResidualTest& t : tests.tests) {
-    if (t.p_value > kAlarm) continue;
+    if (t.p_value > tests.alarm) continue;
     ++alarms;
     if (shown < kMost) text += wrapped(t.stage + ": " + t.sentence);
     shown += shown < kMost ? 1 : 0;

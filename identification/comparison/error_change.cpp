@@ -14,24 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Least growth of an RMS error that counts as harm. Refitting alone moves centres and length-scales, which changes errors
-/// near the sensor noise by some percent.
-constexpr double kLargeChange = 1.1;
-/// With fewer blocks the noise cannot be estimated: the RMS of the few samples that a test log may have within the training
-/// range varies by more than a tenth.
-constexpr int kFewestBlocks = 4;
-/// Length of the pieces that replace motions where these are too few. [s]
-constexpr double kPiece = 1.0;
-constexpr double kStandardErrors = 2.0;
-/// Factor by which refitting alone may change the overall error.
-constexpr double kRefitMoves = 1.02;
-/// Largest increase of squared error where a change acts, as a share of its decrease at other such places.
-constexpr double kLargestLoss = 0.25;
-/// A change acts on a quantity when it moves its prediction by this share of the error.
-constexpr double kActs = 0.02;
-/// Smaller changes of the relative energy error are irrelevant, because flows are known to some percent only.
-constexpr double kEnergyMoves = 2e-3;
-
 /// [blocks] sums of a value before and after the change.
 struct BlockSums {
   VectorXd before, after, weight;
@@ -42,30 +24,33 @@ struct BlockSums {
 
   /// @return whether sum(after) / sum(weight) exceeds sum(before) / sum(weight) significantly, by the variation between
   ///   blocks
-  bool grew() const {
+  bool grew(const ErrorChangeOptions& options) const {
     const double all = weight.sum();
     if (!(all > 0.0)) return false;
     const VectorXd more = after - before;
     const double mean = more.sum() / all;
     if (mean <= 0.0) return false;
     const double n = used();
-    if (n < kFewestBlocks) return false;
+    if (n < options.fewest_blocks) return false;
     const double error = std::sqrt((more - mean * weight).squaredNorm() * n / (n - 1.0)) / all;
-    return mean > kStandardErrors * error;
+    return mean > options.standard_errors * error;
   }
 };
 
 /// Motions, and the pieces that replace them where too few motions show a quantity.
 struct Blocks {
   std::vector<CompareBlock> motions, pieces;
-  explicit Blocks(const CompareResult& result)
-      : motions(compare_blocks(result)), pieces(compare_blocks(result, kPiece)) {}
+  int fewest;
+  Blocks(const CompareResult& result, const ErrorChangeOptions& options)
+      : motions(compare_blocks(result, options.blocks.longest_s)),
+        pieces(compare_blocks(result, options.piece_s)),
+        fewest(options.fewest_blocks) {}
 
   /// @param sums_over callable that returns the BlockSums of a list of blocks
   template <class F>
   BlockSums enough(const F& sums_over) const {
     BlockSums sums = sums_over(motions);
-    return sums.used() < kFewestBlocks ? sums_over(pieces) : sums;
+    return sums.used() < fewest ? sums_over(pieces) : sums;
   }
 };
 
@@ -150,9 +135,9 @@ BlockSums energy_errors(const CompareResult& before, const CompareResult& after,
   return sums;
 }
 
-/// @return whether the change moved this quantity's prediction by at least kActs of its error
+/// @return whether the change moved this quantity's prediction by at least `share` of its error
 bool acts_on(const CompareResult& before, const CompareResult& after,
-             const std::vector<CompareBlock>& blocks, const StageScore& of) {
+             const std::vector<CompareBlock>& blocks, const StageScore& of, double share) {
   double moved = 0.0, error = 0.0;
   for_each_pair(
       before, after, blocks,
@@ -164,7 +149,7 @@ bool acts_on(const CompareResult& before, const CompareResult& after,
           error += std::pow(b.predicted[k] - b.measured[k], 2);
         }
       });
-  return moved > kActs * kActs * error && moved > 0.0;
+  return moved > share * share * error && moved > 0.0;
 }
 
 /// @param before, after RMS errors over the samples that count, SI
@@ -181,21 +166,23 @@ HarmedError harm(const StageScore& b, double before, double after) {
                       kilo ? "kN" : b.unit.name)};
 }
 
-void add_harmed_energy(const Machine& machine, const CompareResult& before,
-                       const CompareResult& after, const Blocks& blocks,
-                       std::vector<HarmedError>& harmed) {
+std::vector<HarmedError> harmed_energies(const Machine& machine, const CompareResult& before,
+                                         const CompareResult& after, const Blocks& blocks,
+                                         const ErrorChangeOptions& options) {
+  std::vector<HarmedError> harmed;
   for (const Pump& pump : machine.pumps) {
     const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
       return energy_errors(before, after, over, pump);
     });
     const double all = sums.weight.sum();
-    if (!(all > 0.0) || !sums.grew()) continue;
+    if (!(all > 0.0) || !sums.grew(options)) continue;
     const double b = sums.before.sum() / all, a = sums.after.sum() / all;
-    if (a - b < kEnergyMoves) continue;
+    if (a - b < options.energy_moves) continue;
     harmed.push_back({"energy", pump.name, "", b, a,
                       fmt::format("the error of the energy of pump {} grew from {:.2f} to {:.2f} %",
                                   pump.name, 100.0 * b, 100.0 * a)});
   }
+  return harmed;
 }
 
 /// Standard error of log(overall) from each block's contribution to it, to first order.
@@ -224,18 +211,28 @@ class OverallNoise {
 
 }  // namespace
 
-bool ErrorChange::worse() const { return own > 1.0 || overall > kRefitMoves || !harmed.empty(); }
+bool ErrorChange::worse(const ErrorChangeOptions& options) const {
+  return own > options.largest_own || overall > options.refit_moves || !harmed.empty();
+}
 
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::string& stage,
                          const std::string& at) {
-  return error_change(machine, before, after, std::vector<std::string>{stage}, at);
+  return error_change(machine, before, after, ChangedPlace{{stage}, at}, {});
 }
 
 ErrorChange error_change(const Machine& machine, const CompareResult& before,
                          const CompareResult& after, const std::vector<std::string>& stages,
                          const std::string& at) {
-  const Blocks blocks(before);
+  return error_change(machine, before, after, ChangedPlace{stages, at}, {});
+}
+
+ErrorChange error_change(const Machine& machine, const CompareResult& before,
+                         const CompareResult& after, const ChangedPlace& place,
+                         const ErrorChangeOptions& options) {
+  const std::vector<std::string>& stages = place.stages;
+  const std::string& at = place.at;
+  const Blocks blocks(before, options);
   const bool known_stages = std::all_of(stages.begin(), stages.end(), [](const std::string& s) {
     return s == "force" || s == "flow" || s == "pressure" || s == "pump";
   });
@@ -263,7 +260,8 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
     all_n += n;
     noise.add(squared_errors(before, after, blocks.motions, b, true), n);
     const bool is_own =
-        in_stage(b) && (one_place ? b.at == at : acts_on(before, after, blocks.motions, b));
+        in_stage(b) &&
+        (one_place ? b.at == at : acts_on(before, after, blocks.motions, b, options.acts_share));
     if (is_own) {
       Pool& pool = own[b.stage];
       const double was = n * b.rmse * b.rmse, is = n * a->rmse * a->rmse;
@@ -278,15 +276,17 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
     const double counted = std::max(1.0, sums.weight.sum());
     const double was = std::sqrt(sums.before.sum() / counted);
     const double is = std::sqrt(sums.after.sum() / counted);
-    if (is > kLargeChange * was && sums.grew())
+    if (is > options.large_change * was && sums.grew(options))
       (is_own ? own[b.stage].harmed : out.harmed).push_back(harm(b, was, is));
   }
   // Where the change acts on several quantities, a small increase of one is accepted for a large decrease of others.
   for (auto& [name, pool] : own) {
-    if (pool.lost <= kLargestLoss * pool.won) continue;
+    if (pool.lost <= options.largest_loss * pool.won) continue;
     out.harmed.insert(out.harmed.end(), pool.harmed.begin(), pool.harmed.end());
   }
-  add_harmed_energy(machine, before, after, blocks, out.harmed);
+  const std::vector<HarmedError> energies =
+      harmed_energies(machine, before, after, blocks, options);
+  out.harmed.insert(out.harmed.end(), energies.begin(), energies.end());
   if (all_n > 0.0) out.overall = std::exp(all / all_n);
   out.overall_deviation = noise.deviation();
   double log_own = 0.0, own_n = 0.0;

@@ -42,7 +42,8 @@ MatrixXd features(const VectorXd& signal) {
   VectorXd square = centred(out.col(0).cwiseAbs2());
   square -= out.col(0) * (out.col(0).dot(square) / n);
   const double left = std::sqrt(square.squaredNorm() / n);
-  if (left > 1e-3) out.col(columns++) = square / left;  // a signal with two values has no square
+  constexpr double kNoSquare = 1e-3;  // of the square; a signal with two values has none of its own
+  if (left > kNoSquare) out.col(columns++) = square / left;
   return out.leftCols(columns);
 }
 
@@ -104,8 +105,8 @@ MatrixXd max_t_sign_flip(const MatrixXd& sums, int flips, unsigned seed) {
   return out;
 }
 
-double effective_samples(const VectorXd& values, const std::vector<int>& block) {
-  constexpr double kGone = 0.05;
+double effective_samples(const VectorXd& values, const std::vector<int>& block,
+                         const AutocorrelationOptions& options) {
   const Index n = values.size();
   if (n < 3) return static_cast<double>(n);
   const VectorXd e = values.array() - values.mean();
@@ -119,9 +120,9 @@ double effective_samples(const VectorXd& values, const std::vector<int>& block) 
       products += e[k] * e[k + lag];
       pairs += 1.0;
     }
-    if (pairs < 10.0) break;
+    if (pairs < options.fewest_pairs) break;
     const double rho = products / pairs / variance;
-    if (rho < kGone) break;
+    if (rho < options.gone) break;
     sum += rho;
   }
   return std::max(1.0, static_cast<double>(n) / (1.0 + 2.0 * sum));
@@ -131,6 +132,7 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
                              const ResidualTestOptions& options) {
   ResidualTests out;
   out.blocks = blocks;
+  out.alarm = options.alarm;
   std::vector<Hypothesis> hypotheses;
   std::vector<VectorXd> columns;
   for (const ComparedPart& part : parts) {
@@ -147,13 +149,14 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
     bias.test.regime = part.regime;
     bias.test.unit = part.unit;
     bias.test.samples = static_cast<long>(part.error.size());
-    bias.test.effective_samples = effective_samples(part.error, part.block);
+    bias.test.effective_samples =
+        effective_samples(part.error, part.block, options.autocorrelation);
     bias.test.blocks = used;
     bias.test.ci95 = {kNaN, kNaN};
     Hypothesis blank = bias;
     const VectorXd sums = block_sums(part.error, part.block, blocks);
     bias.test.size = mean / part.scale;
-    const Range interval = block_interval(sums, counts, false);
+    const Range interval = block_interval(sums, counts, false, options.blocks);
     bias.test.ci95 = {interval.lo / part.scale, interval.hi / part.scale};
     bias.test.share_explained =
         part.error.squaredNorm() > 0.0 ? n * mean * mean / part.error.squaredNorm() : 0.0;

@@ -33,18 +33,43 @@ struct ResidualTest {
   std::string sentence;
 };
 
+struct AutocorrelationOptions {
+  /// Autocorrelation below which the sum over the lags ends, since the rest is noise.
+  /// @threshold [1] 0.01..0.3; chosen: close to zero, as the estimates scatter around it
+  double gone = 0.05;
+  /// Least number of pairs of samples at one lag.
+  /// @threshold [pairs] 5..1000; chosen: an estimate from fewer pairs is noise
+  int fewest_pairs = 10;
+  /// The same where the sum decides how samples of a pressure model are thinned.
+  /// @threshold [pairs] 5..1000; chosen: an estimate from fewer pairs is noise
+  int fewest_pairs_to_thin = 20;
+};
+
+struct ResidualTestOptions {
+  /// Number of random flips of the blocks' signs.
+  /// @threshold [1] 99..100000; derived: the smallest p-value is 1/(flips + 1), a fiftieth of
+  /// `alarm`
+  int flips = 999;
+  unsigned seed = 1;
+  /// Least number of blocks of a quantity.
+  /// @threshold [blocks] 6..100; derived: with fewer the smallest possible p-value (2^-5 for 6) is
+  /// above 5 %
+  int least_blocks = 6;
+  /// Level of significance: a residual test with a larger p-value is no alarm.
+  /// @threshold [1] 0..0.2; chosen: the usual level; one log in twenty without an error gives an
+  /// alarm
+  double alarm = 0.05;
+  AutocorrelationOptions autocorrelation;
+  BlockOptions blocks;
+};
+
 struct ResidualTests {
   std::vector<ResidualTest> tests;  ///< smallest p-value first, then largest share
   int blocks = 0;
   int tested = 0;  ///< hypotheses
+  /// Level of significance of the options: a test with a larger p-value is no alarm.
+  double alarm = ResidualTestOptions().alarm;
   double smallest_p() const { return tests.empty() ? 1.0 : tests.front().p_value; }
-};
-
-struct ResidualTestOptions {
-  int flips = 999;
-  unsigned seed = 1;
-  int least_blocks =
-      6;  ///< of a quantity; with fewer the smallest possible p-value (2^-5 for 6) is above 5 %
 };
 
 ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
@@ -54,7 +79,8 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
 /// @return [tests x 2] T and its family-wise p-value
 Eigen::MatrixXd max_t_sign_flip(const Eigen::MatrixXd& sums, int flips, unsigned seed);
 
-/// @return n / (1 + 2 sum of the autocorrelations up to the first below 0.05), with pairs inside blocks only
-double effective_samples(const Eigen::VectorXd& values, const std::vector<int>& block);
+/// @return n / (1 + 2 sum of the autocorrelations up to the first that is gone), with pairs inside blocks only
+double effective_samples(const Eigen::VectorXd& values, const std::vector<int>& block,
+                         const AutocorrelationOptions& options = {});
 
 }  // namespace sparflow

@@ -104,8 +104,10 @@ std::string amount(double value, const std::string& unit) {
   return fmt::format("{:.3g} {}", value, unit);
 }
 
-StageSplit split(const CraneModel& model, const CompareResult& result, const std::string& stage,
-                 const std::string& at, const std::string& regime) {
+/// Splits the error of one quantity. @param score of the quantity
+StageSplit split(const CraneModel& model, const CompareResult& result, const StageScore& score,
+                 const StageAtFaultOptions& options) {
+  const std::string &stage = score.stage, &at = score.at, &regime = score.regime;
   StageSplit out;
   out.stage = stage;
   out.at = at;
@@ -144,34 +146,34 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const std
   out.inherited = std::sqrt(inherited / n) / unit.si;
   out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
   if (!rough.empty()) {
-    // The smoothed signal keeps a part of the noise, so the difference is too small by about this factor.
-    constexpr double kAllowance = 1.1;
     const Eigen::Map<const VectorXd> r(rough.data(), static_cast<Index>(rough.size()));
-    out.noise = kAllowance * robust_std(r) / unit.si;
+    out.noise = options.noise_allowance * robust_std(r) / unit.si;
   }
   // A law that was learned with wrong inputs compensates their error; its error with right inputs is then not its own.
   const double at_fault = std::min(out.own, out.error);
   const double beyond = std::sqrt(std::max(0.0, at_fault * at_fault - out.noise * out.noise));
   out.severity = out.spread > 0.0 ? beyond / out.spread : 0.0;
+  out.compensates = out.own > options.compensation_ratio * out.error &&
+                    out.inherited > options.compensation_ratio * out.error;
   out.words = words_of(out);
   return out;
 }
 
-std::string describe(const StageAtFault& found) {
+std::string describe(const StageAtFault& found, const StageAtFaultOptions& options) {
   if (found.stages.empty()) return "";
   if (found.fault < 0)
     return "No stage stands out: with measured inputs the error of every stage is near its noise.";
   const StageSplit& f = found.stages[static_cast<std::size_t>(found.fault)];
   std::string text =
       fmt::format("The error arises in the {}: {} RMS of its own", f.words, amount(f.own, f.unit));
-  if (f.inherited > 0.25 * f.own)
+  if (f.inherited > options.mentioned_share * f.own)
     text += fmt::format(" and {} inherited", amount(f.inherited, f.unit));
   // The following stage that inherits the largest error is named with it.
   const StageSplit* heir = nullptr;
   for (const StageSplit& s : found.stages) {
     const bool next = (f.stage == "force" && s.stage == "pressure" && s.at == f.at) ||
                       (f.stage == "pressure" && s.stage == "pump");
-    if (next && !s.makes_up() && s.inherited > 0.25 * s.error &&
+    if (next && !s.compensates && s.inherited > options.mentioned_share * s.error &&
         (heir == nullptr || s.inherited > heir->inherited))
       heir = &s;
   }
@@ -183,7 +185,7 @@ std::string describe(const StageAtFault& found) {
   const StageSplit* compensates = nullptr;
   for (const StageSplit& s : found.stages) {
     const bool next = f.stage == "force" && s.stage == "pressure" && s.at == f.at;
-    if (next && s.makes_up() && (compensates == nullptr || s.own > compensates->own))
+    if (next && s.compensates && (compensates == nullptr || s.own > compensates->own))
       compensates = &s;
   }
   if (compensates != nullptr) {
@@ -203,7 +205,7 @@ StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& r
   StageAtFault out;
   for (const StageScore& score : result.scores) {
     if (score.stage == "flow_sensor") continue;
-    StageSplit s = split(model, result, score.stage, score.at, score.regime);
+    StageSplit s = split(model, result, score, options);
     if (s.n > 1) out.stages.push_back(std::move(s));
   }
   double worst = options.least_severity;
@@ -212,7 +214,7 @@ StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& r
     worst = out.stages[i].severity;
     out.fault = static_cast<int>(i);
   }
-  out.sentence = describe(out);
+  out.sentence = describe(out, options);
   return out;
 }
 

@@ -29,7 +29,7 @@ struct StageSplit {
   /// The smaller of own error and error along the chain, less the noise, over the measured spread; 0 is best.
   double severity = 0.0;
   /// Whether the stage was learned together with the errors of the stage before and compensates them.
-  bool makes_up() const { return own > 2.0 * error && inherited > 2.0 * error; }
+  bool compensates = false;
 };
 
 struct StageAtFault {
@@ -42,7 +42,21 @@ struct StageAtFault {
 
 struct StageAtFaultOptions {
   /// Least own error beyond noise, as a share of the measured spread, for a stage to be at fault.
+  /// @threshold [1] 0..0.5; chosen: smaller errors hardly affect the energy
   double least_severity = 0.05;
+  /// Least own and least inherited error, over the error along the chain, for a stage to compensate
+  /// the errors before it.
+  /// @threshold [1] 1..10; chosen: two errors that partly cancel have to be clearly larger than
+  /// what is left of them
+  double compensation_ratio = 2.0;
+  /// Least inherited error, as a share of the own error (at the stage at fault) or of the error (at
+  /// the following stage), to be mentioned.
+  /// @threshold [1] 0..1; chosen: a smaller part is of no use to the reader
+  double mentioned_share = 0.25;
+  /// Factor on measured minus smoothed signal as an estimate of the sensor noise.
+  /// @threshold [1] 1..1.5; chosen: the smoothed signal keeps a part of the noise, so the
+  /// difference is too small by about this factor
+  double noise_allowance = 1.1;
 };
 
 StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& result,

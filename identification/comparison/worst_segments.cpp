@@ -16,9 +16,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// @return e.g. "boom extending, jib retracting", for motions in at least a tenth of the block's samples
-std::string motions(const Machine& machine, const MachineSignals& signals, SampleRange range) {
-  constexpr double kLeast = 0.1;
+/// @return e.g. "boom extending, jib retracting", for motions in at least `share` of the block's samples
+std::string motions(const Machine& machine, const MachineSignals& signals, SampleRange range,
+                    double share) {
   std::string out;
   for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
     const CylinderSignals& c = signals.cylinders[i];
@@ -27,7 +27,7 @@ std::string motions(const Machine& machine, const MachineSignals& signals, Sampl
       if (!c.moving[k]) continue;
       (c.speed[k] > 0.0 ? up : down) += 1.0;
     }
-    const double least = kLeast * static_cast<double>(range.size());
+    const double least = share * static_cast<double>(range.size());
     const std::string way = up > least && down > least ? " both ways"
                             : up > least               ? " extending"
                             : down > least             ? " retracting"
@@ -62,8 +62,8 @@ Factor terciles(const std::string& name, const VectorXd& values,
   if (n == 0) return f;
   const double lo = quantile(known, 1.0 / 3.0), hi = quantile(known, 2.0 / 3.0);
   const double span = known.maxCoeff() - known.minCoeff();
-  // A signal that hardly varies has no levels.
-  if (!(span > 1e-6 * known.cwiseAbs().maxCoeff()) || !(hi > lo)) return f;
+  constexpr double kConstant = 1e-6;  // of the size; a signal that varies by rounding has no levels
+  if (!(span > kConstant * known.cwiseAbs().maxCoeff()) || !(hi > lo)) return f;
   for (Index k = 0; k < values.size(); ++k) {
     if (!std::isfinite(values[k])) continue;
     f.level[static_cast<std::size_t>(k)] = words[values[k] <= lo ? 0 : values[k] <= hi ? 1 : 2];
@@ -72,12 +72,12 @@ Factor terciles(const std::string& name, const VectorXd& values,
 }
 
 /// @return a factor with a level for each value where there are few values, else for each tercile
-Factor values_or_terciles(const std::string& name, const VectorXd& values) {
-  constexpr std::size_t kMostValues = 5;
+Factor values_or_terciles(const std::string& name, const VectorXd& values,
+                          std::size_t most_values) {
   std::set<double> seen;
   for (const double v : values) {
     if (std::isfinite(v)) seen.insert(v);
-    if (seen.size() > kMostValues) return terciles(name, values, {"low", "medium", "high"});
+    if (seen.size() > most_values) return terciles(name, values, {"low", "medium", "high"});
   }
   Factor f{name, std::vector<std::string>(static_cast<std::size_t>(values.size())), {}};
   if (seen.size() < 2) return f;
@@ -126,7 +126,8 @@ Factor regime_factor(const CompareResult& result, const ComparedPart& part,
 }
 
 std::vector<Factor> factors_of(const CompareResult& result, const ComparedPart& part,
-                               const std::vector<CompareBlock>& blocks) {
+                               const std::vector<CompareBlock>& blocks,
+                               const WorstSegmentOptions& options) {
   std::vector<Factor> out;
   out.push_back(regime_factor(result, part, blocks));
   const RegimeSignal* speed = signal_of(part, part.stage == "pump" ? "flow_lpm" : "speed_");
@@ -135,14 +136,14 @@ std::vector<Factor> factors_of(const CompareResult& result, const ComparedPart& 
     out.push_back(terciles("load", load->values, {"low", "medium", "high"}));
   for (const char* key : {"payload_kg", "oil_C"}) {
     if (const RegimeSignal* s = signal_of(part, key))
-      out.push_back(values_or_terciles(key, s->values));
+      out.push_back(values_or_terciles(key, s->values, options.most_values));
   }
   out.push_back(functions_moving(result, part, blocks));
   return out;
 }
 
 RegimeError error_at(const ComparedPart& part, const Factor& factor, const std::string& level,
-                     Index blocks) {
+                     Index blocks, const BlockOptions& options) {
   RegimeError out;
   out.stage = part.stage;
   out.at = part.at;
@@ -163,8 +164,8 @@ RegimeError error_at(const ComparedPart& part, const Factor& factor, const std::
   out.blocks = static_cast<int>((count.array() > 0.0).count());
   out.rmse = std::sqrt(squares.sum() / count.sum());
   out.bias = sum.sum() / count.sum();
-  out.rmse_ci95 = block_interval(squares, count, true);
-  out.bias_ci95 = block_interval(sum, count, false);
+  out.rmse_ci95 = block_interval(squares, count, true, options);
+  out.bias_ci95 = block_interval(sum, count, false, options);
   return out;
 }
 
@@ -172,8 +173,8 @@ RegimeError error_at(const ComparedPart& part, const Factor& factor, const std::
 
 std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareResult& result,
                                          const std::vector<ComparedPart>& parts,
-                                         const std::vector<CompareBlock>& blocks, int most) {
-  constexpr double kContrast = 1.5;  // least error share over sample share, above coloured noise
+                                         const std::vector<CompareBlock>& blocks,
+                                         const WorstSegmentOptions& options) {
   std::vector<WorstSegment> out;
   for (const ComparedPart& part : parts) {
     VectorXd count = VectorXd::Zero(static_cast<Index>(blocks.size())), sum = count,
@@ -190,7 +191,7 @@ std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareRe
     double most_excess = 0.0;
     for (Index b = 0; b < squares.size(); ++b) {
       const double error = squares[b] / total, share = count[b] / samples;
-      if (error < kContrast * share || error - share <= most_excess) continue;
+      if (error < options.contrast * share || error - share <= most_excess) continue;
       most_excess = error - share;
       worst = b;
     }
@@ -204,7 +205,7 @@ std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareRe
     w.file = s.file;
     w.from_s = s.time[block.samples.begin];
     w.to_s = s.time[block.samples.end - 1];
-    w.moved = motions(machine, s, block.samples);
+    w.moved = motions(machine, s, block.samples, options.moved_share);
     w.rmse = std::sqrt(squares[worst] / count[worst]);
     w.bias = sum[worst] / count[worst];
     w.unit = part.unit;
@@ -222,18 +223,21 @@ std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareRe
   std::stable_sort(out.begin(), out.end(), [](const WorstSegment& a, const WorstSegment& b) {
     return a.share_of_error - a.share_of_samples > b.share_of_error - b.share_of_samples;
   });
-  if (static_cast<int>(out.size()) > most) out.resize(static_cast<std::size_t>(most));
+  if (static_cast<int>(out.size()) > options.most)
+    out.resize(static_cast<std::size_t>(options.most));
   return out;
 }
 
 std::vector<RegimeError> errors_by_regime(const CompareResult& result,
                                           const std::vector<ComparedPart>& parts,
-                                          const std::vector<CompareBlock>& blocks) {
+                                          const std::vector<CompareBlock>& blocks,
+                                          const WorstSegmentOptions& options) {
   std::vector<RegimeError> out;
   for (const ComparedPart& part : parts) {
-    for (const Factor& factor : factors_of(result, part, blocks)) {
+    for (const Factor& factor : factors_of(result, part, blocks, options)) {
       for (const std::string& level : factor.order) {
-        RegimeError e = error_at(part, factor, level, static_cast<Index>(blocks.size()));
+        RegimeError e =
+            error_at(part, factor, level, static_cast<Index>(blocks.size()), options.blocks);
         if (e.samples > 0) out.push_back(std::move(e));
       }
     }

@@ -21,11 +21,29 @@ struct WorstSegment {
   std::string sentence;
 };
 
-/// @param most segments in all
+struct WorstSegmentOptions {
+  /// Largest number of segments in all.
+  /// @threshold [segments] 1..100; chosen: as many as a screen shows and a reader compares
+  int most = 6;
+  /// Least share of the squared error over the share of the samples.
+  /// @threshold [1] 1..5; chosen: above what coloured noise shows
+  double contrast = 1.5;
+  /// Least share of a segment's samples in which a cylinder moves to be named.
+  /// @threshold [1] 0..0.5; chosen: a shorter motion hardly explains the segment's error
+  double moved_share = 0.1;
+  /// Largest number of values of a payload or oil temperature that are levels of their own; with
+  /// more there are terciles.
+  /// @threshold [values] 2..20; chosen: a test plan has a few payloads, a drifting temperature many
+  /// values
+  std::size_t most_values = 5;
+  BlockOptions blocks;
+};
+
 /// @return for every quantity the segment with the largest excess of error share over sample share, largest first
 std::vector<WorstSegment> worst_segments(const Machine& machine, const CompareResult& result,
                                          const std::vector<ComparedPart>& parts,
-                                         const std::vector<CompareBlock>& blocks, int most = 6);
+                                         const std::vector<CompareBlock>& blocks,
+                                         const WorstSegmentOptions& options = {});
 
 /// The error of one quantity while a factor has one of its levels.
 struct RegimeError {
@@ -34,7 +52,7 @@ struct RegimeError {
       factor;  ///< "direction", "speed", "load", "payload_kg", "oil_C", "functions", "leader"
   std::string level;  ///< "extend", "slow", "high", "500", "several", "boom"
   double rmse = 0.0;  ///< in `unit`
-  Range rmse_ci95;    ///< bootstrap of blocks; NaN with fewer than 5
+  Range rmse_ci95;    ///< bootstrap of blocks; NaN with fewer than BlockOptions::fewest
   double bias = 0.0;  ///< in `unit`
   Range bias_ci95;
   std::string unit;
@@ -43,9 +61,10 @@ struct RegimeError {
 };
 
 /// Errors by direction, speed (slow, medium, fast: terciles), load (terciles), payload and oil temperature (each value,
-/// terciles where there are more than five), one or several cylinders moving, and load-sensing leader.
+/// terciles where there are more than `most_values`), one or several cylinders moving, and load-sensing leader.
 std::vector<RegimeError> errors_by_regime(const CompareResult& result,
                                           const std::vector<ComparedPart>& parts,
-                                          const std::vector<CompareBlock>& blocks);
+                                          const std::vector<CompareBlock>& blocks,
+                                          const WorstSegmentOptions& options = {});
 
 }  // namespace sparflow

@@ -46,7 +46,7 @@ void describe_position(const CheckContext& context, CheckedChannel& c) {
   const SavitzkyGolay filter(context.log.time, context.log.runs, context.signals.window);
   const double gain = filter.noise_gain(1);
   c.least_noise = gain > 0.0 ? context.options.least_speed_share * c.fastest / gain : 0.0;
-  c.least_jump = 1.5 * c.fastest * context.log.step;
+  c.least_jump = context.options.jump_speed_ratio * c.fastest * context.log.step;
 }
 
 CheckedChannel describe(const CheckContext& context, const Channel& channel) {
@@ -57,7 +57,7 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
     c.field = units::kBar;
     c.field_unit = "bar";
     c.least_noise = context.options.least_pressure;
-    c.least_jump = 20.0 * context.options.least_pressure;
+    c.least_jump = context.options.pressure_jump_ratio * context.options.least_pressure;
   };
   switch (channel.role) {
     case Role::kJointPosition:
@@ -81,12 +81,12 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
       c.cylinder = channel.index;
       c.field_unit = "";
       c.least_noise = context.options.least_command;
-      c.least_jump = 5.0 * context.options.least_command;
+      c.least_jump = context.options.command_jump_ratio * context.options.least_command;
       break;
     case Role::kOilTemperature:
       c.field_unit = "degC";
-      c.least_noise = 1.0;
-      c.least_jump = 3.0;  // oil does not warm by 3 K from one sample to the next
+      c.least_noise = context.options.least_oil;
+      c.least_jump = context.options.least_oil_jump;
       break;
     default:
       c.cylinder = channel.role == Role::kPayload ? -1 : channel.index;
@@ -97,7 +97,7 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
 
 /// @return affected stretches [s]; short gaps between them are closed for the chart
 std::vector<std::pair<double, double>> stretches_of(const Log& log, const Mask& affected) {
-  const double gap = 0.01 * log.duration();
+  const double gap = 0.01 * log.duration();  // about the width of a line in the chart
   std::vector<std::pair<double, double>> out;
   for (Index k = 0; k < affected.size(); ++k) {
     if (!affected[k]) continue;
@@ -188,7 +188,7 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
   for (const Channel& channel : log.channels) {
     if (channel.role == Role::kCandidate) continue;
     context.channels.push_back(describe(context, channel));
-    context.noise.push_back(noise_profile(channel.values, log));
+    context.noise.push_back(noise_profile(channel.values, log, options));
   }
   // The first finding of a channel ends its checks: a stuck channel is not reported for the jumps into and out of its value.
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);

@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 /// @return median magnitude of the differences of `order` in the range, scaled to the standard deviation of white noise
-///   (the sum of squared binomial coefficients is C(2 order, order)); NaN with fewer than ten differences
-double difference_level(const VectorXd& values, SampleRange range, int order) {
+///   (the sum of squared binomial coefficients is C(2 order, order)); NaN with fewer than `fewest` differences
+double difference_level(const VectorXd& values, SampleRange range, int order, std::size_t fewest) {
   const double scale = order == 3 ? std::sqrt(20.0) : std::sqrt(924.0);
   static constexpr std::array<double, 4> kThird = {-1, 3, -3, 1};
   static constexpr std::array<double, 7> kSixth = {1, -6, 15, -20, 15, -6, 1};
@@ -29,7 +29,7 @@ double difference_level(const VectorXd& values, SampleRange range, int order) {
     }
     if (std::isfinite(sum)) size.push_back(std::abs(sum));
   }
-  if (size.size() < 10) return std::nan("");
+  if (size.size() < fewest) return std::nan("");
   const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
   std::nth_element(size.begin(), middle, size.end());
   return 1.4826 * *middle / scale;
@@ -98,16 +98,13 @@ struct Repeats {
 };
 
 /// @return log10 of the probability of the repetitions `inside`, by the frequency of repetitions elsewhere
-double log_chance(const Repeats& all, const Repeats& inside) {
-  constexpr double kFewest = 50.0;
-  constexpr double kTooCommon =
-      0.7;  // if a channel mostly repeats its value, repetitions are no evidence
+double log_chance(const Repeats& all, const Repeats& inside, const BadDataOptions& options) {
   double sum = 0.0;
   for (std::size_t s = 0; s < 2; ++s) {
     const double steps = all.steps[s] - inside.steps[s], equal = all.equal[s] - inside.equal[s];
-    if (steps < kFewest) continue;
+    if (steps < options.fewest_steps) continue;
     const double p = (equal + 1.0) / (steps + 2.0);
-    if (p < kTooCommon) sum += inside.equal[s] * std::log10(p);
+    if (p < options.common_repeats) sum += inside.equal[s] * std::log10(p);
   }
   return sum;
 }
@@ -115,8 +112,8 @@ double log_chance(const Repeats& all, const Repeats& inside) {
 /// @return whether the channel's cylinder (for a pump any) starts, stops or reverses near a sample, which fills or empties
 ///   a chamber quickly
 bool turns_near(const CheckContext& context, const CheckedChannel& c, Index k) {
-  constexpr double kAnswers = 0.3;  // [s] response time of a valve
-  const auto around = static_cast<Index>(std::ceil(kAnswers / std::max(context.log.step, 1e-9)));
+  const auto around = static_cast<Index>(
+      std::ceil(context.options.valve_answer_s / std::max(context.log.step, 1e-9)));
   for (std::size_t i = 0; i < context.signals.cylinders.size(); ++i) {
     if (c.cylinder >= 0 && c.cylinder != static_cast<int>(i)) continue;
     const Eigen::VectorXi& direction = context.signals.cylinders[i].direction;
@@ -152,8 +149,8 @@ std::optional<Finding> constant_throughout(const CheckContext& context, std::siz
   if (position && !s.has_command()) return {};
   double ways[2] = {0.0, 0.0};
   for (Index k = 0; k < s.direction.size(); ++k) {
-    constexpr double kFirm = 0.25;  // well outside any dead band
-    if (position ? std::abs(s.command[k]) > kFirm : static_cast<bool>(s.moving[k])) {
+    if (position ? std::abs(s.command[k]) > context.options.constant_firm_command
+                 : static_cast<bool>(s.moving[k])) {
       ways[s.direction[k] > 0 ? 1 : 0] += context.log.step;
     }
   }
@@ -187,11 +184,10 @@ VectorXd finite_values(const VectorXd& values) {
   return out;
 }
 
-NoiseProfile noise_profile(const VectorXd& values, const Log& log) {
-  constexpr double kBlock = 1.0;    // [s]
-  constexpr double kFewest = 40.0;  // samples, with which the median scatters by a fifth
+NoiseProfile noise_profile(const VectorXd& values, const Log& log, const BadDataOptions& options) {
   NoiseProfile out;
-  const auto size = static_cast<Index>(std::max(kFewest, kBlock / std::max(log.step, 1e-9)));
+  const auto size = static_cast<Index>(
+      std::max(options.block_fewest, options.block_s / std::max(log.step, 1e-9)));
   for (const SampleRange& run : log.runs) {
     for (Index k = run.begin; k < run.end; k += size) {
       out.blocks.push_back({k, std::min(k + size, run.end)});
@@ -202,12 +198,13 @@ NoiseProfile noise_profile(const VectorXd& values, const Log& log) {
   out.whiteness.resize(count);
   for (Index b = 0; b < count; ++b) {
     const SampleRange& block = out.blocks[static_cast<std::size_t>(b)];
-    out.level[b] = difference_level(values, block, 3);
-    out.whiteness[b] = out.level[b] > 0.0 ? difference_level(values, block, 6) / out.level[b] : 0.0;
+    out.level[b] = difference_level(values, block, 3, options.fewest_differences);
+    const double sixth = difference_level(values, block, 6, options.fewest_differences);
+    out.whiteness[b] = out.level[b] > 0.0 ? sixth / out.level[b] : 0.0;
   }
   const VectorXd known = finite_values(out.level);
   out.typical = median(known);
-  out.quiet = quantile(known, 0.25);
+  out.quiet = quantile(known, options.quiet_quantile);
   return out;
 }
 
@@ -237,31 +234,27 @@ std::optional<Finding> check_missing(const CheckContext& context, std::size_t ch
 }
 
 std::optional<Finding> check_noise(const CheckContext& context, std::size_t channel) {
-  constexpr double kWhite = 0.7;     // an oscillation of a quarter of the sampling rate has 0.42
-  constexpr double kLivelier = 1.6;  // least ratio to the largest disturbance of a peer
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   const NoiseProfile& noise = context.noise[channel];
   const std::vector<std::size_t> peers = peers_of(context, channel);
   const double peer_noise = noise_of_peers(context, channel, peers);
-  // A single peer may be a sensor of a better type, and a stroke sensor vibrates with its own cylinder.
-  constexpr double kShaking = 1e-3;  // of the range
   const bool few = peers.size() < 2;
-  const double caution = peers.size() == 1 ? 2.0 : 1.0;
-  const double least =
-      few && c.family == "position" ? std::max(c.least_noise, kShaking * c.scale) : c.least_noise;
+  const double caution = peers.size() == 1 ? options.single_peer_ratio : 1.0;
+  const double least = few && c.family == "position"
+                           ? std::max(c.least_noise, options.shaking_share * c.scale)
+                           : c.least_noise;
   const bool has_peers = peer_noise > 0.0;
   const double reference = has_peers ? peer_noise : noise.quiet;
-  // The level over many blocks is known better than that of one block, so a smaller ratio suffices.
-  constexpr double kThroughout = 0.83, kThroughoutBlock = 0.5;
-  const double ratio = context.options.noise_ratio * caution;
-  const bool throughout = has_peers && noise.typical > kThroughout * ratio * peer_noise;
-  // A burst is far above the channel's own quiet blocks (their lower quartile is 0.87 of the median).
-  constexpr double kOwn = 1.33, kBurstPeers = 0.67;
+  const double ratio = options.noise_ratio * caution;
+  const bool throughout =
+      has_peers && noise.typical > options.throughout_share * ratio * peer_noise;
   const auto noisy = [&](double level) {
     if (!has_peers) return level > ratio * noise.quiet;
-    if (level > (throughout ? kThroughoutBlock : 1.0) * ratio * peer_noise) return true;
-    return noise.quiet > 0.0 && level > kOwn * ratio * noise.quiet &&
-           level > kBurstPeers * ratio * peer_noise;
+    const double share = throughout ? options.throughout_block_share : 1.0;
+    if (level > share * ratio * peer_noise) return true;
+    return noise.quiet > 0.0 && level > options.burst_own_ratio * ratio * noise.quiet &&
+           level > options.burst_peer_share * ratio * peer_noise;
   };
   Finding found;
   found.kind = BadDataKind::kNoisy;
@@ -270,9 +263,9 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
   for (Index b = 0; b < noise.level.size(); ++b) {
     const double level = noise.level[b];
     if (!(level > least && noisy(level))) continue;
-    if (!(noise.whiteness[b] > kWhite)) continue;
+    if (!(noise.whiteness[b] > options.least_whiteness)) continue;
     if (reference > 0.0 &&
-        level / reference < kLivelier * disturbance_of_peers(context, peers, b)) {
+        level / reference < options.livelier_ratio * disturbance_of_peers(context, peers, b)) {
       continue;
     }
     const SampleRange& block = noise.blocks[static_cast<std::size_t>(b)];
@@ -282,7 +275,7 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
     squares += level * level;
     blocks += 1.0;
   }
-  if (seconds < context.options.noise_bursts_s || blocks < 2.0) return {};
+  if (seconds < options.noise_bursts_s || blocks < options.noise_fewest_blocks) return {};
   const double level = std::sqrt(squares / blocks);
   found.evidence =
       peer_noise > 0.0
@@ -298,6 +291,7 @@ std::optional<Finding> check_noise(const CheckContext& context, std::size_t chan
 }
 
 std::optional<Finding> check_stuck(const CheckContext& context, std::size_t channel) {
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   const Role role = c.channel->role;
   if (role == Role::kCommand || role == Role::kPayload) return {};  // constant by nature
@@ -310,25 +304,26 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
   for (Index i = 0; i < lengths.size(); ++i) {
     lengths[i] = static_cast<double>(stretches[static_cast<std::size_t>(i)].size());
   }
-  const double usual = quantile(lengths, 0.9);
+  const double usual = quantile(lengths, options.usual_stretch_quantile);
   Repeats all;
   for (const SampleRange& run : context.log.runs) all.add(values, state, run);
   const double limit =
-      std::log10(context.options.stuck_chance / static_cast<double>(context.log.samples()));
+      std::log10(options.stuck_chance / static_cast<double>(context.log.samples()));
   Finding found;
   found.affected = Mask::Constant(context.log.samples(), false);
   SampleRange longest;
   bool zero = true;
   for (const SampleRange& s : stretches) {
     const double seconds = context.log.time[s.end - 1] - context.log.time[s.begin];
-    if (seconds < context.options.stuck_s) continue;
-    // With few stretches the usual length would be that of the fault itself.
-    if (stretches.size() >= 10 && static_cast<double>(s.size()) < 3.0 * usual) continue;
+    if (seconds < options.stuck_s) continue;
+    if (stretches.size() >= options.fewest_stretches &&
+        static_cast<double>(s.size()) < options.stretch_ratio * usual)
+      continue;
     Repeats inside;
     inside.add(values, state, s);
-    if (log_chance(all, inside) > limit) continue;
+    if (log_chance(all, inside, options) > limit) continue;
     // A sensor whose range ends at zero is clipped there but not faulty.
-    const double gentle = 10.0 * context.noise[channel].typical + c.least_jump;
+    const double gentle = options.jump_noise * context.noise[channel].typical + c.least_jump;
     if (values[s.begin] == 0.0 && reached_by_machine(context, c, values, s, gentle)) continue;
     zero = zero && values[s.begin] == 0.0;
     found.affected.segment(s.begin, s.size()).setConstant(true);
@@ -347,20 +342,16 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
 }
 
 std::optional<Finding> check_saturated(const CheckContext& context, std::size_t channel) {
-  constexpr double kLively = 0.3;  // with a larger share of repeats elsewhere they are no evidence
-  constexpr Index kShortest = 5;   // [samples] least length of a stretch at the limit
-  constexpr int kFewest = 3;       // least number of stretches
-  constexpr double kTotal = 0.5;   // [s] least total duration
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   const Role role = c.channel->role;
   if (role == Role::kCommand || role == Role::kPayload || role == Role::kOilTemperature) return {};
   const VectorXd& values = c.channel->values;
   const VectorXd known = finite_values(values);
   if (known.size() == 0) return {};
-  // In a log without noise a standby pressure or a relief valve looks like a limit of the sensor.
-  constexpr double kNoiseless = 1e-4;
-  const double lively = quantile(finite_values(context.noise[channel].level), 0.75);
-  if (lively < kNoiseless * (known.maxCoeff() - known.minCoeff())) return {};
+  const double lively =
+      quantile(finite_values(context.noise[channel].level), options.lively_quantile);
+  if (lively < options.noiseless_share * (known.maxCoeff() - known.minCoeff())) return {};
   Repeats all;
   const Mask state = driven(context, c);
   for (const SampleRange& run : context.log.runs) all.add(values, state, run);
@@ -372,16 +363,16 @@ std::optional<Finding> check_saturated(const CheckContext& context, std::size_t 
     int count = 0;
     double seconds = 0.0;
     for (const SampleRange& s : constant_stretches(values, context.log)) {
-      if (values[s.begin] != rail || s.size() < kShortest) continue;
+      if (values[s.begin] != rail || s.size() < options.saturated_shortest) continue;
       inside.add(values, state, s);
       found.affected.segment(s.begin, s.size()).setConstant(true);
       seconds += static_cast<double>(s.size()) * context.log.step;
       ++count;
     }
-    if (count < kFewest || seconds < kTotal) continue;
+    if (count < options.saturated_fewest || seconds < options.saturated_s) continue;
     const double steps = all.steps[0] + all.steps[1] - inside.steps[0] - inside.steps[1];
     const double equal = all.equal[0] + all.equal[1] - inside.equal[0] - inside.equal[1];
-    if (equal > kLively * steps) continue;
+    if (equal > options.saturated_repeats * steps) continue;
     found.kind = BadDataKind::kSaturated;
     found.evidence = fmt::format("it is cut off at exactly {} {} times, for {:.1f} s in total",
                                  in_field(c, rail), count, seconds);

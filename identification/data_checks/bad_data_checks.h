@@ -22,18 +22,19 @@ struct CheckedChannel {
   double fastest = 0.0;
 };
 
-/// Noise of one channel in blocks of about a second.
+/// Noise of one channel in blocks of BadDataOptions::block_s.
 struct NoiseProfile {
   std::vector<SampleRange> blocks;  ///< within runs
   Eigen::VectorXd level;            ///< [unit] [blocks] standard deviation of the white part
   Eigen::VectorXd
       whiteness;         ///< [blocks] sixth over third differences: 1 = white, small = oscillation
   double typical = 0.0;  ///< median over blocks
-  double quiet = 0.0;    ///< lower quartile over blocks
+  double quiet = 0.0;    ///< BadDataOptions::quiet_quantile over blocks
 };
 
 /// Estimates the noise from the median magnitude of third differences, to which smooth motion contributes little.
-NoiseProfile noise_profile(const Eigen::VectorXd& values, const Log& log);
+NoiseProfile noise_profile(const Eigen::VectorXd& values, const Log& log,
+                           const BadDataOptions& options);
 
 struct CheckContext {
   const Machine& machine;

@@ -31,10 +31,10 @@ class OtherChannels {
   }
 
   bool explain(Index k, double step) const {
-    constexpr Index kNear = 3;      // samples, for the delays of sensor and logger
-    constexpr double kPart = 0.05;  // of the step, that a peer must show at least
+    const BadDataOptions& options = context_.options;
+    const Index near = options.near_samples;
     const Index n = context_.log.samples();
-    for (Index i = std::max<Index>(0, k - kNear); i <= std::min(n - 2, k + kNear); ++i) {
+    for (Index i = std::max<Index>(0, k - near); i <= std::min(n - 2, k + near); ++i) {
       for (const std::size_t c : commands_) {
         const VectorXd& u = context_.channels[c].channel->values;
         const double change = std::abs(u[i + 1] - u[i]);
@@ -44,7 +44,9 @@ class OtherChannels {
       for (const std::size_t t : peers_) {
         const VectorXd& y = context_.channels[t].channel->values;
         const double noise = context_.noise[t].typical;
-        if (std::abs(y[i + 1] - y[i]) > std::max(6.0 * noise, kPart * std::abs(step))) return true;
+        const double least =
+            std::max(options.other_noise * noise, options.peer_step_share * std::abs(step));
+        if (std::abs(y[i + 1] - y[i]) > least) return true;
       }
     }
     return false;
@@ -52,11 +54,11 @@ class OtherChannels {
 
   /// @return whether a command changes: a lever that leaves the valve's dead band makes the pump pressure step
   bool lever_moves(Index k) const {
-    constexpr double kLeverMoves = 2e-3;  // [-] from one sample to the next
+    const BadDataOptions& options = context_.options;
     return std::any_of(commands_.begin(), commands_.end(), [&](std::size_t c) {
       const VectorXd& u = context_.channels[c].channel->values;
       const double change = std::abs(u[k + 1] - u[k]);
-      return change > std::max(kLeverMoves, 6.0 * context_.noise[c].typical);
+      return change > std::max(options.lever_step, options.other_noise * context_.noise[c].typical);
     });
   }
 
@@ -81,16 +83,16 @@ VectorXd local_noise(const NoiseProfile& noise, Index samples) {
   return out;
 }
 
-/// @return whether a step is one of three or more in a row of the same sign and similar size, as a chamber that fills
+/// @return whether a step is one of several in a row of the same sign and similar size, as a chamber that fills
 ///   causes them
-bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k) {
-  constexpr double kLike = 0.5;
+bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k,
+                  const BadDataOptions& options) {
   const double size = x[k + 1] - x[k];
   int in_a_row = 1;
   for (const int way : {-1, 1}) {
     for (Index i = k + way; i >= run.begin && i + 1 < run.end; i += way) {
-      if (!((x[i + 1] - x[i]) / size > kLike)) break;
-      if (++in_a_row == 3) return true;
+      if (!((x[i + 1] - x[i]) / size > options.ramp_share)) break;
+      if (++in_a_row == options.ramp_steps) return true;
     }
   }
   return false;
@@ -109,10 +111,12 @@ std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t cha
       const double size = x[k + 1] - x[k];
       const double limit =
           std::max(context.options.jump_noise * std::max(noise[k], noise[k + 1]), c.least_jump) +
-          1.5 * c.fastest * (context.log.time[k + 1] - context.log.time[k]);
+          context.options.jump_speed_ratio * c.fastest *
+              (context.log.time[k + 1] - context.log.time[k]);
       if (!(std::abs(size) > limit)) continue;
       // No load or valve moves a joint that far within a sample, so other channels cannot explain steps of positions.
-      if (!position && (is_on_a_ramp(x, run, k) || others.explain(k, size))) continue;
+      if (!position && (is_on_a_ramp(x, run, k, context.options) || others.explain(k, size)))
+        continue;
       out.push_back({k, size});
     }
   }
@@ -137,12 +141,12 @@ Mask wild_samples(const CheckContext& context, std::size_t channel) {
   const VectorXd noise = local_noise(context.noise[channel], x.size());
   const OtherChannels others(context, channel);
   Mask out = Mask::Constant(x.size(), false);
-  const double least = 4.0 * resolution(x);  // the last digit of a logger may alternate
+  const double least = context.options.wild_resolution * resolution(x);
   for (const SampleRange& run : context.log.runs) {
     for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
       const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
       if (!(off > std::max(least, context.options.jump_noise * noise[k]))) continue;
-      if (std::abs(x[k + 1] - x[k - 1]) > 0.5 * off) continue;
+      if (std::abs(x[k + 1] - x[k - 1]) > context.options.wild_neighbours * off) continue;
       if (c.family != "position" && others.explain(k - 1, off)) continue;
       out[k] = true;
     }
@@ -157,8 +161,7 @@ struct UsualSpeed {
   double at(double command) const { return std::max(0.0, a + b * std::abs(command)); }
 };
 
-UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
-  constexpr std::size_t kFewest = 100;
+UsualSpeed usual_speed(const CylinderSignals& s, int direction, const BadDataOptions& options) {
   std::vector<double> u, v;
   for (Index k = 0; k < s.speed.size(); ++k) {
     if (!s.driven[k] || s.direction[k] != direction) continue;
@@ -166,7 +169,7 @@ UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
     v.push_back(std::abs(s.speed[k]));
   }
   UsualSpeed out;
-  if (u.size() < kFewest) return out;
+  if (u.size() < options.speed_fewest) return out;
   const auto n = static_cast<Index>(u.size());
   Eigen::MatrixXd x(n, 2);
   x.col(0).setOnes();
@@ -189,17 +192,13 @@ UsualSpeed usual_speed(const CylinderSignals& s, int direction) {
 }  // namespace
 
 std::optional<Finding> check_jumps(const CheckContext& context, std::size_t channel) {
-  constexpr double kAlike = 0.35;  // largest relative difference of the step back, beyond noise
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
   if (c.least_jump <= 0.0) return {};
   // A controller may step a command arbitrarily, also for one sample across a dead band; only repeated short, high pulses
   // are faults.
-  constexpr double kPulse = 0.2;        // [s] longest pulse of a command
-  constexpr double kPulseHeight = 0.3;  // [-] smallest pulse of a command
-  constexpr int kPulses = 3;
   const bool command = c.channel->role == Role::kCommand;
-  constexpr double kContact = 0.5;  // [s] longest loss of contact; pump pressures last longer
   const bool pump = c.channel->role == Role::kPumpPressure;
   const OtherChannels others(context, channel);
   const std::vector<Step> steps = unexplained_steps(context, channel);
@@ -213,13 +212,16 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
   for (std::size_t i = 0; i < steps.size(); ++i) {
     for (std::size_t j = i + 1; j < steps.size(); ++j) {
       if (context.log.time[steps[j].at] - context.log.time[steps[i].at] >
-          (command ? kPulse : context.options.jump_back_s)) {
+          (command ? options.pulse_s : options.jump_back_s)) {
         break;
       }
-      if (command && std::abs(steps[i].size) < kPulseHeight) break;
+      if (command && std::abs(steps[i].size) < options.pulse_height) break;
       const double left = std::abs(steps[i].size + steps[j].size);
-      if (left > kAlike * std::abs(steps[i].size) + 4.0 * noise) continue;
-      if (pump && context.log.time[steps[j].at] - context.log.time[steps[i].at] > kContact &&
+      const double alike =
+          options.jump_alike_share * std::abs(steps[i].size) + options.jump_alike_noise * noise;
+      if (left > alike) continue;
+      if (pump &&
+          context.log.time[steps[j].at] - context.log.time[steps[i].at] > options.contact_s &&
           others.lever_moves(steps[i].at)) {
         continue;
       }
@@ -232,7 +234,7 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
       break;
     }
   }
-  if (count < (command ? kPulses : 1)) return {};
+  if (count < (command ? options.pulses : 1)) return {};
   if (zero) found.kind = BadDataKind::kDropOut;
   found.evidence = fmt::format(
       "it {} {} time{} and comes back, by up to {} from one sample to the next, {}",
@@ -246,13 +248,15 @@ std::optional<Finding> check_jumps(const CheckContext& context, std::size_t chan
 }
 
 std::optional<Finding> check_wild(const CheckContext& context, std::size_t channel) {
-  constexpr double kMany = 0.003;  // of the samples
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   const double noise = context.noise[channel].typical;
   if (c.least_jump <= 0.0 || c.channel->role == Role::kCommand || noise <= 0.0) return {};
   const Mask wild = wild_samples(context, channel);
   const auto count = static_cast<double>(wild.count());
-  if (count < std::max(10.0, kMany * static_cast<double>(wild.size()))) return {};
+  const double fewest =
+      std::max(options.wild_fewest, options.wild_share * static_cast<double>(wild.size()));
+  if (count < fewest) return {};
   if (!(wild && c.channel->values.array() != 0.0).any())
     return {};  // check_jumps reports these as drop-outs
   Finding found;
@@ -261,18 +265,13 @@ std::optional<Finding> check_wild(const CheckContext& context, std::size_t chann
   found.evidence = fmt::format(
       "{:.0f} single samples lie more than {:.0f} times its noise ({}) off both their neighbours, "
       "and nothing else in the log changes there",
-      count, context.options.jump_noise, in_field(c, noise));
+      count, options.jump_noise, in_field(c, noise));
   found.remedy = "Check the sensor's cable and plug, and leave these samples out";
   return found;
 }
 
 std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel) {
-  constexpr double kStretch = 1.5;        // [s] least duration of one value
-  constexpr double kContradiction = 0.8;  // [s] least time in which the cylinder does not follow
-  constexpr double kFirm = 0.15;          // [-] outside any dead band
-  // A saturated pump slows a cylinder to half its speed, a faulty pressure compensator lets it run at up to twice.
-  constexpr double kSlow = 0.4, kFast = 2.2;
-  constexpr double kHabit = 0.02;  // largest share of other samples that do not follow either
+  const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
   if (c.channel->role != Role::kCommand) return {};
   const CylinderSignals& s = context.signals.cylinders[static_cast<std::size_t>(c.cylinder)];
@@ -280,27 +279,29 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   const VectorXd& u = c.channel->values;
   const VectorXd lengths = finite_values(s.length);
   if (lengths.size() == 0) return {};
-  const double lo = lengths.minCoeff(), hi = lengths.maxCoeff(), end = 0.03 * (hi - lo);
-  const UsualSpeed usual[2] = {usual_speed(s, -1), usual_speed(s, 1)};
+  const double lo = lengths.minCoeff(), hi = lengths.maxCoeff();
+  const double end = options.end_share * (hi - lo);
+  const UsualSpeed usual[2] = {usual_speed(s, -1, options), usual_speed(s, 1, options)};
   const auto off = [&](Index k) {
-    if (!(std::abs(u[k]) > kFirm)) return false;
+    if (!(std::abs(u[k]) > options.firm_command)) return false;
     const UsualSpeed& expected = usual[u[k] > 0.0 ? 1 : 0];
     const bool at_end = u[k] > 0.0 ? s.length[k] > hi - end : s.length[k] < lo + end;
     if (!expected.known || at_end) return false;
     const double follows = s.speed[k] * (u[k] > 0.0 ? 1.0 : -1.0) / expected.at(u[k]);
-    return follows < kSlow || follows > kFast;
+    return follows < options.slowest_following || follows > options.fastest_following;
   };
   Finding found;
   found.affected = Mask::Constant(u.size(), false);
   double longest = 0.0, value = 0.0;
   for (const SampleRange& stretch : constant_stretches(u, context.log)) {
-    if (std::abs(u[stretch.begin]) < kFirm) continue;
-    if (context.log.time[stretch.end - 1] - context.log.time[stretch.begin] < kStretch) continue;
+    if (std::abs(u[stretch.begin]) < options.firm_command) continue;
+    const double lasts = context.log.time[stretch.end - 1] - context.log.time[stretch.begin];
+    if (lasts < options.command_stuck_s) continue;
     double since = 0.0;
     bool bad = false;
     for (Index k = stretch.begin; k < stretch.end; ++k) {
       since = off(k) ? since + context.log.step : 0.0;
-      bad = bad || since > kContradiction;
+      bad = bad || since > options.contradiction_s;
       if (since > longest) {
         longest = since;
         value = u[k];
@@ -312,11 +313,11 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   // If the cylinder often does not follow other commands either, the cause is the valve or the pump.
   double others = 0.0, astray = 0.0;
   for (Index k = 0; k < u.size(); ++k) {
-    if (found.affected[k] || !(std::abs(u[k]) > kFirm)) continue;
+    if (found.affected[k] || !(std::abs(u[k]) > options.firm_command)) continue;
     others += 1.0;
     if (off(k)) astray += 1.0;
   }
-  if (astray > kHabit * others) return {};
+  if (astray > options.astray_share * others) return {};
   found.kind = BadDataKind::kStuck;
   found.evidence = fmt::format(
       "it stays at exactly {:.3g} while the cylinder, away from its end stops, does not follow it "

@@ -17,10 +17,7 @@ using Eigen::VectorXd;
 
 /// Largest number of samples; more would only increase the computing time.
 constexpr Index kEnough = 800;
-/// Least number of samples on each branch.
-constexpr Index kFewest = 15;
-/// Largest squared error of two planes as a share of that of a smooth law.
-constexpr double kClearly = 0.7;
+/// Largest number of rounds of fit and assignment from one initial corner; most settle earlier.
 constexpr int kRounds = 20;
 
 /// Samples with the flow scaled by its maximum; load over the supply area and pressure in Pa.
@@ -43,10 +40,10 @@ struct Branches {
 
 /// Fits the static branch to the samples with `on_line` and the valve's to the others.
 /// @return false when one branch has too few samples
-bool fit_branches(const Samples& s, const std::vector<char>& on_line, Branches& out) {
+bool fit_branches(const Samples& s, const std::vector<char>& on_line, Index fewest, Branches& out) {
   const auto lines = static_cast<Index>(std::count(on_line.begin(), on_line.end(), 1));
   const Index valves = s.size() - lines;
-  if (lines < kFewest || valves < kFewest) return false;
+  if (lines < fewest || valves < fewest) return false;
   MatrixXd x_line(lines, 2), x_valve(valves, 3);
   VectorXd y_line(lines), y_valve(valves);
   for (Index k = 0, l = 0, v = 0; k < s.size(); ++k) {
@@ -95,22 +92,24 @@ Samples thinned_samples(const GpDataset& all, double supply, int side, double fl
 
 }  // namespace
 
-BranchCorner find_branch_corner(const GpDataset& samples, const Cylinder& cylinder, int side) {
+BranchCorner find_branch_corner(const GpDataset& samples, const Cylinder& cylinder, int side,
+                                const BranchCornerOptions& options) {
   const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
   const double flow_scale = samples.flow.size() > 0 ? samples.flow.maxCoeff() : 0.0;
   if (!(flow_scale > 0.0)) return {};
   const Samples s = thinned_samples(samples, supply, side, flow_scale);
-  if (s.size() < 2 * kFewest) return {};
+  if (s.size() < 2 * options.fewest) return {};
   Branches best;
-  double least = kClearly * smooth_error(s);
+  double least = options.clearly * smooth_error(s);
   bool found = false;
   std::vector<char> on_line(static_cast<std::size_t>(s.size()));
+  // Initial corners, spread over the range of the load.
   for (const double at : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95}) {
     const double lo = s.load.minCoeff(), hi = s.load.maxCoeff();
     for (Index k = 0; k < s.size(); ++k)
       on_line[static_cast<std::size_t>(k)] = s.load[k] > lo + at * (hi - lo);
     Branches b;
-    for (int round = 0; round < kRounds && fit_branches(s, on_line, b); ++round) {
+    for (int round = 0; round < kRounds && fit_branches(s, on_line, options.fewest, b); ++round) {
       const double error = squared_error(s, b);
       if (error < least) {
         least = error;

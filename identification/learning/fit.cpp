@@ -26,7 +26,7 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
   for (MachineSignals& s : signals) apply_effects(pass.model, s);
   const TrainingData data{&signals, std::move(counts)};
   learn_processes(data, options, pass, progress);
-  learn_valves(data, pass);
+  learn_valves(data, options.valve, pass);
   const std::vector<std::string> notes = pass.notes;
   learn_pumps(data, options, pass);
   const bool again = std::any_of(signals.begin(), signals.end(), [](const MachineSignals& s) {
@@ -36,7 +36,6 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
   if (!again) return pass;
   // Effects on a pump's pressure depend on its demand and so on the margins; both are updated alternately until converged.
   constexpr int kTurns = 6;
-  constexpr double kSettled = 1e3;  // [Pa]
   for (int turn = 0; turn < kTurns; ++turn) {
     const CraneModel before = pass.model;
     for (MachineSignals& s : signals) apply_effects(before, s);
@@ -48,7 +47,7 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
           std::max(change, std::abs(pass.model.cylinders[i].margin - before.cylinders[i].margin));
     for (std::size_t p = 0; p < before.pumps.size(); ++p)
       change = std::max(change, std::abs(pass.model.pumps[p].standby - before.pumps[p].standby));
-    if (change < kSettled) break;
+    if (change < options.settled) break;
   }
   return pass;
 }
@@ -106,7 +105,7 @@ std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
       ++taken;
     }
   }
-  if (taken < 2) {
+  if (taken < options.hold_out_least) {
     for (Mask& m : held) m.setConstant(false);
   }
   return held;
@@ -126,7 +125,8 @@ std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double blo
   return out;
 }
 
-double integrated_autocorrelation(const VectorXd& residual, const std::vector<Index>& position) {
+double integrated_autocorrelation(const VectorXd& residual, const std::vector<Index>& position,
+                                  const AutocorrelationOptions& options) {
   const Index n = residual.size();
   SPARFLOW_CHECK(static_cast<std::size_t>(n) == position.size(), "one position a residual");
   const double power = n == 0 ? 0.0 : residual.squaredNorm() / static_cast<double>(n);
@@ -142,9 +142,9 @@ double integrated_autocorrelation(const VectorXd& residual, const std::vector<In
       product += residual[i] * residual[i + lag];
       ++pairs;
     }
-    if (pairs < 20) break;
+    if (pairs < options.fewest_pairs_to_thin) break;
     const double correlation = product / (static_cast<double>(pairs) * power);
-    if (correlation < 0.05) break;
+    if (correlation < options.gone) break;
     sum += 2.0 * correlation;
   }
   return sum;

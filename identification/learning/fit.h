@@ -11,6 +11,7 @@
 #include "identification/learning/gaussian_process/learn_pressure.h"
 #include "identification/learning/learn_pump.h"
 #include "identification/learning/learn_valve.h"
+#include "identification/learning/learning_options.h"
 
 namespace sparflow {
 
@@ -22,14 +23,33 @@ struct FitOptions {
   /// The effects as estimated without the held-out motions, for the error on those motions; empty = `effects`.
   std::vector<AppliedEffect> effects_held_out;
   LearnGpOptions gp;
+  LoadsBeyondOptions loads;
+  BranchCornerOptions corner;
   LearnPumpOptions pump;  ///< the machine file replaces its data-sheet standby and largest pressure
-  /// Without test logs every n-th block of motion is held out to judge a model that is learned without them; the result
-  /// is learned from all data. 0 = no such judgement.
+  LearnValveOptions valve;
+  AutocorrelationOptions autocorrelation;
+  /// Without test logs every n-th block of motion is held out to judge a model that is learned
+  /// without them; the result is learned from all data. 0 = no such judgement.
+  /// @threshold [blocks] 2..20; chosen: three quarters of the motions remain to learn from
   int hold_out_every = 4;
-  double hold_out_block_s = 8.0;  ///< [s] a longer motion is cut into blocks of about this length
-  /// The samples of a pressure model are thinned to independent ones when the integrated autocorrelation of its residual
-  /// reaches this many samples. 0 = never.
+  /// Length of the blocks; a longer motion is cut into blocks of about this length.
+  /// @threshold [s] 2..60; chosen: exceeds the correlation time of errors in a motion
+  double hold_out_block_s = 8.0;
+  /// Least number of held-out blocks for an error on held-out motions.
+  /// @threshold [blocks] 1..20; chosen: a single motion says little about others
+  int hold_out_least = 2;
+  /// The samples of a pressure model are thinned to independent ones when the integrated
+  /// autocorrelation of its residual reaches this many samples. 0 = never.
+  /// @threshold [samples] 1..20; chosen: thinning takes every second sample at least
   double thin_from = 2.0;
+  /// Least number of samples that remain, as far as there are as many.
+  /// @threshold [samples] 50..5000; chosen: enough to represent the law, however strong their
+  /// correlation
+  double thin_least = 400.0;
+  /// Largest change of a margin or standby at which these and the effects on the pump's pressure,
+  /// which depend on each other, are settled.
+  /// @threshold [Pa] 10..1e5; numerical: ends the alternate updates, at a hundredth of a bar
+  double settled = 1e3;
   int threads = 0;  ///< 0 = one for each processor
 };
 
@@ -85,8 +105,9 @@ std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double blo
 /// Number of correlated samples that carry as much information as one independent sample.
 /// Source: A. Sokal, "Monte Carlo methods in statistical mechanics" (1997), ch. 3.
 /// @param residual in order of time  @param position of each in the log; a step other than one ends a stretch
-/// @return 1 + 2 sum of the autocorrelations up to the first below 0.05
+/// @return 1 + 2 sum of the autocorrelations up to the first that is gone
 double integrated_autocorrelation(const Eigen::VectorXd& residual,
-                                  const std::vector<Eigen::Index>& position);
+                                  const std::vector<Eigen::Index>& position,
+                                  const AutocorrelationOptions& options = {});
 
 }  // namespace sparflow

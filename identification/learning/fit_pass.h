@@ -25,7 +25,7 @@ std::string process_name(const Machine& machine, int cylinder, bool extend);
 /// Learns the pressure models of every hydraulic cylinder in both directions.
 void learn_processes(const TrainingData& data, const FitOptions& options, FitPass& pass,
                      const std::function<void(double, const std::string&)>& progress);
-void learn_valves(const TrainingData& data, FitPass& pass);
+void learn_valves(const TrainingData& data, const LearnValveOptions& options, FitPass& pass);
 /// Learns margins and standby; requires the pressure models.
 void learn_pumps(const TrainingData& data, const FitOptions& options, FitPass& pass);
 

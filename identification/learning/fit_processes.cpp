@@ -104,13 +104,15 @@ std::vector<Index> thinned(const std::vector<Index>& position, int step) {
 }
 
 /// Moves a learned pressure model and its report into the pass. @param samples from which it was learned
-void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samples) {
+void take(FitPass& pass, std::size_t i, LearnedGp learned, const GpDataset& samples,
+          const LoadsBeyondOptions& options) {
   ProcessFit& fitted = pass.processes[i];
   fitted.report = std::move(learned.report);
   if (!fitted.report.failure.empty()) return;
   const auto at = static_cast<std::size_t>(fitted.cylinder);
-  learned.parameters.beyond = learn_loads_beyond(
-      learned.parameters, samples, pass.model.machine.cylinders[at], fitted.extend ? 1 : -1);
+  learned.parameters.beyond =
+      learn_loads_beyond(learned.parameters, samples, pass.model.machine.cylinders[at],
+                         fitted.extend ? 1 : -1, options);
   CylinderModel& c = pass.model.cylinders[at];
   (fitted.extend ? c.extend : c.retract) = GaussianProcess(std::move(learned.parameters));
 }
@@ -124,7 +126,7 @@ void subtract_corner(const BranchCorner& corner, GpDataset& set) {
 /// @param which [sets] indices into the pass' processes  @param keep_others true to keep an existing model and its report
 ///   where a new one cannot be learned
 void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& which,
-           const LearnGpOptions& options, int threads, bool keep_others, FitPass& pass,
+           const FitOptions& options, bool keep_others, FitPass& pass,
            const std::function<void(int, int, const std::string&)>& progress = {}) {
   std::vector<GpDataset> asked = sets;
   std::vector<std::optional<SimilarLoads>> similar(sets.size());
@@ -134,15 +136,15 @@ void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& w
     const int side = fitted.extend ? 1 : -1;
     const Cylinder& cylinder =
         pass.model.machine.cylinders[static_cast<std::size_t>(fitted.cylinder)];
-    similar[k] = similar_loads(sets[k], cylinder, side);
+    similar[k] = similar_loads(sets[k], cylinder, side, options.loads);
     if (similar[k]) {
       asked[k] = at_one_load(std::move(asked[k]), *similar[k]);
       continue;
     }
-    corners[k] = find_branch_corner(sets[k], cylinder, side);
+    corners[k] = find_branch_corner(sets[k], cylinder, side, options.corner);
     if (corners[k].there()) subtract_corner(corners[k], asked[k]);
   }
-  std::vector<LearnedGp> learned = learn_gps(asked, options, progress, threads);
+  std::vector<LearnedGp> learned = learn_gps(asked, options.gp, progress, options.threads);
   for (std::size_t k = 0; k < learned.size(); ++k) {
     const bool there = learned[k].report.failure.empty();
     if (!there && keep_others) continue;
@@ -150,7 +152,7 @@ void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& w
     if (there && similar[k]) {
       learned[k].parameters = for_any_load(std::move(learned[k].parameters), *similar[k], sets[k]);
     }
-    take(pass, which[k], std::move(learned[k]), sets[k]);
+    take(pass, which[k], std::move(learned[k]), sets[k], options.loads);
   }
 }
 
@@ -163,11 +165,9 @@ VectorXd residuals(const ProcessData& data, const GaussianProcess& process) {
 }
 
 /// @return thinning step: samples for each independent sample; 1 = all are used
-int thinning_step(double autocorrelation, Index samples, double thin_from) {
-  if (thin_from <= 0.0 || autocorrelation < thin_from) return 1;
-  // Enough samples must remain to represent the law, however strong their correlation.
-  constexpr double kLeast = 400.0;
-  const double most = static_cast<double>(samples) / kLeast;
+int thinning_step(double autocorrelation, Index samples, const FitOptions& options) {
+  if (options.thin_from <= 0.0 || autocorrelation < options.thin_from) return 1;
+  const double most = static_cast<double>(samples) / options.thin_least;
   return std::max(1, static_cast<int>(std::lround(std::min(autocorrelation, most))));
 }
 
@@ -203,7 +203,7 @@ void subtract_backs(const FitOptions& options, std::vector<ProcessData>& samples
     which.push_back(i);
   }
   if (again.empty()) return;
-  learn(again, which, options.gp, options.threads, true, pass);
+  learn(again, which, options, true, pass);
   for (const std::size_t i : which) subtract(i);
 }
 
@@ -255,7 +255,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   };
   std::vector<std::size_t> all(sets.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  learn(sets, all, options.gp, options.threads, false, pass, tell(0.0));
+  learn(sets, all, options, false, pass, tell(0.0));
   subtract_backs(options, samples, pass);
 
   std::vector<GpDataset> again;
@@ -265,8 +265,9 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
     if (!fitted.report.failure.empty()) continue;
     const CylinderModel& c = pass.model.cylinders[static_cast<std::size_t>(fitted.cylinder)];
     const VectorXd residual = residuals(samples[i], fitted.extend ? c.extend : c.retract);
-    fitted.autocorrelation = integrated_autocorrelation(residual, samples[i].position);
-    fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options.thin_from);
+    fitted.autocorrelation =
+        integrated_autocorrelation(residual, samples[i].position, options.autocorrelation);
+    fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options);
     if (fitted.step == 1) continue;
     again.push_back(thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
     which.push_back(i);
@@ -275,10 +276,10 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
     process_notes(machine, pass);
     return;
   }
-  LearnGpOptions screened = options.gp;
-  screened.outlier_threshold = 0.0;
+  FitOptions screened = options;
+  screened.gp.outlier_threshold = 0.0;
   // Where thinned samples cannot be learned, the first fit is kept.
-  learn(again, which, screened, options.threads, true, pass, tell(0.5));
+  learn(again, which, screened, true, pass, tell(0.5));
   process_notes(machine, pass);
 }
 

@@ -73,7 +73,7 @@ PumpSamples pump_samples(const FitPass& pass, const TrainingData& data, int inde
 
 }  // namespace
 
-void learn_valves(const TrainingData& data, FitPass& pass) {
+void learn_valves(const TrainingData& data, const LearnValveOptions& options, FitPass& pass) {
   const Machine& machine = pass.model.machine;
   for (int i = 0; i < machine.cylinder_count(); ++i) {
     if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
@@ -98,7 +98,7 @@ void learn_valves(const TrainingData& data, FitPass& pass) {
       const std::string name = process_name(machine, i, extend);
       try {
         fitted.valve = learn_valve(Eigen::Map<VectorXd>(command.data(), n),
-                                   Eigen::Map<VectorXd>(flow.data(), n));
+                                   Eigen::Map<VectorXd>(flow.data(), n), options);
       } catch (const InputError& error) {
         pass.notes.push_back(fmt::format("valve gain of {}: not learned, {}", name, error.what()));
         continue;
@@ -133,8 +133,8 @@ void learn_pumps(const TrainingData& data, const FitOptions& options, FitPass& p
             if (data.counts[l][k] && std::isfinite(v[k])) all.push_back(v[k]);
           }
         }
-        pass.pumps[static_cast<std::size_t>(p)] =
-            learn_constant_pump(Eigen::Map<VectorXd>(all.data(), static_cast<Index>(all.size())));
+        pass.pumps[static_cast<std::size_t>(p)] = learn_constant_pump(
+            Eigen::Map<VectorXd>(all.data(), static_cast<Index>(all.size())), o);
       }
     } catch (const InputError& error) {
       pass.notes.push_back(

@@ -14,15 +14,6 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 
-/// Share of the learned range at its border in which the slope identifies the branch.
-constexpr double kBorder = 0.1;
-/// Loads with a smaller span do not determine the law over the load: between slope 0 and the static branch, a corner in the
-/// middle deviates from a straight line by at most an eighth of the span, which is about the sensor noise; any more that a
-/// kernel would fit is friction. [Pa]
-constexpr double kSimilar = 8e5;
-/// Largest lowest pressure of a chamber, since anti-cavitation valves keep it near the tank's pressure. [Pa]
-constexpr double kTank = 2e5;
-
 /// @return share of an additional load that raises the supply pressure, by the branch that the slope indicates: 1 on the
 ///   static branch, else the valve's
 double branch_share(double slope) {
@@ -50,13 +41,15 @@ struct Share {
 };
 
 /// Estimates the share by regression of pressure on load, both after removing a parabola over the flow. Friction and
-/// dynamics correlate the errors of a motion, so at most kWorth samples count as independent.
-Share share_in(const GpDataset& samples, double supply, int side) {
+/// dynamics correlate the errors of a motion, so at most LoadsBeyondOptions::worth samples count as independent.
+Share share_in(const GpDataset& samples, double supply, int side,
+               const LoadsBeyondOptions& options) {
+  // A share lies between 0 and 1: the first deviation says nothing about it, the second is as good as exact.
   constexpr double kUnknown = 1e3, kExact = 1e-3;
-  constexpr double kWorth = 20.0;
   const Index n = samples.force.size();
   const double largest_flow = samples.flow.abs().maxCoeff();
-  if (n < 5 || !(largest_flow > 0.0)) return {0.0, kUnknown};
+  constexpr Index kCoefficients = 4;  // of the flow and of the load
+  if (n <= kCoefficients || !(largest_flow > 0.0)) return {0.0, kUnknown};
   const ArrayXd flow = samples.flow / largest_flow;
   Eigen::MatrixXd by_flow(n, 3);
   by_flow << ArrayXd::Ones(n), flow, flow.square();
@@ -66,11 +59,12 @@ Share share_in(const GpDataset& samples, double supply, int side) {
   const Eigen::VectorXd load = beside_flow(side / supply * samples.force.matrix());
   const Eigen::VectorXd pressure = beside_flow(samples.pressure.matrix());
   const double spread = load.squaredNorm();
-  constexpr double kNoSpread = 1e3;  // [Pa]
-  if (!(spread > kNoSpread * kNoSpread * static_cast<double>(n))) return {0.0, kUnknown};
+  if (!(spread > options.no_spread * options.no_spread * static_cast<double>(n)))
+    return {0.0, kUnknown};
   const double share = load.dot(pressure) / spread;
-  const double worth = std::min(1.0, kWorth / static_cast<double>(n));
-  const double left = (pressure - share * load).squaredNorm() / static_cast<double>(n - 4);
+  const double worth = std::min(1.0, options.worth / static_cast<double>(n));
+  const double left =
+      (pressure - share * load).squaredNorm() / static_cast<double>(n - kCoefficients);
   return {share, std::max(kExact, std::sqrt(left / (worth * spread)))};
 }
 
@@ -83,14 +77,14 @@ Share together(const Share& a, const Share& b) {
 }  // namespace
 
 std::optional<SimilarLoads> similar_loads(const GpDataset& samples, const Cylinder& cylinder,
-                                          int side) {
+                                          int side, const LoadsBeyondOptions& options) {
   if (samples.force.size() == 0) return {};
   const double supply = supply_area(cylinder, side);
-  if (samples.force.maxCoeff() - samples.force.minCoeff() >= kSimilar * supply) return {};
-  constexpr double kSurest = 0.1;  // least deviation, as an error of the force by a tenth causes it
+  const double span = samples.force.maxCoeff() - samples.force.minCoeff();
+  if (span >= options.similar_loads * supply) return {};
   const double usual = share_on_static(samples, supply, side);
-  const Share known{usual, std::max(kSurest, std::sqrt(usual * (1.0 - usual)))};
-  const Share share = together(known, share_in(samples, supply, side));
+  const Share known{usual, std::max(options.surest_share, std::sqrt(usual * (1.0 - usual)))};
+  const Share share = together(known, share_in(samples, supply, side, options));
   return SimilarLoads{median(samples.force.matrix()),
                       side * std::clamp(share.value, 0.0, 1.0) / supply, share.deviation / supply};
 }
@@ -122,7 +116,8 @@ GpParameters for_any_load(GpParameters learned, const SimilarLoads& loads,
 }
 
 LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& samples,
-                               const Cylinder& cylinder, int side) {
+                               const Cylinder& cylinder, int side,
+                               const LoadsBeyondOptions& options) {
   LoadsBeyond out;
   const double supply = supply_area(cylinder, side), other = supply_area(cylinder, -side);
   out.side = side;
@@ -131,9 +126,10 @@ LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& 
   const ArrayXd excess = samples.pressure - load / supply;
   const double lightest = side > 0 ? parameters.force_min : -parameters.force_max;
   const double heaviest = side > 0 ? parameters.force_max : -parameters.force_min;
-  out.static_level =
-      std::clamp(quantile(excess.matrix(), 0.1), 0.0, other / supply * return_rise::kReturnLine);
-  out.least = std::clamp(quantile(samples.pressure.matrix(), 0.01), 0.0, kTank);
+  out.static_level = std::clamp(quantile(excess.matrix(), options.static_quantile), 0.0,
+                                other / supply * return_rise::kReturnLine);
+  out.least = std::clamp(quantile(samples.pressure.matrix(), options.least_quantile), 0.0,
+                         options.largest_least);
   const double seen = heaviest - lightest;
   if (seen < return_rise::kLeastSeen * supply) {
     out.slope_heavier = out.slope_lighter =
@@ -141,7 +137,8 @@ LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& 
     return out;
   }
   const GaussianProcess process(parameters);
-  const double width = std::min(seen, std::max(kBorder * seen, return_rise::kLeastLoad * supply));
+  const double width =
+      std::min(seen, std::max(options.border_share * seen, return_rise::kLeastLoad * supply));
   const auto slope_from = [&](double from) {  // [Pa/N] between from and from + width
     std::vector<double> flows;
     for (Index k = 0; k < load.size(); ++k) {

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "identification/learning/gaussian_process/learn_pressure.h"
+#include "identification/learning/learning_options.h"
 #include "models/machine/machine.h"
 
 namespace sparflow {
@@ -21,7 +22,7 @@ struct SimilarLoads {
 /// @param samples of one pressure model  @param side +1 extends, -1 retracts
 /// @return nothing where the loads vary enough to learn a slope, or without samples
 std::optional<SimilarLoads> similar_loads(const GpDataset& samples, const Cylinder& cylinder,
-                                          int side);
+                                          int side, const LoadsBeyondOptions& options = {});
 
 /// Corrects the samples to the median load, so that a pressure model of the flow alone can be learned from them.
 GpDataset at_one_load(GpDataset samples, const SimilarLoads& loads);
@@ -35,6 +36,7 @@ GpParameters for_any_load(GpParameters learned, const SimilarLoads& loads,
 /// @param parameters of the pressure model learned from `samples`, with their range
 /// @param side +1 extends, -1 retracts
 LoadsBeyond learn_loads_beyond(const GpParameters& parameters, const GpDataset& samples,
-                               const Cylinder& cylinder, int side);
+                               const Cylinder& cylinder, int side,
+                               const LoadsBeyondOptions& options = {});
 
 }  // namespace sparflow

@@ -17,8 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kFinest = 100.0;  // [Pa] resolution of the search, a hundredth of a sensor's
-constexpr int kGrid = 96;
-constexpr int kFewestPumpSamples = 10;
+constexpr int kGrid = 96;          // points of each refinement of the search
 
 /// Unknowns of the law in one array: margins of the m cylinders, then standby.
 /// Term k of sample t is offset(t, k) + unknown[k]; -infinity where the cylinder is not active.
@@ -60,7 +59,8 @@ PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, Le
       ++out.invalid;
       continue;
     }
-    if (options.max_pressure > 0.0 && s.pressure[t] > 0.98 * options.max_pressure) {
+    if (options.max_pressure > 0.0 &&
+        s.pressure[t] > options.cut_off_share * options.max_pressure) {
       ++out.saturated;
       continue;
     }
@@ -132,23 +132,23 @@ double minimise(const OneUnknown& f, double hi, double start) {
 }
 
 /// Initial values: margins that almost all samples of the cylinder allow, since p >= P_i + c_i.
-VectorXd initial_unknowns(const PumpLaw& law) {
+VectorXd initial_unknowns(const PumpLaw& law, const LearnPumpOptions& options) {
   const Index m = law.terms() - 1;
   VectorXd unknown = VectorXd::Zero(m + 1);
   std::vector<double> idle;
   for (Index t = 0; t < law.samples(); ++t) {
     if (law.offset.row(t).head(m).maxCoeff() == kNever) idle.push_back(law.pressure[t]);
   }
-  unknown[m] = static_cast<int>(idle.size()) >= kFewestPumpSamples
+  unknown[m] = static_cast<int>(idle.size()) >= options.fewest_samples
                    ? median(Eigen::Map<VectorXd>(idle.data(), static_cast<Index>(idle.size())))
-                   : quantile(law.pressure, 0.02);
+                   : quantile(law.pressure, options.initial_standby_quantile);
   for (Index i = 0; i < m; ++i) {
     std::vector<double> slack;
     for (Index t = 0; t < law.samples(); ++t) {
       if (law.offset(t, i) != kNever) slack.push_back(law.pressure[t] - law.offset(t, i));
     }
     const Eigen::Map<VectorXd> values(slack.data(), static_cast<Index>(slack.size()));
-    unknown[i] = std::max(0.0, quantile(values, 0.1));
+    unknown[i] = std::max(0.0, quantile(values, options.initial_margin_quantile));
   }
   return unknown;
 }
@@ -227,8 +227,8 @@ void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
   for (Index k = 0; k < law.terms(); ++k) {
     auto& values = clear[static_cast<std::size_t>(k)];
     auto& every = all[static_cast<std::size_t>(k)];
-    const bool enough =
-        static_cast<int>(values.size()) >= options.min_leading && 5 * values.size() >= every.size();
+    const bool enough = static_cast<int>(values.size()) >= options.min_leading &&
+                        options.tie_ratio * values.size() >= every.size();
     auto& used = enough ? values : every;
     if (static_cast<int>(used.size()) < options.min_leading) continue;
     const Location l = location(Eigen::Map<VectorXd>(used.data(), static_cast<Index>(used.size())));
@@ -237,9 +237,9 @@ void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
   }
 }
 
-/// @return largest c_i at which the cylinder would not be the leader where the data follow another term: the 2 % quantile
-///   of the distances (the smallest one depends on a single sample)
-double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i) {
+/// @return largest c_i at which the cylinder would not be the leader where the data follow another term: the
+///   quantile `at` of the distances
+double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i, double at) {
   std::vector<double> room;
   for (Index t = 0; t < law.samples(); ++t) {
     if (law.offset(t, i) == kNever) continue;
@@ -248,15 +248,15 @@ double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i) {
   }
   if (room.empty()) return std::numeric_limits<double>::infinity();
   const Eigen::Map<VectorXd> values(room.data(), static_cast<Index>(room.size()));
-  return std::max(0.0, quantile(values, 0.02));
+  return std::max(0.0, quantile(values, at));
 }
 
-void check_enough(Index usable, const LearnedPump& out) {
-  if (usable >= kFewestPumpSamples) return;
+void check_enough(Index usable, const LearnedPump& out, int fewest) {
+  if (usable >= fewest) return;
   throw InputError({}, "pump pressure",
                    fmt::format("got {} usable samples ({} given, {} not finite, {} at the pump's "
                                "limit), expected at least {}",
-                               usable, out.given, out.invalid, out.saturated, kFewestPumpSamples));
+                               usable, out.given, out.invalid, out.saturated, fewest));
 }
 
 double rms(const VectorXd& r) { return std::sqrt(r.squaredNorm() / static_cast<double>(r.size())); }
@@ -296,9 +296,9 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   LearnedPump out;
   out.given = static_cast<int>(samples.pressure.size());
   const PumpLaw law = usable_samples(samples, options, out);
-  check_enough(law.samples(), out);
+  check_enough(law.samples(), out, options.fewest_samples);
 
-  VectorXd unknown = initial_unknowns(law);
+  VectorXd unknown = initial_unknowns(law, options);
   VectorXd standard_error = VectorXd::Constant(m + 1, std::numeric_limits<double>::infinity());
   out.converged = search(law, unknown, out.sweeps);
   for (int i = 0; i < 3; ++i) polish(law, unknown, standard_error, options);
@@ -323,7 +323,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   for (Index i = 0; i < m; ++i) {
     LearnedMargin& margin = out.margins[static_cast<std::size_t>(i)];
     if (!margin.identified) {
-      margin.upper_bound = upper_bound(law, unknown, i);
+      margin.upper_bound = upper_bound(law, unknown, i, options.bound_quantile);
       unknown[i] = std::min(typical, margin.upper_bound);
       const std::string bound =
           std::isfinite(margin.upper_bound)
@@ -340,7 +340,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   out.standby_identified = out.standby_leading >= options.min_leading;
   if (!out.standby_identified) {
     // Without samples at standby the data sheet's value is used, but not above the lowest measured pressure.
-    const double lowest = quantile(law.pressure, 0.01);
+    const double lowest = quantile(law.pressure, options.lowest_quantile);
     unknown[m] =
         options.data_sheet_standby > 0.0 ? std::min(options.data_sheet_standby, lowest) : lowest;
     out.warnings.push_back(
@@ -358,14 +358,15 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
   return out;
 }
 
-LearnedPump learn_constant_pump(const Eigen::Ref<const VectorXd>& pressure) {
+LearnedPump learn_constant_pump(const Eigen::Ref<const VectorXd>& pressure,
+                                const LearnPumpOptions& options) {
   LearnedPump out;
   out.given = static_cast<int>(pressure.size());
   std::vector<double> valid;
   std::copy_if(pressure.begin(), pressure.end(), std::back_inserter(valid),
                [](double p) { return std::isfinite(p); });
   out.invalid = out.given - static_cast<int>(valid.size());
-  check_enough(static_cast<Index>(valid.size()), out);
+  check_enough(static_cast<Index>(valid.size()), out, options.fewest_samples);
   const Eigen::Map<VectorXd> values(valid.data(), static_cast<Index>(valid.size()));
   out.standby = location(values).value;
   out.standby_identified = true;
@@ -373,8 +374,8 @@ LearnedPump learn_constant_pump(const Eigen::Ref<const VectorXd>& pressure) {
   const VectorXd residuals = values.array() - out.standby;
   out.rmse = rms(residuals);
   out.robust_std = robust_std(residuals);
-  out.outliers =
-      static_cast<int>((residuals.array().abs() > 6.0 * std::max(out.robust_std, kFinest)).count());
+  const double limit = options.outlier_threshold * std::max(out.robust_std, kFinest);
+  out.outliers = static_cast<int>((residuals.array().abs() > limit).count());
   out.converged = true;
   return out;
 }

@@ -26,12 +26,39 @@ struct PumpSamples {
 
 struct LearnPumpOptions {
   double data_sheet_standby = 0.0;  ///< [Pa] used when the log shows no standby; 0 = unknown
-  double max_pressure =
-      0.0;  ///< [Pa] samples within 2 % of it are left out (pressure cut-off); 0 = none
-  double tie_gap_stds = 2.0;  ///< near tie: closer than this many robust standard deviations
-  int min_leading = 20;       ///< least samples as load-sensing leader for an identified margin
-  double outlier_threshold =
-      6.0;  ///< robust standard deviations beyond which a sample is left out at the end
+  double max_pressure = 0.0;        ///< [Pa] of the pressure cut-off; 0 = none
+  /// Samples above this share of `max_pressure` are left out.
+  /// @threshold [1] 0.8..1; chosen: near the pressure cut-off the pump does not follow the load
+  double cut_off_share = 0.98;
+  /// Least number of usable samples.
+  /// @threshold [samples] 2..1000; chosen: the robust standard deviation of fewer is no estimate
+  int fewest_samples = 10;
+  /// Near tie: the two largest terms are closer than this many robust standard deviations.
+  /// @threshold [1] 0..5; chosen: beyond it the model's error hardly ever exchanges the leader
+  double tie_gap_stds = 2.0;
+  /// Largest ratio of all samples of a leader to those without near ties, for the ties to be left
+  /// out.
+  /// @threshold [1] 1..100; chosen: at least a fifth of the samples remains
+  std::size_t tie_ratio = 5;
+  /// Least number of samples as load-sensing leader for an identified margin.
+  /// @threshold [samples] 5..1000; chosen: their median scatters by about a quarter of a standard
+  /// deviation
+  int min_leading = 20;
+  /// Robust standard deviations beyond which a sample is left out at the end.
+  /// @threshold [1] 3..20; chosen: beyond noise of any usual distribution
+  double outlier_threshold = 6.0;
+  /// Quantile of the pressure from which the search for standby starts, without idle samples.
+  /// @threshold [1] 0..0.2; chosen: the lowest pressure but for outliers
+  double initial_standby_quantile = 0.02;
+  /// Quantile of the distances p - P_i from which the search for a margin starts.
+  /// @threshold [1] 0..0.5; chosen: a margin that almost all samples of the cylinder allow
+  double initial_margin_quantile = 0.1;
+  /// Quantile of the distances to the leader that bounds a margin that is not identified.
+  /// @threshold [1] 0..0.2; chosen: the smallest distance would depend on a single sample
+  double bound_quantile = 0.02;
+  /// Quantile of the pressure that is the highest possible standby, without samples at standby.
+  /// @threshold [1] 0..0.2; chosen: the lowest measured pressure but for outliers
+  double lowest_quantile = 0.01;
 };
 
 struct LearnedMargin {
@@ -67,11 +94,12 @@ double pump_law(const Eigen::Ref<const Eigen::RowVectorXd>& working_pressure,
 
 /// A margin that is not identified is set to the median of the identified ones (0 if there is none), at most its
 /// upper bound. Samples with NaN in a required value are left out. Deterministic.
-/// @throws InputError when fewer than ten samples can be used
+/// @throws InputError when fewer than `fewest_samples` can be used
 LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& options = {});
 
 /// Learns a constant-pressure supply: one robust constant, no margins.
-/// @throws InputError when fewer than ten samples can be used
-LearnedPump learn_constant_pump(const Eigen::Ref<const Eigen::VectorXd>& pressure);
+/// @throws InputError when fewer than `fewest_samples` can be used
+LearnedPump learn_constant_pump(const Eigen::Ref<const Eigen::VectorXd>& pressure,
+                                const LearnPumpOptions& options = {});
 
 }  // namespace sparflow

@@ -15,8 +15,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kFewestValveSamples = 10;
-
 struct RobustFit {
   VectorXd coefficients;
   MatrixXd covariance;
@@ -52,7 +50,7 @@ double r_squared(const VectorXd& residuals, const VectorXd& y) {
 }  // namespace
 
 LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
-                         const Eigen::Ref<const VectorXd>& flow) {
+                         const Eigen::Ref<const VectorXd>& flow, const LearnValveOptions& options) {
   SPARFLOW_CHECK(command.size() == flow.size(), "command and flow must be equally long");
   LearnedValve out;
   out.given = static_cast<int>(command.size());
@@ -66,11 +64,11 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
   u.conservativeResize(n);
   q.conservativeResize(n);
   out.used = static_cast<int>(n);
-  if (n < kFewestValveSamples) {
+  if (n < options.fewest_samples) {
     throw InputError({}, "command",
                      fmt::format("got {} samples with a command and a flow ({} given), expected at "
                                  "least {}; log more motion in this direction",
-                                 n, out.given, kFewestValveSamples));
+                                 n, out.given, options.fewest_samples));
   }
   const RobustFit line = robust_fit(u, q);
   out.gain = line.coefficients[0];
@@ -83,7 +81,7 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
   }
 
   const double spread = std::sqrt((u.array() - u.mean()).square().mean());
-  out.affine = spread > 0.02 * out.command_max;
+  out.affine = spread > options.least_spread * out.command_max;
   if (!out.affine) return out;
   MatrixXd features(n, 2);
   features << u, VectorXd::Ones(n);
@@ -91,7 +89,8 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
   const double slope = affine.coefficients[0];
   out.affine_gain = slope;
   out.affine_r2 = r_squared(affine.residuals, q);
-  if (std::abs(slope) <= 1e-6 * std::abs(out.gain)) {
+  constexpr double kNoSlope = 1e-6;  // of the gain; the dead band is divided by the slope
+  if (std::abs(slope) <= kNoSlope * std::abs(out.gain)) {
     out.affine = false;
     return out;
   }
@@ -99,10 +98,9 @@ LearnedValve learn_valve(const Eigen::Ref<const VectorXd>& command,
   // First-order error propagation of dead_band = -b/a.
   const Eigen::Vector2d jacobian(-out.dead_band / slope, -1.0 / slope);
   out.dead_band_standard_error = std::sqrt(jacobian.dot(affine.covariance * jacobian));
-  // Neighbouring samples are correlated and the standard error is too small, so a dead band must be large against it and
-  // reduce the residual.
-  if (out.dead_band > 0.01 && out.dead_band > 6.0 * out.dead_band_standard_error &&
-      1.0 - out.affine_r2 < 0.8 * (1.0 - out.r2)) {
+  if (out.dead_band > options.least_dead_band &&
+      out.dead_band > options.dead_band_errors * out.dead_band_standard_error &&
+      1.0 - out.affine_r2 < options.residual_ratio * (1.0 - out.r2)) {
     out.warnings.push_back(
         fmt::format("The residual suggests a dead band of {:.3f} of full command.", out.dead_band));
   }

@@ -7,6 +7,26 @@
 
 namespace sparflow {
 
+struct LearnValveOptions {
+  /// Least number of samples with a command and a flow.
+  /// @threshold [samples] 2..1000; chosen: the robust standard deviation of fewer is no estimate
+  int fewest_samples = 10;
+  /// Least standard deviation of |u| over the largest |u| for the affine fit.
+  /// @threshold [1] 0..0.5; chosen: with nearly one command only, slope and offset are not
+  /// determined
+  double least_spread = 0.02;
+  /// Least dead band of which a warning tells.
+  /// @threshold [1] 0..0.2; chosen: a hundredth of full command, which hardly affects a flow
+  double least_dead_band = 0.01;
+  /// Least dead band over its standard error.
+  /// @threshold [1] 2..20; chosen: neighbouring samples are correlated and the standard error is
+  /// too small, so a dead band must be large against it
+  double dead_band_errors = 6.0;
+  /// Largest unexplained share of the affine fit over that of the gain alone.
+  /// @threshold [1] 0..1; chosen: the dead band must reduce the residual
+  double residual_ratio = 0.8;
+};
+
 struct LearnedValve {
   double gain = 0.0;                 ///< [m^3/s] flow at full command
   double gain_standard_error = 0.0;  ///< [m^3/s]
@@ -22,8 +42,9 @@ struct LearnedValve {
 };
 
 /// @param command [-] of either sign; only |u| is used  @param flow [m^3/s] of the same samples, not negative
-/// @throws InputError when fewer than ten samples can be used
+/// @throws InputError when fewer than `fewest_samples` can be used
 LearnedValve learn_valve(const Eigen::Ref<const Eigen::VectorXd>& command,
-                         const Eigen::Ref<const Eigen::VectorXd>& flow);
+                         const Eigen::Ref<const Eigen::VectorXd>& flow,
+                         const LearnValveOptions& options = {});
 
 }  // namespace sparflow

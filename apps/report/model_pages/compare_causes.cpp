@@ -50,10 +50,10 @@ void add_stages(Page& page, const CompareResult& result) {
       return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
     };
     // Where a law compensates the error that it inherits, the remaining error of both is drawn.
-    const double own_error = s.makes_up() ? s.error : s.own;
+    const double own_error = s.compensates ? s.error : s.own;
     noise.values[i] = share(std::min(s.noise, own_error));
     own.values[i] = share(own_error) - noise.values[i];
-    inherited.values[i] = s.makes_up() ? 0.0 : share(s.inherited);
+    inherited.values[i] = s.compensates ? 0.0 : share(s.inherited);
   }
   chart.series = {std::move(own), std::move(inherited), std::move(noise)};
   page.plot(std::move(chart));
@@ -75,7 +75,7 @@ void add_tests(Page& page, const CompareResult& result) {
   constexpr std::size_t kMost = 12;
   const ResidualTests& tests = result.tests;
   if (tests.tests.empty()) return;
-  if (tests.smallest_p() > kAlarm) {
+  if (tests.smallest_p() > tests.alarm) {
     page.paragraph(
         fmt::format("No part of the error is systematic: {} tests of bias and of dependence on "
                     "signals, over {} "
@@ -93,7 +93,7 @@ void add_tests(Page& page, const CompareResult& result) {
   chart.value_axis = {"of the squared error", "%"};
   std::vector<double> shares;
   for (const ResidualTest& t : tests.tests) {
-    if (t.p_value > kAlarm || table.rows.size() == kMost) continue;
+    if (t.p_value > tests.alarm || table.rows.size() == kMost) continue;
     table.rows.push_back(
         {capitalised(t.sentence), 100.0 * t.share_explained, t.p_value, t.effective_samples});
     chart.categories.push_back(quantity_words(t.stage, t.at) +
@@ -106,7 +106,7 @@ void add_tests(Page& page, const CompareResult& result) {
       "the "
       "chance that noise alone, whatever its autocorrelation, gives even one line of this table is "
       "{:.0f} %.",
-      tests.blocks, tests.tested, 100.0 * kAlarm);
+      tests.blocks, tests.tested, 100.0 * tests.alarm);
   chart.series = {
       {"explained", Eigen::Map<VectorXd>(shares.data(), static_cast<Index>(shares.size()))}};
   page.plot(std::move(chart));

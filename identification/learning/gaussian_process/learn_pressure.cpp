@@ -73,11 +73,11 @@ Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& p
   const double shortest = std::log(options.shortest_length);
   const double longest = std::log(options.longest_length);
   const double noise = 2.0 * std::log(options.smallest_noise / p.pressure.scale);
-  // Bounds of the signal's deviation from the linear mean: a thousandth of the spread to `largest_signal` spreads.
+  // The last two bounds are those of the signal's and the noise's variance.
   p.lower = GpHyper(p.flow.constant ? longest : shortest, p.force.constant ? longest : shortest,
-                    std::log(1e-6), noise);
+                    std::log(options.smallest_signal * options.smallest_signal), noise);
   p.upper = GpHyper(longest, longest, 2.0 * std::log(options.largest_signal),
-                    std::max(noise, std::log(4.0)));
+                    std::max(noise, std::log(options.largest_noise * options.largest_noise)));
   return p;
 }
 
@@ -146,11 +146,11 @@ GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
     SparseGp sparse(thinned, choose(thinned).rows);
     hyper = maximise(problem, before, 30, report,
                      [&](const GpHyper& h, GpHyper* g) { return sparse.bound(h, g); });
-    if ((hyper - before).head<2>().cwiseAbs().maxCoeff() < 0.1) break;
+    if ((hyper - before).head<2>().cwiseAbs().maxCoeff() < options.settled) break;
   }
   const InducingChoice choice = choose(points);
   const double left = choice.mean_variance * std::exp(hyper[2] - hyper[3]);
-  if (left > 10.0 * options.sparse_tolerance) {
+  if (left > options.warned_ratio * options.sparse_tolerance) {
     report.warnings.push_back(fmt::format(
         "With {} centres the mean conditional variance is {:.0f} % of the noise variance; more "
         "centres would fit more closely.",
@@ -271,18 +271,20 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
     }
   }
   report.invalid = report.given - static_cast<int>(rows.size());
-  if (static_cast<int>(rows.size()) < std::max(options.min_samples, 3)) {
-    throw InputError(
-        {}, "pressure",
-        fmt::format("got {} usable samples ({} given, {} not finite), expected at "
-                    "least {}; log more motion in this direction",
-                    rows.size(), report.given, report.invalid, std::max(options.min_samples, 3)));
+  // With fewer than three samples the mean alone is not determined.
+  const int fewest = std::max(options.min_samples, 3);
+  if (static_cast<int>(rows.size()) < fewest) {
+    throw InputError({}, "pressure",
+                     fmt::format("got {} usable samples ({} given, {} not finite), expected at "
+                                 "least {}; log more motion in this direction",
+                                 rows.size(), report.given, report.invalid, fewest));
   }
   ArrayXd q = flow(rows), f = force(rows), p = pressure(rows);
   Problem problem = make_problem(q, f, p, options);
 
   // The preliminary fit on representatives gives initial values and the reference for outliers.
-  const std::vector<Index> few = representative_points(problem.points, 11);
+  const std::vector<Index> few =
+      representative_points(problem.points, options.representative_cells);
   GpHyper hyper = preliminary_fit(problem, problem.points.select(few), report);
   const Screening screening = screen_outliers(problem.points, few, hyper, options.outlier_threshold,
                                               options.max_outlier_fraction);

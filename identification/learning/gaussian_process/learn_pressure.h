@@ -22,30 +22,71 @@ const char* gp_method_name(GpMethod method);
 
 struct LearnGpOptions {
   GpMethod method = GpMethod::kAutomatic;
-  int exact_limit = 200;  ///< samples; the cost of an evaluation grows with them
-  int max_centres = 60;   ///< of kInducing; of kSubset the number of samples
-  /// kInducing stops adding centres when the mean conditional variance of the samples given the centres is below this
-  /// fraction of the noise variance.
+  /// Largest number of samples of an exact process with `kAutomatic`.
+  /// @threshold [samples] 10..2000; chosen: the cost of an evaluation grows with them
+  int exact_limit = 200;
+  /// Largest number of centres of kInducing; of kSubset the number of samples.
+  /// @threshold [centres] 5..1000; chosen: several times what the models of loader_crane/plain
+  /// need, see the table in docs/gaussian_process.md
+  int max_centres = 60;
+  /// kInducing stops adding centres when the mean conditional variance of the samples given the
+  /// centres is below this fraction of the noise variance.
+  /// @threshold [1] 1e-4..0.5; tuned: on loader_crane/plain, table in docs/gaussian_process.md
   double sparse_tolerance = 0.01;
-  int hyper_samples =
-      1000;  ///< most samples for learning the hyperparameters, every k-th of the log
+  /// Ratio of that variance to its tolerance from which on the report warns of too few centres.
+  /// @threshold [1] 1..100; chosen: a tenth of the noise variance, which shows in the errors
+  double warned_ratio = 10.0;
+  /// Largest number of samples for learning the hyperparameters, every k-th of the log.
+  /// @threshold [samples] 100..100000; tuned: on loader_crane/plain, table in
+  /// docs/gaussian_process.md
+  int hyper_samples = 1000;
+  /// Largest change of the logarithm of a length-scale at which centres and hyperparameters, which
+  /// depend on each other, are settled.
+  /// @threshold [1] 1e-3..0.5; numerical: ends the alternate updates, at a tenth of a length-scale
+  double settled = 0.1;
 
-  /// Bounds of the length-scales as fractions of the data's range in that input. Below a seventh of the range the process
-  /// would fit steps (Coulomb friction, dead bands) that are effects of their own and must remain in the residual; above
-  /// three the kernel is a parabola over the data and a longer one changes only the numerical condition.
-  double shortest_length = 0.15, longest_length = 3.0;
-  double smallest_noise = 1e3;  ///< [Pa] standard deviation; sensors on cranes are not better
-
+  /// Least length-scale as a fraction of the data's range in that input.
+  /// @threshold [1] 0.02..0.5; tuned: on loader_crane/plain, table in docs/gaussian_process.md;
+  /// below it the process would fit steps (Coulomb friction, dead bands) that are effects of their
+  /// own and must remain in the residual
+  double shortest_length = 0.15;
+  /// Largest length-scale as a fraction of the data's range in that input.
+  /// @threshold [1] 1..10; derived: above three ranges the kernel is a parabola over the data and a
+  /// longer one changes only the numerical condition
+  double longest_length = 3.0;
+  /// Least standard deviation of the noise.
+  /// @threshold [Pa] 10..1e5; chosen: sensors on cranes are not better
+  double smallest_noise = 1e3;
+  /// Largest standard deviation of the noise, in standard deviations of the pressures.
+  /// @threshold [1] 1..10; chosen: above one, at which the noise explains everything
+  double largest_noise = 2.0;
+  /// Least standard deviation of the process, in standard deviations of the pressures.
+  /// @threshold [1] 1e-6..0.1; chosen: a smaller deviation from the linear mean has no effect
+  double smallest_signal = 1e-3;
   /// Largest standard deviation of the process, in standard deviations of the pressures.
+  /// @threshold [1] 1..10; chosen: a larger one is not determined by data of this spread
   double largest_signal = 3.0;
-  /// Prior standard deviation of the mean's slope around that of a straight line through the data, in standard deviations
-  /// of the pressures over the range of the force.
+  /// Prior standard deviation of the mean's slope around that of a straight line through the data,
+  /// in standard deviations of the pressures over the range of the force.
+  /// @threshold [1] 0.1..10; chosen: one spread of the pressures over the range of the force;
+  /// without it a long length-scale and the line are exchangeable
   double slope_std = 1.0;
 
-  double outlier_threshold =
-      6.0;  ///< robust standard deviations from a preliminary fit; 0 = no screening
-  double max_outlier_fraction =
-      0.15;  ///< with a larger fraction beyond the threshold all samples are kept, with a warning
+  /// Number of boxes along each input, in each of which one sample represents the others in the
+  /// preliminary fit.
+  /// @threshold [1] 3..50; chosen: some hundred representatives, of which a process is learned at
+  /// once
+  int representative_cells = 11;
+  /// Robust standard deviations from a preliminary fit beyond which a sample is an outlier; 0 = no
+  /// screening.
+  /// @threshold [1] 3..20; chosen: beyond noise of any usual distribution
+  double outlier_threshold = 6.0;
+  /// Largest fraction of outliers; with a larger one all samples are kept, with a warning.
+  /// @threshold [1] 0..0.5; chosen: more are no outliers but a law that is not smooth
+  double max_outlier_fraction = 0.15;
+  /// Least number of samples.
+  /// @threshold [samples] 3..1000; chosen: more than the four hyperparameters and the two
+  /// coefficients of the mean
   int min_samples = 10;
 };
 

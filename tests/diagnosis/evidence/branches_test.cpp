@@ -161,5 +161,17 @@ TEST(Branches, MissingValuesAndTooFewSamplesAreInNoMask) {
   EXPECT_FALSE(few.return_line.any() || few.counterbalance.any());
 }
 
+TEST(Branches, OptionsDecideWhatIsNamed) {
+  const Made m = make({});
+  BranchOptions many;
+  many.fewest_samples = static_cast<int>(m.data.moving.size()) + 1;
+  BranchOptions certain;
+  certain.least_probability = 1.0;
+  for (const BranchOptions& options : {many, certain}) {
+    const BranchSplit none = split_branches({m.data}, 0, options).front();
+    EXPECT_FALSE(none.return_line.any() || none.counterbalance.any());
+  }
+}
+
 }  // namespace
 }  // namespace sparflow

@@ -119,6 +119,17 @@ TEST_P(MatchedFilters, CommandsMatchSpeeds) {
   EXPECT_LT((flow->y - gain * u).norm() / std::sqrt(static_cast<double>(u.size())), 1e-3);
 }
 
+TEST(Evidence, KeepsItsOptionsAndDropsChannelsOfFewRows) {
+  const CraneModel model = CraneModel::untrained(carriage());
+  const MachineSignals signals = make_signals(model.machine, rippling_log(1.0, 50.0));
+  ASSERT_FALSE(collect_evidence(model, {signals}).channels.empty());
+  EvidenceOptions options;
+  options.fewest_rows = 1000000;
+  const Evidence none = collect_evidence(model, {signals}, {}, nullptr, options);
+  EXPECT_TRUE(none.channels.empty());
+  EXPECT_EQ(none.options.fewest_rows, 1000000);
+}
+
 INSTANTIATE_TEST_SUITE_P(WindowsAndRates, MatchedFilters,
                          testing::Values(std::pair{0.3, 50.0}, std::pair{0.4, 50.0},
                                          std::pair{0.2, 100.0}));

@@ -138,6 +138,20 @@ TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
   EXPECT_TRUE(std::isfinite(constant.deviation()));
 }
 
+TEST(NoiseModel, OptionsLimitReflectionsAndOffsets) {
+  std::mt19937_64 random(4);
+  NoiseOptions options;
+  options.largest_reflection = 0.5;
+  options.fewest_blocks_for_offsets = 6;
+  const std::vector<NoiseBlock> eight = blocks_of(std::vector<Index>(8, 60));
+  const NoiseModel ramp =
+      NoiseModel::estimate(VectorXd::LinSpaced(480, -1.0, 1.0), eight, false, options);
+  EXPECT_NEAR(ramp.phi1 / (1.0 - ramp.phi2), 0.5, 1e-12);
+  const std::vector<NoiseBlock> five = blocks_of({50, 50, 50, 50, 50});
+  const VectorXd y = draw(laws()[2], five, random);
+  EXPECT_EQ(NoiseModel::estimate(y, five, true, options).offset_variance, 0.0);
+}
+
 TEST(NoiseModel, ARampStaysStationary) {
   // a drift through the log must not become an unstable autoregression
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(8, 60));

@@ -133,6 +133,9 @@ TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
   // the coefficient is the change of the exponent, up to second order
   EXPECT_NEAR(coefficients[1], -0.1, 0.03);
   EXPECT_LE(power.lower[0], -0.15);  // friction with v^0.85
+  RegressionOptions narrow;
+  narrow.largest_power_change = 0.05;
+  EXPECT_EQ(other_power(viscous, theta, narrow).lower[0], -0.05);
   EffectDesign mass = plain_design({v});
   mass.effect.effect = find_effect("unmodelled_mass");
   EXPECT_FALSE(other_power(mass, theta).acts()) << "a weight has no free exponent";

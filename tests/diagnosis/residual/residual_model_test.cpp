@@ -137,7 +137,7 @@ TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {
   raw.tail(raw.size() - middle) *= 3.0;
   for (Index i = 0; i < raw.size(); ++i)
     raw[i] += 2.5e5 * std::sin(2.0 * std::numbers::pi * hz * series.step * static_cast<double>(i));
-  const Oscillation oscillation = strongest_oscillation(left.evidence, channel);
+  const Oscillation oscillation = strongest_oscillation(left.evidence, channel, {});
   EXPECT_NEAR(oscillation.frequency, hz, 0.1 * hz);
   // standard error of the variance: some 3 % at 2000 samples a run, twice that with third differences
   EXPECT_NEAR(oscillation.noise, size * std::sqrt(5.0), 0.1 * size * std::sqrt(5.0));

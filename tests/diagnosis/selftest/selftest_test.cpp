@@ -203,8 +203,8 @@ TEST(Selftest, EightyPercentMeansEightyPercent) {
   const EffectFit fit = fit_effects(evidence, {});
   const EffectDesign design = make_design(evidence, friction.effect, {});
   const Eigen::VectorXd theta = Eigen::VectorXd::Constant(1, friction.times80 * 8e3);
-  SearchOptions options;
-  options.simulations = 60;  // of the null distribution of each search
+  SelftestOptions options;
+  options.search.simulations = 60;  // of the null distribution of each search
   constexpr int kRuns = 40;
   int named = 0;
   for (unsigned seed = 0; seed < kRuns; ++seed) {

@@ -78,7 +78,7 @@ TEST(StageAtFault, ALawLearnedWithAWrongForceIsNotAtFault) {
   EXPECT_LT(up.error, 0.8);  // sensor noise, 0.5 bar
   EXPECT_NEAR(up.own, 17.7, 0.3);
   EXPECT_NEAR(up.inherited, 17.7, 0.3);
-  EXPECT_TRUE(up.makes_up());
+  EXPECT_TRUE(up.compensates);
   ASSERT_GE(r.fault.fault, 0);
   EXPECT_EQ(r.fault.stages[static_cast<std::size_t>(r.fault.fault)].stage, "force");
   EXPECT_THAT(r.fault.sentence, HasSubstr("working pressure of arm extending was learned with it"));

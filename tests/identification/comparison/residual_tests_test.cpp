@@ -50,7 +50,10 @@ TEST(ResidualTests, FalseAlarmsOnAutocorrelatedResidualsAreFivePercentAtMost) {
   constexpr int kReplicates = 400;
   int alarms = 0;
   for (unsigned seed = 1; seed <= kReplicates; ++seed) {
-    if (test_residuals(ar_parts(seed), 30, {199, seed, 6}).smallest_p() <= 0.05) ++alarms;
+    ResidualTestOptions options;
+    options.flips = 199;
+    options.seed = seed;
+    if (test_residuals(ar_parts(seed), 30, options).smallest_p() <= 0.05) ++alarms;
   }
   // 5 % of 400 are 20, binomial deviation 4.4: 33 would be three of them above
   EXPECT_LE(alarms, 33);

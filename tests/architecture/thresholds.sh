@@ -1,0 +1,124 @@
+#!/bin/bash
+# Makes docs/thresholds.md from the headers: every field with a line `@threshold [UNIT] LO..HI; KIND: reason` in the comment
+# above it. `thresholds.sh` writes the page, `thresholds.sh --check` says whether it is up to date; both refuse a line of
+# another form. `thresholds.sh [--check] TREE` does so in another tree.
+set -euo pipefail
+check=
+if [ "${1-}" = --check ]; then check=1 && shift; fi
+cd "${1:-$(dirname "$(readlink -f "$0")")/../..}"
+page=docs/thresholds.md
+rooms="models identification diagnosis problems planners optimizer simulator"
+
+headers() { # in the order of the rooms
+  local room
+  for room in $rooms; do
+    if [ -d "$room" ]; then find "$room" -name '*.h' -type f | LC_ALL=C sort; fi
+  done
+}
+
+table() {
+  # shellcheck disable=SC2046  # one word a header
+  awk '
+    function fault(line, text) { printf "%s:%d: %s\n", FILENAME, line, text >"/dev/stderr"; bad = 1 }
+    function trim(text) { gsub(/^[ \t]+|[ \t]+$/, "", text); return text }
+    function cell(text) { gsub(/\|/, "\\|", text); return text }
+    # paths of pages become links
+    function linked(text,   out, path) {
+      while (match(text, /docs\/[a-z_\/]+\.md/)) {
+        path = substr(text, RSTART + 5, RLENGTH - 5)
+        out = out substr(text, 1, RSTART - 1) "[" path "](" path ")"
+        text = substr(text, RSTART + RLENGTH)
+      }
+      return out text
+    }
+    # the structs around the present line
+    function around(   k, names) {
+      for (k = 1; k <= depth; k++) if (name[k] != "") names = names name[k] "::"
+      return names
+    }
+    function finish(   unit, range, kind, reason, rest, value, option, folder) {
+      rest = trim(substr(spec, length("@threshold") + 1))
+      if (!match(rest, /^\[[^\]]+\]/)) { fault(at, "@threshold without a unit in brackets"); return }
+      unit = substr(rest, 2, RLENGTH - 2); rest = trim(substr(rest, RLENGTH + 1))
+      if (!match(rest, /^[^; ]*\.\.[^; ]*;/)) { fault(at, "@threshold without a range LO..HI; after its unit"); return }
+      range = substr(rest, 1, RLENGTH - 1); rest = trim(substr(rest, RLENGTH + 1))
+      match(rest, /^[a-z]*/); kind = substr(rest, 1, RLENGTH)
+      reason = substr(rest, RLENGTH + 1); sub(/^:/, "", reason); reason = trim(reason); sub(/\.$/, "", reason)
+      if (!(kind in of_kind)) { fault(at, "\"" kind "\" is no kind of threshold: derived, cited, tuned, numerical, chosen"); return }
+      if (reason == "") { fault(at, "@threshold without a reason"); return }
+      if (trim(sentence) == "") { fault(at, "@threshold without a sentence above it that says what it decides"); return }
+      sub(/;.*$/, "", field)
+      if (match(field, /=|\{/)) {
+        value = substr(field, RSTART); sub(/^=/, "", value); field = trim(substr(field, 1, RSTART - 1))
+      }
+      value = trim(value); gsub(/[ \t]+/, " ", value)
+      if (value == "" || field !~ / / || field ~ /[()]/) { fault(at, "@threshold above something that is no field with a value"); return }
+      if (value ~ /, [a-z_0-9]+ = /) { fault(at, "@threshold above two fields: one line declares one field"); return }
+      option = field; sub(/\[[^\]]*\]$/, "", option); sub(/^.*[ \t&*]/, "", option)
+      folder = FILENAME; sub(/\/[^\/]*$/, "", folder)
+      if (!(folder in rows)) folders[++count] = folder
+      rows[folder] = rows[folder] sprintf("| `%s%s` | %s | %s | %s | %s | %s | %s |\n", around(), option, cell(value), cell(unit), cell(range), kind, linked(cell(trim(sentence))), linked(cell(reason)))
+      of_kind[kind]++; all++
+    }
+    BEGIN {
+      kinds = split("derived cited tuned numerical chosen", kind_at, " ")
+      for (k = 1; k <= kinds; k++) of_kind[kind_at[k]] = 0
+      means["derived"] = "from statistics or from the data"; means["cited"] = "by an author"; means["tuned"] = "on the data that the reason names"
+      means["numerical"] = "guards rounding or ends an iteration"; means["chosen"] = "by engineering, without a study"
+    }
+    FNR == 1 { depth = 0; pending = ""; spec = ""; sentence = ""; field = ""; in_comment = 0 }
+    /^[ \t]*\/\/\/($|[^<])/ {
+      if (spec != "" && !in_comment) { fault(at, "@threshold without a field below it"); spec = "" }
+      if (!in_comment) { sentence = ""; spec = "" }
+      in_comment = 1
+      text = $0; sub(/^[ \t]*\/\/\//, "", text); text = trim(text)
+      if (text ~ /^@threshold/) {
+        if (spec != "") fault(FNR, "two lines @threshold above one field")
+        spec = text; at = FNR
+      } else if (spec != "") spec = spec " " text
+      else sentence = sentence " " text
+      next
+    }
+    {
+      if (length($0) > 0 && /@threshold/) fault(FNR, "@threshold outside a comment of its own (///)")
+      in_comment = 0
+      code = $0
+      gsub(/"([^"\\]|\\.)*"/, "\"\"", code); sub(/\/\/.*/, "", code)
+      if (spec != "") {
+        field = field " " trim(code)
+        if (field ~ /;/) { finish(); spec = ""; sentence = ""; field = "" }
+        else if (trim(code) == "" || code ~ /^[ \t]*(struct|class|enum|namespace|using|[}])/) { fault(at, "@threshold without a field below it"); spec = ""; field = "" }
+      }
+      if (code !~ /enum/ && match(code, /(^|[ \t])(struct|class) +[A-Za-z_0-9:]+/)) {
+        pending = substr(code, RSTART, RLENGTH); sub(/^.*[ \t]/, "", pending)
+      }
+      n = length(code)
+      for (k = 1; k <= n; k++) {
+        c = substr(code, k, 1)
+        if (c == "{") { name[++depth] = pending; pending = "" }
+        else if (c == "}") depth--
+        else if (c == ";") pending = ""
+      }
+    }
+    END {
+      if (bad) exit 1
+      print "# Thresholds\n"
+      print "Every number that decides something (which effect is named, which data is bad, which branch holds, which candidate is kept, when a"
+      print "search ends) is a field of an options struct, and what is said of it here stands above it in its header. `tests/architecture/thresholds.sh`"
+      print "makes this page from the headers, and `./run lint` says when it is older than they are.\n"
+      print "| kind | the value comes | thresholds |\n|---|---|---|"
+      for (k = 1; k <= kinds; k++) printf "| %s | %s | %d |\n", kind_at[k], means[kind_at[k]], of_kind[kind_at[k]]
+      printf "| all | | %d |\n", all
+      for (k = 1; k <= count; k++) {
+        printf "\n## %s\n\n| option | value | unit | range | kind | what it decides | reason |\n|---|---|---|---|---|---|---|\n", folders[k]
+        printf "%s", rows[folders[k]]
+      }
+    }' $(headers)
+}
+
+text=$(table) || exit 1
+if [ -z "$check" ]; then
+  printf '%s\n' "$text" >"$page"
+elif [ "$text" != "$(cat "$page" 2>/dev/null)" ]; then
+  echo "$page is older than the thresholds in the headers: run tests/architecture/thresholds.sh" && exit 1
+fi
