@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 /// Quantiles of the law's pressure from which the search for the limit starts.
-constexpr double kInitialLevels[] = {0.15, 0.4, 0.7};
+constexpr double kInitialPressureLevels[] = {0.15, 0.4, 0.7};
 constexpr int kTurns = 25;  // of the alternating assignment
 
 /// The lower limit of a chamber's pressure by its anti-cavitation valve; below it the law of flow and force ends.
@@ -33,7 +33,7 @@ CavitationFloor cavitation_floor(const Eigen::MatrixXd& baseline, const VectorXd
   if (y.size() < options.fewest_rows) return best;
   const VectorXd plain = least_squares(baseline, y);
   double least = options.largest_error_ratio * (y - baseline * plain).squaredNorm();
-  for (const double start : kInitialLevels) {
+  for (const double start : kInitialPressureLevels) {
     CavitationFloor f{plain, quantile(VectorXd(baseline * plain), start)};
     for (int turn = 0; turn < kTurns; ++turn) {
       const VectorXd by_law = baseline * f.law;

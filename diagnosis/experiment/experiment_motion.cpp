@@ -17,8 +17,8 @@ using Eigen::VectorXd;
 
 /// [-] Peak acceleration of a half cosine, by way over time squared: pi^2 / 2, rounded up.
 constexpr double kHalfCosinePeak = 4.94;
-constexpr double kFewestSteps = 4.0;  ///< samples that a leg takes at least
-constexpr double kMoving = 1e-7;      ///< [m/s] a smaller speed is rounding
+constexpr double kFewestSamplesOfALeg = 4.0;  ///< samples that a leg takes at least
+constexpr double kMoving = 1e-7;              ///< [m/s] a smaller speed is rounding
 
 double middle(const Joint& j, double share) {
   return j.position.lo + share * (j.position.hi - j.position.lo);
@@ -192,7 +192,7 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
   for (std::size_t turn = 0; k < n; ++turn) {
     const MotionLeg& leg = recipe.legs[turn % recipe.legs.size()];
     goal = here;
-    double seconds = kFewestSteps * step;
+    double seconds = kFewestSamplesOfALeg * step;
     for (const int j : leg.joints) {
       const auto at = static_cast<std::size_t>(j);
       goal[j] = middle(m.joints[at], leg.to);

@@ -13,7 +13,7 @@ namespace {
 constexpr int kPasses = 2;
 /// Golden-section search of a nonlinear parameter; it ends at an interval of this share of the value.
 constexpr double kGolden = 0.381966, kNarrow = 2e-3;
-constexpr int kSections = 14;
+constexpr int kMostRefinements = 14;
 
 std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
   std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });
@@ -160,7 +160,8 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
     if (here == values.end()) continue;
     double lo = here == values.begin() ? *here : *(here - 1);
     double hi = here + 1 == values.end() ? *here : *(here + 1);
-    for (int i = 0; i < kSections && hi - lo > kNarrow * std::max(std::abs(hi), 1e-12); ++i) {
+    for (int i = 0; i < kMostRefinements && hi - lo > kNarrow * std::max(std::abs(hi), 1e-12);
+         ++i) {
       const bool right = hi - d.shape[k] > d.shape[k] - lo;
       EffectDesign trial = d;
       const double x = right ? d.shape[k] + kGolden * (hi - d.shape[k])
