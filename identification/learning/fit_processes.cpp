@@ -46,14 +46,38 @@ struct ProcessData {
 };
 
 GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
-  return {all.name, all.flow(rows), all.force(rows), all.pressure(rows)};
+  std::vector<int> group;
+  for (const Index row : rows) group.push_back(all.group[static_cast<std::size_t>(row)]);
+  return {all.name, all.flow(rows), all.force(rows), all.pressure(rows), std::move(group)};
+}
+
+/// Groups of samples that a law is judged on when it is learned without them: the logs, or the blocks of motion of a
+/// single log. @param log [samples]  @param row [samples] within its log
+std::vector<int> groups_of(const TrainingData& data, const std::vector<std::size_t>& log,
+                           const std::vector<Index>& row, double block_s) {
+  const bool several = !log.empty() && log.front() != log.back();
+  std::vector<int> out;
+  if (several) {
+    for (const std::size_t l : log) out.push_back(static_cast<int>(l));
+    return out;
+  }
+  if (log.empty()) return out;
+  const std::vector<SampleRange> blocks = motion_blocks((*data.signals)[log.front()], block_s);
+  std::size_t block = 0;
+  for (const Index k : row) {
+    while (block + 1 < blocks.size() && k >= blocks[block].end) ++block;
+    out.push_back(static_cast<int>(block));
+  }
+  return out;
 }
 
 /// Collects the samples that move in the direction of the command. Pressures are used as logged, because the Gaussian
 /// process averages white noise itself and a filter would smooth the steps at starts and stops.
 ProcessData process_data(const Machine& machine, const TrainingData& data, int cylinder,
-                         bool extend) {
+                         bool extend, double block_s) {
   std::vector<double> flow, force, pressure, back;
+  std::vector<std::size_t> log;
+  std::vector<Index> row;
   ProcessData out;
   out.set.name = process_name(machine, cylinder, extend);
   Index offset = 0;
@@ -71,6 +95,8 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
       pressure.push_back(own);
       back.push_back(or_zero(c.return_effect, k));
       out.position.push_back(offset + k);
+      log.push_back(l);
+      row.push_back(k);
     }
     offset += s.samples() + 2;
   }
@@ -78,6 +104,7 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
   out.set.flow = Eigen::Map<Eigen::ArrayXd>(flow.data(), n);
   out.set.force = Eigen::Map<Eigen::ArrayXd>(force.data(), n);
   out.set.pressure = Eigen::Map<Eigen::ArrayXd>(pressure.data(), n);
+  out.set.group = groups_of(data, log, row, block_s);
   out.measured = out.set.pressure.matrix();
   out.back = Eigen::Map<VectorXd>(back.data(), n);
   if (out.has_back()) {
@@ -239,7 +266,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
   for (int i = 0; i < machine.cylinder_count(); ++i) {
     if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
     for (const bool extend : {true, false}) {
-      samples.push_back(process_data(machine, data, i, extend));
+      samples.push_back(process_data(machine, data, i, extend, options.hold_out_block_s));
       sets.push_back(samples.back().set);
       ProcessFit fitted;
       fitted.cylinder = i;

@@ -45,8 +45,8 @@ std::string figures(const CompareResult& result) {
 std::string process_lines(const FitResult& r) {
   if (r.processes.empty()) return "no hydraulic cylinder: there is no pressure model to learn\n";
   std::string text =
-      fmt::format("{:<20}{:>8}{:>6}{:>9}{:>11}{:>11}{:>16}{:>20}\n", "pressure of", "samples",
-                  "step", "centres", "RMSE bar", "noise bar", "flow l/min", "load kN");
+      fmt::format("{:<20}{:>8}{:>6}{:>16}{:>11}{:>11}{:>16}{:>20}\n", "pressure of", "samples",
+                  "step", "law", "RMSE bar", "noise bar", "flow l/min", "load kN");
   for (const ProcessFit& f : r.processes) {
     const auto i = static_cast<std::size_t>(f.cylinder);
     const std::string name =
@@ -58,8 +58,8 @@ std::string process_lines(const FitResult& r) {
       continue;
     }
     const GpParameters& p = g.parameters();
-    text += fmt::format("{:<20}{:>8}{:>6}{:>9}{:>11.2f}{:>11.2f}{:>16}{:>20}\n", name, f.offered,
-                        f.step, f.report.centres, f.report.rmse / units::kBar,
+    text += fmt::format("{:<20}{:>8}{:>6}{:>16}{:>11.2f}{:>11.2f}{:>16}{:>20}\n", name, f.offered,
+                        f.step, pressure_law_name(p.law), f.report.rmse / units::kBar,
                         f.report.noise_std / units::kBar,
                         fmt::format("{:.1f}..{:.1f}", p.flow_min / units::kLitrePerMinute,
                                     p.flow_max / units::kLitrePerMinute),

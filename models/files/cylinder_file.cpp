@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "models/files/file_quantities.h"
 
 namespace sparflow {
@@ -17,6 +20,12 @@ constexpr Quantity kDiameter{"diameter", "m", Sign::kPositive, 1.0, 3.0};
 constexpr Quantity kCog{"distance", "m", Sign::kNonNegative, 1.0, 200.0};
 constexpr Quantity kStroke{"stroke", "m", Sign::kPositive, 1.0, 200.0};
 constexpr Quantity kRadius{"radius", "m", Sign::kAny, 1.0, 200.0};
+constexpr Quantity kDrumRadius{"radius", "m", Sign::kPositive, 1.0, 200.0};
+// A rod of diameter zero is a cylinder with equal areas.
+constexpr Quantity kRodDiameter{"diameter", "m", Sign::kNonNegative, 1.0, 3.0};
+// The largest radial piston motors take some 50 litres a turn.
+constexpr Quantity kDisplacement{"displacement", "cm3", Sign::kPositive, 1e-6, 2e5};
+constexpr Quantity kGearRatio{"gear ratio", "-", Sign::kAny, 1.0, 1e5};
 
 /// Reads one linkage of the cylinder that drives `joint`.
 class LinkageReader {
@@ -156,6 +165,41 @@ class LinkageReader {
   const FileFrames& frames_;
 };
 
+/// A hydraulic motor is the cylinder with equal areas that takes the same oil for the same motion and gives the same
+/// torque at the same pressures: V_g/(2 pi) |i| = A r with displacement V_g for each turn, gear ratio i = turns of the
+/// motor for each turn of the joint, and x = r q. A revolute joint gets r = 1 m, so that its force [N] is the torque
+/// [Nm] by its number; on a prismatic joint r is the radius of the drum or pinion and x = q.
+void read_motor(const YamlMap& motor, const Joint& joint, Cylinder& cylinder) {
+  const double displacement = motor.need_number("displacement_cm3", kDisplacement);
+  const double ratio = motor.number_or("gear_ratio", kGearRatio, 1.0);
+  if (ratio == 0.0) {
+    motor.need("gear_ratio", "")
+        .fail("got 0, expected turns of the motor for each turn of the joint or drum");
+  }
+  double radius = 1.0;
+  if (joint.type == JointType::kRevolute) {
+    if (const auto given = motor.find("radius")) {
+      given->fail(fmt::format(
+          "joint {} is revolute, so the motor turns it through gear_ratio alone; radius is for a "
+          "drum or pinion that moves a prismatic joint",
+          joint.name));
+    }
+    cylinder.linkage = RackLinkage{ratio > 0.0 ? radius : -radius};
+  } else {
+    radius = motor.need_number("radius", kDrumRadius);
+    if (ratio < 0.0) {
+      motor.need("gear_ratio", "")
+          .fail(fmt::format(
+              "got {}, expected more than zero: joint {} is prismatic, turn its axis round instead",
+              ratio, joint.name));
+    }
+    cylinder.linkage = DirectLinkage{};
+  }
+  const double area = displacement * std::abs(ratio) / (2.0 * std::numbers::pi * radius);
+  cylinder.bore = std::sqrt(4.0 * area / std::numbers::pi);
+  cylinder.rod = 0.0;
+}
+
 }  // namespace
 
 int FileFrames::index(const YamlValue& value) const {
@@ -178,17 +222,30 @@ Eigen::Vector3d FileFrames::point(int joint, const Eigen::Vector3d& in_file) con
 Cylinder read_cylinder(const YamlValue& value, const std::vector<Joint>& joints,
                        const FileFrames& frames) {
   const YamlMap map =
-      value.map("a cylinder {name, joint, bore, rod, linkage}",
+      value.map("a cylinder {name, joint, bore, rod, linkage} or a motor {name, joint, motor}",
                 {"name", "joint", "bore", "rod", "stages", "parallel", "length_at_zero_stroke",
-                 "stroke", "barrel_mass", "barrel_cog", "rod_mass", "rod_cog", "linkage"});
+                 "stroke", "barrel_mass", "barrel_cog", "rod_mass", "rod_cog", "linkage", "motor"});
   Cylinder cylinder;
   cylinder.name = map.need("name", "the cylinder's name").name("a name");
   const YamlValue joint = map.need("joint", "the name of the joint it drives");
   cylinder.joint = frames.index(joint);
   if (cylinder.joint < 0) joint.fail("got \"base\", expected the joint this cylinder drives");
+  if (const auto beside = map.find("parallel")) {
+    cylinder.parallel = beside->integer("cylinders or motors side by side", 1);
+  }
+  if (const auto motor = map.find("motor")) {
+    value.map(
+        "a motor {name, joint, motor, parallel}; bore, rod, linkage and masses belong to a "
+        "cylinder",
+        {"name", "joint", "motor", "parallel"});
+    read_motor(motor->map("a motor {displacement_cm3, gear_ratio}",
+                          {"displacement_cm3", "gear_ratio", "radius"}),
+               joints[static_cast<std::size_t>(cylinder.joint)], cylinder);
+    return cylinder;
+  }
   if (map.has("bore")) {
     cylinder.bore = map.need_number("bore", kDiameter);
-    cylinder.rod = map.need_number("rod", kDiameter);
+    cylinder.rod = map.need_number("rod", kRodDiameter);
     if (cylinder.rod >= cylinder.bore) {
       map.need("rod", "").fail(
           fmt::format("got {}, expected less than the bore, {}; rod and bore are diameters",
@@ -198,9 +255,6 @@ Cylinder read_cylinder(const YamlValue& value, const std::vector<Joint>& joints,
     map.need("bore", "the bore [m] beside the rod (leave both out for a drive without hydraulics)");
   }
   if (const auto stages = map.find("stages")) cylinder.stages = stages->integer("stages", 1);
-  if (const auto beside = map.find("parallel")) {
-    cylinder.parallel = beside->integer("cylinders side by side", 1);
-  }
   if (const auto length = map.find("length_at_zero_stroke")) {
     cylinder.length_at_zero_stroke = length->number(kCoordinate);
   }

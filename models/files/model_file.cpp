@@ -67,6 +67,8 @@ Json process_json(const GaussianProcess& process) {
               {"force", numbers(p.force)},
               {"weight", numbers(p.weight)},
               {"variance_core", std::move(core)}};
+  if (p.mean_flow_slope != 0.0) out["mean_flow_slope"] = p.mean_flow_slope;
+  if (p.law == PressureLaw::kPlane) out["law"] = "plane";
   const BranchCorner& corner = p.corner;
   if (corner.there()) {
     out["corner"] = {
@@ -115,7 +117,7 @@ GaussianProcess read_process(const Cursor& c) {
   if (c.is_null()) return {};
   c.keys({"length_flow", "length_force", "signal_std", "noise_std", "mean_constant", "mean_slope",
           "flow_range", "force_range", "data_count", "flow", "force", "weight", "variance_core",
-          "corner", "beyond"});
+          "mean_flow_slope", "law", "corner", "beyond"});
   const auto positive = [&](const char* key, const char* unit) {
     const Cursor v = c.at(key, fmt::format("a positive number [{}]", unit));
     const double number = v.number(fmt::format("a positive number [{}]", unit));
@@ -129,6 +131,15 @@ GaussianProcess read_process(const Cursor& c) {
   p.noise_std = c.at("noise_std", "a number [Pa]").non_negative("a number >= 0 [Pa]");
   p.mean_constant = c.at("mean_constant", "a number [Pa]").number("a number [Pa]");
   p.mean_slope = c.at("mean_slope", "a number [Pa/N]").number("a number [Pa/N]");
+  if (c.has("mean_flow_slope"))
+    p.mean_flow_slope = c.at("mean_flow_slope", "").number("a number [Pa s/m^3]");
+  if (c.has("law")) {
+    const Cursor law = c.at("law", "");
+    const std::string word = law.text("plane or plane_and_process");
+    if (word != "plane" && word != "plane_and_process")
+      law.fail_expected("plane or plane_and_process");
+    p.law = word == "plane" ? PressureLaw::kPlane : PressureLaw::kPlaneAndProcess;
+  }
   const Range flow = c.at("flow_range", "[lo, hi] [m^3/s]").range("[lo, hi] with lo <= hi [m^3/s]");
   const Range force = c.at("force_range", "[lo, hi] [N]").range("[lo, hi] with lo <= hi [N]");
   p.flow_min = flow.lo;
@@ -152,10 +163,10 @@ GaussianProcess read_process(const Cursor& c) {
   const Cursor core = c.at("variance_core", "the lower triangle of a symmetric matrix, row by row");
   const Eigen::ArrayXd packed = core.numbers("a list of numbers");
   if (packed.size() > 0) {
-    const Eigen::Index rows = n + 2;
+    const Eigen::Index rows = n + (c.has("mean_flow_slope") ? 3 : 2);
     if (packed.size() != rows * (rows + 1) / 2) {
-      core.fail_expected(fmt::format("{} numbers: the lower triangle of {} x {} (centres + 2)",
-                                     rows * (rows + 1) / 2, rows, rows));
+      core.fail_expected(fmt::format("{} numbers: the lower triangle of {} x {} (centres + {})",
+                                     rows * (rows + 1) / 2, rows, rows, rows - n));
     }
     p.variance_core.resize(rows, rows);
     for (Eigen::Index i = 0, k = 0; i < rows; ++i) {

@@ -29,7 +29,7 @@ void check_parameters(const GpParameters& p) {
   positive(p.length_force, "length_force");
   require(std::isfinite(p.signal_std) && p.signal_std >= 0.0, "signal_std",
           fmt::format("got {}, expected a number that is not negative", p.signal_std));
-  require(std::isfinite(p.mean_constant) && std::isfinite(p.mean_slope), "mean_constant",
+  require(std::isfinite(p.mean_constant + p.mean_slope + p.mean_flow_slope), "mean_constant",
           "the mean is not finite");
   const Index n = p.weight.size();
   require(p.flow.size() == n && p.force.size() == n, "weight",
@@ -38,10 +38,12 @@ void check_parameters(const GpParameters& p) {
   require(p.flow.allFinite() && p.force.allFinite() && p.weight.allFinite(), "weight",
           "a centre or weight is not finite");
   const Index rows = p.variance_core.rows();
-  require(p.variance_core.size() == 0 || (rows == n + 2 && p.variance_core.cols() == n + 2),
+  require(p.variance_core.size() == 0 ||
+              ((rows == n + 2 || rows == n + 3) && p.variance_core.cols() == rows),
           "variance_core",
-          fmt::format("got {} x {}, expected {} x {} (centres + 2)", rows, p.variance_core.cols(),
-                      n + 2, n + 2));
+          fmt::format(
+              "got {} x {}, expected {} x {} (centres + 2) or one more with a slope over the flow",
+              rows, p.variance_core.cols(), n + 2, n + 2));
   require(p.variance_core.allFinite(), "variance_core", "a value is not finite");
   const BranchCorner& c = p.corner;
   require(std::isfinite(c.level + c.per_flow + c.per_force), "corner", "a value is not finite");
@@ -72,6 +74,10 @@ double* scratch(std::size_t size) {
 }
 
 }  // namespace
+
+const char* pressure_law_name(PressureLaw law) {
+  return law == PressureLaw::kPlane ? "plane" : "plane + process";
+}
 
 GaussianProcess::GaussianProcess(GpParameters parameters) : parameters_(std::move(parameters)) {
   check_parameters(parameters_);
@@ -115,6 +121,7 @@ GpDerivatives GaussianProcess::mean_derivatives(double flow, double force) const
 double GaussianProcess::learned_mean(double flow, double force) const {
   const BranchCorner& corner = parameters_.corner;
   return parameters_.mean_constant + parameters_.mean_slope * force +
+         parameters_.mean_flow_slope * flow +
          (corner.there() ? corner_rise(corner, flow, force).value : 0.0) +
          kernel_sum(centres(), flow * inverse_length_flow_, force * inverse_length_force_);
 }
@@ -123,8 +130,9 @@ GpDerivatives GaussianProcess::learned_derivatives(double flow, double force) co
   const double a = inverse_length_flow_, b = inverse_length_force_;
   const KernelSums s = kernel_sum_derivatives(centres(), flow * a, force * b);
   GpDerivatives out;
-  out.value = parameters_.mean_constant + parameters_.mean_slope * force + s.value;
-  out.d_flow = s.d_x * a;
+  out.value = parameters_.mean_constant + parameters_.mean_slope * force +
+              parameters_.mean_flow_slope * flow + s.value;
+  out.d_flow = s.d_x * a + parameters_.mean_flow_slope;
   out.d_force = s.d_y * b + parameters_.mean_slope;
   out.d_flow_flow = s.d_xx * a * a;
   out.d_flow_force = s.d_xy * a * b;
@@ -144,13 +152,14 @@ double GaussianProcess::variance(double flow, double force) const {
   const double prior = parameters_.signal_std * parameters_.signal_std;
   if (parameters_.variance_core.size() == 0) return prior;
   const Index n = parameters_.weight.size();
-  const Index stride = scaled_weight_.size() + 2;
+  const Index stride = scaled_weight_.size() + 3, rows = parameters_.variance_core.rows();
   double* memory = scratch(static_cast<std::size_t>(2 * stride));
   kernel_vector(centres(), flow * inverse_length_flow_, force * inverse_length_force_, memory);
-  Eigen::Map<VectorXd> basis(memory, n + 2), product(memory + stride, n + 2);
+  Eigen::Map<VectorXd> basis(memory, rows), product(memory + stride, rows);
   basis.head(n) *= prior;
   basis[n] = 1.0;
   basis[n + 1] = force;
+  if (rows == n + 3) basis[n + 2] = flow;
   product.noalias() = parameters_.variance_core * basis;
   // Rounding can leave a tiny negative number where the data determine the pressure precisely.
   return std::max(0.0, prior - basis.dot(product));
@@ -162,13 +171,13 @@ GpDerivatives GaussianProcess::variance_derivatives(double flow, double force) c
   out.value = prior;
   if (parameters_.variance_core.size() == 0) return out;
   const Index n = parameters_.weight.size();
-  const Index stride = scaled_weight_.size() + 2;
+  const Index stride = scaled_weight_.size() + 3, rows = parameters_.variance_core.rows();
   double* memory = scratch(static_cast<std::size_t>(6 * stride));
   const double a = inverse_length_flow_, b = inverse_length_force_;
   kernel_vector(centres(), flow * a, force * b, memory);
-  Eigen::Map<VectorXd> basis(memory, n + 2), d_flow(memory + stride, n + 2),
-      d_force(memory + 2 * stride, n + 2), c_basis(memory + 3 * stride, n + 2),
-      c_flow(memory + 4 * stride, n + 2), c_force(memory + 5 * stride, n + 2);
+  Eigen::Map<VectorXd> basis(memory, rows), d_flow(memory + stride, rows),
+      d_force(memory + 2 * stride, rows), c_basis(memory + 3 * stride, rows),
+      c_flow(memory + 4 * stride, rows), c_force(memory + 5 * stride, rows);
   basis.head(n) *= prior;
   const auto u = ((flow * a - scaled_flow_.head(n)) * a).matrix();
   const auto v = ((force * b - scaled_force_.head(n)) * b).matrix();
@@ -178,6 +187,11 @@ GpDerivatives GaussianProcess::variance_derivatives(double flow, double force) c
   basis[n + 1] = force;
   d_flow[n] = d_flow[n + 1] = d_force[n] = 0.0;
   d_force[n + 1] = 1.0;
+  if (rows == n + 3) {
+    basis[n + 2] = flow;
+    d_flow[n + 2] = 1.0;
+    d_force[n + 2] = 0.0;
+  }
   c_basis.noalias() = parameters_.variance_core * basis;
   c_flow.noalias() = parameters_.variance_core * d_flow;
   c_force.noalias() = parameters_.variance_core * d_force;

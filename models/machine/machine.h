@@ -73,7 +73,8 @@ struct DirectLinkage {};
 using Linkage = std::variant<PinsLinkage, FourBarLinkage, RackLinkage, DirectLinkage>;
 
 /// A hydraulic cylinder, or (bore = 0) a drive of which only the force is known.
-/// A = bore side, B = rod side; x grows as the cylinder extends.
+/// A = bore side, B = rod side; x grows as the cylinder extends. A rod of diameter zero makes equal areas; a hydraulic
+/// motor is such a cylinder too (docs/machine_file.md, `motor`).
 struct Cylinder {
   std::string name;
   int joint = 0;      ///< the joint it drives

@@ -35,10 +35,11 @@ void add_processes(Page& page, const FitResult& r) {
     return;
   }
   Table table;
-  table.title = "Pressure models: working pressure over flow and force (Gaussian processes)";
-  table.columns = {{"cylinder"},      {"direction"},  {"samples"},        {"used"},
-                   {"outliers"},      {"centres"},    {"RMSE", "bar", 3}, {"noise", "bar", 3},
-                   {"flow", "l/min"}, {"load", "kN"}, {"method"}};
+  table.title = "Pressure models: working pressure over flow and force";
+  table.columns = {
+      {"cylinder"}, {"direction"},      {"samples"},         {"used"},          {"outliers"},
+      {"centres"},  {"RMSE", "bar", 3}, {"noise", "bar", 3}, {"flow", "l/min"}, {"load", "kN"},
+      {"law"}};
   for (const ProcessFit& f : r.processes) {
     const GaussianProcess& g = process_of(r, f);
     if (g.empty()) {
@@ -55,7 +56,7 @@ void add_processes(Page& page, const FitResult& r) {
          fmt::format("{:.1f} to {:.1f}", p.flow_min / kLitrePerMinute,
                      p.flow_max / kLitrePerMinute),
          fmt::format("{:.1f} to {:.1f}", p.force_min / 1e3, p.force_max / 1e3),
-         std::string(gp_method_name(f.report.method))});
+         std::string(pressure_law_name(p.law))});
   }
   table.note =
       "RMSE: of the samples used. Noise: learned standard deviation of one measurement. Samples "

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "identification/learning/gaussian_process/choose_law.h"
 #include "identification/learning/gaussian_process/gp_likelihood.h"
 #include "identification/learning/gaussian_process/gp_screening.h"
 #include "identification/learning/gaussian_process/minimise_bounded.h"
@@ -44,7 +45,8 @@ Scale input_scale(const ArrayXd& x) {
 /// The data of one pressure model in scaled units, with the scales.
 struct Problem {
   Scale flow, force, pressure;
-  double line_constant = 0.0, line_slope = 0.0;  // straight line that is subtracted from points.y
+  VectorXd
+      line;  // [b] coefficients of the plane by least squares, which is subtracted from points.y
   GpPoints points;
   GpHyper lower, upper;
 };
@@ -60,15 +62,17 @@ Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& p
   p.points.x1 = p.flow.apply(flow);
   p.points.x2 = p.force.apply(force);
   p.points.y = p.pressure.apply(pressure);
-  p.points.basis = MatrixXd::Ones(flow.size(), p.force.constant ? 1 : 2);
+  const bool over_force = !p.force.constant, over_flow = !p.flow.constant;
+  p.points.basis = MatrixXd::Ones(flow.size(), 1 + (over_force ? 1 : 0) + (over_flow ? 1 : 0));
+  if (over_force) p.points.basis.col(1) = p.points.x2;
+  if (over_flow) p.points.basis.rightCols<1>() = p.points.x1;
   p.points.basis_precision = VectorXd::Zero(p.points.basis.cols());
-  if (!p.force.constant) {
-    p.points.basis.col(1) = p.points.x2;
-    const ArrayXd x = p.points.x2 - p.points.x2.mean();
-    p.line_slope = (x * p.points.y.array()).sum() / x.square().sum();
-    p.line_constant = -p.line_slope * p.points.x2.mean();
-    p.points.y.array() -= p.line_constant + p.line_slope * p.points.x2;
-    p.points.basis_precision[1] = 1.0 / (options.slope_std * options.slope_std);
+  p.points.basis_precision.tail(p.points.basis.cols() - 1)
+      .setConstant(1.0 / (options.slope_std * options.slope_std));
+  p.line = VectorXd::Zero(p.points.basis.cols());
+  if (p.line.size() > 1) {
+    p.line = p.points.basis.colPivHouseholderQr().solve(p.points.y);
+    p.points.y -= p.points.basis * p.line;
   }
   const double shortest = std::log(options.shortest_length);
   const double longest = std::log(options.longest_length);
@@ -189,24 +193,37 @@ GpParameters to_si(const Problem& problem, const GpPosterior& posterior, const G
   out.length_force = std::exp(hyper[1]) * f.scale;
   out.signal_std = std::exp(0.5 * hyper[2]) * p.scale;
   out.noise_std = std::exp(0.5 * hyper[3]) * p.scale;
-  const double slope = problem.line_slope + (b == 2 ? posterior.beta[1] : 0.0);
-  out.mean_slope = slope * p.scale / f.scale;
+  const VectorXd mean = problem.line + posterior.beta;
+  const Index over_force = problem.force.constant ? 0 : 1, over_flow = b > 1 + over_force ? 1 : 0;
+  if (over_force > 0) out.mean_slope = mean[1] * p.scale / f.scale;
+  if (over_flow > 0) out.mean_flow_slope = mean[b - 1] * p.scale / q.scale;
   out.mean_constant =
-      p.offset + (problem.line_constant + posterior.beta[0]) * p.scale - out.mean_slope * f.offset;
+      p.offset + mean[0] * p.scale - out.mean_slope * f.offset - out.mean_flow_slope * q.offset;
   out.flow = q.offset + q.scale * posterior.x1;
   out.force = f.offset + f.scale * posterior.x2;
   out.weight = posterior.weight.array() / p.scale;
-  // Scaled basis = T * SI basis: k' = k / p^2, 1 = 1, x2 = (F - offset) / scale.
-  MatrixXd t = MatrixXd::Zero(m + b, m + 2);
+  // Scaled basis = T * SI basis: k' = k / p^2, 1 = 1, x2 = (F - offset) / scale, x1 = (Q - offset) / scale.
+  MatrixXd t = MatrixXd::Zero(m + b, m + 2 + over_flow);
   t.topLeftCorner(m, m).diagonal().setConstant(1.0 / (p.scale * p.scale));
   t(m, m) = 1.0;
-  if (b == 2) {
+  if (over_force > 0) {
     t(m + 1, m) = -f.offset / f.scale;
     t(m + 1, m + 1) = 1.0 / f.scale;
+  }
+  if (over_flow > 0) {
+    t(m + b - 1, m) = -q.offset / q.scale;
+    t(m + b - 1, m + 2) = 1.0 / q.scale;
   }
   const MatrixXd core = p.scale * p.scale * product(transposed_product(t, posterior.core), t);
   out.variance_core = 0.5 * (core + core.transpose());
   return out;
+}
+
+/// Hyperparameters at which the process is a plane: no signal, and the spread about the plane as noise.
+GpHyper plane_hyper(const Problem& problem) {
+  const double spread = problem.points.y.squaredNorm() / static_cast<double>(problem.points.size());
+  return {problem.upper[0], problem.upper[1], problem.lower[2],
+          std::clamp(std::log(std::max(spread, 1e-300)), problem.lower[3], problem.upper[3])};
 }
 
 void add_warnings(const Problem& problem, const GpHyper& hyper, GpReport& report) {
@@ -258,7 +275,12 @@ const char* gp_method_name(GpMethod method) {
 
 LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const ArrayXd>& force,
                    const Eigen::Ref<const ArrayXd>& pressure, const LearnGpOptions& options) {
+  return learn_gp(GpDataset{{}, flow, force, pressure}, options);
+}
+
+LearnedGp learn_gp(const GpDataset& samples, const LearnGpOptions& options) {
   const auto start_time = std::chrono::steady_clock::now();
+  const ArrayXd &flow = samples.flow, &force = samples.force, &pressure = samples.pressure;
   SPARFLOW_CHECK(flow.size() == force.size() && flow.size() == pressure.size(),
                  "flow, force and pressure must be equally long");
   LearnedGp learned;
@@ -280,6 +302,9 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
                                  rows.size(), report.given, report.invalid, fewest));
   }
   ArrayXd q = flow(rows), f = force(rows), p = pressure(rows);
+  std::vector<int> group;
+  for (std::size_t i = 0; i < rows.size() && !samples.group.empty(); ++i)
+    group.push_back(samples.group[static_cast<std::size_t>(rows[i])]);
   Problem problem = make_problem(q, f, p, options);
 
   // The preliminary fit on representatives gives initial values and the reference for outliers.
@@ -298,6 +323,10 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
     q = ArrayXd(q(screening.kept));
     f = ArrayXd(f(screening.kept));
     p = ArrayXd(p(screening.kept));
+    std::vector<int> kept;
+    for (std::size_t i = 0; i < screening.kept.size() && !group.empty(); ++i)
+      kept.push_back(group[static_cast<std::size_t>(screening.kept[i])]);
+    group = std::move(kept);
     // Removing outliers may reduce the scales; the hyperparameters are converted to the new ones.
     const Problem before = problem;
     problem = make_problem(q, f, p, options);
@@ -322,8 +351,20 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
     posterior = fit_subset(problem, points, options, hyper, report);
   }
 
+  if (options.simplest_law &&
+      plane_is_not_worse({points, group, hyper, plane_hyper(problem)}, options, report)) {
+    report.law = PressureLaw::kPlane;
+    hyper = plane_hyper(problem);
+    posterior = SparseGp(points, {points.size() / 2}).posterior(hyper);
+    posterior.weight.setZero();
+  }
+
+  report.plane_left_out *= problem.pressure.scale;
+  report.process_left_out *= problem.pressure.scale;
+
   GpParameters& out = learned.parameters;
   out = to_si(problem, posterior, hyper);
+  out.law = report.law;
   out.flow_min = q.minCoeff();
   out.flow_max = q.maxCoeff();
   out.force_min = f.minCoeff();
@@ -351,7 +392,7 @@ std::vector<LearnedGp> learn_gps(const std::vector<GpDataset>& datasets,
       [&](std::size_t at) {
         const GpDataset& data = datasets[at];
         try {
-          learned[at] = learn_gp(data.flow, data.force, data.pressure, options);
+          learned[at] = learn_gp(data, options);
         } catch (const InputError& error) {
           learned[at].report.failure = fmt::format("{}: {}", data.name, error.what());
         }

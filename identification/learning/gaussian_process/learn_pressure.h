@@ -1,6 +1,6 @@
 #pragma once
 /// Learns the working pressure of a cylinder in one direction from (flow, static force, pressure) samples:
-/// a Gaussian process with an ARD squared-exponential kernel and a mean linear in the force, all
+/// a plane, and a Gaussian process with an ARD squared-exponential kernel about it where it predicts better, all
 /// hyperparameters by marginal likelihood. docs/gaussian_process.md describes the method.
 /// Source: Rasmussen & Williams (2006), ch. 2.7, 5.4; Titsias (2009) for long logs.
 #include <Eigen/Dense>
@@ -71,6 +71,15 @@ struct LearnGpOptions {
   /// @threshold [1] 0.1..10; chosen: one spread of the pressures over the range of the force;
   /// without it a long length-scale and the line are exchangeable
   double slope_std = 1.0;
+  /// Whether a plane without a process is taken where it predicts groups that were left out not worse.
+  bool simplest_law = true;
+  /// Largest number of parts into which the groups are divided, each of which is left out in turn.
+  /// @threshold [parts] 2..20; cited: five or ten (Hastie, Tibshirani & Friedman 2009, ch. 7.10.1)
+  int most_folds = 5;
+  /// Standard errors by which the plane's squared error may exceed that of the process and still
+  /// count as not worse.
+  /// @threshold [1] 0..3; cited: one (Breiman et al. 1984, ch. 3.4.3)
+  double not_worse = 1.0;
 
   /// Number of boxes along each input, in each of which one sample represents the others in the
   /// preliminary fit.
@@ -105,8 +114,20 @@ struct GpReport {
   int evaluations = 0;  ///< of the likelihood
   bool converged = false;
   double seconds = 0.0;
+  PressureLaw law = PressureLaw::kPlaneAndProcess;
+  double plane_left_out = 0.0;  ///< [Pa] RMS error of a plane on groups left out; 0 = not compared
+  double process_left_out = 0.0;      ///< [Pa] the same of plane and process
   std::string failure;                ///< learn_gps only: why nothing was learned, "" = learned
   std::vector<std::string> warnings;  ///< whole sentences
+};
+
+/// Samples of one pressure model: a cylinder in one direction.
+struct GpDataset {
+  std::string name;  ///< "boom extend", for messages and progress
+  Eigen::ArrayXd flow, force, pressure;
+  /// [samples] log, or block of motion in a single log, of each sample; empty: one group. Samples of one group have
+  /// errors in common, so that only a group left out whole shows how a law predicts other motions.
+  std::vector<int> group = {};
 };
 
 struct LearnedGp {
@@ -115,19 +136,16 @@ struct LearnedGp {
 };
 
 /// Rows with a NaN or infinity are left out. An input that does not vary gets the longest length-scale of a nominal range
-/// and, if it is the force, a slope of zero; the report says so. Deterministic.
-/// @param flow [m^3/s]  @param force static force [N]  @param pressure measured [Pa], all [samples]
+/// and a slope of zero; the report says so. With two groups or more, plane and process are compared on groups left out,
+/// and the simplest law that is not worse is taken. Deterministic.
 /// @throws InputError when fewer than `min_samples` rows remain
+LearnedGp learn_gp(const GpDataset& samples, const LearnGpOptions& options = {});
+/// The same for samples of one group.
+/// @param flow [m^3/s]  @param force static force [N]  @param pressure measured [Pa], all [samples]
 LearnedGp learn_gp(const Eigen::Ref<const Eigen::ArrayXd>& flow,
                    const Eigen::Ref<const Eigen::ArrayXd>& force,
                    const Eigen::Ref<const Eigen::ArrayXd>& pressure,
                    const LearnGpOptions& options = {});
-
-/// Samples of one pressure model: a cylinder in one direction.
-struct GpDataset {
-  std::string name;  ///< "boom extend", for messages and progress
-  Eigen::ArrayXd flow, force, pressure;
-};
 
 /// Learns several pressure models in parallel. A data set that cannot be learned gets `report.failure` and empty
 /// parameters; the others are not affected. The result does not depend on `threads`.

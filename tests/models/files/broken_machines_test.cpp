@@ -269,6 +269,32 @@ const std::vector<Broken> kCylinders = {
     {"rod without bore", "bore: 0.07, ", "",
      "crane.yaml:27:5: cylinders[ext].bore: missing; expected the bore [m] beside the rod (leave "
      "both out for a drive without hydraulics)"},
+    {"negative rod", "rod: 0.115", "rod: -0.1",
+     "crane.yaml:15:10: cylinders[boom].rod: got -0.1, expected a diameter that is not negative "
+     "[m]"},
+    {"motor beside a bore", "stages: 4, ",
+     "stages: 4, motor: {displacement_cm3: 100, radius: 0.1}, ",
+     "crane.yaml:27:29: cylinders[ext]: unknown key \"stages\"; known here: name, joint, motor, "
+     "parallel"},
+    {"motor with a ratio of zero", "stages: 4, bore: 0.07, rod: 0.05, linkage: {type: direct}",
+     "motor: {displacement_cm3: 100, gear_ratio: 0, radius: 0.1}",
+     "crane.yaml:27:72: cylinders[ext].motor.gear_ratio: got 0, expected turns of the motor for "
+     "each "
+     "turn of the joint or drum"},
+    {"motor on a prismatic joint without a drum",
+     "stages: 4, bore: 0.07, rod: 0.05, linkage: {type: direct}", "motor: {displacement_cm3: 100}",
+     "crane.yaml:27:36: cylinders[ext].motor.radius: missing; expected a positive radius [m]"},
+    {"motor turned backwards on a prismatic joint",
+     "stages: 4, bore: 0.07, rod: 0.05, linkage: {type: direct}",
+     "motor: {displacement_cm3: 100, gear_ratio: -3, radius: 0.1}",
+     "crane.yaml:27:72: cylinders[ext].motor.gear_ratio: got -3, expected more than zero: joint "
+     "ext "
+     "is prismatic, turn its axis round instead"},
+    {"motor with a negative displacement",
+     "stages: 4, bore: 0.07, rod: 0.05, linkage: {type: direct}",
+     "motor: {displacement_cm3: -1, radius: 0.1}",
+     "crane.yaml:27:55: cylinders[ext].motor.displacement_cm3: got -1, expected a positive "
+     "displacement [cm3]"},
     {"unknown driven joint", "    joint: jib", "    joint: gib",
      "crane.yaml:18:12: cylinders[jib].joint: got \"gib\", expected a frame of this machine (base, "
      "boom, jib, ext); did you mean \"jib\"?"},

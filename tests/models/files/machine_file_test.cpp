@@ -234,6 +234,47 @@ TEST(MachineFile, RackDirectParallelAndSingleValveFlow) {
   EXPECT_DOUBLE_EQ(m.valves[0].max_flow_retract, 0.0005);
 }
 
+// A slewing drive: 250 cm3 a turn through a gear of 40 takes 10 l for each turn of the column.
+TEST(MachineFile, MotorIsTheDriveWithEqualAreasThatTakesTheSameOil) {
+  const Machine m = parsed(
+      "name: m\njoints:\n"
+      "  - {name: slew, type: revolute, axis: [0, 0, 1], position: [-3, 3], " +
+      kRates + "}\n  - {name: winch, type: prismatic, axis: [0, 0, 1], position: [0, 10], " +
+      kRates +
+      "}\n"
+      "tip: {joint: winch, xyz: [1, 0, 0]}\n"
+      "cylinders:\n"
+      "  - {name: s, joint: slew, motor: {displacement_cm3: 250, gear_ratio: -40}, parallel: 2}\n"
+      "  - {name: w, joint: winch, motor: {displacement_cm3: 250, gear_ratio: 40, radius: 0.2}}\n"
+      "pumps: [{name: p, feeds: [s, w], max_flow_lpm: 60, max_pressure_bar: 200, standby_bar: "
+      "20}]\n"
+      "valves: [{cylinder: s, max_flow_lpm: 30}]\n");
+  const Cylinder& slew = m.cylinders[0];
+  EXPECT_TRUE(slew.hydraulic());
+  EXPECT_EQ(slew.area_piston(), slew.area_rod());
+  const double turn = cylinder_length(m, 0, 2 * kPi) - cylinder_length(m, 0, 0.0);
+  EXPECT_LT(turn, 0.0);  // the ratio is negative: port A turns the joint backwards
+  EXPECT_NEAR(slew.area_piston() * -turn, 2 * 10e-3, kFileRounding);
+  const Cylinder& winch = m.cylinders[1];
+  const double up = cylinder_length(m, 1, 2 * kPi * 0.2) - cylinder_length(m, 1, 0.0);
+  EXPECT_NEAR(winch.area_rod() * up, 10e-3, kFileRounding);  // one turn of the drum
+}
+
+TEST(MachineFile, RodOfDiameterZeroMakesEqualAreas) {
+  const Machine m = parsed(
+      "name: m\njoints:\n"
+      "  - {name: a, type: revolute, axis: [0, 0, 1], position: [-3, 3], " +
+      kRates +
+      "}\n"
+      "tip: {joint: a, xyz: [1, 0, 0]}\n"
+      "cylinders:\n"
+      "  - {name: c, joint: a, bore: 0.1, rod: 0, linkage: {type: rack, radius: 0.2}}\n");
+  EXPECT_TRUE(m.cylinders[0].hydraulic());
+  EXPECT_EQ(m.cylinders[0].area_piston(), m.cylinders[0].area_rod());
+  const Machine again = parse_machine(write_machine(m), "m", "");
+  EXPECT_EQ(again.cylinders[0].area_rod(), m.cylinders[0].area_rod());
+}
+
 TEST(MachineFile, MachineWithoutJointsIsPossible) {
   const Machine m = parsed("name: post\njoints: []\ntip: {joint: base, xyz: [0, 0, 1]}\n");
   EXPECT_EQ(m.joint_count(), 0);

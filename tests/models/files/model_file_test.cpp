@@ -36,6 +36,8 @@ TEST(ModelFile, ReadsBackEveryNumberExactly) {
     EXPECT_EQ(a.noise_std, b.noise_std);
     EXPECT_EQ(a.mean_constant, b.mean_constant);
     EXPECT_EQ(a.mean_slope, b.mean_slope);
+    EXPECT_EQ(a.mean_flow_slope, b.mean_flow_slope);
+    EXPECT_EQ(a.law, b.law);
     EXPECT_EQ(a.data_count, b.data_count);
     EXPECT_EQ(a.flow_min, b.flow_min);
     EXPECT_EQ(a.force_max, b.force_max);

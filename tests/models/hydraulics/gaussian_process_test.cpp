@@ -108,6 +108,7 @@ GpParameters example(Eigen::Index n) {
   p.signal_std = 30e5;
   p.mean_constant = 12e5;
   p.mean_slope = 40.0;
+  p.mean_flow_slope = 6e9;
   p.flow = p.force = p.weight = Eigen::ArrayXd::Zero(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     p.flow[j] = 1.6e-3 * uniform(random);
@@ -115,7 +116,7 @@ GpParameters example(Eigen::Index n) {
     p.weight[j] = 1e-6 * (uniform(random) - 0.5);
   }
   const Eigen::MatrixXd root =
-      Eigen::MatrixXd::NullaryExpr(n + 2, n + 2, [&] { return uniform(random); });
+      Eigen::MatrixXd::NullaryExpr(n + 3, n + 3, [&] { return uniform(random); });
   p.variance_core = 1e-16 * root * root.transpose();
   return p;
 }
