@@ -6,7 +6,7 @@
 ///   M += m J^T J,   h += m J^T (d2p/dt2 at ydd = 0 - g),
 /// where J and the acceleration are derivatives of the place along the motion. That is no recursion over bodies.
 /// Source: Featherstone (2008), Rigid Body Dynamics Algorithms, ch. 5-6 (what KDL implements); for points Kane, Levinson
-/// (1985), Dynamics, sec. 4.11.
+/// (1985), Dynamics.
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
 #include <memory>

@@ -1,16 +1,16 @@
 #pragma once
 /// What happens at the ends of a stroke: a cushion that throttles the last part, then a stop that yields a little.
 /// Cushion: dp = peak s^2 (v / v_ref)^2 on the piston, s = 1 - gap / length, towards the stop only; the oil trapped in it is
-/// taken as incompressible. Source: Jelali, Kroll (2003), sec. 4.3.3 (end-position cushioning as a throttle).
-/// Stop: F = k d (1 + c dd/dt), never pulling. Source: Hunt, Crossley (1975), J. Applied Mechanics 42, eq. 7 with n = 1.
+/// taken as incompressible. Source: Jelali, Kroll (2003), ch. 4 (end-position cushioning as a throttle).
+/// Stop: F = k d (1 + c dd/dt), never pulling. Source: Hunt, Crossley (1975), J. Applied Mechanics 42, with exponent 1.
 #include <algorithm>
 
 namespace sparflow::plant {
 
 struct EndStopParameters {
   double cushion_length = 0.03;  ///< [m], 0: no cushion
-  double cushion_pressure =
-      100e5;                   ///< [Pa] on the larger area at the reference speed and the very end
+  /// Drop at the reference speed and the very end, if the piston got there, on the larger area. [Pa]
+  double cushion_pressure = 1000e5;
   double stop_travel = 0.002;  ///< [m] by which the stop yields under the cylinder's largest force
   double stop_damping = 5.0;   ///< [s/m] c
 };

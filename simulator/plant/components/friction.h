@@ -1,8 +1,8 @@
 #pragma once
 /// Friction of seals and guides with presliding: the LuGre model with speed-dependent bristle damping.
 ///   dz/dt = v - s0 |v| z / g(v),  g = Fc + (Fs - Fc) exp(-(v/vs)^2),  F = s0 z + s1 exp(-(v/vd)^2) dz/dt + s2 v
-/// Source: Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE Trans. Automatic Control 40(3), eqs. 1-5; damping that
-/// falls with speed: Olsson (1996), PhD thesis, Lund, sec. 3.4.
+/// Source: Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE Trans. Automatic Control 40(3); damping that
+/// falls with speed: Olsson (1996), Control Systems with Friction, Lund.
 #include <cmath>
 
 namespace sparflow::plant {

@@ -4,7 +4,7 @@
 /// with absolute pressures and p0 = one atmosphere. Masses are counted as the volume that they have at p0: a flow q
 /// [m^3/s] is a mass flow divided by the density at p0. So mass and energy are conserved exactly, also where a
 /// chamber's volume changes between compression and decompression.
-/// Source: Jelali, Kroll (2003), Hydraulic Servo-systems, sec. 3.2 (mixture with polytropic air). Valid: dissolved air and
+/// Source: Jelali, Kroll (2003), Hydraulic Servo-systems, ch. 3 (mixture with polytropic air). Valid: dissolved air and
 /// vapour left out, so pressures below one atmosphere are softer than real oil's.
 #include <cmath>
 

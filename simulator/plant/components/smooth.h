@@ -16,7 +16,7 @@ inline double positive_part(double x, double width) {
 inline double smaller(double a, double b, double width) { return b - positive_part(b - a, width); }
 
 /// Signed square root of a pressure drop, laminar below about `transition`: x / (x^2 + d^2)^(1/4). [Pa^0.5]
-/// Source: Merritt (1967), Hydraulic Control Systems, sec. 3.4 (transition of an orifice at low Reynolds numbers).
+/// Source: Merritt (1967), Hydraulic Control Systems, ch. 3 (transition of an orifice at low Reynolds numbers).
 inline double orifice_root(double drop, double transition) {
   return drop / std::sqrt(std::hypot(drop, transition));
 }

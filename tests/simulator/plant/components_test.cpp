@@ -127,7 +127,7 @@ TEST(PlantEndStop, PushesAwayNeverPullsAndLosesEnergy) {
   // leaving it: nothing
   EXPECT_EQ(end_stop({0.01, -0.1, 0.02, 0.1, k}, p).force, 0.0);
   // at its very end with the reference speed: the peak pressure on the area
-  EXPECT_NEAR(end_stop({0.0, 0.1, 0.02, 0.1, k}, p).force, 0.02 * 100e5, 1e-6);
+  EXPECT_NEAR(end_stop({0.0, 0.1, 0.02, 0.1, k}, p).force, 0.02 * 1000e5, 1e-6);
   for (const double speed : {-1.0, -0.1, 0.0, 0.1}) {
     const EndStop e = end_stop({-0.001, speed, 0.02, 0.1, k}, p);
     EXPECT_GE(e.force, 0.0);
