@@ -16,7 +16,7 @@ struct CounterbalanceParameters {
   double set_pressure = 350e5;  ///< [Pa] load pressure that opens it without pilot
   double pilot_ratio = 3.0;     ///< [-] R
   double range = 150e5;         ///< [Pa] from closed to open
-  double lag = 0.2;             ///< [s] T
+  double lag = 0.4;             ///< [s] T
   double open_drop = 30e5;      ///< [Pa] when open, at the cylinder's full flow
 };
 

@@ -15,9 +15,8 @@ constexpr double kHoseVelocity = 5.0;       // [m/s] of the oil in a pressure li
 constexpr double kFrictionPressure = 2e5;   // [Pa] on the piston area
 constexpr double kViscousPressure = 0.2e5;  // [Pa] on the piston area at full speed
 constexpr double kPistonLeak = 0.02;        // [l/min] at 100 bar
-constexpr double kSetOverPump =
-    1.15;  // [-] counterbalance setting over the pump's largest pressure
-constexpr double kPumpLeakShare = 0.03;  // [-] of the largest flow at the largest pressure
+constexpr double kSetOverPump = 1.0;  // [-] counterbalance setting over the pump's largest pressure
+constexpr double kPumpLeakShare = 0.08;  // [-] of the largest flow at the largest pressure
 constexpr double kCornerPower = 0.75;    // [-] of largest pressure times largest flow
 constexpr double kDriveLag = 0.05;       // [s] of a drive without hydraulics
 
@@ -106,7 +105,7 @@ PlantParameters default_parameters(const Machine& machine) {
     p.standby = pump.standby > 0.0 ? pump.standby : p.standby;
     p.leakage = kPumpLeakShare * pump.max_flow / pump.max_pressure;
     p.power = kCornerPower * pump.max_flow * pump.max_pressure;
-    p.line_volume = std::max(1e-3, pump.max_flow / kHoseVelocity * 4.0 * 1.5);
+    p.line_volume = std::max(1e-3, pump.max_flow / kHoseVelocity * 4.0);
     r.pumps.push_back(p);
   }
   return r;

@@ -24,7 +24,7 @@ struct CylinderParameters {
   double max_flow_extend = 0.0;   ///< [m^3/s] into the bore side at full command
   double max_flow_retract = 0.0;  ///< [m^3/s] into the rod side
   double compensator = 7e5;       ///< [Pa]
-  double return_drop = 15e5;      ///< [Pa] over the spool's return edge at full flow
+  double return_drop = 20e5;      ///< [Pa] over the spool's return edge at full flow
   double line_drop = 5e5;         ///< [Pa] between valve and cylinder at full flow
   double leakage = 0.0;           ///< [m^3/s/Pa] across the piston, oil at 40 degC
   double dead_volume = 0.0;       ///< [m^3] of each chamber at its end of the stroke

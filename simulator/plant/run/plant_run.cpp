@@ -83,7 +83,8 @@ struct PlantRun::Integrator {
     return kPumpPowers * system.layout().pumps + kLosses * system.layout().cylinders +
            kCommonPowers;
   }
-  int roots() const { return std::max(1, system.layout().cylinders); }
+  /// One for each cylinder's stops, one for the rope.
+  int roots() const { return system.layout().cylinders + 1; }
 
   static int right_hand_side(double, N_Vector at, N_Vector rate, void* self) {
     auto& i = *static_cast<Integrator*>(self);
@@ -132,7 +133,7 @@ struct PlantRun::Integrator {
     return 0;
   }
 
-  /// The way left to a stop: its sign changes where the stop begins to act.
+  /// The way left to a stop, whose sign changes where it begins to act, and the rope's to the end of its angles.
   static int root_function(double, N_Vector at, double* root, void* self) {
     auto& i = *static_cast<Integrator*>(self);
     try {
@@ -140,8 +141,9 @@ struct PlantRun::Integrator {
     } catch (const std::domain_error&) {
       return 1;
     }
-    root[0] = 1.0;
-    for (int c = 0; c < i.system.layout().cylinders; ++c)
+    const int cylinders = i.system.layout().cylinders;
+    root[cylinders] = i.system.rope_margin(N_VGetArrayPointer(at));
+    for (int c = 0; c < cylinders; ++c)
       root[c] = i.system.gap(c, i.instant.cylinders[static_cast<std::size_t>(c)].length);
     return 0;
   }
@@ -185,6 +187,11 @@ struct PlantRun::Integrator {
       double reached = t;
       if (flag >= 0) CVodeGetQuad(memory, &reached, quadratures);
       if (flag == CV_ROOT_RETURN) {
+        if (system.rope_margin(state.data()) < 1e-6) {
+          status = RunStatus::kKinematicsEnd;
+          message = "the payload's rope is nearly horizontal";
+          break;
+        }
         restart();
       } else if (flag < 0) {
         const bool kinematics = flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR ||

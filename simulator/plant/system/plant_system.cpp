@@ -77,6 +77,12 @@ double PlantSystem::gap(int cylinder, double length) const {
   return std::min(length - k.shortest, k.longest - length);
 }
 
+double PlantSystem::rope_margin(const double* state) const {
+  if (!bodies_.hanging()) return 1.0;
+  constexpr double kEnd = 0.15;  // cosine; RigidBodies refuses 0.087
+  return (std::cos(state[layout_.coordinates - 1]) - kEnd) / (1.0 - kEnd);
+}
+
 Chamber PlantSystem::chamber_a(int c, double length) const {
   const CylinderParameters& p = parameters_.cylinders[index(c)];
   const Constants& k = constants_[index(c)];

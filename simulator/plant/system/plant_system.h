@@ -103,6 +103,8 @@ class PlantSystem {
   double stored_energy(const double* state, const Instant& at);
   /// Way from the cylinder to its nearer stop [m], negative inside it.
   double gap(int cylinder, double length) const;
+  /// What is left of the rope's second angle before its description ends, 1 hanging, 0 at the end; 1 without a rope. [-]
+  double rope_margin(const double* state) const;
   /// Absolute tolerance of each state for a relative tolerance `relative`.
   std::vector<double> tolerances(double relative) const;
   /// Gauge pressure's properties of the plant's oil.

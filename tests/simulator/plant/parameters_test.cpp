@@ -68,6 +68,11 @@ TEST(PlantParameters, AWrongFileIsAnErrorWithItsPlace) {
               testing::HasSubstr("hysteresis"));
 }
 
+TEST(PlantParameters, ThePageHasTheTable) {
+  const std::string page = read_file(std::string(SPARFLOW_SOURCE_DIR) + "/docs/plant.md");
+  EXPECT_THAT(page, testing::HasSubstr(parameter_markdown()));
+}
+
 PlantParameters with(const std::vector<std::string>& items) {
   const Machine machine = crane();
   PlantParameters p = default_parameters(machine);

@@ -217,6 +217,8 @@ TEST(PlantRun, EnergyBalancesOverTwentyRandomCycles) {
     simulator::Random random(100 + cycle, "levers");
     PlantParameters p = default_parameters(machine);
     if (cycle % 2 == 0) p.flex_angle = 0.0;
+    if (machine.name == "excavator")
+      p.pendulum.rope_length = 0.0;  // full levers would swing it over
     PlantRun run(machine, p, middle(machine), 200.0);
     const CommandSource levers = random_levers(machine, random);
     run_plant(run, levers, 6.0);
@@ -231,6 +233,26 @@ TEST(PlantRun, EnergyBalancesOverTwentyRandomCycles) {
     EXPECT_GT(pumps, 1e3);
     EXPECT_LT(std::abs(l.imbalance()), 1e-3 * pumps) << machine.name << " cycle " << cycle;
   }
+}
+
+TEST(PlantRun, ARopeThatIsSwungUpSidewaysEndsTheRunAndSaysSo) {
+  const Machine machine = machine_named("excavator");
+  PlantParameters p = default_parameters(machine);
+  p.flex_angle = 0.0;
+  PlantRun run(machine, p, middle(machine), 300.0);
+  const double period = 2.0 * 3.14159 * std::sqrt(1.5 / 9.81);
+  const RunResult r = run_plant(
+      run,
+      [&](const Record& now) {  // slews in time with the swing
+        std::vector<double> u(machine.cylinders.size(), 0.0);
+        u[0] = std::fmod(now.t, period) < 0.5 * period ? 1.0 : -1.0;
+        return u;
+      },
+      60.0);
+  EXPECT_EQ(r.status, RunStatus::kKinematicsEnd);
+  EXPECT_NE(r.message.find("rope"), std::string::npos);
+  EXPECT_LT(r.records.back().t, 59.0);
+  EXPECT_TRUE(std::isfinite(r.ledger.imbalance()));
 }
 
 TEST(PlantRun, NoPassivePartCreatesEnergy) {
