@@ -5,8 +5,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 
 #include "apps/cli/context.h"
+#include "apps/report/model_pages/simulation_page.h"
 #include "diagnosis/experiment/experiment.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
@@ -145,6 +147,94 @@ struct Simulated {
   int rows = 0;
 };
 
+/// Values of a recorded channel at other instants, NaN outside it and where it is not valid.
+Eigen::VectorXd at_times(const Log& log, const Eigen::VectorXd& values, const Eigen::VectorXd& t) {
+  Eigen::VectorXd r = Eigen::VectorXd::Constant(t.size(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::Index i = 0;
+  for (Eigen::Index k = 0; k < t.size(); ++k) {
+    const double at = log.time[0] + t[k];
+    while (i + 1 < log.samples() && log.time[i + 1] < at) ++i;
+    if (i + 1 >= log.samples()) break;
+    const double share = (at - log.time[i]) / (log.time[i + 1] - log.time[i]);
+    r[k] = values[i] + share * (values[i + 1] - values[i]);
+  }
+  return r;
+}
+
+/// Collects what the page and the errors against a recording are made of.
+class Recording {
+ public:
+  Recording(const Machine& machine, const std::vector<plant::Record>& rows, std::optional<Log> log)
+      : machine_(machine), rows_(rows), log_(std::move(log)) {
+    view_.machine = machine.name;
+    view_.t.resize(static_cast<Eigen::Index>(rows.size()));
+    for (std::size_t i = 0; i < rows.size(); ++i) view_.t[static_cast<Eigen::Index>(i)] = rows[i].t;
+    for (int c = 0; c < machine.cylinder_count(); ++c) add_cylinder(c);
+    for (int p = 0; p < machine.pump_count(); ++p) {
+      const auto k = static_cast<std::size_t>(p);
+      add({"pump " + machine.pumps[k].name, "pressure", "bar", {}, {}}, units::kBar,
+          Role::kPumpPressure, p, [k](const plant::Record& r) { return r.pump_pressure[k]; });
+    }
+  }
+  SimulationView& view() { return view_; }
+
+ private:
+  void add_cylinder(int c) {
+    const auto k = static_cast<std::size_t>(c);
+    const Cylinder& drive = machine_.cylinders[k];
+    const auto j = static_cast<std::size_t>(drive.joint);
+    SimulatedChannel stroke{drive.name + ": stroke", "stroke", "mm", {}, {}};
+    stroke.simulated =
+        collected([&](const plant::Record& r) { return 1e3 * stroke_at(machine_, c, r.q[j]); });
+    if (log_) {
+      const Eigen::MatrixXd q = positions_of(*log_, machine_);
+      Eigen::VectorXd x(q.rows());
+      for (Eigen::Index i = 0; i < q.rows(); ++i)
+        x[i] = std::isfinite(q(i, drive.joint)) ? 1e3 * stroke_at(machine_, c, q(i, drive.joint))
+                                                : std::numeric_limits<double>::quiet_NaN();
+      if (x.array().isFinite().any()) stroke.recorded = at_times(*log_, x, view_.t);
+    }
+    view_.channels.push_back(std::move(stroke));
+    add({drive.name + ": command", "command", "", {}, {}}, 1.0, Role::kCommand, c,
+        [k](const plant::Record& r) { return r.command[k]; });
+    if (!drive.hydraulic()) return;
+    add({drive.name + ": pressures", "bore side", "bar", {}, {}}, units::kBar, Role::kPressureA, c,
+        [k](const plant::Record& r) { return r.pressure_a[k]; });
+    add({drive.name + ": pressures", "rod side", "bar", {}, {}}, units::kBar, Role::kPressureB, c,
+        [k](const plant::Record& r) { return r.pressure_b[k]; });
+  }
+  template <class Value>
+  Eigen::VectorXd collected(const Value& value) const {
+    Eigen::VectorXd v(view_.t.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      v[static_cast<Eigen::Index>(i)] = value(rows_[i]);
+    return v;
+  }
+  template <class Value>
+  void add(SimulatedChannel channel, double scale, Role role, int index, const Value& value) {
+    channel.simulated = collected(value) / scale;
+    const Channel* measured = log_ ? log_->find(role, index) : nullptr;
+    if (measured != nullptr) channel.recorded = at_times(*log_, measured->values / scale, view_.t);
+    view_.channels.push_back(std::move(channel));
+  }
+
+  const Machine& machine_;
+  const std::vector<plant::Record>& rows_;
+  std::optional<Log> log_;
+  SimulationView view_;
+};
+
+/// The file whose commands or motion were given, where it tells positions.
+std::optional<Log> recording_of(const SimulateArguments& a, const Machine& machine) {
+  const std::string path = a.track.empty() ? a.replay : a.track;
+  if (path.empty()) return std::nullopt;
+  try {
+    return load_log(path, machine);
+  } catch (const InputError&) {  // commands alone, which the replay has read already
+    return std::nullopt;
+  }
+}
+
 nlohmann::json simulation_json(const SimulateArguments& a, const Machine& machine,
                                const Simulated& s) {
   const plant::EnergyLedger& l = s.run->ledger();
@@ -182,6 +272,47 @@ nlohmann::json simulation_json(const SimulateArguments& a, const Machine& machin
                         {"jacobians", counts.jacobians},
                         {"starts", counts.starts}};
   return json;
+}
+
+/// Page, and errors against a recording in JSON and text.
+std::string write_comparison(const SimulateArguments& a, const Machine& machine, const Simulated& s,
+                             const std::vector<plant::Record>& rows, nlohmann::json& json) {
+  Recording recording(machine, rows, recording_of(a, machine));
+  SimulationView& view = recording.view();
+  std::string text;
+  for (const SimulatedChannel& c : view.channels) {
+    const RecordingError e = recording_error(c);
+    if (!std::isfinite(e.rmse) || c.name == "command") continue;
+    json["recording"][c.chart + ": " + c.name] = {
+        {"rmse", e.rmse}, {"spread", e.spread}, {"unit", c.unit}};
+    text += fmt::format("  {:<28} {:8.3g} {} RMS from the recording (its spread {:.3g})\n",
+                        c.chart + ", " + c.name, e.rmse, c.unit, e.spread);
+  }
+  if (a.outputs.report.empty()) return text;
+  const plant::EnergyLedger& l = s.run->ledger();
+  for (std::size_t c = 0; c < machine.cylinders.size(); ++c) {
+    for (int k = 0; k < plant::kLosses; ++k) {
+      const auto place = static_cast<std::size_t>(k);
+      if (l.cylinder_loss[c][place] > 1.0)
+        view.losses_kJ.emplace_back(
+            fmt::format("{}: {}", machine.cylinders[c].name, plant::kLossNames[place]),
+            l.cylinder_loss[c][place] / 1e3);
+    }
+  }
+  for (std::size_t p = 0; p < machine.pumps.size(); ++p)
+    view.losses_kJ.emplace_back(machine.pumps[p].name + ": leakage and relief",
+                                l.pump_loss[p] / 1e3);
+  view.losses_kJ.emplace_back("return line", l.tank_loss / 1e3);
+  view.headline = fmt::format("{:.1f} s, {:.1f} kJ of work", s.run->time(), l.input() / 1e3);
+  view.text = text.empty() ? "Nothing was recorded to compare with."
+                           : "The plant got what was recorded; the table tells its errors.";
+  view.provenance = {{"machine", a.machine},
+                     {"seed", std::to_string(a.seed)},
+                     {"effects", fmt::format("{}", fmt::join(a.effects, " "))},
+                     {"plant", a.plant},
+                     {"recording", a.track.empty() ? a.replay : a.track}};
+  simulation_page(view).write(a.outputs.report);
+  return text;
 }
 
 std::string summary(const Machine& machine, const Simulated& s, const std::string& output) {
@@ -234,6 +365,7 @@ int run(const SimulateArguments& a) {
   options.sample_time = 1.0 / a.rate;
   s.run = std::make_unique<plant::PlantRun>(machine, parameters, programme->start(),
                                             programme->start_payload(), options);
+  std::vector<plant::Record> rows;
   finish_on_interrupt();
   const auto begin = std::chrono::steady_clock::now();
   {
@@ -245,6 +377,7 @@ int run(const SimulateArguments& a) {
       plant::Record row = s.run->record();
       row.command = step.command;
       log.add(row);
+      rows.push_back(row);
       s.run->advance(step.command);
       progress(s.run->time() / a.seconds, fmt::format("{:.0f} s", s.run->time()));
       if (interrupted()) break;
@@ -258,9 +391,10 @@ int run(const SimulateArguments& a) {
   if (s.run->status() != plant::RunStatus::kRunning)
     mark = fmt::format("cut at {:.4f} s: {}", s.run->time(), s.run->message());
   write_file_atomically(a.output, log.text(mark));
-  if (!a.outputs.json.empty())
-    write_file_atomically(a.outputs.json, simulation_json(a, machine, s).dump(2) + "\n");
-  fmt::print("{}", summary(machine, s, a.output));
+  nlohmann::json json = simulation_json(a, machine, s);
+  const std::string errors = write_comparison(a, machine, s, rows, json);
+  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, json.dump(2) + "\n");
+  fmt::print("{}{}", errors, summary(machine, s, a.output));
   if (s.cut) return kInterrupted;
   return s.run->status() == plant::RunStatus::kRunning ? kDone : kNotSolved;
 }
@@ -312,7 +446,7 @@ void add_simulate_verb(CLI::App& app, int& code) {
         throw CLI::Success();
       },
       "list the effects that can be switched, and end");
-  a->outputs.add_to(*verb, false);
+  a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }
 

@@ -41,7 +41,14 @@ TEST_F(CliSimulate, ItsLogCanBeReplayedAndTracked) {
   ASSERT_EQ(run(simulate("--seconds 8 --programme cycles")).code, 0);
   fs::copy_file(at("log.csv"), at("before.csv"));
   EXPECT_EQ(run(simulate("--seconds 8 --replay " + at("before.csv"))).code, 0);
-  EXPECT_EQ(run(simulate("--seconds 8 --track " + at("before.csv"))).code, 0);
+  EXPECT_EQ(run(simulate("--seconds 8 --track " + at("before.csv") + " --json " + at("run.json") +
+                         " --report " + at("run.html")))
+                .code,
+            0);
+  const json tracked = test_support::parsed_json(slurp(at("run.json")));
+  // in mm; the work cycle of the log before was tracked
+  EXPECT_LT(tracked["recording"]["boom: stroke: stroke"]["rmse"], 20.0);
+  EXPECT_THAT(slurp(at("run.html")), HasSubstr("Against the recording"));
   write("commands.csv", "t_s,u_boom\n0,0\n1,0.5\n2,0\n3,0\n");
   EXPECT_EQ(run(simulate("--seconds 8 --replay " + at("commands.csv"))).code, 0);
   EXPECT_EQ(run(simulate("--seconds 4 --motion \"boom alone, fast\"")).code, 0);
@@ -63,6 +70,23 @@ TEST_F(CliSimulate, WrongUsageAndBadInputSayWhatIsWrong) {
   o = run("simulate --list-effects");
   EXPECT_EQ(o.code, 0);
   EXPECT_THAT(o.out, HasSubstr("coulomb_friction"));
+}
+
+TEST_F(CliSimulate, ARealCranesCommandsGiveItsStrokesAndPressures) {
+  const std::string beside = std::string(SPARFLOW_SOURCE_DIR) + "/../shared/";
+  const std::string log = beside + "data/hmf_2020_k4/MainSineTest_230425.csv";
+  if (!fs::exists(log)) GTEST_SKIP() << "the logs of the real crane are not part of the repository";
+  const Outcome o =
+      run("simulate -m " + beside + "machines/hmf_2020_k4.yaml --plant " + kData +
+          "/plants/hmf_2020_k4.yaml --replay " + log + " --payload 181 --seconds 300 -o " +
+          at("log.csv") + " --json " + at("run.json") + " --report " + at("run.html"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json recording = test_support::parsed_json(slurp(at("run.json")))["recording"];
+  // 8.5 mm, 4.8 and 7.8 bar were found; the limits leave a quarter for other compilers and later parameters
+  EXPECT_LT(recording["main: stroke: stroke"]["rmse"], 10.5);
+  EXPECT_LT(recording["main: pressures: bore side"]["rmse"], 6.0);
+  EXPECT_LT(recording["main: pressures: rod side"]["rmse"], 9.8);
+  EXPECT_THAT(slurp(at("run.html")), HasSubstr("Against the recording"));
 }
 
 TEST_F(CliSimulate, AnInterruptKeepsTheLogSoFarMarkedAsCut) {

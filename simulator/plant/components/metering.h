@@ -33,4 +33,11 @@ inline double throttle(double opening, double drop, double full_flow, double ful
          orifice_root(full_drop, kLaminarDrop);
 }
 
+/// Return edge of a section whose load nothing else holds: a compensator limits the flow to that of `full_drop`, so that a
+/// load runs no faster than the lever says. @return [m^3/s] with the drop's sign
+inline double limited_throttle(double opening, double drop, double full_flow, double full_drop) {
+  constexpr double kRound = 0.1e5;  // [Pa]
+  return throttle(opening, smaller(drop, full_drop, kRound), full_flow, full_drop);
+}
+
 }  // namespace sparflow::plant

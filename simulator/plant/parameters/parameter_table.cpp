@@ -8,7 +8,7 @@ namespace sparflow::plant {
 namespace {
 
 // clang-format off
-constexpr std::array<ParameterRow, 68> kTable = {{
+constexpr std::array<ParameterRow, 69> kTable = {{
     {Place::kPlant, "bulk_modulus_MPa", "MPa", 1e6, 200.0, 1000000.0,
      "1500", "bulk modulus of oil without air",
      "Merritt 1967, ch. 2; Jelali, Kroll 2003, ch. 3",
@@ -229,6 +229,10 @@ constexpr std::array<ParameterRow, 68> kTable = {{
      "5", "of the stop's force with speed",
      "Hunt, Crossley 1975",
      [](PlantParameters& p, std::size_t i) -> double& { return p.cylinders[i].end.stop_damping; }},
+    {Place::kCylinder, "rest_pressure_bar", "bar", 1e5, 0.0, 300.0,
+     "2", "at the start, in the chamber that carries no load",
+     "HMF 2020-K4: up to 80, trapped by both counterbalance valves (University of Agder 2025)",
+     [](PlantParameters& p, std::size_t i) -> double& { return p.cylinders[i].rest_pressure; }},
     {Place::kCylinder, "drive_gain_N_s_m", "N s/m", 1, 0.0, 1000000000.0,
      "moving mass / 0.05 s", "speed control of a drive without hydraulics",
      "chosen",

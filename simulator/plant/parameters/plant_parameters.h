@@ -30,6 +30,7 @@ struct CylinderParameters {
   double dead_volume = 0.0;       ///< [m^3] of each chamber at its end of the stroke
   double hose_volume = 0.0;       ///< [m^3] of each hose between valve and cylinder
   double hose_modulus = 0.8e9;    ///< [Pa] pressure by its relative growth of volume
+  double rest_pressure = 2e5;     ///< [Pa] at the start, in the chamber that carries no load
   double drive_gain = 0.0;        ///< [N s/m] of a drive without hydraulics
 };
 

@@ -12,6 +12,8 @@ constexpr double kAsking =
     0.02;  // [-] opening at which a section's load-sensing port is fully open
 constexpr double kNeutralDrain =
     0.05;  // [-] of the return edge that stays open in neutral, for counterbalance valves
+constexpr double kReturnReserve =
+    1.03;  // of a limited return edge over its supply edge, else the two would lock
 constexpr double kCracking = 0.3e5;    // [Pa] of anti-cavitation valves
 constexpr double kRefillDrop = 2e5;    // [Pa] over them at the port's full flow
 constexpr double kReliefRange = 10e5;  // [Pa] from closed to the pump's full flow
@@ -94,9 +96,13 @@ void PlantSystem::evaluate_hydraulics(const double* state, int c, double viscosi
   const double drain = p.counterbalance.sides > 0.5 ? kNeutralDrain : 0.0;
   const double drain_a = drain * (1.0 - ramp(spool / std::max(p.spool.dead_band_extend, 0.01)));
   const double drain_b = drain * (1.0 - ramp(-spool / std::max(p.spool.dead_band_retract, 0.01)));
-  i.out_a = throttle(i.opening_b + drain_a, ha - pt, k.return_a, p.return_drop);
-  i.out_b = throttle(i.opening_a + drain_b, hb - pt, k.return_b, p.return_drop);
   const CounterbalanceParameters& v = p.counterbalance;
+  const auto out = [&p](bool held, double opening, double drop, double full) {
+    return held ? throttle(opening, drop, full, p.return_drop)
+                : limited_throttle(opening, drop, kReturnReserve * full, p.return_drop);
+  };
+  i.out_a = out(holds_bore(v), i.opening_b + drain_a, ha - pt, k.return_a);
+  i.out_b = out(holds_rod(v), i.opening_a + drain_b, hb - pt, k.return_b);
   const double open_a = counterbalance_opening(pa, value(StateLayout::kPilotA), ha, v);
   const double open_b = counterbalance_opening(pb, value(StateLayout::kPilotB), hb, v);
   i.port_a = port_flow(ha - pa, {holds_bore(v), open_a, k.full_a, p.line_drop}, v);

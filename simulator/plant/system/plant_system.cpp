@@ -9,7 +9,6 @@
 namespace sparflow::plant {
 namespace {
 
-constexpr double kRestPressure = 2e5;    // [Pa] in the chamber that carries nothing
 constexpr double kTankPressure = 0.2e5;  // [Pa] in return line and hoses of a machine at rest
 constexpr double kSupplyHose = 0.5;      // share of a supply line that is hose
 constexpr double kLeastVolume = 0.2;     // of the dead volume, kept where a stop yields
@@ -132,14 +131,19 @@ std::vector<double> PlantSystem::rest(const std::vector<double>& q) {
   const Machine& m = booms_.machine;
   for (int c = 0; c < layout_.cylinders; ++c) {
     const Cylinder& drive = m.cylinders[index(c)];
-    const Constants& k = constants_[index(c)];
-    const double rate = linkage_rates(m, c, state[index(drive.joint)]).d1;
+    Constants& k = constants_[index(c)];
+    const Taylor3 x = linkage_rates(m, c, state[index(drive.joint)]);
+    const double rate = x.d1;
+    // A machine that stands beyond the range that its file tells has its stop there.
+    k.shortest = std::min(k.shortest, x.value);
+    k.longest = std::max(k.longest, x.value);
     const double load = bodies_.bias()[drive.joint] / rate;
     if (!drive.hydraulic()) {
       state[index(layout_.cylinder(c, StateLayout::kPressureA))] = load;  // its integral, a force
       continue;
     }
-    double a = kRestPressure, b = kRestPressure;
+    const double unloaded = parameters_.cylinders[index(c)].rest_pressure;
+    double a = unloaded, b = unloaded;
     if (load + k.area_b * b > k.area_a * a) {
       a = (load + k.area_b * b) / k.area_a;
     } else {

@@ -320,6 +320,13 @@ TEST(PlantRun, AStopCatchesTheCylinderAndTheCushionSlowsItBefore) {
   EXPECT_LT(fastest[1], 0.7 * fastest[0]);
 }
 
+TEST(PlantRun, AMachineThatStartsBeyondItsRangeIsNotPushedBackByItsStop) {
+  const Machine machine = machine_named("loader_crane");
+  PlantRun run(machine, plain_parameters(machine), {0.5, -1.0, 6.05}, 300.0);
+  hold(run, {0.0, 0.0, 0.0}, 2.0);
+  EXPECT_NEAR(run.record().q[2], 6.05, 0.005);
+}
+
 TEST(PlantRun, AMachineWithoutHydraulicsFollowsItsDrive) {
   const Machine machine = machine_named("emps");
   PlantParameters p = default_parameters(machine);
