@@ -78,6 +78,18 @@ sparflow_require("matio" libmatio-dev MATIO_INCLUDE AND MATIO_LIBRARY)
 find_path(NLOPT_INCLUDE nlopt.h)
 find_library(NLOPT_LIBRARY nlopt)
 sparflow_require("NLopt" libnlopt-dev NLOPT_INCLUDE AND NLOPT_LIBRARY)
+# SUNDIALS' package file names libraries of PETSc, hypre and MPI, which nothing here uses: its parts are linked by themselves.
+find_path(SUNDIALS_INCLUDE cvodes/cvodes.h)
+set(SUNDIALS_LIBRARIES "")
+foreach(PART cvodes nvecserial sunmatrixdense sunlinsoldense)
+  find_library(SUNDIALS_${PART} sundials_${PART})
+  mark_as_advanced(SUNDIALS_${PART})
+  list(APPEND SUNDIALS_LIBRARIES ${SUNDIALS_${PART}})
+  sparflow_require("SUNDIALS (${PART})" libsundials-dev SUNDIALS_INCLUDE AND SUNDIALS_${PART})
+endforeach()
+find_path(KDL_INCLUDE kdl/chain.hpp)
+find_library(KDL_LIBRARY orocos-kdl)
+sparflow_require("Orocos KDL" liborocos-kdl-dev KDL_INCLUDE AND KDL_LIBRARY)
 find_package(OpenSSL QUIET COMPONENTS Crypto)
 sparflow_require("OpenSSL" libssl-dev OPENSSL_FOUND)
 if(SPARFLOW_TESTS)
@@ -107,6 +119,14 @@ add_library(sparflow_nlopt INTERFACE)
 target_include_directories(sparflow_nlopt SYSTEM INTERFACE ${NLOPT_INCLUDE})
 target_link_libraries(sparflow_nlopt INTERFACE ${NLOPT_LIBRARY})
 
+add_library(sparflow_sundials INTERFACE)
+target_include_directories(sparflow_sundials SYSTEM INTERFACE ${SUNDIALS_INCLUDE})
+target_link_libraries(sparflow_sundials INTERFACE ${SUNDIALS_LIBRARIES})
+
+add_library(sparflow_kdl INTERFACE)
+target_include_directories(sparflow_kdl SYSTEM INTERFACE ${KDL_INCLUDE})
+target_link_libraries(sparflow_kdl INTERFACE ${KDL_LIBRARY} Eigen3::Eigen)
+
 add_library(sparflow_urdf INTERFACE)
 target_link_libraries(sparflow_urdf INTERFACE PkgConfig::URDFDOM)
 
@@ -119,7 +139,7 @@ function(sparflow_check_links NAME LIBRARIES PACKAGE CODE)
   set(FILE ${CMAKE_BINARY_DIR}/generated/link_${NAME}.cpp)
   file(WRITE ${FILE} "${CODE}\n")
   try_compile(LINKS ${CMAKE_BINARY_DIR}/generated/link_${NAME} SOURCES ${FILE} LINK_LIBRARIES ${LIBRARIES}
-              CMAKE_FLAGS "-DINCLUDE_DIRECTORIES=${OMPL_INCLUDE};${MATIO_INCLUDE}" CXX_STANDARD 20 OUTPUT_VARIABLE OUTPUT)
+              CMAKE_FLAGS "-DINCLUDE_DIRECTORIES=${OMPL_INCLUDE};${MATIO_INCLUDE};${SUNDIALS_INCLUDE};${KDL_INCLUDE};${EIGEN3_INCLUDE_DIRS}" CXX_STANDARD 20 OUTPUT_VARIABLE OUTPUT)
   if(NOT LINKS)
     message(FATAL_ERROR "${NAME} is installed but a program of one line does not link with it; Debian package ${PACKAGE} "
                         "or one that it needs is incomplete:\n${OUTPUT}")
@@ -135,3 +155,7 @@ sparflow_check_links(matio ${MATIO_LIBRARY} libmatio-dev
 sparflow_check_links(urdfdom PkgConfig::URDFDOM liburdfdom-dev
   "#include <urdf_parser/urdf_parser.h>\nint main() { return urdf::parseURDF(\"\") == nullptr; }")
 sparflow_check_links(yaml_cpp yaml-cpp libyaml-cpp-dev "#include <yaml-cpp/yaml.h>\nint main() { return YAML::Load(\"1\").IsNull(); }")
+sparflow_check_links(SUNDIALS "${SUNDIALS_LIBRARIES}" libsundials-dev
+  "#include <cvodes/cvodes.h>\nint main() { void* memory = CVodeCreate(CV_BDF, nullptr); CVodeFree(&memory); }")
+sparflow_check_links(KDL ${KDL_LIBRARY} liborocos-kdl-dev
+  "#include <kdl/chain.hpp>\nint main() { return static_cast<int>(KDL::Chain().getNrOfJoints()); }")

@@ -138,6 +138,7 @@ const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result
 
 // Each of these adds the subcommand of one verb, whose callback writes its exit code to `code`.
 void add_fit_verb(CLI::App& app, int& code);
+void add_simulate_verb(CLI::App& app, int& code);
 void add_compare_verb(CLI::App& app, int& code);
 void add_diagnose_verb(CLI::App& app, int& code);
 void add_selftest_verb(CLI::App& app, int& code);

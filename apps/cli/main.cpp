@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
       "            5 a verification failed, 130 interrupted.");
   int code = cli::kDone;
   cli::add_demo_verb(app, code);
+  cli::add_simulate_verb(app, code);
   cli::add_fit_verb(app, code);
   cli::add_compare_verb(app, code);
   cli::add_diagnose_verb(app, code);

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "models/machine/machine.h"
-#include "simulator/hidden_effects/random.h"
+#include "simulator/random/random.h"
 
 namespace sparflow::simulator {
 

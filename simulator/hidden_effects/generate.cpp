@@ -153,7 +153,10 @@ void drive_log(const LogRequest& request, HiddenCase& one, const StepWatch& befo
   const CraneLaws& laws = one.laws;
   Random load_random(request.motion_seed, "loads");
   Payloads payloads = draw_payloads(load_random, one.usual_payload, request.seconds, request.warm);
-  OperatorMotion motion(machine, laws, request.motion_seed);
+  std::vector<std::array<double, 2>> flows;
+  for (const CylinderLaws& c : laws.cylinders)
+    flows.push_back({c.direction[0].valve_gain, c.direction[1].valve_gain});
+  OperatorMotion motion(machine, lever_flows(machine, flows), request.motion_seed);
   const int substeps =
       std::max(1, static_cast<int>(std::ceil(1.0 / request.rate / kLongestStep - 1e-9)));
   const double h = 1.0 / request.rate / substeps;

@@ -2,7 +2,7 @@
 /// The crane with its base laws and hidden laws, stepped in time: lever -> spool -> flow -> rod -> load -> chambers
 /// -> pump -> sensors. It is quasi-static; inertia is one of the hidden effects.
 #include "simulator/hidden_effects/hidden_law.h"
-#include "simulator/hidden_effects/operator_motion.h"
+#include "simulator/operator/operator_motion.h"
 
 namespace sparflow::simulator {
 

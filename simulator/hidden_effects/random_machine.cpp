@@ -7,7 +7,7 @@
 #include "models/files/machine_file.h"
 #include "models/machine/machine_check.h"
 #include "models/math/error.h"
-#include "simulator/hidden_effects/random.h"
+#include "simulator/random/random.h"
 
 namespace sparflow::simulator {
 namespace {

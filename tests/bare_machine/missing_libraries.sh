@@ -26,8 +26,9 @@ expect() {
 
 # fmt is a CMake package; spdlog's needs it. Both stand in one list.
 expect package "libfmt-dev libspdlog-dev apt-get" -DCMAKE_DISABLE_FIND_PACKAGE_fmt=ON
-# What Ipopt's pkg-config file asks for and its package does not bring: CMake is told not to look where it lies.
-expect transitive "liblapack-dev libblas-dev Ipopt" -DCMAKE_IGNORE_PATH="/usr/lib/x86_64-linux-gnu;/lib/x86_64-linux-gnu;/usr/lib;/lib"
+# What Ipopt's pkg-config file asks for and its package does not bring: CMake is told not to look where it lies. There lie the
+# libraries without a package file, too.
+expect transitive "liblapack-dev libblas-dev Ipopt libsundials-dev liborocos-kdl-dev" -DCMAKE_IGNORE_PATH="/usr/lib/x86_64-linux-gnu;/lib/x86_64-linux-gnu;/usr/lib;/lib"
 expect tests "libgtest-dev libgmock-dev" -DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON
 # A library that is there and does not link.
 expect broken "matio libmatio-dev" -DMATIO_LIBRARY=/dev/null

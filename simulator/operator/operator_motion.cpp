@@ -1,7 +1,8 @@
-#include "simulator/hidden_effects/operator_motion.h"
+#include "simulator/operator/operator_motion.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "models/machine/linkage.h"
 
@@ -27,9 +28,17 @@ double OperatorMotion::Move::profile() const {
   return smooth_step(phase / ramp) * smooth_step((duration() - phase) / ramp);
 }
 
-OperatorMotion::OperatorMotion(const Machine& machine, const CraneLaws& laws,
+std::vector<LeverFlow> lever_flows(const Machine& machine,
+                                   const std::vector<std::array<double, 2>>& flows) {
+  std::vector<LeverFlow> r;
+  for (std::size_t c = 0; c < machine.cylinders.size(); ++c)
+    r.push_back({flows[c], {machine.cylinders[c].area_piston(), machine.cylinders[c].area_rod()}});
+  return r;
+}
+
+OperatorMotion::OperatorMotion(const Machine& machine, std::vector<LeverFlow> flows,
                                std::uint64_t motion_seed)
-    : machine_(machine), laws_(laws), random_(motion_seed, "motion") {
+    : machine_(machine), flows_(std::move(flows)), random_(motion_seed, "motion") {
   preferred_.assign(machine.cylinders.size(), 0);
   pause_end_ = random_.uniform(0.5, 1.5);
 }
@@ -59,8 +68,8 @@ bool OperatorMotion::plan_move(int cylinder, double window, double q, Move& move
   const double limit = std::max(1e-3, std::min(joint.velocity.hi, -joint.velocity.lo));
   const double rate = linkage_rates(machine_, cylinder, q).d1;
   const std::size_t d = direction(static_cast<double>(way) * rate);
-  const double area = d == 0 ? drive.area_piston() : drive.area_rod();
-  const double gain = laws_.cylinders[c].direction[d].valve_gain;
+  const double area = flows_[c].area[d];
+  const double gain = flows_[c].flow[d];
   const double fastest = std::min(limit, 0.95 * gain / (std::abs(rate) * area));
   const double share =
       random_.chance(kSlowMoves) ? random_.uniform(0.04, 0.2) : random_.uniform(0.2, 0.85);
@@ -129,11 +138,10 @@ void OperatorMotion::levers(double t, double h, const std::vector<double>& q,
     if (m.lever_held) {
       u[c] = m.amplitude * profile;
     } else {
-      const Cylinder& drive = machine_.cylinders[c];
       const double rod_speed = m.amplitude * profile * length_rate[c];
       const std::size_t d = direction(rod_speed);
-      const double area = d == 0 ? drive.area_piston() : drive.area_rod();
-      u[c] = rod_speed * area / laws_.cylinders[c].direction[d].valve_gain;
+      const double area = flows_[c].area[d];
+      u[c] = rod_speed * area / flows_[c].flow[d];
     }
     u[c] = std::clamp(u[c], -1.0, 1.0);
     // The operator releases a lever when the joint has reached that end of its range.
@@ -148,7 +156,7 @@ void OperatorMotion::levers(double t, double h, const std::vector<double>& q,
     double flow = 0.0;
     for (const int i : pump.feeds) {
       const auto c = static_cast<std::size_t>(i);
-      flow += std::abs(u[c]) * laws_.cylinders[c].direction[direction(u[c])].valve_gain;
+      flow += std::abs(u[c]) * flows_[c].flow[direction(u[c])];
     }
     if (pump.max_flow > 0.0 && flow > kPumpShare * pump.max_flow)
       slow = std::min(slow, kPumpShare * pump.max_flow / flow);

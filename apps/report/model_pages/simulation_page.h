@@ -1,0 +1,35 @@
+#pragma once
+/// The page of `simulate`: what the plant did over time, beside a recording where its commands or motion were given by one.
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/report/page/page.h"
+
+namespace sparflow {
+
+struct SimulatedChannel {
+  std::string chart;  ///< channels of one chart share this title
+  std::string name, unit;
+  Eigen::VectorXd simulated;  ///< [samples]
+  Eigen::VectorXd recorded;   ///< [samples], NaN where nothing was recorded; empty: no recording
+};
+
+struct SimulationView {
+  std::string machine;
+  Eigen::VectorXd t;  ///< [s]
+  std::vector<SimulatedChannel> channels;
+  std::vector<std::pair<std::string, double>> losses_kJ;
+  std::string headline, text;
+  std::vector<std::pair<std::string, std::string>> provenance;
+};
+
+/// Root mean square of simulated less recorded, and the recording's standard deviation; NaN without common samples.
+struct RecordingError {
+  double rmse = 0.0, spread = 0.0;
+};
+RecordingError recording_error(const SimulatedChannel& channel);
+
+Page simulation_page(const SimulationView& view);
+
+}  // namespace sparflow
