@@ -81,10 +81,11 @@ struct ObjectiveWeights {
 };
 
 struct MotionProblem {
-  std::string name;          ///< `name` in the file, or the file's stem
-  std::string file;          ///< as read
-  std::string machine_path;  ///< resolved; empty when the machine was given to load_problem()
-  std::string model_path;    ///< resolved; empty when the file names none
+  std::string name;  ///< `name` in the file, or the file's stem
+  std::string file;  ///< as read
+  /// `machine` in the file, resolved; empty when the file names none, or none that is there and another machine is given.
+  std::string machine_path;
+  std::string model_path;  ///< resolved; empty when the file names none
   Machine machine;
   std::vector<std::string> machine_warnings;  ///< warnings of load_machine()
   double payload = 0.0;                       ///< [kg], hangs at the tip

@@ -36,7 +36,7 @@ class ProblemReader {
   ProblemReader(std::string file, std::string folder)
       : file_(std::move(file)), folder_(std::move(folder)) {}
 
-  MotionProblem read(const std::string& text, const Machine* machine) {
+  MotionProblem read(const std::string& text, const ChooseMachine& choose) {
     const YamlMap root = parse_yaml(text, file_)
                              .map("a motion problem: machine, start, goal, duration_s, ...",
                                   {"name", "machine", "model", "payload_kg", "start", "goal",
@@ -45,7 +45,7 @@ class ProblemReader {
     problem_.file = file_;
     problem_.name = fs::path(file_).stem().string();
     if (const auto name = root.find("name")) problem_.name = name->text("the problem's name");
-    read_machine(root, machine);
+    read_machine(root, choose);
     problem_.limits = limits_of(problem_.machine);
     if (const auto limits = root.find("limits")) read_limits(*limits);
     problem_.payload = root.number_or("payload_kg", kMass, 0.0);
@@ -86,7 +86,7 @@ class ProblemReader {
     return (fs::path(folder_) / given).lexically_normal().string();
   }
 
-  void read_machine(const YamlMap& root, const Machine* machine) {
+  void read_machine(const YamlMap& root, const ChooseMachine& choose) {
     if (const auto model = root.find("model")) {
       problem_.model_path = resolved(model->text("the fitted model's file"));
       if (!fs::is_regular_file(problem_.model_path)) {
@@ -94,25 +94,28 @@ class ProblemReader {
                                 problem_.model_path));
       }
     }
-    if (machine != nullptr) {
-      root.find("machine");
+    if (const Machine* machine = choose(problem_.model_path); machine != nullptr) {
+      if (const auto own = root.find("machine"))
+        problem_.machine_path = machine_file_of(own->text("the machine file"));
       problem_.machine = *machine;
       return;
     }
     const YamlValue value = root.need("machine", "the machine file");
     const std::string given = value.text("the machine file");
-    problem_.machine_path = resolved(given);
-    if (!fs::is_regular_file(problem_.machine_path)) {
-      const std::string bundled = bundled_machine(given);
-      if (bundled.empty()) {
-        value.fail(
-            fmt::format("there is no file {} (the path is relative to the problem file) and no "
-                        "bundled machine \"{}\"",
-                        problem_.machine_path, given));
-      }
-      problem_.machine_path = bundled;
+    problem_.machine_path = machine_file_of(given);
+    if (problem_.machine_path.empty()) {
+      value.fail(
+          fmt::format("there is no file {} (the path is relative to the problem file) and no "
+                      "bundled machine \"{}\"",
+                      resolved(given), given));
     }
     problem_.machine = load_machine(problem_.machine_path, &problem_.machine_warnings);
+  }
+
+  /// Path of a machine file beside the problem, or of the bundled machine of that name; empty: there is neither.
+  std::string machine_file_of(const std::string& given) const {
+    const std::string beside = resolved(given);
+    return fs::is_regular_file(beside) ? beside : bundled_machine(given);
   }
 
   static std::string bundled_machine(const std::string& name) {
@@ -320,11 +323,15 @@ class ProblemReader {
 
 MotionProblem parse_problem(const std::string& text, const std::string& name,
                             const std::string& folder, const Machine* machine) {
-  return ProblemReader(name, folder).read(text, machine);
+  return ProblemReader(name, folder).read(text, [=](const std::string&) { return machine; });
 }
 
 MotionProblem load_problem(const std::string& path, const Machine* machine) {
-  return parse_problem(read_file(path), path, fs::path(path).parent_path().string(), machine);
+  return load_problem_with(path, [=](const std::string&) { return machine; });
+}
+
+MotionProblem load_problem_with(const std::string& path, const ChooseMachine& choose) {
+  return ProblemReader(path, fs::path(path).parent_path().string()).read(read_file(path), choose);
 }
 
 }  // namespace sparflow

@@ -61,7 +61,6 @@ RawEvidence::RawEvidence(const CraneModel& model, const std::vector<Log>& suspec
   for (const Log& log : suspects) s.push_back(make_signals(machine_, log));
   for (const Log& log : references) r.push_back(make_signals(machine_, log));
   evidence_ = collect_evidence(model, s, r);
-  for (MachineSeries& series : evidence_.series) series.machine = &machine_;
   signals_ = std::move(s);
   for (MachineSignals& one : r) signals_.push_back(std::move(one));
   for (const EvidenceChannel& from : evidence_.channels) {

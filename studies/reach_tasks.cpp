@@ -115,10 +115,10 @@ std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelCache& m
                         : own % 2 != 0 ? "hmf_lift"
                                        : "swing_crane_far";
     const std::string file = bundled_file(std::string("reaches/") + reach + ".yaml");
-    const std::string model_file = load_problem(file).model_path;
-    const CraneModel& model = models.at(model_file);
-    tasks.push_back(random_task(load_problem(file, &model.machine), model, own));
-    tasks.back().mark = models.mark_of(model_file);
+    const MotionProblem problem = load_problem_with(
+        file, [&](const std::string& named) { return &models.at(named).machine; });
+    tasks.push_back(random_task(problem, models.at(problem.model_path), own));
+    tasks.back().mark = models.mark_of(problem.model_path);
   }
   return tasks;
 }

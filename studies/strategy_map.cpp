@@ -103,11 +103,12 @@ int run(int argc, char** argv) {
   const auto work = [&](int index) {
     const Task& task = tasks[static_cast<std::size_t>(index)];
     const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
-    MotionProblem problem = load_problem(file);
-    // Older problems name no model.
-    const CraneModel model = load_model(
-        problem.model_path.empty() ? bundled_file("models/loader_crane.json") : problem.model_path);
-    problem = load_problem(file, &model.machine);
+    CraneModel model;
+    MotionProblem problem = load_problem_with(file, [&](const std::string& named) {
+      // Older problems name no model.
+      model = load_model(named.empty() ? bundled_file("models/loader_crane.json") : named);
+      return &model.machine;
+    });
     problem.payload = task.payload;
     ParetoOptions options;
     options.points = points;

@@ -2,7 +2,9 @@
 
 #include <cmath>
 
-#include "apps/cli/context.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/compare_page.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"

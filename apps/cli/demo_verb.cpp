@@ -3,7 +3,11 @@
 #include <chrono>
 #include <filesystem>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/motion_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/compare_page.h"
 #include "apps/report/motion_pages/motion_page.h"
 #include "identification/learning/fit.h"

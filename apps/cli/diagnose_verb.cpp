@@ -3,7 +3,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/diagnose_page.h"
 #include "diagnosis/extension/extend.h"
 #include "models/math/error.h"

@@ -6,6 +6,9 @@
 #include <chrono>
 #include <ctime>
 
+#include "apps/cli/console.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/outputs.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {

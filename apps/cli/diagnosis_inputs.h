@@ -3,7 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/cli/context.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/outputs.h"
 #include "apps/report/page/page.h"
 #include "diagnosis/extension/extend.h"
 

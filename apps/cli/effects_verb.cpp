@@ -2,7 +2,9 @@
 
 #include <memory>
 
-#include "apps/cli/context.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "models/effects/effect_text.h"
 #include "models/math/error.h"
 

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
+#include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/improve_page.h"
 #include "diagnosis/extension/extend.h"
 #include "models/files/model_file.h"

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/model_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/compare_page.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"

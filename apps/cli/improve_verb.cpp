@@ -1,4 +1,6 @@
+#include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
+#include "apps/cli/verbs.h"
 #include "diagnosis/extension/extend.h"
 
 namespace sparflow::cli {

@@ -2,7 +2,8 @@
 
 #include <exception>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/verbs.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 

@@ -2,7 +2,10 @@
 
 #include <cmath>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/motion_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/motion_page.h"
 #include "models/math/error.h"
 #include "optimizer/bounds/energy_bound_time.h"

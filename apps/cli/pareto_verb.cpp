@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/motion_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/pareto_page.h"
 #include "models/math/error.h"
 

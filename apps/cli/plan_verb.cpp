@@ -2,7 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/motion_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "models/math/error.h"
 #include "problems/problem_file.h"
 

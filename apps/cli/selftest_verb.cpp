@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
+#include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/selftest_page.h"
 #include "diagnosis/selftest/selftest.h"
 #include "models/math/error.h"

@@ -7,7 +7,9 @@
 #include <numeric>
 #include <optional>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/model_pages/simulation_page.h"
 #include "diagnosis/experiment/experiment.h"
 #include "models/machine/linkage.h"

@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 
-#include "apps/cli/context.h"
+#include "apps/cli/console.h"
+#include "apps/cli/motion_inputs.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/strategies_page.h"
 #include "models/math/error.h"
 #include "optimizer/solve/child_processes.h"
-#include "problems/problem_file.h"
 
 namespace sparflow::cli {
 namespace {
@@ -23,15 +26,20 @@ struct StrategiesArguments {
   Outputs outputs;
 };
 
-/// Replaces each folder by its .yaml files in the order of their names. Without --model, files of a folder that name
-/// no model are left out. @throws InputError for a folder without such files
-std::vector<std::string> problem_files(const std::vector<std::string>& given, bool with_model) {
+struct ProblemPath {
+  std::string file;
+  bool of_folder = false;  ///< found in a folder, not named by the user
+};
+
+/// Replaces each folder by its .yaml files in the order of their names.
+/// @throws InputError for a folder without such files
+std::vector<ProblemPath> problem_files(const std::vector<std::string>& given) {
   namespace fs = std::filesystem;
-  std::vector<std::string> files;
+  std::vector<ProblemPath> files;
   for (const std::string& path : given) {
     std::error_code error;
     if (!fs::is_directory(path, error)) {
-      files.push_back(path);
+      files.push_back({path, false});
       continue;
     }
     std::vector<std::string> inside;
@@ -41,13 +49,7 @@ std::vector<std::string> problem_files(const std::vector<std::string>& given, bo
     if (inside.empty())
       throw InputError({path, 0, 0}, "", "no motion problem (*.yaml) in this folder");
     std::sort(inside.begin(), inside.end());
-    for (const std::string& file : inside) {
-      if (with_model || !load_problem(file).model_path.empty()) {
-        files.push_back(file);
-      } else {
-        note(fmt::format("{} is left out: it names no model", file));
-      }
-    }
+    for (const std::string& file : inside) files.push_back({file, true});
   }
   return files;
 }
@@ -79,9 +81,9 @@ void read_times(const std::string& text, StrategyOptions& options) {
 }
 
 int run(const StrategiesArguments& a) {
-  const std::vector<std::string> files = problem_files(a.problems, !a.model.empty());
-  std::vector<NamedFile> inputs = named("--problem", files);
-  inputs.push_back({"--model", a.model});
+  const std::vector<ProblemPath> files = problem_files(a.problems);
+  std::vector<NamedFile> inputs = {{"--model", a.model}};
+  for (const ProblemPath& p : files) inputs.push_back({"--problem", p.file});
   check_outputs_apart("strategies", a.outputs.files(), inputs);
   a.outputs.check();
   StrategyOptions options;
@@ -91,8 +93,14 @@ int run(const StrategiesArguments& a) {
   options.optimize.interrupted = interrupted;
   std::vector<ProblemAndModel> tasks;
   tasks.reserve(files.size());
-  for (const std::string& file : files) {
-    tasks.push_back(load_problem_and_model(file, a.model));
+  for (const auto& [file, of_folder] : files) {
+    std::optional<ProblemAndModel> task = load_problem_with_model(file, a.model);
+    if (!task) {
+      if (!of_folder) throw no_model();
+      note(fmt::format("{} is left out: it names no model", file));
+      continue;
+    }
+    tasks.push_back(std::move(*task));
     const double idle = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : tasks.back().problem.idle_power;
     if (options.own_time && idle <= 0.0) {
       warn(
@@ -129,7 +137,7 @@ int run(const StrategiesArguments& a) {
     }
     return packed(c);
   };
-  const int count = static_cast<int>(files.size());
+  const int count = static_cast<int>(tasks.size());
   const int processes = a.processes > 0 ? a.processes : usable_processors();
   std::vector<ChildResult> children;
   {

@@ -139,22 +139,6 @@ std::string against(const ExtendStep& step, const ErrorChangeOptions& options) {
   return fmt::format("on the {} {}", step.judged_on, fmt::join(harm, ", "));
 }
 
-/// A diagnosis together with its model, because its evidence refers to that model's machine.
-std::shared_ptr<const Diagnosis> diagnose_kept(const CraneModel& model,
-                                               const std::vector<Log>& logs,
-                                               const std::vector<Log>& references,
-                                               const DiagnoseOptions& options,
-                                               const SearchProgress& progress) {
-  struct Kept {
-    CraneModel model;
-    Diagnosis diagnosis;
-  };
-  const auto kept = std::make_shared<Kept>();
-  kept->model = model;
-  kept->diagnosis = diagnose(kept->model, logs, references, options, progress);
-  return {kept, &kept->diagnosis};
-}
-
 /// Factor by which an effect reduces the error of the channel that it improves most, beside all others.
 double times_smaller(const DiagnosedEffect& e) {
   double most = 1.0;
@@ -383,8 +367,8 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       result.stopped_because = "no other effect is left to try";
       break;
     }
-    const std::shared_ptr<const Diagnosis> diagnosis =
-        diagnose_kept(current.model, logs, references, diagnose_options, round(0.4));
+    const std::shared_ptr<const Diagnosis> diagnosis = std::make_shared<const Diagnosis>(
+        diagnose(current.model, logs, references, diagnose_options, round(0.4)));
     done += (1.0 - done) * 0.4;
     result.last = diagnosis;
     const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);

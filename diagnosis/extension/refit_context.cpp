@@ -124,8 +124,8 @@ EffectEstimate RefitContext::estimate(const CraneModel& model,
   std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
   EstimateOptions how;
   how.evidence = options_.diagnose.evidence;
-  EffectEstimate estimate = estimate_effects(base, wanted, signals_, references_, leave_out,
-                                             progress, &in_references, how);
+  EffectEstimate estimate = estimate_effects(
+      base, wanted, {signals_, references_, leave_out, std::move(in_references)}, progress, how);
   std::vector<AppliedEffect> all;
   for (const EffectAt& e : effects) {
     for (const auto* list : {&estimate.effects, &base.effects}) {

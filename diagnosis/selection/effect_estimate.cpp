@@ -76,23 +76,21 @@ EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& lea
 
 class Estimator {
  public:
-  Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted,
-            const std::vector<MachineSignals>& suspects,
-            const std::vector<MachineSignals>& references, const std::vector<Mask>& leave_out,
-            const std::vector<AppliedEffect>* in_references, const EstimateOptions& options)
+  Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted, EstimateLogs logs,
+            const EstimateOptions& options)
       : base_(model),
         options_(options),
         known_(model.effects),
-        suspects_(suspects),
-        references_(references),
-        sharp_(can_sharpen(suspects) && (references.empty() || can_sharpen(references))),
-        leave_out_(leave_out) {
+        suspects_(std::move(logs.suspects)),
+        references_(std::move(logs.references)),
+        sharp_(can_sharpen(suspects_) && (references_.empty() || can_sharpen(references_))),
+        leave_out_(std::move(logs.leave_out)) {
     if (sharp_) sharpen_all();
     std::erase_if(base_.effects, [&](const AppliedEffect& a) {
       return std::any_of(wanted.begin(), wanted.end(),
                          [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
     });
-    in_references_ = in_references != nullptr ? *in_references : base_.effects;
+    in_references_ = logs.in_references.value_or(base_.effects);
     evidence_ = collect(base_);
     active_.assign(evidence_.channels.size(), false);
     for (const EffectAt& e : wanted) add_design(model, e);
@@ -324,7 +322,7 @@ class Estimator {
   std::vector<AppliedEffect> known_;  ///< all effects of the model
   std::vector<MachineSignals> suspects_, references_;
   bool sharp_ = false;  // shorter windows than the search's, with rows up to the ends of motions
-  const std::vector<Mask>& leave_out_;
+  std::vector<Mask> leave_out_;
   std::vector<AppliedEffect> in_references_;
   Evidence evidence_;
   std::vector<bool> active_;  // by channel: touched by an effect
@@ -335,15 +333,11 @@ class Estimator {
 }  // namespace
 
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
-                                const std::vector<MachineSignals>& suspects,
-                                const std::vector<MachineSignals>& references,
-                                const std::vector<Mask>& leave_out, const SearchProgress& progress,
-                                const std::vector<AppliedEffect>* in_references,
+                                EstimateLogs logs, const SearchProgress& progress,
                                 const EstimateOptions& options) {
   if (wanted.empty()) return {};
-  SPARFLOW_CHECK(!suspects.empty(), "effects need a log to be estimated from");
-  return Estimator(model, wanted, suspects, references, leave_out, in_references, options)
-      .run(progress);
+  SPARFLOW_CHECK(!logs.suspects.empty(), "effects need a log to be estimated from");
+  return Estimator(model, wanted, std::move(logs), options).run(progress);
 }
 
 }  // namespace sparflow

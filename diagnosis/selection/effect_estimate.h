@@ -4,6 +4,7 @@
 /// Effects that change the machine (masses, angles) are not quite linear: the regression is repeated with the
 /// linearisation error added to the data. Values and intervals are those of effect_intervals.h. Diagnosis and extension
 /// both use this estimate, so that they report the same values for the same effects on the same logs.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,16 @@ struct EstimateOptions {
   double largest_step = 2.0;
 };
 
+/// The logs that effects are estimated from.
+struct EstimateLogs {
+  std::vector<MachineSignals> suspects;         ///< with the effects
+  std::vector<MachineSignals> references = {};  ///< of the same machine without them; may be empty
+  /// For each suspect log, a mask of samples that take no part; empty = none.
+  std::vector<Mask> leave_out = {};
+  /// Effects that act in the references, none of them estimated; absent: those of the model that are not estimated.
+  std::optional<std::vector<AppliedEffect>> in_references = std::nullopt;
+};
+
 struct EffectEstimate {
   std::vector<AppliedEffect> effects;  ///< in the order of `wanted`, with 95 % intervals
   std::vector<std::string> notes;      ///< which parameters lie on their bounds; whole sentences
@@ -31,17 +42,9 @@ struct EffectEstimate {
 /// @param model its margins give the first estimate of pump demand; its effects are initial values of those in `wanted`
 ///        and are kept as they are otherwise
 /// @param wanted every effect to be estimated, once each
-/// @param suspects logs with the effects  @param references logs of the same machine without them; may be empty
-/// @param leave_out for each suspect log, a mask of samples that take no part; empty = none
-/// @param in_references effects that act in the references, none of them in `wanted`; null: those of the model that are
-///        not in `wanted`
 /// @throws InputError when one of the effects does not act on any channel of the logs
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
-                                const std::vector<MachineSignals>& suspects,
-                                const std::vector<MachineSignals>& references = {},
-                                const std::vector<Mask>& leave_out = {},
-                                const SearchProgress& progress = {},
-                                const std::vector<AppliedEffect>* in_references = nullptr,
+                                EstimateLogs logs, const SearchProgress& progress = {},
                                 const EstimateOptions& options = {});
 
 }  // namespace sparflow

@@ -123,11 +123,11 @@ void set_joint_estimates(const CraneModel& model, const std::vector<MachineSigna
   std::vector<EffectAt> wanted;
   wanted.reserve(found.size());
   for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
-  const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
   EstimateOptions options;
   options.evidence = evidence;
-  const EffectEstimate all =
-      estimate_effects(model, wanted, suspects, references, {}, {}, &in_references, options);
+  const EffectEstimate all = estimate_effects(
+      model, wanted, {suspects, references, {}, effects_in_references(model, references)}, {},
+      options);
   for (std::size_t i = 0; i < found.size(); ++i) {
     found[i].values = all.effects[i].values;
     found[i].lower95 = all.effects[i].lower95;

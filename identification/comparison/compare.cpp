@@ -268,8 +268,7 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   }
   for (std::size_t l = 0; l < signals.size(); ++l) {
     LogComparison log;
-    log.signals = std::move(signals[l]);
-    apply_effects(model, log.signals);
+    log.signals = with_effects(model, std::move(signals[l]));
     Comparison comparison(model, log.signals, only.empty() ? nullptr : &only[l]);
     log.series = comparison.series(notes);
     comparison.energy(energy);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <span>
 
 #include "identification/learning/fit_pass.h"
 #include "identification/signals/apply_effects.h"
@@ -17,13 +18,21 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using Progress = std::function<void(double, const std::string&)>;
 
-/// Learns a model from the samples that count. @param signals get the contributions of the options' effects
-FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
+std::vector<MachineSignals> all_with_effects(const CraneModel& model,
+                                             std::span<const MachineSignals> signals) {
+  std::vector<MachineSignals> out;
+  out.reserve(signals.size());
+  for (const MachineSignals& s : signals) out.push_back(with_effects(model, s));
+  return out;
+}
+
+/// Learns a model from the samples that count, with the options' effects.
+FitPass learn(const Machine& machine, std::span<const MachineSignals> plain,
               std::vector<Mask> counts, const FitOptions& options, const Progress& progress) {
   FitPass pass;
   pass.model = CraneModel::untrained(machine);
   pass.model.effects = options.effects;
-  for (MachineSignals& s : signals) apply_effects(pass.model, s);
+  std::vector<MachineSignals> signals = all_with_effects(pass.model, plain);
   const TrainingData data{&signals, std::move(counts)};
   learn_processes(data, options, pass, progress);
   learn_valves(data, options.valve, pass);
@@ -38,7 +47,7 @@ FitPass learn(const Machine& machine, std::vector<MachineSignals>& signals,
   constexpr int kTurns = 6;
   for (int turn = 0; turn < kTurns; ++turn) {
     const CraneModel before = pass.model;
-    for (MachineSignals& s : signals) apply_effects(before, s);
+    signals = all_with_effects(before, plain);
     pass.notes = notes;
     learn_pumps(data, options, pass);
     double change = 0.0;
@@ -70,7 +79,7 @@ std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
 
 /// Judges a model that is learned without the held-out blocks of motion on these blocks.
 std::optional<CompareResult> judge_held_out(const Machine& machine,
-                                            std::vector<MachineSignals>& signals,
+                                            const std::vector<MachineSignals>& signals,
                                             const FitOptions& options,
                                             std::vector<std::string>& notes) {
   const std::vector<Mask> held = held_out_samples(signals, options);

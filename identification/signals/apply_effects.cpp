@@ -237,7 +237,7 @@ double working_pressure_effect(const CraneModel& model, const MachineSignals& si
                                    c.flow[k], c.model_force[k], back);
 }
 
-void apply_effects(const CraneModel& model, MachineSignals& signals) {
+MachineSignals with_effects(const CraneModel& model, MachineSignals signals) {
   for (CylinderSignals& c : signals.cylinders) {
     c.model_force = c.predicted_force = c.static_force;
     for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,
@@ -249,13 +249,14 @@ void apply_effects(const CraneModel& model, MachineSignals& signals) {
   const bool changed = machine.get() != &model.machine;
   if (changed || signals.of_effective_machine) evaluate_effective(*machine, signals);
   signals.of_effective_machine = changed;
-  if (model.effects.empty()) return;
+  if (model.effects.empty()) return signals;
   MachineSeries log = make_series(model, signals);
-  log.machine = machine.get();
+  log.machine = machine;
   force_stage(model, log, signals);
   for (const AppliedEffect& e : model.effects) pressure_stage(e, log, signals);
   predict_demand(model, signals, log);
   pump_stage(model, log, signals);
+  return signals;
 }
 
 }  // namespace sparflow

@@ -5,13 +5,13 @@
 
 namespace sparflow {
 
-/// Writes the effects' contributions into the signals (model_force, pressure_effect, ... of signals.h). Effects that change
-/// the machine also replace lengths, rates, speeds and flows by those of the changed machine; the static force remains
+/// The same log seen through a machine with the model's effects: their contributions (model_force, pressure_effect, ... of
+/// signals.h) stand in a new value, in place of those of any other model. Effects that change the machine also replace lengths, rates, speeds and flows by those of the changed machine; the static force remains
 /// that of the machine file. Effects with memory are evaluated on the log's time series; laws without memory sample by
 /// sample with the model's own force. Effects on a pump start from the predicted demand where the pressure models are
-/// learned, else from the demand of the measured pressures. May be called again, with another model.
-/// @param signals of the machine as its file describes it
-void apply_effects(const CraneModel& model, MachineSignals& signals);
+/// learned, else from the demand of the measured pressures.
+/// @param signals of the machine as its file describes it, with or without effects
+MachineSignals with_effects(const CraneModel& model, MachineSignals signals);
 
 /// Inputs of the chain at one sample: the signed speed that gives the signals' flow and direction [m/s], the total
 /// force [N], and the effects' contributions to working pressure, demand and return chamber [Pa].

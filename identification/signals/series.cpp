@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "identification/signals/load_sensing_leader.h"
 #include "models/effects/memory.h"
@@ -115,7 +116,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
                      signals.pumps.size() == machine.pumps.size(),
                  "signals of another machine");
   MachineSeries out;
-  out.machine = &machine;
+  out.machine = std::make_shared<const Machine>(machine);
   out.step = signals.step;
   out.time = signals.time;
   for (const SampleRange& run : signals.runs) out.runs.emplace_back(run.begin, run.end);

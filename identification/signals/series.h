@@ -8,9 +8,8 @@ namespace sparflow {
 
 /// Measured forces and chamber pressures are smoothed by the position's filter; the pumps' demand uses the pressures as
 /// logged. The demand of a load-sensing pump is empty when a command or both chamber pressures of a cylinder it feeds are
-/// not logged, and NaN where the supply chamber's pressure is not measured.
-/// @param model gives machine, standby, margins and, with the demands of its effects, the load-sensing leader; must
-///   outlive the result
+/// not logged, and NaN where the supply chamber's pressure is not measured. The result owns its machine.
+/// @param model gives machine, standby, margins and, with the demands of its effects, the load-sensing leader
 /// @param signals of the machine as its file describes it
 MachineSeries make_series(const CraneModel& model, const MachineSignals& signals);
 

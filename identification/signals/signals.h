@@ -46,7 +46,7 @@ struct CylinderSignals {
   Eigen::VectorXd working_pressure;
   Eigen::VectorXd working_pressure_smooth;  ///< [Pa] the same by the position's filter
 
-  // `apply_effects` adds the model's effects to these; before, they hold the values without effects.
+  // `make_signals` gives these without effects, `with_effects` (apply_effects.h) with those of a model.
   Eigen::VectorXd model_force;  ///< [N] static force + force effects, input of the pressure models
   Eigen::VectorXd
       predicted_force;  ///< [N] model force + sensor effects, to compare with the sensor
@@ -75,6 +75,8 @@ struct CandidateSignal {
   Eigen::VectorXd values;
 };
 
+/// A log seen through a machine. `make_signals`, `smoothed_anew` and `with_effects` alone build it; what was built is not
+/// changed: each of them returns a new value, and whoever keeps one keeps it as const.
 struct MachineSignals {
   std::string file;            ///< the log's name
   std::string sha256;          ///< of the log's bytes
@@ -96,7 +98,7 @@ struct MachineSignals {
   Mask edge;                      ///< within half a filter window of either end of a run
   Mask usable;                    ///< pose, speed and payload are known
   bool of_effective_machine =
-      false;  ///< apply_effects has computed speeds and flows with a changed machine
+      false;  ///< `with_effects` has computed speeds and flows with a changed machine
   std::vector<std::string> notes;  ///< whole sentences: what was missing, converted, left out
 
   Eigen::Index samples() const { return time.size(); }
@@ -114,7 +116,7 @@ struct MachineSignals {
 MachineSignals make_signals(const Machine& machine, const Log& log,
                             const SignalOptions& options = {});
 
-/// Recomputes the signals with another filter window; the contributions of effects (apply_effects) are removed.
+/// Recomputes the signals with another filter window; the contributions of effects (`with_effects`) are removed.
 /// @param window_s full width [s], > 0
 MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signals, double window_s,
                              const SignalOptions& options = {});

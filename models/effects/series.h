@@ -3,6 +3,7 @@
 /// by sample, in SI. identification/ fills it from a log. Effects with memory (lags, delays, hysteresis) work on whole
 /// series, laws without memory sample by sample. An empty vector means not measured, NaN not valid.
 #include <Eigen/Dense>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -49,7 +50,8 @@ struct PumpSeries {
 };
 
 struct MachineSeries {
-  const Machine* machine = nullptr;
+  /// Shared with whatever keeps the series, a diagnosis for example, which may outlive the model it was made with.
+  std::shared_ptr<const Machine> machine;
   double step = 0.0;                                        ///< [s] median sampling interval
   Eigen::VectorXd time;                                     ///< [s]
   std::vector<std::pair<Eigen::Index, Eigen::Index>> runs;  ///< gap-free [first, last)

@@ -117,6 +117,25 @@ TEST(ProblemFile, AGivenMachineReplacesTheFilesOwn) {
   EXPECT_EQ(p.machine_path, "");
 }
 
+/// The model that a file names decides the machine in the same reading, and its own machine's file stays known.
+TEST(ProblemFile, TheModelThatItNamesGivesTheMachine) {
+  const std::string file = bundled_file("reaches/swing_crane_far.yaml");
+  const MotionProblem own = load_problem(file);
+  ASSERT_NE(own.model_path, "");
+  std::vector<std::string> asked;
+  const auto same = [&](const std::string& model) -> const Machine* {
+    asked.push_back(model);
+    return nullptr;
+  };
+  EXPECT_EQ(load_problem_with(file, same).machine.name, own.machine.name);
+  EXPECT_THAT(asked, testing::ElementsAre(own.model_path));
+  Machine replaced = own.machine;
+  replaced.name = "of the model";
+  const MotionProblem p = load_problem_with(file, [&](const std::string&) { return &replaced; });
+  EXPECT_EQ(p.machine.name, "of the model");
+  EXPECT_EQ(p.machine_path, own.machine_path);
+}
+
 TEST(ProblemFile, EveryBundledProblemLoads) {
   const std::vector<std::string> files = bundled_files("reaches", ".yaml");
   EXPECT_GE(files.size(), 6u);

@@ -5,7 +5,7 @@
 
 namespace sparflow {
 
-/// @param diagnosis made of `model`, which must outlive it
+/// @param diagnosis made of `model`
 /// @param tested result of adding the effects found to the model, judged on test logs; may be null
 Page diagnose_page(const CraneModel& model, const Diagnosis& diagnosis,
                    const ExtendResult* tested = nullptr);

@@ -77,6 +77,18 @@ Log rippling_log(double force_scale, double rate) {
 
 class MatchedFilters : public testing::TestWithParam<std::pair<double, double>> {};
 
+/// A diagnosis is kept longer than the model it was made with, by pages and by the record of an improvement.
+TEST(Evidence, OwnsTheMachineItRefersTo) {
+  Evidence e;
+  {
+    const CraneModel model = CraneModel::untrained(carriage());
+    e = collect_evidence(model, {make_signals(model.machine, rippling_log(1.3, 50.0))});
+    ASSERT_FALSE(e.series.empty());
+    EXPECT_NE(e.series[0].machine.get(), &model.machine);
+  }
+  EXPECT_EQ(e.series[0].machine->name, carriage().name);
+}
+
 TEST_P(MatchedFilters, InertiaIsRecovered) {
   const auto [window, rate] = GetParam();
   const CraneModel model = CraneModel::untrained(carriage());

@@ -175,7 +175,7 @@ TEST(PumpLeaders, ADiagnosisReportsTheErrorWithTheLeadersWithoutTheEffect) {
 TEST(PumpLeaders, AnExtensionUpdatesThemToo) {
   const LossyCrane& crane = lossy();
   const EffectEstimate estimate =
-      estimate_effects(crane.model, {{crane.loss.effect, crane.loss.at}}, {crane.signals}, {});
+      estimate_effects(crane.model, {{crane.loss.effect, crane.loss.at}}, {{crane.signals}});
   ASSERT_EQ(estimate.effects.size(), 1u);
   EXPECT_NEAR(estimate.effects[0].values[0], kLoss, 0.01 * kLoss);
 }

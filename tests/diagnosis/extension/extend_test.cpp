@@ -46,7 +46,7 @@ TEST(EstimateEffects, RecoversTheForce) {
   const CraneModel model = arm_model();
   const std::vector<MachineSignals> signals = {
       make_signals(model.machine, arm_log_with_friction(kFriction))};
-  const EffectEstimate e = estimate_effects(model, {coulomb()}, signals);
+  const EffectEstimate e = estimate_effects(model, {coulomb()}, {signals});
   ASSERT_THAT(e.effects, SizeIs(1));
   // 0.8 bar on 113 cm^2 is 0.9 kN for each of about a hundred independent samples: 2 % of 5 kN is two deviations
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.03 * kFriction);
@@ -62,7 +62,7 @@ TEST(EstimateEffects, AllEffectsTogether) {
   const std::vector<MachineSignals> signals = {
       make_signals(model.machine, arm_log_with_friction(kFriction))};
   const EffectEstimate e = estimate_effects(
-      model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, signals);
+      model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, {signals});
   ASSERT_THAT(e.effects, SizeIs(2));
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
   // one joint determines only its moment: 60 kg at 1.5 m
@@ -83,7 +83,7 @@ TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
   const std::vector<MachineSignals> signals = {make_signals(model.machine, log)};
   Mask second = Mask::Constant(n, false);
   second.tail(n - half).setConstant(true);
-  const EffectEstimate e = estimate_effects(model, {coulomb()}, signals, {}, {second});
+  const EffectEstimate e = estimate_effects(model, {coulomb()}, {signals, {}, {second}});
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
 }
 
@@ -94,7 +94,7 @@ TEST(EstimateEffects, AnErrorNamesTheSignalsThatTheLogsLack) {
   const CraneModel model = arm_model();
   const std::vector<MachineSignals> signals = {make_signals(model.machine, log)};
   try {
-    estimate_effects(model, {coulomb()}, signals);
+    estimate_effects(model, {coulomb()}, {signals});
     FAIL() << "friction from a log without a force";
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), HasSubstr("coulomb_friction:arm"));
@@ -259,7 +259,7 @@ TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
   Log log = arm_log(0.8, 6);
   testing_support::channel(log, "pA_arm").values.array() += 4e5;  // [Pa]
   const EffectAt offset = parse_effect("pressure_offset:arm", model.machine);
-  const EffectEstimate e = estimate_effects(model, {offset}, {make_signals(model.machine, log)});
+  const EffectEstimate e = estimate_effects(model, {offset}, {{make_signals(model.machine, log)}});
   const auto& parameters = offset.effect->info().parameters;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     const AppliedEffect& a = e.effects[0];

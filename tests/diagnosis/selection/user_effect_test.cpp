@@ -162,8 +162,7 @@ TEST(UserEffectScope, LeavesTheCatalogueAsItWas) {
 TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
   const Machine machine = arm_machine();
   const MachineSignals signals = make_signals(machine, arm_log());
-  MachineSeries series = make_series(arm_model(), signals);
-  series.machine = &machine;
+  const MachineSeries series = make_series(arm_model(), signals);
   const auto column = [&](const char* stage, const char* unit, EvidenceKind kind) {
     const std::string id = std::string("evidence_") + stage;
     const std::string text = fmt::format(

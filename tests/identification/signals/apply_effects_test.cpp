@@ -88,8 +88,7 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
     CraneModel model = bare;
     const std::string key = effect_key(info, bare.machine, place.at);
     model.effects = {typical(key, bare.machine)};
-    MachineSignals s = make_signals(bare.machine, arm_log());
-    apply_effects(model, s);
+    const MachineSignals s = with_effects(model, make_signals(bare.machine, arm_log()));
     Chain chain(model), without(bare);
     double largest = 0.0, difference = 0.0;
     for (Index k = 0; k < s.samples(); ++k) {
@@ -172,8 +171,7 @@ TEST(ApplyEffects, FlowsOfReadingsAreFilteredLikeTheSpeed) {
   CraneModel model = arm_model();
   const AppliedEffect oil = typical("compressibility:arm", model.machine);
   model.effects = {oil};
-  MachineSignals s = make_signals(model.machine, log_of(model, 0.8));
-  apply_effects(model, s);
+  const MachineSignals s = with_effects(model, make_signals(model.machine, log_of(model, 0.8)));
   CraneModel without = model;
   without.effects.clear();
   const Evidence e = collect_evidence(without, {s});
@@ -191,18 +189,17 @@ TEST(ApplyEffects, FlowsOfReadingsAreFilteredLikeTheSpeed) {
   EXPECT_LT(flow.norm(), 0.9 * raw.norm()) << "the filter removes noise";
 }
 
-TEST(ApplyEffects, CallingItAgainReplacesEarlierEffects) {
+TEST(ApplyEffects, AnotherModelReplacesEarlierEffectsAndChangesNoValue) {
   CraneModel model = arm_model();
   const MachineSignals plain = make_signals(model.machine, arm_log());
-  MachineSignals s = plain;
   model.effects = {typical("angle_offset:arm", model.machine),
                    typical("coulomb_friction:arm", model.machine)};
-  apply_effects(model, s);
-  const Eigen::VectorXd once = s.cylinders[0].model_force, speed = s.cylinders[0].speed;
-  EXPECT_GT((speed - plain.cylinders[0].speed).cwiseAbs().maxCoeff(), 1e-5) << "another lever";
-  apply_effects(model, s);
-  EXPECT_EQ(s.cylinders[0].model_force, once);
-  apply_effects(arm_model(), s);
+  const MachineSignals once = with_effects(model, plain), twice = with_effects(model, once);
+  EXPECT_GT((once.cylinders[0].speed - plain.cylinders[0].speed).cwiseAbs().maxCoeff(), 1e-5)
+      << "another lever";
+  EXPECT_EQ(plain.cylinders[0].model_force, plain.cylinders[0].static_force);
+  EXPECT_EQ(twice.cylinders[0].model_force, once.cylinders[0].model_force);
+  const MachineSignals s = with_effects(arm_model(), twice);
   EXPECT_EQ(s.cylinders[0].model_force, plain.cylinders[0].static_force);
   EXPECT_EQ(s.cylinders[0].static_force, plain.cylinders[0].static_force);
   EXPECT_EQ(s.cylinders[0].speed, plain.cylinders[0].speed);

@@ -38,7 +38,7 @@ inline Machine two_direct_cylinders() {
 inline MachineSeries two_cylinder_series(const Machine& m) {
   MachineSeries s;
   constexpr Eigen::Index n = 2000;
-  s.machine = &m;
+  s.machine = std::make_shared<const Machine>(m);
   s.step = 0.02;
   s.time = Eigen::VectorXd::LinSpaced(n, 0.0, s.step * static_cast<double>(n - 1));
   s.runs = {{0, 1200}, {1200, n}};

@@ -105,7 +105,7 @@ MachineSeries log_of(const Machine& machine, const Motion& motion, double second
   MachineSeries log;
   const auto n = static_cast<Eigen::Index>(std::lround(seconds / step)) + 1;
   const Eigen::Index joints = machine.joint_count();
-  log.machine = &machine;
+  log.machine = std::make_shared<const Machine>(machine);
   log.step = step;
   log.time = Eigen::VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
   log.runs = {{0, n}};

@@ -1,0 +1,50 @@
+#pragma once
+/// What a verb tells while it works, on stderr: warnings, progress; and interruption by Ctrl-C.
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+namespace sparflow::cli {
+
+/// Progress on stderr. On a terminal it rewrites one line; elsewhere (a file, a job's log) it prints a plain line at
+/// the beginning and one every ten seconds, also while nothing new is reported, to show that the work goes on.
+class Progress {
+ public:
+  explicit Progress(std::string what);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  void operator()(double share, const std::string& what);
+
+ private:
+  void print_periodically(const std::stop_token& stop);
+
+  std::string what_;
+  bool terminal_ = false;
+  std::size_t width_ = 0;
+  double last_ = -1.0;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::mutex mutex_;  ///< guards share_ and doing_
+  double share_ = 0.0;
+  std::string doing_;
+  std::condition_variable_any ended_;
+  std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
+};
+
+/// Lets Ctrl-C end the program with exit code 130 from now on.
+void catch_interrupts();
+/// Lets the first Ctrl-C only set interrupted() from now on, so that the verb finishes with the best result so far;
+/// the second ends the program.
+void finish_on_interrupt();
+/// True once Ctrl-C was pressed, in child processes too.
+bool interrupted();
+
+/// Prints "warning: " and the sentence on stderr.
+void warn(const std::string& sentence);
+/// Prints the sentence on stderr.
+void note(const std::string& sentence);
+
+}  // namespace sparflow::cli

@@ -1,0 +1,79 @@
+#include "apps/cli/outputs.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "models/math/error.h"
+
+namespace sparflow::cli {
+
+void Outputs::add_to(CLI::App& verb, bool with_report) {
+  verb.add_option("--json", json, "write the result to FILE as JSON")->type_name("FILE");
+  if (with_report) {
+    verb.add_option("--report", report,
+                    "write a page with figures to FILE.html; it needs no network")
+        ->type_name("FILE.html");
+  }
+}
+
+void check_writable(const std::string& path) {
+  if (path.empty()) return;
+  namespace fs = std::filesystem;
+  const fs::path folder =
+      fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
+  std::error_code error;
+  if (fs::is_directory(path, error))
+    throw InputError({path, 0, 0}, "", "cannot write: this is a folder; give a file name");
+  if (!fs::is_directory(folder, error)) {
+    throw InputError(
+        {path, 0, 0}, "",
+        fmt::format("cannot write: there is no folder {}; create it first", folder.string()));
+  }
+  if (::access(folder.c_str(), W_OK) != 0) {
+    throw InputError({path, 0, 0}, "",
+                     fmt::format("cannot write: no permission in {}", folder.string()));
+  }
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::equivalent(a, b, error)) return true;
+  const fs::path whole_a = fs::weakly_canonical(fs::absolute(a, error), error);
+  const fs::path whole_b = fs::weakly_canonical(fs::absolute(b, error), error);
+  return !whole_a.empty() && whole_a == whole_b;
+}
+
+std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths) {
+  std::vector<NamedFile> files;
+  files.reserve(paths.size());
+  for (const std::string& path : paths) files.push_back({option, path});
+  return files;
+}
+
+void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& outputs,
+                         const std::vector<NamedFile>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].path.empty()) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (outputs[j].path.empty() || !same_file(outputs[i].path, outputs[j].path)) continue;
+      throw UsageError(
+          fmt::format("{}: {} and {} name the same file, {}; give each a file of its own", verb,
+                      outputs[j].option, outputs[i].option, outputs[i].path));
+    }
+    for (const NamedFile& input : inputs) {
+      if (input.path.empty() || !same_file(outputs[i].path, input.path)) continue;
+      throw UsageError(fmt::format("{}: {} would overwrite the input {} (given with {})", verb,
+                                   outputs[i].option, input.path, input.option));
+    }
+  }
+}
+
+void Outputs::check() const {
+  check_writable(json);
+  check_writable(report);
+}
+
+}  // namespace sparflow::cli
