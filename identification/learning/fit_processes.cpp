@@ -45,12 +45,6 @@ struct ProcessData {
   }
 };
 
-GpDataset rows_of(const GpDataset& all, const std::vector<Index>& rows) {
-  std::vector<int> group;
-  for (const Index row : rows) group.push_back(all.group[static_cast<std::size_t>(row)]);
-  return {all.name, all.flow(rows), all.force(rows), all.pressure(rows), std::move(group)};
-}
-
 /// Groups of samples that a law is judged on when it is learned without them: the logs, or the blocks of motion of a
 /// single log. @param log [samples]  @param row [samples] within its log
 std::vector<int> groups_of(const TrainingData& data, const std::vector<std::size_t>& log,
@@ -207,7 +201,7 @@ GpDataset thinned_set(const ProcessData& data, const VectorXd& residual, int ste
   for (const Index row : thinned(data.position, step)) {
     if (threshold <= 0.0 || std::abs(residual[row]) <= limit) rows.push_back(row);
   }
-  return rows_of(data.set, rows);
+  return data.set.select(rows);
 }
 
 /// Subtracts the effects on the return chambers. Their transmission to the supply follows from the pressure models that are

@@ -258,7 +258,64 @@ double rms_error(const GaussianProcess& process, const ArrayXd& flow, const Arra
   return std::sqrt(sum / static_cast<double>(flow.size()));
 }
 
+/// @throws InputError with fewer than `min_samples` finite rows
+GpDataset finite_samples(const GpDataset& samples, const LearnGpOptions& options,
+                         GpReport& report) {
+  const ArrayXd &flow = samples.flow, &force = samples.force, &pressure = samples.pressure;
+  SPARFLOW_CHECK(flow.size() == force.size() && flow.size() == pressure.size(),
+                 "flow, force and pressure must be equally long");
+  report.given = static_cast<int>(flow.size());
+  std::vector<Index> rows;
+  for (Index i = 0; i < flow.size(); ++i) {
+    if (std::isfinite(flow[i]) && std::isfinite(force[i]) && std::isfinite(pressure[i])) {
+      rows.push_back(i);
+    }
+  }
+  report.invalid = report.given - static_cast<int>(rows.size());
+  // With fewer than three samples the mean alone is not determined.
+  const int fewest = std::max(options.min_samples, 3);
+  if (static_cast<int>(rows.size()) < fewest) {
+    throw InputError({}, "pressure",
+                     fmt::format("got {} usable samples ({} given, {} not finite), expected at "
+                                 "least {}; log more motion in this direction",
+                                 rows.size(), report.given, report.invalid, fewest));
+  }
+  return samples.select(rows);
+}
+
+/// Fits representatives of the samples, which gives initial values and the reference for outliers, and removes these.
+/// @param samples without the outliers afterwards  @param hyper initial values
+Problem without_outliers(GpDataset& samples, const LearnGpOptions& options, GpHyper& hyper,
+                         GpReport& report) {
+  const Problem all = make_problem(samples.flow, samples.force, samples.pressure, options);
+  const std::vector<Index> few = representative_points(all.points, options.representative_cells);
+  hyper = preliminary_fit(all, all.points.select(few), report);
+  const Screening screening = screen_outliers(all.points, few, hyper, options.outlier_threshold,
+                                              options.max_outlier_fraction);
+  if (screening.too_many) {
+    report.warnings.push_back(
+        "So many samples lie far from a smooth pressure that they are no outliers: all are kept.");
+  }
+  report.outliers = static_cast<int>(all.points.size()) - static_cast<int>(screening.kept.size());
+  report.used = static_cast<int>(screening.kept.size());
+  if (report.outliers == 0) return all;
+  samples = samples.select(screening.kept);
+  // Removing outliers may reduce the scales; the hyperparameters are converted to the new ones.
+  Problem kept = make_problem(samples.flow, samples.force, samples.pressure, options);
+  hyper[0] += std::log(all.flow.scale / kept.flow.scale);
+  hyper[1] += std::log(all.force.scale / kept.force.scale);
+  hyper.tail<2>().array() += 2.0 * std::log(all.pressure.scale / kept.pressure.scale);
+  return kept;
+}
+
 }  // namespace
+
+GpDataset GpDataset::select(const std::vector<Index>& rows) const {
+  std::vector<int> groups;
+  for (std::size_t i = 0; i < rows.size() && !group.empty(); ++i)
+    groups.push_back(group[static_cast<std::size_t>(rows[i])]);
+  return {name, flow(rows), force(rows), pressure(rows), std::move(groups)};
+}
 
 const char* gp_method_name(GpMethod method) {
   switch (method) {
@@ -280,61 +337,11 @@ LearnedGp learn_gp(const Eigen::Ref<const ArrayXd>& flow, const Eigen::Ref<const
 
 LearnedGp learn_gp(const GpDataset& samples, const LearnGpOptions& options) {
   const auto start_time = std::chrono::steady_clock::now();
-  const ArrayXd &flow = samples.flow, &force = samples.force, &pressure = samples.pressure;
-  SPARFLOW_CHECK(flow.size() == force.size() && flow.size() == pressure.size(),
-                 "flow, force and pressure must be equally long");
   LearnedGp learned;
   GpReport& report = learned.report;
-  report.given = static_cast<int>(flow.size());
-  std::vector<Index> rows;
-  for (Index i = 0; i < flow.size(); ++i) {
-    if (std::isfinite(flow[i]) && std::isfinite(force[i]) && std::isfinite(pressure[i])) {
-      rows.push_back(i);
-    }
-  }
-  report.invalid = report.given - static_cast<int>(rows.size());
-  // With fewer than three samples the mean alone is not determined.
-  const int fewest = std::max(options.min_samples, 3);
-  if (static_cast<int>(rows.size()) < fewest) {
-    throw InputError({}, "pressure",
-                     fmt::format("got {} usable samples ({} given, {} not finite), expected at "
-                                 "least {}; log more motion in this direction",
-                                 rows.size(), report.given, report.invalid, fewest));
-  }
-  ArrayXd q = flow(rows), f = force(rows), p = pressure(rows);
-  std::vector<int> group;
-  for (std::size_t i = 0; i < rows.size() && !samples.group.empty(); ++i)
-    group.push_back(samples.group[static_cast<std::size_t>(rows[i])]);
-  Problem problem = make_problem(q, f, p, options);
-
-  // The preliminary fit on representatives gives initial values and the reference for outliers.
-  const std::vector<Index> few =
-      representative_points(problem.points, options.representative_cells);
-  GpHyper hyper = preliminary_fit(problem, problem.points.select(few), report);
-  const Screening screening = screen_outliers(problem.points, few, hyper, options.outlier_threshold,
-                                              options.max_outlier_fraction);
-  if (screening.too_many) {
-    report.warnings.push_back(
-        "So many samples lie far from a smooth pressure that they are no outliers: all are kept.");
-  }
-  report.outliers = static_cast<int>(rows.size() - screening.kept.size());
-  report.used = static_cast<int>(screening.kept.size());
-  if (report.outliers > 0) {
-    q = ArrayXd(q(screening.kept));
-    f = ArrayXd(f(screening.kept));
-    p = ArrayXd(p(screening.kept));
-    std::vector<int> kept;
-    for (std::size_t i = 0; i < screening.kept.size() && !group.empty(); ++i)
-      kept.push_back(group[static_cast<std::size_t>(screening.kept[i])]);
-    group = std::move(kept);
-    // Removing outliers may reduce the scales; the hyperparameters are converted to the new ones.
-    const Problem before = problem;
-    problem = make_problem(q, f, p, options);
-    hyper[0] += std::log(before.flow.scale / problem.flow.scale);
-    hyper[1] += std::log(before.force.scale / problem.force.scale);
-    const double ratio = 2.0 * std::log(before.pressure.scale / problem.pressure.scale);
-    hyper.tail<2>().array() += ratio;
-  }
+  GpDataset used = finite_samples(samples, options, report);
+  GpHyper hyper;
+  const Problem problem = without_outliers(used, options, hyper, report);
   const GpPoints& points = problem.points;
 
   report.method = options.method;
@@ -351,28 +358,28 @@ LearnedGp learn_gp(const GpDataset& samples, const LearnGpOptions& options) {
     posterior = fit_subset(problem, points, options, hyper, report);
   }
 
+  const GpHyper plane = plane_hyper(problem);
   if (options.simplest_law &&
-      plane_is_not_worse({points, group, hyper, plane_hyper(problem)}, options, report)) {
+      plane_is_not_worse({points, used.group, hyper, plane}, options, report)) {
     report.law = PressureLaw::kPlane;
-    hyper = plane_hyper(problem);
+    hyper = plane;
     posterior = SparseGp(points, {points.size() / 2}).posterior(hyper);
     posterior.weight.setZero();
   }
-
   report.plane_left_out *= problem.pressure.scale;
   report.process_left_out *= problem.pressure.scale;
 
   GpParameters& out = learned.parameters;
   out = to_si(problem, posterior, hyper);
   out.law = report.law;
-  out.flow_min = q.minCoeff();
-  out.flow_max = q.maxCoeff();
-  out.force_min = f.minCoeff();
-  out.force_max = f.maxCoeff();
+  out.flow_min = used.flow.minCoeff();
+  out.flow_max = used.flow.maxCoeff();
+  out.force_min = used.force.minCoeff();
+  out.force_max = used.force.maxCoeff();
   out.data_count = report.used;
   report.centres = static_cast<int>(out.weight.size());
   report.noise_std = out.noise_std;
-  report.rmse = rms_error(GaussianProcess(out), q, f, p);
+  report.rmse = rms_error(GaussianProcess(out), used.flow, used.force, used.pressure);
   add_warnings(problem, hyper, report);
   report.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_time).count();

@@ -128,6 +128,8 @@ struct GpDataset {
   /// [samples] log, or block of motion in a single log, of each sample; empty: one group. Samples of one group have
   /// errors in common, so that only a group left out whole shows how a law predicts other motions.
   std::vector<int> group = {};
+
+  GpDataset select(const std::vector<Eigen::Index>& rows) const;
 };
 
 struct LearnedGp {
