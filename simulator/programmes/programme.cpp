@@ -36,9 +36,9 @@ double LeverMap::fastest(int cylinder, bool extend) const {
   return extend ? p.max_flow_extend / drive.area_piston() : p.max_flow_retract / drive.area_rod();
 }
 
-std::vector<double> follow(const Machine& machine, const LeverMap& levers, const Record& measured,
-                           const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
-                           const FollowerOptions& options) {
+std::vector<double> follow(const LeverMap& levers, const Record& measured, const Eigen::VectorXd& q,
+                           const Eigen::VectorXd& qd, const FollowerOptions& options) {
+  const Machine& machine = levers.machine();
   std::vector<double> command(machine.cylinders.size(), 0.0);
   for (int c = 0; c < machine.cylinder_count(); ++c) {
     const int j = machine.cylinders[static_cast<std::size_t>(c)].joint;

@@ -25,6 +25,7 @@ class Programme {
 class LeverMap {
  public:
   LeverMap(const Machine& machine, const PlantParameters& parameters);
+  const Machine& machine() const { return machine_; }
   /// @param speed [m/s] of the rod, positive extends @return [-1..1]
   double lever(int cylinder, double speed) const;
   /// Fastest rod speed that valve and pump allow this cylinder alone. [m/s]
@@ -45,8 +46,8 @@ struct FollowerOptions {
   double rest = 0.003;
 };
 
-std::vector<double> follow(const Machine& machine, const LeverMap& levers, const Record& measured,
-                           const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
-                           const FollowerOptions& options = {});
+/// @param q, qd wanted joint positions and rates
+std::vector<double> follow(const LeverMap& levers, const Record& measured, const Eigen::VectorXd& q,
+                           const Eigen::VectorXd& qd, const FollowerOptions& options = {});
 
 }  // namespace sparflow::plant

@@ -23,7 +23,7 @@ std::optional<double> changed_payload(const TimeTable& table, Eigen::Index row, 
 class TrackedMotion : public Programme {
  public:
   TrackedMotion(const Machine& machine, const PlantParameters& parameters, TimeTable motion)
-      : machine_(machine), levers_(machine, parameters), motion_(std::move(motion)) {}
+      : levers_(machine, parameters), motion_(std::move(motion)) {}
   std::vector<double> start() const override { return motion_.start; }
   double start_payload() const override { return motion_.start_payload; }
 
@@ -36,13 +36,12 @@ class TrackedMotion : public Programme {
     const Eigen::VectorXd rate = (motion_.values.row(i + 1) - motion_.values.row(i)) / width;
     const Eigen::VectorXd at = motion_.values.row(i).transpose() + share * width * rate;
     s.end = t > motion_.t[rows - 1];
-    s.command = follow(machine_, levers_, r, at, s.end ? Eigen::VectorXd::Zero(at.size()) : rate);
+    s.command = follow(levers_, r, at, s.end ? Eigen::VectorXd::Zero(at.size()) : rate);
     s.payload = changed_payload(motion_, i, r.payload);
     return s;
   }
 
  private:
-  const Machine& machine_;
   LeverMap levers_;
   TimeTable motion_;
 };

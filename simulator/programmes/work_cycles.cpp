@@ -49,7 +49,7 @@ class WorkCycles : public Programme {
       s.payload = leg.payload_after;
       handled_ = true;
     }
-    s.command = follow(machine_, levers_, r, at, rate);
+    s.command = follow(levers_, r, at, rate);
     if (t > duration_ + (leg.payload_after ? kHandling : 0.3)) {
       from_ = leg.to;
       begin_ = -1.0;

@@ -21,12 +21,15 @@ struct EndStop {
   double stored = 0.0;  ///< [J]
 };
 
-/// @param gap [m] way left to the stop, negative when it yields @param speed [m/s] towards the stop
-/// @param area [m^2] @param reference_speed [m/s] @param stiffness [N/m] of the stop
-/// @return force against the motion towards the stop, with the sign of a push away from it
 struct EndStopState {
-  double gap = 0.0, speed = 0.0, area = 0.0, reference_speed = 1.0, stiffness = 0.0;
+  double gap = 0.0;              ///< [m] way left to the stop, negative when it yields
+  double speed = 0.0;            ///< [m/s] towards the stop
+  double area = 0.0;             ///< [m^2] of the piston
+  double reference_speed = 1.0;  ///< [m/s] at which the cushion's pressure is told
+  double stiffness = 0.0;        ///< [N/m] of the stop
 };
+
+/// @return force with the sign of a push away from the stop
 inline EndStop end_stop(const EndStopState& s, const EndStopParameters& p) {
   EndStop r;
   if (p.cushion_length > 0.0 && s.gap < p.cushion_length && s.speed > 0.0) {

@@ -101,6 +101,7 @@ PlantParameters default_parameters(const Machine& machine) {
   for (const Pump& pump : machine.pumps) {
     PumpParameters p;
     p.max_flow = pump.max_flow;
+    p.flow_sharing = 1.0;
     p.cut_off = pump.max_pressure;
     p.standby = pump.standby > 0.0 ? pump.standby : p.standby;
     p.leakage = kPumpLeakShare * pump.max_flow / pump.max_pressure;

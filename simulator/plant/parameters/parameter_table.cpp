@@ -282,7 +282,7 @@ constexpr std::array<ParameterRow, 69> kTable = {{
      "chosen",
      [](PlantParameters& p, std::size_t i) -> double& { return p.pumps[i].relief_above; }},
     {Place::kPump, "flow_sharing", "-", 1, 0.0, 1.0,
-     "0", "1: compensators behind the edges share what flow there is",
+     "1", "1: compensators behind the edges share what flow there is",
      "Bosch Rexroth LUDV sections",
      [](PlantParameters& p, std::size_t i) -> double& { return p.pumps[i].flow_sharing; }},
 }};

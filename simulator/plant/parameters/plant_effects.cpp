@@ -10,7 +10,7 @@
 namespace sparflow::plant {
 namespace {
 
-constexpr std::array<PlantEffect, 27> kEffects = {{
+constexpr std::array<PlantEffect, 31> kEffects = {{
     {"coulomb_friction", "coulomb_friction_N", 0.0, true, "dry friction with presliding (LuGre)"},
     {"stiction", "stiction_ratio", 1.0, true, "breakaway above dry friction"},
     {"viscous_friction", "viscous_friction_N_s_m", 0.0, true,
@@ -19,6 +19,7 @@ constexpr std::array<PlantEffect, 27> kEffects = {{
     {"compressibility", "bulk_modulus_MPa", 1e4, true, "oil yields to pressure"},
     {"entrained_air", "air_fraction", 0.0, true, "softens the oil at low pressure"},
     {"hose_expansion", "hose_modulus_MPa", 1e4, true, "hoses widen under pressure"},
+    {"hose_volume", "hose_volume_l", 0.05, true, "oil in the hoses between valve and cylinder"},
     {"line_loss", "line_drop_bar", 0.2, true, "between valve and cylinder"},
     {"return_back_pressure", "tank_drop_bar", 0.05, true,
      "of filter and return line, shared by all cylinders"},
@@ -35,12 +36,15 @@ constexpr std::array<PlantEffect, 27> kEffects = {{
     {"pump_lag", "response_s", 0.008, true, "of the pump's pressure control"},
     {"pump_leakage", "pump_leakage_lpm_100bar", 1.0, true,
      "into the pump's case; off: what lets the line down"},
+    {"flow_saturation", "max_flow_lpm", 2000.0, true, "largest flow of the pump"},
     {"torque_limit", "power_kW", 1e5, true, "least of torque limit and asked flow"},
     {"flow_sharing", "flow_sharing", 0.0, false,
      "an exhausted pump's flow is shared in proportion"},
     {"sway", "rope_length_m", 0.0, true, "payload on a rope, two angles"},
     {"flexible_boom", "boom_flex_rad", 0.0, false, "booms bend"},
-    {"sensor_noise", "pressure_noise_bar", 0.0, true, "of pressures; positions keep theirs"},
+    {"sensor_noise", "pressure_noise_bar", 0.0, true, "of pressures"},
+    {"position_noise", "position_noise", 0.0, true, "of positions"},
+    {"quantisation", "pressure_step_bar", 0.0, true, "of pressures"},
     {"pressure_offset", "pressure_offset_bar", 0.0, false, "of the bore side's sensor"},
     {"sensor_delay", "sensor_delay_s", 0.0, false, "pressures come late"},
     {"drop_outs", "drop_out_per_s", 0.0, false, "gaps in single channels"},

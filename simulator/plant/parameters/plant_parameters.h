@@ -68,7 +68,8 @@ struct PlantParameters {
   std::vector<PumpParameters> pumps;
 };
 
-/// Nominal values of every effect, derived from the machine file; see parameter_table.h.
+/// Nominal values of every effect, derived from the machine file; see parameter_table.h. Those effects are on, too, that
+/// are off unless named: apply_effects (plant_effects.h) without items switches them off.
 /// @throws InputError when a hydraulic cylinder is fed by no pump
 PlantParameters default_parameters(const Machine& machine);
 

@@ -62,7 +62,8 @@ PlantSystem::PlantSystem(const Machine& machine, const PlantParameters& paramete
     const double capacity =
         line.volume(100e5) / oil_.at(100e5).modulus + line.hose / line.hose_modulus;
     pump_gains_.push_back(pump_gains(pump, capacity));
-    tank_full_flow_ += pump.max_flow;
+    // of the machine's pumps, not of one whose limit is switched off
+    tank_full_flow_ += m.pumps[index(p)].max_flow;
   }
   tank_full_flow_ = std::max(tank_full_flow_, 1e-4);
   mass_.setZero(layout_.coordinates, layout_.coordinates);

@@ -77,6 +77,7 @@ PlantParameters with(const std::vector<std::string>& items) {
   const Machine machine = crane();
   PlantParameters p = default_parameters(machine);
   std::vector<EffectSetting> settings;
+  settings.reserve(items.size());
   for (const std::string& i : items) settings.push_back(parse_effect(i));
   apply_effects(machine, settings, p);
   return p;
@@ -104,6 +105,20 @@ TEST(PlantEffects, EachOffValueIsWithinTheBoundsOfItsParameter) {
     EXPECT_GE(e.off, row->lowest) << e.name;
     EXPECT_LE(e.off, row->highest) << e.name;
     EXPECT_THAT(effects_help(), testing::HasSubstr(std::string(e.name)));
+  }
+}
+
+TEST(PlantEffects, EachPassesFromOnToOffAndChangesItsParameterAlone) {
+  for (const PlantEffect& e : plant_effects()) {
+    PlantParameters on = with({std::string(e.name)}), off = with({std::string(e.name) + "=off"});
+    for (const ParameterRow& row : parameter_table()) {
+      const double before = row.value(on, 0), after = row.value(off, 0);
+      if (row.key == e.key) {
+        EXPECT_NE(before, after) << e.name;
+      } else {
+        EXPECT_EQ(before, after) << e.name << " changes " << row.key;
+      }
+    }
   }
 }
 

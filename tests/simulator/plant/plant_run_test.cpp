@@ -23,6 +23,7 @@ PlantParameters plain_parameters(const Machine& machine) {
   PlantParameters p = default_parameters(machine);
   p.flex_angle = 0.0;
   p.pendulum.rope_length = 0.0;
+  for (PumpParameters& pump : p.pumps) pump.flow_sharing = 0.0;
   return p;
 }
 

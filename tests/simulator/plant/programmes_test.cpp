@@ -24,6 +24,7 @@ Machine machine_at(const std::string& name) {
 PlantParameters nominal(const Machine& machine, const std::vector<std::string>& effects = {}) {
   PlantParameters p = default_parameters(machine);
   std::vector<EffectSetting> settings;
+  settings.reserve(effects.size());
   for (const std::string& e : effects) settings.push_back(parse_effect(e));
   apply_effects(machine, settings, p);
   return p;
@@ -186,8 +187,9 @@ std::vector<std::vector<double>> rising(const std::vector<std::string>& effects)
 constexpr std::size_t kBorePressure = 1 + 3 + 3;  // behind time, positions and commands
 
 TEST(PlantSensors, NoiseOffsetDelayAndQuantisationAreWhatTheirParametersSay) {
-  const auto exact = rising({"none"});
-  EXPECT_NEAR(exact[1000][kBorePressure], 1000.0, 0.051);  // steps of 0.1 bar
+  EXPECT_DOUBLE_EQ(rising({"none"})[1000][kBorePressure], 1000.0);
+  const auto coarse = rising({"none", "quantisation=7"});
+  EXPECT_NEAR(coarse[1000][kBorePressure], 1001.0, 1e-9);  // 143 steps
   const auto late = rising({"none", "sensor_delay=0.2"});
   EXPECT_NEAR(late[1000][kBorePressure], 980.0, 0.051);
   const auto shifted = rising({"none", "pressure_offset:boom=3"});
