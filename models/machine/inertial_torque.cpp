@@ -1,7 +1,7 @@
 #include "models/machine/inertial_torque.h"
 
 #include "models/machine/linkage.h"
-#include "models/math/jet_eigen.h"
+#include "models/math/jet.h"
 #include "models/math/taylor.h"
 
 namespace sparflow {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "models/machine/machine.h"
-#include "models/math/dual.h"
+#include "models/math/scalar.h"
 
 namespace sparflow {
 

@@ -6,15 +6,14 @@ namespace sparflow {
 
 namespace {
 
+using Series = TaylorSeries<3>;
+
 /// k + c cos q + s sin q, the form of squared distances and scalar products of a rotating pin's position.
 struct Turning {
   double k, c, s;
-  Taylor3 at(double cosine, double sine) const {
-    Taylor3 t(k + c * cosine + s * sine);
-    t.d1 = s * cosine - c * sine;
-    t.d2 = -(c * cosine + s * sine);
-    t.d3 = -t.d1;
-    return t;
+  Series at(double cosine, double sine) const {
+    const double along = c * cosine + s * sine, across = s * cosine - c * sine;
+    return Series::from_derivatives({k + along, across, -along, -across});
   }
 };
 
@@ -35,7 +34,7 @@ struct TurningPin {
   Eigen::Vector3d centre, across, turned;
 };
 
-Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosine, double sine) {
+Series four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosine, double sine) {
   using std::sqrt;
   const Eigen::Vector3d axis = joint.origin.linear() * joint.axis;
   TurningPin coupler(joint, f.coupler);
@@ -43,14 +42,14 @@ Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosi
   Eigen::Vector3d& centre = coupler.centre;
   centre -= f.rocker;
   centre -= axis * axis.dot(centre);
-  const Taylor3 w2 = coupler.distance2(Eigen::Vector3d::Zero()).at(cosine, sine);
+  const Series w2 = coupler.distance2(Eigen::Vector3d::Zero()).at(cosine, sine);
   const double r = f.rocker_length, k = f.coupler_length;
   // The rod pin is rocker + along w + beside (axis x w), at the rocker's length from the rocker pin.
-  const Taylor3 inverse = Taylor3(1.0) / w2;
-  const Taylor3 along = Taylor3(0.5) + Taylor3(0.5 * (r * r - k * k)) * inverse;
-  const Taylor3 beside2 = Taylor3(r * r) * inverse - along * along;
-  if (!(beside2.value > 0.0)) throw std::domain_error("the four-bar cannot close");
-  const Taylor3 beside = sqrt(beside2);
+  const Series inverse = 1.0 / w2;
+  const Series along = 0.5 + 0.5 * (r * r - k * k) * inverse;
+  const Series beside2 = r * r * inverse - along * along;
+  if (!(beside2.value() > 0.0)) throw std::domain_error("the four-bar cannot close");
+  const Series beside = sqrt(beside2);
   const Eigen::Vector3d base = f.rocker - f.barrel, across = base.cross(axis);
   const auto product = [&](const Eigen::Vector3d& with) {
     return Turning{with.dot(centre), with.dot(coupler.across), with.dot(coupler.turned)}.at(cosine,
@@ -58,8 +57,8 @@ Taylor3 four_bar_length(const FourBarLinkage& f, const Joint& joint, double cosi
   };
   // base . (axis x w) = (base x axis) . w
   const double branch = static_cast<double>(f.branch);
-  return sqrt(Taylor3(base.squaredNorm() + r * r) +
-              Taylor3(2.0) * (along * product(base) + beside * product(branch * across)));
+  return sqrt(base.squaredNorm() + r * r +
+              2.0 * (along * product(base) + beside * product(branch * across)));
 }
 
 }  // namespace
@@ -72,7 +71,7 @@ Taylor3 linkage_rates(const Machine& machine, int cylinder, double q) {
   const auto* pins = std::get_if<PinsLinkage>(&c.linkage);
   const auto* four_bar = std::get_if<FourBarLinkage>(&c.linkage);
   if (joint.type == JointType::kPrismatic || (pins == nullptr && four_bar == nullptr))
-    return cylinder_length(machine, cylinder, Taylor3::variable(q));
+    return cylinder_length(machine, cylinder, Series::variable(q));
   const double cosine = std::cos(q), sine = std::sin(q);
   if (four_bar != nullptr) return four_bar_length(*four_bar, joint, cosine, sine);
   return sqrt(TurningPin(joint, pins->child_pin).distance2(pins->parent_pin).at(cosine, sine));

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "models/machine/machine.h"
-#include "models/math/dual.h"
+#include "models/math/taylor.h"
 
 namespace sparflow {
 
@@ -17,20 +17,20 @@ Vector3<T> child_point_in_parent(const Joint& joint, const Eigen::Vector3d& poin
   using std::sin;
   Vector3<T> local;
   if (joint.type == JointType::kPrismatic) {
-    for (int i = 0; i < 3; ++i) local[i] = T(point[i]) + T(joint.axis[i]) * q;
+    for (int i = 0; i < 3; ++i) local[i] = point[i] + joint.axis[i] * q;
   } else {
     // Rodrigues: the part along the axis is constant, the rest rotates.
     const Eigen::Vector3d along = joint.axis * joint.axis.dot(point);
     const Eigen::Vector3d across = point - along;
     const Eigen::Vector3d turned = joint.axis.cross(point);
     const T c = cos(q), s = sin(q);
-    for (int i = 0; i < 3; ++i) local[i] = T(along[i]) + T(across[i]) * c + T(turned[i]) * s;
+    for (int i = 0; i < 3; ++i) local[i] = along[i] + across[i] * c + turned[i] * s;
   }
   Vector3<T> result;
   const Eigen::Matrix3d rotation = joint.origin.linear();
   for (int i = 0; i < 3; ++i) {
-    result[i] = T(joint.origin.translation()[i]) + T(rotation(i, 0)) * local[0] +
-                T(rotation(i, 1)) * local[1] + T(rotation(i, 2)) * local[2];
+    result[i] = joint.origin.translation()[i] + rotation(i, 0) * local[0] +
+                rotation(i, 1) * local[1] + rotation(i, 2) * local[2];
   }
   return result;
 }
@@ -67,10 +67,10 @@ LinkagePins<T> linkage_pins(const Machine& machine, int cylinder, const T& q) {
     const T distance2 = between.dot(between);
     const T distance = sqrt(distance2);
     const double r = f->rocker_length, k = f->coupler_length;
-    const T a = (distance2 + T(r * r - k * k)) / (T(2.0) * distance);
-    const T h2 = T(r * r) - a * a;
+    const T a = (distance2 + (r * r - k * k)) / (2.0 * distance);
+    const T h2 = r * r - a * a;
     if (!(plain(h2) > 0.0)) throw std::domain_error("the four-bar cannot close");
-    const T h = sqrt(h2) * T(static_cast<double>(f->branch));
+    const T h = static_cast<double>(f->branch) * sqrt(h2);
     Vector3<T> e, n;
     for (int i = 0; i < 3; ++i) e[i] = between[i] / distance;
     n = axis.cross(e);
@@ -88,7 +88,7 @@ template <class T>
 T cylinder_length(const Machine& machine, int cylinder, const T& q) {
   using std::sqrt;
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
-  if (const auto* rack = std::get_if<RackLinkage>(&c.linkage)) return T(rack->radius) * q;
+  if (const auto* rack = std::get_if<RackLinkage>(&c.linkage)) return rack->radius * q;
   if (std::holds_alternative<DirectLinkage>(c.linkage)) return q;
   const LinkagePins<T> pins = linkage_pins(machine, cylinder, q);
   const Vector3<T> d = pins.rod - pins.barrel;
@@ -136,16 +136,16 @@ void append_linkage_masses(const Machine& machine, int cylinder, const T& q,
   }
   const auto between = [](const Vector3<T>& from, const Vector3<T>& to, double share) {
     Vector3<T> p;
-    for (int i = 0; i < 3; ++i) p[i] = from[i] + T(share) * (to[i] - from[i]);
+    for (int i = 0; i < 3; ++i) p[i] = from[i] + share * (to[i] - from[i]);
     return p;
   };
   Vector3<T> p;
   if (c.barrel_mass > 0.0) {
-    for (int i = 0; i < 3; ++i) p[i] = pins.barrel[i] + T(c.barrel_cog) * direction[i];
+    for (int i = 0; i < 3; ++i) p[i] = pins.barrel[i] + c.barrel_cog * direction[i];
     out.push_back({c.barrel_mass, p});
   }
   if (c.rod_mass > 0.0) {
-    for (int i = 0; i < 3; ++i) p[i] = pins.rod[i] - T(c.rod_cog) * direction[i];
+    for (int i = 0; i < 3; ++i) p[i] = pins.rod[i] - c.rod_cog * direction[i];
     out.push_back({c.rod_mass, p});
   }
   if (f && f->rocker_mass > 0.0) {

@@ -1,5 +1,7 @@
 #include "models/machine/static_force.h"
 
+#include "models/math/jet.h"
+
 namespace sparflow {
 namespace {
 
@@ -53,15 +55,15 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_torque(const Machine& machine,
     add_rigid(machine.tip.payload_scale * payload, machine.tip.joint,
               point_in_base(frames, machine.tip.joint, machine.tip.xyz));
   }
-  std::vector<LinkageMass<Taylor3>> masses;
+  std::vector<LinkageMass<TaylorSeries<3>>> masses;
   for (int c = 0; c < machine.cylinder_count(); ++c) {
     const int j = machine.cylinders[static_cast<std::size_t>(c)].joint;
     masses.clear();
-    append_linkage_masses(machine, c, Taylor3::variable(plain(q[j])), masses);
-    for (const LinkageMass<Taylor3>& m : masses) {
+    append_linkage_masses(machine, c, TaylorSeries<3>::variable(plain(q[j])), masses);
+    for (const LinkageMass<TaylorSeries<3>>& m : masses) {
       Vector3<T> local, rate;
       for (int i = 0; i < 3; ++i) {
-        const Taylor3& x = m.position[i];
+        const Taylor3 x = m.position[i];
         local[i] = lifted(q[j], x.value, x.d1, x.d2);
         rate[i] = lifted(q[j], x.d1, x.d2, x.d3);
       }
@@ -79,8 +81,8 @@ Eigen::Matrix<T, Eigen::Dynamic, 1> static_torque(const Machine& machine,
 
 template Eigen::Matrix<double, Eigen::Dynamic, 1> static_torque<double>(
     const Machine&, const Eigen::Matrix<double, Eigen::Dynamic, 1>&, double);
-template Eigen::Matrix<Dual2<2>, Eigen::Dynamic, 1> static_torque<Dual2<2>>(
-    const Machine&, const Eigen::Matrix<Dual2<2>, Eigen::Dynamic, 1>&, double);
+template Eigen::Matrix<Jet, Eigen::Dynamic, 1> static_torque<Jet>(
+    const Machine&, const Eigen::Matrix<Jet, Eigen::Dynamic, 1>&, double);
 
 double potential_energy(const Machine& machine, const Eigen::VectorXd& q, double payload) {
   const std::vector<Frame<double>> frames = forward_kinematics<double>(machine, q);
@@ -156,18 +158,19 @@ void StaticForce::accumulate_moments(const double* q, double payload) {
   for (int c = 0; c < machine_->cylinder_count(); ++c) {
     const int j = machine_->cylinders[static_cast<std::size_t>(c)].joint;
     linkage_masses_.clear();
-    append_linkage_masses(*machine_, c, Taylor3::variable(q[j]), linkage_masses_);
-    for (const LinkageMass<Taylor3>& m : linkage_masses_) {
-      const auto part = [&](auto member) {
-        return Eigen::Vector3d(m.position[0].*member, m.position[1].*member, m.position[2].*member);
+    append_linkage_masses(*machine_, c, TaylorSeries<3>::variable(q[j]), linkage_masses_);
+    for (const LinkageMass<TaylorSeries<3>>& m : linkage_masses_) {
+      const auto part = [&](int order) {
+        return Eigen::Vector3d(m.position[0].derivative(order), m.position[1].derivative(order),
+                               m.position[2].derivative(order));
       };
       const Eigen::Matrix3d turn = j > 0 ? chain_.rotation[static_cast<std::size_t>(j - 1)]
                                          : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
       const auto k = static_cast<std::size_t>(j);
-      first_[k] += m.mass * (turn * part(&Taylor3::d1));
-      second_[k] += m.mass * (turn * part(&Taylor3::d2));
-      third_[k] += m.mass * (turn * part(&Taylor3::d3));
-      add_rigid(m.mass, j - 1, chain_.point(j - 1, part(&Taylor3::value)));
+      first_[k] += m.mass * (turn * part(1));
+      second_[k] += m.mass * (turn * part(2));
+      third_[k] += m.mass * (turn * part(3));
+      add_rigid(m.mass, j - 1, chain_.point(j - 1, part(0)));
     }
   }
   // Everything fixed to link k or beyond moves as one body with joint k.

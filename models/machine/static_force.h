@@ -85,7 +85,7 @@ class StaticForce {
   Eigen::MatrixXd torque_jacobian_, force_jacobian_;
   std::vector<Eigen::MatrixXd> torque_hessian_, force_hessian_;
   std::vector<Taylor3> lengths_;
-  std::vector<LinkageMass<Taylor3>> linkage_masses_;
+  std::vector<LinkageMass<TaylorSeries<3>>> linkage_masses_;
   // by joint: mass-weighted position derivatives d/dq_k, d2/dq_k2, d3/dq_k3 of all masses behind it
   std::vector<Eigen::Vector3d> first_, second_, third_;
   std::vector<Eigen::Vector3d> rigid_moment_;  // sum m p of what is fixed to link k or beyond

@@ -3,9 +3,12 @@
 /// the number of joints is known only from the machine file. Value, gradient and packed Hessian are in a fixed
 /// buffer, so that nothing is allocated; operations use only the variables present. Constants have no variables and can
 /// be combined with any number. Fike & Alonso (2011), hyper-dual numbers, in packed form.
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "models/math/scalar.h"
 
 namespace sparflow {
 
@@ -173,3 +176,14 @@ inline Jet tanh(const Jet& a) {
 inline Jet abs(const Jet& a) { return a.value < 0.0 ? -a : a; }
 
 }  // namespace sparflow
+
+/// Traits by which vectors and matrices can hold Jets; kinematics templated on the scalar need them.
+namespace Eigen {
+template <>
+struct NumTraits<sparflow::Jet> : NumTraits<double> {
+  using Real = sparflow::Jet;
+  using NonInteger = sparflow::Jet;
+  using Nested = sparflow::Jet;
+  enum { RequireInitialization = 1, ReadCost = 50, AddCost = 50, MulCost = 200 };
+};
+}  // namespace Eigen

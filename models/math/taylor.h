@@ -1,16 +1,32 @@
 #pragma once
 /// Truncated Taylor series of one variable, to any order, by the classical recurrences (Griewank & Walther 2008,
-/// Evaluating Derivatives, sec. 13.2). Dynamics need one derivative more than statics do.
+/// Evaluating Derivatives, sec. 13.2). Linkages depend on one joint each: statics need three derivatives of a length,
+/// because the Hessian of the static force contains d^3 x / dq^3, and dynamics need a fourth.
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include "models/math/scalar.h"
 
 namespace sparflow {
 
+/// Calls f(integral_constant 0), f(1) ... f(count - 1). With -O2 a loop over so few coefficients is not unrolled, and these
+/// numbers are in the inner loop of an optimisation.
+template <std::size_t count, class F>
+void unrolled(const F& f) {
+  [&]<std::size_t... i>(std::index_sequence<i...>) {
+    (f(std::integral_constant<std::size_t, i>()), ...);
+  }
+  (std::make_index_sequence<count>());
+}
+
 template <int N>
 struct TaylorSeries {
+  static constexpr std::size_t kCount = N + 1;
   /// coefficient[k] = f^(k) / k!
-  std::array<double, N + 1> coefficient{};
+  std::array<double, kCount> coefficient{};
 
   TaylorSeries() = default;
   TaylorSeries(double v) { coefficient[0] = v; }  // NOLINT: constants mix freely
@@ -19,10 +35,15 @@ struct TaylorSeries {
     t.coefficient[1] = 1.0;
     return t;
   }
+  static TaylorSeries from_derivatives(const std::array<double, kCount>& derivatives) {
+    TaylorSeries t;
+    unrolled<kCount>([&](auto k) { t.coefficient[k] = derivatives[k] * (1.0 / kFactorial[k]); });
+    return t;
+  }
+  double value() const { return coefficient[0]; }
   double derivative(int k) const {
-    double factorial = 1.0;
-    for (int i = 2; i <= k; ++i) factorial *= i;
-    return factorial * coefficient[static_cast<std::size_t>(k)];
+    const auto i = static_cast<std::size_t>(k);
+    return kFactorial[i] * coefficient[i];
   }
 
   TaylorSeries& operator+=(const TaylorSeries& b) { return *this = *this + b; }
@@ -30,30 +51,35 @@ struct TaylorSeries {
   TaylorSeries& operator*=(const TaylorSeries& b) { return *this = *this * b; }
   TaylorSeries& operator/=(const TaylorSeries& b) { return *this = *this / b; }
 
-  friend TaylorSeries operator+(TaylorSeries a, const TaylorSeries& b) {
-    for (std::size_t k = 0; k <= N; ++k) a.coefficient[k] += b.coefficient[k];
-    return a;
+  friend TaylorSeries operator+(const TaylorSeries& a, const TaylorSeries& b) {
+    TaylorSeries r;
+    unrolled<kCount>([&](auto k) { r.coefficient[k] = a.coefficient[k] + b.coefficient[k]; });
+    return r;
   }
-  friend TaylorSeries operator-(TaylorSeries a, const TaylorSeries& b) {
-    for (std::size_t k = 0; k <= N; ++k) a.coefficient[k] -= b.coefficient[k];
-    return a;
+  friend TaylorSeries operator-(const TaylorSeries& a, const TaylorSeries& b) {
+    TaylorSeries r;
+    unrolled<kCount>([&](auto k) { r.coefficient[k] = a.coefficient[k] - b.coefficient[k]; });
+    return r;
   }
-  friend TaylorSeries operator-(const TaylorSeries& a) { return TaylorSeries() - a; }
+  friend TaylorSeries operator-(const TaylorSeries& a) { return -1.0 * a; }
+  friend TaylorSeries operator*(double a, const TaylorSeries& b) {
+    TaylorSeries r;
+    unrolled<kCount>([&](auto k) { r.coefficient[k] = a * b.coefficient[k]; });
+    return r;
+  }
   friend TaylorSeries operator*(const TaylorSeries& a, const TaylorSeries& b) {
     TaylorSeries r;
-    for (std::size_t k = 0; k <= N; ++k) {
-      for (std::size_t j = 0; j <= k; ++j)
-        r.coefficient[k] += a.coefficient[j] * b.coefficient[k - j];
-    }
+    unrolled<kCount>([&](auto k) { r.coefficient[k] = convolved<0, k>(a, b, k); });
     return r;
   }
   friend TaylorSeries operator/(const TaylorSeries& a, const TaylorSeries& b) {
+    const double inverse = 1.0 / b.coefficient[0];
     TaylorSeries r;
-    for (std::size_t k = 0; k <= N; ++k) {
+    unrolled<kCount>([&](auto k) {
       double rest = a.coefficient[k];
-      for (std::size_t j = 0; j < k; ++j) rest -= r.coefficient[j] * b.coefficient[k - j];
-      r.coefficient[k] = rest / b.coefficient[0];
-    }
+      if constexpr (k > 0) rest -= convolved<0, k - 1>(r, b, k);
+      r.coefficient[k] = rest * inverse;
+    });
     return r;
   }
   friend bool operator<(const TaylorSeries& a, const TaylorSeries& b) {
@@ -66,24 +92,26 @@ struct TaylorSeries {
 
   friend TaylorSeries sqrt(const TaylorSeries& a) {
     TaylorSeries r(std::sqrt(a.coefficient[0]));
-    for (std::size_t k = 1; k <= N; ++k) {
+    const double half = 0.5 / r.coefficient[0];
+    unrolled<N>([&](auto below) {
+      constexpr std::size_t k = below + 1;
       double rest = a.coefficient[k];
-      for (std::size_t j = 1; j < k; ++j) rest -= r.coefficient[j] * r.coefficient[k - j];
-      r.coefficient[k] = rest / (2.0 * r.coefficient[0]);
-    }
+      if constexpr (k > 1) rest -= convolved<1, k - 1>(r, r, k);
+      r.coefficient[k] = rest * half;
+    });
     return r;
   }
   /// Both at once: each recurrence needs the other.
   static void sin_cos(const TaylorSeries& a, TaylorSeries& s, TaylorSeries& c) {
     s = TaylorSeries(std::sin(a.coefficient[0]));
     c = TaylorSeries(std::cos(a.coefficient[0]));
-    for (std::size_t k = 1; k <= N; ++k) {
-      for (std::size_t j = 1; j <= k; ++j) {
-        const double w = static_cast<double>(j) / static_cast<double>(k) * a.coefficient[j];
-        s.coefficient[k] += w * c.coefficient[k - j];
-        c.coefficient[k] -= w * s.coefficient[k - j];
-      }
-    }
+    TaylorSeries d;  // the derivative of a
+    unrolled<N>([&](auto k) {
+      d.coefficient[k] = static_cast<double>(k + 1) * a.coefficient[k + 1];
+      constexpr double share = 1.0 / static_cast<double>(k + 1);
+      s.coefficient[k + 1] = share * convolved<0, k>(d, c, k);
+      c.coefficient[k + 1] = -share * convolved<0, k>(d, s, k);
+    });
   }
   friend TaylorSeries sin(const TaylorSeries& a) {
     TaylorSeries s, c;
@@ -95,12 +123,38 @@ struct TaylorSeries {
     sin_cos(a, s, c);
     return c;
   }
+
+ private:
+  static constexpr std::array<double, kCount> kFactorial = [] {
+    std::array<double, kCount> f{};
+    f[0] = 1.0;
+    for (std::size_t k = 1; k < kCount; ++k) f[k] = f[k - 1] * static_cast<double>(k);
+    return f;
+  }();
+  /// sum over j = from .. to of a_j b_(k-j)
+  template <std::size_t from, std::size_t to>
+  static double convolved(const TaylorSeries& a, const TaylorSeries& b, std::size_t k) {
+    double sum = 0.0;
+    unrolled<to - from + 1>(
+        [&](auto j) { sum += a.coefficient[from + j] * b.coefficient[k - from - j]; });
+    return sum;
+  }
 };
 
 template <int N>
 double plain(const TaylorSeries<N>& x) {
   return x.coefficient[0];
 }
+
+/// Value and first three derivatives of a function of one variable at a point, the result of a TaylorSeries<3> as plain
+/// numbers; nothing is differentiated with it.
+struct Taylor3 {
+  double value = 0.0, d1 = 0.0, d2 = 0.0, d3 = 0.0;
+
+  Taylor3() = default;
+  Taylor3(const TaylorSeries<3>& s)  // NOLINT: the same content
+      : value(s.value()), d1(s.derivative(1)), d2(s.derivative(2)), d3(s.derivative(3)) {}
+};
 
 }  // namespace sparflow
 

@@ -52,7 +52,7 @@ class Expression {
   /// branch taken (abs and max at the kink: the right or first one; sign, step: 0); where it would be infinite (sqrt at
   /// 0) it is 0.
   /// @param signals SI, readings in degC, in the order of signals(); T is double or has `double value` and
-  ///   `T chain(f0, f1, f2) const`, as Dual2<N> and Jet
+  ///   `T chain(f0, f1, f2) const`, as Jet
   /// @param parameters SI, in the order of parameters()
   template <class T>
   T evaluate(std::span<const T> signals, std::span<const double> parameters) const {

@@ -7,6 +7,7 @@
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainjnttojacsolver.hpp>
 
+#include "models/math/jet.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {
@@ -105,7 +106,7 @@ TEST(Kinematics, TipJacobianAgreesWithKdl) {
   }
 }
 
-TEST(Kinematics, HessianIsTheDerivativeOfTheJacobianAndAgreesWithDuals) {
+TEST(Kinematics, HessianIsTheDerivativeOfTheJacobianAndAgreesWithJets) {
   for (const Machine& machine : chains()) {
     SCOPED_TRACE(machine.name);
     Random random(5);
@@ -127,17 +128,16 @@ TEST(Kinematics, HessianIsTheDerivativeOfTheJacobianAndAgreesWithDuals) {
           // distances in a chain of seven links reach some twenty metres
           EXPECT_LT((second - numeric).norm(), 20 * kDerivativeTolerance);
 
-          using Dual = Dual2<2>;
-          Eigen::Matrix<Dual, Eigen::Dynamic, 1> dual(n);
-          for (int j = 0; j < n; ++j) dual[j] = Dual(q[j]);
-          dual[i] = Dual::variable(q[i], 0);
-          dual[k] = Dual::variable(q[k], i == k ? 0 : 1);
-          const Vector3<Dual> point =
-              point_in_base(forward_kinematics<Dual>(machine, dual), link, local);
+          Eigen::Matrix<Jet, Eigen::Dynamic, 1> jet(n);
+          for (int j = 0; j < n; ++j) jet[j] = Jet(q[j]);
+          jet[i] = Jet::variable(q[i], 0, 2);
+          jet[k] = Jet::variable(q[k], i == k ? 0 : 1, 2);
+          const Vector3<Jet> point =
+              point_in_base(forward_kinematics<Jet>(machine, jet), link, local);
           for (int axis = 0; axis < 3; ++axis) {
             EXPECT_NEAR(point[axis].value, p[axis], kRounding);
-            EXPECT_NEAR(point[axis].gradient[i == k ? 0 : 1], column[axis], kRounding);
-            EXPECT_NEAR(point[axis].hess(i == k ? 0 : 1, 0), second[axis], kRounding);
+            EXPECT_NEAR(point[axis].gradient(i == k ? 0 : 1), column[axis], kRounding);
+            EXPECT_NEAR(point[axis].hessian(i == k ? 0 : 1, 0), second[axis], kRounding);
           }
         }
       }

@@ -68,7 +68,7 @@ TEST(Linkage, ClosedFormIsTheTemplateWithThreeDerivatives) {
     for (double q = -1.4; q < 1.45; q += 0.2) {
       Taylor3 expected;
       try {
-        expected = cylinder_length(m, 0, Taylor3::variable(q));
+        expected = cylinder_length(m, 0, TaylorSeries<3>::variable(q));
       } catch (const std::domain_error&) {
         EXPECT_THROW(linkage_rates(m, 0, q), std::domain_error);
         continue;

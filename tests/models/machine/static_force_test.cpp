@@ -1,11 +1,12 @@
 /// Static torques and cylinder forces, each recomputed by another code path: numeric gradients of the
-/// potential energy, duals through the templated form, and Orocos KDL.
+/// potential energy, Jets through the templated form, and Orocos KDL.
 #include "models/machine/static_force.h"
 
 #include <gtest/gtest.h>
 
 #include <kdl/chaindynparam.hpp>
 
+#include "models/math/jet.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {
@@ -16,20 +17,19 @@ using test_support::numeric_partial;
 using test_support::Random;
 using test_support::random_configuration;
 
-using Dual = Dual2<2>;
-using DualVector = Eigen::Matrix<Dual, Eigen::Dynamic, 1>;
+using JetVector = Eigen::Matrix<Jet, Eigen::Dynamic, 1>;
 
-/// Two hand-derived or dual results differ by rounding only; sums over a dozen masses and quotients with
+/// Two hand-derived or Jet results differ by rounding only; sums over a dozen masses and quotients with
 /// small dx/dq amplify it to some 1e3 roundings.
 constexpr double kSamePathTolerance = 1e-11;
 
 /// Seeds coordinates i and k (second slot unused when they are the same).
-DualVector seeded(const Eigen::VectorXd& q, Eigen::Index i, Eigen::Index k) {
-  DualVector dual(q.size());
-  for (Eigen::Index j = 0; j < q.size(); ++j) dual[j] = Dual(q[j]);
-  dual[k] = Dual::variable(q[k], 1);
-  dual[i] = Dual::variable(q[i], 0);
-  return dual;
+JetVector seeded(const Eigen::VectorXd& q, Eigen::Index i, Eigen::Index k) {
+  JetVector jet(q.size());
+  for (Eigen::Index j = 0; j < q.size(); ++j) jet[j] = Jet(q[j]);
+  jet[k] = Jet::variable(q[k], 1, 2);
+  jet[i] = Jet::variable(q[i], 0, 2);
+  return jet;
 }
 
 /// Away from dead centres: near dx/dq = 0 a force grows without bound and so do its derivatives. (A machine
@@ -159,28 +159,28 @@ TEST(StaticForce, TemplatedFormWithDoublesIsTheSame) {
   });
 }
 
-TEST(StaticForce, JacobianAndHessianAgreeWithDuals) {
+TEST(StaticForce, JacobianAndHessianAgreeWithJets) {
   for_random_states([](const Machine& machine, const Eigen::VectorXd& q, double payload) {
     StaticForce statics(machine);
     statics.update(q.data(), payload, 2);
     const Eigen::Index n = q.size();
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index k = 0; k <= i; ++k) {
-        const DualVector force = static_force<Dual>(machine, seeded(q, i, k), payload);
-        const DualVector torque = static_torque<Dual>(machine, seeded(q, i, k), payload);
+        const JetVector force = static_force<Jet>(machine, seeded(q, i, k), payload);
+        const JetVector torque = static_torque<Jet>(machine, seeded(q, i, k), payload);
         for (int c = 0; c < machine.cylinder_count(); ++c) {
           const Eigen::MatrixXd& hessian = statics.force_hessian(c);
-          const double expected = i == k ? force[c].hess(0, 0) : force[c].hess(1, 0);
+          const double expected = i == k ? force[c].hessian(0, 0) : force[c].hessian(1, 0);
           const double scale =
               1 + statics.force().norm() + statics.force_jacobian().norm() + hessian.norm();
           EXPECT_NEAR(statics.force()[c], force[c].value, kSamePathTolerance * scale);
-          EXPECT_NEAR(statics.force_jacobian()(c, i), force[c].gradient[0],
+          EXPECT_NEAR(statics.force_jacobian()(c, i), force[c].gradient(0),
                       kSamePathTolerance * scale);
           EXPECT_NEAR(hessian(i, k), expected, kSamePathTolerance * scale);
           EXPECT_EQ(hessian(i, k), hessian(k, i));
         }
         for (Eigen::Index j = 0; j < n; ++j) {
-          EXPECT_NEAR(statics.torque_jacobian()(j, i), torque[j].gradient[0],
+          EXPECT_NEAR(statics.torque_jacobian()(j, i), torque[j].gradient(0),
                       kSamePathTolerance * (1 + statics.torque_jacobian().norm()));
         }
       }

@@ -1,6 +1,6 @@
 #include "models/effects/builtin.h"
 #include "models/machine/inertial_torque.h"
-#include "models/math/jet_eigen.h"
+#include "models/math/jet.h"
 
 namespace sparflow {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "models/effects/builtin.h"
 #include "models/machine/kinematics.h"
-#include "models/math/jet_eigen.h"
+#include "models/math/jet.h"
 
 namespace sparflow {
 namespace {

@@ -10,8 +10,8 @@
 #include <ostream>
 
 #include "models/files/machine_file.h"
-#include "models/math/dual.h"
 #include "models/math/error.h"
+#include "models/math/jet.h"
 #include "tests/models/files/broken_model_support.h"
 
 namespace sparflow {
@@ -108,11 +108,11 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
 TEST(EffectFile, LawsGiveSiValuesAndDerivatives) {
   const std::vector<UserEffectSpec> specs = parse(kGoodEffects);
   const std::vector<double> p = {3e3, 5e-3};
-  const std::vector<Dual2<1>> v = {Dual2<1>::variable(4e-3, 0)};
-  const Dual2<1> force = specs[0].law.evaluate<Dual2<1>>(v, p);
+  const std::vector<Jet> v = {Jet::variable(4e-3, 0, 1)};
+  const Jet force = specs[0].law.evaluate<Jet>(v, p);
   const double t = std::tanh(0.8);
   EXPECT_DOUBLE_EQ(force.value, 3e3 * t);
-  EXPECT_DOUBLE_EQ(force.gradient[0], 3e3 / 5e-3 * (1.0 - t * t));
+  EXPECT_DOUBLE_EQ(force.gradient(0), 3e3 / 5e-3 * (1.0 - t * t));
   // 0.1 bar/(l/min) at 60 l/min and ten degrees below 40: 6 bar exp(0.3)
   const std::vector<double> k_beta = {0.1e5 * 6e4, 0.03}, flow_oil = {1e-3, 30.0};
   EXPECT_DOUBLE_EQ(specs[1].law.evaluate<double>(flow_oil, k_beta), 6e5 * std::exp(0.3));

@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "models/math/dual.h"
 #include "models/math/jet.h"
 #include "tests/models/numeric.h"
 
@@ -148,34 +147,32 @@ TEST(Expression, DerivativesMatchFiniteDifferencesInEveryScalar) {
     SCOPED_TRACE(twin.law);
     const Expression law = compiled(twin);
     for (const auto& p : points()) {
-      using Dual = Dual2<4>;
-      const std::vector<Dual> ab = {Dual::variable(p[2], 2), Dual::variable(p[3], 3)};
-      const Dual d = law.evaluate_with<Dual>(
-          in_order(law, Dual::variable(p[0], 0), Dual::variable(p[1], 1)), ab);
+      const std::vector<Jet> ab = {Jet::variable(p[2], 2, 4), Jet::variable(p[3], 3, 4)};
+      const Jet d = law.evaluate_with<Jet>(
+          in_order(law, Jet::variable(p[0], 0, 4), Jet::variable(p[1], 1, 4)), ab);
       const std::vector<double> plain_ab = {p[2], p[3]};
       const Jet j = law.evaluate<Jet>(
           in_order(law, Jet::variable(p[0], 0, 2), Jet::variable(p[1], 1, 2)), plain_ab);
       const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(p.data(), 4);
       const auto f = [&](const Eigen::VectorXd& z) { return twin.plain(z[0], z[1], z[2], z[3]); };
-      // Duals divide by multiplying with the reciprocal, which is one rounding more.
+      // Jets divide by multiplying with the reciprocal, which is one rounding more.
       EXPECT_NEAR(j.value, law.evaluate<double>(in_order(law, p[0], p[1]), plain_ab),
                   1e-14 * (1.0 + std::abs(j.value)));
       for (int i = 0; i < 4; ++i) {
-        const auto si = static_cast<std::size_t>(i);
         const double slope = test_support::numeric_partial(f, at, i);
-        EXPECT_NEAR(d.gradient[si], slope, kDerivativeTolerance * (1.0 + std::abs(slope)));
+        EXPECT_NEAR(d.gradient(i), slope, kDerivativeTolerance * (1.0 + std::abs(slope)));
         for (int k = 0; k < 4; ++k) {
           const double bend = test_support::numeric_partial(
               [&](const Eigen::VectorXd& z) { return test_support::numeric_partial(f, z, i); }, at,
               k);
           // two nested differences: rounding of the inner one, 1e-13, is divided by the outer step 1e-2 / 4
-          EXPECT_NEAR(d.hess(i, k), bend, 1e-8 * (1.0 + std::abs(bend)));
+          EXPECT_NEAR(d.hessian(i, k), bend, 1e-8 * (1.0 + std::abs(bend)));
           if (i < 2 && k < 2) {
-            EXPECT_NEAR(j.hessian(i, k), d.hess(i, k), 1e-13 * (1.0 + std::abs(bend)));
+            EXPECT_NEAR(j.hessian(i, k), d.hessian(i, k), 1e-13 * (1.0 + std::abs(bend)));
           }
         }
         if (i < 2) {
-          EXPECT_NEAR(j.gradient(i), d.gradient[si], 1e-13 * (1.0 + std::abs(slope)));
+          EXPECT_NEAR(j.gradient(i), d.gradient(i), 1e-13 * (1.0 + std::abs(slope)));
         }
       }
     }
@@ -187,16 +184,16 @@ TEST(Expression, ReverseGradientEqualsForwardOne) {
     SCOPED_TRACE(twin.law);
     const Expression law = compiled(twin);
     for (const auto& p : points()) {
-      using Dual = Dual2<2>;
-      const std::vector<Dual> ab = {Dual::variable(p[2], 0), Dual::variable(p[3], 1)};
-      const Dual d = law.evaluate_with<Dual>(in_order(law, Dual(p[0]), Dual(p[1])), ab);
+      const std::vector<Jet> ab = {Jet::variable(p[2], 0, 2), Jet::variable(p[3], 1, 2)};
+      const Jet d = law.evaluate_with<Jet>(in_order(law, Jet(p[0]), Jet(p[1])), ab);
       const std::vector<double> plain_ab = {p[2], p[3]};
       std::vector<double> gradient = {7.0, 7.0};  // overwritten, not added to
       const double v = law.value_and_gradient(in_order(law, p[0], p[1]), plain_ab, gradient);
       // the same products in another order
       EXPECT_NEAR(v, d.value, 1e-14 * (1.0 + std::abs(v)));
       for (std::size_t i = 0; i < 2; ++i) {
-        EXPECT_NEAR(gradient[i], d.gradient[i], 1e-13 * (1.0 + std::abs(gradient[i])));
+        EXPECT_NEAR(gradient[i], d.gradient(static_cast<int>(i)),
+                    1e-13 * (1.0 + std::abs(gradient[i])));
       }
     }
   }
@@ -215,11 +212,11 @@ TEST(Expression, AtAKinkTheDerivativeIsThatOfABranchAndFinite) {
   for (const Kink& kink : all) {
     SCOPED_TRACE(kink.law);
     const Expression law = Expression::compile(kink.law, numbers({"x"}), {});
-    const std::vector<Dual2<1>> x = {Dual2<1>::variable(0.0, 0)};
-    const Dual2<1> y = law.evaluate<Dual2<1>>(x, {});
+    const std::vector<Jet> x = {Jet::variable(0.0, 0, 1)};
+    const Jet y = law.evaluate<Jet>(x, {});
     EXPECT_EQ(y.value, 0.0);
-    EXPECT_EQ(y.gradient[0], kink.slope);
-    EXPECT_TRUE(std::isfinite(y.hessian[0]));
+    EXPECT_EQ(y.gradient(0), kink.slope);
+    EXPECT_TRUE(std::isfinite(y.hessian(0, 0)));
   }
 }
 
@@ -327,17 +324,16 @@ TEST(Expression, LinearParametersAreLinearNumerically) {
     const Expression law = compiled(twin);
     const std::vector<std::string> group = law.proportional_parameters();
     for (const auto& p : points()) {
-      using Dual = Dual2<2>;
-      const std::vector<Dual> ab = {Dual::variable(p[2], 0), Dual::variable(p[3], 1)};
-      const Dual d = law.evaluate_with<Dual>(in_order(law, Dual(p[0]), Dual(p[1])), ab);
+      const std::vector<Jet> ab = {Jet::variable(p[2], 0, 2), Jet::variable(p[3], 1, 2)};
+      const Jet d = law.evaluate_with<Jet>(in_order(law, Jet(p[0]), Jet(p[1])), ab);
       double sum = 0.0;
       for (int i = 0; i < 2; ++i) {
         const std::string name = i == 0 ? "a" : "b";
         if (law.linear_in(name)) {
-          EXPECT_NEAR(d.hess(i, i), 0.0, 1e-14);
+          EXPECT_NEAR(d.hessian(i, i), 0.0, 1e-14);
         }
         if (std::find(group.begin(), group.end(), name) != group.end()) {
-          sum += p[static_cast<std::size_t>(2 + i)] * d.gradient[static_cast<std::size_t>(i)];
+          sum += p[static_cast<std::size_t>(2 + i)] * d.gradient(i);
         }
       }
       if (!group.empty()) {
