@@ -301,6 +301,7 @@ class Adolc final : public WrappedKnotModel {
       adouble pressure = standby;
       if (pump.type == PumpType::kLoadSensing) {
         const double beta = options_.smoothing.pressure;
+        // A taped copy of models/chain/pump_law.h; motion_speed stops when it differs from the first.
         adouble total = exp((standby - top) / beta);
         for (const std::size_t i : asking) total += exp((demand[i] - top) / beta);
         pressure = top + beta * log(total);

@@ -100,7 +100,9 @@ std::array<double, 3> ReferenceKnot::forces(const Kinematics& kin) const {
 }
 
 /// Log-sum-exp over standby and the cylinders' demands; the largest term is factored out to prevent overflow. Terms
-/// below exp(-40) of the largest are less than a tenth of the sum's last digit.
+/// below exp(-40) of the largest are less than a tenth of the sum's last digit. It is a copy of the smooth law in
+/// models/chain/pump_law.h, because the reference NLP is an independent second path and this is its hot loop;
+/// tests/bench/reference_nlp_test.cpp holds it against the first.
 /// @param share [3] weights of the softmax (derivatives), may be null
 double ReferenceKnot::pump_pressure(const std::array<double, 3>& demand, double* share) const {
   const ReferenceProblem& p = *problem_;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "diagnosis/experiment/experiment.h"
+#include "models/chain/pump_law.h"
 #include "models/machine/static_force.h"
 #include "models/math/units.h"
 
@@ -269,7 +270,7 @@ Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, doubl
       pb[i] = extends ? p_return : p_supply;
       const int pump = m.pump_of_cylinder(static_cast<int>(c));
       if (moves && pump >= 0)
-        asked(i, pump) = std::max(asked(i, pump), p_supply + model.cylinders[c].margin);
+        asked(i, pump) = pump_pressure(asked(i, pump), p_supply + model.cylinders[c].margin);
     }
     add(Role::kCommand, static_cast<int>(c), "u_" + cylinder.name, u);
     if (cylinder.hydraulic()) {

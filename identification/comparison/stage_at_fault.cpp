@@ -7,6 +7,7 @@
 
 #include "identification/comparison/compare.h"
 #include "identification/signals/apply_effects.h"
+#include "models/chain/pump_law.h"
 #include "models/math/nan.h"
 #include "models/math/robust.h"
 
@@ -54,7 +55,7 @@ class Inheritance {
     const Pump& pump = model_.machine.pumps[static_cast<std::size_t>(pump_index)];
     if (pump.type == PumpType::kConstantPressure) return 0.0;
     const double standby = model_.pumps[static_cast<std::size_t>(pump_index)].standby;
-    double predicted = standby, measured = standby;
+    PumpLaw predicted(standby), measured(standby);
     for (const int i : pump.feeds) {
       const CylinderSignals& c = signals_.cylinders[static_cast<std::size_t>(i)];
       if (c.direction[k] == 0) continue;
@@ -65,10 +66,10 @@ class Inheritance {
       if (c.demand_effect.size() > 0) added += c.demand_effect[k];
       double by_model = p.mean(c.flow[k], predicted_force(c)[k]);
       by_model += working_pressure_effect(model_, signals_, i, k);
-      predicted = std::max(predicted, by_model + added);
-      measured = std::max(measured, c.working_pressure_smooth[k] + added);
+      predicted.add(i, by_model + added);
+      measured.add(i, c.working_pressure_smooth[k] + added);
     }
-    return predicted - measured;
+    return predicted.pressure() - measured.pressure();
   }
 
   const CraneModel& model_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/chain/pump_law.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 
@@ -21,22 +22,25 @@ constexpr int kGrid = 96;          // points of each refinement of the search
 
 /// Unknowns of the law in one array: margins of the m cylinders, then standby.
 /// Term k of sample t is offset(t, k) + unknown[k]; -infinity where the cylinder is not active.
-struct PumpLaw {
+struct PumpTerms {
   MatrixXd offset;    // [samples x (m + 1)], the last column zero
   VectorXd pressure;  // [samples]
 
   Index samples() const { return pressure.size(); }
   Index terms() const { return offset.cols(); }
-  double value(const VectorXd& unknown, Index t) const {
-    return (offset.row(t).transpose() + unknown).maxCoeff();
+  /// The law at sample t, without the term `except` if that is one of them.
+  PumpLaw at(const VectorXd& unknown, Index t, Index except = -1) const {
+    const Index m = terms() - 1;
+    PumpLaw law(except == m ? kNever : unknown[m]);
+    for (Index k = 0; k < m; ++k) {
+      if (k != except) law.add(static_cast<int>(k), offset(t, k) + unknown[k]);
+    }
+    return law;
   }
+  double value(const VectorXd& unknown, Index t) const { return at(unknown, t).pressure(); }
   /// @return largest term except one
   double others(const VectorXd& unknown, Index t, Index except) const {
-    double largest = kNever;
-    for (Index k = 0; k < terms(); ++k) {
-      if (k != except) largest = std::max(largest, offset(t, k) + unknown[k]);
-    }
-    return largest;
+    return at(unknown, t, except).pressure();
   }
   VectorXd residuals(const VectorXd& unknown) const {
     VectorXd r(samples());
@@ -46,9 +50,9 @@ struct PumpLaw {
 };
 
 /// Selects the usable rows and counts the others in `out`.
-PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, LearnedPump& out) {
+PumpTerms usable_samples(const PumpSamples& s, const LearnPumpOptions& options, LearnedPump& out) {
   const Index m = s.active.cols();
-  PumpLaw law{MatrixXd::Constant(s.pressure.size(), m + 1, kNever), VectorXd(s.pressure.size())};
+  PumpTerms law{MatrixXd::Constant(s.pressure.size(), m + 1, kNever), VectorXd(s.pressure.size())};
   Index n = 0;
   for (Index t = 0; t < s.pressure.size(); ++t) {
     bool valid = std::isfinite(s.pressure[t]);
@@ -79,7 +83,7 @@ PumpLaw usable_samples(const PumpSamples& s, const LearnPumpOptions& options, Le
 /// The objective as a function of one unknown, with the others fixed.
 class OneUnknown {
  public:
-  OneUnknown(const PumpLaw& law, const VectorXd& unknown, Index k, double limit) : limit_(limit) {
+  OneUnknown(const PumpTerms& law, const VectorXd& unknown, Index k, double limit) : limit_(limit) {
     for (Index t = 0; t < law.samples(); ++t) {
       if (law.offset(t, k) == kNever) continue;
       samples_.push_back({law.offset(t, k), law.others(unknown, t, k), law.pressure[t]});
@@ -88,7 +92,7 @@ class OneUnknown {
   double operator()(double x) const {
     double sum = 0.0;
     for (const Sample& s : samples_)
-      sum += huber_loss(s.pressure - std::max(s.others, s.own + x), limit_);
+      sum += huber_loss(s.pressure - pump_pressure(s.others, s.own + x), limit_);
     return sum;
   }
   /// @return upper end of the search: the margin at which the largest distance to the measured pressure is closed; 0 when
@@ -132,7 +136,7 @@ double minimise(const OneUnknown& f, double hi, double start) {
 }
 
 /// Initial values: margins that almost all samples of the cylinder allow, since p >= P_i + c_i.
-VectorXd initial_unknowns(const PumpLaw& law, const LearnPumpOptions& options) {
+VectorXd initial_unknowns(const PumpTerms& law, const LearnPumpOptions& options) {
   const Index m = law.terms() - 1;
   VectorXd unknown = VectorXd::Zero(m + 1);
   std::vector<double> idle;
@@ -154,7 +158,7 @@ VectorXd initial_unknowns(const PumpLaw& law, const LearnPumpOptions& options) {
 }
 
 /// Coordinate descent until no unknown changes. @return true when it converged
-bool search(const PumpLaw& law, VectorXd& unknown, int& sweeps) {
+bool search(const PumpTerms& law, VectorXd& unknown, int& sweeps) {
   double limit = 0.0;
   for (int sweep = 0; sweep < 40; ++sweep) {
     ++sweeps;
@@ -176,10 +180,11 @@ struct Leader {
   double gap = 0.0;  // to the second largest term [Pa]
 };
 
-Leader leader_of(const PumpLaw& law, const VectorXd& unknown, Index t) {
+Leader leader_of(const PumpTerms& law, const VectorXd& unknown, Index t) {
+  const PumpLaw at = law.at(unknown, t);
   Leader leader;
-  const double value = (law.offset.row(t).transpose() + unknown).maxCoeff(&leader.term);
-  leader.gap = value - law.others(unknown, t, leader.term);
+  leader.term = at.leader() >= 0 ? at.leader() : law.terms() - 1;
+  leader.gap = at.pressure() - law.others(unknown, t, leader.term);
   return leader;
 }
 
@@ -211,7 +216,7 @@ Location location(const VectorXd& values) {
 
 /// With fixed leaders each unknown is Huber's location of p - P_i over the samples in which its term is the largest. Near
 /// ties are left out (see the header) where enough samples remain, outliers always.
-void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
+void polish(const PumpTerms& law, VectorXd& unknown, VectorXd& standard_error,
             const LearnPumpOptions& options) {
   const VectorXd residuals = law.residuals(unknown);
   const double std = std::max(robust_std(residuals), kFinest);
@@ -239,7 +244,7 @@ void polish(const PumpLaw& law, VectorXd& unknown, VectorXd& standard_error,
 
 /// @return largest c_i at which the cylinder would not be the leader where the data follow another term: the
 ///   quantile `at` of the distances
-double upper_bound(const PumpLaw& law, const VectorXd& unknown, Index i, double at) {
+double upper_bound(const PumpTerms& law, const VectorXd& unknown, Index i, double at) {
   std::vector<double> room;
   for (Index t = 0; t < law.samples(); ++t) {
     if (law.offset(t, i) == kNever) continue;
@@ -261,25 +266,6 @@ void check_enough(Index usable, const LearnedPump& out, int fewest) {
 
 double rms(const VectorXd& r) { return std::sqrt(r.squaredNorm() / static_cast<double>(r.size())); }
 
-}  // namespace
-
-double pump_law(const Eigen::Ref<const Eigen::RowVectorXd>& working_pressure,
-                const Eigen::Ref<const Eigen::Array<bool, 1, Eigen::Dynamic>>& active,
-                const std::vector<LearnedMargin>& margins, double standby, int* leader) {
-  double pressure = standby;
-  if (leader != nullptr) *leader = -1;
-  for (Index i = 0; i < working_pressure.size(); ++i) {
-    if (!active[i]) continue;
-    const double demand = working_pressure[i] + margins[static_cast<std::size_t>(i)].margin;
-    if (demand <= pressure) continue;
-    pressure = demand;
-    if (leader != nullptr) *leader = static_cast<int>(i);
-  }
-  return pressure;
-}
-
-namespace {
-
 std::string cylinder_name(const PumpSamples& samples, Index i) {
   const auto k = static_cast<std::size_t>(i);
   return k < samples.names.size() ? samples.names[k] : fmt::format("cylinder {}", i + 1);
@@ -295,7 +281,7 @@ LearnedPump learn_pump(const PumpSamples& samples, const LearnPumpOptions& optio
                  "pump samples must be equally long");
   LearnedPump out;
   out.given = static_cast<int>(samples.pressure.size());
-  const PumpLaw law = usable_samples(samples, options, out);
+  const PumpTerms law = usable_samples(samples, options, out);
   check_enough(law.samples(), out, options.fewest_samples);
 
   VectorXd unknown = initial_unknowns(law, options);

@@ -86,12 +86,6 @@ struct LearnedPump {
   std::vector<std::string> warnings;
 };
 
-/// Evaluates the law for one sample. @param leader may be null; gets the load-sensing leader, -1 = standby
-/// @return pump pressure [Pa]
-double pump_law(const Eigen::Ref<const Eigen::RowVectorXd>& working_pressure,
-                const Eigen::Ref<const Eigen::Array<bool, 1, Eigen::Dynamic>>& active,
-                const std::vector<LearnedMargin>& margins, double standby, int* leader = nullptr);
-
 /// A margin that is not identified is set to the median of the identified ones (0 if there is none), at most its
 /// upper bound. Samples with NaN in a required value are left out. Deterministic.
 /// @throws InputError when fewer than `fewest_samples` can be used

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/chain/pump_law.h"
 #include "models/effects/instant.h"
 
 namespace sparflow {
@@ -16,17 +17,15 @@ void find_leader(const MatrixXd& extra, PumpSeries& pump) {
   const Index n = pump.asked.rows();
   for (Index k = 0; k < n; ++k) {
     if (std::isnan(pump.demand[k])) continue;
-    double most = pump.demand[k] = pump.standby;
-    pump.leader[k] = -1;
+    PumpLaw law(pump.standby);  // a cylinder at rest has NaN and demands nothing
     for (std::size_t f = 0; f < pump.feeds.size(); ++f) {
       const double asked = pump.asked(k, static_cast<Index>(f));
       const double more = extra.rows() > 0 ? extra(k, pump.feeds[f]) : 0.0;
-      const double with = asked + (std::isfinite(more) ? more : 0.0);
-      if (!(with > most)) continue;  // true also for a cylinder at rest, whose demand is NaN
-      most = with;
-      pump.demand[k] = asked;
-      pump.leader[k] = pump.feeds[f];
+      law.add(static_cast<int>(f), asked + (std::isfinite(more) ? more : 0.0));
     }
+    const bool led = law.leader() >= 0;
+    pump.leader[k] = led ? pump.feeds[static_cast<std::size_t>(law.leader())] : -1;
+    pump.demand[k] = led ? pump.asked(k, law.leader()) : pump.standby;
   }
 }
 

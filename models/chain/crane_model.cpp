@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/chain/pump_law.h"
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
 #include "models/hydraulics/return_rise.h"
@@ -195,8 +196,7 @@ void Chain::pump_stage(const double* added_demand) {
     const Pump& pump = machine_->pumps[p];
     PumpState& s = state_.pumps[p];
     s.flow = 0.0;
-    s.pressure = model_->pumps[p].standby;
-    s.leader = -1;
+    PumpLaw law(model_->pumps[p].standby);
     for (const int feed : pump.feeds) {
       const auto i = static_cast<std::size_t>(feed);
       const CylinderState& c = state_.cylinders[i];
@@ -204,11 +204,10 @@ void Chain::pump_stage(const double* added_demand) {
       if (pump.type != PumpType::kLoadSensing || !c.moving) continue;
       double demand = c.pressure + model_->cylinders[i].margin;
       if (added_demand != nullptr) demand += added_demand[i];
-      if (demand > s.pressure) {
-        s.pressure = demand;
-        s.leader = feed;
-      }
+      law.add(feed, demand);
     }
+    s.pressure = law.pressure();
+    s.leader = law.leader();
     state_.power += s.pressure * s.flow;
   }
 }

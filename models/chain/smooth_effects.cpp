@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/chain/pump_law.h"
 #include "models/effects/effective_machine.h"
 #include "models/hydraulics/return_rise.h"
 #include "models/math/error.h"
@@ -185,29 +186,16 @@ void SmoothEffects::add_demands() {
 
 void SmoothEffects::soft_maximum(std::size_t p) {
   const Pump& pump = machine_->pumps[p];
-  const double standby = model_->pumps[p].standby, beta = smoothing.pressure;
-  double top = standby;
-  first_.leader[p] = -1;
-  for (const int feed : pump.feeds) {
-    const Cylinder& c = cylinders_[static_cast<std::size_t>(feed)];
-    if (!c.demands || !(c.demand.value > top)) continue;
-    top = c.demand.value;
-    first_.leader[p] = feed;
-  }
-  standby_share_[p] = std::exp((standby - top) / beta);
-  Jet total = standby_share_[p];
-  for (const int feed : pump.feeds) {
+  const SmoothPumpLaw law{model_->pumps[p].standby, smoothing.pressure};
+  const auto demand_of = [&](int feed) -> SmoothDemand<Jet> {
     Cylinder& c = cylinders_[static_cast<std::size_t>(feed)];
-    if (!c.demands) continue;
-    c.lead = exp((c.demand - Jet(top)) / beta);
-    total += c.lead;
-  }
-  standby_share_[p] /= total;
-  for (const int feed : pump.feeds) {
-    Cylinder& c = cylinders_[static_cast<std::size_t>(feed)];
-    if (c.demands) c.lead /= total;
-  }
-  pressure_[p] = top + beta * log(total);
+    if (!c.demands) return {};
+    return {&c.demand, &c.lead};
+  };
+  const SmoothPumpPressure<Jet> soft = law.pressure<Jet>(pump.feeds, demand_of);
+  pressure_[p] = soft.pressure;
+  standby_share_[p] = soft.standby_share;
+  first_.leader[p] = soft.leader;
 }
 
 Jet SmoothEffects::pump_effects(std::size_t pump, int leader, Instant<Jet>& s) {

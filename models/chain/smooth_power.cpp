@@ -1,7 +1,8 @@
 #include "models/chain/smooth_power.h"
 
-#include <algorithm>
 #include <cmath>
+
+#include "models/chain/pump_law.h"
 
 namespace sparflow {
 namespace {
@@ -121,27 +122,18 @@ void SmoothPower::pump_sums() {
     const Pump& pump = model_->machine.pumps[p];
     PumpSum& sum = pumps_[p];
     sum = PumpSum{};
-    const double standby = model_->pumps[p].standby;
-    double top = standby;
-    for (const int i : pump.feeds) {
-      const Demand& d = demands_[static_cast<std::size_t>(i)];
-      sum.flow += d.flow.q;
-      if (d.active) top = std::max(top, d.d);
-    }
+    for (const int i : pump.feeds) sum.flow += demands_[static_cast<std::size_t>(i)].flow.q;
+    const SmoothPumpLaw law{model_->pumps[p].standby, smoothing.pressure};
     if (pump.type != PumpType::kLoadSensing) {
-      sum.pressure = standby;
+      sum.pressure = law.standby;
       continue;
     }
-    const double beta = smoothing.pressure;
-    double total = std::exp((standby - top) / beta);
-    for (const int i : pump.feeds) {
+    const auto demand_of = [&](int i) -> SmoothDemand<double> {
       Demand& d = demands_[static_cast<std::size_t>(i)];
-      if (!d.active) continue;
-      d.share = std::exp((d.d - top) / beta);
-      total += d.share;
-    }
-    for (const int i : pump.feeds) demands_[static_cast<std::size_t>(i)].share /= total;
-    sum.pressure = top + beta * std::log(total);
+      if (!d.active) return {};
+      return {&d.d, &d.share};
+    };
+    sum.pressure = law.pressure<double>(pump.feeds, demand_of).pressure;
   }
 }
 

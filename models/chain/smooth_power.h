@@ -4,8 +4,7 @@
 ///
 /// For each cylinder, with t = tanh(v/eps), w = (1+t)/2:  |v| -> m = v t,  Q = (w A + (1-w) B) m,
 ///   demand d = t^2 [w p+(A m, F) + (1-w) p-(B m, F) + c].
-/// For each pump: p = beta log(exp(standby/beta) + sum_i exp(d_i/beta)), which exceeds the maximum by at most
-/// beta log(n+1). Energies under this law serve the solver only and are never reported.
+/// For each pump the smooth law of models/chain/pump_law.h. Energies under this law serve the solver only and are never reported.
 #include <vector>
 
 #include "models/chain/crane_model.h"

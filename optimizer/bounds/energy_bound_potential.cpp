@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "models/chain/pump_law.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
 
@@ -77,7 +78,8 @@ void MoveWeights::prices(const double* /*q*/, const double* force, const double*
     for (const int direction : {0, 1}) {
       const int side = (direction == 0) == (rate[d.cylinder] > 0.0) ? 0 : 1;
       double pressure = standby_[ix(d.pump)];
-      if (d.load_sensing) pressure = std::max(pressure, d.table[side].least(force[d.cylinder]));
+      if (d.load_sensing)
+        pressure = pump_pressure(pressure, d.table[side].least(force[d.cylinder]));
       price(d.joint, direction) +=
           std::max(0.0, pressure) * d.area[side] * std::abs(rate[d.cylinder]);
     }

@@ -142,15 +142,12 @@ void TimedWeights::prices(const double* q, const double* force, const double* ra
 }
 
 double TimedWeights::gain_from_rest() const {
-  const auto least_pressure = [](const TimedMove& m) {
-    return m.flow_step > 0.0 ? std::max(m.standby, m.demand[0]) : m.standby;
-  };
   // Rate with a pump at that pressure; of each joint only the direction with the larger rate is summed.
   const auto at = [&](int pump, double pressure) {
     double total = 0.0, of_joint = 0.0;
     int joint = -1;
     for (const TimedMove& m : moves_) {  // ordered by joint
-      if (m.pump != pump || (pump >= 0 && least_pressure(m) > pressure)) continue;
+      if (m.pump != pump || (pump >= 0 && m.least_pressure() > pressure)) continue;
       if (m.joint != joint) {
         total += of_joint;
         of_joint = 0.0;
@@ -166,7 +163,7 @@ double TimedWeights::gain_from_rest() const {
   for (int pump = 0; pump < static_cast<int>(pump_flow_.size()); ++pump) {
     double most = 0.0;  // the sum falls with the pressure between two cylinders' least demands
     for (const TimedMove& m : moves_) {
-      if (m.pump == pump) most = std::max(most, at(pump, least_pressure(m)));
+      if (m.pump == pump) most = std::max(most, at(pump, m.least_pressure()));
     }
     total += most;
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "models/chain/pump_law.h"
+
 namespace sparflow {
 
 double TimedMove::flow(double pressure, double* growth) const {
@@ -21,8 +23,12 @@ double TimedMove::flow(double pressure, double* growth) const {
   return k == kFlowKnots ? top : std::min(flow, top);
 }
 
+double TimedMove::least_pressure() const {
+  return flow_step > 0.0 ? pump_pressure(standby, demand[0]) : standby;
+}
+
 double TimedMove::least_slope(double gain) const {
-  const double first = flow_step > 0.0 ? std::max(standby, demand[0]) : standby;
+  const double first = least_pressure();
   double growth = 0.0, pressure = first, flow_here = flow(first, &growth);
   if (!(gain > 0.0)) return first;
   double best =

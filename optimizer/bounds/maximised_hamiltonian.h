@@ -18,6 +18,8 @@ struct TimedMove {
   double flow_step = 0.0;  ///< volume flow from knot to knot of `demand` [m^3/s], 0 = no demand
   DemandTable::Rising demand{};  ///< at the knots [Pa]
 
+  /// Pump pressure of this move alone at vanishing flow. [Pa]
+  double least_pressure() const;
   /// Largest volume flow at a supply pressure [m^3/s], and its right derivative [m^3/s/Pa].
   double flow(double pressure, double* growth) const;
   /// Slope at which this move alone has the Hamiltonian `gain` [W]: min over P >= standby of P + gain / flow(P). [Pa]

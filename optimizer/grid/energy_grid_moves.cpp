@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "models/chain/pump_law.h"
+
 namespace sparflow {
 
 double MoveCost::at_price(double price) const {
@@ -67,14 +69,15 @@ MoveCost MovePricer::price(const double* dq, const double* dx, const double* for
     double energy = 0.0;
     for (std::size_t p = 0; p < pump_volume_.size(); ++p) {
       if (pump_volume_[p] <= 0.0) continue;
-      double pressure = standby_[p];
+      PumpLaw law(standby_[p]);
       for (std::size_t i = 0; i < demands_.size(); ++i) {
         const CylinderDemand& d = demands_[i];
         if (dx[i] == 0.0 || !d.load_sensing || static_cast<std::size_t>(d.pump) != p) continue;
         const int side = dx[i] > 0.0 ? 0 : 1;
         const double flow = d.area[side] * std::abs(dx[i]) * kMoveSpeeds[s] / seconds;
-        pressure = std::max(pressure, d.table[side].demand(flow, force[i]));
+        law.add(d.cylinder, d.table[side].demand(flow, force[i]));
       }
+      const double pressure = law.pressure();
       energy += pressure > pump_pressure_limit_[p] ? std::numeric_limits<double>::infinity()
                                                    : pressure * pump_volume_[p];
     }

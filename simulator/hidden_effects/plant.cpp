@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/machine/linkage.h"
+#include "simulator/hidden_effects/largest_demand.h"
 
 namespace sparflow::simulator {
 namespace {
@@ -204,19 +205,16 @@ void Plant::supply() {
     PumpState& pump = s.pumps[p];
     const Pump& drawn = machine_.pumps[p];
     pump.flow = 0.0;
-    pump.demand = laws_.standby[p];
-    pump.leader = -1;
+    LargestDemand asked{laws_.standby[p]};
     for (const int i : drawn.feeds) {
       const CylinderState& c = s.cylinders[static_cast<std::size_t>(i)];
       pump.flow += c.flow;
       if (c.asked == 0 || drawn.type == PumpType::kConstantPressure) continue;
       const double chamber = c.asked > 0 ? c.pressure_a : c.pressure_b;
-      const double asks = chamber + c.margin + c.line_drop;
-      if (asks > pump.demand) {
-        pump.demand = asks;
-        pump.leader = i;
-      }
+      asked.add(i, chamber + c.margin + c.line_drop);
     }
+    pump.demand = asked.pressure;
+    pump.leader = asked.leader;
     pump.pressure = std::min(pump.demand, drawn.max_pressure);
   }
   each([&s](HiddenLaw& law) { law.pump(s); });

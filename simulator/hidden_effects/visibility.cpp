@@ -8,6 +8,7 @@
 
 #include "models/math/linear_algebra.h"
 #include "simulator/hidden_effects/drive.h"
+#include "simulator/hidden_effects/largest_demand.h"
 #include "simulator/hidden_effects/log_columns.h"
 
 namespace sparflow::simulator {
@@ -150,21 +151,16 @@ std::unique_ptr<Shadow> make_shadow(const LogRequest& request, std::size_t witho
 
 /// Demand of a pump [Pa]: the largest measured pressure plus margin of the commanded cylinders. It is computed for each
 /// crane, because an effect elsewhere may change the leader, and with it the margin, without an effect in the pump.
-/// @param leader index of the leader, -1 = none
-double asked_pressure(const Pump& pump, double standby, const CraneLaws& laws, const PlantState& s,
-                      const SensorState& read, int& leader) {
-  double most = standby;
-  leader = -1;
+LargestDemand asked_pressure(const Pump& pump, double standby, const CraneLaws& laws,
+                             const PlantState& s, const SensorState& read) {
+  LargestDemand asked{standby};
   for (const int i : pump.feeds) {
     const auto k = static_cast<std::size_t>(i);
     const double u = s.cylinders[k].command;
     if (u == 0.0) continue;
-    const double p = (u > 0.0 ? read.pressure_a[k] : read.pressure_b[k]) + laws.cylinders[k].margin;
-    if (p <= most) continue;
-    most = p;
-    leader = i;
+    asked.add(i, (u > 0.0 ? read.pressure_a[k] : read.pressure_b[k]) + laws.cylinders[k].margin);
   }
-  return most;
+  return asked;
 }
 
 void compare_row(const Machine& machine, const PlantState& a, const SensorState& read, Shadow& s) {
@@ -202,14 +198,13 @@ void compare_row(const Machine& machine, const PlantState& a, const SensorState&
     s.pressure[i][(ca.side > 0 ? 0U : 2U) + (ra.counterbalance ? 1U : 0U)].add(change, own);
   }
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
-    int leader = -1, other = -1;
-    const double asked =
-        asked_pressure(machine.pumps[p], s.crane->laws.standby[p], s.crane->laws, a, read, leader);
-    const double asked_without = asked_pressure(machine.pumps[p], s.crane->laws.standby[p],
-                                                s.crane->laws, b, s.sensors, other);
+    const CraneLaws& laws = s.crane->laws;
+    const LargestDemand asked = asked_pressure(machine.pumps[p], laws.standby[p], laws, a, read);
+    const LargestDemand without =
+        asked_pressure(machine.pumps[p], laws.standby[p], laws, b, s.sensors);
     VectorXd margins = VectorXd::Zero(static_cast<Index>(machine.cylinders.size()) + 1);
-    margins[leader + 1] = 1.0;
-    s.pump[p].add(read.pump[p] - asked - (s.sensors.pump[p] - asked_without), margins);
+    margins[asked.leader + 1] = 1.0;
+    s.pump[p].add(read.pump[p] - asked.pressure - (s.sensors.pump[p] - without.pressure), margins);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/reference_model.h"
+#include "models/chain/pump_law.h"
 #include "models/math/error.h"
 #include "optimizer/nlp/derivative_check.h"
 #include "optimizer/nlp/ipopt_solver.h"
@@ -136,6 +137,35 @@ TEST(ReferenceNlp, IntermediateQuantitiesAgree) {
   near(middle.flow, {8.390711318075, 88.108368301526, 60.337425560522});
   near(middle.pressure, {30.413159103642, 44.134303232829, 10.38854451192});
   EXPECT_NEAR(middle.pump, 62.1263314032, 1e-9);
+}
+
+// The reference model has a copy of the smooth law, because it is an independent second path.
+TEST(ReferenceNlp, PumpPressureIsTheSmoothLawOfTheModel) {
+  const ReferenceProblem& p = *problem();
+  Transcription nlp = reference_transcription(problem());
+  ReferenceKnot knot(problem());
+  const VectorXd x = vector(checkpoints()["points"]["solution"]["x"]);
+  const std::vector<int> cylinders = {0, 1, 2};
+  double least_standby_share = 1.0;
+  for (int k = 0; k < 81; ++k) {
+    VectorXd z(6);
+    z << x.segment(nlp.q_index(k, 0), 3), x.segment(nlp.qd_index(k, 0), 3);
+    const ReferenceKnot::State state = knot.state(z.data());
+    std::array<double, 3> demand, share;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double q2 = state.flow[i] * state.flow[i];
+      demand[i] = state.pressure[i] + p.margin * q2 / (q2 + p.q_eps * p.q_eps);
+    }
+    const SmoothPumpLaw law{p.standby, p.lse_temperature};
+    const auto soft = law.pressure<double>(cylinders, [&](int i) -> SmoothDemand<double> {
+      const auto c = static_cast<std::size_t>(i);
+      return {&demand[c], &share[c]};
+    });
+    // The copy leaves out terms below a tenth of the last digit of pressures of some 100 bar.
+    EXPECT_NEAR(state.pump, soft.pressure, 1e-12 * soft.pressure);
+    least_standby_share = std::min(least_standby_share, soft.standby_share);
+  }
+  EXPECT_LT(least_standby_share, 0.01) << "some knots are led by a cylinder";
 }
 
 TEST(ReferenceNlp, EveryInstructionSetGivesTheSameObjective) {

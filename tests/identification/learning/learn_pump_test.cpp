@@ -188,24 +188,5 @@ TEST(LearnPump, ConstantPressureIsARobustConstant) {
   EXPECT_THROW(learn_constant_pump(pressure.head(5)), InputError);
 }
 
-TEST(LearnPump, LawIsTheExactMaximum) {
-  std::vector<LearnedMargin> margins(2);
-  margins[0].margin = 10e5;
-  margins[1].margin = 20e5;
-  Eigen::RowVectorXd p(2);
-  p << 50e5, 45e5;
-  Eigen::Array<bool, 1, Eigen::Dynamic> active(2);
-  int leader = 7;
-  active << true, true;
-  EXPECT_EQ(pump_law(p, active, margins, 22e5, &leader), 65e5);
-  EXPECT_EQ(leader, 1);
-  active << true, false;
-  EXPECT_EQ(pump_law(p, active, margins, 22e5, &leader), 60e5);
-  EXPECT_EQ(leader, 0);
-  active << false, false;
-  EXPECT_EQ(pump_law(p, active, margins, 22e5, &leader), 22e5);
-  EXPECT_EQ(leader, -1);
-}
-
 }  // namespace
 }  // namespace sparflow
