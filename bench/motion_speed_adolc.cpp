@@ -150,6 +150,10 @@ adouble learned_mean(const GaussianProcess& process, const adouble& flow, const 
     const adouble dx = x - p.flow[j] / p.length_flow, dy = y - p.force[j] / p.length_force;
     sum += variance * p.weight[j] * exp(-0.5 * (dx * dx + dy * dy));
   }
+  if (p.corner.there()) {
+    const adouble u = p.corner.level + p.corner.per_flow * flow + p.corner.per_force * force;
+    sum += 0.5 * (u + sqrt(u * u + kCornerRounded * kCornerRounded));
+  }
   return sum;
 }
 
@@ -301,7 +305,7 @@ class Adolc final : public WrappedKnotModel {
       adouble pressure = standby;
       if (pump.type == PumpType::kLoadSensing) {
         const double beta = options_.smoothing.pressure;
-        // A taped copy of models/chain/pump_law.h; motion_speed stops when it differs from the first.
+        // A taped copy of models/chain/pump_law.h; tests/bench/taped_law_test.cpp holds it against the first.
         adouble total = exp((standby - top) / beta);
         for (const std::size_t i : asking) total += exp((demand[i] - top) / beta);
         pressure = top + beta * log(total);

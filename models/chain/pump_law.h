@@ -4,9 +4,8 @@
 /// exact, and smooth for the solver:
 ///   p = beta log(exp(standby/beta) + sum_i exp(d_i/beta)), which exceeds the maximum by at most beta log(n+1).
 /// Whoever needs the law calls it. Copies that are independent on purpose are held against it: that of the simulator by
-/// tests/simulator/largest_demand_test.cpp, that of the reference NLP by tests/bench/reference_nlp_test.cpp, the ADOL-C
-/// tape by bench/motion_speed, which stops when they differ. Nothing is allocated; callers keep demands in containers of
-/// their own.
+/// tests/simulator/largest_demand_test.cpp, that of the reference NLP by tests/bench/reference_nlp_test.cpp, that on
+/// ADOL-C's tape by tests/bench/taped_law_test.cpp. Nothing is allocated; callers keep demands in containers of their own.
 #include <cmath>
 #include <vector>
 
