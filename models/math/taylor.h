@@ -13,13 +13,14 @@
 namespace sparflow {
 
 /// Calls f(integral_constant 0), f(1) ... f(count - 1). With -O2 a loop over so few coefficients is not unrolled, and these
-/// numbers are in the inner loop of an optimisation.
+/// numbers are in the inner loop of an optimisation; for the same reason the calls are always inlined.
+template <class F, std::size_t... i>
+[[gnu::always_inline]] inline void unrolled(const F& f, std::index_sequence<i...>) {
+  (f(std::integral_constant<std::size_t, i>()), ...);
+}
 template <std::size_t count, class F>
-void unrolled(const F& f) {
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    (f(std::integral_constant<std::size_t, i>()), ...);
-  }
-  (std::make_index_sequence<count>());
+[[gnu::always_inline]] inline void unrolled(const F& f) {
+  unrolled(f, std::make_index_sequence<count>());
 }
 
 template <int N>
@@ -133,7 +134,8 @@ struct TaylorSeries {
   }();
   /// sum over j = from .. to of a_j b_(k-j)
   template <std::size_t from, std::size_t to>
-  static double convolved(const TaylorSeries& a, const TaylorSeries& b, std::size_t k) {
+  [[gnu::always_inline]] static double convolved(const TaylorSeries& a, const TaylorSeries& b,
+                                                 std::size_t k) {
     double sum = 0.0;
     unrolled<to - from + 1>(
         [&](auto j) { sum += a.coefficient[from + j] * b.coefficient[k - from - j]; });

@@ -54,7 +54,8 @@ const std::vector<Binary>& binary_functions() {
 
 TEST(Jet, MatchesNumericDerivativesOfEveryFunction) {
   for (const Binary& f : binary_functions()) {
-    for (const auto& [x, y] : {std::pair{0.7, 1.3}, std::pair{1.9, 0.4}}) {
+    for (const auto& at : {std::pair{0.7, 1.3}, std::pair{1.9, 0.4}}) {
+      const double x = at.first, y = at.second;
       SCOPED_TRACE(f.name);
       const Jet d = f.jet(Jet::variable(x, 0, 2), Jet::variable(y, 1, 2));
       EXPECT_DOUBLE_EQ(d.value, f.plain(x, y));
