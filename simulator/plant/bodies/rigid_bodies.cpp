@@ -188,20 +188,20 @@ void RigidBodies::add_points(const double* y, const double* yd) {
     jacobian_.col(link.slides_with) += link.fraction * geometry.axis[s];
     add_point(link.mass, accelerations(p));
   }
-  std::vector<LinkageMass<Taylor3>> masses;
+  std::vector<LinkageMass<Series>> masses;  // over the joint's own position, not yet over time
   for (int c = 0; c < machine_.cylinder_count(); ++c) {
     const int j = machine_.cylinders[static_cast<std::size_t>(c)].joint;
     masses.clear();
-    append_linkage_masses(machine_, c, Taylor3::variable(y[j]), masses);
-    for (const LinkageMass<Taylor3>& m : masses) {
+    append_linkage_masses(machine_, c, Series::variable(y[j]), masses);
+    for (const LinkageMass<Series>& m : masses) {
       Vector3<Series> local;
       Eigen::Vector3d slope;
       for (int i = 0; i < 3; ++i) {
-        const Taylor3& x = m.position[i];
-        local[i] = Series(x.value);
-        local[i].coefficient[1] = x.d1 * yd[j];
-        local[i].coefficient[2] = 0.5 * x.d2 * yd[j] * yd[j];
-        slope[i] = x.d1;
+        const Series& x = m.position[i];
+        local[i] = Series(x.value());
+        local[i].coefficient[1] = x.coefficient[1] * yd[j];
+        local[i].coefficient[2] = x.coefficient[2] * yd[j] * yd[j];
+        slope[i] = x.coefficient[1];
       }
       if (j > 0) {
         const Frame<Series>& parent = frames[static_cast<std::size_t>(j - 1)];
