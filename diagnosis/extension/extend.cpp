@@ -121,11 +121,26 @@ std::string blurred_by_last(const CraneModel& before, const CraneModel& after, d
   return {};
 }
 
+/// Whether the logs determine that an effect is there at all: the 95 % interval of one of the parameters to which it is
+/// proportional excludes zero. True for an effect without such a parameter or without intervals.
+bool is_determined(const AppliedEffect& e) {
+  if (e.lower95.size() != e.values.size()) return true;
+  bool proportional = false;
+  for (std::size_t k = 0; k < e.values.size(); ++k) {
+    if (!e.effect->info().parameters[k].linear) continue;
+    if (e.lower95[k] > 0.0 || e.upper95[k] < 0.0) return true;
+    proportional = true;
+  }
+  return !proportional;
+}
+
 /// Why a step is not kept, as part of a sentence about it.
 std::string against(const ExtendStep& step, const ErrorChangeOptions& options) {
   if (!step.same_as.empty())
     return fmt::format("on these logs it is indistinguishable from {}, which is in the model",
                        step.same_as);
+  if (!step.determined)
+    return "estimated together with the effects of the model, its 95 % interval contains zero";
   if (step.change.own > options.largest_own) {
     return fmt::format("with it, the error on the {} is {} where it acts", step.judged_on,
                        percent_text(step.change.own));
@@ -391,10 +406,11 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
       done += (1.0 - done) * 0.2;
       step.diagnosis = diagnosis;
       step.same_as = blurred_by_last(current.model, next.model, options.blurred);
-      if (step.change.worse(options.change) || !step.same_as.empty()) {
+      step.determined = is_determined(step.effect);
+      if (step.change.worse(options.change) || !step.same_as.empty() || !step.determined) {
         aside.push_back(e->effect);
         // it helps where it acts but harms elsewhere: its rivals would do the same and are set aside, too
-        if (step.change.own < options.change.largest_own && step.same_as.empty())
+        if (step.change.own < options.change.largest_own && step.same_as.empty() && step.determined)
           add_indistinguishable(*diagnosis, e->effect, aside);
         ++tried;
         result.rejected.push_back(std::move(step));

@@ -23,6 +23,7 @@ struct ExtendStep {
   ErrorChange change;
   bool others_kept = false;  ///< whether the effects added before kept their values
   std::string same_as;       ///< title of an effect of the model from which it is indistinguishable
+  bool determined = true;    ///< false: its 95 % interval contains no effect at all; `improve` only
   /// The diagnosis that named it, shared by its steps; null when the user asked for the effect.
   std::shared_ptr<const Diagnosis> diagnosis;
 };
@@ -77,8 +78,9 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
 /// Adds the effects that `diagnose` names and diagnoses again, until it names none, data is bad, or `max_steps` are
 /// done; `stopped_because` says which. Of several effects the one that reduces an error by the largest factor comes
 /// first. A step is kept when data that took no part is predicted better where the effect acts and nothing else worse
-/// (error_change.h). If not, it is tried once more with the other effects unchanged, because in a joint estimate they
-/// may reduce an error of one place at the cost of another. Effects not kept are excluded until another step is kept.
+/// (error_change.h), and when the interval of the effect, estimated with the others, excludes zero. If the error rises, it
+/// is tried once more with the other effects unchanged, because in a joint estimate they may reduce an error of one place
+/// at the cost of another. Effects not kept are excluded until another step is kept.
 /// @param references as in ExtendOptions
 ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
                      const std::vector<Log>& references, const std::vector<Log>& tests,
