@@ -22,6 +22,14 @@ class InputError : public std::runtime_error {
   std::string key;
 };
 
+/// An error inside a short text (a unit, a formula). The caller, who knows the file, turns it into an InputError.
+class TextError : public std::runtime_error {
+ public:
+  TextError(int column_in, const std::string& message)
+      : std::runtime_error(message), column(column_in) {}
+  int column;  ///< 1-based, in characters
+};
+
 /// Wrong use of the program (exit code 2).
 class UsageError : public std::runtime_error {
  public:

@@ -35,7 +35,7 @@ include models/chain/crane_model.h '"identification/log/log.h"'
 expect "upwards" 'models/chain/crane_model.h:1: includes "identification/log/log.h", but models/chain may include only'
 include simulator/hidden_effects/plant.cpp '"models/chain/crane_model.h"'
 expect "opponent that shares a law" "it is the model's opponent"
-include models/effects/registry.cpp '"models/effects/formula/expression.h"'
+include models/effects/registry.cpp '"models/effects/formula/law.h"'
 expect "folder of the same room" 'models/effects may include only'
 include diagnosis/verdict/diagnose.cpp '"identification/log/log_number.h"'
 expect "internal header" 'which is internal to identification'

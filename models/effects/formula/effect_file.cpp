@@ -13,10 +13,13 @@
 namespace sparflow {
 namespace {
 
-using Stage = UserEffectStage;
-using Place = UserEffectPlace;
+using Stage = EffectStage;
+using Place = EffectPlace;
 
 constexpr int kGridPoints = 7;
+constexpr std::size_t kQuoted = 300;  // [characters] of a law in a message
+
+constexpr const char* kNameRule = "of letters, digits and _ that does not begin with a digit";
 
 bool plain_name(const std::string& word) {
   return !word.empty() && std::isdigit(static_cast<unsigned char>(word[0])) == 0 &&
@@ -25,23 +28,26 @@ bool plain_name(const std::string& word) {
          });
 }
 
-std::string identifier(const YamlValue& value, const std::string& what) {
-  const std::string word = value.text(what);
-  if (!plain_name(word)) {
-    value.fail(
-        fmt::format("got \"{}\", expected {} of letters, digits and _ that does not begin "
-                    "with a digit",
-                    word, what));
+/// Values at equal steps over the bounds, at equal ratios where they are positive and span more than a decade.
+std::vector<double> default_grid(const EffectParameter& p) {
+  std::vector<double> grid;
+  const bool by_ratio = p.lower > 0.0 && p.upper > 10.0 * p.lower;
+  for (int i = 0; i < kGridPoints; ++i) {
+    const double f = static_cast<double>(i) / (kGridPoints - 1);
+    grid.push_back(by_ratio ? p.lower * std::pow(p.upper / p.lower, f)
+                            : p.lower + f * (p.upper - p.lower));
   }
-  return word;
+  return grid;
 }
 
-/// Dimension of a joint's coordinate or of its first or second time derivative.
-Dimension joint_dimension(JointType type, SignalKind kind) {
-  const Dimension q = type == JointType::kPrismatic ? dimensions::kLength : dimensions::kNone;
-  return kind == SignalKind::kJointPosition ? q
-         : kind == SignalKind::kJointSpeed  ? q * dimensions::kRate
-                                            : q * dimensions::kRateOfRate;
+/// A number in the parameter's unit, checked to be inside its bounds; returned in SI.
+double within(const YamlValue& value, const EffectParameter& p) {
+  const double si = value.number({"number", p.unit.c_str(), Quantity::Sign::kAny, p.si});
+  if (!(si >= p.lower && si <= p.upper)) {
+    value.fail(fmt::format("got {}, expected a number inside the bounds [{:g}, {:g}] {}",
+                           value.word(), p.lower / p.si, p.upper / p.si, p.unit));
+  }
+  return si;
 }
 
 class EffectReader {
@@ -54,244 +60,214 @@ class EffectReader {
                                   {"id", "title", "stage", "at", "law", "parameters", "equation",
                                    "citation", "confused_with", "separated_by"});
     UserEffectSpec spec;
+    EffectInfo& info = spec.info;
     spec.where = value.place();
-    const YamlValue id = map.need("id", "a name for the effect, such as my_friction");
-    spec.id = identifier(id, "an id");
-    if (std::find(reserved_.begin(), reserved_.end(), spec.id) != reserved_.end()) {
-      id.fail(fmt::format("an effect \"{0}\" exists already; choose another id, such as my_{0}",
-                          spec.id));
-    }
-    spec.stage = static_cast<Stage>(map.need("stage", "one of force, flow, pressure, pump")
+    info.id = id(map.need("id", "a name for the effect, such as my_friction"));
+    info.stage = static_cast<Stage>(map.need("stage", "one of force, flow, pressure, pump")
                                         .choice({"force", "flow", "pressure", "pump"}));
-    spec.place = place(map, spec.stage);
+    info.place = place(map, info.stage);
+    const YamlValue parameters = map.need(
+        "parameters", "a mapping such as Fc: {unit: N, bounds: [0, 20000], typical: 3000}");
+    std::vector<ReadParameter> read;
+    for (const auto& [name, entry] :
+         parameters.map("a mapping from names to parameters", {}).entries()) {
+      read.push_back(parameter(name, entry));
+    }
+    if (read.empty()) parameters.fail("an effect needs at least one parameter, its size");
+    read_law(map.need("law", "a formula such as Fc * sign(v)"), read, spec);
     const auto text_or = [&](const char* key, const std::string& what, const std::string& other) {
       const auto found = map.find(key);
       return found ? found->text(what) : other;
     };
-    spec.title = text_or("title", "a title", spec.id);
-    const YamlValue parameters = map.need(
-        "parameters", "a mapping such as Fc: {unit: N, bounds: [0, 20000], typical: 3000}");
-    std::vector<std::pair<std::string, YamlValue>> places;
-    std::vector<Symbol> symbols;
-    for (const auto& [name, entry] :
-         parameters.map("a mapping from names to parameters", {}).entries()) {
-      check_name(name, entry);
-      symbols.push_back({name, {}, true});
-      spec.parameters.push_back(parameter(name, entry, symbols.back().unit));
-      places.emplace_back(name, entry);
-    }
-    if (places.empty()) parameters.fail("an effect needs at least one parameter, its size");
-    const YamlValue law = map.need("law", "a formula such as Fc * sign(v)");
-    read_law(law, symbols, spec);
-    judge_parameters(places, law, spec);
-    spec.equation = text_or("equation", "one line of text", spec.law.text());
-    spec.citation = text_or("citation", "author (year), where", "");
-    spec.separated_by = text_or("separated_by", "the motion that distinguishes it", "");
+    info.title = text_or("title", "a title", info.id);
+    info.equation = text_or("equation", "one line of text", spec.law.text());
+    info.citation = text_or("citation", "author (year), where", "");
+    info.separated_by = text_or("separated_by", "the motion that distinguishes it", "");
     if (const auto list = map.find("confused_with")) {
       for (const YamlValue& word : list->list("ids of effects or words")) {
-        spec.confused_with.push_back(word.text("the id of an effect or words"));
+        info.confused_with.push_back(word.text("the id of an effect or words"));
       }
     }
+    info.in_motion = !spec.in_motion() ? "nothing: its law uses signals that only a log has"
+                     : info.stage == Stage::kFlow ? "nothing: a motion prescribes flow"
+                                                  : effect_stage_name(info.stage);
     return spec;
   }
 
  private:
-  static Place place(const YamlMap& map, Stage stage) {
-    const Place own = stage == Stage::kPump ? Place::kPump : Place::kCylinder;
-    const auto value = map.find("at");
-    if (!value) return own;
-    const auto found = static_cast<Place>(value->choice({"cylinder", "pump", "machine"}));
-    if (found != own && found != Place::kMachine) {
-      value->fail(fmt::format("got {}, expected {} or machine: stage {} adds to each {}",
-                              user_effect_place_name(found), user_effect_place_name(own),
-                              user_effect_stage_name(stage), user_effect_place_name(own)));
+  struct ReadParameter {
+    YamlValue value;
+    EffectParameter parameter;
+    Symbol symbol;
+  };
+
+  std::string id(const YamlValue& value) const {
+    const std::string word = value.text("an id");
+    if (!plain_name(word))
+      value.fail(fmt::format("got \"{}\", expected an id {}", word, kNameRule));
+    if (std::find(reserved_.begin(), reserved_.end(), word) != reserved_.end()) {
+      value.fail(
+          fmt::format("an effect \"{0}\" exists already; choose another id, such as my_{0}", word));
     }
-    return found;
+    return word;
   }
 
-  static void check_name(const std::string& name, const YamlValue& at) {
+  static Place place(const YamlMap& map, Stage stage) {
+    static const std::vector<std::string> kNames = {"cylinder", "pump", "machine"};
+    static constexpr Place kPlaces[] = {Place::kCylinder, Place::kPump, Place::kMachine};
+    const int own = stage == Stage::kPump ? 1 : 0;
+    const auto value = map.find("at");
+    const int found = value ? value->choice(kNames) : own;
+    if (found != own && kPlaces[found] != Place::kMachine) {
+      value->fail(fmt::format("got {}, expected {} or machine: stage {} adds to each {}",
+                              value->word(), kNames[own], effect_stage_name(stage), kNames[own]));
+    }
+    return kPlaces[found];
+  }
+
+  static ReadParameter parameter(const std::string& name, const YamlValue& value) {
     if (!plain_name(name)) {
-      at.fail(
-          fmt::format("\"{}\" cannot stand in a law; expected a parameter's name of letters, "
-                      "digits and _ that does not begin with a digit",
-                      name));
+      value.fail(fmt::format("\"{}\" cannot stand in a law; expected a parameter's name {}", name,
+                             kNameRule));
     }
     for (const SignalInfo& signal : user_effect_signals()) {
-      if (name == signal.name) {
-        at.fail(fmt::format("\"{}\" is a signal: {}; give the parameter another name, such as {}0",
-                            name, signal.meaning, name));
-      }
+      if (name != signal.name) continue;
+      value.fail(
+          fmt::format("\"{0}\" is a signal: {1}; give the parameter another name, such as {0}0",
+                      name, signal.meaning));
     }
-    const std::vector<std::string> functions = Expression::functions();
-    if (std::find(functions.begin(), functions.end(), name) != functions.end()) {
-      at.fail(fmt::format("\"{}\" is a function; give the parameter another name", name));
+    if (find_function(name) != nullptr) {
+      value.fail(fmt::format("\"{}\" is a function; give the parameter another name", name));
     }
-  }
-
-  static UserParameter parameter(const std::string& name, const YamlValue& value, Unit& unit) {
     const YamlMap map = value.map("a parameter {unit, bounds, typical}",
                                   {"unit", "bounds", "typical", "meaning", "grid"});
-    UserParameter p;
-    p.name = name;
-    const YamlValue unit_value =
-        map.need("unit", "a unit such as N, bar/(l/min)^2 or 1 for a pure number");
-    p.unit = unit_value.text("a unit such as N, bar/(l/min)^2 or 1 for a pure number");
+    const std::string units = "a unit such as N, bar/(l/min)^2 or 1 for a pure number";
+    const YamlValue unit_value = map.need("unit", units);
+    EffectParameter p{name, unit_value.text(units), 1.0, 0.0, 0.0, 0.0, "", true, {}};
+    Unit unit;
     try {
       unit = parse_unit(p.unit);
     } catch (const TextError& error) {
       unit_value.fail(fmt::format("got \"{}\": column {}: {}", p.unit, error.column, error.what()));
     }
     p.si = unit.si;
-    const Quantity number{"number", p.unit.c_str(), Quantity::Sign::kAny, p.si};
     const Range bounds =
         map.need("bounds", fmt::format("the plausible range [lo, hi], each a number [{}]", p.unit))
-            .range(number);
+            .range({"number", p.unit.c_str(), Quantity::Sign::kAny, p.si});
     p.lower = bounds.lo;
     p.upper = bounds.hi;
-    const YamlValue typical = map.need(
-        "typical", fmt::format("the value at which the effect is clearly seen [{}]", p.unit));
-    p.typical = within(typical, number, p);
+    p.typical =
+        within(map.need("typical",
+                        fmt::format("the value at which the effect is clearly seen [{}]", p.unit)),
+               p);
     if (const auto grid = map.find("grid")) {
       for (const YamlValue& point : grid->list("values to search from")) {
-        p.grid.push_back(within(point, number, p));
+        p.grid.push_back(within(point, p));
       }
       if (p.grid.size() < 2)
         grid->fail("expected two values or more, from which the search starts");
     }
     if (const auto meaning = map.find("meaning")) p.meaning = meaning->text("a few words");
-    return p;
-  }
-
-  /// A number in the parameter's unit, checked to be inside its bounds; returned in SI.
-  static double within(const YamlValue& value, const Quantity& what, const UserParameter& p) {
-    const double si = value.number(what);
-    if (!(si >= p.lower && si <= p.upper)) {
-      value.fail(fmt::format("got {}, expected a number inside the bounds [{:g}, {:g}] {}",
-                             value.word(), p.lower / p.si, p.upper / p.si, p.unit));
-    }
-    return si;
+    return {value, p, {name, unit}};
   }
 
   /// The names that a law of this stage may contain.
   std::vector<Symbol> vocabulary(Stage stage) const {
     std::vector<Symbol> symbols;
     for (const SignalInfo& signal : user_effect_signals()) {
-      if (signal.of_cylinder && stage == Stage::kPump) continue;
-      if (signal.kind < SignalKind::kJointPosition) {
-        symbols.push_back({signal.name, parse_unit(signal.unit), true});
+      if (signal.owner != SignalInfo::Owner::kJoint) {
+        Symbol symbol{signal.name, parse_unit(signal.unit)};
+        if (stage == Stage::kPump && signal.owner == SignalInfo::Owner::kCylinder) {
+          symbol.refused = symbol.name +
+                           " is a signal of a cylinder, and a law of stage pump is about a pump; "
+                           "use Q_pump, p_pump or signals of the machine";
+        }
+        symbols.push_back(symbol);
       } else if (machine_ == nullptr) {
         symbols.push_back({std::string(signal.name) + "*", {}, false});
       } else {
+        const std::string units = signal.unit;  // "rad/s or m/s"
+        const std::size_t either = units.find(" or ");
         for (const Joint& joint : machine_->joints) {
-          symbols.push_back({signal.name + joint.name,
-                             {joint_dimension(joint.type, signal.kind), 1.0, false},
-                             true});
+          const bool prismatic = joint.type == JointType::kPrismatic;
+          symbols.push_back(
+              {signal.name + joint.name,
+               parse_unit(prismatic ? units.substr(either + 4) : units.substr(0, either))});
         }
       }
     }
     return symbols;
   }
 
-  void read_law(const YamlValue& value, const std::vector<Symbol>& parameters,
+  /// Reads the law and checks its unit, that every parameter occurs in it and that the effect can be absent.
+  void read_law(const YamlValue& value, const std::vector<ReadParameter>& read,
                 UserEffectSpec& spec) const {
     const std::string text = value.text("a formula such as Fc * sign(v)");
+    const std::string got = text.size() > kQuoted ? text.substr(0, kQuoted) + "..." : text;
+    const std::vector<Symbol> signals = vocabulary(spec.info.stage);
+    std::vector<Symbol> symbols;
+    symbols.reserve(read.size());
+    for (const ReadParameter& r : read) symbols.push_back(r.symbol);
     try {
-      spec.law = Expression::compile(text, vocabulary(spec.stage), parameters);
+      spec.law = Law::compile(text, signals, symbols);
     } catch (const TextError& error) {
-      value.fail(fmt::format("got \"{}\": column {}: {}", text, error.column,
-                             explained(text, error, spec.stage)));
+      value.fail(fmt::format("got \"{}\": column {}: {}", got, error.column, error.what()));
     }
-    const Dimension expected = user_effect_dimension(spec.stage);
-    const Dimension found = spec.law.dimension();
+    const Dimension expected = stage_dimension(spec.info.stage), found = spec.law.dimension();
     if (spec.law.dimension_known() && found != expected) {
       value.fail(fmt::format(
           "got \"{}\", which gives {}, expected {}, the unit of stage {}; it lacks a factor of {}",
-          text, in_brackets(found), in_brackets(expected), user_effect_stage_name(spec.stage),
+          got, in_brackets(found), in_brackets(expected), effect_stage_name(spec.info.stage),
           in_brackets(expected / found)));
     }
-    for (const std::string& name : spec.law.signals()) {
-      spec.signals.push_back(signal_of(name, spec.stage));
-    }
-  }
-
-  /// The message when a pump's law uses a cylinder's signal; otherwise the parser's own message.
-  static std::string explained(const std::string& law, const TextError& error, Stage stage) {
-    const std::size_t begin = static_cast<std::size_t>(error.column) - 1;
-    std::size_t end = begin;
-    while (end < law.size() &&
-           (std::isalnum(static_cast<unsigned char>(law[end])) != 0 || law[end] == '_')) {
-      ++end;
-    }
-    const std::string word = begin < end ? law.substr(begin, end - begin) : "";
-    for (const SignalInfo& signal : user_effect_signals()) {
-      if (stage == Stage::kPump && signal.of_cylinder && word == signal.name) {
-        return fmt::format(
-            "{} is a signal of a cylinder, and a law of stage pump is about a pump; "
-            "use Q_pump, p_pump or signals of the machine",
-            word);
-      }
-    }
-    return error.what();
-  }
-
-  UserSignal signal_of(const std::string& name, Stage stage) const {
-    for (const SignalInfo& info : user_effect_signals()) {
-      const bool joint = info.kind >= SignalKind::kJointPosition;
-      if (joint ? !name.starts_with(info.name) : name != info.name) continue;
-      UserSignal signal{info.kind, name, "", -1, info.in_motion && info.motion_stage <= stage};
-      if (joint) {
-        signal.joint = name.substr(std::string(info.name).size());
-        if (machine_ != nullptr) signal.joint_index = machine_->joint_index(signal.joint);
-      }
-      return signal;
-    }
-    check_failed("signal", __FILE__, __LINE__, "a law has a signal outside the table: " + name);
-  }
-
-  /// Checks that every parameter occurs in the law and that the effect can be absent; gives the nonlinear ones a grid.
-  static void judge_parameters(const std::vector<std::pair<std::string, YamlValue>>& places,
-                               const YamlValue& law, UserEffectSpec& spec) {
     const std::vector<std::string> sizes = spec.law.proportional_parameters();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const auto& [name, value] = places[i];
-      UserParameter& p = spec.parameters[i];
-      if (!spec.law.uses_parameter(name)) {
-        value.fail("does not stand in the law; use it or remove it");
-      }
-      p.proportional = std::find(sizes.begin(), sizes.end(), name) != sizes.end();
-      if (p.proportional) {
-        if (!p.grid.empty()) {
-          value.fail(
-              "has a grid, but the law is proportional to it, so it is found without a "
-              "search; remove the grid");
-        }
-        if (p.typical == 0.0) {
-          value.fail(
-              "got typical 0, at which the effect is absent; give the value at which it is "
-              "clearly seen");
-        }
-      } else if (p.grid.empty()) {
-        p.grid = default_grid(p);
+    symbols.clear();
+    for (const bool linear : {true, false}) {  // The catalogue lists proportional parameters first.
+      for (const ReadParameter& r : read) {
+        const bool size = std::find(sizes.begin(), sizes.end(), r.symbol.name) != sizes.end();
+        if (size != linear) continue;
+        symbols.push_back(r.symbol);
+        spec.info.parameters.push_back(judged(r, spec.law, size));
       }
     }
-    if (!sizes.empty()) return;
-    law.fail(fmt::format(
-        "got \"{}\", which is proportional to none of its parameters, so the effect could never be "
-        "absent; multiply all of it by one, as in size * (...), size: {{unit: 1, bounds: [0, 2], "
-        "typical: 1}}",
-        spec.law.text()));
+    if (sizes.empty()) {
+      value.fail(fmt::format(
+          "got \"{}\", which is proportional to none of its parameters, so the effect could never "
+          "be "
+          "absent; multiply all of it by one, as in size * (...), size: {{unit: 1, bounds: [0, 2], "
+          "typical: 1}}",
+          got));
+    }
+    spec.law = Law::compile(text, signals, symbols);
+    spec.info.signals = spec.law.signals();
+    for (const std::string& name : spec.law.signals()) {
+      for (const SignalInfo& info : user_effect_signals()) {
+        const bool joint = info.owner == SignalInfo::Owner::kJoint;
+        if (joint ? !name.starts_with(info.name) : name != info.name) continue;
+        spec.signals.push_back(&info);
+        spec.joints.push_back(joint ? name.substr(std::string(info.name).size()) : "");
+      }
+    }
   }
 
-  /// Values at equal steps over the bounds, at equal ratios where they are positive and span more than a decade.
-  static std::vector<double> default_grid(const UserParameter& p) {
-    std::vector<double> grid;
-    const bool by_ratio = p.lower > 0.0 && p.upper > 10.0 * p.lower;
-    for (int i = 0; i < kGridPoints; ++i) {
-      const double f = static_cast<double>(i) / (kGridPoints - 1);
-      grid.push_back(by_ratio ? p.lower * std::pow(p.upper / p.lower, f)
-                              : p.lower + f * (p.upper - p.lower));
+  /// The parameter with its grid. @param size whether the law is proportional to it
+  static EffectParameter judged(const ReadParameter& read, const Law& law, bool size) {
+    EffectParameter p = read.parameter;
+    p.linear = size;
+    if (!law.uses_parameter(p.name))
+      read.value.fail("does not stand in the law; use it or remove it");
+    if (size && !p.grid.empty()) {
+      read.value.fail(
+          "has a grid, but the law is proportional to it, so it is found without a search; remove "
+          "the grid");
     }
-    return grid;
+    if (size && p.typical == 0.0) {
+      read.value.fail(
+          "got typical 0, at which the effect is absent; give the value at which it is clearly "
+          "seen");
+    }
+    if (!size && p.grid.empty()) p.grid = default_grid(p);
+    return p;
   }
 
   const Machine* machine_;
@@ -309,9 +285,16 @@ std::string alone(const YamlValue& effect) {
 
 }  // namespace
 
+Dimension stage_dimension(EffectStage stage) {
+  return stage == Stage::kForce  ? dimensions::kForce
+         : stage == Stage::kFlow ? dimensions::kFlow
+                                 : dimensions::kPressure;
+}
+
 bool UserEffectSpec::in_motion() const {
-  return std::all_of(signals.begin(), signals.end(),
-                     [](const UserSignal& signal) { return signal.in_motion; });
+  return std::all_of(signals.begin(), signals.end(), [&](const SignalInfo* signal) {
+    return signal->in_motion() && signal->motion_stage <= info.stage;
+  });
 }
 
 std::vector<UserEffectSpec> parse_user_effects(const std::string& text, const std::string& file,
@@ -324,22 +307,16 @@ std::vector<UserEffectSpec> parse_user_effects(const std::string& text, const st
   for (const YamlValue& value : list.list("effects, each beginning with - id: ...")) {
     UserEffectSpec spec = reader.read(value);
     for (const UserEffectSpec& earlier : specs) {
-      if (earlier.id == spec.id) {
+      if (earlier.info.id == spec.info.id) {
         value.fail(fmt::format("the id \"{}\" is taken by the effect on line {}; choose another",
-                               spec.id, earlier.where.line));
+                               spec.info.id, earlier.where.line));
       }
     }
-    spec.source_text = text;
     spec.definition = alone(value);
     specs.push_back(std::move(spec));
   }
   if (specs.empty()) list.fail("the list is empty; expected at least one effect");
   return specs;
-}
-
-std::vector<UserEffectSpec> load_user_effects(const std::string& path, const Machine* machine,
-                                              const std::vector<std::string>& reserved) {
-  return parse_user_effects(read_file(path), path, machine, reserved);
 }
 
 }  // namespace sparflow

@@ -1,52 +1,34 @@
 #pragma once
-/// Stages and places of a user's effect, and the signals that its law can contain.
+/// The signals that the law of a user's effect can contain: one table with their names, units and values.
 #include <vector>
 
-#include "models/effects/formula/unit_algebra.h"
+#include "models/effects/effect.h"
 
 namespace sparflow {
 
-/// The quantity to which the law adds: force of a cylinder [N], flow into it [m^3/s], its working pressure [Pa], a pump's
-/// pressure [Pa]. A motion is computed in this order, so that a law may use results of earlier stages.
-enum class UserEffectStage { kForce, kFlow, kPressure, kPump };
-/// Whether each cylinder or pump has its own parameters, or the whole machine has one set.
-enum class UserEffectPlace { kCylinder, kPump, kMachine };
-const char* user_effect_stage_name(UserEffectStage stage);  ///< "force" ...
-const char* user_effect_place_name(UserEffectPlace place);  ///< "cylinder" ...
-Dimension user_effect_dimension(UserEffectStage stage);
-
-/// Signals of a law; they belong to the cylinder, or to the pump that feeds it, unless stated otherwise.
-enum class SignalKind {
-  kSpeed,             ///< v [m/s] of the rod, positive when it extends
-  kAcceleration,      ///< a [m/s^2] of the rod
-  kLength,            ///< x [m] pin to pin
-  kStroke,            ///< stroke [m] = x - length_at_zero_stroke
-  kStaticForce,       ///< F [N] of gravity on the piston, positive when it pushes the rod in
-  kFlow,              ///< Q [m^3/s] into the supply chamber, not negative
-  kReturnFlow,        ///< Q_return [m^3/s] out of the return chamber, not negative
-  kCommand,           ///< u [1], -1..1
-  kDirection,         ///< direction: +1 extends, -1 retracts, 0 rests
-  kPressureA,         ///< pA [Pa]
-  kPressureB,         ///< pB [Pa]
-  kPayload,           ///< payload [kg]
-  kOil,               ///< oil [degC]
-  kTime,              ///< t [s]
-  kPumpFlow,          ///< Q_pump [m^3/s], sum over what the pump feeds
-  kPumpPressure,      ///< p_pump [Pa]
-  kReturnSum,         ///< Q_return_sum [m^3/s], over all cylinders of the machine
-  kJointPosition,     ///< q.NAME [rad] or [m]
-  kJointSpeed,        ///< qd.NAME
-  kJointAcceleration  ///< qdd.NAME
+/// The place at which a law is evaluated, and the joint that a signal names.
+struct SignalPlace {
+  const Machine& machine;
+  std::size_t cylinder = 0;  ///< unused by signals of the machine
+  int pump = -1;             ///< the pump, or that which feeds the cylinder; -1 = none
+  std::size_t joint = 0;
 };
 
 struct SignalInfo {
-  SignalKind kind;
+  enum class Owner { kCylinder, kMachine, kJoint };
   const char* name;  ///< "v"; "q." for joints
   const char* unit;  ///< "m/s"
   const char* meaning;
-  bool of_cylinder;              ///< only laws of the stages force, flow and pressure have it
-  bool in_motion;                ///< known for a planned motion; false: only a log has it
-  UserEffectStage motion_stage;  ///< first stage of a motion's computation at which it is known
+  Owner owner;  ///< kCylinder: laws of stage pump cannot have it
+  /// First stage of a motion's computation at which it is known.
+  EffectStage motion_stage = EffectStage::kForce;
+  /// Values in a log, where they are not those of its instants; an empty vector: not measured.
+  Eigen::VectorXd (*of_log)(const MachineSeries&, std::size_t cylinder) = nullptr;
+  /// Value at an instant [SI, degC]. Null: only a log has it.
+  double (*value)(const Instant<double>&, const SignalPlace&) = nullptr;
+  Jet (*jet)(const Instant<Jet>&, const SignalPlace&) = nullptr;
+
+  bool in_motion() const { return value != nullptr; }  ///< known for a planned motion
 };
 /// All signals, in the order of the table in docs/user_effects.md.
 const std::vector<SignalInfo>& user_effect_signals();

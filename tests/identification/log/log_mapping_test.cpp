@@ -13,6 +13,7 @@ namespace sparflow {
 namespace {
 
 using test::LogFiles;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 const char* const kForeign =
@@ -99,24 +100,25 @@ TEST(Expression, ErrorsNameTheirPlaceAndCause) {
   const std::string place = "m.yaml:3:7: columns.x: ";
   EXPECT_EQ(
       error("a +"),
-      place + "\"a +\", character 4: the expression ends where a column or a number was expected");
-  EXPECT_EQ(error("(a"), place + "\"(a\", character 3: a bracket is opened and not closed");
-  EXPECT_EQ(error("a)"),
-            place + "\"a)\", character 2: found \")\", expected an operator or the end");
-  EXPECT_EQ(error("a 5"),
-            place + "\"a 5\", character 3: found \"5\", expected an operator or the end");
-  EXPECT_EQ(error("a % 2"),
-            place + "\"a % 2\", character 3: found \"% 2\", expected an operator or the end");
+      place +
+          "\"a +\", character 4: the expression ends where a number, a name or ( should follow");
+  EXPECT_EQ(error("(a"), place + "\"(a\", character 1: this ( is never closed");
+  EXPECT_EQ(error("a)"), place + "\"a)\", character 2: this ) has no ( before it");
   EXPECT_EQ(
-      error("* a"),
-      place + "\"* a\", character 1: found \"* a\", expected a column, a number or a bracket");
+      error("a 5"),
+      place + "\"a 5\", character 3: expected an operator before \"5\"; a product is written *");
+  EXPECT_EQ(error("a % 2"), place +
+                                "\"a % 2\", character 3: \"%\" means nothing in a formula; it is "
+                                "written with numbers, names and + - * / ^ ( )");
+  EXPECT_EQ(error("* a"),
+            place + "\"* a\", character 1: found \"*\", expected a number, a name or ( before it");
   EXPECT_EQ(error("max(a)"),
-            place + "\"max(a)\", character 6: max takes two values, separated by a comma");
-  EXPECT_EQ(error("abs(a"), place + "\"abs(a\", character 6: the bracket of abs( is not closed");
+            place + "\"max(a)\", character 1: max() takes two values or more, as in max(0, x)");
+  EXPECT_EQ(error("abs(a"), place + "\"abs(a\", character 4: this ( is never closed");
   EXPECT_EQ(error("`a"), place + "\"`a\", character 1: a backtick is opened and not closed");
-  EXPECT_EQ(
-      error("1 + a-b [m/h]"),
-      place + "\"1 + a-b [m/h]\", character 9: found \"[m/h]\", expected an operator or the end");
+  EXPECT_EQ(error("1 + a-b [m/h]"), place +
+                                        "\"1 + a-b [m/h]\", character 9: expected an operator "
+                                        "before \"[m/h]\"; a product is written *");
   EXPECT_EQ(
       error("pressure_7"),
       place +
@@ -124,8 +126,11 @@ TEST(Expression, ErrorsNameTheirPlaceAndCause) {
           "a, b, a b, a-b [m/s], 1, sin");
   EXPECT_EQ(error("`a_b`"),
             place + "\"`a_b`\", character 1: the log has no column \"a_b\"; did you mean \"a b\"?");
-  EXPECT_NE(error(std::string(100000, '(')).find("nested too deeply"), std::string::npos);
-  EXPECT_NE(error(std::string(100000, '-')).find("nested too deeply"), std::string::npos);
+  for (const char c : {'(', '-'}) {
+    EXPECT_THAT(error(std::string(5000, c)), HasSubstr("nested more than 100 deep; split it"));
+    EXPECT_THAT(error(std::string(100000, c)), HasSubstr("longer than 10000 characters; split it"));
+  }
+  EXPECT_THAT(error("1e999 * a"), HasSubstr("character 1: the number 1e999 is beyond"));
 }
 
 TEST_F(LogFiles, AMappingFileConvertsOtherColumnNames) {

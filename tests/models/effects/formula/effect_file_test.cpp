@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <ostream>
 
+#include "models/effects/formula/user_effect.h"
+#include "models/effects/user_effect_scope.h"
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
 #include "models/math/jet.h"
@@ -56,18 +58,19 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
   const std::vector<UserEffectSpec> specs = parse(kGoodEffects);
   ASSERT_EQ(specs.size(), 3u);
   const UserEffectSpec& rod = specs[0];
-  EXPECT_EQ(rod.id, "rod_friction");
-  EXPECT_EQ(rod.title, "Seal friction of the rod");
-  EXPECT_EQ(rod.stage, UserEffectStage::kForce);
-  EXPECT_EQ(rod.place, UserEffectPlace::kCylinder);
-  EXPECT_EQ(rod.equation, "Fc * tanh(v / v0)");
-  EXPECT_EQ(rod.citation, "Andersson, Soderberg, Bjorklund (2007), Tribology International 40");
-  EXPECT_EQ(rod.confused_with, (std::vector<std::string>{"coulomb_friction", "viscous_friction"}));
-  EXPECT_EQ(rod.separated_by, "slow moves");
+  EXPECT_EQ(rod.info.id, "rod_friction");
+  EXPECT_EQ(rod.info.title, "Seal friction of the rod");
+  EXPECT_EQ(rod.info.stage, EffectStage::kForce);
+  EXPECT_EQ(rod.info.place, EffectPlace::kCylinder);
+  EXPECT_EQ(rod.info.equation, "Fc * tanh(v / v0)");
+  EXPECT_EQ(rod.info.citation,
+            "Andersson, Soderberg, Bjorklund (2007), Tribology International 40");
+  EXPECT_EQ(rod.info.confused_with,
+            (std::vector<std::string>{"coulomb_friction", "viscous_friction"}));
+  EXPECT_EQ(rod.info.separated_by, "slow moves");
   EXPECT_EQ(rod.where.line, 2);
-  EXPECT_EQ(rod.source_text, kGoodEffects);
-  ASSERT_EQ(rod.parameters.size(), 2u);
-  const UserParameter& fc = rod.parameters[0];
+  ASSERT_EQ(rod.info.parameters.size(), 2u);
+  const EffectParameter& fc = rod.info.parameters[0];
   EXPECT_EQ(fc.name, "Fc");
   EXPECT_EQ(fc.unit, "kN");
   EXPECT_EQ(fc.meaning, "friction force");
@@ -75,34 +78,34 @@ TEST(EffectFile, WhatIsWrittenIsRead) {
   EXPECT_EQ(fc.lower, 0.0);
   EXPECT_EQ(fc.upper, 20e3);
   EXPECT_EQ(fc.typical, 3e3);
-  EXPECT_TRUE(fc.proportional);
+  EXPECT_TRUE(fc.linear);
   EXPECT_TRUE(fc.grid.empty());
-  const UserParameter& v0 = rod.parameters[1];
-  EXPECT_FALSE(v0.proportional);
+  const EffectParameter& v0 = rod.info.parameters[1];
+  EXPECT_FALSE(v0.linear);
   ASSERT_EQ(v0.grid.size(), 7u);  // two decades by ratio
   EXPECT_NEAR(v0.grid[0], 0.5e-3, 1e-18);
   EXPECT_NEAR(v0.grid[3], 5e-3, 1e-17);
   EXPECT_NEAR(v0.grid[6], 50e-3, 1e-16);
   ASSERT_EQ(rod.signals.size(), 1u);
-  EXPECT_EQ(rod.signals[0].kind, SignalKind::kSpeed);
+  EXPECT_STREQ(rod.signals[0]->name, "v");
   EXPECT_TRUE(rod.in_motion());
 
   const UserEffectSpec& hose = specs[1];
-  EXPECT_EQ(hose.stage, UserEffectStage::kPressure);
-  EXPECT_EQ(hose.place, UserEffectPlace::kMachine);
-  EXPECT_EQ(hose.title, "cold_hose");
-  EXPECT_EQ(hose.parameters[1].grid, (std::vector<double>{0.01, 0.03, 0.06}));
-  EXPECT_EQ(hose.signals[1].kind, SignalKind::kOil);
+  EXPECT_EQ(hose.info.stage, EffectStage::kPressure);
+  EXPECT_EQ(hose.info.place, EffectPlace::kMachine);
+  EXPECT_EQ(hose.info.title, "cold_hose");
+  EXPECT_EQ(hose.info.parameters[1].grid, (std::vector<double>{0.01, 0.03, 0.06}));
+  EXPECT_STREQ(hose.signals[1]->name, "oil");
 
   const UserEffectSpec& pump = specs[2];
-  EXPECT_EQ(pump.place,
-            UserEffectPlace::kPump);  // default place of an effect of stage pump
-  EXPECT_EQ(pump.equation, "dp grows with the square of the flow");
-  EXPECT_EQ(pump.parameters[0].typical, 0.02);
-  EXPECT_TRUE(pump.parameters[0].proportional);
-  EXPECT_TRUE(pump.parameters[1].proportional);
-  EXPECT_FALSE(pump.parameters[2].proportional);
-  EXPECT_EQ(pump.parameters[2].grid.size(), 7u);
+  EXPECT_EQ(pump.info.place,
+            EffectPlace::kPump);  // default place of an effect of stage pump
+  EXPECT_EQ(pump.info.equation, "dp grows with the square of the flow");
+  EXPECT_EQ(pump.info.parameters[0].typical, 0.02);
+  EXPECT_TRUE(pump.info.parameters[0].linear);
+  EXPECT_TRUE(pump.info.parameters[1].linear);
+  EXPECT_FALSE(pump.info.parameters[2].linear);
+  EXPECT_EQ(pump.info.parameters[2].grid.size(), 7u);
 }
 
 TEST(EffectFile, LawsGiveSiValuesAndDerivatives) {
@@ -121,28 +124,28 @@ TEST(EffectFile, LawsGiveSiValuesAndDerivatives) {
 // Each signal of the table can be used at its stage, has its unit, and is known where the table states it.
 TEST(EffectFile, EverySignalOfTheTableIsUnderstood) {
   for (const SignalInfo& info : user_effect_signals()) {
-    const bool joint = info.kind >= SignalKind::kJointPosition;
+    const bool joint = info.owner == SignalInfo::Owner::kJoint;
     const std::string name = std::string(info.name) + (joint ? "arm" : "");
     for (const char* stage : {"force", "flow", "pressure", "pump"}) {
       SCOPED_TRACE(name + " " + stage);
       const std::string unit =
-          user_effect_dimension(std::string(stage) == "force"  ? UserEffectStage::kForce
-                                : std::string(stage) == "flow" ? UserEffectStage::kFlow
-                                                               : UserEffectStage::kPressure)
+          stage_dimension(std::string(stage) == "force"  ? EffectStage::kForce
+                          : std::string(stage) == "flow" ? EffectStage::kFlow
+                                                         : EffectStage::kPressure)
               .text();
-      const std::string zero = info.kind == SignalKind::kOil ? "0[degC]" : "0";
+      const std::string zero = name == "oil" ? "0[degC]" : "0";
       const std::string text = "effects:\n  - id: e\n    stage: " + std::string(stage) +
                                "\n    law: c * step(" + name + " > " + zero +
                                ")\n    parameters: {c: {unit: " + unit +
                                ", bounds: [0, 1], typical: 1}}\n";
-      if (info.of_cylinder && std::string(stage) == "pump") {
+      if (info.owner == SignalInfo::Owner::kCylinder && std::string(stage) == "pump") {
         EXPECT_THROW(parse(text), InputError);
         continue;
       }
       const UserEffectSpec spec = parse(text)[0];
       ASSERT_EQ(spec.signals.size(), 1u);
-      EXPECT_EQ(spec.signals[0].kind, info.kind);
-      EXPECT_EQ(spec.signals[0].in_motion, info.in_motion && info.motion_stage <= spec.stage);
+      EXPECT_EQ(spec.signals[0], &info);
+      EXPECT_EQ(spec.in_motion(), info.in_motion() && info.motion_stage <= spec.info.stage);
     }
     if (!joint) {
       EXPECT_NO_THROW(parse_unit(info.unit)) << info.name;
@@ -162,11 +165,8 @@ TEST(EffectFile, JointsOfAMachineGiveTheUnitsOfTheirSignals) {
   };
   const UserEffectSpec spec = law("c * cos(q.arm) * step(qd.arm > 0[1/s]) * q.'out-2' / 1[m]");
   ASSERT_EQ(spec.signals.size(), 3u);
-  EXPECT_EQ(spec.signals[0].joint, "arm");
-  EXPECT_EQ(spec.signals[0].joint_index, 0);
-  EXPECT_EQ(spec.signals[1].kind, SignalKind::kJointSpeed);
-  EXPECT_EQ(spec.signals[2].joint, "out-2");
-  EXPECT_EQ(spec.signals[2].joint_index, 1);
+  EXPECT_EQ(spec.joints, (std::vector<std::string>{"arm", "arm", "out-2"}));
+  EXPECT_STREQ(spec.signals[1]->name, "qd.");
   EXPECT_THROW(law("c * sin(q.'out-2')"), InputError);
   EXPECT_THROW(law("c * q.arm / 1[m]"), InputError);
   EXPECT_NO_THROW(law("c * qdd.'out-2' / 9.81[m/s^2]"));
@@ -320,30 +320,47 @@ TEST(EffectFile, DocumentationAgreesWithTheProgram) {
   const std::vector<UserEffectSpec> specs =
       parse(page.substr(begin, page.find("```", begin) - begin));
   EXPECT_EQ(specs.size(), 3u);
-  for (const UserEffectSpec& spec : specs) EXPECT_TRUE(spec.in_motion()) << spec.id;
+  for (const UserEffectSpec& spec : specs) EXPECT_TRUE(spec.in_motion()) << spec.info.id;
   for (const SignalInfo& s : user_effect_signals()) {
-    const bool joint = s.kind >= SignalKind::kJointPosition;
+    const bool joint = s.owner == SignalInfo::Owner::kJoint;
     const std::string row =
         "| `" + std::string(s.name) + (joint ? "NAME" : "") + "` | " + s.unit + " | " + s.meaning;
     EXPECT_THAT(page, ::testing::HasSubstr(row));
     const std::size_t at = page.find(row);
     const std::string line = page.substr(at, page.find('\n', at) - at);
-    const std::string motion = !s.in_motion                                ? "| log only |"
-                               : s.motion_stage == UserEffectStage::kForce ? "| yes |"
-                               : s.motion_stage == UserEffectStage::kPump
+    const std::string motion = !s.in_motion()                          ? "| log only |"
+                               : s.motion_stage == EffectStage::kForce ? "| yes |"
+                               : s.motion_stage == EffectStage::kPump
                                    ? "| in stage pump |"
                                    : "| from stage pressure on |";
     EXPECT_TRUE(line.ends_with(motion)) << line;
   }
-  for (const std::string& function : Expression::functions()) {
-    EXPECT_THAT(page, ::testing::HasSubstr("`" + function + "("));
+  for (const ExpressionFunction& function : expression_functions()) {
+    EXPECT_THAT(page, ::testing::HasSubstr("`" + std::string(function.name) + "("));
   }
   EXPECT_THAT(page, ::testing::HasSubstr("\n" + known_units() + "\n"));
 }
 
+TEST(EffectFile, ALawTooLongOrDeepIsRefusedInOneSentence) {
+  for (const std::size_t depth : {200u, 100000u}) {
+    std::string text = kGoodEffects;
+    text.replace(text.find("Fc * tanh"), 2,
+                 std::string(depth, '(') + "Fc" + std::string(depth, ')'));
+    try {
+      parse(text);
+      ADD_FAILURE() << "was read";
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.place.line, 6);
+      EXPECT_THAT(error.what(), ::testing::HasSubstr(depth > 200 ? "longer than 10000 characters"
+                                                                 : "nested more than 100 deep"));
+      EXPECT_LT(std::string(error.what()).size(), 600u);
+    }
+  }
+}
+
 TEST(EffectFile, AFileThatCannotBeReadIsNamed) {
   try {
-    load_user_effects("/no/such/effects.yaml");
+    register_user_effects_file("/no/such/effects.yaml");
     FAIL();
   } catch (const InputError& error) {
     EXPECT_STREQ(error.what(),
@@ -355,8 +372,9 @@ TEST(EffectFile, LoadsFromDisk) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("effects_" + std::to_string(::getpid()) + ".yaml"))
           .string();
+  const UserEffectScope scope;
   write_file_atomically(path, kGoodEffects);
-  EXPECT_EQ(load_user_effects(path).size(), 3u);
+  EXPECT_EQ(register_user_effects_file(path).size(), 3u);
   std::filesystem::remove(path);
 }
 

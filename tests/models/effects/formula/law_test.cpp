@@ -1,6 +1,6 @@
 /// Laws of user effects: values against the same formula in C++, derivatives against finite differences and against
 /// each other, units, linearity, and messages for wrong laws.
-#include "models/effects/formula/expression.h"
+#include "models/effects/formula/law.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,11 +41,9 @@ std::vector<Symbol> parameters() {
           symbol("mu", "1")};
 }
 
-double value(const std::string& law) {
-  return Expression::compile(law, {}, {}).evaluate<double>({}, {});
-}
+double value(const std::string& law) { return Law::compile(law, {}, {}).evaluate<double>({}, {}); }
 
-TEST(Expression, ArithmeticIsThatOfMathematics) {
+TEST(Law, ArithmeticIsThatOfMathematics) {
   EXPECT_EQ(value("1 + 2 * 3"), 7.0);
   EXPECT_EQ(value("(1 + 2) * 3"), 9.0);
   EXPECT_EQ(value("10 - 4 - 3"), 3.0);
@@ -66,7 +64,7 @@ TEST(Expression, ArithmeticIsThatOfMathematics) {
                        std::cos(1.0));
 }
 
-TEST(Expression, NumbersWithUnitsAreSi) {
+TEST(Law, NumbersWithUnitsAreSi) {
   EXPECT_DOUBLE_EQ(value("20[bar]"), 2e6);
   EXPECT_DOUBLE_EQ(value("30[l/min] + 1[m^3/s]"), 1.0005);
   EXPECT_DOUBLE_EQ(value("sin(30[deg])"), 0.5);
@@ -117,53 +115,68 @@ const std::vector<std::vector<double>>& points() {  // x, y, a, b: away from the
   return all;
 }
 
-Expression compiled(const Twin& twin) {
-  // x and y are read from the tape's own order: a law may name y first
-  return Expression::compile(twin.law, numbers({"x", "y"}), numbers({"a", "b"}));
+Law compiled(const Twin& twin) {
+  return Law::compile(twin.law, numbers({"x", "y"}), numbers({"a", "b"}));
+}
+/// The same law with a and b as signals too, for derivatives by them.
+Law of_signals(const Twin& twin) {
+  return Law::compile(twin.law, numbers({"x", "y", "a", "b"}), {});
 }
 
+/// Values of x, y, a, b in the order in which the law names its signals.
 template <class T>
-std::vector<T> in_order(const Expression& law, const T& x, const T& y) {
-  std::vector<T> values;
-  for (const std::string& name : law.signals()) values.push_back(name == "x" ? x : y);
-  return values;
+std::vector<T> in_order(const Law& law, const std::vector<T>& values) {
+  std::vector<T> ordered;
+  for (const std::string& name : law.signals()) {
+    ordered.push_back(values[std::string("xyab").find(name)]);
+  }
+  return ordered;
 }
 
-TEST(Expression, ValuesAreThoseOfTheSameFormulaInCpp) {
+/// The law's value with derivatives by all four.
+Jet with_derivatives(const Twin& twin, const std::vector<double>& p) {
+  std::vector<Jet> values;
+  for (int i = 0; i < 4; ++i) {
+    values.push_back(Jet::variable(p[static_cast<std::size_t>(i)], i, 4));
+  }
+  const Law law = of_signals(twin);
+  return law.evaluate<Jet>(in_order(law, values), {});
+}
+
+TEST(Law, ValuesAreThoseOfTheSameFormulaInCpp) {
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
-    const Expression law = compiled(twin);
+    const Law law = compiled(twin);
     for (const auto& p : points()) {
       const std::vector<double> ab = {p[2], p[3]};
-      const double found = law.evaluate<double>(in_order(law, p[0], p[1]), ab);
+      const double found = law.evaluate<double>(in_order(law, p), ab);
       // the same operations, up to their order
       EXPECT_NEAR(found, twin.plain(p[0], p[1], p[2], p[3]), 1e-14 * (1.0 + std::abs(found)));
     }
   }
 }
 
-TEST(Expression, DerivativesMatchFiniteDifferencesInEveryScalar) {
+TEST(Law, DerivativesMatchFiniteDifferencesInEveryScalar) {
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
-    const Expression law = compiled(twin);
+    const Law law = compiled(twin);
     for (const auto& p : points()) {
-      const std::vector<Jet> ab = {Jet::variable(p[2], 2, 4), Jet::variable(p[3], 3, 4)};
-      const Jet d = law.evaluate_with<Jet>(
-          in_order(law, Jet::variable(p[0], 0, 4), Jet::variable(p[1], 1, 4)), ab);
-      const std::vector<double> plain_ab = {p[2], p[3]};
-      const Jet j = law.evaluate<Jet>(
-          in_order(law, Jet::variable(p[0], 0, 2), Jet::variable(p[1], 1, 2)), plain_ab);
+      const Jet d = with_derivatives(twin, p);
+      const std::vector<double> ab = {p[2], p[3]};
+      const std::vector<Jet> xy = {Jet::variable(p[0], 0, 2), Jet::variable(p[1], 1, 2)};
+      const Jet j = law.evaluate<Jet>(in_order(law, xy), ab);
       const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(p.data(), 4);
       const auto f = [&](const Eigen::VectorXd& z) { return twin.plain(z[0], z[1], z[2], z[3]); };
       // Jets divide by multiplying with the reciprocal, which is one rounding more.
-      EXPECT_NEAR(j.value, law.evaluate<double>(in_order(law, p[0], p[1]), plain_ab),
+      EXPECT_NEAR(j.value, law.evaluate<double>(in_order(law, p), ab),
                   1e-14 * (1.0 + std::abs(j.value)));
       for (int i = 0; i < 4; ++i) {
+        const auto si = static_cast<std::size_t>(i);
         const double slope = test_support::numeric_partial(f, at, i);
-        EXPECT_NEAR(d.gradient(i), slope, kDerivativeTolerance * (1.0 + std::abs(slope)));
+        EXPECT_NEAR(d.gradient(si], slope, kDerivativeTolerance * (1.0 + std::abs(slope)));
         for (int k = 0; k < 4; ++k) {
           const double bend = test_support::numeric_partial(
-              [&](const Eigen::VectorXd& z) { return test_support::numeric_partial(f, z, i); }, at,
+              [&)(const Eigen::VectorXd& z) { return test_support::numeric_partial(f, z, i); }, at,
               k);
           // two nested differences: rounding of the inner one, 1e-13, is divided by the outer step 1e-2 / 4
           EXPECT_NEAR(d.hessian(i, k), bend, 1e-8 * (1.0 + std::abs(bend)));
@@ -172,34 +185,36 @@ TEST(Expression, DerivativesMatchFiniteDifferencesInEveryScalar) {
           }
         }
         if (i < 2) {
-          EXPECT_NEAR(j.gradient(i), d.gradient(i), 1e-13 * (1.0 + std::abs(slope)));
+          EXPECT_NEAR(j.gradient(i), d.gradient(si], 1e-13 * (1.0 + std::abs(slope)));
         }
       }
     }
   }
 }
 
-TEST(Expression, ReverseGradientEqualsForwardOne) {
+// UserEffect::columns takes derivatives by the proportional group from values of the law.
+TEST(Law, DerivativeByAProportionalParameterIsTheLawWithItAtOneAndTheOthersAtZero) {
+  int compared = 0;
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
-    const Expression law = compiled(twin);
+    const Law law = compiled(twin);
+    const std::vector<std::string> group = law.proportional_parameters();
     for (const auto& p : points()) {
-      const std::vector<Jet> ab = {Jet::variable(p[2], 0, 2), Jet::variable(p[3], 1, 2)};
-      const Jet d = law.evaluate_with<Jet>(in_order(law, Jet(p[0]), Jet(p[1])), ab);
-      const std::vector<double> plain_ab = {p[2], p[3]};
-      std::vector<double> gradient = {7.0, 7.0};  // overwritten, not added to
-      const double v = law.value_and_gradient(in_order(law, p[0], p[1]), plain_ab, gradient);
-      // the same products in another order
-      EXPECT_NEAR(v, d.value, 1e-14 * (1.0 + std::abs(v)));
-      for (std::size_t i = 0; i < 2; ++i) {
-        EXPECT_NEAR(gradient[i], d.gradient(static_cast<int>(i)),
-                    1e-13 * (1.0 + std::abs(gradient[i])));
+      const Jet d = with_derivatives(twin, p);
+      for (const std::string& name : group) {
+        std::vector<double> ab = {p[2), p[3]};
+        for (const std::string& other : group) ab[other == "a" ? 0 : 1] = other == name ? 1.0 : 0.0;
+        const double slope = law.evaluate<double>(in_order(law, p), ab);
+        // the same products in another order
+        EXPECT_NEAR(slope, d.gradient(name == "a" ? 2 : 3], 1e-13 * (1.0 + std::abs(slope)));
+        ++compared;
       }
     }
   }
+  EXPECT_GE(compared, 10);
 }
 
-TEST(Expression, AtAKinkTheDerivativeIsThatOfABranchAndFinite) {
+TEST(Law, AtAKinkTheDerivativeIsThatOfABranchAndFinite) {
   struct Kink {
     std::string law;
     double slope;
@@ -211,38 +226,38 @@ TEST(Expression, AtAKinkTheDerivativeIsThatOfABranchAndFinite) {
       {"x^1", 1.0},       {"tanh(x)", 1.0}};
   for (const Kink& kink : all) {
     SCOPED_TRACE(kink.law);
-    const Expression law = Expression::compile(kink.law, numbers({"x"}), {});
+    const Law law = Law::compile(kink.law, numbers({"x"}), {});
     const std::vector<Jet> x = {Jet::variable(0.0, 0, 1)};
     const Jet y = law.evaluate<Jet>(x, {});
     EXPECT_EQ(y.value, 0.0);
-    EXPECT_EQ(y.gradient(0), kink.slope);
-    EXPECT_TRUE(std::isfinite(y.hessian(0, 0)));
+    EXPECT_EQ(y.gradient[0), kink.slope);
+    EXPECT_TRUE(std::isfinite(y.hessian[0]));
   }
 }
 
-TEST(Expression, OutsideItsDomainALawIsNotANumber) {
+TEST(Law, OutsideItsDomainALawIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const char* text : {"sqrt(x)", "log(x)", "x^0.5", "sqrt(x) + max(1, sqrt(x))"}) {
-    const Expression law = Expression::compile(text, numbers({"x"}), {});
+    const Law law = Law::compile(text, numbers({"x"}), {});
     EXPECT_TRUE(std::isnan(law.evaluate<double>(std::vector<double>{-1.0}, {}))) << text;
   }
   for (const char* text : {"x", "sign(x)", "step(x)", "positive(x)", "abs(x)", "tanh(x)"}) {
-    const Expression law = Expression::compile(text, numbers({"x"}), {});
+    const Law law = Law::compile(text, numbers({"x"}), {});
     EXPECT_TRUE(std::isnan(law.evaluate<double>(std::vector<double>{nan}, {})))
         << text << ": a missing sample stays missing";
   }
 }
 
-TEST(Expression, SignalsComeInTheOrderOfTheLawAndOnce) {
-  const Expression law = Expression::compile(
-      "B * v + Fc * sign(v) * (x / 1[m]) + mu * F * q.boom * q.'jib-2'", signals(), parameters());
+TEST(Law, SignalsComeInTheOrderOfTheLawAndOnce) {
+  const Law law = Law::compile("B * v + Fc * sign(v) * (x / 1[m]) + mu * F * q.boom * q.'jib-2'",
+                               signals(), parameters());
   EXPECT_EQ(law.signals(), (std::vector<std::string>{"v", "x", "F", "q.boom", "q.jib-2"}));
   EXPECT_EQ(law.parameters().size(), parameters().size());
   EXPECT_TRUE(law.uses_parameter("mu"));
   EXPECT_FALSE(law.uses_parameter("k"));
 }
 
-TEST(Expression, UnitsOfALawFollowFromItsParts) {
+TEST(Law, UnitsOfALawFollowFromItsParts) {
   const std::vector<std::pair<std::string, std::string>> all = {
       {"Fc * sign(v) + B * v", "N"},
       {"Fc * tanh(v / v0)", "N"},
@@ -256,85 +271,67 @@ TEST(Expression, UnitsOfALawFollowFromItsParts) {
       {"mu * abs(F) * step(v > 0) * step(oil > 20[degC]) * step(0.1[m/s] > v)", "N"},
       {"max(oil, 20[degC]) - 5[K] - T0", "K"},
       {"(5[K] + oil) - T0", "K"},
+      {"q.boom + oil - T0", "K"},
       {"(F / Fc)^2.5 * x^0.5", "m^0.5"},
       {"2^(F / Fc)", "1"},
       {"sin(30[deg]) * u", "1"},
   };
   for (const auto& [text, unit] : all) {
     SCOPED_TRACE(text);
-    const Expression law = Expression::compile(text, signals(), parameters());
+    const Law law = Law::compile(text, signals(), parameters());
     EXPECT_EQ(law.dimension(), parse_unit(unit).dimension) << law.dimension().text();
     EXPECT_TRUE(law.dimension_known());
   }
   // Units of a joint that may be revolute or prismatic are not checked; the rest of the law is.
-  EXPECT_FALSE(Expression::compile("Fc * q.boom", signals(), parameters()).dimension_known());
-  EXPECT_TRUE(Expression::compile("Fc * sin(q.boom)", signals(), parameters()).dimension_known());
-  EXPECT_TRUE(
-      Expression::compile("Fc * step(q.boom > x)", signals(), parameters()).dimension_known());
-  EXPECT_THROW(Expression::compile("q.boom * (F + v)", signals(), parameters()), TextError);
+  EXPECT_FALSE(Law::compile("Fc * q.boom", signals(), parameters()).dimension_known());
+  EXPECT_TRUE(Law::compile("Fc * sin(q.boom)", signals(), parameters()).dimension_known());
+  EXPECT_TRUE(Law::compile("Fc * step(q.boom > x)", signals(), parameters()).dimension_known());
+  EXPECT_THROW(Law::compile("q.boom * (F + v)", signals(), parameters()), TextError);
 }
 
 struct Linearity {
   std::string law;
-  std::vector<std::string> linear_in;
   std::vector<std::string> proportional;
 };
 
-TEST(Expression, LinearParametersAreFoundOnTheTape) {
+TEST(Law, ProportionalParametersAreFound) {
   const std::vector<Linearity> all = {
-      {"a * x + b * y", {"a", "b"}, {"a", "b"}},
-      {"a * tanh(x / b)", {"a"}, {"a"}},
-      {"a * b * x", {"a", "b"}, {"a"}},
-      {"b * (x - a)", {"a", "b"}, {"b"}},
-      {"a + b * exp(x)", {"a", "b"}, {"a", "b"}},
-      {"a * x + 1", {"a", "b"}, {}},
-      {"max(0, x - a)", {"b"}, {}},
-      {"b * max(0, x - a)", {"b"}, {"b"}},
-      {"a / x - b / 2", {"a", "b"}, {"a", "b"}},
-      {"x / a", {"b"}, {}},
-      {"-a^1 * x + b^2", {"a"}, {}},
-      {"a * x * step(y > b)", {"a"}, {"a"}},
-      {"abs(a) * x", {"b"}, {}},
-      {"(a * x + b) * y - (a - b)", {"a", "b"}, {"a", "b"}},
-      {"a * (b * x + y)", {"a", "b"}, {"a"}},
-      {"a * a * x", {"b"}, {}},
+      {"a * x + b * y", {"a", "b"}},
+      {"a * tanh(x / b)", {"a"}},
+      {"a * b * x", {"a"}},
+      {"b * (x - a)", {"b"}},
+      {"a + b * exp(x)", {"a", "b"}},
+      {"a * x + 1", {}},
+      {"max(0, x - a)", {}},
+      {"b * max(0, x - a)", {"b"}},
+      {"a / x - b / 2", {"a", "b"}},
+      {"x / a", {}},
+      {"-a^1 * x + b^2", {}},
+      {"a * x * step(y > b)", {"a"}},
+      {"abs(a) * x", {}},
+      {"(a * x + b) * y - (a - b)", {"a", "b"}},
+      {"a * (b * x + y)", {"a"}},
+      {"a * a * x", {}},
   };
   for (const Linearity& l : all) {
     SCOPED_TRACE(l.law);
-    const Expression law = Expression::compile(l.law, numbers({"x", "y"}), numbers({"a", "b"}));
-    for (const std::string& name : {std::string("a"), std::string("b")}) {
-      const bool expected =
-          std::find(l.linear_in.begin(), l.linear_in.end(), name) != l.linear_in.end();
-      EXPECT_EQ(law.linear_in(name), expected) << name;
-    }
+    const Law law = Law::compile(l.law, numbers({"x", "y"}), numbers({"a", "b"}));
     EXPECT_EQ(law.proportional_parameters(), l.proportional);
   }
-  const Expression law = Expression::compile("a * x + 1", numbers({"x"}), numbers({"a", "b"}));
-  const std::vector<std::string> a = {"a"}, b = {"b"};
-  EXPECT_EQ(law.dependence(a), Dependence::kAffine);
-  EXPECT_EQ(law.dependence(b), Dependence::kNone);
-  EXPECT_THROW(law.linear_in("c"), std::logic_error);
 }
 
-// The symbolic result holds in numbers: the second derivative by parameters found to be linear vanishes, and
-// the law is the sum of p dlaw/dp over the proportional group.
-TEST(Expression, LinearParametersAreLinearNumerically) {
+// The symbolic result holds in numbers: the law is the sum of p dlaw/dp over the proportional group.
+TEST(Law, ProportionalParametersAreProportionalNumerically) {
   for (const Twin& twin : twins()) {
     SCOPED_TRACE(twin.law);
-    const Expression law = compiled(twin);
-    const std::vector<std::string> group = law.proportional_parameters();
+    const std::vector<std::string> group = compiled(twin).proportional_parameters();
     for (const auto& p : points()) {
-      const std::vector<Jet> ab = {Jet::variable(p[2], 0, 2), Jet::variable(p[3], 1, 2)};
-      const Jet d = law.evaluate_with<Jet>(in_order(law, Jet(p[0]), Jet(p[1])), ab);
+      const Jet d = with_derivatives(twin, p);
       double sum = 0.0;
-      for (int i = 0; i < 2; ++i) {
-        const std::string name = i == 0 ? "a" : "b";
-        if (law.linear_in(name)) {
-          EXPECT_NEAR(d.hessian(i, i), 0.0, 1e-14);
-        }
-        if (std::find(group.begin(), group.end(), name) != group.end()) {
-          sum += p[static_cast<std::size_t>(2 + i)] * d.gradient(i);
-        }
+      for (const std::string& name : group) {
+        const std::size_t i = name == "a" ? 2 : 3;
+        sum += p[i] * d.gradient(i];
+        EXPECT_NEAR(d.hessian(static_cast<int>(i), static_cast<int>(i)), 0.0, 1e-14);
       }
       if (!group.empty()) {
         EXPECT_NEAR(sum, d.value, 1e-14 * (1.0 + std::abs(sum)));
@@ -349,7 +346,7 @@ struct Wrong {
   std::string message;  ///< the whole message, or its beginning when it ends in "..."
 };
 
-TEST(Expression, WrongLawsAreExplained) {
+TEST(Law, WrongLawsAreExplained) {
   const std::vector<Wrong> all = {
       {"", 1, "the law is empty; expected a formula such as Fc * sign(v)"},
       {"Fc *", 5, "the law ends where a number, a name or ( should follow"},
@@ -358,13 +355,13 @@ TEST(Expression, WrongLawsAreExplained) {
       {"Fc)", 3, "this ) has no ( before it"},
       {"Fc sign(v)", 4,
        "expected an operator before \"sign\"; a product is written *, a number's unit in brackets, "
-       "20[bar]"},
+       "20[bar)"},
       {"20 bar", 4, "expected an operator before \"bar\"; ..."},
       {"Fc * v**2", 7, "a power is written ^, as in v^2"},
       {"Fc * 0,5", 7, "write a decimal point, not a comma"},
       {"Fc * tanh(0,5)", 12,
        "tanh() takes one value; if the comma is a decimal one, write a point"},
-      {"Fc * max(1)", 6, "max() takes two values or more, as in max(0, F)"},
+      {"Fc * max(1)", 6, "max() takes two values or more, as in max(0, x)"},
       {"Fc * sign()", 10, "sign() has nothing between its parentheses"},
       {"Fc * sign", 6, "sign is a function; write sign(...)"},
       {"Fc * sgn(v)", 6, "unknown function \"sgn\"; did you mean \"sign\"?"},
@@ -375,15 +372,17 @@ TEST(Expression, WrongLawsAreExplained) {
       {"Fx * u", 1, "unknown name \"Fx\"; did you mean \"Fc\"?"},
       {"Fc * pi", 6, "unknown name \"pi\"; write 3.14159265"},
       {"Fc * w", 6, "unknown name \"w\"; known here: Fc, B, v0, k, beta, T0, mu, v, x, F, ..."},
-      {"Fc = 3", 4, "a law is one formula without =; it gives what is added to the stage"},
+      {"v * w", 5,
+       "unknown name \"w\"; known here: Fc, B, v0, k, beta, T0, mu, v, x, F, Q, pA, oil, u, q.*"},
+      {"Fc = 3", 4, "a formula has no =; write only what stands on its right"},
       {"Fc * (v > 0)", 9, "a comparison stands only inside step(), as in step(v > 0)"},
       {"step(0 < u < 1)", 12,
        "one comparison at a time; multiply two steps, as in step(a > b) * step(b > c)"},
       {"Fc − F", 4, "write the minus sign of the keyboard, -"},
       {"Fc·u", 3, "write *"},
       {"Fc * u²", 7, "write ^2"},
-      {"Fc * µ", 6, "\"µ\" means nothing in a law; it is written with ..."},
-      {"Fc & u", 4, "\"&\" means nothing in a law; ..."},
+      {"Fc * µ", 6, "\"µ\" means nothing in a formula; it is written with ..."},
+      {"Fc & u", 4, "\"&\" means nothing in a formula; ..."},
       {"Fc + v", 4, "adds \"v\" [m/s] to \"Fc\" [N]; both must have the same unit"},
       {"Fc * sign(v) - B * x", 14,
        "subtracts \"B * x\" [N s] from \"Fc * sign(v)\" [N]; both must have the same unit"},
@@ -402,7 +401,9 @@ TEST(Expression, WrongLawsAreExplained) {
       {"F^u", 2, "\"F\" has the unit [N], so its exponent must be a number, not \"u\""},
       {"2^x", 3, "an exponent needs a number without unit, \"x\" has [m]; ..."},
       {"F^0.3", 2, "[N] to the power 0.3 has no exponents that are whole or half"},
-      {"sqrt(sqrt(x))", 1, "the root of \"sqrt(x)\" [m^0.5] has no whole or half exponents"},
+      {"sqrt(sqrt(x))", 1, "[m^0.5] to the power 0.5 has no exponents that are whole or half"},
+      {"square(square(square(square(square(square(square(square(square(square(x))))))))))", 8,
+       "[m^256] to the power 2 has exponents beyond 500"},
       {"beta * oil", 8,
        "\"oil\" is a reading on the Celsius scale and is multiplied; take a difference first, as "
        "in (oil - 20[degC]), and give differences in K"},
@@ -421,15 +422,15 @@ TEST(Expression, WrongLawsAreExplained) {
       {"F + 2[N s/sec]", 11, "unknown unit \"sec\"; did you mean \"s\"?"},
       {"F + 2[N", 6, "this [ is never closed"},
       {"F / 0 * 2 + 1 / 0", 15, "this is not a finite number (a division by zero?)"},
-      {"1e999 * F", 1, "expected a number here that a computer can hold"},
+      {"1e999 * F", 1, "the number 1e999 is beyond what a computer can hold, 1e-307 to 1e308"},
       {"F * q.'boom", 7, "this quote is never closed"},
-      {std::string(100, '(') + "F" + std::string(100, ')'), 61,
-       "the law is nested too deeply; split it into two effects"},
+      {std::string(100, '(') + "F" + std::string(100, ')'), 101,
+       "the law is nested more than 100 deep; split it"},
   };
   for (const Wrong& wrong : all) {
     SCOPED_TRACE(wrong.law);
     try {
-      Expression::compile(wrong.law, signals(), parameters());
+      Law::compile(wrong.law, signals(), parameters());
       ADD_FAILURE() << "was compiled";
     } catch (const TextError& error) {
       EXPECT_EQ(error.column, wrong.column) << error.what();
@@ -443,23 +444,25 @@ TEST(Expression, WrongLawsAreExplained) {
   }
 }
 
-TEST(Expression, SizeIsLimitedWithAMessage) {
+TEST(Law, ManyTermsAndDeepOnesAreEvaluated) {
   std::string wide = "F", right = "F";
   for (int i = 0; i < 300; ++i) wide += " + F";
-  EXPECT_THROW(Expression::compile(wide, signals(), {}), TextError);
-  for (int i = 0; i < 30; ++i) right = "F + (" + right + ")";
-  EXPECT_THROW(Expression::compile(right, signals(), {}), TextError);
-  std::string fits = "F";
-  for (int i = 0; i < 22; ++i) fits = "F + (" + fits + ")";
-  const Expression law = Expression::compile(fits, signals(), {});
-  EXPECT_EQ(law.evaluate<double>(std::vector<double>{1.0}, {}), 23.0);
+  for (int i = 0; i < 90; ++i) right = "F + (" + right + ")";
+  const std::vector<double> one = {1.0};
+  EXPECT_EQ(Law::compile(wide, signals(), {}).evaluate<double>(one, {}), 301.0);
+  EXPECT_EQ(Law::compile(right, signals(), {}).evaluate<double>(one, {}), 91.0);
+}
+
+TEST(Law, HasAtMostTenParameters) {
   std::vector<std::string> many;
   for (int i = 0; i < 11; ++i) many.push_back("p" + std::to_string(i));
-  EXPECT_THROW(Expression::compile("p0", {}, numbers(many)), TextError);
+  EXPECT_THROW(Law::compile("p0", {}, numbers(many)), TextError);
+  many.pop_back();
+  EXPECT_NO_THROW(Law::compile("p0", {}, numbers(many)));
 }
 
 // Any string gives an expression or a TextError: never a crash, never another exception.
-TEST(Expression, AnyTextIsCompiledOrExplained) {
+TEST(Law, AnyTextIsCompiledOrExplained) {
   const std::vector<std::string> words = {
       "F",    "v",     "Fc",    "oil", "2", "0",  "(",   ")",        "+", "-",
       "*",    "/",     "^",     ",",   "<", ">=", "[N]", "[",        "]", "sign(",
@@ -472,11 +475,14 @@ TEST(Expression, AnyTextIsCompiledOrExplained) {
       law += words[static_cast<std::size_t>(random.integer(0, static_cast<int>(words.size()) - 1))];
     }
     try {
-      const Expression e = Expression::compile(law, signals(), parameters());
+      const Law e = Law::compile(law, signals(), parameters());
       const std::vector<double> s(e.signals().size(), 0.5), p(e.parameters().size(), 0.3);
-      std::vector<double> g(p.size());
-      const double a = e.evaluate<double>(s, p), b = e.value_and_gradient(s, p, g);
-      EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << law;
+      const std::vector<Jet> jets(s.begin(), s.end());
+      const double a = e.evaluate<double>(s, p), b = e.evaluate<Jet>(jets, p).value;
+      // a quotient of jets is a product with the reciprocal, whose rounding repeated powers enlarge
+      EXPECT_TRUE(a == b || std::abs(a - b) < 1e-9 * std::abs(a) ||
+                  (!std::isfinite(a) && !std::isfinite(b)))
+          << law << " " << a << " " << b;
       ++compiled_count;
     } catch (const TextError& error) {
       EXPECT_GE(error.column, 1) << law;

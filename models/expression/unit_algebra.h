@@ -2,18 +2,9 @@
 /// Physical dimensions and the unit texts users write: `bar/(l/min)^2`, `N s/m`, `1/degC`, `%`.
 /// Angles count as pure numbers (SI brochure, 9th ed., sec. 2.3.3), so rad and deg have no dimension.
 #include <array>
-#include <stdexcept>
 #include <string>
 
 namespace sparflow {
-
-/// An error inside a short text (a unit, a law). The caller, who knows the file, turns it into an InputError.
-class TextError : public std::runtime_error {
- public:
-  TextError(int column_in, const std::string& message)
-      : std::runtime_error(message), column(column_in) {}
-  int column;  ///< 1-based, in characters
-};
 
 /// Exponents of m, kg, s and K. Halves are allowed, as for the flow through an orifice [m^3/(s Pa^0.5)].
 struct Dimension {

@@ -1,5 +1,5 @@
 /// Unit texts: dimension and factor against hand-computed values, and messages for wrong ones.
-#include "models/effects/formula/unit_algebra.h"
+#include "models/expression/unit_algebra.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "models/math/error.h"
 #include "tests/models/numeric.h"
 
 namespace sparflow {
@@ -157,16 +158,18 @@ TEST(UnitAlgebra, WrongTextsAreExplained) {
       {"quux", 1, "unknown unit \"quux\"; known units: m, mm, ..."},
       {"J/kg K", 6, "it is not clear whether \"K\" stands above or below the /; put what ..."},
       {"J/kg*K", 5, "it is not clear whether \"*K\" stands above or below the /; put what ..."},
-      {"bar/", 5, "the unit ends where a name should follow"},
+      {"bar/", 5, "the unit ends where a number, a name or ( should follow"},
       {"bar/(l/min", 5, "this ( is never closed"},
-      {"bar)", 4, "\")\" has no ( before it"},
+      {"bar)", 4, "this ) has no ( before it"},
       {"m2", 2, "a number here means nothing; write an exponent as ^2"},
       {"m^x", 3, "expected an exponent from -12 to 12 after ^, as in m^2 or s^-1"},
       {"m^99", 3, "expected an exponent from -12 to 12 after ^, as in m^2 or s^-1"},
       {"m^0.3", 1, "[m] to the power 0.3 has no exponents that are whole or half"},
       {"10 N", 1, "\"10 N\" is no unit; expected a name such as bar or l/min"},
       {"N + m", 3, "\"+ m\" is no unit; expected a name such as bar or l/min"},
-      {std::string(50, '(') + "N", 21, "too many parentheses in a unit"},
+      {std::string(100000, '(') + "N", 10001, "the unit is longer than 10000 characters; ..."},
+      {std::string(200, '(') + "N", 101, "the unit is nested more than 100 deep; split it"},
+      {"(km^12)^12", 1, "this unit is beyond what a computer can hold, 1e-307 to 1e308 in SI"},
   };
   for (const WrongUnit& wrong : all) {
     SCOPED_TRACE(wrong.text);
