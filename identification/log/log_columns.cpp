@@ -13,7 +13,7 @@
 namespace sparflow {
 namespace {
 
-struct Unit {
+struct ColumnUnit {
   std::string_view spelling;
   double factor;
   double offset = 0.0;
@@ -23,7 +23,7 @@ struct ColumnQuantity {
   std::string_view what;  ///< with article, for messages
   std::string_view si;
   std::string_view usual;  ///< suffix of the usual column name
-  std::vector<Unit> units;
+  std::vector<ColumnUnit> units;
 };
 
 // Spellings are compared after `plain_unit`.
@@ -74,9 +74,9 @@ std::string plain_unit(std::string_view written) {
   return std::string(written);
 }
 
-const Unit* find_unit(const ColumnQuantity& quantity, std::string_view written) {
+const ColumnUnit* find_unit(const ColumnQuantity& quantity, std::string_view written) {
   const std::string plain = plain_unit(written);
-  for (const Unit& unit : quantity.units) {
+  for (const ColumnUnit& unit : quantity.units) {
     if (unit.spelling == plain) return &unit;
   }
   return nullptr;
@@ -84,7 +84,7 @@ const Unit* find_unit(const ColumnQuantity& quantity, std::string_view written) 
 
 std::string unit_list(const ColumnQuantity& quantity) {
   std::string list;
-  for (const Unit& unit : quantity.units) {
+  for (const ColumnUnit& unit : quantity.units) {
     if (unit.spelling == "1") continue;
     if (!list.empty()) list += ", ";
     list += unit.spelling.empty() ? "none" : unit.spelling;
@@ -168,7 +168,7 @@ std::optional<std::string_view> suffix_behind(std::string_view name, std::string
 /// @return false when the suffix shows that it is another signal: "pA_boom_valve_bar", "u_boom_filtered_percent"
 bool settle_unit(const ColumnQuantity& quantity, std::string_view suffix, const std::string& beside,
                  const std::string& column, ColumnMeaning* meaning) {
-  const Unit* unit = find_unit(quantity, suffix);
+  const ColumnUnit* unit = find_unit(quantity, suffix);
   meaning->unit = quantity.si;
   if (suffix.empty()) {
     unit = beside.empty() ? find_unit(quantity, "") : find_unit(quantity, beside);
@@ -186,7 +186,7 @@ bool settle_unit(const ColumnQuantity& quantity, std::string_view suffix, const 
                                  quantity.what, unit_list(quantity));
     return true;
   } else if (!beside.empty()) {
-    const Unit* other = find_unit(quantity, beside);
+    const ColumnUnit* other = find_unit(quantity, beside);
     if (other != unit) {
       meaning->error = fmt::format(
           "the name says \"{}\" and the unit given with it is \"{}\"; "
@@ -214,7 +214,7 @@ void settle_candidate(const std::string& column, const std::string& beside,
   }
   for (const ColumnQuantity* quantity :
        {&kPressure, &kAngle, &kLength, &kForce, &kFlow, &kTemperature}) {
-    const Unit* unit = find_unit(*quantity, suffix);
+    const ColumnUnit* unit = find_unit(*quantity, suffix);
     // "_K" and "_F" after an unknown name may equally mean a gain or a force.
     if (unit == nullptr || (beside.empty() && unit->offset != 0.0)) continue;
     meaning->unit = quantity->si;
