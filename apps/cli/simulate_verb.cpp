@@ -174,7 +174,7 @@ class Recording {
     for (int c = 0; c < machine.cylinder_count(); ++c) add_cylinder(c);
     for (int p = 0; p < machine.pump_count(); ++p) {
       const auto k = static_cast<std::size_t>(p);
-      add({"pump " + machine.pumps[k].name, "pressure", "bar", {}, {}}, units::kBar,
+      add({"pump " + machine.pumps[k].name, "pressure", "pressure", "bar", {}, {}}, units::kBar,
           Role::kPumpPressure, p, [k](const plant::Record& r) { return r.pump_pressure[k]; });
     }
   }
@@ -185,7 +185,7 @@ class Recording {
     const auto k = static_cast<std::size_t>(c);
     const Cylinder& drive = machine_.cylinders[k];
     const auto j = static_cast<std::size_t>(drive.joint);
-    SimulatedChannel stroke{drive.name + ": stroke", "stroke", "mm", {}, {}};
+    SimulatedChannel stroke{drive.name, "stroke", "stroke", "mm", {}, {}};
     stroke.simulated =
         collected([&](const plant::Record& r) { return 1e3 * stroke_at(machine_, c, r.q[j]); });
     if (log_) {
@@ -197,12 +197,12 @@ class Recording {
       if (x.array().isFinite().any()) stroke.recorded = at_times(*log_, x, view_.t);
     }
     view_.channels.push_back(std::move(stroke));
-    add({drive.name + ": command", "command", "", {}, {}}, 1.0, Role::kCommand, c,
+    add({drive.name, "command", "command", "", {}, {}}, 1.0, Role::kCommand, c,
         [k](const plant::Record& r) { return r.command[k]; });
     if (!drive.hydraulic()) return;
-    add({drive.name + ": pressures", "bore side", "bar", {}, {}}, units::kBar, Role::kPressureA, c,
+    add({drive.name, "pressures", "bore side", "bar", {}, {}}, units::kBar, Role::kPressureA, c,
         [k](const plant::Record& r) { return r.pressure_a[k]; });
-    add({drive.name + ": pressures", "rod side", "bar", {}, {}}, units::kBar, Role::kPressureB, c,
+    add({drive.name, "pressures", "rod side", "bar", {}, {}}, units::kBar, Role::kPressureB, c,
         [k](const plant::Record& r) { return r.pressure_b[k]; });
   }
   template <class Value>
@@ -276,6 +276,42 @@ nlohmann::json simulation_json(const SimulateArguments& a, const Machine& machin
   return json;
 }
 
+double pump_work(const plant::PlantRun& run) {
+  const std::vector<double>& work = run.ledger().pump_work;
+  return std::accumulate(work.begin(), work.end(), 0.0);
+}
+double delivered(const plant::PlantRun& run) {
+  const std::vector<double>& energy = run.ledger().delivered;
+  return std::accumulate(energy.begin(), energy.end(), 0.0);
+}
+
+/// The energy balance and its losses in kJ; what is below one joule is left out.
+void add_energies(const Machine& machine, const plant::PlantRun& run, SimulationView& view) {
+  const plant::EnergyLedger& l = run.ledger();
+  const auto add = [](auto& list, const std::string& name, double joule) {
+    if (std::abs(joule) > 1.0) list.emplace_back(name, joule / 1e3);
+  };
+  add(view.balance_kJ, "work of the pumps", pump_work(run));
+  add(view.balance_kJ, "work of drives without hydraulics", l.drive_work);
+  add(view.balance_kJ, "brought by payloads that were taken, less those put down",
+      l.payload_exchange);
+  add(view.balance_kJ, "turned into heat", -l.total_loss());
+  add(view.balance_kJ, "stored in height, motion and oil", -l.stored);
+  add(view.balance_kJ, "error of the integration", -l.imbalance());
+  for (std::size_t c = 0; c < machine.cylinders.size(); ++c) {
+    for (int k = 0; k < plant::kLosses; ++k) {
+      const auto place = static_cast<std::size_t>(k);
+      add(view.losses_kJ,
+          fmt::format("{}: {}", machine.cylinders[c].name, plant::kLossWords[place]),
+          l.cylinder_loss[c][place]);
+    }
+  }
+  for (std::size_t p = 0; p < machine.pumps.size(); ++p)
+    add(view.losses_kJ, "pump " + machine.pumps[p].name + ": leakage and relief", l.pump_loss[p]);
+  add(view.losses_kJ, "return line", l.tank_loss);
+  add(view.losses_kJ, "swinging payload and bending booms", l.swing_loss);
+}
+
 /// Page, and errors against a recording in JSON and text.
 std::string write_comparison(const SimulateArguments& a, const Machine& machine, const Simulated& s,
                              const std::vector<plant::Record>& rows, nlohmann::json& json) {
@@ -285,33 +321,23 @@ std::string write_comparison(const SimulateArguments& a, const Machine& machine,
   for (const SimulatedChannel& c : view.channels) {
     const RecordingError e = recording_error(c);
     if (!std::isfinite(e.rmse) || c.name == "command") continue;
-    json["recording"][c.chart + ": " + c.name] = {
-        {"rmse", e.rmse}, {"spread", e.spread}, {"unit", c.unit}};
+    json["recording"][c.label()] = {{"rmse", e.rmse}, {"spread", e.spread}, {"unit", c.unit}};
     text += fmt::format("  {:<28} {:8.3g} {} RMS from the recording (its spread {:.3g})\n",
-                        c.chart + ", " + c.name, e.rmse, c.unit, e.spread);
+                        c.label(), e.rmse, c.unit, e.spread);
   }
   if (a.outputs.report.empty()) return text;
-  const plant::EnergyLedger& l = s.run->ledger();
-  for (std::size_t c = 0; c < machine.cylinders.size(); ++c) {
-    for (int k = 0; k < plant::kLosses; ++k) {
-      const auto place = static_cast<std::size_t>(k);
-      if (l.cylinder_loss[c][place] > 1.0)
-        view.losses_kJ.emplace_back(
-            fmt::format("{}: {}", machine.cylinders[c].name, plant::kLossNames[place]),
-            l.cylinder_loss[c][place] / 1e3);
-    }
-  }
-  for (std::size_t p = 0; p < machine.pumps.size(); ++p)
-    view.losses_kJ.emplace_back(machine.pumps[p].name + ": leakage and relief",
-                                l.pump_loss[p] / 1e3);
-  view.losses_kJ.emplace_back("return line", l.tank_loss / 1e3);
-  view.headline = fmt::format("{:.1f} s, {:.1f} kJ of work", s.run->time(), l.input() / 1e3);
+  add_energies(machine, *s.run, view);
+  view.headline = fmt::format(
+      "In {:.1f} s the pumps did {:.1f} kJ of work, of which {:.1f} kJ went into the valves",
+      s.run->time(), pump_work(*s.run) / 1e3, delivered(*s.run) / 1e3);
   view.text = text.empty() ? "Nothing was recorded to compare with."
                            : "The plant got what was recorded; the table tells its errors.";
+  if (s.cut) view.text += " The run was interrupted.";
+  if (!s.run->message().empty()) view.text += " The run ended early: " + s.run->message() + ".";
   view.provenance = {{"machine", a.machine},
+                     {"plant", a.plant},
                      {"seed", std::to_string(a.seed)},
                      {"effects", fmt::format("{}", fmt::join(a.effects, " "))},
-                     {"plant", a.plant},
                      {"recording", a.track.empty() ? a.replay : a.track}};
   simulation_page(view).write(a.outputs.report);
   return text;
@@ -322,14 +348,21 @@ std::string summary(const Machine& machine, const Simulated& s, const std::strin
   std::string text = fmt::format("{}: {:.2f} s, {} samples, {:.0f} times real time\n", machine.name,
                                  s.run->time(), s.rows, s.run->time() / std::max(s.elapsed, 1e-9));
   for (std::size_t p = 0; p < machine.pumps.size(); ++p)
-    text += fmt::format("  pump {:<14} {:10.2f} kJ into the valves, {:10.2f} kJ of work\n",
-                        machine.pumps[p].name, l.delivered[p] / 1e3, l.pump_work[p] / 1e3);
+    text +=
+        fmt::format("  {:<21} {:10.2f} kJ of work, {:.2f} kJ of them into the valves\n",
+                    "pump " + machine.pumps[p].name, l.pump_work[p] / 1e3, l.delivered[p] / 1e3);
   for (int k = 0; k < plant::kLosses; ++k) {
     const auto place = static_cast<std::size_t>(k);
     double sum = 0.0;
     for (const auto& c : l.cylinder_loss) sum += c[place];
-    text += fmt::format("  lost in {:<16} {:8.2f} kJ\n", plant::kLossNames[place], sum / 1e3);
+    text += fmt::format("  {:<21} {:10.2f} kJ lost\n", plant::kLossWords[place], sum / 1e3);
   }
+  text += fmt::format("  {:<21} {:10.2f} kJ lost\n", "pump leakage, relief",
+                      std::accumulate(l.pump_loss.begin(), l.pump_loss.end(), 0.0) / 1e3);
+  text += fmt::format("  {:<21} {:10.2f} kJ lost\n", "return line", l.tank_loss / 1e3);
+  if (std::abs(l.payload_exchange) > 1.0)
+    text +=
+        fmt::format("  {:<21} {:10.2f} kJ brought\n", "payloads taken", l.payload_exchange / 1e3);
   text += fmt::format("  energy balance closes to {:.2g} %\n",
                       100.0 * std::abs(l.imbalance()) /
                           std::max(1.0, l.drive_work + std::accumulate(l.pump_work.begin(),

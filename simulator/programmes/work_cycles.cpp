@@ -45,7 +45,7 @@ class WorkCycles : public Programme {
       const double phase = std::numbers::pi * t / duration_;
       at = from_ + 0.5 * (1.0 - std::cos(phase)) * (leg.to - from_);
       rate = 0.5 * std::numbers::pi / duration_ * std::sin(phase) * (leg.to - from_);
-    } else if (leg.payload_after && !handled_ && t > duration_ + 0.5 * kHandling) {
+    } else if (leg.payload_after && !handled_ && t > duration_ + 0.25 * kHandling) {
       s.payload = leg.payload_after;
       handled_ = true;
     }

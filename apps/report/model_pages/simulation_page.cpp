@@ -11,11 +11,12 @@ namespace {
 std::vector<LineChart> simulation_charts(const SimulationView& view) {
   std::vector<LineChart> charts;
   for (const SimulatedChannel& c : view.channels) {
+    const std::string title = c.part + ": " + c.chart;
     auto chart = std::find_if(charts.begin(), charts.end(),
-                              [&](const LineChart& known) { return known.title == c.chart; });
+                              [&](const LineChart& known) { return known.title == title; });
     if (chart == charts.end()) {
       LineChart next;
-      next.title = c.chart;
+      next.title = title;
       next.group = "time";
       next.x = view.t;
       next.y_axis = {"", c.unit};
@@ -62,7 +63,8 @@ Page simulation_page(const SimulationView& view) {
   Page page("Simulated: " + view.machine);
   page.subtitle("measurements of the dynamic plant, true values without sensors");
   page.verdict(Tone::kNeutral, view.headline, view.text);
-  for (const auto& [name, value] : view.provenance) page.provenance(name, value);
+  for (const auto& [name, value] : view.provenance)
+    if (!value.empty()) page.provenance(name, value);
   Table errors;
   errors.title = "Simulated less recorded";
   errors.columns = {
@@ -70,7 +72,7 @@ Page simulation_page(const SimulationView& view) {
   for (const SimulatedChannel& c : view.channels) {
     const RecordingError e = recording_error(c);
     if (std::isfinite(e.rmse) && c.name != "command")
-      errors.rows.push_back({c.chart + ": " + c.name, c.unit, e.rmse, e.spread});
+      errors.rows.push_back({c.label(), c.unit, e.rmse, e.spread});
   }
   if (!errors.rows.empty()) {
     page.section("Against the recording");
@@ -82,8 +84,17 @@ Page simulation_page(const SimulationView& view) {
   for (LineChart& chart : simulation_charts(view)) page.plot(std::move(chart));
   if (!view.losses_kJ.empty()) {
     page.section("Where the energy went");
+    Table balance;
+    balance.title = "Energy balance";
+    balance.columns = {{"part"}, {"energy", "kJ", 4}};
+    for (const auto& [name, value] : view.balance_kJ) balance.rows.push_back({name, value});
+    balance.note =
+        "The pumps' work is the ideal work on their oil. A payload that is taken brings its "
+        "height's energy, and takes "
+        "it along where it is put down.";
+    page.table(balance);
     BarChart bars;
-    bars.title = "Energy by part";
+    bars.title = "Turned into heat, by part";
     bars.value_axis = {"energy", "kJ"};
     BarSeries series{"energy", Eigen::VectorXd(static_cast<Eigen::Index>(view.losses_kJ.size()))};
     for (std::size_t i = 0; i < view.losses_kJ.size(); ++i) {

@@ -9,8 +9,10 @@
 namespace sparflow {
 
 struct SimulatedChannel {
-  std::string chart;  ///< channels of one chart share this title
+  std::string part;   ///< cylinder or pump
+  std::string chart;  ///< channels of one part that share a chart share this word
   std::string name, unit;
+  std::string label() const { return part + ": " + name; }
   Eigen::VectorXd simulated;  ///< [samples]
   Eigen::VectorXd recorded;   ///< [samples], NaN where nothing was recorded; empty: no recording
 };
@@ -19,7 +21,9 @@ struct SimulationView {
   std::string machine;
   Eigen::VectorXd t;  ///< [s]
   std::vector<SimulatedChannel> channels;
-  std::vector<std::pair<std::string, double>> losses_kJ;
+  std::vector<std::pair<std::string, double>>
+      balance_kJ;  ///< work put in, heat, stored, not accounted for
+  std::vector<std::pair<std::string, double>> losses_kJ;  ///< by part and place
   std::string headline, text;
   std::vector<std::pair<std::string, std::string>> provenance;
 };

@@ -16,9 +16,10 @@
 namespace sparflow::plant {
 namespace {
 
-constexpr int kPumpPowers = 3;       // quadratures of a pump: work, delivered, loss
-constexpr int kCommonPowers = 3;     // tank, swing, drives
-constexpr long kMostSteps = 200000;  // in one sample; far beyond what any sample needs
+constexpr int kPumpPowers = 3;         // quadratures of a pump: work, delivered, loss
+constexpr int kCommonPowers = 3;       // tank, swing, drives
+constexpr double kPayloadStep = 0.02;  // [s] between two steps of a payload that is being taken
+constexpr long kMostSteps = 200000;    // in one sample; far beyond what any sample needs
 
 void silent(int, const char*, const char*, char*, void*) {}  // the status says what happened
 
@@ -37,7 +38,10 @@ double EnergyLedger::input() const {
 struct PlantRun::Integrator {
   Integrator(const Machine& machine, const PlantParameters& parameters, std::vector<double> q,
              double payload_kg, RunOptions o)
-      : system(machine, parameters, payload_kg), options(o), payload(payload_kg) {
+      : system(machine, parameters, payload_kg),
+        options(o),
+        payload(payload_kg),
+        payload_goal(payload_kg) {
     state = system.rest(q);
     const auto n = static_cast<sunindextype>(state.size());
     y = N_VMake_Serial(n, state.data(), context);
@@ -180,7 +184,19 @@ struct PlantRun::Integrator {
     command = u;
     if (jump > options.command_jump) restart();
     const double end = t + duration;
-    while (t < end - 1e-12) {
+    while (payload != payload_goal && t < end - 1e-12 && status == RunStatus::kRunning) {
+      const double next = std::min(end, t + kPayloadStep);
+      step_payload(next - t);
+      integrate_to(next);
+    }
+    integrate_to(end);
+    system.evaluate(state.data(), command, instant);
+    write_record();
+    write_ledger();
+  }
+
+  void integrate_to(double end) {
+    while (status == RunStatus::kRunning && t < end - 1e-12) {
       CVodeSetStopTime(memory, end);
       const int flag = CVode(memory, end, y, &t, CV_NORMAL);
       collect();
@@ -204,20 +220,23 @@ struct PlantRun::Integrator {
         break;
       }
     }
-    system.evaluate(state.data(), command, instant);
-    write_record();
-    write_ledger();
   }
 
   void set_payload(double kg) {
+    if (kg == payload_goal) return;
+    payload_goal = kg;
+    payload_rate = (kg - payload) / std::max(options.payload_time, kPayloadStep);
+  }
+
+  /// The next small step of a payload on its way. The error control follows it without a new start of the integrator.
+  void step_payload(double seconds) {
+    system.evaluate(state.data(), command, instant);
     const double before = system.stored_energy(state.data(), instant);
-    system.set_payload(kg);
-    payload = kg;
+    const double left = payload_goal - payload, step = payload_rate * seconds;
+    payload = std::abs(left) <= std::abs(step) ? payload_goal : payload + step;
+    system.set_payload(payload);
     system.evaluate(state.data(), command, instant);
     exchanged += system.stored_energy(state.data(), instant) - before;
-    restart();
-    write_record();
-    write_ledger();
   }
 
   void write_record() {
@@ -284,7 +303,8 @@ struct PlantRun::Integrator {
   sundials::Context context;
   PlantSystem system;
   RunOptions options;
-  double payload = 0.0, t = 0.0, stored_at_start = 0.0, exchanged = 0.0;
+  double payload = 0.0, payload_goal = 0.0, payload_rate = 0.0;  // [kg], [kg], [kg/s]
+  double t = 0.0, stored_at_start = 0.0, exchanged = 0.0;
   std::vector<double> state, command;
   Instant instant;
   N_Vector y = nullptr, tolerance = nullptr, quadratures = nullptr;

@@ -1,7 +1,7 @@
 #pragma once
 /// Runs the dynamic plant in time: commands in, all that happens out. Controllers, benchmarks and `sparflow simulate` stand on
 /// this. Integration is by CVODES (BDF with Newton's method and a dense Jacobian); commands are held between two samples.
-/// Stops, payloads taken or put down and jumps of the command are events: the integrator stops at them and begins anew.
+/// Stops and jumps of the command are events: the integrator stops at them and begins anew.
 /// Source: Hindmarsh et al. (2005), SUNDIALS, ACM Trans. Mathematical Software 31(3).
 #include <functional>
 #include <memory>
@@ -25,6 +25,9 @@ struct RunOptions {
   /// Longest step of the integrator.
   /// @threshold [s] 0.001..1; numerical: no opening of a valve is stepped over
   double longest_step = 0.02;
+  /// Time in which a payload is taken or put down: as a sling tightens, the crane's load grows.
+  /// @threshold [s] 0..10; chosen: a payload that appeared at once would make the pressures ring as no work does
+  double payload_time = 0.8;
 };
 
 /// Energies since the start [J]. `pump_work` = sum of losses + change of `stored`, up to the integrator's error.
@@ -74,6 +77,7 @@ class PlantRun {
   RunStatus advance(const std::vector<double>& command);
   /// Advances without a new start of the integrator by any time [s].
   RunStatus advance(const std::vector<double>& command, double duration);
+  /// From now on the payload goes to this one [kg], linearly within RunOptions::payload_time.
   void set_payload(double payload);
 
   const Record& record() const;

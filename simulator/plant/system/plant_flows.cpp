@@ -121,7 +121,12 @@ void PlantSystem::evaluate_hydraulics(const double* state, int c, double viscosi
   };
   loss(Loss::kMeterIn) = i.in_a * (ws - wha) + i.in_b * (ws - whb);
   loss(Loss::kMeterOut) = i.out_a * (wha - wt) + i.out_b * (whb - wt);
-  loss(Loss::kLine) = i.port_a * (wha - wa) + i.port_b * (whb - wb);
+  // Out of a chamber the valve throttles alone, into it hose and check valve (components/counterbalance.h).
+  const auto port = [](bool held, double flow) {
+    return held && flow < 0.0 ? Loss::kCounterbalance : Loss::kLine;
+  };
+  loss(port(holds_bore(v), i.port_a)) += i.port_a * (wha - wa);
+  loss(port(holds_rod(v), i.port_b)) += i.port_b * (whb - wb);
   loss(Loss::kLeakage) = i.leak * (wa - wb);
   loss(Loss::kAntiCavitation) = i.refill_a * (wt - wa) + i.refill_b * (wt - wb);
 }

@@ -12,10 +12,25 @@
 namespace sparflow::plant {
 
 /// Where a cylinder turns energy into heat.
-enum class Loss { kMeterIn, kMeterOut, kLine, kLeakage, kAntiCavitation, kFriction, kEndStop };
-inline constexpr int kLosses = 7;
+enum class Loss {
+  kMeterIn,
+  kMeterOut,
+  kCounterbalance,  ///< flow out of a chamber through its counterbalance valve
+  kLine,            ///< hose, and the valve's check on the way in
+  kLeakage,
+  kAntiCavitation,
+  kFriction,
+  kEndStop
+};
+inline constexpr int kLosses = 8;
+/// Keys of files.
 inline constexpr std::array<const char*, kLosses> kLossNames = {
-    "meter_in", "meter_out", "line", "leakage", "anti_cavitation", "friction", "end_stop"};
+    "meter_in", "meter_out",       "counterbalance", "line",
+    "leakage",  "anti_cavitation", "friction",       "end_stop"};
+/// Words for people.
+inline constexpr std::array<const char*, kLosses> kLossWords = {
+    "meter-in edge",         "meter-out edge", "counterbalance valve", "line", "leakage",
+    "anti-cavitation valve", "friction",       "end stop and cushion"};
 
 /// Places of the parts in the state vector.
 struct StateLayout {

@@ -107,6 +107,54 @@ TEST(PlantRun, APayloadPressesClosedChambersTogetherByTheirModulus) {
   }
 }
 
+TEST(PlantRun, APayloadIsTakenGraduallyAndThePressuresHardlyRing) {
+  const Machine machine = machine_named("loader_crane");
+  double overshoot[2];
+  for (const bool gradual : {false, true}) {
+    RunOptions options;
+    options.payload_time = gradual ? 0.8 : 0.0;
+    PlantRun run(machine, default_parameters(machine), middle(machine), 0.0, options);
+    hold(run, {0.0, 0.0, 0.0}, 1.0);
+    const double before = run.record().pressure_a[1];
+    run.set_payload(800.0);
+    double peak = 0.0, halfway = 0.0;
+    for (int i = 0; i < 1500; ++i) {
+      run.advance({0.0, 0.0, 0.0});
+      peak = std::max(peak, run.record().pressure_a[1]);
+      if (i == 19) halfway = run.record().payload;
+    }
+    EXPECT_NEAR(halfway, gradual ? 400.0 : 800.0, 1e-6);
+    EXPECT_EQ(run.record().payload, 800.0);
+    const double after = run.record().pressure_a[1];
+    ASSERT_GT(after, before + 20e5);
+    overshoot[gradual ? 1 : 0] = (peak - after) / (after - before);
+    // what the load brought, less what became heat, is stored: a load taken at rest needs no work of the pump
+    EXPECT_LT(std::abs(run.ledger().imbalance()), 1e-3 * std::abs(run.ledger().payload_exchange));
+  }
+  // a load that appears at once swings as far beyond its place as it had to go, but for the damping
+  EXPECT_GT(overshoot[0], 0.4);
+  EXPECT_LT(overshoot[1], 0.5 * overshoot[0]);
+}
+
+TEST(PlantRun, WhatACounterbalanceValveThrottlesIsToldApartFromTheLine) {
+  const Machine machine = machine_named("loader_crane");
+  for (const double sides : {0.0, 1.0}) {
+    PlantParameters p = default_parameters(machine);
+    for (CylinderParameters& c : p.cylinders) c.counterbalance.sides = sides;
+    PlantRun run(machine, p, middle(machine), 500.0);
+    hold(run, {-0.5, 0.0, 0.0}, 4.0);
+    const auto& loss = run.ledger().cylinder_loss[0];
+    const double valve = loss[static_cast<std::size_t>(Loss::kCounterbalance)];
+    const double line = loss[static_cast<std::size_t>(Loss::kLine)];
+    EXPECT_GT(line, 0.0);
+    if (sides < 0.5) {
+      EXPECT_EQ(valve, 0.0);
+    } else {
+      EXPECT_GT(valve, 10.0 * line);  // the valve holds the load back, the hose does not
+    }
+  }
+}
+
 TEST(PlantRun, ALeakingPistonSinksAtTheRateOfItsLeak) {
   const Machine machine = machine_named("loader_crane");
   PlantParameters p = plain_parameters(machine);
