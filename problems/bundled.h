@@ -6,7 +6,7 @@
 namespace sparflow {
 
 /// Folder that holds `machines/`, `reaches/` and `logs/`: $SPARFLOW_DATA if set, else
-/// `<prefix>/share/sparflow` of the running program, else the source tree it was built from, else the
+/// `PREFIX/share/sparflow` of the running program, else the source tree it was built from, else the
 /// prefix it was configured for.
 /// @throws InputError when none of them exists
 std::string data_folder();

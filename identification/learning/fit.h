@@ -93,7 +93,7 @@ FitResult fit(const Machine& machine, const std::vector<Log>& logs,
               const std::vector<Log>& test_logs = {}, const FitOptions& options = {},
               const std::function<void(double share, const std::string& what)>& progress = {});
 
-/// @return [logs] masks of the samples held out for `FitResult::held_out`; all false when fewer than two blocks of motion
+/// @return [logs] masks of the samples held out for FitResult; all false when fewer than two blocks of motion
 ///   could be held out
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
                                    const FitOptions& options);

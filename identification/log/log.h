@@ -10,7 +10,7 @@
 
 namespace sparflow {
 
-/// What a channel measures; `Channel::index` names the joint, cylinder or pump.
+/// What a channel measures; its index names the joint, cylinder or pump.
 enum class Role {
   kJointPosition,   ///< of a joint [rad] or [m]
   kStroke,          ///< of a cylinder [m], grows as it extends

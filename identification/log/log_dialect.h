@@ -12,9 +12,9 @@ namespace sparflow {
 
 /// A field that is zero or empty is detected from the file.
 struct DialectOptions {
-  char delimiter = 0;                ///< ',', ';', '\t' or ' ' (any number of blanks)
-  char decimal = 0;                  ///< '.' or ','
-  int skip_rows = 0;                 ///< lines above the header that are not part of the table
+  char delimiter = 0;  ///< comma, semicolon, tabulator or blank (any number of blanks)
+  char decimal = 0;    ///< '.' or ','
+  int skip_rows = 0;   ///< lines above the header that are not part of the table
   std::vector<std::string> missing;  ///< further marks for "missing", e.g. "-999"
 };
 

@@ -76,7 +76,7 @@ class YamlValue {
 
  private:
   friend class YamlMap;
-  friend YamlValue parse_yaml(const std::string&, const std::string&);
+  friend YamlValue parse_yaml(const std::string& text, const std::string& file);
   YamlValue(const YAML::Node& node, const std::string& file, std::string path);
   YamlValue child(const YAML::Node& node, std::string path) const;
 
