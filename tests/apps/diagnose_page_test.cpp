@@ -235,7 +235,7 @@ TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const std::string html =
       improve_page(extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
-                          {log_with_friction(1)}, {log_with_friction(2)}))
+                          {{log_with_friction(1)}, {}, {log_with_friction(2)}}))
           .html();
   EXPECT_THAT(html, HasSubstr("\"x_counts\":true"));
   EXPECT_THAT(html, HasSubstr("% of before"));
@@ -244,7 +244,7 @@ TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
 TEST(ImprovePageInBrowser, StepsOfExtend) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
-                                     {log_with_friction(1)}, {log_with_friction(2)});
+                                     {{log_with_friction(1)}, {}, {log_with_friction(2)}});
   const Page page = improve_page(result);
   const std::string html = page.html();
   EXPECT_THAT(html, HasSubstr("Error after each step"));

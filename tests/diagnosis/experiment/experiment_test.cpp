@@ -88,12 +88,12 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
   const Case c(one_speed_log());
   const std::vector<EffectAt> rival = {parse_effect("viscous_friction:arm", c.model.machine)};
   const BetterMotion small =
-      better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {400.0}), rival);
+      better_motion(c.model, c.evidence, c.fit, {applied("coulomb_friction:arm", {400.0}), rival});
   EXPECT_THAT(small.words, HasSubstr("arm"));
   EXPECT_GT(small.nats_per_minute, 1.5 * small.nats_here);
   EXPECT_THAT(small.apart, SizeIs(1));
   const BetterMotion large =
-      better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {800.0}), rival);
+      better_motion(c.model, c.evidence, c.fit, {applied("coulomb_friction:arm", {800.0}), rival});
   EXPECT_GT(large.nats_per_minute, small.nats_per_minute)
       << "a larger effect is distinguished sooner";
 }
@@ -101,9 +101,9 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
 TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {
   // on the only joint a mass at the tip and a moment of the link are equivalent
   const Case c(one_speed_log());
-  const BetterMotion m =
-      better_motion(c.model, c.evidence, c.fit, applied("payload_error", {60.0, 0.0}),
-                    {parse_effect("unmodelled_mass:arm", c.model.machine)});
+  const BetterMotion m = better_motion(c.model, c.evidence, c.fit,
+                                       {applied("payload_error", {60.0, 0.0}),
+                                        {parse_effect("unmodelled_mass:arm", c.model.machine)}});
   EXPECT_THAT(m.words, IsEmpty());
 }
 

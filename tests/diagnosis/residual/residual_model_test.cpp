@@ -32,7 +32,7 @@ const CraneModel& model() {
 const Evidence& motions() {
   static const Evidence e = collect_evidence(
       model(), {make_signals(model().machine,
-                             testing_support::hidden_case(model().machine, {}, 5, 90.0).train)});
+                             testing_support::hidden_case(model().machine, {}, {5, 90.0}).train)});
   return e;
 }
 

@@ -97,7 +97,7 @@ TEST_F(UserEffect, IsAddedAndCarriedByTheModelFile) {
   CraneModel model = arm_model();
   model.user_effects = {effect.effect};
   const ExtendResult r =
-      extend(model, {effect}, {log_with_tight_spot(1)}, {log_with_tight_spot(2)});
+      extend(model, {effect}, {{log_with_tight_spot(1)}, {}, {log_with_tight_spot(2)}});
   ASSERT_EQ(r.steps.size(), 1u);
   // the residual is noise: 6 kN over a tenth of the stroke are explained
   EXPECT_LT(r.steps[0].change.own, 0.8);

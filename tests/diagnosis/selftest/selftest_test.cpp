@@ -208,8 +208,8 @@ TEST(Selftest, EightyPercentMeansEightyPercent) {
   constexpr int kRuns = 40;
   int named = 0;
   for (unsigned seed = 0; seed < kRuns; ++seed) {
-    named += inject_and_search(evidence, fit, design, theta, some_effects(model.machine), options,
-                               seed + 1)
+    named += inject_and_search(evidence, fit, {design, theta, seed + 1},
+                               some_effects(model.machine), options)
                  .named;
   }
   // the binomial standard deviation of 40 at 0.8 is 0.063; errors of the threshold and rivals of nearly the same form
