@@ -63,7 +63,9 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
   for (const char* name : {"loader_crane", "excavator", "swing_crane_two_pumps"}) {
     const Machine machine = drawn_machine(name);
     CraneModel model = CraneModel::untrained(machine);
-    for (const MotionRecipe& recipe : motion_menu(machine, 500.0)) {
+    const std::vector<MotionRecipe> menu = motion_menu(machine, 500.0);
+    std::size_t positions = 0, commands = 0;
+    for (const MotionRecipe& recipe : menu) {
       Log log;
       try {
         log = synthesise_motion(model, recipe, 0.02, 30.0);
@@ -72,15 +74,20 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
       }
       for (const Channel& c : log.channels) {
         if (c.role == Role::kJointPosition) {
+          ++positions;
           const Joint& j = machine.joints[static_cast<std::size_t>(c.index)];
           EXPECT_GE(c.values.minCoeff(), j.position.lo) << name << ": " << recipe.words;
           EXPECT_LE(c.values.maxCoeff(), j.position.hi) << name << ": " << recipe.words;
         }
         if (c.role == Role::kCommand) {
+          ++commands;
           EXPECT_LE(c.values.cwiseAbs().maxCoeff(), 1.0) << name << ": " << recipe.words;
         }
       }
     }
+    // the linkages of at least nine in ten motions can take every pose
+    EXPECT_GE(10 * positions, 9 * menu.size() * machine.joints.size()) << name;
+    EXPECT_GE(10 * commands, 9 * menu.size() * machine.cylinders.size()) << name;
   }
 }
 

@@ -182,6 +182,7 @@ TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
   // flow into the working chamber moves the rod by that chamber's area
   const Eigen::MatrixXd flow = column("flow", "m^3/s", EvidenceKind::kFlow);
   ASSERT_EQ(flow.rows(), side.size());
+  EXPECT_TRUE((side.array() > 0).any() && (side.array() < 0).any());
   for (Eigen::Index k = 0; k < side.size(); ++k) {
     if (side[k] == 0) continue;
     EXPECT_DOUBLE_EQ(flow(k, 0), side[k] > 0 ? 1.0 / c.area_piston() : -1.0 / c.area_rod());
