@@ -275,6 +275,11 @@ const char* verdict_name(Verdict verdict) {
   return "";
 }
 
+double DiagnosedEffect::shown_probability() const {
+  constexpr double kRounding = 1e-9;  // 100 * 0.29 is less than 29
+  return std::floor(100.0 * probability + kRounding);
+}
+
 DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log>& logs,
                                    const std::vector<Log>& references,
                                    const DiagnoseOptions& options) {

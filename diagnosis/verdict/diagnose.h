@@ -46,6 +46,8 @@ struct DiagnosedEffect {
   std::vector<std::string> evidence;  ///< whole sentences
 
   std::string key() const { return at.empty() ? id : id + ":" + at; }
+  /// The probability as reports show it: whole percent, rounded down, so that none that is short of certain shows 100. [%]
+  double shown_probability() const;
 };
 
 /// A part of the residual that neither model nor catalogue explains.

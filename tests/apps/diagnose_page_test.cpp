@@ -105,6 +105,22 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 
+TEST(DiagnosePage, ShowsTheProbabilityOfTheTerminalAndNoCertaintyThatIsNone) {
+  const CraneModel model = arm_model();
+  Diagnosis d = missing_friction(model);
+  const auto in_terminal = [&] { return d.table(); };
+  const auto in_page = [&] { return diagnose_page(model, d).html(); };
+  d.effects[0].probability = 1.0;
+  EXPECT_THAT(in_terminal(), HasSubstr("probability 100 %"));
+  EXPECT_THAT(in_page(), HasSubstr(">100<"));
+  d.effects[0].probability = 0.996;
+  EXPECT_THAT(in_terminal(), HasSubstr("probability  99 %"));
+  EXPECT_THAT(in_page(), ::testing::Not(HasSubstr(">100<")));
+  EXPECT_THAT(in_page(), HasSubstr(">99<"));
+  d.effects[0].probability = 0.29;  // 100 * 0.29 is less than 29 in floating point
+  EXPECT_EQ(d.effects[0].shown_probability(), 29.0);
+}
+
 TEST(DiagnosePage, ChannelPictureRemovesTheEffect) {
   const CraneModel model = arm_model();
   const Diagnosis d = missing_friction(model);
