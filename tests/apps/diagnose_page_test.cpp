@@ -269,6 +269,17 @@ TEST(ImprovePageInBrowser, StepsOfExtend) {
   expect_good_in_browser(page, "improve page");
 }
 
+TEST(ImprovePage, CountsTheEffectsNotKeptHoweverTheReasonIsWorded) {
+  const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
+  ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
+                               {{log_with_friction(1)}, {}, {log_with_friction(2)}});
+  result.rejected = {result.steps[0]};
+  result.reason = "nothing more is missing";
+  result.stopped_because = result.reason + "; friction did no good: its interval contains zero";
+  EXPECT_THAT(improve_page(result).html(),
+              HasSubstr("othing more is missing; 1 more was tried and not kept."));
+}
+
 TEST(ImprovePage, StatesWhyNothingWasAdded) {
   ExtendResult result;
   result.model = arm_model();
