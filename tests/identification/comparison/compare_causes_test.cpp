@@ -179,5 +179,17 @@ TEST(CompareJson, HasTheCauses) {
   EXPECT_THAT(table, HasSubstr("systematic errors"));
 }
 
+/// A load of 20 kN too much, judged so strictly that no test can be significant.
+TEST(CompareTable, DoesNotDenyAnErrorThatTheMotionsAreTooFewToDecide) {
+  Log log = heavier(20e3);
+  ResidualTestOptions strict;
+  strict.alarm = 5e-4;  // 999 flips allow no p-value below 0.001, so no number of blocks suffices
+  CompareOptions options;
+  options.tests = strict;
+  const std::string table = compare_table(compare(arm_model(), {log}, options));
+  EXPECT_THAT(table, HasSubstr("too few to decide whether"));
+  EXPECT_THAT(table, testing::Not(HasSubstr("none: no significant")));
+}
+
 }  // namespace
 }  // namespace sparflow
