@@ -58,20 +58,31 @@ CraneModel bundled_model() {
   return fit(machine, {load_log(bundled_file("logs/loader_crane_train.csv"), machine)}).model;
 }
 
-MotionProblem reach(const std::string& name, const Machine& machine,
-                    const std::vector<double>& start, const Eigen::Vector3d& goal, double payload,
-                    double duration) {
+namespace {
+
+/// A reach without obstacles.
+struct Reach {
+  std::string name;
+  std::vector<double> start;  ///< posture [rad] or [m]
+  Eigen::Vector3d goal;       ///< of the tip [m]
+  double payload = 0.0;       ///< [kg]
+  double duration = 0.0;      ///< [s]
+};
+
+MotionProblem problem_of(const Reach& reach, const Machine& machine) {
   MotionProblem p;
-  p.name = name;
+  p.name = reach.name;
   p.machine = machine;
-  p.payload = payload;
-  p.start =
-      Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
-  p.goal = TipGoal{goal};
-  p.duration = {duration, duration};
+  p.payload = reach.payload;
+  p.start = Eigen::Map<const Eigen::VectorXd>(reach.start.data(),
+                                              static_cast<Eigen::Index>(reach.start.size()));
+  p.goal = TipGoal{reach.goal};
+  p.duration = {reach.duration, reach.duration};
   p.limits = limits_of(machine);
   return p;
 }
+
+}  // namespace
 
 std::vector<MotionProblem> loader_crane_reaches() {
   std::vector<MotionProblem> reaches;
@@ -89,8 +100,9 @@ std::vector<MotionProblem> loader_crane_reaches() {
   brisk.name = "lift, 12 s";
   brisk.duration = {12.0, 12.0};
   reaches.push_back(brisk);
-  reaches.push_back(reach("heavy, up", machine, {0.6, -0.9, 2.0}, {6.5, 0.0, 5.0}, 800.0, 18.0));
-  reaches.push_back(reach("fold", machine, {0.5, -0.4, 3.0}, {5.0, 0.0, 1.0}, 200.0, 20.0));
+  reaches.push_back(
+      problem_of({"heavy, up", {0.6, -0.9, 2.0}, {6.5, 0.0, 5.0}, 800.0, 18.0}, machine));
+  reaches.push_back(problem_of({"fold", {0.5, -0.4, 3.0}, {5.0, 0.0, 1.0}, 200.0, 20.0}, machine));
   return reaches;
 }
 

@@ -14,12 +14,6 @@ CraneModel bundled_model();
 /// Reaches of the loader crane at fixed durations, without obstacles.
 std::vector<MotionProblem> loader_crane_reaches();
 
-/// Makes a reach without obstacles.
-/// @param start posture [rad] or [m]  @param goal tip [m]  @param payload [kg]  @param duration [s]
-MotionProblem reach(const std::string& name, const Machine& machine,
-                    const std::vector<double>& start, const Eigen::Vector3d& goal, double payload,
-                    double duration);
-
 /// Makes a reach of a planar chain of `joints` revolute joints with horizontal axes, each with a pinned cylinder, all fed
 /// by one load-sensing pump; lengths and masses decrease towards the tip. It goes from posture to posture in 14 s.
 MotionProblem chain_problem(int joints);

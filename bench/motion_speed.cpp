@@ -194,16 +194,24 @@ struct GrowthRow {
   Run run;
 };
 
-GrowthRow growth_row(const std::string& what, int value, const CraneModel& model,
-                     const MotionProblem& problem, const SeedMotion& seed, int intervals,
+/// One reach whose solve is timed.
+struct TimedReach {
+  const CraneModel& model;
+  const MotionProblem& problem;
+  SeedMotion seed;
+};
+
+GrowthRow growth_row(const std::string& what, int value, const TimedReach& reach, int intervals,
                      int iterations) {
   OptimizeOptions options = one_solve(intervals);
   options.phase_iterations = iterations;
   options.tightenings = 0;
   options.refine = 2;  // The growth of the solve is measured, not that of the checks.
   GrowthRow row{what, value, {}};
-  row.run =
-      timed([&] { return optimize_from(model, problem, seed, problem.duration.min, options); });
+  row.run = timed([&] {
+    return optimize_from(reach.model, reach.problem, reach.seed, reach.problem.duration.min,
+                         options);
+  });
   return row;
 }
 
@@ -220,17 +228,17 @@ std::vector<GrowthRow> run_growth(const CraneModel& model, const MotionProblem& 
   rows.reserve(18);
   const std::vector<SeedMotion> seeds = planned_seeds(lift, 2, 100);
   for (const int intervals : {50, 100, 200, 400, 800, 1600})
-    rows.push_back(growth_row("intervals", intervals, model, lift, seeds.front(), intervals, 25));
+    rows.push_back(growth_row("intervals", intervals, {model, lift, seeds.front()}, intervals, 25));
   for (const int joints : {2, 3, 4, 5, 6, 7}) {
     const MotionProblem chain = chain_problem(joints);
     const CraneModel synthetic = synthetic_model(chain.machine, 100);
-    rows.push_back(growth_row("joints", joints, synthetic, chain, straight_line(chain), 100, 25));
+    rows.push_back(growth_row("joints", joints, {synthetic, chain, straight_line(chain)}, 100, 25));
   }
   const MotionProblem chain = chain_problem(3);
   for (const int centres : {50, 100, 300, 600, 1200, 2400}) {
     const CraneModel synthetic = synthetic_model(chain.machine, centres);
-    rows.push_back(
-        growth_row("kernels a process", centres, synthetic, chain, straight_line(chain), 100, 12));
+    rows.push_back(growth_row("kernels a process", centres,
+                              {synthetic, chain, straight_line(chain)}, 100, 12));
   }
   return rows;
 }

@@ -184,6 +184,8 @@ ReferenceKnot::Demand ReferenceKnot::demand(std::size_t i, const Speed& s, doubl
   return d;
 }
 
+// Over 80 lines because it is one derivation by the chain rule whose blocks use each other's terms, and the kernel that
+// the optimiser's speed is measured against: it was timed in this form.
 double ReferenceKnot::cost_derivatives(const double* z, double* gradient, double* hessian) {
   const ReferenceProblem& p = *problem_;
   const Kinematics& kin = kinematics(z);

@@ -58,7 +58,7 @@ void run(int argc, char** argv) {
   const Log test = load_log(file(3, "logs/loader_crane_friction_test.csv"), machine);
   const EffectAt effect = parse_effect(argc > 4 ? argv[4] : "smooth_friction:boom", machine);
 
-  const ExtendResult result = extend(fit(machine, {log}).model, {effect}, {log}, {test});
+  const ExtendResult result = extend(fit(machine, {log}).model, {effect}, {{log}, {}, {test}});
   fmt::print("{}", result.table());
   const AppliedEffect& found = result.model.effects.front();
   fmt::print("{}: Fc = {:.0f} N, 95 % interval {:.0f} .. {:.0f}\n", found.key(machine),

@@ -33,7 +33,7 @@ void run(int argc, char** argv) {
     fmt::print("{}\n", effect_entry(*e));
   const EffectAt effect = parse_effect(argc > 5 ? argv[5] : "seal_friction:boom", machine);
 
-  const ExtendResult result = extend(fit(machine, {log}).model, {effect}, {log}, {test});
+  const ExtendResult result = extend(fit(machine, {log}).model, {effect}, {{log}, {}, {test}});
   fmt::print("{}", result.table());
   const std::string path = argc > 6 ? argv[6] : "with_seal_friction.json";
   save_model(result.model, path);

@@ -177,47 +177,53 @@ std::vector<std::vector<double>> RawEvidence::shapes(const EffectAt& effect) con
   return all;
 }
 
-SimpleAnswer RawEvidence::iid_bic(int most) const {
-  const std::size_t n = channels_.size();
-  std::vector<MatrixXd> basis(n);
-  std::vector<VectorXd> residual(n);  // without the baseline, scaled to unit variance
-  std::vector<double> deviation(n);
-  double rows = 0.0;
-  for (std::size_t c = 0; c < n; ++c) {
-    basis[c] = span_of(channels_[c].baseline);
-    residual[c] = without(basis[c], channels_[c].y);
-    const auto count = static_cast<double>(residual[c].size());
-    deviation[c] = std::max(1e-300, residual[c].norm() / std::sqrt(count));
-    residual[c] /= deviation[c];
-    rows += count;
+/// Least squares of designs on all channels with independent noise and one variance for each channel.
+class RawEvidence::IidFit {
+ public:
+  explicit IidFit(const RawEvidence& raw)
+      : raw_(raw),
+        basis_(raw.channels_.size()),
+        residual_(raw.channels_.size()),
+        deviation_(raw.channels_.size()) {
+    for (std::size_t c = 0; c < basis_.size(); ++c) {
+      basis_[c] = span_of(raw.channels_[c].baseline);
+      residual_[c] = without(basis_[c], raw.channels_[c].y);
+      const auto count = static_cast<double>(residual_[c].size());
+      deviation_[c] = std::max(1e-300, residual_[c].norm() / std::sqrt(count));
+      residual_[c] /= deviation_[c];
+      rows_ += count;
+    }
   }
-  const auto design = [&](const EffectAt& effect, const std::vector<double>& shape) {
-    Design d{effect, shape, std::vector<MatrixXd>(n), 0, false};
-    for (std::size_t c = 0; c < n; ++c) {
-      const MatrixXd x = columns(effect, shape, channels_[c]);
+  double rows() const { return rows_; }
+
+  Design design(const EffectAt& effect, const std::vector<double>& shape) const {
+    Design d{effect, shape, std::vector<MatrixXd>(basis_.size()), 0, false};
+    for (std::size_t c = 0; c < basis_.size(); ++c) {
+      const MatrixXd x = raw_.columns(effect, shape, raw_.channels_[c]);
       if (x.cols() == 0) continue;
-      d.columns[c] = without(basis[c], x) / deviation[c];
+      d.columns[c] = without(basis_[c], x) / deviation_[c];
       d.linear = static_cast<int>(x.cols());
       d.acts = true;
     }
     return d;
-  };
-  // Sum of n ln(squared error / n) with all designs and their parameters within bounds.
-  const auto misfit = [&](const std::vector<const Design*>& designs, VectorXd& theta) {
+  }
+
+  /// Sum of n ln(squared error / n) with all designs and their parameters `theta` within bounds.
+  double misfit(const std::vector<const Design*>& designs, VectorXd& theta) const {
     Index width = 0;
     for (const Design* d : designs) width += d->linear;
     MatrixXd gram = MatrixXd::Zero(width, width);
     VectorXd cross = VectorXd::Zero(width);
-    std::vector<MatrixXd> x(n);
-    for (std::size_t c = 0; c < n; ++c) {
-      x[c].setZero(residual[c].size(), width);
+    std::vector<MatrixXd> x(residual_.size());
+    for (std::size_t c = 0; c < x.size(); ++c) {
+      x[c].setZero(residual_[c].size(), width);
       Index at = 0;
       for (const Design* d : designs) {
         if (d->columns[c].cols() > 0) x[c].middleCols(at, d->linear) = d->columns[c];
         at += d->linear;
       }
       gram.noalias() += x[c].transpose() * x[c];
-      cross.noalias() += x[c].transpose() * residual[c];
+      cross.noalias() += x[c].transpose() * residual_[c];
     }
     const VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
@@ -232,23 +238,33 @@ SimpleAnswer RawEvidence::iid_bic(int most) const {
       }
     }
     double sum = 0.0;
-    for (std::size_t c = 0; c < n; ++c) {
-      const auto count = static_cast<double>(residual[c].size());
-      sum += count * std::log((residual[c] - x[c] * theta).squaredNorm() / count);
+    for (std::size_t c = 0; c < x.size(); ++c) {
+      const auto count = static_cast<double>(residual_[c].size());
+      sum += count * std::log((residual_[c] - x[c] * theta).squaredNorm() / count);
     }
     return sum;
-  };
+  }
 
+ private:
+  const RawEvidence& raw_;
+  std::vector<MatrixXd> basis_;
+  std::vector<VectorXd> residual_;  ///< without the baseline, scaled to unit variance
+  std::vector<double> deviation_;
+  double rows_ = 0.0;
+};
+
+SimpleAnswer RawEvidence::iid_bic(int most) const {
+  const IidFit fit(*this);
   std::vector<Design> pool;
   std::vector<double> first_gain;
   for (const EffectAt& effect : candidates(machine_)) {
     double best = -std::numeric_limits<double>::infinity();
     Design kept;
     for (const std::vector<double>& shape : shapes(effect)) {
-      Design d = design(effect, shape);
+      Design d = fit.design(effect, shape);
       VectorXd theta;
       if (!d.acts) continue;
-      const double gain = -misfit({&d}, theta);
+      const double gain = -fit.misfit({&d}, theta);
       if (gain > best) best = gain, kept = std::move(d);
     }
     if (kept.acts) pool.push_back(std::move(kept)), first_gain.push_back(best);
@@ -264,9 +280,9 @@ SimpleAnswer RawEvidence::iid_bic(int most) const {
       if (std::find(chosen.begin(), chosen.end(), &pool[k]) != chosen.end()) continue;
       std::vector<const Design*> with = chosen;
       with.push_back(&pool[k]);
-      const double value = chosen.empty() ? -first_gain[k] : misfit(with, theta);
+      const double value = chosen.empty() ? -first_gain[k] : fit.misfit(with, theta);
       const auto parameters = static_cast<double>(pool[k].effect.effect->info().parameters.size());
-      const double change = value - before + parameters * std::log(rows);
+      const double change = value - before + parameters * std::log(fit.rows());
       if (change < best_change) best_change = change, best_misfit = value, best = &pool[k];
     }
     if (best == nullptr) break;
@@ -274,7 +290,7 @@ SimpleAnswer RawEvidence::iid_bic(int most) const {
     before = best_misfit;
   }
   if (chosen.empty()) return answer;
-  misfit(chosen, theta);
+  fit.misfit(chosen, theta);
   Index at = 0;
   for (const Design* d : chosen) {
     answer.found.push_back(d->effect);

@@ -42,6 +42,7 @@ class RawEvidence {
     Eigen::MatrixXd baseline;
   };
   struct Design;
+  class IidFit;
 
   double measured(std::size_t log, EvidenceKind kind, int index, Eigen::Index row) const;
   Eigen::VectorXd baseline_row(std::size_t log, EvidenceKind kind, int index,

@@ -297,12 +297,11 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
     for (const DiagnosedEffect& e : d.effects) named.push_back(e.effect);
   }
   ExtendOptions options;
-  options.references = crane.references;
   options.fit.hold_out_every = 0;
   const auto learned = [&](const std::vector<EffectAt>& effects) -> std::optional<ExtendResult> {
     if (effects.empty()) return {};
     try {
-      return extend(crane.model, effects, crane.train, crane.tests, options);
+      return extend(crane.model, effects, {crane.train, crane.references, crane.tests}, options);
     } catch (const InputError&) {  // The logs do not show the effect.
       return {};
     }

@@ -41,28 +41,35 @@ std::string median_limits(std::vector<double> v, double scale) {
                      at(std::ceil(0.5 * n + half)));
 }
 
+/// A row of the table that shows a share.
+struct ShareRow {
+  std::string text;
+  const char *least = "", *aim = "";  ///< "" for a row without a requirement
+  double lowest = 0.0, highest = 1.0;
+};
+
 class Table {
  public:
   explicit Table(const Runs& runs) : runs_(runs) {}
 
-  void share(const std::string& text, const char* least, const char* aim, const Pick& of,
-             const Pick& hit, double lowest, double highest) {
+  void share(const ShareRow& row, const Pick& of, const Pick& hit) {
     int n = 0, k = 0;
     for (const BlindRun& r : runs_) {
       if (!of(r)) continue;
       ++n;
       k += hit(r) ? 1 : 0;
     }
-    share(text, least, aim, k, n, lowest, highest);
+    share(row, k, n);
   }
-  void share(const std::string& text, const char* least, const char* aim, int k, int n,
-             double lowest, double highest) {
+  /// @param k of n runs
+  void share(const ShareRow& row, int k, int n) {
     if (n == 0) return;
     const auto [lo, hi] = share_limits(k, n);
     const double p = 1.0 * k / n;
-    lines_.push_back({text, fmt::format("{:.1f} %", 100.0 * p),
+    lines_.push_back({row.text, fmt::format("{:.1f} %", 100.0 * p),
                       fmt::format("{:.0f} .. {:.0f} %", 100.0 * lo, 100.0 * hi),
-                      fmt::format("{} of {}", k, n), least, aim, p, p >= lowest && p <= highest});
+                      fmt::format("{} of {}", k, n), row.least, row.aim, p,
+                      p >= row.lowest && p <= row.highest});
   }
   void number(Measure m, double most) {
     m.reached = m.number <= most;
@@ -109,8 +116,8 @@ void add_parameters(const Runs& runs, Table& table) {
                 median_limits(errors, 100.0) + " %", fmt::format("{}", errors.size()), "<= 10 %",
                 "<= 5 %", median},
                0.10);
-  table.share("95 % intervals that hold the truth", "90..98 %", "90..98 %", covered, intervals, 0.9,
-              0.98);
+  table.share({"95 % intervals that hold the truth", "90..98 %", "90..98 %", 0.9, 0.98}, covered,
+              intervals);
 }
 
 /// Adds the geometric mean of the RMS with the named effects (if any) over the RMS with the true effects.
@@ -168,25 +175,22 @@ void add_energy(const Runs& runs, Table& table) {
 std::vector<Measure> blind_table(const Runs& runs, double seconds) {
   Table t(runs);
   const auto good = [](const BlindRun& r) { return r.good(); };
-  t.share(
-      "false alarm, nothing missing", "<= 5 %", "<= 3 %", is("none"),
-      [](const BlindRun& r) { return r.verdict != "none"; }, 0.0, 0.05);
-  t.share("top-1 id and place, clear effect", ">= 97 %", ">= 99 %", is("clear"), good, 0.97, 1.0);
-  t.share("top-1, small effect (one third)", ">= 90 %", ">= 95 %", is("small"), good, 0.9, 1.0);
-  t.share(
-      "true effect in the reported set", ">= 98 %", ">= 99 %", single,
-      [](const BlindRun& r) { return r.in_set; }, 0.98, 1.0);
+  t.share({"false alarm, nothing missing", "<= 5 %", "<= 3 %", 0.0, 0.05}, is("none"),
+          [](const BlindRun& r) { return r.verdict != "none"; });
+  t.share({"top-1 id and place, clear effect", ">= 97 %", ">= 99 %", 0.97}, is("clear"), good);
+  t.share({"top-1, small effect (one third)", ">= 90 %", ">= 95 %", 0.9}, is("small"), good);
+  t.share({"true effect in the reported set", ">= 98 %", ">= 99 %", 0.98}, single,
+          [](const BlindRun& r) { return r.in_set; });
   add_set_size(runs, t);
-  t.share("outside the catalogue -> unknown", ">= 90 %", ">= 95 %", is("outside"), good, 0.9, 1.0);
-  t.share("pairs: both found and nothing else", ">= 85 %", ">= 95 %", is("pairs"), good, 0.85, 1.0);
-  t.share("broken sensor -> bad data", "", "", is("fault"), good, 0.0, 1.0);
+  t.share({"outside the catalogue -> unknown", ">= 90 %", ">= 95 %", 0.9}, is("outside"), good);
+  t.share({"pairs: both found and nothing else", ">= 85 %", ">= 95 %", 0.85}, is("pairs"), good);
+  t.share({"broken sensor -> bad data"}, is("fault"), good);
   add_parameters(runs, t);
   add_held_out(runs, t);
   add_energy(runs, t);
   t.share(
-      "held-out made worse by what was added", "<= 2 %", "0",
-      [](const BlindRun& r) { return r.changed; }, [](const BlindRun& r) { return r.made_worse; },
-      0.0, 0.02);
+      {"held-out made worse by what was added", "<= 2 %", "0", 0.0, 0.02},
+      [](const BlindRun& r) { return r.changed; }, [](const BlindRun& r) { return r.made_worse; });
   if (std::isfinite(seconds)) {
     t.number({"diagnosis of 15 000 rows, wall time", fmt::format("{:.1f} s", seconds), "", "",
               "<= 60 s", "<= 20 s", seconds},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -86,15 +87,19 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelCache& models
   std::vector<ReachTask> tasks;
   for (const std::string& file : bundled_files("reaches", ".yaml")) {
     if (file.find(only) == std::string::npos) continue;
-    MotionProblem problem = load_problem(file);
-    std::string model_file = problem.model_path;
-    if (model_file.empty() && problem.machine.name == "loader-crane")
-      model_file = bundled_file("models/loader_crane.json");
-    if (model_file.empty()) continue;
+    // Older reaches name no model; those of the loader crane are solved with the bundled one.
+    const bool of_loader_crane =
+        std::filesystem::path(file).filename().string().starts_with("loader_crane");
+    std::string model_file;
     ReachTask task;
+    task.problem = load_problem_with(file, [&](const std::string& named) -> const Machine* {
+      model_file =
+          named.empty() && of_loader_crane ? bundled_file("models/loader_crane.json") : named;
+      return model_file.empty() ? nullptr : &models.at(model_file).machine;
+    });
+    if (model_file.empty()) continue;
     task.model = &models.at(model_file);
     task.mark = models.mark_of(model_file);
-    task.problem = load_problem(file, &task.model->machine);
     // Infeasible reaches say so in the first line of their file.
     std::ifstream in(file);
     std::string first;

@@ -70,67 +70,66 @@ MapCurve unpack_curve(const std::string& bytes) {
   return curve;
 }
 
-int run(int argc, char** argv) {
-  bench::ProgramOptions app(
-      "Map of sequential, simultaneous and optimal motions over duration, payload, reach and idle "
-      "power");
+struct MapOptions {
   std::string folder = ".", only;
   int intervals = 80, points = 9, processes = 2, rounds = 1;
-  bool ends_only = false;
-  double longest = 6.0;
-  app.add("-o,--out", folder, "folder for the tables and the picture");
-  app.add("--only", only, "reaches whose name contains this");
-  app.add("--intervals", intervals, "mesh intervals").range(20, 1000);
-  app.add("--points", points, "number of durations of each curve");
-  app.add("--longest", longest, "longest duration, as a multiple of the shortest");
-  app.add("--rounds", rounds, "rounds of the search over mode sequences");
-  app.flag("--two-loads", ends_only, "only the lightest and the heaviest payload");
-  app.add("--processes", processes, "curves in parallel");
-  if (const auto code = app.parse(argc, argv)) return *code;
-  struct Task {
-    std::string reach;
-    double payload;
-  };
-  std::vector<Task> tasks;
+  bool ends_only = false;  ///< only the lightest and the heaviest payload
+  double longest = 6.0;    ///< longest duration, as a multiple of the shortest
+};
+
+/// A curve of the map: a reach with one payload.
+struct MapTask {
+  std::string reach;
+  double payload = 0.0;  ///< [kg]
+};
+
+std::vector<MapTask> map_tasks(const MapOptions& o) {
+  std::vector<MapTask> tasks;
   for (const Pose& pose : poses()) {
-    if (pose.reach.find(only) == std::string::npos) continue;
+    if (pose.reach.find(o.only) == std::string::npos) continue;
     for (const double payload : pose.payloads) {
-      if (ends_only && payload != pose.payloads.front() && payload != pose.payloads.back())
+      if (o.ends_only && payload != pose.payloads.front() && payload != pose.payloads.back())
         continue;
       tasks.push_back({pose.reach, payload});
     }
   }
-  const auto work = [&](int index) {
-    const Task& task = tasks[static_cast<std::size_t>(index)];
-    const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
-    CraneModel model;
-    MotionProblem problem = load_problem_with(file, [&](const std::string& named) {
-      // Older problems name no model.
-      model = load_model(named.empty() ? bundled_file("models/loader_crane.json") : named);
-      return &model.machine;
-    });
-    problem.payload = task.payload;
-    ParetoOptions options;
-    options.points = points;
-    options.longest = longest;
-    options.grid_nodes = 0;
-    OptimizeOptions& optimize = options.strategies.optimize;
-    optimize.intervals = intervals;
-    optimize.processes = 1;
-    optimize.search_intervals = std::min(40, intervals);
-    optimize.sequence_rounds = rounds;
-    optimize.mesh_error =
-        1e-3;  // A single mesh suffices, because the differences of interest are larger.
-    options.strategies.smooth_seeds = 1;
-    options.strategies.baselines.intervals = intervals;
-    options.strategies.baselines.polished_orders = 1;
-    options.strategies.baselines.optimize = optimize;
-    return pack_curve(
-        energy_against_time(model, problem, bench::planned_seeds(problem, 4, intervals), options));
-  };
-  const std::vector<ChildResult> results =
-      run_in_children(static_cast<int>(tasks.size()), processes, work, [&](int index, int done) {
-        const Task& task = tasks[static_cast<std::size_t>(index)];
+  return tasks;
+}
+
+std::string packed_curve_of(const MapTask& task, const MapOptions& o) {
+  const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
+  CraneModel model;
+  MotionProblem problem = load_problem_with(file, [&](const std::string& named) {
+    // Older problems name no model.
+    model = load_model(named.empty() ? bundled_file("models/loader_crane.json") : named);
+    return &model.machine;
+  });
+  problem.payload = task.payload;
+  ParetoOptions options;
+  options.points = o.points;
+  options.longest = o.longest;
+  options.grid_nodes = 0;
+  OptimizeOptions& optimize = options.strategies.optimize;
+  optimize.intervals = o.intervals;
+  optimize.processes = 1;
+  optimize.search_intervals = std::min(40, o.intervals);
+  optimize.sequence_rounds = o.rounds;
+  optimize.mesh_error =
+      1e-3;  // A single mesh suffices, because the differences of interest are larger.
+  options.strategies.smooth_seeds = 1;
+  options.strategies.baselines.intervals = o.intervals;
+  options.strategies.baselines.polished_orders = 1;
+  options.strategies.baselines.optimize = optimize;
+  return pack_curve(
+      energy_against_time(model, problem, bench::planned_seeds(problem, 4, o.intervals), options));
+}
+
+std::vector<MapCurve> solve_curves(const std::vector<MapTask>& tasks, const MapOptions& o) {
+  const std::vector<ChildResult> results = run_in_children(
+      static_cast<int>(tasks.size()), o.processes,
+      [&](int index) { return packed_curve_of(tasks[static_cast<std::size_t>(index)], o); },
+      [&](int index, int done) {
+        const MapTask& task = tasks[static_cast<std::size_t>(index)];
         fmt::print(stderr, "{}/{} {} {} kg\n", done, tasks.size(), task.reach, task.payload);
       });
   std::vector<MapCurve> curves;
@@ -147,13 +146,31 @@ int run(int argc, char** argv) {
       fmt::print(stderr, "{} {} kg: {}\n", curve.reach, curve.payload, curve.message);
     curves.push_back(std::move(curve));
   }
-  std::filesystem::create_directories(folder);
-  write_file_atomically(folder + "/strategy_map.csv", map_csv(curves));
+  return curves;
+}
+
+int run(int argc, char** argv) {
+  bench::ProgramOptions app(
+      "Map of sequential, simultaneous and optimal motions over duration, payload, reach and idle "
+      "power");
+  MapOptions o;
+  app.add("-o,--out", o.folder, "folder for the tables and the picture");
+  app.add("--only", o.only, "reaches whose name contains this");
+  app.add("--intervals", o.intervals, "mesh intervals").range(20, 1000);
+  app.add("--points", o.points, "number of durations of each curve");
+  app.add("--longest", o.longest, "longest duration, as a multiple of the shortest");
+  app.add("--rounds", o.rounds, "rounds of the search over mode sequences");
+  app.flag("--two-loads", o.ends_only, "only the lightest and the heaviest payload");
+  app.add("--processes", o.processes, "curves in parallel");
+  if (const auto code = app.parse(argc, argv)) return *code;
+  const std::vector<MapCurve> curves = solve_curves(map_tasks(o), o);
+  std::filesystem::create_directories(o.folder);
+  write_file_atomically(o.folder + "/strategy_map.csv", map_csv(curves));
   const std::vector<double> idle = {0.0, 1e3, 2e3, 5e3, 10e3, 15e3};
-  write_file_atomically(folder + "/strategy_idle.csv", idle_csv(curves, idle));
-  write_file_atomically(folder + "/strategy_map.svg", map_svg(curves, idle));
+  write_file_atomically(o.folder + "/strategy_idle.csv", idle_csv(curves, idle));
+  write_file_atomically(o.folder + "/strategy_map.svg", map_svg(curves, idle));
   const std::string summary = map_summary(curves, idle);
-  write_file_atomically(folder + "/summary.txt", summary);
+  write_file_atomically(o.folder + "/summary.txt", summary);
   fmt::print("{}", summary);
   return 0;
 }

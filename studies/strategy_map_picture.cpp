@@ -73,12 +73,17 @@ std::string grey(double share) {
   return fmt::format("#{0:02x}{0:02x}{0:02x}", level);
 }
 
-std::string text_at(double x, double y, const std::string& text, const char* anchor = "middle",
-                    int size = 11, const char* fill = "#222") {
+struct TextStyle {
+  const char* anchor = "middle";
+  int size = 11;
+  const char* fill = "#222";
+};
+
+std::string text_at(double x, double y, const std::string& text, const TextStyle& style = {}) {
   return fmt::format(
       R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}">{}</text>)"
       "\n",
-      x, y, anchor, size, fill, text);
+      x, y, style.anchor, style.size, style.fill, text);
 }
 
 std::string box_at(double x, double y, double w, double h, const std::string& fill) {
@@ -164,27 +169,27 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0:.0f} {1:.0f}" width="{0:.0f}" height="{1:.0f}" font-family="sans-serif">)"
       "\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
       width, height);
-  svg += text_at(kLeft, 20, "Sequential against simultaneous in equal time", "start", 13);
+  svg += text_at(kLeft, 20, "Sequential against simultaneous in equal time", {"start", 13});
   svg += text_at(kLeft, 36, "energy of the sequential motion over that of the joint line - 1 [%]",
-                 "start");
-  svg += text_at(second, 20, "Moving cylinders in the optimum", "start", 13);
+                 {"start"});
+  svg += text_at(second, 20, "Moving cylinders in the optimum", {"start", 13});
   svg += text_at(second, 36, "share of its moving time with two or more cylinders moving [%]",
-                 "start");
-  svg += text_at(third, 20, "Each at its own best duration", "start", 13);
-  svg += text_at(third, 36, "sequential over joint line - 1, idle energy included [%]", "start");
+                 {"start"});
+  svg += text_at(third, 20, "Each at its own best duration", {"start", 13});
+  svg += text_at(third, 36, "sequential over joint line - 1, idle energy included [%]", {"start"});
   for (std::size_t k = 0; k < n; ++k) {
     const std::string label = fmt::format("{:g}", columns()[k]);
     const double x = kCell * static_cast<double>(k);
     svg += text_at(kLeft + x, kTop - 8, label) + text_at(second + x, kTop - 8, label);
   }
-  svg += text_at(kLeft - 8, kTop - 8, "duration over the shortest:", "end");
+  svg += text_at(kLeft - 8, kTop - 8, "duration over the shortest:", {"end"});
   for (std::size_t k = 0; k < idle_powers.size(); ++k) {
     svg += text_at(third + kCell * (static_cast<double>(k) + 0.5), kTop - 8,
                    fmt::format("{:g} kW", idle_powers[k] / 1e3));
   }
   double y = kTop;
   for (const MapCurve& c : curves) {
-    svg += text_at(kLeft - 8, y + 13, row_label(c), "end");
+    svg += text_at(kLeft - 8, y + 13, row_label(c), {"end"});
     for (std::size_t k = 0; k < n && c.shortest > 0.0; ++k) {
       const double x = kCell * static_cast<double>(k);
       const MapPoint* p = point_in(c, columns()[k], columns()[k + 1]);
@@ -196,16 +201,16 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
                     : sim      ? "#f6c492"
                     : seq      ? "#9fc3e3"
                                : "#eee");
-      svg += text_at(kLeft + x + kCell / 2, y + 13,
-                     seq && sim ? fmt::format("{:+.0f}", 100.0 * share)
-                     : sim      ? "only sim"
-                     : seq      ? "only seq"
-                                : "neither",
-                     "middle", seq && sim ? 11 : 9,
-                     seq && sim && std::abs(share) > 0.2 ? "#fff" : "#222");
+      svg += text_at(
+          kLeft + x + kCell / 2, y + 13,
+          seq && sim ? fmt::format("{:+.0f}", 100.0 * share)
+          : sim      ? "only sim"
+          : seq      ? "only seq"
+                     : "neither",
+          {"middle", seq && sim ? 11 : 9, seq && sim && std::abs(share) > 0.2 ? "#fff" : "#222"});
       svg += box_at(second + x, y, kCell, kRow, grey(overlap(*p)));
       svg += text_at(second + x + kCell / 2, y + 13, fmt::format("{:.0f}", 100.0 * overlap(*p)),
-                     "middle", 11, overlap(*p) > 0.6 ? "#fff" : "#222");
+                     {"middle", 11, overlap(*p) > 0.6 ? "#fff" : "#222"});
     }
     for (std::size_t k = 0; k < idle_powers.size(); ++k) {
       const BestTime seq = best_time(c, MapWay::kSequentialMotion, idle_powers[k]),
@@ -213,8 +218,8 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
       if (seq.duration <= 0.0 || sim.duration <= 0.0) continue;
       const double share = seq.cost / sim.cost - 1.0, x = third + kCell * static_cast<double>(k);
       svg += box_at(x, y, kCell, kRow, colour(share));
-      svg += text_at(x + kCell / 2, y + 13, fmt::format("{:+.0f}", 100.0 * share), "middle", 11,
-                     std::abs(share) > 0.2 ? "#fff" : "#222");
+      svg += text_at(x + kCell / 2, y + 13, fmt::format("{:+.0f}", 100.0 * share),
+                     {"middle", 11, std::abs(share) > 0.2 ? "#fff" : "#222"});
     }
     y += kRow;
   }
@@ -222,12 +227,12 @@ std::string map_svg(const std::vector<MapCurve>& curves, const std::vector<doubl
       text_at(kLeft, y + 24,
               "Blue: the sequential motion takes less. Orange: the simultaneous motion takes less. "
               "Columns begin at the figure above their left edge.",
-              "start");
+              {"start"});
   svg +=
       text_at(kLeft, y + 42,
               "only sim: no sequential motion of this duration keeps the limits; neither: only the "
               "optimum with its overlaps does.",
-              "start");
+              {"start"});
   return svg + "</svg>\n";
 }
 

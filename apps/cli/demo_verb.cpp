@@ -20,6 +20,54 @@
 namespace sparflow::cli {
 namespace {
 
+FitResult learn(const Machine& machine, const std::vector<Log>& train,
+                const std::vector<Log>& test) {
+  Progress progress("fit");
+  return fit(machine, train, test, {},
+             [&](double share, const std::string& what) { progress(share, what); });
+}
+
+OptimizeResult optimize_from_seeds(const CraneModel& model, const MotionProblem& problem,
+                                   Seeds& seeds) {
+  OptimizeOptions options;
+  options.interrupted = interrupted;
+  Progress progress("optimize");
+  SeedOptions seed_options;
+  seed_options.count = 6;
+  seeds = make_seeds(problem, seed_options, options.intervals);
+  finish_on_interrupt();
+  options.progress = [&](int done, int all, const std::string& what) {
+    progress(static_cast<double>(done) / std::max(1, all), what);
+    return !interrupted();
+  };
+  return optimize(model, problem, seeds.motions, options);
+}
+
+/// @param rows samples of the log that was learned from
+Page demo_page(const FitResult& fitted, const MotionProblem& problem, const Seeds& seeds,
+               const OptimizeResult& result, Eigen::Index rows) {
+  Page page("Sparflow demo");
+  page.subtitle(
+      "One loader crane: pressure models identified from a log and compared with a test log, and "
+      "the "
+      "energy-optimal motion of one reach.");
+  const std::string against = against_seeds(result);
+  page.verdict(
+      Tone::kGood,
+      fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
+                  against.empty() ? "" : ": ", against),
+      fmt::format("Learned from {} rows; the energy of the test log is predicted within {:.2f} "
+                  "%. Energies are those of the exact law.",
+                  rows, 100.0 * std::abs(fitted.test->energy.front().relative_error)));
+  add_motion(page, fitted.model, problem, result, compared_motion(seeds, result));
+  add_comparison(page, fitted.model, *fitted.test, "Held-out log: ");
+  add_fit(page, fitted);
+  page.provenance("program", std::string("sparflow ") + program_version());
+  for (const DataSource& d : fitted.model.data)
+    page.provenance(d.use + " log", d.file + ", sha256 " + d.sha256.substr(0, 16));
+  return page;
+}
+
 int run(const std::string& folder) {
   const auto begin = std::chrono::steady_clock::now();
   const auto seconds = [&] {
@@ -41,11 +89,7 @@ int run(const std::string& folder) {
       load_logs({bundled_file("logs/loader_crane_test.csv")}, machine, "");
   fmt::print("1. Learn pressures from {} ({} rows, {:.0f} s of work)\n", train[0].file,
              train[0].samples(), train[0].duration());
-  const FitResult fitted = [&] {
-    Progress progress("fit");
-    return fit(machine, train, test, {},
-               [&](double share, const std::string& what) { progress(share, what); });
-  }();
+  const FitResult fitted = learn(machine, train, test);
   save_model(fitted.model, in("model.json"));
   fmt::print("   {}\n\n", fitted.brief());
 
@@ -55,51 +99,13 @@ int run(const std::string& folder) {
   const MotionProblem problem =
       load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &machine);
   fmt::print("3. Optimise a reach: {}, {} kg\n", problem.name, problem.payload);
-  OptimizeOptions options;
-  options.interrupted = interrupted;
   Seeds seeds;
-  const OptimizeResult result = [&] {
-    Progress progress("optimize");
-    SeedOptions seed_options;
-    seed_options.count = 6;
-    seeds = make_seeds(problem, seed_options, options.intervals);
-    finish_on_interrupt();
-    options.progress = [&](int done, int all, const std::string& what) {
-      progress(static_cast<double>(done) / std::max(1, all), what);
-      return !interrupted();
-    };
-    return optimize(fitted.model, problem, seeds.motions, options);
-  }();
+  const OptimizeResult result = optimize_from_seeds(fitted.model, problem, seeds);
   fmt::print("{}\n", optimize_table(fitted.model, problem, result));
   if (result.status == OptimizeStatus::kInterrupted) return kInterrupted;
   if (result.motion.size() < 2) return kNotSolved;
   write_file_atomically(in("motion.csv"), motion_csv(fitted.model, result.motion, problem.payload));
-
-  Page page("Sparflow demo");
-  page.subtitle(
-      "One loader crane: pressure models identified from a log and compared with a test log, and "
-      "the "
-      "energy-optimal motion of one reach.");
-  const std::string against = against_seeds(result);
-  page.verdict(
-      Tone::kGood,
-      fmt::format("The reach takes {:.1f} kJ{}{}.", result.energy.total / 1e3,
-                  against.empty() ? "" : ": ", against),
-      fmt::format("Learned from {} rows; the energy of the test log is predicted within {:.2f} "
-                  "%. Energies are those of the exact law.",
-                  train[0].samples(),
-                  100.0 * std::abs(fitted.test->energy.front().relative_error)));
-  const SeedMotion* straight = baseline_seed(seeds, result);
-  const Trajectory timed =
-      straight ? with_duration(straight->motion, result.duration) : Trajectory{};
-  add_motion(page, fitted.model, problem, result, straight ? &timed : nullptr,
-             straight ? straight->name : "");
-  add_comparison(page, fitted.model, *fitted.test, "Held-out log: ");
-  add_fit(page, fitted);
-  page.provenance("program", std::string("sparflow ") + program_version());
-  for (const DataSource& d : fitted.model.data)
-    page.provenance(d.use + " log", d.file + ", sha256 " + d.sha256.substr(0, 16));
-  page.write(in("index.html"));
+  demo_page(fitted, problem, seeds, result, train[0].samples()).write(in("index.html"));
   fmt::print(
       "Written to {}: index.html (open it in a browser), model.json, motion.csv; {:.1f} s in "
       "all.\n",

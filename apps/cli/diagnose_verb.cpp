@@ -27,11 +27,9 @@ std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
   for (const DiagnosedEffect& e : diagnosis.effects) {
     if (diagnosis.probable(e)) found.push_back(e.effect);
   }
-  if (files.tests.empty() || found.empty()) return std::nullopt;
-  ExtendOptions options;
-  options.references = files.references;
+  if (files.logs.tests.empty() || found.empty()) return std::nullopt;
   Progress progress("test logs");
-  return extend(files.model, found, files.logs, files.tests, options,
+  return extend(files.model, found, files.logs, {},
                 [&](double share, const std::string& what) { progress(share, what); });
 }
 
@@ -43,7 +41,7 @@ int run(const DiagnoseArguments& a) {
   options.check_data = !a.skip_data_checks;
   const Diagnosis result = [&] {
     Progress progress("diagnose");
-    return diagnose(files.model, files.logs, files.references, options,
+    return diagnose(files.model, files.logs.suspects, files.logs.references, options,
                     [&](double share, const std::string& what) { progress(share, what); });
   }();
   const std::optional<ExtendResult> tested = judge_on_tests(files, result);

@@ -15,7 +15,7 @@ namespace sparflow::cli {
 namespace {
 
 /// Checks that each log is diagnosed, a reference or a test log, and only one of these. @throws UsageError
-void refuse_shared_logs(const std::string& verb, const DiagnosisFiles& files) {
+void refuse_shared_logs(const std::string& verb, const ExtendLogs& logs) {
   const auto refuse = [&](const std::vector<Log>& some, const std::vector<Log>& others,
                           const char* one, const char* other) {
     for (const Log& a : some) {
@@ -27,9 +27,9 @@ void refuse_shared_logs(const std::string& verb, const DiagnosisFiles& files) {
       }
     }
   };
-  refuse(files.logs, files.references, "--log", "--reference");
-  refuse(files.logs, files.tests, "--log", "--test");
-  refuse(files.references, files.tests, "--reference", "--test");
+  refuse(logs.suspects, logs.references, "--log", "--reference");
+  refuse(logs.suspects, logs.tests, "--log", "--test");
+  refuse(logs.references, logs.tests, "--reference", "--test");
 }
 
 }  // namespace
@@ -41,9 +41,9 @@ void DiagnosisFiles::write_provenance(Page& page) const {
           what, fmt::format("{}, {} rows, sha256 {}", l.file, l.samples(), l.sha256.substr(0, 16)));
     }
   };
-  name("log", logs);
-  name("reference log", references);
-  name("test log", tests);
+  name("log", logs.suspects);
+  name("reference log", logs.references);
+  name("test log", logs.tests);
 }
 
 void DiagnosisInputs::add_model(CLI::App& app) {
@@ -115,22 +115,23 @@ DiagnosisFiles DiagnosisInputs::read() const {
     }
     for (const int at : everywhere->places(machine)) files.candidates.push_back({everywhere, at});
   }
-  files.logs = load_logs(logs_, machine, mapping_);
-  files.references = load_logs(references_, machine, mapping_);
-  files.tests = load_logs(tests_, machine, mapping_);
-  refuse_shared_logs(verb_, files);
+  files.logs.suspects = load_logs(logs_, machine, mapping_);
+  files.logs.references = load_logs(references_, machine, mapping_);
+  files.logs.tests = load_logs(tests_, machine, mapping_);
+  refuse_shared_logs(verb_, files.logs);
   return files;
 }
 
 void note_what_is_reference(const DiagnosisFiles& files) {
-  if (!files.references.empty()) return;
+  if (!files.logs.references.empty()) return;
   const auto seen = [&](const Log& log) {
     return std::any_of(files.model.data.begin(), files.model.data.end(), [&](const DataSource& d) {
       return d.use == "train" && d.sha256 == log.sha256;
     });
   };
-  const auto unseen = std::find_if_not(files.logs.begin(), files.logs.end(), seen);
-  if (unseen == files.logs.end()) return;
+  const std::vector<Log>& suspects = files.logs.suspects;
+  const auto unseen = std::find_if_not(suspects.begin(), suspects.end(), seen);
+  if (unseen == suspects.end()) return;
   note(
       fmt::format("{}: the model was not fitted on this log; without --reference the model serves "
                   "as reference for forces only, and pressures and flows are learned again",

@@ -13,7 +13,7 @@ namespace sparflow::cli {
 /// The contents of all input files.
 struct DiagnosisFiles {
   CraneModel model;  ///< with the user's own effects registered
-  std::vector<Log> logs, references, tests;
+  ExtendLogs logs;
   std::vector<EffectAt> candidates;  ///< empty: the whole catalogue
 
   /// Lists the logs with their hashes in the footer of a page.

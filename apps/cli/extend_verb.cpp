@@ -32,9 +32,9 @@ int run(const ExtendArguments& a) {
   const ExtendResult result = [&] {
     Progress progress("extend");
     const auto tell = [&](double share, const std::string& what) { progress(share, what); };
-    return a.remove.empty() ? extend(files.model, add, files.logs, files.tests, options, tell)
-                            : take_back(files.model, parse_effect(a.remove, machine), files.logs,
-                                        files.tests, options, tell);
+    return a.remove.empty()
+               ? extend(files.model, add, files.logs, options, tell)
+               : take_back(files.model, parse_effect(a.remove, machine), files.logs, options, tell);
   }();
   write_extended(a.inputs, result);
   return kDone;

@@ -21,7 +21,7 @@ int run(const ImproveArguments& a) {
   options.diagnose.candidates = files.candidates;
   const ExtendResult result = [&] {
     Progress progress("improve");
-    return improve(files.model, files.logs, files.references, files.tests, options,
+    return improve(files.model, files.logs, options,
                    [&](double share, const std::string& what) { progress(share, what); });
   }();
   write_extended(a.inputs, result);

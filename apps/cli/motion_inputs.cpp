@@ -68,13 +68,13 @@ Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int i
   return seeds;
 }
 
-const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result) {
+std::optional<ComparedMotion> compared_motion(const Seeds& seeds, const OptimizeResult& result) {
   const std::string& name =
       result.straight_line_name.empty() ? result.best_seed_name : result.straight_line_name;
   for (const SeedMotion& s : seeds.motions) {
-    if (s.name == name) return &s;
+    if (s.name == name) return ComparedMotion{s.name, with_duration(s.motion, result.duration)};
   }
-  return nullptr;
+  return std::nullopt;
 }
 
 }  // namespace sparflow::cli

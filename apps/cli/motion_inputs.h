@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/report/motion_pages/motion_page.h"
 #include "models/chain/crane_model.h"
 #include "models/math/error.h"
 #include "optimizer/solve/optimize.h"
@@ -36,7 +37,7 @@ struct Seeds {
 Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int intervals);
 
 /// The seed that a page draws beside the optimum: the cheapest straight joint line at this duration, or the cheapest
-/// seed where no straight line keeps the limits; null when no seed does.
-const SeedMotion* baseline_seed(const Seeds& seeds, const OptimizeResult& result);
+/// seed where no straight line keeps the limits; nothing when no seed does.
+std::optional<ComparedMotion> compared_motion(const Seeds& seeds, const OptimizeResult& result);
 
 }  // namespace sparflow::cli

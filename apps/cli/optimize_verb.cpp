@@ -117,10 +117,7 @@ int run(const OptimizeArguments& a) {
   if (!a.outputs.json.empty())
     write_file_atomically(a.outputs.json, optimize_json(model, problem, result));
   if (!a.outputs.report.empty()) {
-    const SeedMotion* line = baseline_seed(seeds, result);
-    const Trajectory timed = line ? with_duration(line->motion, result.duration) : Trajectory{};
-    motion_page(model, problem, result, line ? &timed : nullptr, line ? line->name : "")
-        .write(a.outputs.report);
+    motion_page(model, problem, result, compared_motion(seeds, result)).write(a.outputs.report);
   }
   fmt::print("{}", optimize_table(model, problem, result));
   if (result.motion.size() > 1 && !a.output.empty()) fmt::print("motion written to {}\n", a.output);

@@ -23,7 +23,7 @@ int run(const SelftestArguments& a) {
   options.candidates = files.candidates;
   const Selftest result = [&] {
     Progress progress("selftest");
-    return selftest(files.model, files.logs, files.references, options,
+    return selftest(files.model, files.logs.suspects, files.logs.references, options,
                     [&](double share, const std::string& what) { progress(share, what); });
   }();
   const Outputs& outputs = a.inputs.outputs();

@@ -80,17 +80,14 @@ void read_times(const std::string& text, StrategyOptions& options) {
   }
 }
 
-int run(const StrategiesArguments& a) {
-  const std::vector<ProblemPath> files = problem_files(a.problems);
-  std::vector<NamedFile> inputs = {{"--model", a.model}};
-  for (const ProblemPath& p : files) inputs.push_back({"--problem", p.file});
-  check_outputs_apart("strategies", a.outputs.files(), inputs);
-  a.outputs.check();
-  StrategyOptions options;
-  read_times(a.time, options);
-  options.baselines.polished_orders = a.orders;
-  options.optimize.processes = 1;
-  options.optimize.interrupted = interrupted;
+/// Idle power of a problem: that of the command line, else the problem's own. [W]
+double idle_power(const StrategiesArguments& a, const ProblemAndModel& task) {
+  return a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : task.problem.idle_power;
+}
+
+/// @throws InputError for a model without the pressures of a movement  @throws UsageError for a problem without a model
+std::vector<ProblemAndModel> load_tasks(const StrategiesArguments& a,
+                                        const std::vector<ProblemPath>& files, bool own_time) {
   std::vector<ProblemAndModel> tasks;
   tasks.reserve(files.size());
   for (const auto& [file, of_folder] : files) {
@@ -101,8 +98,7 @@ int run(const StrategiesArguments& a) {
       continue;
     }
     tasks.push_back(std::move(*task));
-    const double idle = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : tasks.back().problem.idle_power;
-    if (options.own_time && idle <= 0.0) {
+    if (own_time && idle_power(a, tasks.back()) <= 0.0) {
       warn(
           fmt::format("{}: no idle power is given, so time costs nothing and the best time of each "
                       "strategy is its shortest; give --idle KW to weigh time",
@@ -116,57 +112,81 @@ int run(const StrategiesArguments& a) {
                                    fmt::join(missing, ", ")));
     }
   }
-  finish_on_interrupt();
-  const auto work = [&](int index) {
-    const ProblemAndModel& task = tasks[static_cast<std::size_t>(index)];
-    StrategyOptions own = options;
-    own.idle_power = a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : task.problem.idle_power;
-    own.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
-    own.baselines.intervals = own.optimize.intervals;
-    own.baselines.optimize = own.optimize;
-    const Seeds seeds = make_seeds(task.problem, a.seeds, own.optimize.intervals);
-    StrategyComparison c;
-    if (seeds.motions.empty()) {
-      c.problem = task.problem.name;
-      c.file = task.problem.file;
-      c.payload = task.problem.payload;
-      c.idle_power = own.idle_power;
-      c.message = "infeasible. " + seeds.paths.message;
-    } else {
-      c = compare_strategies(task.model, task.problem, seeds.motions, own);
-    }
-    return packed(c);
-  };
+  return tasks;
+}
+
+StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
+                              StrategyOptions options) {
+  options.idle_power = idle_power(a, task);
+  options.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
+  options.baselines.intervals = options.optimize.intervals;
+  options.baselines.optimize = options.optimize;
+  const Seeds seeds = make_seeds(task.problem, a.seeds, options.optimize.intervals);
+  if (!seeds.motions.empty())
+    return compare_strategies(task.model, task.problem, seeds.motions, options);
+  StrategyComparison c;
+  c.problem = task.problem.name;
+  c.file = task.problem.file;
+  c.payload = task.problem.payload;
+  c.idle_power = options.idle_power;
+  c.message = "infeasible. " + seeds.paths.message;
+  return c;
+}
+
+/// Compares the strategies of every problem, each in a process of its own.
+std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& tasks,
+                                            const StrategiesArguments& a,
+                                            const StrategyOptions& options) {
   const int count = static_cast<int>(tasks.size());
   const int processes = a.processes > 0 ? a.processes : usable_processors();
-  std::vector<ChildResult> children;
-  {
-    Progress progress("strategies");
-    progress(0.0, fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
-    children = run_in_children(count, processes, work, [&](int index, int finished) {
-      progress(static_cast<double>(finished) / count,
-               tasks[static_cast<std::size_t>(index)].problem.name);
-    });
-  }
+  const auto work = [&](int index) {
+    return packed(compare_in(tasks[static_cast<std::size_t>(index)], a, options));
+  };
+  Progress progress("strategies");
+  progress(0.0, fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
+  const std::vector<ChildResult> children =
+      run_in_children(count, processes, work, [&](int index, int finished) {
+        progress(static_cast<double>(finished) / count,
+                 tasks[static_cast<std::size_t>(index)].problem.name);
+      });
   std::vector<StrategyComparison> all;
-  std::vector<Machine> machines;
-  int solved = 0;
+  all.reserve(children.size());
   for (std::size_t i = 0; i < children.size(); ++i) {
-    StrategyComparison c;
     if (children[i].ok) {
-      c = unpacked_comparison(children[i].bytes);
-    } else {
-      c.problem = tasks[i].problem.name;
-      c.file = tasks[i].problem.file;
-      c.message = children[i].error;
+      all.push_back(unpacked_comparison(children[i].bytes));
+      continue;
     }
-    const bool any = std::any_of(c.rows.begin(), c.rows.end(), [](const StrategyRow& row) {
-      return row.find(kOptimal) != nullptr && row.find(kOptimal)->found();
-    });
-    solved += any ? 1 : 0;
-    all.push_back(std::move(c));
-    machines.push_back(tasks[i].model.machine);
+    all.emplace_back();
+    all.back().problem = tasks[i].problem.name;
+    all.back().file = tasks[i].problem.file;
+    all.back().message = children[i].error;
   }
+  return all;
+}
+
+bool has_optimum(const StrategyComparison& c) {
+  return std::any_of(c.rows.begin(), c.rows.end(), [](const StrategyRow& row) {
+    return row.find(kOptimal) != nullptr && row.find(kOptimal)->found();
+  });
+}
+
+int run(const StrategiesArguments& a) {
+  const std::vector<ProblemPath> files = problem_files(a.problems);
+  std::vector<NamedFile> inputs = {{"--model", a.model}};
+  for (const ProblemPath& p : files) inputs.push_back({"--problem", p.file});
+  check_outputs_apart("strategies", a.outputs.files(), inputs);
+  a.outputs.check();
+  StrategyOptions options;
+  read_times(a.time, options);
+  options.baselines.polished_orders = a.orders;
+  options.optimize.processes = 1;
+  options.optimize.interrupted = interrupted;
+  const std::vector<ProblemAndModel> tasks = load_tasks(a, files, options.own_time);
+  finish_on_interrupt();
+  const std::vector<StrategyComparison> all = compare_all(tasks, a, options);
+  std::vector<Machine> machines;
+  machines.reserve(tasks.size());
+  for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
   if (!a.outputs.json.empty())
     write_file_atomically(a.outputs.json, strategies_json(all, machines));
   if (!a.outputs.report.empty()) {
@@ -177,7 +197,7 @@ int run(const StrategiesArguments& a) {
   }
   fmt::print("{}", strategies_table(all));
   if (interrupted()) return kInterrupted;
-  return solved > 0 ? kDone : kNotSolved;
+  return std::any_of(all.begin(), all.end(), has_optimum) ? kDone : kNotSolved;
 }
 
 }  // namespace

@@ -29,11 +29,11 @@ EffectDesign design_of(const Evidence& evidence, const AppliedEffect& found,
 
 /// By rival: gain of the found effect over it on this evidence if the found effect is the true one. [nats]
 std::vector<double> separations(const Evidence& evidence, const EffectFit& fit,
-                                const AppliedEffect& found, const std::vector<EffectAt>& rivals,
-                                const PowerOptions& options) {
+                                const IndistinguishableSet& set, const PowerOptions& options) {
+  const std::vector<EffectAt>& rivals = set.rivals;
   std::vector<double> nats(rivals.size(), 0.0);
   Eigen::VectorXd theta;
-  const EffectDesign design = design_of(evidence, found, theta);
+  const EffectDesign design = design_of(evidence, set.found, theta);
   if (!design.acts()) return nats;
   const PowerStudy study(evidence, fit, kSeed, options);
   const Signature truth = signature(study.project(design), theta);
@@ -66,8 +66,8 @@ EffectFit noise_of(Evidence& motion, const Evidence& evidence, const EffectFit& 
 }  // namespace
 
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
-                           const ExperimentOptions& options) {
+                           const IndistinguishableSet& set, const ExperimentOptions& options) {
+  const std::vector<EffectAt>& rivals = set.rivals;
   BetterMotion best;
   if (rivals.empty()) return best;
   double heaviest = 0.0, minutes = 0.0;
@@ -99,10 +99,9 @@ BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, co
       continue;  // the motion has poses that the machine cannot take
     }
     const EffectFit noise = noise_of(motion, evidence, fit);
-    if (!motion.channels.empty())
-      nats[m] = separations(motion, noise, found, rivals, options.power);
+    if (!motion.channels.empty()) nats[m] = separations(motion, noise, set, options.power);
   }
-  std::vector<double> here = separations(evidence, fit, found, rivals, options.power);
+  std::vector<double> here = separations(evidence, fit, set, options.power);
   for (double& h : here) h /= std::max(minutes, 1e-3);
   const auto worth = [&](std::size_t m, std::size_t r) {
     return nats[m][r] >= options.least_nats_per_minute &&
@@ -143,14 +142,14 @@ std::string Experiment::sentence() const {
 }
 
 Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
-                           const ExperimentOptions& options) {
+                           const IndistinguishableSet& set, const ExperimentOptions& options) {
+  const AppliedEffect& found = set.found;
   const auto name = [&](const Effect& effect, int at) {
     return effect_key(effect.info(), model.machine, at);
   };
-  const BetterMotion motion = better_motion(model, evidence, fit, found, rivals, options);
+  const BetterMotion motion = better_motion(model, evidence, fit, set, options);
   std::vector<std::string> apart;
-  for (const EffectAt& e : motion.words.empty() ? rivals : motion.apart)
+  for (const EffectAt& e : motion.words.empty() ? set.rivals : motion.apart)
     apart.push_back(name(*e.effect, e.at));
   const std::string reason = fmt::format("distinguishes {} from {}", name(*found.effect, found.at),
                                          fmt::join(apart, ", "));

@@ -46,11 +46,15 @@ struct BetterMotion {
       apart;  ///< rivals that it distinguishes from the effect: all, or those that any motion does
 };
 
+/// Effects between which the evidence cannot decide.
+struct IndistinguishableSet {
+  AppliedEffect found;           ///< with its values
+  std::vector<EffectAt> rivals;  ///< effects that explain the evidence as well
+};
+
 /// @param fit with the noise models of the evidence's channels; quantities not measured there are left out
-/// @param found effect with its values  @param rivals effects that explain the evidence as well
 BetterMotion better_motion(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
-                           const ExperimentOptions& options = {});
+                           const IndistinguishableSet& set, const ExperimentOptions& options = {});
 
 /// What to record next to decide between the effects of an indistinguishable set.
 struct Experiment {
@@ -68,7 +72,6 @@ struct Experiment {
 /// What to record next to distinguish a found effect from its rivals; where no motion of the list does, the catalogue's
 /// general advice for the effect.
 Experiment next_experiment(const CraneModel& model, const Evidence& evidence, const EffectFit& fit,
-                           const AppliedEffect& found, const std::vector<EffectAt>& rivals,
-                           const ExperimentOptions& options = {});
+                           const IndistinguishableSet& set, const ExperimentOptions& options = {});
 
 }  // namespace sparflow

@@ -92,6 +92,171 @@ std::vector<MotionLeg> up_and_down(const std::vector<int>& joints,
   return legs;
 }
 
+/// What is driven, before the machine answers.
+struct DrivenMotion {
+  Eigen::MatrixXd q;  ///< [samples x joints]
+  VectorXd payload;   ///< [samples] [kg]
+};
+
+/// How long a leg takes by the limits of its joints, valves and pumps. [s]
+/// @param here, goal joint positions at its ends
+double leg_seconds(const CraneModel& model, const MotionLeg& leg, const VectorXd& here,
+                   const VectorXd& goal, const MotionOptions& options) {
+  const Machine& m = model.machine;
+  double seconds = 0.0;
+  for (const int j : leg.joints) {
+    const auto at = static_cast<std::size_t>(j);
+    const double mean = leg.speed * fastest(model, j, leg.joints.size(), options);
+    const double way = std::abs(goal[j] - here[j]);
+    const double brake =
+        std::min(std::abs(m.joints[at].acceleration.lo), std::abs(m.joints[at].acceleration.hi));
+    seconds = std::max(seconds, way / std::max(mean, 1e-9));
+    if (brake > 0.0) seconds = std::max(seconds, std::sqrt(way * kHalfCosinePeak / brake));
+  }
+  return seconds;
+}
+
+/// The recipe's legs in turn from the middle of all ranges. @param step [s]  @param n samples
+DrivenMotion drive(const CraneModel& model, const MotionRecipe& recipe, double step, Index n,
+                   const MotionOptions& options) {
+  const Machine& m = model.machine;
+  const auto joints = static_cast<Index>(m.joint_count());
+  DrivenMotion out{Eigen::MatrixXd(n, joints), VectorXd(n)};
+  VectorXd here(joints), goal(joints);
+  for (Index j = 0; j < joints; ++j) here[j] = middle(m.joints[static_cast<std::size_t>(j)], 0.5);
+  Index k = 0;
+  const auto pause = [&](double seconds, double load) {
+    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
+      out.q.row(k) = here;
+      out.payload[k] = load;
+    }
+  };
+  pause(0.5, recipe.legs.front().payload);
+  for (std::size_t turn = 0; k < n; ++turn) {
+    const MotionLeg& leg = recipe.legs[turn % recipe.legs.size()];
+    goal = here;
+    for (const int j : leg.joints) goal[j] = middle(m.joints[static_cast<std::size_t>(j)], leg.to);
+    const double seconds =
+        std::max(kFewestSamplesOfALeg * step, leg_seconds(model, leg, here, goal, options));
+    const double rise =
+        std::clamp(options.ramp / seconds, options.shortest_ramp, options.longest_ramp);
+    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
+      out.q.row(k) = here + progress(t / seconds, recipe.steps, rise) * (goal - here);
+      out.payload[k] = leg.payload;
+    }
+    here = goal;
+    pause(leg.pause, leg.payload);
+  }
+  return out;
+}
+
+/// Static answer of the machine to a motion. [samples x cylinders]
+struct StaticAnswer {
+  Eigen::MatrixXd length;  ///< [m] pin to pin
+  Eigen::MatrixXd force;   ///< [N]
+};
+
+StaticAnswer static_answer(const Machine& m, const DrivenMotion& driven) {
+  const Index n = driven.q.rows();
+  StaticAnswer out{Eigen::MatrixXd(n, m.cylinder_count()), Eigen::MatrixXd(n, m.cylinder_count())};
+  StaticForce statics(m);
+  VectorXd pose(m.joint_count());
+  for (Index i = 0; i < n; ++i) {
+    pose = driven.q.row(i);
+    statics.update(pose.data(), driven.payload[i], 0);
+    out.force.row(i) = statics.force();
+    for (int c = 0; c < m.cylinder_count(); ++c) out.length(i, c) = statics.length(c).value;
+  }
+  return out;
+}
+
+/// Speed of a cylinder from its lengths, by central differences inside and one-sided ones at the ends. [m/s]
+VectorXd speed_of(const Eigen::MatrixXd& length, Index cylinder, double step) {
+  const Index n = length.rows();
+  VectorXd v(n);
+  for (Index i = 0; i < n; ++i) {
+    const Index before = std::max<Index>(0, i - 1), after = std::min<Index>(n - 1, i + 1);
+    v[i] = (length(after, cylinder) - length(before, cylinder)) /
+           (step * static_cast<double>(std::max<Index>(1, after - before)));
+  }
+  return v;
+}
+
+/// Pressures in the filled and in the emptied chamber. [Pa]
+struct ChamberPressures {
+  double supply = 0.0, back = 0.0;
+};
+
+/// @param force of the cylinder [N]  @param v its speed [m/s]
+ChamberPressures chamber_pressures(const Cylinder& cylinder, double force, double v,
+                                   const MotionOptions& options) {
+  const bool extends = v >= 0.0;
+  const double a = cylinder.area_piston(), b = cylinder.area_rod();
+  const double supply_area = extends ? a : b, return_area = extends ? b : a;
+  const double back_flow = return_area * std::abs(v);
+  // the return line sets the return pressure unless a valve must hold an overrunning load
+  ChamberPressures p;
+  p.back = options.return_pressure + options.return_loss * back_flow * back_flow;
+  const double load = extends ? force : -force;  // against the motion
+  p.supply = (load + p.back * return_area) / supply_area;
+  if (p.supply < options.least_supply) {
+    p.supply = options.least_supply;
+    p.back = (p.supply * supply_area - load) / return_area;
+  }
+  return p;
+}
+
+void add_channel(Log& log, Role role, int index, const std::string& signal,
+                 const VectorXd& values) {
+  Channel c;
+  c.column = c.signal = signal;
+  c.role = role;
+  c.index = index;
+  c.values = values;
+  c.valid = values.array().isFinite();
+  log.channels.push_back(std::move(c));
+}
+
+/// The log of a motion as its channels are added, with the largest demand on each pump so far.
+struct MotionLog {
+  Log log;
+  Eigen::MatrixXd demand;  ///< [samples x pumps] [Pa]
+};
+
+/// Adds command and chamber pressures of a cylinder, or its force where it has no chambers.
+void add_cylinder(const CraneModel& model, int index, const StaticAnswer& answer,
+                  const MotionOptions& options, MotionLog& out) {
+  const Machine& m = model.machine;
+  const Cylinder& cylinder = m.cylinders[static_cast<std::size_t>(index)];
+  const VectorXd v = speed_of(answer.length, index, out.log.step);
+  const Index n = v.size();
+  VectorXd u = VectorXd::Zero(n), pa(n), pb(n);
+  for (Index i = 0; i < n; ++i) {
+    const bool extends = v[i] >= 0.0, moves = std::abs(v[i]) > kMoving;
+    const double side = extends ? 1.0 : -1.0;
+    if (!cylinder.hydraulic()) {
+      u[i] = moves ? side : 0.0;
+      continue;
+    }
+    const double flow = (extends ? cylinder.area_piston() : cylinder.area_rod()) * std::abs(v[i]);
+    if (moves) u[i] = side * flow / full_flow(model, index, extends, options);
+    const ChamberPressures p = chamber_pressures(cylinder, answer.force(i, index), v[i], options);
+    pa[i] = extends ? p.supply : p.back;
+    pb[i] = extends ? p.back : p.supply;
+    const int pump = m.pump_of_cylinder(index);
+    if (moves && pump >= 0)
+      out.demand(i, pump) = pump_pressure(
+          out.demand(i, pump), p.supply + model.cylinders[static_cast<std::size_t>(index)].margin);
+  }
+  add_channel(out.log, Role::kCommand, index, "u_" + cylinder.name, u);
+  if (cylinder.hydraulic()) {
+    add_channel(out.log, Role::kPressureA, index, "pA_" + cylinder.name, pa);
+    add_channel(out.log, Role::kPressureB, index, "pB_" + cylinder.name, pb);
+  } else {
+    add_channel(out.log, Role::kForce, index, "force_" + cylinder.name, answer.force.col(index));
+  }
+}
+
 }  // namespace
 
 std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest,
@@ -168,125 +333,33 @@ std::vector<MotionRecipe> motion_menu(const Machine& machine, double heaviest,
 Log synthesise_motion(const CraneModel& model, const MotionRecipe& recipe, double step,
                       double duration, const MotionOptions& options) {
   const Machine& m = model.machine;
-  const auto joints = static_cast<Index>(m.joint_count());
-  const auto cylinders = static_cast<std::size_t>(m.cylinder_count());
   const auto n = static_cast<Index>(duration / step);
-  Log log;
+  MotionLog out;
+  Log& log = out.log;
   log.path = log.file = "motion";
   log.sha256 = std::string(64, '0');
   log.step = step;
   log.time = VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
   log.runs = {{0, n}};
-
-  Eigen::MatrixXd q(n, joints);
-  VectorXd payload(n), here(joints), goal(joints);
-  for (Index j = 0; j < joints; ++j) here[j] = middle(m.joints[static_cast<std::size_t>(j)], 0.5);
-  const VectorXd start = here;
-  const auto pause = [&](Index& k, double seconds, double load) {
-    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
-      q.row(k) = here;
-      payload[k] = load;
-    }
-  };
-  Index k = 0;
-  pause(k, 0.5, recipe.legs.front().payload);
-  for (std::size_t turn = 0; k < n; ++turn) {
-    const MotionLeg& leg = recipe.legs[turn % recipe.legs.size()];
-    goal = here;
-    double seconds = kFewestSamplesOfALeg * step;
-    for (const int j : leg.joints) {
-      const auto at = static_cast<std::size_t>(j);
-      goal[j] = middle(m.joints[at], leg.to);
-      const double mean = leg.speed * fastest(model, j, leg.joints.size(), options);
-      const double way = std::abs(goal[j] - here[j]);
-      const double brake =
-          std::min(std::abs(m.joints[at].acceleration.lo), std::abs(m.joints[at].acceleration.hi));
-      seconds = std::max(seconds, way / std::max(mean, 1e-9));
-      if (brake > 0.0) seconds = std::max(seconds, std::sqrt(way * kHalfCosinePeak / brake));
-    }
-    const double rise =
-        std::clamp(options.ramp / seconds, options.shortest_ramp, options.longest_ramp);
-    for (double t = 0.0; t < seconds && k < n; t += step, ++k) {
-      q.row(k) = here + progress(t / seconds, recipe.steps, rise) * (goal - here);
-      payload[k] = leg.payload;
-    }
-    here = goal;
-    pause(k, leg.pause, leg.payload);
+  const DrivenMotion driven = drive(model, recipe, step, n, options);
+  const StaticAnswer answer = static_answer(m, driven);
+  for (int j = 0; j < m.joint_count(); ++j) {
+    add_channel(log, Role::kJointPosition, j, "q_" + m.joints[static_cast<std::size_t>(j)].name,
+                driven.q.col(j));
   }
-
-  const auto add = [&](Role role, int index, const std::string& signal, const VectorXd& values) {
-    Channel c;
-    c.column = c.signal = signal;
-    c.role = role;
-    c.index = index;
-    c.values = values;
-    c.valid = values.array().isFinite();
-    log.channels.push_back(std::move(c));
-  };
-  for (Index j = 0; j < joints; ++j) {
-    add(Role::kJointPosition, static_cast<int>(j),
-        "q_" + m.joints[static_cast<std::size_t>(j)].name, q.col(j));
-  }
-  Eigen::MatrixXd length(n, m.cylinder_count()), force(n, m.cylinder_count());
-  StaticForce statics(m);
-  VectorXd pose(joints);
-  for (Index i = 0; i < n; ++i) {
-    pose = q.row(i);
-    statics.update(pose.data(), payload[i], 0);
-    force.row(i) = statics.force();
-    for (int c = 0; c < m.cylinder_count(); ++c) length(i, c) = statics.length(c).value;
-  }
-  Eigen::MatrixXd asked = Eigen::MatrixXd::Zero(n, m.pump_count());
+  out.demand.resize(n, m.pump_count());
   for (int p = 0; p < m.pump_count(); ++p)
-    asked.col(p).setConstant(model.pumps[static_cast<std::size_t>(p)].standby);
-  for (std::size_t c = 0; c < cylinders; ++c) {
-    const Cylinder& cylinder = m.cylinders[c];
-    const auto at = static_cast<Index>(c);
-    VectorXd u = VectorXd::Zero(n), pa(n), pb(n);
-    for (Index i = 0; i < n; ++i) {
-      const Index before = std::max<Index>(0, i - 1), after = std::min<Index>(n - 1, i + 1);
-      const double v = (length(after, at) - length(before, at)) /
-                       (step * static_cast<double>(std::max<Index>(1, after - before)));
-      const bool extends = v >= 0.0, moves = std::abs(v) > kMoving;
-      if (!cylinder.hydraulic()) {
-        u[i] = moves ? (extends ? 1.0 : -1.0) : 0.0;
-        continue;
-      }
-      const double a = cylinder.area_piston(), b = cylinder.area_rod();
-      const double supply_area = extends ? a : b, return_area = extends ? b : a;
-      const double flow = supply_area * std::abs(v), back = return_area * std::abs(v);
-      if (moves)
-        u[i] =
-            (extends ? 1.0 : -1.0) * flow / full_flow(model, static_cast<int>(c), extends, options);
-      // the return line sets the return pressure unless a valve must hold an overrunning load
-      double p_return = options.return_pressure + options.return_loss * back * back;
-      const double load = extends ? force(i, at) : -force(i, at);  // against the motion
-      double p_supply = (load + p_return * return_area) / supply_area;
-      if (p_supply < options.least_supply) {
-        p_supply = options.least_supply;
-        p_return = (p_supply * supply_area - load) / return_area;
-      }
-      pa[i] = extends ? p_supply : p_return;
-      pb[i] = extends ? p_return : p_supply;
-      const int pump = m.pump_of_cylinder(static_cast<int>(c));
-      if (moves && pump >= 0)
-        asked(i, pump) = pump_pressure(asked(i, pump), p_supply + model.cylinders[c].margin);
-    }
-    add(Role::kCommand, static_cast<int>(c), "u_" + cylinder.name, u);
-    if (cylinder.hydraulic()) {
-      add(Role::kPressureA, static_cast<int>(c), "pA_" + cylinder.name, pa);
-      add(Role::kPressureB, static_cast<int>(c), "pB_" + cylinder.name, pb);
-    } else {
-      add(Role::kForce, static_cast<int>(c), "force_" + cylinder.name, force.col(at));
-    }
+    out.demand.col(p).setConstant(model.pumps[static_cast<std::size_t>(p)].standby);
+  for (int c = 0; c < m.cylinder_count(); ++c) add_cylinder(model, c, answer, options, out);
+  for (int p = 0; p < m.pump_count(); ++p) {
+    add_channel(log, Role::kPumpPressure, p, "p_" + m.pumps[static_cast<std::size_t>(p)].name,
+                out.demand.col(p));
   }
-  for (int p = 0; p < m.pump_count(); ++p)
-    add(Role::kPumpPressure, p, "p_" + m.pumps[static_cast<std::size_t>(p)].name, asked.col(p));
-  add(Role::kPayload, -1, "payload", payload);
-  add(Role::kOilTemperature, -1, "oil",
-      recipe.warms_up ? VectorXd(VectorXd::LinSpaced(n, options.cold_oil, options.hot_oil))
-                      : VectorXd(VectorXd::Constant(n, options.oil)));
-  return log;
+  add_channel(log, Role::kPayload, -1, "payload", driven.payload);
+  add_channel(log, Role::kOilTemperature, -1, "oil",
+              recipe.warms_up ? VectorXd(VectorXd::LinSpaced(n, options.cold_oil, options.hot_oil))
+                              : VectorXd(VectorXd::Constant(n, options.oil)));
+  return std::move(out.log);
 }
 
 }  // namespace sparflow

@@ -15,11 +15,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-ModelStep record_of(const ExtendStep& step, const RefitContext& context, const std::string& date) {
+ModelStep record_of(const ExtendStep& step, const RefitContext& context) {
   ModelStep record;
   record.added = step.added;
   record.removed = step.removed;
-  record.date = date;
+  record.date = context.options().date;
   record.data = context.data();
   const AppliedEffect& e = step.effect;
   for (std::size_t p = 0; step.removed.empty() && p < e.values.size(); ++p) {
@@ -46,40 +46,41 @@ std::string place_name(const Machine& machine, const EffectAt& e) {
   return "";
 }
 
-void set_errors(const RefitContext& context, const Machine& machine, const EffectAt& e,
-                const CompareResult& before, const CompareResult& after, ExtendStep& step) {
+/// A step with the model that it leads to, which the caller may keep or not.
+struct TriedStep {
+  ExtendStep step;
+  Judged next;
+  std::vector<std::string> notes;  ///< of the estimate
+};
+
+/// Compares the errors before and after an effect is added or removed.
+void judge_step(const RefitContext& context, const EffectAt& e, const Judged& current,
+                TriedStep& tried) {
+  const Machine& machine = current.model.machine;
+  ExtendStep& step = tried.step;
   step.stage = effect_stage_name(e.effect->info().stage);
-  step.before = before;
-  step.after = after;
+  step.before = current.error;
+  step.after = tried.next.error;
   step.judged_on = context.judged_on();
-  step.change = error_change(machine, before, after, {{step.stage}, place_name(machine, e)},
-                             context.options().change);
+  step.change = error_change(machine, step.before, step.after,
+                             {{step.stage}, place_name(machine, e)}, context.options().change);
 }
 
-/// Adds one effect to `current`. @return the step and the model with it, which the caller may keep or not
-std::pair<ExtendStep, Judged> one_step(const RefitContext& context, const Judged& current,
-                                       const EffectAt& add, Others others,
-                                       std::vector<std::string>& notes,
-                                       const SearchProgress& progress) {
+/// Adds one effect to `current`.
+TriedStep try_adding(const RefitContext& context, const Judged& current, const EffectAt& add,
+                     Others others, const SearchProgress& progress) {
   const Machine& machine = current.model.machine;
   const EffectInfo& info = add.effect->info();
   std::vector<EffectAt> effects = places_of(current.model.effects);
   effects.push_back(add);
-  Judged next = context.with(current, effects, others, progress, &notes);
-  ExtendStep step;
-  step.added = effect_key(info, machine, add.at);
-  step.title = effect_title(info, machine, add.at);
-  step.effect = next.model.effects.back();
-  step.others_kept = others == Others::kKept;
-  set_errors(context, machine, add, current.error, next.error, step);
-  return {std::move(step), std::move(next)};
-}
-
-void keep(ExtendStep step, Judged next, const RefitContext& context, const std::string& date,
-          Judged& current, ExtendResult& result) {
-  next.model.steps.push_back(record_of(step, context, date));
-  current = std::move(next);
-  result.steps.push_back(std::move(step));
+  TriedStep tried;
+  tried.next = context.with(current, effects, others, progress, &tried.notes);
+  tried.step.added = effect_key(info, machine, add.at);
+  tried.step.title = effect_title(info, machine, add.at);
+  tried.step.effect = tried.next.model.effects.back();
+  tried.step.others_kept = others == Others::kKept;
+  judge_step(context, add, current, tried);
+  return tried;
 }
 
 void add_notes(std::vector<std::string> notes, ExtendResult& result) {
@@ -87,6 +88,13 @@ void add_notes(std::vector<std::string> notes, ExtendResult& result) {
     if (std::find(result.notes.begin(), result.notes.end(), n) == result.notes.end())
       result.notes.push_back(std::move(n));
   }
+}
+
+void keep(TriedStep tried, const RefitContext& context, Judged& current, ExtendResult& result) {
+  tried.next.model.steps.push_back(record_of(tried.step, context));
+  current = std::move(tried.next);
+  result.steps.push_back(std::move(tried.step));
+  add_notes(std::move(tried.notes), result);
 }
 
 void finish(Judged current, Clock::time_point start, ExtendResult& result) {
@@ -132,6 +140,27 @@ bool is_determined(const AppliedEffect& e) {
     proportional = true;
   }
   return !proportional;
+}
+
+/// Adds one effect; if the error rises, once more with the effects of the model as they are.
+TriedStep try_beside_others(const RefitContext& context, const Judged& current, const EffectAt& add,
+                            const SearchProgress& progress) {
+  const ExtendOptions& options = context.options();
+  TriedStep tried = try_adding(context, current, add, Others::kEstimatedAnew, progress);
+  if (tried.step.change.worse(options.change) && !current.model.effects.empty())
+    tried = try_adding(context, current, add, Others::kKept, progress);
+  tried.step.same_as = blurred_by_last(current.model, tried.next.model, options.blurred);
+  tried.step.determined = is_determined(tried.step.effect);
+  return tried;
+}
+
+bool worth_keeping(const ExtendStep& step, const ErrorChangeOptions& options) {
+  return !step.change.worse(options) && step.same_as.empty() && step.determined;
+}
+
+/// Whether a step that is not kept fails for the sake of other places alone.
+bool helps_here_and_harms_elsewhere(const ExtendStep& step, const ErrorChangeOptions& options) {
+  return step.change.own < options.largest_own && step.same_as.empty() && step.determined;
 }
 
 /// Why a step is not kept, as part of a sentence about it.
@@ -225,7 +254,7 @@ bool shapes_opening(const AppliedEffect& e) {
   return opening != small;
 }
 
-/// Appends each effect that was not kept in the end, and why, to `stopped_because`.
+/// Makes `stopped_because` of the reason, with each effect that was not kept in the end, and why.
 void name_rejected(const ErrorChangeOptions& options, ExtendResult& result) {
   std::erase_if(result.rejected, [&](const ExtendStep& r) {
     return std::any_of(result.steps.begin(), result.steps.end(),
@@ -242,6 +271,7 @@ void name_rejected(const ErrorChangeOptions& options, ExtendResult& result) {
     }
   }
   result.rejected = std::move(once);
+  result.stopped_because = result.reason;
   for (const ExtendStep& r : result.rejected)
     result.stopped_because +=
         fmt::format("; {} was tried and not kept: {}", r.title, against(r, options));
@@ -279,8 +309,8 @@ std::string effect_title(const EffectInfo& info, const Machine& machine, int at)
 }
 
 ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
-                    const std::vector<Log>& logs, const std::vector<Log>& tests,
-                    const ExtendOptions& options, const SearchProgress& progress) {
+                    const ExtendLogs& logs, const ExtendOptions& options,
+                    const SearchProgress& progress) {
   const auto start = Clock::now();
   std::vector<EffectAt> all = places_of(model.effects);
   for (const EffectAt& e : add) {
@@ -290,7 +320,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
     }
     all.push_back(e);
   }
-  const RefitContext context(model, logs, options.references, tests, options);
+  const RefitContext context(model, logs, options);
   const double parts = static_cast<double>(add.size()) + 1.0;
   const auto part = [&](std::size_t i) {
     return [&progress, i, parts](double share, const std::string& what) {
@@ -300,24 +330,20 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
   ExtendResult result;
   Judged current = context.as_it_is(model, result.notes, part(0));
   for (std::size_t i = 0; i < add.size(); ++i) {
-    std::vector<std::string> notes;
-    auto [step, next] =
-        one_step(context, current, add[i], Others::kEstimatedAnew, notes, part(i + 1));
-    add_notes(std::move(notes), result);
-    if (step.change.worse(options.change)) {
-      result.notes.push_back(
-          fmt::format("{} is in the model as asked, but the data contradict it: {}", step.title,
-                      against(step, options.change)));
+    TriedStep tried = try_adding(context, current, add[i], Others::kEstimatedAnew, part(i + 1));
+    if (tried.step.change.worse(options.change)) {
+      tried.notes.push_back(
+          fmt::format("{} is in the model as asked, but the data contradict it: {}",
+                      tried.step.title, against(tried.step, options.change)));
     }
-    keep(std::move(step), std::move(next), context, options.date, current, result);
+    keep(std::move(tried), context, current, result);
   }
-  result.stopped_because = "all effects asked for were added";
+  result.stopped_because = result.reason = "all effects asked for were added";
   finish(std::move(current), start, result);
   return result;
 }
 
-ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
-                       const std::vector<Log>& logs, const std::vector<Log>& tests,
+ExtendResult take_back(const CraneModel& model, const EffectAt& effect, const ExtendLogs& logs,
                        const ExtendOptions& options, const SearchProgress& progress) {
   const auto start = Clock::now();
   const std::string key = effect_key(effect.effect->info(), model.machine, effect.at);
@@ -332,36 +358,34 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
                      has.empty() ? "the model has no effects to remove"
                                  : "the model does not have this effect; it has " + has);
   }
-  const AppliedEffect was = model.effects[static_cast<std::size_t>(at - rest.begin())];
+  TriedStep tried;
+  tried.step.effect = model.effects[static_cast<std::size_t>(at - rest.begin())];
   rest.erase(at);
-  const RefitContext context(model, logs, options.references, tests, options);
+  const RefitContext context(model, logs, options);
   const auto part = [&](double first) {
     return [&progress, first](double share, const std::string& what) {
       if (progress) progress(first + 0.5 * share, what);
     };
   };
   ExtendResult result;
-  const Judged current = context.as_it_is(model, result.notes, part(0.0));
-  std::vector<std::string> notes;
-  Judged next = context.with(current, rest, Others::kEstimatedAnew, part(0.5), &notes);
-  add_notes(std::move(notes), result);
-  ExtendStep step;
-  step.removed = key;
-  step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " removed";
-  step.effect = was;
-  set_errors(context, model.machine, effect, current.error, next.error, step);
-  Judged kept = current;
-  keep(std::move(step), std::move(next), context, options.date, kept, result);
-  result.stopped_because = "the effect was removed as asked";
-  finish(std::move(kept), start, result);
+  Judged current = context.as_it_is(model, result.notes, part(0.0));
+  tried.next = context.with(current, rest, Others::kEstimatedAnew, part(0.5), &tried.notes);
+  tried.step.removed = key;
+  tried.step.title = effect_title(effect.effect->info(), model.machine, effect.at) + " removed";
+  judge_step(context, effect, current, tried);
+  keep(std::move(tried), context, current, result);
+  result.stopped_because = result.reason = "the effect was removed as asked";
+  finish(std::move(current), start, result);
   return result;
 }
 
-ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
-                     const std::vector<Log>& references, const std::vector<Log>& tests,
-                     const ExtendOptions& options, const SearchProgress& progress) {
+ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const ExtendOptions& options,
+                     const SearchProgress& progress) {
   const auto start = Clock::now();
-  const RefitContext context(model, logs, references, tests, options);
+  const RefitContext context(model, logs, options);
+  // the machine stays while effects come, so what is seen of the logs and their faults serves every diagnosis
+  const DiagnosisSignals signals =
+      diagnosis_signals(model.machine, logs.suspects, logs.references, options.diagnose);
   // the number of rounds is unknown, so each advances by a share of the remaining progress
   double done = 0.0;
   const auto round = [&](double width) {
@@ -374,56 +398,45 @@ ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
   done = 0.05;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };
   std::vector<EffectAt> aside;  // effects not kept since the last step that was kept
-  std::size_t tried = 0;
+  std::size_t rejected = 0;
   DiagnoseOptions diagnose_options = options.diagnose;
-  while (result.stopped_because.empty()) {
+  while (result.reason.empty()) {
     diagnose_options.candidates = choices(options, current.model, aside);
     if (diagnose_options.candidates.empty()) {  // an empty list would mean the whole catalogue
-      result.stopped_because = "no other effect is left to try";
+      result.reason = "no other effect is left to try";
       break;
     }
     const std::shared_ptr<const Diagnosis> diagnosis = std::make_shared<const Diagnosis>(
-        diagnose(current.model, logs, references, diagnose_options, round(0.4)));
+        diagnose_signals(current.model, signals, diagnose_options, round(0.4)));
     done += (1.0 - done) * 0.4;
     result.last = diagnosis;
     const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
-    if (wanted.empty()) result.stopped_because = why_stopped(*diagnosis);
+    if (wanted.empty()) result.reason = why_stopped(*diagnosis);
     for (const DiagnosedEffect* e : wanted) {
       if (!steps_left()) {
-        result.stopped_because =
+        result.reason =
             fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
                         effect_title(e->effect.effect->info(), model.machine, e->effect.at));
         break;
       }
-      std::vector<std::string> notes;
-      auto [step, next] =
-          one_step(context, current, e->effect, Others::kEstimatedAnew, notes, round(0.15));
-      if (step.change.worse(options.change) && !current.model.effects.empty()) {
-        notes.clear();
-        std::tie(step, next) =
-            one_step(context, current, e->effect, Others::kKept, notes, round(0.15));
-      }
+      TriedStep tried = try_beside_others(context, current, e->effect, round(0.15));
       done += (1.0 - done) * 0.2;
-      step.diagnosis = diagnosis;
-      step.same_as = blurred_by_last(current.model, next.model, options.blurred);
-      step.determined = is_determined(step.effect);
-      if (step.change.worse(options.change) || !step.same_as.empty() || !step.determined) {
+      tried.step.diagnosis = diagnosis;
+      if (!worth_keeping(tried.step, options.change)) {
         aside.push_back(e->effect);
-        // it helps where it acts but harms elsewhere: its rivals would do the same and are set aside, too
-        if (step.change.own < options.change.largest_own && step.same_as.empty() && step.determined)
-          add_indistinguishable(*diagnosis, e->effect, aside);
-        ++tried;
-        result.rejected.push_back(std::move(step));
+        if (helps_here_and_harms_elsewhere(tried.step, options.change))
+          add_indistinguishable(*diagnosis, e->effect, aside);  // they would do the same
+        ++rejected;
+        result.rejected.push_back(std::move(tried.step));
         continue;
       }
       aside.clear();
-      if (!e->rivals.empty()) notes.push_back(stands_for(*e));
-      add_notes(std::move(notes), result);
-      keep(std::move(step), std::move(next), context, options.date, current, result);
+      if (!e->rivals.empty()) tried.notes.push_back(stands_for(*e));
+      keep(std::move(tried), context, current, result);
       if (shapes_opening(current.model.effects.back())) break;
     }
-    if (tried > options.most_rejected && result.stopped_because.empty())
-      result.stopped_because = "the effects found do not improve data that took no part";
+    if (rejected > options.most_rejected && result.reason.empty())
+      result.reason = "the effects found do not improve data that took no part";
   }
   name_rejected(options.change, result);
   finish(std::move(current), start, result);

@@ -33,7 +33,8 @@ struct ExtendResult {
   std::vector<ExtendStep> steps;
   std::vector<ExtendStep>
       rejected;  ///< steps tried by `improve` and not kept, because held-out errors rose
-  std::string stopped_because;            ///< a phrase
+  std::string stopped_because;            ///< a phrase, with the effects tried and not kept
+  std::string reason;                     ///< the same without these effects
   std::shared_ptr<const Diagnosis> last;  ///< the diagnosis after the last step; `improve` only
   std::vector<std::string> notes;         ///< whole sentences
   double seconds = 0.0;
@@ -43,13 +44,21 @@ struct ExtendResult {
   std::string json() const;   ///< keys of the contract and more
 };
 
+/// The logs by which a model is extended, by what they are for.
+struct ExtendLogs {
+  /// With the effects: effects' parameters and everything learned come from them. What they do not show stays as it was
+  /// learned before.
+  std::vector<Log> suspects;
+  /// Of the same machine without the effects: what the model has learned then stays as it is, and only the parameters of
+  /// effects are estimated. May be empty.
+  std::vector<Log> references = {};
+  std::vector<Log> tests = {};  ///< test logs; without any, motions are held out of `suspects`
+};
+
 struct ExtendOptions {
   FitOptions fit;             ///< its `effects` are not used
   DiagnoseOptions diagnose;   ///< used by `improve` only
   ErrorChangeOptions change;  ///< whether a step is kept
-  /// Logs of the same machine without the effects: what the model has learned then stays as it is, and only the
-  /// parameters of effects are estimated. `improve` ignores this and has a parameter of its own.
-  std::vector<Log> references;
   /// Largest number of steps that `improve` keeps.
   /// @threshold [steps] 0..; chosen: as many effects as a diagnosis may find
   /// (SearchOptions::max_effects).
@@ -67,13 +76,10 @@ struct ExtendOptions {
 };
 
 /// @param add effects in the order they are added, one step each; none that the model has already
-/// @param logs with the effects: effects' parameters and everything learned come from them. What they do not show stays
-///        as it was learned before.
-/// @param tests test logs; without any, motions are held out of `logs`
 /// @throws InputError for an effect that the model has already, and for one that acts on no channel of the logs
 ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
-                    const std::vector<Log>& logs, const std::vector<Log>& tests,
-                    const ExtendOptions& options = {}, const SearchProgress& progress = {});
+                    const ExtendLogs& logs, const ExtendOptions& options = {},
+                    const SearchProgress& progress = {});
 
 /// Adds the effects that `diagnose` names and diagnoses again, until it names none, data is bad, or `max_steps` are
 /// done; `stopped_because` says which. Of several effects the one that reduces an error by the largest factor comes
@@ -81,14 +87,11 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
 /// (error_change.h), and when the interval of the effect, estimated with the others, excludes zero. If the error rises, it
 /// is tried once more with the other effects unchanged, because in a joint estimate they may reduce an error of one place
 /// at the cost of another. Effects not kept are excluded until another step is kept.
-/// @param references as in ExtendOptions
-ExtendResult improve(const CraneModel& model, const std::vector<Log>& logs,
-                     const std::vector<Log>& references, const std::vector<Log>& tests,
+ExtendResult improve(const CraneModel& model, const ExtendLogs& logs,
                      const ExtendOptions& options = {}, const SearchProgress& progress = {});
 
 /// Removes an effect and learns the rest again. @throws InputError when the model does not have it
-ExtendResult take_back(const CraneModel& model, const EffectAt& effect,
-                       const std::vector<Log>& logs, const std::vector<Log>& tests,
+ExtendResult take_back(const CraneModel& model, const EffectAt& effect, const ExtendLogs& logs,
                        const ExtendOptions& options = {}, const SearchProgress& progress = {});
 
 /// "Coulomb friction, boom"

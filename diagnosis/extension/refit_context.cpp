@@ -43,21 +43,16 @@ std::vector<EffectAt> places_of(const std::vector<AppliedEffect>& effects) {
   return out;
 }
 
-RefitContext::RefitContext(const CraneModel& model, const std::vector<Log>& logs,
-                           const std::vector<Log>& references, const std::vector<Log>& tests,
+RefitContext::RefitContext(const CraneModel& model, const ExtendLogs& logs,
                            const ExtendOptions& options)
-    : machine_(model.machine),
-      logs_(logs),
-      reference_logs_(references),
-      tests_(tests),
-      options_(options) {
-  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
+    : machine_(model.machine), logs_(logs), options_(options) {
+  if (logs.suspects.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
   const SignalOptions& how = options.fit.signals;
-  signals_ = signals_of(machine_, logs, how);
-  references_ = signals_of(machine_, references, how);
-  if (!references.empty()) in_references_ = effects_in_references(model, references_);
-  test_signals_ = signals_of(machine_, tests, how);
-  if (!tests.empty()) {
+  signals_ = signals_of(machine_, logs.suspects, how);
+  references_ = signals_of(machine_, logs.references, how);
+  if (!logs.references.empty()) in_references_ = effects_in_references(model, references_);
+  test_signals_ = signals_of(machine_, logs.tests, how);
+  if (!logs.tests.empty()) {
     judged_on_ = "test logs";
     return;
   }
@@ -70,7 +65,7 @@ RefitContext::RefitContext(const CraneModel& model, const std::vector<Log>& logs
 Judged RefitContext::as_it_is(const CraneModel& model, std::vector<std::string>& notes,
                               const SearchProgress& progress) const {
   if (!references_.empty()) return as_references_say(model, notes, progress);
-  const bool knows = std::all_of(logs_.begin(), logs_.end(),
+  const bool knows = std::all_of(logs_.suspects.begin(), logs_.suspects.end(),
                                  [&](const Log& log) { return learned_from(model, log); });
   if (held_.empty() && knows) return {model, judge(model), model.effects};
   if (!knows) {
@@ -87,15 +82,15 @@ Judged RefitContext::as_references_say(const CraneModel& model, std::vector<std:
                                        const SearchProgress& progress) const {
   const auto knows = [&](const Log& log) { return learned_from(model, log); };
   Judged out{model, {}, model.effects};
-  if (!std::all_of(reference_logs_.begin(), reference_logs_.end(), knows) ||
-      std::any_of(logs_.begin(), logs_.end(), knows)) {
+  if (!std::all_of(logs_.references.begin(), logs_.references.end(), knows) ||
+      std::any_of(logs_.suspects.begin(), logs_.suspects.end(), knows)) {
     notes.push_back(
         "the model was not learned from the reference logs alone: pressures, margins and gains are "
         "learned from them first");
     FitOptions fit_options = options_.fit;
     fit_options.effects = model.effects;
     fit_options.hold_out_every = 0;
-    out.model = fit(machine_, reference_logs_, {}, fit_options, progress).model;
+    out.model = fit(machine_, logs_.references, {}, fit_options, progress).model;
     out.model.steps = model.steps;
     keep_what_was_learned(model, out.model);
   }
@@ -104,17 +99,15 @@ Judged RefitContext::as_references_say(const CraneModel& model, std::vector<std:
   return out;
 }
 
-EffectEstimate RefitContext::estimate(const CraneModel& model,
-                                      const std::vector<AppliedEffect>& known,
-                                      const std::vector<EffectAt>& effects, Others others,
-                                      const std::vector<Mask>& leave_out,
+EffectEstimate RefitContext::estimate(const Judged& from, const std::vector<EffectAt>& effects,
+                                      Others others, Samples samples,
                                       const SearchProgress& progress) const {
   const auto in = [](const auto& list, const auto& e) {
     return std::any_of(list.begin(), list.end(),
                        [&](const auto& o) { return o.effect == e.effect && o.at == e.at; });
   };
-  CraneModel base = model;
-  base.effects = known;
+  CraneModel base = from.model;
+  if (samples == Samples::kNotHeldOut) base.effects = from.effects_held_out;
   // effects of the model that are not in `effects` are removed
   std::erase_if(base.effects, [&](const AppliedEffect& k) { return !in(effects, k); });
   std::vector<AppliedEffect> in_references = in_references_;
@@ -124,6 +117,7 @@ EffectEstimate RefitContext::estimate(const CraneModel& model,
   std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
   EstimateOptions how;
   how.evidence = options_.diagnose.evidence;
+  const std::vector<Mask> leave_out = samples == Samples::kAll ? std::vector<Mask>{} : held_;
   EffectEstimate estimate = estimate_effects(
       base, wanted, {signals_, references_, leave_out, std::move(in_references)}, progress, how);
   std::vector<AppliedEffect> all;
@@ -148,13 +142,11 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
       if (progress) progress(first + width * share, what);
     };
   };
-  EffectEstimate all =
-      estimate(from.model, from.model.effects, effects, others, {}, part(0.0, 0.4));
+  EffectEstimate all = estimate(from, effects, others, Samples::kAll, part(0.0, 0.4));
   Judged out;
-  out.effects_held_out = held_.empty() ? all.effects
-                                       : estimate(from.model, from.effects_held_out, effects,
-                                                  others, held_, part(0.4, 0.2))
-                                             .effects;
+  out.effects_held_out =
+      held_.empty() ? all.effects
+                    : estimate(from, effects, others, Samples::kNotHeldOut, part(0.4, 0.2)).effects;
   if (notes != nullptr) *notes = all.notes;
   if (!references_.empty()) {
     out.model = from.model;
@@ -175,7 +167,7 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
   } else {
     fit_options.effects_held_out = out.effects_held_out;
   }
-  FitResult fitted = fit(machine_, logs_, tests_, fit_options, part(0.6, 0.4));
+  FitResult fitted = fit(machine_, logs_.suspects, logs_.tests, fit_options, part(0.6, 0.4));
   out.model = std::move(fitted.model);
   out.model.steps = from.model.steps;
   keep_what_was_learned(from.model, out.model);
@@ -185,8 +177,8 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
 
 std::vector<DataSource> RefitContext::data() const {
   std::vector<DataSource> out;
-  for (const Log& l : logs_) out.push_back({l.file, l.sha256, l.samples(), "train"});
-  for (const Log& l : tests_) out.push_back({l.file, l.sha256, l.samples(), "test"});
+  for (const Log& l : logs_.suspects) out.push_back({l.file, l.sha256, l.samples(), "train"});
+  for (const Log& l : logs_.tests) out.push_back({l.file, l.sha256, l.samples(), "test"});
   return out;
 }
 
@@ -198,7 +190,8 @@ CompareOptions RefitContext::compare_options() const {
 }
 
 CompareResult RefitContext::judge(const CraneModel& model) const {
-  return compare_signals(model, tests_.empty() ? signals_ : test_signals_, {}, compare_options());
+  return compare_signals(model, logs_.tests.empty() ? signals_ : test_signals_, {},
+                         compare_options());
 }
 
 }  // namespace sparflow

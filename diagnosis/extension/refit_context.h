@@ -23,12 +23,14 @@ struct Judged {
 /// What happens to a model's effects when another is added.
 enum class Others { kEstimatedAnew, kKept };
 
+/// The samples that an estimate is made from.
+enum class Samples { kAll, kNotHeldOut };
+
 class RefitContext {
  public:
-  /// @param references when empty, everything is learned again for each model, else only the effects' parameters are
-  RefitContext(const CraneModel& model, const std::vector<Log>& logs,
-               const std::vector<Log>& references, const std::vector<Log>& tests,
-               const ExtendOptions& options);
+  /// Without references everything is learned again for each model, with them only the effects' parameters are.
+  /// @param model, logs, options must outlive this
+  RefitContext(const CraneModel& model, const ExtendLogs& logs, const ExtendOptions& options);
 
   const std::string& judged_on() const { return judged_on_; }
   const ExtendOptions& options() const { return options_; }
@@ -51,18 +53,15 @@ class RefitContext {
   std::vector<DataSource> data() const;
 
  private:
-  EffectEstimate estimate(const CraneModel& model, const std::vector<AppliedEffect>& known,
-                          const std::vector<EffectAt>& effects, Others others,
-                          const std::vector<Mask>& leave_out, const SearchProgress& progress) const;
+  EffectEstimate estimate(const Judged& from, const std::vector<EffectAt>& effects, Others others,
+                          Samples samples, const SearchProgress& progress) const;
   Judged as_references_say(const CraneModel& model, std::vector<std::string>& notes,
                            const SearchProgress& progress) const;
   CompareOptions compare_options() const;
   CompareResult judge(const CraneModel& model) const;
 
   const Machine& machine_;
-  const std::vector<Log>& logs_;
-  const std::vector<Log>& reference_logs_;
-  const std::vector<Log>& tests_;
+  const ExtendLogs& logs_;
   const ExtendOptions& options_;
   std::vector<MachineSignals> signals_, references_, test_signals_;
   std::vector<AppliedEffect>

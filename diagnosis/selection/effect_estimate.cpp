@@ -153,7 +153,7 @@ class Estimator {
     how.whole_motions = how.whole_motions || sharp_;
     Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, how);
     // a lag keeps the valve openings of the dead band known before, also while both are estimated
-    for (MachineSeries& s : evidence.series) set_openings(known_, s);
+    for (MachineSeries& s : evidence.series) s = with_openings(known_, std::move(s));
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
     return evidence;

@@ -103,35 +103,99 @@ std::vector<std::vector<std::string>> sets_of(const std::vector<InjectedEffect>&
   return out;
 }
 
-/// For each set, the motion that distinguishes one of its effects at the typical size from the others.
-std::vector<Experiment> motions_for(const CraneModel& model, const Evidence& evidence,
-                                    const EffectFit& fit,
-                                    const std::vector<InjectedEffect>& effects,
-                                    const std::vector<std::vector<std::string>>& sets,
-                                    const SelftestOptions& options) {
+/// One of the effects of a set at its typical size, and the others as its rivals.
+IndistinguishableSet as_set(const std::vector<std::string>& keys,
+                            const std::vector<InjectedEffect>& effects) {
   const auto named = [&](const std::string& key) {
     return std::find_if(effects.begin(), effects.end(),
                         [&](const InjectedEffect& e) { return e.key() == key; });
   };
-  std::vector<Experiment> out;
-  for (std::size_t k = 0; k < std::min(kSetsWithMotion, sets.size()); ++k) {
-    // the effect that has all others as rivals, which need not hold for every member
-    const auto whole = std::find_if(sets[k].begin(), sets[k].end(), [&](const std::string& key) {
-      return named(key)->confused_with.size() + 1 == sets[k].size();
-    });
-    const InjectedEffect& first = *named(whole != sets[k].end() ? *whole : sets[k].front());
-    AppliedEffect typical{first.effect.effect, first.effect.at, {}, {}, {}};
-    for (std::size_t p = 0; p < first.typical.size(); ++p)
-      typical.values.push_back(first.typical[p].value *
+  // the effect that has all others as rivals, which need not hold for every member
+  const auto whole = std::find_if(keys.begin(), keys.end(), [&](const std::string& key) {
+    return named(key)->confused_with.size() + 1 == keys.size();
+  });
+  const InjectedEffect& first = *named(whole != keys.end() ? *whole : keys.front());
+  IndistinguishableSet set{{first.effect.effect, first.effect.at, {}, {}, {}}, {}};
+  for (std::size_t p = 0; p < first.typical.size(); ++p)
+    set.found.values.push_back(first.typical[p].value *
                                first.effect.effect->info().parameters[p].si);
-    std::vector<EffectAt> rivals;
-    for (const std::string& key : sets[k]) {
-      if (key != first.key()) rivals.push_back(named(key)->effect);
-    }
-    out.push_back(next_experiment(model, evidence, fit, typical, rivals, options.experiment));
-    out.back().decisive_nats = options.search.same_nats;
+  for (const std::string& key : keys) {
+    if (key != first.key()) set.rivals.push_back(named(key)->effect);
   }
-  return out;
+  return set;
+}
+
+/// The evidence of the logs; their number and length enter `out`.
+SelftestEvidence evidence_of(const CraneModel& model, const std::vector<Log>& logs,
+                             const std::vector<Log>& references, const SelftestOptions& options,
+                             Selftest& out) {
+  std::vector<MachineSignals> suspects, pinned;
+  for (const Log& log : logs) {
+    suspects.push_back(make_signals(model.machine, log, options.signals));
+    out.samples += static_cast<double>(log.samples());
+    out.duration += log.time.size() > 0 ? log.time[log.time.size() - 1] - log.time[0] : 0.0;
+  }
+  for (const Log& log : references)
+    pinned.push_back(make_signals(model.machine, log, options.signals));
+  out.logs = logs.size();
+  out.references = references.size();
+  SelftestEvidence seen;
+  seen.evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
+  if (!references.empty())
+    seen.alone = collect_evidence(model, suspects, {}, nullptr, options.evidence);
+  seen.fit = fit_effects(seen.evidence, {});
+  return seen;
+}
+
+/// A sentence for each channel whose residual is so large that something is probably missing already.
+void note_large_residuals(const SelftestEvidence& logs, const SelftestOptions& options,
+                          std::vector<std::string>& notes) {
+  for (std::size_t c = 0; c < logs.evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = logs.evidence.channels[c];
+    const double ratio = logs.fit.noise[c].deviation() / channel.noise_floor;
+    if (!(ratio > options.suspicious_noise)) continue;
+    notes.push_back(fmt::format(
+        "{}: the residual is {:.0f} times the noise floor and counts as noise here; `diagnose` may "
+        "find its cause, and more effects can then be named",
+        channel.text, ratio));
+  }
+}
+
+/// The effects to be tested: those asked for, else the catalogue without the effects of the model.
+std::vector<EffectAt> effects_to_inject(const CraneModel& model, const SelftestOptions& options) {
+  if (!options.candidates.empty()) return options.candidates;
+  std::vector<EffectAt> wanted;
+  for (const EffectAt& c : candidates(model.machine)) {
+    const bool known =
+        std::any_of(model.effects.begin(), model.effects.end(),
+                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
+    if (!known) wanted.push_back(c);
+  }
+  return wanted;
+}
+
+NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
+                                      const SelftestEvidence& logs, const SearchOptions& search) {
+  std::vector<NullCandidate> null_candidates;
+  null_candidates.reserve(all.size());
+  for (const SearchCandidate& c : all)
+    null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
+  std::mt19937_64 random(search.seed);
+  return simulate_null_distribution(logs.evidence, null_candidates, {}, logs.fit,
+                                    search.simulations, random, search.regression);
+}
+
+/// Sorts effects into the order of `wanted`.
+void sort_as(const std::vector<EffectAt>& wanted, std::vector<InjectedEffect>& effects) {
+  const auto place = [&](const InjectedEffect& e) {
+    return std::find_if(wanted.begin(), wanted.end(),
+                        [&](const EffectAt& w) {
+                          return w.effect == e.effect.effect && w.at == e.effect.at;
+                        }) -
+           wanted.begin();
+  };
+  std::sort(effects.begin(), effects.end(),
+            [&](const auto& a, const auto& b) { return place(a) < place(b); });
 }
 
 }  // namespace
@@ -146,92 +210,49 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   };
   Selftest out;
   report(0.02, "collecting the evidence");
-  std::vector<MachineSignals> suspects, pinned;
-  for (const Log& log : logs) {
-    suspects.push_back(make_signals(model.machine, log, options.signals));
-    out.samples += static_cast<double>(log.samples());
-    out.duration += log.time.size() > 0 ? log.time[log.time.size() - 1] - log.time[0] : 0.0;
-  }
-  for (const Log& log : references)
-    pinned.push_back(make_signals(model.machine, log, options.signals));
-  out.logs = logs.size();
-  out.references = references.size();
   out.false_alarm = options.search.false_alarm;
-  const Evidence evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
-  const Evidence alone = references.empty()
-                             ? Evidence{}
-                             : collect_evidence(model, suspects, {}, nullptr, options.evidence);
-  out.notes = evidence.notes;
-
-  std::vector<EffectAt> wanted = options.candidates;
-  if (wanted.empty()) {
-    for (const EffectAt& c : candidates(model.machine)) {
-      const bool known =
-          std::any_of(model.effects.begin(), model.effects.end(),
-                      [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
-      if (!known) wanted.push_back(c);
-    }
-  }
-  FitControl control;
-  const EffectFit fit = fit_effects(evidence, {}, nullptr, control);
-  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
-    const EvidenceChannel& channel = evidence.channels[c];
-    const double ratio = fit.noise[c].deviation() / channel.noise_floor;
-    if (!(ratio > options.suspicious_noise)) continue;
-    out.notes.push_back(fmt::format(
-        "{}: the residual is {:.0f} times the noise floor and counts as noise here; `diagnose` may "
-        "find its cause, and more effects can then be named",
-        channel.text, ratio));
-  }
+  const SelftestEvidence seen = evidence_of(model, logs, references, options, out);
+  out.notes = seen.evidence.notes;
+  note_large_residuals(seen, options, out.notes);
   report(0.1, "signatures of the effects");
-  std::vector<SearchCandidate> all = search_candidates(evidence, wanted);
+  const std::vector<EffectAt> wanted = effects_to_inject(model, options);
+  std::vector<SearchCandidate> all = search_candidates(seen.evidence, wanted);
   for (const EffectAt& w : wanted) {
     const bool acts = std::any_of(all.begin(), all.end(), [&](const SearchCandidate& c) {
       return c.effect.effect == w.effect && c.effect.at == w.at;
     });
-    if (!acts) out.effects.push_back(without_action(evidence, model.machine, w));
+    if (!acts) out.effects.push_back(without_action(seen.evidence, model.machine, w));
   }
   report(0.3, "null distribution of the largest gain");
-  std::vector<NullCandidate> null_candidates;
-  null_candidates.reserve(all.size());
-  for (const SearchCandidate& c : all)
-    null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
-  std::mt19937_64 random(options.search.seed);
-  const NullDistribution null =
-      simulate_null_distribution(evidence, null_candidates, {}, fit, options.search.simulations,
-                                 random, options.search.regression);
+  const NullDistribution null = null_distribution_of(all, seen, options.search);
   out.threshold = null.threshold(options.search.false_alarm);
   report(0.5, "power and rivals");
-  SelftestStudy study(model, evidence, references.empty() ? nullptr : &alone, fit, std::move(all),
-                      null, options);
-  const std::vector<InjectedEffect> seen = study.run();
+  SelftestStudy study(model.machine, seen, std::move(all), null, options);
+  const std::vector<InjectedEffect> tested = study.run();
 
-  const std::vector<std::size_t> drawn = draw_checks(seen, options);
+  const std::vector<std::size_t> drawn = draw_checks(tested, options);
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const std::size_t i = drawn[k];
     report(0.6 + 0.35 * static_cast<double>(k) / static_cast<double>(drawn.size()),
-           "injecting " + seen[i].key());
-    const SearchCandidate& c = study.candidate(i);
+           "injecting " + tested[i].key());
     InjectionCheck check =
-        inject_and_search(evidence, fit, c.designs[study.size(i).typical], study.size(i).theta,
-                          wanted, options, options.search.seed + static_cast<unsigned>(k));
-    check.power = seen[i].power;
-    check.predicted = seen[i].visibility == Visibility::kSeen;
+        inject_and_search(seen.evidence, seen.fit,
+                          {study.candidate(i).designs[study.size(i).typical], study.size(i).theta,
+                           options.search.seed + static_cast<unsigned>(k)},
+                          wanted, options);
+    check.power = tested[i].power;
+    check.predicted = tested[i].visibility == Visibility::kSeen;
     out.checks.push_back(std::move(check));
   }
-  out.sets = sets_of(seen);
+  out.sets = sets_of(tested);
   report(0.97, "motions that would distinguish the effects");
-  out.experiments = motions_for(model, evidence, fit, seen, out.sets, options);
-  out.effects.insert(out.effects.end(), seen.begin(), seen.end());
-  const auto place = [&](const InjectedEffect& e) {
-    return std::find_if(wanted.begin(), wanted.end(),
-                        [&](const EffectAt& w) {
-                          return w.effect == e.effect.effect && w.at == e.effect.at;
-                        }) -
-           wanted.begin();
-  };
-  std::sort(out.effects.begin(), out.effects.end(),
-            [&](const auto& a, const auto& b) { return place(a) < place(b); });
+  for (std::size_t k = 0; k < std::min(kSetsWithMotion, out.sets.size()); ++k) {
+    out.experiments.push_back(next_experiment(model, seen.evidence, seen.fit,
+                                              as_set(out.sets[k], tested), options.experiment));
+    out.experiments.back().decisive_nats = options.search.same_nats;
+  }
+  out.effects.insert(out.effects.end(), tested.begin(), tested.end());
+  sort_as(wanted, out.effects);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   report(1.0, "done");
   return out;

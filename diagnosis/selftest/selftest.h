@@ -143,11 +143,18 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
                   const std::vector<Log>& references = {}, const SelftestOptions& options = {},
                   const SearchProgress& progress = {});
 
-/// One injection: in the channels where the design acts, y is a random draw from the noise models of `fit` plus the
-/// design's action at `theta` [SI]; the search then runs over all candidates.
+/// An effect that is added to simulated noise.
+struct Injection {
+  const EffectDesign& design;
+  Eigen::VectorXd theta;  ///< [SI] its linear parameters
+  unsigned seed = 0;      ///< of the noise draw
+};
+
+/// In the channels where the design acts, y is a random draw from the noise models of `fit` plus the design's action; the
+/// search then runs over all candidates.
 InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
-                                 const EffectDesign& design, const Eigen::VectorXd& theta,
+                                 const Injection& injection,
                                  const std::vector<EffectAt>& candidates,
-                                 const SelftestOptions& options, unsigned seed);
+                                 const SelftestOptions& options);
 
 }  // namespace sparflow

@@ -6,18 +6,19 @@
 namespace sparflow {
 
 InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
-                                 const EffectDesign& design, const Eigen::VectorXd& theta,
+                                 const Injection& injection,
                                  const std::vector<EffectAt>& candidates,
-                                 const SelftestOptions& options, unsigned seed) {
+                                 const SelftestOptions& options) {
+  const EffectDesign& design = injection.design;
   const Machine& machine = *evidence.series[0].machine;
-  std::mt19937_64 random(seed);
+  std::mt19937_64 random(injection.seed);
   Evidence injected = evidence;
   injected.channels.clear();
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     if (!design.touches(c)) continue;
     EvidenceChannel channel = evidence.channels[c];
     channel.y = draw_noise(fit.noise[c], channel.blocks, channel.rows(), random) +
-                design.columns[c] * theta;
+                design.columns[c] * injection.theta;
     injected.channels.push_back(std::move(channel));
   }
   SearchOptions few = options.search;

@@ -61,19 +61,18 @@ bool behind_learned_law(EffectStage stage) {
   return stage == EffectStage::kPressure || stage == EffectStage::kPump;
 }
 
-SelftestStudy::SelftestStudy(const CraneModel& model, const Evidence& evidence,
-                             const Evidence* alone, const EffectFit& fit,
+SelftestStudy::SelftestStudy(const Machine& machine, const SelftestEvidence& logs,
                              std::vector<SearchCandidate> candidates, NullDistribution null,
                              const SelftestOptions& options)
-    : machine_(model.machine),
-      evidence_(evidence),
-      alone_(alone),
-      fit_(fit),
+    : machine_(machine),
+      evidence_(logs.evidence),
+      alone_(logs.alone),
+      fit_(logs.fit),
       options_(options),
       search_(options.search),
       null_(std::move(null)),
       threshold_(std::max(null_.threshold(options.search.false_alarm), options.search.least_gain)),
-      power_(evidence, fit, options.search.seed, options.experiment.power),
+      power_(evidence_, fit_, options.search.seed, options.experiment.power),
       candidates_(std::move(candidates)),
       sizes_(candidates_.size()),
       projected_(candidates_.size()),
@@ -173,7 +172,7 @@ void SelftestStudy::see(std::size_t i) {
       effect_action(evidence_, {&design}, 0, noise_only(fit_, s.theta), search_.regression);
   out.size = action.size;
   out.absorbed = out.absorbed_alone = action.absorbed;
-  if (alone_ != nullptr) out.absorbed_alone = absorbed_alone(c, s);
+  if (alone_) out.absorbed_alone = absorbed_alone(c, s);
   const Signature typical = typical_signature(i);
   out.gain = power_.gain(typical);
   if (behind_learned_law(info.stage) && out.absorbed > search_.largest_absorbed) {

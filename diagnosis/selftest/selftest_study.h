@@ -1,5 +1,6 @@
 #pragma once
 /// Power and confusion of every candidate on the user's own motions. Used by selftest.cpp only.
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,15 +14,20 @@ namespace sparflow {
 /// Whether effects of a stage are tested for their absorbed share: pressure models and margins are learned there.
 bool behind_learned_law(EffectStage stage);
 
+/// What the logs say before an effect is injected.
+struct SelftestEvidence {
+  Evidence evidence;
+  std::optional<Evidence> alone;  ///< the same without references; absent when there are none
+  EffectFit fit;                  ///< without effects, with the channels' noise models
+};
+
 class SelftestStudy {
  public:
-  /// @param alone the same evidence without references; null when there are none
-  /// @param fit without effects, with the channels' noise models
   /// @param null distribution of the largest gain of these candidates, in their order
-  /// All references and pointers must outlive this.
-  SelftestStudy(const CraneModel& model, const Evidence& evidence, const Evidence* alone,
-                const EffectFit& fit, std::vector<SearchCandidate> candidates,
-                NullDistribution null, const SelftestOptions& options);
+  /// All references must outlive this.
+  SelftestStudy(const Machine& machine, const SelftestEvidence& logs,
+                std::vector<SearchCandidate> candidates, NullDistribution null,
+                const SelftestOptions& options);
 
   std::vector<InjectedEffect> run();
   const EffectSize& size(std::size_t i) const { return sizes_[i]; }
@@ -40,7 +46,7 @@ class SelftestStudy {
 
   const Machine& machine_;
   const Evidence& evidence_;
-  const Evidence* alone_;
+  const std::optional<Evidence>& alone_;
   const EffectFit& fit_;
   const SelftestOptions& options_;
   const SearchOptions& search_;

@@ -76,16 +76,15 @@ bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& b
   return false;
 }
 
-/// Removes the channels whose jumps known physics explains.
-void keep_sensor_faults(const Diagnosis& d, const std::vector<std::size_t>& log_of,
-                        std::vector<BadChannel>& bad) {
+/// The faulty channels whose jumps known physics does not explain.
+std::vector<BadChannel> sensor_faults(const Diagnosis& d, const std::vector<LogFault>& faults) {
+  std::vector<BadChannel> out;
+  if (faults.empty()) return out;
   const EffectFit fit = fit_without(d, d.search.found.size());
-  std::vector<BadChannel> kept;
-  kept.reserve(bad.size());
-  for (std::size_t i = 0; i < bad.size(); ++i) {
-    if (!follows_steps(d, fit, bad[i], log_of[i])) kept.push_back(std::move(bad[i]));
+  for (const LogFault& f : faults) {
+    if (!follows_steps(d, fit, f.channel, f.log)) out.push_back(f.channel);
   }
-  bad = std::move(kept);
+  return out;
 }
 
 /// Drops minor effects when other effects remain; their error becomes `unexplained`.
@@ -117,8 +116,7 @@ void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
 }
 
 /// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets.
-void set_joint_estimates(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                         const std::vector<MachineSignals>& references,
+void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signals,
                          const EvidenceOptions& evidence, std::vector<FoundEffect>& found) {
   std::vector<EffectAt> wanted;
   wanted.reserve(found.size());
@@ -126,8 +124,9 @@ void set_joint_estimates(const CraneModel& model, const std::vector<MachineSigna
   EstimateOptions options;
   options.evidence = evidence;
   const EffectEstimate all = estimate_effects(
-      model, wanted, {suspects, references, {}, effects_in_references(model, references)}, {},
-      options);
+      model, wanted,
+      {signals.suspects, signals.references, {}, effects_in_references(model, signals.references)},
+      {}, options);
   for (std::size_t i = 0; i < found.size(); ++i) {
     found[i].values = all.effects[i].values;
     found[i].lower95 = all.effects[i].lower95;
@@ -144,49 +143,35 @@ std::vector<EffectAt> rivals_of(const FoundEffect& found, const SearchOptions& o
   return rivals;
 }
 
-}  // namespace
-
-const char* verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kMissing:
-      return "missing";
-    case Verdict::kNone:
-      return "none";
-    case Verdict::kUnknown:
-      return "unknown";
-    case Verdict::kBadData:
-      return "bad_data";
+/// The catalogue on the model's machine without the effects that the model has.
+std::vector<EffectAt> effects_not_in(const CraneModel& model) {
+  std::vector<EffectAt> out;
+  for (const EffectAt& c : candidates(model.machine)) {
+    const bool known =
+        std::any_of(model.effects.begin(), model.effects.end(),
+                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
+    if (!known) out.push_back(c);
   }
-  return "";
+  return out;
 }
 
-Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                           const std::vector<MachineSignals>& references,
-                           const DiagnoseOptions& options, const SearchProgress& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  Diagnosis d;
-  d.thresholds = options.verdict;
-  if (progress) progress(0.02, "collecting the evidence");
-  const std::vector<AppliedEffect> in_references = effects_in_references(model, references);
-  d.evidence = collect_evidence(model, suspects, references, &in_references, options.evidence);
-  d.notes = d.evidence.notes;
-  std::vector<EffectAt> candidates_here = options.candidates;
-  if (candidates_here.empty()) {
-    for (const EffectAt& c : candidates(model.machine)) {
-      const bool known =
-          std::any_of(model.effects.begin(), model.effects.end(),
-                      [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
-      if (!known) candidates_here.push_back(c);
-    }
-  }
-  d.search = search_effects(d.evidence, candidates_here, options.search, progress);
+/// Searches for the effects that explain the evidence.
+void search(const CraneModel& model, const DiagnoseOptions& options, const SearchProgress& progress,
+            Diagnosis& d) {
+  d.search = search_effects(d.evidence,
+                            options.candidates.empty() ? effects_not_in(model) : options.candidates,
+                            options.search, progress);
   if (d.search.updated_evidence) d.evidence = *d.search.updated_evidence;
   d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
   d.p_value = d.search.p_value;
   for (const auto& [effect, gain] : d.search.ranking) {
     d.ranking.emplace_back(effect_key(effect.effect->info(), model.machine, effect.at), gain);
   }
-  if (progress) progress(0.92, "searching for unmodelled structure in the residual");
+}
+
+/// Finds the structure that the effects leave in the residual and tells the worst of it.
+/// @return the structure above the share from which it counts
+std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, Diagnosis& d) {
   const std::vector<ResidualStructure> left = find_residual_structure(
       d.evidence, fit_with_other_powers(d, options.search.regression), options.residual);
   std::vector<ResidualStructure> unmodelled;
@@ -209,11 +194,11 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
     d.unexplained = describe_isolated_event(d, options.isolated_event);
-  drop_minor_effects(d, options.search);
-  if (!d.search.found.empty())
-    set_joint_estimates(model, suspects, references, options.evidence, d.search.found);
-  for (std::size_t i = 0; i < d.search.found.size(); ++i)
-    d.effects.push_back(describe_effect(d, i, options.search));
+  return unmodelled;
+}
+
+/// Decides between missing, none and unknown from the effects and the unmodelled structure.
+void set_verdict(const std::vector<ResidualStructure>& unmodelled, Diagnosis& d) {
   // One effect without unmodelled structure at its place is enough for a verdict of a missing effect.
   const bool unknown =
       (!unmodelled.empty() || !d.effects.empty()) &&
@@ -226,6 +211,11 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
               : !d.effects.empty() ? Verdict::kMissing
               : d.unexplained      ? Verdict::kUnknown
                                    : Verdict::kNone;
+}
+
+/// For each indistinguishable set the motion that would distinguish its effects.
+void design_experiments(const CraneModel& model, const DiagnoseOptions& options,
+                        const SearchProgress& progress, Diagnosis& d) {
   for (std::size_t i = 0; i < d.effects.size(); ++i) {
     const DiagnosedEffect& e = d.effects[i];
     if (e.rivals.empty()) continue;
@@ -233,11 +223,34 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     std::vector<std::string> set = {e.key()};
     for (const auto& [rival, worse] : e.rivals) set.push_back(rival);
     d.indistinguishable.push_back(std::move(set));
-    d.experiments.push_back(next_experiment(model, d.evidence, d.search.final, e.applied,
-                                            rivals_of(d.search.found[i], options.search),
-                                            options.experiment));
+    d.experiments.push_back(next_experiment(
+        model, d.evidence, d.search.final,
+        {e.applied, rivals_of(d.search.found[i], options.search)}, options.experiment));
     d.experiments.back().decisive_nats = options.search.same_nats;
   }
+}
+
+/// The diagnosis of logs without faulty channels.
+Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signals,
+                         const DiagnoseOptions& options, const SearchProgress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  Diagnosis d;
+  d.thresholds = options.verdict;
+  if (progress) progress(0.02, "collecting the evidence");
+  const std::vector<AppliedEffect> in_references = effects_in_references(model, signals.references);
+  d.evidence = collect_evidence(model, signals.suspects, signals.references, &in_references,
+                                options.evidence);
+  d.notes = d.evidence.notes;
+  search(model, options, progress, d);
+  if (progress) progress(0.92, "searching for unmodelled structure in the residual");
+  const std::vector<ResidualStructure> unmodelled = find_unmodelled(options, d);
+  drop_minor_effects(d, options.search);
+  if (!d.search.found.empty())
+    set_joint_estimates(model, signals, options.evidence, d.search.found);
+  for (std::size_t i = 0; i < d.search.found.size(); ++i)
+    d.effects.push_back(describe_effect(d, i, options.search));
+  set_verdict(unmodelled, d);
+  design_experiments(model, options, progress, d);
   // They stay in the order in which they were found, except that those that are not probable come last.
   std::stable_partition(d.effects.begin(), d.effects.end(),
                         [&](const DiagnosedEffect& e) { return d.probable(e); });
@@ -246,41 +259,75 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   return d;
 }
 
-Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
-                   const std::vector<Log>& references, const DiagnoseOptions& options,
-                   const SearchProgress& progress) {
+}  // namespace
+
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kMissing:
+      return "missing";
+    case Verdict::kNone:
+      return "none";
+    case Verdict::kUnknown:
+      return "unknown";
+    case Verdict::kBadData:
+      return "bad_data";
+  }
+  return "";
+}
+
+double DiagnosedEffect::shown_probability() const {
+  constexpr double kRounding = 1e-9;  // 100 * 0.29 is less than 29
+  return std::floor(100.0 * probability + kRounding);
+}
+
+DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log>& logs,
+                                   const std::vector<Log>& references,
+                                   const DiagnoseOptions& options) {
   if (logs.empty())
     throw InputError({}, "logs", "no log to diagnose: give at least one with --log");
-  std::vector<MachineSignals> suspects, pinned;
-  std::vector<BadChannel> bad;
-  std::vector<std::size_t> log_of;  // log of each bad channel
-  for (const Log& log : logs) {
-    suspects.push_back(make_signals(model.machine, log, options.signals));
+  DiagnosisSignals out;
+  out.suspects.reserve(logs.size());
+  out.references.reserve(references.size());
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    out.suspects.push_back(make_signals(machine, logs[i], options.signals));
     if (!options.check_data) continue;
-    for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back(), options.bad_data))
-      bad.push_back(std::move(b));
-    log_of.resize(bad.size(), suspects.size() - 1);
+    for (BadChannel& b : find_bad_channels(machine, logs[i], out.suspects[i], options.bad_data))
+      out.faults.push_back({i, std::move(b)});
   }
   for (const Log& log : references)
-    pinned.push_back(make_signals(model.machine, log, options.signals));
+    out.references.push_back(make_signals(machine, log, options.signals));
+  return out;
+}
+
+Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& signals,
+                           const DiagnoseOptions& options, const SearchProgress& progress) {
+  const std::vector<LogFault>& faults = signals.faults;
   // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
   // them, so the diagnosis runs first; with any other fault the data cannot be diagnosed.
-  const bool surely_bad = std::any_of(
-      bad.begin(), bad.end(), [](const BadChannel& b) { return b.kind != BadDataKind::kJumping; });
+  const bool surely_bad = std::any_of(faults.begin(), faults.end(), [](const LogFault& f) {
+    return f.channel.kind != BadDataKind::kJumping;
+  });
   if (!surely_bad) {
-    Diagnosis d = diagnose_signals(model, suspects, pinned, options, progress);
-    if (!bad.empty()) keep_sensor_faults(d, log_of, bad);
-    if (!bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
-    d.bad = std::move(bad);
+    Diagnosis d = diagnose_sound(model, signals, options, progress);
+    d.bad = sensor_faults(d, faults);
+    if (!d.bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
     return d;
   }
   Diagnosis d;
   d.thresholds = options.verdict;
   d.verdict = Verdict::kBadData;
-  d.evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
+  d.evidence =
+      collect_evidence(model, signals.suspects, signals.references, nullptr, options.evidence);
   d.notes = d.evidence.notes;
-  d.bad = std::move(bad);
+  for (const LogFault& f : faults) d.bad.push_back(f.channel);
   return d;
+}
+
+Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
+                   const std::vector<Log>& references, const DiagnoseOptions& options,
+                   const SearchProgress& progress) {
+  return diagnose_signals(model, diagnosis_signals(model.machine, logs, references, options),
+                          options, progress);
 }
 
 Diagnosis::Diagnosis() = default;

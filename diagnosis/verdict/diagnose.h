@@ -46,6 +46,8 @@ struct DiagnosedEffect {
   std::vector<std::string> evidence;  ///< whole sentences
 
   std::string key() const { return at.empty() ? id : id + ":" + at; }
+  /// The probability as reports show it: whole percent, rounded down, so that none that is short of certain shows 100. [%]
+  double shown_probability() const;
 };
 
 /// A part of the residual that neither model nor catalogue explains.
@@ -159,9 +161,27 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
                    const std::vector<Log>& references = {}, const DiagnoseOptions& options = {},
                    const SearchProgress& progress = {});
 
-/// The same on signals already made, without a check for bad channels.
-Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSignals>& suspects,
-                           const std::vector<MachineSignals>& references,
+/// A faulty channel of one suspect log.
+struct LogFault {
+  std::size_t log = 0;  ///< index into DiagnosisSignals::suspects
+  BadChannel channel;
+};
+
+/// Logs seen through a machine, with their faulty channels. Effects of a model change neither, so one value serves the
+/// diagnoses of all models of the machine.
+struct DiagnosisSignals {
+  std::vector<MachineSignals> suspects;
+  std::vector<MachineSignals> references = {};
+  std::vector<LogFault> faults = {};  ///< in the order of the logs; empty: none, or not checked
+};
+
+/// @param logs, references as in `diagnose`  @throws InputError when there is no log
+DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log>& logs,
+                                   const std::vector<Log>& references = {},
+                                   const DiagnoseOptions& options = {});
+
+/// The same as `diagnose` on signals already made. @param options its `signals`, `bad_data` and `check_data` are not used
+Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& signals,
                            const DiagnoseOptions& options = {},
                            const SearchProgress& progress = {});
 

@@ -105,7 +105,7 @@ std::string Diagnosis::table() const {
   }
   for (const DiagnosedEffect& e : effects) {
     out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}\n", e.key(),
-                       std::floor(100.0 * e.probability), e.stage);
+                       e.shown_probability(), e.stage);
     for (const ParameterEstimate& p : e.parameters)
       out += fmt::format("      {}\n", with_interval(p));
     for (std::size_t i = 0; i < std::min<std::size_t>(4, e.evidence.size()); ++i) {

@@ -93,12 +93,13 @@ void causes_json(const CompareResult& result, Json& root) {
            {"p_value", result.tests.smallest_p()},
            {"tests", Json::array()}};
   for (const ResidualTest& t : result.tests.tests) {
-    Json test = {{"stage", t.stage},     {"at", t.at},
-                 {"regime", t.regime},   {"depends_on", t.depends_on},
-                 {"p_value", t.p_value}, {"size", t.size},
-                 {"unit", t.unit},       {"share_explained", t.share_explained},
-                 {"samples", t.samples}, {"effective_samples", t.effective_samples},
-                 {"blocks", t.blocks},   {"sentence", t.sentence}};
+    Json test = {{"stage", t.stage},      {"at", t.at},
+                 {"regime", t.regime},    {"depends_on", t.depends_on},
+                 {"p_value", t.p_value},  {"size", t.size},
+                 {"unit", t.unit},        {"share_explained", t.share_explained},
+                 {"samples", t.samples},  {"effective_samples", t.effective_samples},
+                 {"blocks", t.blocks},    {"least_p_value", t.least_p},
+                 {"sentence", t.sentence}};
     if (t.depends_on.empty()) test["ci95"] = range_json(t.ci95);
     tests["tests"].push_back(std::move(test));
   }
@@ -179,8 +180,12 @@ std::string systematic_errors_text(const CompareResult& result) {
   std::string text = "\nsystematic errors";
   text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
                       tests.tested, tests.blocks, 100.0 * tests.alarm);
-  if (tests.smallest_p() > tests.alarm)
-    return text + "  none: no significant bias, no significant dependence on a signal\n";
+  const std::string undecided = tests.undecided_sentence();
+  if (tests.smallest_p() > tests.alarm) {
+    return text + (undecided.empty()
+                       ? "  none: no significant bias, no significant dependence on a signal\n"
+                       : wrapped("none is significant, but " + undecided));
+  }
   std::size_t shown = 0, alarms = 0;
   for (const ResidualTest& t : tests.tests) {
     if (t.p_value > tests.alarm) continue;
@@ -189,6 +194,7 @@ std::string systematic_errors_text(const CompareResult& result) {
     shown += shown < kMost ? 1 : 0;
   }
   if (alarms > shown) text += fmt::format("  and {} more, in --json\n", alarms - shown);
+  if (!undecided.empty()) text += wrapped(undecided);
   return text;
 }
 

@@ -88,7 +88,7 @@ struct Hypothesis {
 
 MatrixXd max_t_sign_flip(const MatrixXd& sums, int flips, unsigned seed) {
   const Index tests = sums.cols();
-  MatrixXd out = MatrixXd::Zero(tests, 2);
+  MatrixXd out = MatrixXd::Zero(tests, 3);
   Eigen::RowVectorXd scale = sums.colwise().norm();
   for (double& s : scale) s = s > 0.0 ? 1.0 / s : 0.0;
   const MatrixXd scaled = sums * scale.asDiagonal();
@@ -97,12 +97,31 @@ MatrixXd max_t_sign_flip(const MatrixXd& sums, int flips, unsigned seed) {
   MatrixXd sign(flips, sums.rows());
   for (Index i = 0; i < sign.size(); ++i) sign.data()[i] = (random() >> 16) & 1u ? 1.0 : -1.0;
   const VectorXd largest = (sign * scaled).cwiseAbs().rowwise().maxCoeff();
-  for (Index t = 0; t < tests; ++t) {
+  const auto p_of = [&](double statistic) {
     constexpr double kRounding = 1e-9;  // the sums are formed in another order
-    const auto above = (largest.array() >= out(t, 0) - kRounding).cast<double>().sum();
-    out(t, 1) = scale[t] > 0.0 ? (1.0 + above) / (1.0 + flips) : 1.0;
+    return (1.0 + (largest.array() >= statistic - kRounding).cast<double>().sum()) / (1.0 + flips);
+  };
+  for (Index t = 0; t < tests; ++t) {
+    out(t, 1) = scale[t] > 0.0 ? p_of(out(t, 0)) : 1.0;
+    out(t, 2) = p_of(scaled.col(t).cwiseAbs().sum());
   }
   return out;
+}
+
+const ResidualTest* ResidualTests::undecided() const {
+  const ResidualTest* out = nullptr;
+  for (const ResidualTest& t : tests) {
+    if (t.least_p <= alarm || t.share_explained < large_share) continue;
+    if (out == nullptr || t.share_explained > out->share_explained) out = &t;
+  }
+  return out;
+}
+
+std::string ResidualTests::undecided_sentence() const {
+  const ResidualTest* t = undecided();
+  if (t == nullptr) return "";
+  return fmt::format("{} blocks of motion are too few to decide whether {}", t->blocks,
+                     t->sentence);
 }
 
 double effective_samples(const VectorXd& values, const std::vector<int>& block,
@@ -133,6 +152,7 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
   ResidualTests out;
   out.blocks = blocks;
   out.alarm = options.alarm;
+  out.large_share = options.large_share;
   std::vector<Hypothesis> hypotheses;
   std::vector<VectorXd> columns;
   for (const ComparedPart& part : parts) {
@@ -189,6 +209,7 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
     judged.col(0).segment(h.first, h.columns).maxCoeff(&best);
     h.test.statistic = judged(h.first + best, 0);
     h.test.p_value = judged(h.first + best, 1);
+    h.test.least_p = judged(h.first + best, 2);
     h.test.sentence = sentence_of(h.test, *h.part, h.signal);
     out.tests.push_back(std::move(h.test));
   }

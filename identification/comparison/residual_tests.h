@@ -30,6 +30,8 @@ struct ResidualTest {
   /// Number of independent samples with the same information about the mean: n / (1 + 2 sum rho_k), Sokal 1997.
   double effective_samples = 0.0;
   int blocks = 0;  ///< blocks with samples of the quantity
+  /// Smallest p-value that these blocks allow among all tests: that of the same sums with one sign in all blocks.
+  double least_p = 0.0;
   std::string sentence;
 };
 
@@ -59,6 +61,10 @@ struct ResidualTestOptions {
   /// @threshold [1] 0..0.2; chosen: the usual level; one log in twenty without an error gives an
   /// alarm
   double alarm = 0.05;
+  /// Share of the squared error from which a part of it is told although the blocks are too few to
+  /// decide.
+  /// @threshold [1] 0..1; chosen: half of it; without a smaller part the error would be much the same
+  double large_share = 0.5;
   AutocorrelationOptions autocorrelation;
   BlockOptions blocks;
 };
@@ -70,13 +76,18 @@ struct ResidualTests {
   /// Level of significance of the options: a test with a larger p-value is no alarm.
   double alarm = ResidualTestOptions().alarm;
   double smallest_p() const { return tests.empty() ? 1.0 : tests.front().p_value; }
+  double large_share = ResidualTestOptions().large_share;  ///< that of the options
+  /// The largest part of an error that could not be an alarm, because its quantity moves in too few blocks; null: none of
+  /// the share that is told.
+  const ResidualTest* undecided() const;
+  std::string undecided_sentence() const;  ///< says so, without a full stop; "" when there is none
 };
 
 ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
                              const ResidualTestOptions& options = {});
 
 /// Single-step max-T test by sign flips. @param sums [blocks x tests], 0 where a block holds no sample
-/// @return [tests x 2] T and its family-wise p-value
+/// @return [tests x 3] T, its family-wise p-value, and that of the same sums with one sign in all blocks
 Eigen::MatrixXd max_t_sign_flip(const Eigen::MatrixXd& sums, int flips, unsigned seed);
 
 /// @return n / (1 + 2 sum of the autocorrelations up to the first that is gone), with pairs inside blocks only

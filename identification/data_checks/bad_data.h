@@ -113,7 +113,8 @@ struct BadDataOptions {
   /// @threshold [steps] 10..1000; chosen: the frequency is then known to a seventh of a standard
   /// deviation of a single step
   double fewest_steps = 50.0;
-  /// Frequency of repetitions above which they are no evidence.
+  /// Frequency of repetitions above which they are no evidence that a channel is stuck. Below it,
+  /// `stuck_chance` weighs how long the stretch is for that frequency.
   /// @threshold [1] 0.3..0.99; chosen: such a channel mostly repeats its value, as one that is
   /// logged faster than it is measured
   double common_repeats = 0.7;
@@ -129,13 +130,14 @@ struct BadDataOptions {
   /// Time before and after a start, stop or reversal in which it may fill or empty a chamber.
   /// @threshold [s] 0.05..2; chosen: response time of a valve
   double valve_answer_s = 0.3;
-  /// Command in which a cylinder must be told to move for a position that never changes to be a
-  /// fault.
-  /// @threshold [1] 0..1; chosen: well outside any dead band
-  double constant_firm_command = 0.25;
   /// Least share of a channel's samples without a value.
   /// @threshold [1] 0..1; chosen: a fifth missing leaves too little of most motions
   double missing_share = 0.2;
+
+  /// Command above which a cylinder is surely told to move: then a position that never changes is a
+  /// fault, and so is a command that the cylinder does not follow.
+  /// @threshold [1] 0..1; chosen: outside any dead band
+  double firm_command = 0.15;
 
   // Stuck commands, which the cylinder's motion contradicts.
 
@@ -145,9 +147,6 @@ struct BadDataOptions {
   /// Least time without interruption in which the cylinder does not follow.
   /// @threshold [s] 0.2..10; chosen: longer than a valve and an oscillating load delay a motion
   double contradiction_s = 0.8;
-  /// Least command that is judged.
-  /// @threshold [1] 0..1; chosen: outside any dead band
-  double firm_command = 0.15;
   /// Speed over the usual speed at this command below which the cylinder does not follow.
   /// @threshold [1] 0..0.5; chosen: a saturated pump slows a cylinder to half its speed
   double slowest_following = 0.4;
@@ -231,8 +230,10 @@ struct BadDataOptions {
 
   // Saturation.
 
-  /// Largest share of repetitions away from the limit.
-  /// @threshold [1] 0..1; chosen: with a larger share repetitions at the limit are no evidence
+  /// Largest share of repetitions away from the limit. It is smaller than `common_repeats`, because
+  /// stretches at the limit are counted and not weighed by their length.
+  /// @threshold [1] 0..1; derived: as many equal samples as `saturated_shortest` asks for then
+  /// repeat by chance with a probability below one percent, 0.3^4
   double saturated_repeats = 0.3;
   /// Least length of a stretch at the limit.
   /// @threshold [samples] 2..100; chosen: a peak that is not cut off is shorter

@@ -149,7 +149,7 @@ std::optional<Finding> constant_throughout(const CheckContext& context, std::siz
   if (position && !s.has_command()) return {};
   double ways[2] = {0.0, 0.0};
   for (Index k = 0; k < s.direction.size(); ++k) {
-    if (position ? std::abs(s.command[k]) > context.options.constant_firm_command
+    if (position ? std::abs(s.command[k]) > context.options.firm_command
                  : static_cast<bool>(s.moving[k])) {
       ways[s.direction[k] > 0 ? 1 : 0] += context.log.step;
     }

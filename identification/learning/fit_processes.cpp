@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "identification/learning/find_branch_corner.h"
@@ -143,12 +142,18 @@ void subtract_corner(const BranchCorner& corner, GpDataset& set) {
     set.pressure[k] -= corner_rise(corner, set.flow[k], set.force[k]).value;
 }
 
+/// Data of the processes that are learned in one go.
+struct ProcessSets {
+  std::vector<GpDataset> sets;
+  std::vector<std::size_t> which = {};  ///< [sets] indices into the pass' processes
+  /// Whether an existing model and its report stay where a new one cannot be learned.
+  bool keep_others = false;
+};
+
 /// Learns pressure models in parallel and moves those that could be learned into the pass.
-/// @param which [sets] indices into the pass' processes  @param keep_others true to keep an existing model and its report
-///   where a new one cannot be learned
-void learn(const std::vector<GpDataset>& sets, const std::vector<std::size_t>& which,
-           const FitOptions& options, bool keep_others, FitPass& pass,
+void learn(const ProcessSets& data, const FitOptions& options, FitPass& pass,
            const std::function<void(int, int, const std::string&)>& progress = {}) {
+  const auto& [sets, which, keep_others] = data;
   std::vector<GpDataset> asked = sets;
   std::vector<std::optional<SimilarLoads>> similar(sets.size());
   std::vector<BranchCorner> corners(sets.size());
@@ -215,17 +220,16 @@ void subtract_backs(const FitOptions& options, std::vector<ProcessData>& samples
     samples[i].subtract_back(pass.model.machine.cylinders[c], fitted.extend ? 1 : -1,
                              fitted.extend ? m.extend : m.retract);
   };
-  std::vector<GpDataset> again;
-  std::vector<std::size_t> which;
+  ProcessSets again{{}, {}, true};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!pass.processes[i].report.failure.empty() || !samples[i].has_back()) continue;
     subtract(i);
-    again.push_back(samples[i].set);
-    which.push_back(i);
+    again.sets.push_back(samples[i].set);
+    again.which.push_back(i);
   }
-  if (again.empty()) return;
-  learn(again, which, options, true, pass);
-  for (const std::size_t i : which) subtract(i);
+  if (again.sets.empty()) return;
+  learn(again, options, pass);
+  for (const std::size_t i : again.which) subtract(i);
 }
 
 void process_notes(const Machine& machine, FitPass& pass) {
@@ -256,12 +260,13 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
                      const std::function<void(double, const std::string&)>& progress) {
   const Machine& machine = pass.model.machine;
   std::vector<ProcessData> samples;
-  std::vector<GpDataset> sets;
+  ProcessSets all;
   for (int i = 0; i < machine.cylinder_count(); ++i) {
     if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
     for (const bool extend : {true, false}) {
       samples.push_back(process_data(machine, data, i, extend, options.hold_out_block_s));
-      sets.push_back(samples.back().set);
+      all.sets.push_back(samples.back().set);
+      all.which.push_back(all.which.size());
       ProcessFit fitted;
       fitted.cylinder = i;
       fitted.extend = extend;
@@ -274,13 +279,11 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
       if (progress) progress(from + 0.5 * done / total, "pressure of " + name);
     };
   };
-  std::vector<std::size_t> all(sets.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  learn(sets, all, options, false, pass, tell(0.0));
+  learn(all, options, pass, tell(0.0));
   subtract_backs(options, samples, pass);
 
-  std::vector<GpDataset> again;
-  std::vector<std::size_t> which;
+  // Where thinned samples cannot be learned, the first fit is kept.
+  ProcessSets again{{}, {}, true};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ProcessFit& fitted = pass.processes[i];
     if (!fitted.report.failure.empty()) continue;
@@ -290,17 +293,17 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
         integrated_autocorrelation(residual, samples[i].position, options.autocorrelation);
     fitted.step = thinning_step(fitted.autocorrelation, residual.size(), options);
     if (fitted.step == 1) continue;
-    again.push_back(thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
-    which.push_back(i);
+    again.sets.push_back(
+        thinned_set(samples[i], residual, fitted.step, options.gp.outlier_threshold));
+    again.which.push_back(i);
   }
-  if (again.empty()) {
+  if (again.sets.empty()) {
     process_notes(machine, pass);
     return;
   }
   FitOptions screened = options;
   screened.gp.outlier_threshold = 0.0;
-  // Where thinned samples cannot be learned, the first fit is kept.
-  learn(again, which, screened, true, pass, tell(0.5));
+  learn(again, screened, pass, tell(0.5));
   process_notes(machine, pass);
 }
 

@@ -63,9 +63,16 @@ bool looks_like_degrees(const Channel& channel, Range range, const Extent& e) {
          e.hi * units::kDegree <= range.hi + tolerance;
 }
 
-/// Warns of valid samples outside `range` by more than the tolerance.
-void check_range(const Channel& channel, Range range, const char* of_what, double unit_shown,
-                 const char* unit_name, Log* log) {
+/// A range that the machine file gives for a channel, in SI.
+struct FileRange {
+  Range range;
+  const char* of_what;  ///< "the joint's range"
+  const char* unit;     ///< the SI unit, as messages show it
+};
+
+/// Warns of valid samples outside the range by more than the tolerance.
+void check_range(const Channel& channel, const FileRange& file, Log* log) {
+  const Range& range = file.range;
   const double tolerance = kRangeTolerance * (range.hi - range.lo);
   if (!(tolerance > 0.0)) return;
   Eigen::Index outside = 0, valid = 0;
@@ -82,8 +89,7 @@ void check_range(const Channel& channel, Range range, const char* of_what, doubl
                   "{:.4g} {}, measured "
                   "{:.4g} to {:.4g}); check sign, zero and unit",
                   channel.column, 100.0 * static_cast<double>(outside) / static_cast<double>(valid),
-                  of_what, range.lo / unit_shown, range.hi / unit_shown, unit_name,
-                  e.lo / unit_shown, e.hi / unit_shown));
+                  file.of_what, range.lo, range.hi, file.unit, e.lo, e.hi));
 }
 
 /// Warns of a long stretch of equal values on a channel that otherwise seldom repeats one.
@@ -158,7 +164,7 @@ void check_position(const Channel& channel, const Machine& machine, const Extent
         channel.column, e.lo, e.hi, joint.position.lo, joint.position.hi, channel.signal));
     return;
   }
-  check_range(channel, joint.position, "the joint's range", 1.0, revolute ? "rad" : "m", log);
+  check_range(channel, {joint.position, "the joint's range", revolute ? "rad" : "m"}, log);
   check_jumps(channel, joint, log);
 }
 
@@ -264,7 +270,7 @@ void check_plausible(const Machine& machine, Log* log) {
               "{}: values up to {:.4g} m; are they in millimetres? Then name the column {}_mm",
               channel.column, largest(e), channel.signal));
         } else if (cylinder.stroke) {
-          check_range(channel, {0.0, *cylinder.stroke}, "the cylinder's stroke", 1.0, "m", log);
+          check_range(channel, {{0.0, *cylinder.stroke}, "the cylinder's stroke", "m"}, log);
         }
         break;
       }

@@ -7,10 +7,16 @@
 namespace sparflow {
 namespace {
 
-/// Inverts every stretch of `value` in the run that is shorter than `shortest` [s].
-/// @param inside_only true to keep stretches at the ends of the run
-void remove_short(const Eigen::VectorXd& time, SampleRange run, bool value, double shortest,
-                  bool inside_only, std::vector<char>* moving) {
+/// Stretches that are too short to count.
+struct ShortStretch {
+  bool moving = false;       ///< of motion, or of rest
+  double shortest = 0.0;     ///< [s] those below it are meant
+  bool inside_only = false;  ///< whether stretches at the ends of the run stay
+};
+
+/// Inverts every such stretch of the run.
+void remove_short(const Eigen::VectorXd& time, SampleRange run, const ShortStretch& which,
+                  std::vector<char>* moving) {
   Eigen::Index begin = run.begin;
   for (Eigen::Index i = run.begin + 1; i <= run.end; ++i) {
     const auto at = static_cast<std::size_t>(begin);
@@ -18,8 +24,10 @@ void remove_short(const Eigen::VectorXd& time, SampleRange run, bool value, doub
     const bool at_end = begin == run.begin || i == run.end;
     // A stretch lasts from its first sample to the first sample of the next stretch.
     const double lasts = (i < run.end ? time[i] : time[i - 1]) - time[begin];
-    if (((*moving)[at] != 0) == value && lasts < shortest && !(inside_only && at_end)) {
-      for (Eigen::Index k = begin; k < i; ++k) (*moving)[static_cast<std::size_t>(k)] = !value;
+    if (((*moving)[at] != 0) == which.moving && lasts < which.shortest &&
+        !(which.inside_only && at_end)) {
+      for (Eigen::Index k = begin; k < i; ++k)
+        (*moving)[static_cast<std::size_t>(k)] = !which.moving;
     }
     begin = i;
   }
@@ -72,8 +80,8 @@ std::vector<Segment> find_segments(const Eigen::VectorXd& time, const Eigen::Mat
   std::vector<Segment> segments;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const SampleRange run = runs[r];
-    remove_short(time, run, false, options.pause_s, true, &moving);
-    remove_short(time, run, true, options.shortest_s, false, &moving);
+    remove_short(time, run, {false, options.pause_s, true}, &moving);
+    remove_short(time, run, {true, options.shortest_s, false}, &moving);
     Eigen::Index begin = run.begin;
     for (Eigen::Index i = run.begin + 1; i <= run.end; ++i) {
       const bool now = moving[static_cast<std::size_t>(begin)] != 0;

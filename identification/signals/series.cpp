@@ -134,7 +134,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     }
   }
   set_static_slopes(machine, out);
-  set_openings(model.effects, out);
+  out = with_openings(model.effects, std::move(out));
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     PumpSeries pump;
     pump.pressure = signals.pumps[p].pressure_smooth;
@@ -146,13 +146,14 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
   return out;
 }
 
-void set_openings(const std::vector<AppliedEffect>& effects, MachineSeries& series) {
+MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSeries series) {
   for (std::size_t i = 0; i < series.cylinders.size(); ++i) {
     CylinderSeries& c = series.cylinders[i];
     c.opening = c.command;
     for (const AppliedEffect& e : effects)
       e.effect->shape_opening(static_cast<int>(i), e.at, e.values, c.opening);
   }
+  return series;
 }
 
 VectorXd effect_series(const AppliedEffect& effect, const MachineSeries& log, EvidenceKind kind,

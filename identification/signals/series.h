@@ -13,9 +13,9 @@ namespace sparflow {
 /// @param signals of the machine as its file describes it
 MachineSeries make_series(const CraneModel& model, const MachineSignals& signals);
 
-/// Computes the valve openings (CylinderSeries::opening) that these effects leave of the commands; `make_series` does so
-/// with the model's effects.
-void set_openings(const std::vector<AppliedEffect>& effects, MachineSeries& series);
+/// The same series with the valve openings (CylinderSeries::opening) that these effects leave of the commands;
+/// `make_series` computes them with the model's effects.
+MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSeries series);
 
 /// Contribution of one effect, at its parameter values, to the measured quantity `kind` of cylinder or pump `index`, not
 /// filtered: exact for effects that change the machine, else the effect's columns times its linear parameters.

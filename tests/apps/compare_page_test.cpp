@@ -52,12 +52,15 @@ TEST(ComparePage, CorrectModelIsGoodInEveryStage) {
   const CompareResult result = compare(model, {arm_log(kNoise)});
   const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
   ASSERT_FALSE(judged.empty());
+  int pumps = 0;
   for (const JudgedScore& j : judged) {
     EXPECT_EQ(j.tone, Tone::kGood) << j.score.stage << " " << j.score.regime;
     if (j.score.stage != "pump") continue;
+    ++pumps;
     // The filter keeps a part of the noise, so the estimate is low, by at most 15 %.
     EXPECT_NEAR(j.noise / units::kBar, kNoise, 0.15 * kNoise);
   }
+  EXPECT_EQ(pumps, 1) << "the arm has one pump, and the log its pressure";
   EXPECT_THAT(compare_page(model, result).html(),
               HasSubstr("The model follows the measurements in every stage"));
 }

@@ -105,6 +105,22 @@ TEST(DiagnosePage, VerdictNamesEffectParameterAndError) {
   EXPECT_THAT(html, HasSubstr("against arm rod speed"));
 }
 
+TEST(DiagnosePage, ShowsTheProbabilityOfTheTerminalAndNoCertaintyThatIsNone) {
+  const CraneModel model = arm_model();
+  Diagnosis d = missing_friction(model);
+  const auto in_terminal = [&] { return d.table(); };
+  const auto in_page = [&] { return diagnose_page(model, d).html(); };
+  d.effects[0].probability = 1.0;
+  EXPECT_THAT(in_terminal(), HasSubstr("probability 100 %"));
+  EXPECT_THAT(in_page(), HasSubstr(">100<"));
+  d.effects[0].probability = 0.996;
+  EXPECT_THAT(in_terminal(), HasSubstr("probability  99 %"));
+  EXPECT_THAT(in_page(), ::testing::Not(HasSubstr(">100<")));
+  EXPECT_THAT(in_page(), HasSubstr(">99<"));
+  d.effects[0].probability = 0.29;  // 100 * 0.29 is less than 29 in floating point
+  EXPECT_EQ(d.effects[0].shown_probability(), 29.0);
+}
+
 TEST(DiagnosePage, ChannelPictureRemovesTheEffect) {
   const CraneModel model = arm_model();
   const Diagnosis d = missing_friction(model);
@@ -235,7 +251,7 @@ TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const std::string html =
       improve_page(extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
-                          {log_with_friction(1)}, {log_with_friction(2)}))
+                          {{log_with_friction(1)}, {}, {log_with_friction(2)}}))
           .html();
   EXPECT_THAT(html, HasSubstr("\"x_counts\":true"));
   EXPECT_THAT(html, HasSubstr("% of before"));
@@ -244,13 +260,24 @@ TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
 TEST(ImprovePageInBrowser, StepsOfExtend) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
-                                     {log_with_friction(1)}, {log_with_friction(2)});
+                                     {{log_with_friction(1)}, {}, {log_with_friction(2)}});
   const Page page = improve_page(result);
   const std::string html = page.html();
   EXPECT_THAT(html, HasSubstr("Error after each step"));
   EXPECT_THAT(html, HasSubstr("sensor noise"));
   EXPECT_GE(page.plot_count(), 3);  // overview, the force's error, its curves
   expect_good_in_browser(page, "improve page");
+}
+
+TEST(ImprovePage, CountsTheEffectsNotKeptHoweverTheReasonIsWorded) {
+  const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
+  ExtendResult result = extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
+                               {{log_with_friction(1)}, {}, {log_with_friction(2)}});
+  result.rejected = {result.steps[0]};
+  result.reason = "nothing more is missing";
+  result.stopped_because = result.reason + "; friction did no good: its interval contains zero";
+  EXPECT_THAT(improve_page(result).html(),
+              HasSubstr("othing more is missing; 1 more was tried and not kept."));
 }
 
 TEST(ImprovePage, StatesWhyNothingWasAdded) {

@@ -30,18 +30,24 @@ struct HiddenCase {
   }
 };
 
+/// What is recorded of a machine.
+struct Recording {
+  std::uint64_t seed = 0;  ///< of the machine's parameters and of its motions
+  double seconds = 0.0;    ///< of the suspect and of the reference log
+  simulator::LogChannels channels = {};
+  double test_seconds = 5.0;
+};
+
 inline HiddenCase hidden_case(const Machine& machine,
                               const std::vector<simulator::HiddenEffect>& effects,
-                              std::uint64_t seed, double seconds,
-                              const simulator::LogChannels& channels = {},
-                              double test_seconds = 5.0) {
+                              const Recording& recording) {
   simulator::CaseRequest request;
   request.log.machine = machine;
   request.log.effects = effects;
-  request.log.crane_seed = request.log.motion_seed = seed;
-  request.log.seconds = seconds;
-  request.log.channels = channels;
-  request.test_seconds = test_seconds;
+  request.log.crane_seed = request.log.motion_seed = recording.seed;
+  request.log.seconds = recording.seconds;
+  request.log.channels = recording.channels;
+  request.test_seconds = recording.test_seconds;
   HiddenCase c;
   c.logs = simulator::generate_case(request);
   c.train = log_from_text("train.csv", simulator::csv_text(c.logs.train), machine);

@@ -9,10 +9,10 @@
 
 namespace sparflow::arms {
 
-/// Limits of a joint; speed and acceleration are the same in both directions.
+/// Limits of a joint, [rad] or [m] and their rates; velocity and acceleration in both directions.
 struct JointLimits {
   Range position;
-  double velocity, acceleration;
+  double velocity = 0.0, acceleration = 0.0;
 };
 
 inline Joint joint(const std::string& name, JointType type, const Eigen::Vector3d& origin,

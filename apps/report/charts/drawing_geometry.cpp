@@ -139,9 +139,15 @@ double shortest_length(const Machine& machine, int cylinder) {
   return shortest;
 }
 
-/// Appends bars and cylinder to `parts` and their pins to `pins`, which are drawn over everything.
+/// Parts of a machine in the order in which they are drawn: pins over everything.
+struct DrawnParts {
+  std::vector<MachinePart> parts, pins;
+};
+
+/// Appends bars, cylinder and their pins.
 void append_cylinder(const Machine& machine, const Frames& frames, const VectorXd& q, int cylinder,
-                     std::vector<MachinePart>& parts, std::vector<MachinePart>& pins) {
+                     DrawnParts& drawn) {
+  auto& [parts, pins] = drawn;
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(cylinder)];
   const bool four_bar = std::holds_alternative<FourBarLinkage>(c.linkage);
   if (!four_bar && !std::holds_alternative<PinsLinkage>(c.linkage)) return;
@@ -210,10 +216,11 @@ DrawingPlane drawing_plane(const Machine& machine, const VectorXd& q) {
 std::vector<MachinePart> machine_parts(const Machine& machine, const VectorXd& q) {
   SPARFLOW_CHECK(q.size() == machine.joint_count(), "one coordinate a joint");
   const Frames frames = forward_kinematics<double>(machine, q);
-  std::vector<MachinePart> parts, pins;
+  DrawnParts drawn;
+  auto& [parts, pins] = drawn;
   append_links(machine, frames, up_direction(machine), parts);
   for (int c = 0; c < machine.cylinder_count(); ++c) {
-    append_cylinder(machine, frames, q, c, parts, pins);
+    append_cylinder(machine, frames, q, c, drawn);
   }
   for (int k = 0; k < machine.joint_count(); ++k) {
     if (machine.joints[static_cast<std::size_t>(k)].type == JointType::kRevolute) {
@@ -221,7 +228,7 @@ std::vector<MachinePart> machine_parts(const Machine& machine, const VectorXd& q
     }
   }
   parts.insert(parts.end(), pins.begin(), pins.end());
-  return parts;
+  return std::move(parts);
 }
 
 DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double time) {

@@ -75,12 +75,14 @@ void add_tests(Page& page, const CompareResult& result) {
   constexpr std::size_t kMost = 12;
   const ResidualTests& tests = result.tests;
   if (tests.tests.empty()) return;
+  const std::string undecided = tests.undecided_sentence();
   if (tests.smallest_p() > tests.alarm) {
-    page.paragraph(
-        fmt::format("No part of the error is systematic: {} tests of bias and of dependence on "
-                    "signals, over {} "
-                    "blocks of motion, found no more than autocorrelated noise would show.",
-                    tests.tested, tests.blocks));
+    page.paragraph(fmt::format(
+        "{}: {} tests of bias and of dependence on signals, over {} blocks of motion, "
+        "found no more than autocorrelated noise would show.{}",
+        undecided.empty() ? "No part of the error is systematic"
+                          : "No part of the error is significantly systematic",
+        tests.tested, tests.blocks, undecided.empty() ? "" : " " + capitalised(undecided) + "."));
     return;
   }
   Table table;

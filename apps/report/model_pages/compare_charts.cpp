@@ -62,9 +62,13 @@ std::vector<Span> spans_of(const Mask& inside, const VectorXd& time) {
   return spans;
 }
 
+/// Measured and predicted curve of a quantity in one of its logs.
+/// @param of the log and its series, as in ComparedQuantity::logs
 LineChart curve_chart(const Machine& machine, const CompareResult& result,
-                      const ComparedQuantity& quantity, const LogComparison& log,
-                      const ComparedSeries& series, int color) {
+                      const ComparedQuantity& quantity,
+                      const std::pair<const LogComparison*, const ComparedSeries*>& of, int color) {
+  const LogComparison& log = *of.first;
+  const ComparedSeries& series = *of.second;
   LineChart chart;
   chart.title = capitalised(quantity.words);
   chart.width = FigureWidth::kHalf;
@@ -146,8 +150,8 @@ void add_compared_curves(Page& page, const Machine& machine, const CompareResult
   for (const LogComparison& log : result.logs) {
     bool heading = false;
     for (std::size_t i = 0; i < quantities.size(); ++i) {
-      for (const auto& [of, series] : quantities[i].logs) {
-        if (of != &log) continue;
+      for (const auto& of : quantities[i].logs) {
+        if (of.first != &log) continue;
         if (drawn == kMostCurveCharts) {
           ++left_out;
           continue;
@@ -158,7 +162,7 @@ void add_compared_curves(Page& page, const Machine& machine, const CompareResult
           heading = true;
         }
         ++drawn;
-        page.plot(curve_chart(machine, result, quantities[i], log, *series, static_cast<int>(i)));
+        page.plot(curve_chart(machine, result, quantities[i], of, static_cast<int>(i)));
       }
     }
   }

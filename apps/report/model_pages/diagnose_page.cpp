@@ -99,7 +99,7 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                    {"absorbed", "%", 2}};
   for (const DiagnosedEffect& e : d.effects) {
     table.rows.push_back({title_of(machine, e), e.stage, parameters_text(e.parameters),
-                          std::round(100.0 * e.probability), e.gain,
+                          e.shown_probability(), e.gain,
                           e.held_out_error > 0.0 ? e.held_out_gain / e.held_out_error : kNaN,
                           std::round(100.0 * e.absorbed)});
   }

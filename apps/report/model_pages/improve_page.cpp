@@ -239,13 +239,9 @@ const AppliedEffect& in_the_model(const CraneModel& model, const AppliedEffect& 
 
 /// Why improve() stopped, without the list of rejected effects, which have a section of their own.
 std::string stopped_briefly(const ExtendResult& r) {
-  if (r.rejected.empty()) return r.stopped_because;
-  const std::size_t at =
-      r.stopped_because.find(fmt::format("; {} was tried", r.rejected.front().title));
-  if (at == std::string::npos) return r.stopped_because;
-  return r.stopped_because.substr(0, at) + fmt::format("; {} more {} tried and not kept",
-                                                       r.rejected.size(),
-                                                       r.rejected.size() == 1 ? "was" : "were");
+  if (r.rejected.empty()) return r.reason;
+  return r.reason + fmt::format("; {} more {} tried and not kept", r.rejected.size(),
+                                r.rejected.size() == 1 ? "was" : "were");
 }
 
 void set_verdict(Page& page, const ExtendResult& r) {

@@ -82,21 +82,20 @@ std::optional<double> ground_of(const MotionProblem& problem) {
 }
 
 void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
-               const OptimizeResult& result, const Trajectory* baseline,
-               const std::string& baseline_name) {
+               const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
   CraneDrawing drawing;
   drawing.title = "The motion";
   drawing.note =
       "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the "
       "tip" +
-      (baseline != nullptr ? "; dashed: its path along " + baseline_name : std::string()) + ".";
+      (baseline ? "; dashed: its path along " + baseline->name : std::string()) + ".";
   drawing.group = "motion";
   const DrawingPlane plane = drawing_plane(machine, problem.start);
   drawing.x_axis = {plane.horizontal_name, "m"};
   drawing.z_axis = {plane.vertical_name, "m"};
   drawing.frames = drawing_frames(machine, result.motion, 90);
   drawing.obstacles = cut_obstacles(problem.obstacles, plane);
-  if (baseline != nullptr) drawing.paths.push_back({baseline_name, tip_path(machine, *baseline)});
+  if (baseline) drawing.paths.push_back({baseline->name, tip_path(machine, baseline->motion)});
   if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
     drawing.goal = drawing_plane(machine, result.motion.q.row(result.motion.size() - 1).transpose())
                        .project(goal->tip);
@@ -160,8 +159,7 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
 }
 
 void add_losses(Page& page, const CraneModel& model, const MotionProblem& problem,
-                const OptimizeResult& result, const Trajectory* baseline,
-                const std::string& baseline_name) {
+                const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
   BarChart bars;
   bars.title = "Useful energy and throttling loss";
   bars.value_axis = {"energy", "kJ"};
@@ -170,8 +168,8 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
       "times "
       "flow; another cylinder, the margin or standby sets the pump pressure.";
   std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
-  if (baseline != nullptr)
-    motions.push_back({baseline_name, exact_energy(model, *baseline, problem.payload)});
+  if (baseline)
+    motions.emplace_back(baseline->name, exact_energy(model, baseline->motion, problem.payload));
   for (const auto& [name, energy] : motions) {
     for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
       if (!model.machine.cylinders[i].hydraulic()) continue;
@@ -266,8 +264,7 @@ std::string seconds_text(double s) { return fmt::format("{:.2f}", s); }
 }  // namespace
 
 void add_motion(Page& page, const CraneModel& model, const MotionProblem& problem,
-                const OptimizeResult& result, const Trajectory* baseline,
-                const std::string& baseline_name) {
+                const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
   page.section("Motion: " + problem.name);
   if (result.motion.size() < 2) {
     page.paragraph("No motion was found; " + std::string(result.starts.empty()
@@ -307,15 +304,14 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
                     100.0 * result.energy.moving_share_outside_data,
                     result.energy.largest_pressure_std / units::kBar));
   }
-  add_crane(page, model.machine, problem, result, baseline, baseline_name);
+  add_crane(page, model.machine, problem, result, baseline);
   add_curves(page, model, problem, result);
-  add_losses(page, model, problem, result, baseline, baseline_name);
+  add_losses(page, model, problem, result, baseline);
   add_tables(page, result);
 }
 
 Page motion_page(const CraneModel& model, const MotionProblem& problem,
-                 const OptimizeResult& result, const Trajectory* baseline,
-                 const std::string& baseline_name) {
+                 const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
   Page page("Energy-optimal motion: " + problem.name);
   if (result.status == OptimizeStatus::kOptimal) {
     const std::string against = against_seeds(result);
@@ -338,7 +334,7 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                      : std::string(to_string(result.status)),
                  why);
   }
-  add_motion(page, model, problem, result, baseline, baseline_name);
+  add_motion(page, model, problem, result, baseline);
   page.provenance("program", std::string("sparflow ") + program_version());
   page.provenance("machine", model.machine.name);
   for (const DataSource& d : model.data)

@@ -1,21 +1,27 @@
 #pragma once
 /// The page and the texts of optimize.
+#include <optional>
+#include <string>
+
 #include "apps/report/page/page.h"
 #include "optimizer/solve/optimize.h"
 
 namespace sparflow {
 
+/// The motion that the optimum is compared with: a seed path, driven in the same duration.
+struct ComparedMotion {
+  std::string name;
+  Trajectory motion;
+};
+
 /// Appends the motion: crane at several instants, joint speeds, flows, pressures, power, throttling loss of each
 /// cylinder, limits at their worst, all starts.
-/// @param baseline motion of the same duration to compare with (see baseline_seed()); may be null
 void add_motion(Page& page, const CraneModel& model, const MotionProblem& problem,
-                const OptimizeResult& result, const Trajectory* baseline = nullptr,
-                const std::string& baseline_name = "");
+                const OptimizeResult& result, const std::optional<ComparedMotion>& baseline = {});
 
 /// Makes a page of add_motion() with a verdict.
 Page motion_page(const CraneModel& model, const MotionProblem& problem,
-                 const OptimizeResult& result, const Trajectory* baseline = nullptr,
-                 const std::string& baseline_name = "");
+                 const OptimizeResult& result, const std::optional<ComparedMotion>& baseline = {});
 
 /// "31 % less than the straight joint line to the nearest goal configuration (120.6 kJ) and 4 % less than the cheapest
 /// straight line (85.9 kJ) in the same time"; also names the cheapest seed path where it is neither of these. Returns

@@ -43,6 +43,109 @@ nlohmann::json start_json(const StartResult& s) {
   return out;
 }
 
+std::string no_motion_text(const OptimizeResult& r) {
+  const bool said = r.message.find(to_string(r.status)) != std::string::npos;
+  std::string text =
+      (said ? r.message : fmt::format("{}: {}", to_string(r.status), r.message)) + "\n";
+  for (const StartResult& s : r.starts) text += fmt::format("  {:<34} {}\n", s.seed, s.message);
+  return text;
+}
+
+/// The optimum's energy beside those it is compared with, and beside its bounds.
+std::string energies_text(const OptimizeResult& r) {
+  std::string text = fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}\n",
+                                 r.energy.total / 1e3, r.duration,
+                                 r.starts[static_cast<std::size_t>(r.best_start)].seed);
+  const auto against = [&](const char* what, double energy, const std::string& name) {
+    if (energy > 0.0)
+      text += fmt::format(
+          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %{}{}\n", what, energy / 1e3,
+          r.energy.total <= energy ? "saves" : "takes more (energy is not its only cost):",
+          100.0 * std::abs(1.0 - r.energy.total / energy), name.empty() ? "" : "; ", name);
+    else
+      text += fmt::format("  {:<20}         -      it breaks a limit in this time\n", what);
+  };
+  against("straight, nearest", r.nearest_line_energy, "");
+  against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
+  against("best seed path", r.best_seed_energy, r.best_seed_name);
+  if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
+  if (r.unlimited_energy > 0.0) {
+    text += fmt::format(
+        "  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly\n",
+        r.unlimited_energy / 1e3);
+  }
+  if (r.lower_bound > 0.0) {
+    const std::string which =
+        r.lower_bound_time > 0.0 ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
+                                 : "of motions of any duration";
+    text += fmt::format("  estimated bound      {:9.2f} kJ   {}: {:.1f} % below this one\n",
+                        r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total));
+  } else if (!r.bound_note.empty()) {
+    text += "  estimated bound           none   " + r.bound_note + "\n";
+  }
+  return text + fmt::format("  potential energy     {:+9.2f} kJ   end minus start\n",
+                            r.energy.potential_difference / 1e3);
+}
+
+std::string cylinders_text(const Machine& machine, const MotionEnergy& energy) {
+  std::string text =
+      fmt::format("  {:<14} {:>12} {:>14}\n", "cylinder", "useful [kJ]", "throttled [kJ]");
+  for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
+    text += fmt::format("  {:<14} {:>12.2f} {:>14.2f}\n", machine.cylinders[i].name,
+                        energy.useful[i] / 1e3, energy.throttling[i] / 1e3);
+  }
+  return text;
+}
+
+/// Whether all limits are kept, and which one is nearest; start and goal are met at equality and are no news.
+std::string limits_text(const std::vector<LimitCheck>& checks) {
+  const double margin = -100.0 * checks.front().excess;
+  for (const LimitCheck& k : checks) {
+    if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
+      continue;
+    return fmt::format(
+        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} "
+        "{} at "
+        "{:.2f} s\n",
+        margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time);
+  }
+  return {};
+}
+
+/// What a reader must know before the energies are believed.
+std::string reservations_text(const CraneModel& model, const MotionEnergy& energy) {
+  std::string text;
+  if (energy.moving_share_outside_data > 0.02) {
+    text += fmt::format(
+        "  note                 {:.0f} % of the moving time lies outside the data; least certain "
+        "pressure +-{:.1f} bar (one standard deviation)\n",
+        100.0 * energy.moving_share_outside_data, energy.largest_pressure_std / units::kBar);
+  }
+  if (const std::string why = constant_pressure_note(model); !why.empty())
+    text += "  note                 " + why + "\n";
+  if (energy.impossible()) {
+    text +=
+        "  WARNING              the pump delivers less energy than machine and payload gain: "
+        "working "
+        "pressures\n"
+        "                       are extrapolated to loads beyond the data; fit the model to logs "
+        "with "
+        "such loads\n";
+  }
+  return text;
+}
+
+std::string starts_text(const OptimizeResult& r) {
+  int usable = 0, distinct = 0;
+  for (const StartResult& s : r.starts) {
+    usable += s.motion.size() > 1 && s.excess <= 1e-4;
+    distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
+  }
+  return fmt::format(
+      "  starts               {} tried, {} kept all limits, {} distinct motions; {:.1f} s\n",
+      r.starts.size(), usable, distinct, r.solve_s);
+}
+
 }  // namespace
 
 std::string against_seeds(const OptimizeResult& r) {
@@ -138,88 +241,10 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
 
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
                            const OptimizeResult& r) {
-  std::string text;
-  const auto add = [&](const std::string& line) { text += line + "\n"; };
-  if (r.motion.size() < 2) {
-    const bool said = r.message.find(to_string(r.status)) != std::string::npos;
-    add(said ? r.message : fmt::format("{}: {}", to_string(r.status), r.message));
-    for (const StartResult& s : r.starts) add(fmt::format("  {:<34} {}", s.seed, s.message));
-    return text;
-  }
-  add(fmt::format("{}: {}", to_string(r.status), problem.name));
-  add(fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}", r.energy.total / 1e3,
-                  r.duration, r.starts[static_cast<std::size_t>(r.best_start)].seed));
-  const auto against = [&](const char* what, double energy, const std::string& name) {
-    if (energy > 0.0)
-      add(fmt::format(
-          "  {:<20} {:9.2f} kJ   the optimum {} {:.1f} %{}{}", what, energy / 1e3,
-          r.energy.total <= energy ? "saves" : "takes more (energy is not its only cost):",
-          100.0 * std::abs(1.0 - r.energy.total / energy), name.empty() ? "" : "; ", name));
-    else
-      add(fmt::format("  {:<20}         -      it breaks a limit in this time", what));
-  };
-  against("straight, nearest", r.nearest_line_energy, "");
-  against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
-  against("best seed path", r.best_seed_energy, r.best_seed_name);
-  if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
-  if (r.unlimited_energy > 0.0) {
-    add(fmt::format(
-        "  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly",
-        r.unlimited_energy / 1e3));
-  }
-  if (r.lower_bound > 0.0) {
-    const std::string which =
-        r.lower_bound_time > 0.0 ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
-                                 : "of motions of any duration";
-    add(fmt::format("  estimated bound      {:9.2f} kJ   {}: {:.1f} % below this one",
-                    r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total)));
-  } else if (!r.bound_note.empty()) {
-    add("  estimated bound           none   " + r.bound_note);
-  }
-  add(fmt::format("  potential energy     {:+9.2f} kJ   end minus start",
-                  r.energy.potential_difference / 1e3));
-  add(fmt::format("  {:<14} {:>12} {:>14}", "cylinder", "useful [kJ]", "throttled [kJ]"));
-  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
-    add(fmt::format("  {:<14} {:>12.2f} {:>14.2f}", model.machine.cylinders[i].name,
-                    r.energy.useful[i] / 1e3, r.energy.throttling[i] / 1e3));
-  }
-  const LimitCheck& c = r.checks.front();
-  const double margin = -100.0 * c.excess;
-  for (const LimitCheck& k : r.checks) {
-    if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
-      continue;
-    add(fmt::format(
-        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} "
-        "{} at "
-        "{:.2f} s",
-        margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time));
-    break;
-  }
-  if (r.energy.moving_share_outside_data > 0.02) {
-    add(fmt::format(
-        "  note                 {:.0f} % of the moving time lies outside the data; least certain "
-        "pressure +-{:.1f} bar (one standard deviation)",
-        100.0 * r.energy.moving_share_outside_data, r.energy.largest_pressure_std / units::kBar));
-  }
-  if (const std::string why = constant_pressure_note(model); !why.empty())
-    add("  note                 " + why);
-  if (r.energy.impossible()) {
-    add("  WARNING              the pump delivers less energy than machine and payload gain: "
-        "working "
-        "pressures\n"
-        "                       are extrapolated to loads beyond the data; fit the model to logs "
-        "with "
-        "such loads");
-  }
-  int usable = 0, distinct = 0;
-  for (const StartResult& s : r.starts) {
-    usable += s.motion.size() > 1 && s.excess <= 1e-4;
-    distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
-  }
-  add(fmt::format(
-      "  starts               {} tried, {} kept all limits, {} distinct motions; {:.1f} s",
-      r.starts.size(), usable, distinct, r.solve_s));
-  return text;
+  if (r.motion.size() < 2) return no_motion_text(r);
+  return fmt::format("{}: {}\n", to_string(r.status), problem.name) + energies_text(r) +
+         cylinders_text(model.machine, r.energy) + limits_text(r.checks) +
+         reservations_text(model, r.energy) + starts_text(r);
 }
 
 }  // namespace sparflow

@@ -153,7 +153,7 @@ const Machine& arm() {
   return machine;
 }
 const HiddenCase& plain_case() {
-  static const HiddenCase c = hidden_case(arm(), {}, 3, 60.0);
+  static const HiddenCase c = hidden_case(arm(), {}, {3, 60.0});
   return c;
 }
 CraneModel crane_model() {

@@ -38,7 +38,7 @@ struct LossyCrane {
     model.pumps[0].standby = kStandby;
     const EffectAt place = parse_effect("line_loss:extension", machine);
     loss = {place.effect, place.at, {kLoss, 0.0, 0.0}, {}, {}};
-    Log log = hidden_case(machine, {}, seed, 60.0).train;
+    Log log = hidden_case(machine, {}, {seed, 60.0}).train;
     signals = make_signals(machine, log);
     VectorXd& pump = channel(log, "p_" + machine.pumps[0].name).values;
     const MachineSeries series = make_series(model, signals);
@@ -159,7 +159,7 @@ TEST(PumpLeaders, ADiagnosisReportsTheErrorWithTheLeadersWithoutTheEffect) {
   const LossyCrane& crane = lossy();
   DiagnoseOptions options;
   options.candidates = pump_effects(crane.machine);
-  const Diagnosis d = diagnose_signals(crane.model, {crane.signals}, {}, options);
+  const Diagnosis d = diagnose_signals(crane.model, {{crane.signals}}, options);
   ASSERT_EQ(d.effects.size(), 1u);
   const Evidence plain = collect_evidence(crane.model, {crane.signals});
   const EffectFit without = without_effects(plain);

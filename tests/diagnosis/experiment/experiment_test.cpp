@@ -63,7 +63,9 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
   for (const char* name : {"loader_crane", "excavator", "swing_crane_two_pumps"}) {
     const Machine machine = drawn_machine(name);
     CraneModel model = CraneModel::untrained(machine);
-    for (const MotionRecipe& recipe : motion_menu(machine, 500.0)) {
+    const std::vector<MotionRecipe> menu = motion_menu(machine, 500.0);
+    std::size_t positions = 0, commands = 0;
+    for (const MotionRecipe& recipe : menu) {
       Log log;
       try {
         log = synthesise_motion(model, recipe, 0.02, 30.0);
@@ -72,15 +74,20 @@ TEST(MotionMenu, EveryMotionStaysInsideTheMachine) {
       }
       for (const Channel& c : log.channels) {
         if (c.role == Role::kJointPosition) {
+          ++positions;
           const Joint& j = machine.joints[static_cast<std::size_t>(c.index)];
           EXPECT_GE(c.values.minCoeff(), j.position.lo) << name << ": " << recipe.words;
           EXPECT_LE(c.values.maxCoeff(), j.position.hi) << name << ": " << recipe.words;
         }
         if (c.role == Role::kCommand) {
+          ++commands;
           EXPECT_LE(c.values.cwiseAbs().maxCoeff(), 1.0) << name << ": " << recipe.words;
         }
       }
     }
+    // the linkages of at least nine in ten motions can take every pose
+    EXPECT_GE(10 * positions, 9 * menu.size() * machine.joints.size()) << name;
+    EXPECT_GE(10 * commands, 9 * menu.size() * machine.cylinders.size()) << name;
   }
 }
 
@@ -88,12 +95,12 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
   const Case c(one_speed_log());
   const std::vector<EffectAt> rival = {parse_effect("viscous_friction:arm", c.model.machine)};
   const BetterMotion small =
-      better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {400.0}), rival);
+      better_motion(c.model, c.evidence, c.fit, {applied("coulomb_friction:arm", {400.0}), rival});
   EXPECT_THAT(small.words, HasSubstr("arm"));
   EXPECT_GT(small.nats_per_minute, 1.5 * small.nats_here);
   EXPECT_THAT(small.apart, SizeIs(1));
   const BetterMotion large =
-      better_motion(c.model, c.evidence, c.fit, applied("coulomb_friction:arm", {800.0}), rival);
+      better_motion(c.model, c.evidence, c.fit, {applied("coulomb_friction:arm", {800.0}), rival});
   EXPECT_GT(large.nats_per_minute, small.nats_per_minute)
       << "a larger effect is distinguished sooner";
 }
@@ -101,9 +108,9 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
 TEST(BetterMotion, NothingIsAdvisedWhereNoMotionHelps) {
   // on the only joint a mass at the tip and a moment of the link are equivalent
   const Case c(one_speed_log());
-  const BetterMotion m =
-      better_motion(c.model, c.evidence, c.fit, applied("payload_error", {60.0, 0.0}),
-                    {parse_effect("unmodelled_mass:arm", c.model.machine)});
+  const BetterMotion m = better_motion(c.model, c.evidence, c.fit,
+                                       {applied("payload_error", {60.0, 0.0}),
+                                        {parse_effect("unmodelled_mass:arm", c.model.machine)}});
   EXPECT_THAT(m.words, IsEmpty());
 }
 

@@ -33,10 +33,12 @@ const CraneModel& ignorant_model() {
   return model;
 }
 
+ExtendLogs logs_with_friction() {
+  return {{arm_log_with_friction(kFriction, 1)}, {}, {arm_log_with_friction(kFriction, 2)}};
+}
+
 const ExtendResult& extended() {
-  static const ExtendResult result =
-      extend(ignorant_model(), {coulomb()}, {arm_log_with_friction(kFriction, 1)},
-             {arm_log_with_friction(kFriction, 2)});
+  static const ExtendResult result = extend(ignorant_model(), {coulomb()}, logs_with_friction());
   return result;
 }
 
@@ -137,7 +139,7 @@ TEST(Extend, ModelKeepsEffectAndRecordAndSurvivesItsFile) {
 
 TEST(Extend, WithoutTestLogsMotionsAreHeldOut) {
   const ExtendResult r =
-      extend(ignorant_model(), {coulomb()}, {arm_log_with_friction(kFriction, 1)}, {});
+      extend(ignorant_model(), {coulomb()}, {{arm_log_with_friction(kFriction, 1)}});
   ASSERT_THAT(r.steps, SizeIs(1));
   EXPECT_EQ(r.steps[0].judged_on, "held-out motions");
   // fewer samples than the log has: only every fourth motion counts
@@ -146,18 +148,17 @@ TEST(Extend, WithoutTestLogsMotionsAreHeldOut) {
 }
 
 TEST(Extend, WithReferencesWhatWasLearnedStays) {
-  ExtendOptions options;
-  options.references = {arm_log(0.8, 3)};
-  const CraneModel model = fit(arm_machine(), options.references).model;
-  const ExtendResult r = extend(model, {coulomb()}, {arm_log_with_friction(kFriction, 1)},
-                                {arm_log_with_friction(kFriction, 2)}, options);
+  ExtendLogs logs = logs_with_friction();
+  logs.references = {arm_log(0.8, 3)};
+  const CraneModel model = fit(arm_machine(), logs.references).model;
+  const ExtendResult r = extend(model, {coulomb()}, logs);
   EXPECT_NEAR(r.model.effects[0].values[0], kFriction, 0.03 * kFriction);
   EXPECT_EQ(r.model.cylinders[0].margin, model.cylinders[0].margin);
   EXPECT_EQ(r.model.cylinders[0].extend.mean(1e-3, 5e4), model.cylinders[0].extend.mean(1e-3, 5e4));
 }
 
 TEST(Extend, EffectTheModelHasIsRefused) {
-  EXPECT_THROW(extend(extended().model, {coulomb()}, {arm_log_with_friction(kFriction, 1)}, {}),
+  EXPECT_THROW(extend(extended().model, {coulomb()}, {{arm_log_with_friction(kFriction, 1)}}),
                InputError);
 }
 
@@ -184,9 +185,7 @@ TEST(Extend, TableIsOneScreenWithUnits) {
 }
 
 TEST(TakeBack, RestoresTheErrorAndKeepsTheRecord) {
-  const ExtendResult r =
-      take_back(extended().model, coulomb(), {arm_log_with_friction(kFriction, 1)},
-                {arm_log_with_friction(kFriction, 2)});
+  const ExtendResult r = take_back(extended().model, coulomb(), logs_with_friction());
   EXPECT_THAT(r.model.effects, IsEmpty());
   ASSERT_THAT(r.model.steps, SizeIs(2));
   EXPECT_EQ(r.model.steps[1].removed, "coulomb_friction:arm");
@@ -197,13 +196,12 @@ TEST(TakeBack, RestoresTheErrorAndKeepsTheRecord) {
 }
 
 TEST(TakeBack, EffectTheModelDoesNotHaveIsRefused) {
-  EXPECT_THROW(take_back(ignorant_model(), coulomb(), {arm_log_with_friction(kFriction, 1)}, {}),
+  EXPECT_THROW(take_back(ignorant_model(), coulomb(), {{arm_log_with_friction(kFriction, 1)}}),
                InputError);
 }
 
 TEST(Improve, AddsTheFrictionAndStops) {
-  const ExtendResult r = improve(ignorant_model(), {arm_log_with_friction(kFriction, 1)}, {},
-                                 {arm_log_with_friction(kFriction, 2)});
+  const ExtendResult r = improve(ignorant_model(), logs_with_friction());
   ASSERT_FALSE(r.steps.empty());
   EXPECT_THAT(r.steps[0].added, HasSubstr("friction:arm"));
   EXPECT_LT(force_error(r.steps.back().after), 0.3 * kFriction);
@@ -221,7 +219,7 @@ TEST(Improve, AddsNothingWhereNothingIsMissing) {
   // the log's positions are exact, so a valve effect would explain rounding only
   for (const char* key : {"coulomb_friction:arm", "viscous_friction:arm", "unmodelled_mass:arm"})
     options.diagnose.candidates.push_back(parse_effect(key, model.machine));
-  const ExtendResult r = improve(model, {arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)}, options);
+  const ExtendResult r = improve(model, {{arm_log(0.8, 4)}, {}, {arm_log(0.8, 5)}}, options);
   EXPECT_THAT(r.steps, IsEmpty());
   EXPECT_THAT(r.model.effects, IsEmpty());
   EXPECT_THAT(r.stopped_because, HasSubstr("nothing more is missing"));
@@ -238,7 +236,7 @@ TEST(Diagnose, ReportsTheValuesThatExtendPutsIntoTheModel) {
   ASSERT_THAT(d.effects, SizeIs(2));
   std::vector<EffectAt> found;
   for (const DiagnosedEffect& e : d.effects) found.push_back(e.effect);
-  const ExtendResult r = extend(model, found, {log}, {});
+  const ExtendResult r = extend(model, found, {{log}});
   ASSERT_THAT(r.model.effects, SizeIs(2));
   for (std::size_t i = 0; i < 2; ++i) {
     const AppliedEffect& a = d.effects[i].applied;
@@ -279,8 +277,8 @@ TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {
   // the test log is of a machine without friction, so an effect must not be kept whatever the diagnosis names
   ExtendOptions options;
   options.diagnose.candidates = {coulomb()};
-  const ExtendResult r = improve(ignorant_model(), {arm_log_with_friction(kFriction, 1)}, {},
-                                 {arm_log(0.8, 2)}, options);
+  const ExtendResult r = improve(
+      ignorant_model(), {{arm_log_with_friction(kFriction, 1)}, {}, {arm_log(0.8, 2)}}, options);
   EXPECT_THAT(r.steps, IsEmpty());
   EXPECT_THAT(r.model.effects, IsEmpty());
   ASSERT_THAT(r.rejected, SizeIs(1));
@@ -294,8 +292,7 @@ TEST(Extend, BeforeIsLearnedFromTheSameLogs) {
   CraneModel other = ignorant_model();
   other.cylinders[0].margin += 20e5;
   other.data.clear();
-  const ExtendResult r = extend(other, {coulomb()}, {arm_log_with_friction(kFriction, 1)},
-                                {arm_log_with_friction(kFriction, 2)});
+  const ExtendResult r = extend(other, {coulomb()}, logs_with_friction());
   EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("not learned from these logs")));
   const double before = r.steps[0].before.find("pump", "main")->rmse;
   EXPECT_LT(before, 5e5);  // [Pa] not the 20 bar of the other machine's margin

@@ -141,7 +141,7 @@ TEST_P(RealCraneImproved, NamesMassAndDryFrictionAndPredictsTheRunLeftOut) {
   const CraneModel model = fit(machine, logs).model;
   ExtendOptions options;
   options.max_steps = 6;  // the effects that are checked, and a few more
-  const ExtendResult r = improve(model, logs, {}, test, options);
+  const ExtendResult r = improve(model, {logs, {}, test}, options);
   expect_published(r);
   const double before = r.steps.front().before.find("force", "main")->rmse;
   const double after = r.steps.back().after.find("force", "main")->rmse;
@@ -174,7 +174,7 @@ TEST_F(RealCrane, ValveLogsShowTheDeadBand) {
   for (const EffectAt& c : candidates(machine)) {
     if (c.effect->info().stage == EffectStage::kFlow) options.diagnose.candidates.push_back(c);
   }
-  const ExtendResult r = improve(model, valve, {}, {logs[0]}, options);
+  const ExtendResult r = improve(model, {valve, {}, {logs[0]}}, options);
   const AppliedEffect* band = effect_of(r.model, "valve_deadband:main");
   ASSERT_NE(band, nullptr) << steps_text(r);
   // Authors: 0.071 up, 0.126 down, read off by eye from slow ramps
@@ -187,7 +187,7 @@ TEST(RealDrive, FrictionAndInertiaAsPublished) {
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no log of the drive beside the source tree";
   const Machine machine = load_machine(kRealLogs + "machines/emps.yaml");
   const std::vector<Log> logs = {load_log(path, machine)};
-  const ExtendResult r = improve(fit(machine, logs).model, logs, {}, {});
+  const ExtendResult r = improve(fit(machine, logs).model, {logs});
   std::vector<std::string> keys;
   for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
   ASSERT_THAT(keys, testing::UnorderedElementsAre("inertia", "viscous_friction:axis",

@@ -62,7 +62,7 @@ TEST_P(HiddenByALaw, IsFoundWithAndWithoutAReference) {
   const HiddenLaw& law = GetParam();
   const Machine machine = drawn_machine("loader_crane");
   const HiddenCase logs =
-      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, kLogSeed, kLogSeconds);
+      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, {kLogSeed, kLogSeconds});
   FitOptions options;
   options.hold_out_every = 0;
   const auto learned = [&](const Log& log) { return fit(machine, {log}, {}, options).model; };
@@ -81,13 +81,13 @@ TEST_P(HiddenByALaw, IsAddedFirst) {
   const HiddenLaw& law = GetParam();
   const Machine machine = drawn_machine("loader_crane");
   const HiddenCase logs =
-      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, kLogSeed, kLogSeconds);
+      hidden_case(machine, {{law.id, law.at, 1.0, law.law}}, {kLogSeed, kLogSeconds});
   FitOptions fit_options;
   fit_options.hold_out_every = 0;
   const CraneModel healthy = fit(machine, {logs.reference}, {}, fit_options).model;
   ExtendOptions options;
   options.max_steps = 1;
-  const ExtendResult r = improve(healthy, {logs.train}, {logs.reference}, {}, options);
+  const ExtendResult r = improve(healthy, {{logs.train}, {logs.reference}}, options);
   ASSERT_EQ(r.steps.size(), 1u) << r.stopped_because;
   EXPECT_EQ(r.steps[0].added,
             *law.at == '\0' ? std::string(law.id) : std::string(law.id) + ":" + law.at);
@@ -99,15 +99,13 @@ TEST(OilTemperatureByALaw, DoesNoHarmWhereAValveActsAgainstTheLoad) {
   const Machine machine = drawn_machine("loader_crane");
   for (const int law : {0, 1, 2}) {
     SCOPED_TRACE(law);
-    const HiddenCase logs =
-        hidden_case(machine, {{"oil_temperature", "", 1.0, law}}, kLogSeed, kLogSeconds, {}, 120.0);
+    const HiddenCase logs = hidden_case(machine, {{"oil_temperature", "", 1.0, law}},
+                                        {kLogSeed, kLogSeconds, {}, 120.0});
     FitOptions fit_options;
     fit_options.hold_out_every = 0;
     const CraneModel healthy = fit(machine, {logs.reference}, {}, fit_options).model;
-    ExtendOptions options;
-    options.references = {logs.reference};
-    const ExtendResult r = extend(healthy, {parse_effect("oil_temperature", machine)}, {logs.train},
-                                  {logs.test}, options);
+    const ExtendResult r = extend(healthy, {parse_effect("oil_temperature", machine)},
+                                  {{logs.train}, {logs.reference}, {logs.test}});
     const ErrorChange& change = r.steps.front().change;
     // a supply pressure that a valve sets does not depend on the return line, so the error must not change
     EXPECT_LT(change.overall, 1.01);

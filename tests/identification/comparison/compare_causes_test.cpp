@@ -144,14 +144,18 @@ TEST(Regimes, IntervalsContainTheErrorAndTheWrongPayloadIsFound) {
   }
   const CompareResult r = compare(arm_model(), {log});
   double light = 0.0, heavy = 0.0;
+  std::size_t intervals = 0;
   for (const RegimeError& e : r.regimes) {
     if (std::isfinite(e.rmse_ci95.lo)) {
+      ++intervals;
       EXPECT_LE(e.rmse_ci95.lo, e.rmse * (1.0 + 1e-9));
       EXPECT_GE(e.rmse_ci95.hi, e.rmse * (1.0 - 1e-9));
     }
     if (e.stage != "pressure" || e.regime != "extend" || e.factor != "payload_kg") continue;
     (e.level == "200" ? heavy : light) = e.rmse;
   }
+  // where a regime has too few motions there is none
+  EXPECT_GE(2 * intervals, r.regimes.size());
   EXPECT_NEAR(light, kNoise, 0.1);
   EXPECT_NEAR(heavy, 4.0, 0.2);
 }
@@ -173,6 +177,18 @@ TEST(CompareJson, HasTheCauses) {
   EXPECT_THAT(table, HasSubstr("stage at fault"));
   EXPECT_THAT(table, HasSubstr("p_main is stuck"));
   EXPECT_THAT(table, HasSubstr("systematic errors"));
+}
+
+/// A load of 20 kN too much, judged so strictly that no test can be significant.
+TEST(CompareTable, DoesNotDenyAnErrorThatTheMotionsAreTooFewToDecide) {
+  Log log = heavier(20e3);
+  ResidualTestOptions strict;
+  strict.alarm = 5e-4;  // 999 flips allow no p-value below 0.001, so no number of blocks suffices
+  CompareOptions options;
+  options.tests = strict;
+  const std::string table = compare_table(compare(arm_model(), {log}, options));
+  EXPECT_THAT(table, HasSubstr("too few to decide whether"));
+  EXPECT_THAT(table, testing::Not(HasSubstr("none: no significant")));
 }
 
 }  // namespace

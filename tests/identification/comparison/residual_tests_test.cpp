@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -104,11 +105,35 @@ TEST(ResidualTests, TooFewBlocksAreNotTested) {
   EXPECT_TRUE(test_residuals(parts, 5).tests.empty());
 }
 
+/// Ten times the noise on average, half of it in one of six blocks: T is 30 / sqrt(15^2 + 5^2 + 4^2 + 3^2 + 2^2 + 1) = 1.8
+/// though all blocks agree, which one of 14 tests exceeds by chance.
+TEST(ResidualTests, WhatTooFewBlocksCannotDecideIsToldAndNotDenied) {
+  std::vector<ComparedPart> parts = ar_parts(5, 10.0);
+  const std::vector<int> last = {14, 19, 23, 26, 28, 29};
+  for (ComparedPart& part : parts) {
+    for (int& b : part.block)
+      b = static_cast<int>(std::lower_bound(last.begin(), last.end(), b) - last.begin());
+  }
+  const ResidualTests few = test_residuals(parts, 6);
+  EXPECT_GT(few.smallest_p(), few.alarm);
+  ASSERT_NE(few.undecided(), nullptr);
+  EXPECT_EQ(few.undecided()->depends_on, "");
+  EXPECT_GT(few.undecided()->share_explained, 0.98);  // 1 - 1 / (1 + 10^2)
+  EXPECT_THAT(few.undecided_sentence(),
+              testing::StartsWith("6 blocks of motion are too few to decide whether the working "
+                                  "pressure of arm is predicted 10"));
+  const ResidualTests enough = test_residuals(ar_parts(5, 10.0), 30);
+  EXPECT_LE(enough.smallest_p(), enough.alarm);
+  EXPECT_EQ(enough.undecided(), nullptr);
+  EXPECT_EQ(enough.undecided_sentence(), "");
+}
+
 TEST(ResidualTests, FlipsWithBlocksOfOneSignReachTheSmallestPossibleValue) {
   const Eigen::MatrixXd sums = Eigen::MatrixXd::Ones(20, 1);
   const Eigen::MatrixXd judged = max_t_sign_flip(sums, 999, 1);
   EXPECT_DOUBLE_EQ(judged(0, 0), std::sqrt(20.0));
   EXPECT_LE(judged(0, 1), 0.002);  // 2^-19 of all flips are as large: none or one of 999
+  EXPECT_EQ(judged(0, 2), judged(0, 1));
   // A test of zeros only is never significant.
   EXPECT_EQ(max_t_sign_flip(Eigen::MatrixXd::Zero(20, 1), 99, 1)(0, 1), 1.0);
 }

@@ -96,6 +96,16 @@ TEST(BadData, NoiseOfAllPressuresIsAttributedToTheMachine) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
+TEST(BadData, APositionThatNeverChangesIsStuckWhereverACommandIsFirm) {
+  Log log = noisy_arm();
+  channel(log, "q_arm").values.setConstant(0.3);
+  Eigen::VectorXd& u = channel(log, "u_arm").values;
+  u *= 0.2 / u.cwiseAbs().maxCoeff();  // outside any dead band, and no more
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), testing::Contains("q_arm stuck"));
+  u *= 0.1 / 0.2;  // a dead band may explain it
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), testing::Not(testing::Contains("q_arm stuck")));
+}
+
 TEST(BadData, AStuckChannelIsFoundWithItsStretch) {
   for (const char* signal : {"pA_arm", "pB_arm", "p_main", "q_arm"}) {
     Log log = noisy_arm();

@@ -115,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(BothSides, FindBranchCorner, ::testing::Values(1, -1));
 
 TEST(Fit, IdentifiesCornersBetweenValveAndStaticBranch) {
   const Machine machine = testing_support::drawn_machine("loader_crane");
-  const auto logs = testing_support::hidden_case(machine, {}, 4, 120.0, {}, 60.0);
+  const auto logs = testing_support::hidden_case(machine, {}, {4, 120.0, {}, 60.0});
   const FitResult fitted = fit(machine, {logs.train}, {logs.test});
   int corners = 0;
   for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {

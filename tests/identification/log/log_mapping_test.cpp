@@ -61,9 +61,7 @@ TEST(Expression, Arithmetic) {
                                                    {"cos(pi)", -1.0},
                                                    {"min(3, 2)", 2.0},
                                                    {"max(3, 2)", 3.0},
-                                                   {"pi", pi},
-                                                   {"2 rad", NAN}}) {
-    if (std::isnan(expected)) continue;
+                                                   {"pi", pi}}) {
     EXPECT_NEAR(value_of(expression), expected, 1e-15 * std::abs(expected)) << expression;
   }
 }

@@ -59,7 +59,7 @@ double rmse(const CompareResult& r, const std::string& stage, const std::string&
   return score == nullptr ? std::nan("") : score->rmse;
 }
 
-TEST(SetOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
+TEST(WithOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
   const Machine machine = testing_support::arm_machine();
   MachineSeries series;
   series.cylinders.resize(2);
@@ -67,15 +67,16 @@ TEST(SetOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
       (Eigen::VectorXd(6) << -1.0, -0.3, -0.05, 0.05, 0.3, 1.0).finished();
   AppliedEffect band = typical("valve_deadband:arm", machine);
   band.values = {0.1, 0.2, 1.0};  // extending, retracting; the gain does not matter here
-  set_openings({band}, series);
-  const Eigen::VectorXd& opening = series.cylinders[0].opening;
+  const MachineSeries banded = with_openings({band}, series);
+  EXPECT_EQ(series.cylinders[0].opening.size(), 0) << "the series given stays as it is";
+  const Eigen::VectorXd& opening = banded.cylinders[0].opening;
   EXPECT_NEAR(opening[0], -0.8, 1e-12);
   EXPECT_NEAR(opening[1], -0.1, 1e-12);
   EXPECT_EQ(opening[2], 0.0);
   EXPECT_EQ(opening[3], 0.0);
   EXPECT_NEAR(opening[4], 0.2, 1e-12);
   EXPECT_NEAR(opening[5], 0.9, 1e-12);
-  EXPECT_EQ(series.cylinders[1].opening, series.cylinders[1].command) << "another cylinder's valve";
+  EXPECT_EQ(banded.cylinders[1].opening, series.cylinders[1].command) << "another cylinder's valve";
 }
 
 TEST(ApplyEffects, ForcesAreTheExactChains) {

@@ -289,6 +289,7 @@ TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
 }
 
 TEST(ForceEffects, ZeroParametersChangeNothing) {
+  int machines_changed = 0;
   for (const Machine& machine : test_support::effect_machines()) {
     Random random(5);
     const VectorXd x = test_support::usable_state(machine, random);
@@ -303,12 +304,14 @@ TEST(ForceEffects, ZeroParametersChangeNothing) {
       for (const int at : e->places(machine)) {
         EXPECT_EQ(added(*e, s, at, p).norm(), 0.0) << e->info().id;
         if (!e->changes_machine()) continue;
+        ++machines_changed;
         const VectorXd same =
             changed_force(machine, {e.get(), at, p, {}, {}}, x.head(machine.joint_count()), 250.0);
         EXPECT_LT((same - force).norm(), 1e-9 * (1.0 + force.norm())) << e->info().id;
       }
     }
   }
+  EXPECT_GT(machines_changed, 10) << "masses, payload, angles, tilt on several machines";
 }
 
 /// Columns times parameters equal the law, at sizes where the law is nearly linear.
