@@ -11,7 +11,9 @@
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/reference_comparison.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
+#include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 
@@ -77,13 +79,13 @@ bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& b
 }
 
 /// Removes the channels whose jumps known physics explains.
-void keep_sensor_faults(const Diagnosis& d, const std::vector<std::size_t>& log_of,
-                        std::vector<BadChannel>& bad) {
+void keep_sensor_faults(const Diagnosis& d, std::size_t log, std::vector<BadChannel>& bad) {
+  if (bad.empty()) return;
   const EffectFit fit = fit_without(d, d.search.found.size());
   std::vector<BadChannel> kept;
   kept.reserve(bad.size());
   for (std::size_t i = 0; i < bad.size(); ++i) {
-    if (!follows_steps(d, fit, bad[i], log_of[i])) kept.push_back(std::move(bad[i]));
+    if (!follows_steps(d, fit, bad[i], log)) kept.push_back(std::move(bad[i]));
   }
   bad = std::move(kept);
 }
@@ -125,6 +127,7 @@ void set_joint_estimates(const CraneModel& model, const std::vector<MachineSigna
   for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
   EstimateOptions options;
   options.evidence = evidence;
+  options.differences = !references.empty();
   const EffectEstimate all = estimate_effects(
       model, wanted, {suspects, references, {}, effects_in_references(model, references)}, {},
       options);
@@ -173,7 +176,9 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   std::vector<EffectAt> candidates_here = options.candidates;
   if (candidates_here.empty()) {
     for (const EffectAt& c : candidates(model.machine)) {
+      // with references, another value of an effect that the model has is a change, too
       const bool known =
+          references.empty() &&
           std::any_of(model.effects.begin(), model.effects.end(),
                       [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
       if (!known) candidates_here.push_back(c);
@@ -194,6 +199,10 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
   for (const ResidualStructure& l : left) {
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
+    if (!exceeds_references(d, l.channel)) {
+      d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
+      continue;
+    }
     const double share = unmodelled_share(d, l);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
     if (share <
@@ -205,7 +214,11 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     unmodelled.push_back(l);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
-    d.unexplained = describe_unnamed(d);
+    Unexplained unnamed = describe_unnamed(d);
+    if (exceeds_references(d, unnamed.channel))
+      d.unexplained = std::move(unnamed);
+    else
+      d.shared_structure.push_back(std::move(unnamed));
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
     d.unexplained = describe_isolated_event(d, options.isolated_event);
@@ -251,35 +264,43 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
                    const SearchProgress& progress) {
   if (logs.empty())
     throw InputError({}, "logs", "no log to diagnose: give at least one with --log");
-  std::vector<MachineSignals> suspects, pinned;
-  std::vector<BadChannel> bad;
-  std::vector<std::size_t> log_of;  // log of each bad channel
+  std::vector<Log> usable;
+  std::vector<std::vector<BadChannel>> jumps;  // of each log
+  std::vector<BadChannel> set_aside;
   for (const Log& log : logs) {
-    suspects.push_back(make_signals(model.machine, log, options.signals));
-    if (!options.check_data) continue;
-    for (BadChannel& b : find_bad_channels(model.machine, log, suspects.back(), options.bad_data))
-      bad.push_back(std::move(b));
-    log_of.resize(bad.size(), suspects.size() - 1);
+    jumps.emplace_back();
+    std::vector<BadChannel> faults;
+    if (options.check_data) {
+      const MachineSignals signals = make_signals(model.machine, log, options.signals);
+      // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
+      // them, so the diagnosis runs with them first.
+      for (BadChannel& b : find_bad_channels(model.machine, log, signals, options.bad_data))
+        (b.kind == BadDataKind::kJumping ? jumps.back() : faults).push_back(std::move(b));
+    }
+    usable.push_back(without_bad_data(log, faults));
+    set_aside.insert(set_aside.end(), faults.begin(), faults.end());
   }
+  std::vector<MachineSignals> pinned;
   for (const Log& log : references)
     pinned.push_back(make_signals(model.machine, log, options.signals));
-  // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
-  // them, so the diagnosis runs first; with any other fault the data cannot be diagnosed.
-  const bool surely_bad = std::any_of(
-      bad.begin(), bad.end(), [](const BadChannel& b) { return b.kind != BadDataKind::kJumping; });
-  if (!surely_bad) {
-    Diagnosis d = diagnose_signals(model, suspects, pinned, options, progress);
-    if (!bad.empty()) keep_sensor_faults(d, log_of, bad);
-    if (!bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
-    d.bad = std::move(bad);
-    return d;
+  const auto diagnosed = [&] {
+    std::vector<MachineSignals> suspects;
+    for (const Log& log : usable)
+      suspects.push_back(make_signals(model.machine, log, options.signals));
+    return pinned.empty() ? diagnose_signals(model, suspects, pinned, options, progress)
+                          : diagnose_against_references(model, suspects, pinned, options, progress);
+  };
+  Diagnosis d = diagnosed();
+  bool again = false;
+  for (std::size_t log = 0; log < usable.size(); ++log) {
+    keep_sensor_faults(d, log, jumps[log]);
+    usable[log] = without_bad_data(std::move(usable[log]), jumps[log]);
+    again = again || !jumps[log].empty();
+    set_aside.insert(set_aside.end(), jumps[log].begin(), jumps[log].end());
   }
-  Diagnosis d;
-  d.thresholds = options.verdict;
-  d.verdict = Verdict::kBadData;
-  d.evidence = collect_evidence(model, suspects, pinned, nullptr, options.evidence);
-  d.notes = d.evidence.notes;
-  d.bad = std::move(bad);
+  if (again) d = diagnosed();
+  d.set_aside = std::move(set_aside);
+  if (!d.set_aside.empty() && d.evidence.channels.empty()) d.verdict = Verdict::kBadData;
   return d;
 }
 
