@@ -227,7 +227,10 @@ void judge_answer(const Diagnosis& d, const std::vector<HiddenTruth>& hidden, Bl
   run.answer += fmt::format("{}", fmt::join(answer, " + "));
   if (d.verdict == Verdict::kUnknown && d.unexplained)
     run.answer += "unknown: " + d.unexplained->sentence;
-  if (d.verdict == Verdict::kBadData) run.answer += bad_channel_sentence(d.bad.front());
+  for (const BadChannel& b : d.set_aside) {
+    run.answer += " set aside: " + bad_channel_sentence(b);
+    for (const HiddenTruth& t : hidden) run.broken_found = run.broken_found || t.at == b.channel;
+  }
   if (d.unmodelled_share > 0.0) run.answer += fmt::format(" (left {:.2f})", d.unmodelled_share);
   for (const DiagnosedEffect& e : d.effects) {
     for (const auto& [rival, worse] : e.rivals) run.answer += fmt::format(" ~{}", rival);
@@ -342,7 +345,7 @@ void judge_extended(const Diagnosis& d, const Crane& crane, BlindRun& run) {
 bool BlindRun::good() const {
   if (asked.row == "none") return verdict == "none";
   if (asked.row == "outside") return verdict == "unknown";
-  if (asked.row == "fault") return verdict == "bad_data";
+  if (asked.row == "fault") return broken_found && verdict != "missing" && verdict != "unknown";
   if (asked.row == "pairs") return exact;
   return top;
 }

@@ -39,6 +39,7 @@ struct BlindRun {
   std::string details;                    ///< text of the diagnosis, and the true parameters
   bool top = false;                       ///< the first named effect has the true id and place
   bool in_set = false;                    ///< a true effect is named or is a rival of a named one
+  bool broken_found = false;              ///< the channel of the broken sensor was set aside
   bool all_found = false, exact = false;  ///< all true effects are named; and no others
   double set_size = 1.0;  ///< number of named effects and rivals for each true effect
   double seconds = 0.0;   ///< [s] wall time of the diagnosis

@@ -137,14 +137,16 @@ bool is_nonlinear_in_parameter(const Effect& effect) {
 }
 
 Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
-                                  const EvidenceChannel& channel,
-                                  std::span<const double> about) const {
+                                  const EvidenceChannel& channel, std::span<const double> about,
+                                  ActingLogs where) const {
+  const std::size_t first_log = where == ActingLogs::kReferences ? suspects : 0;
+  const std::size_t last_log = where == ActingLogs::kSuspects ? suspects : series.size();
   const bool chord = !about.empty() && about[0] != 0.0 && channel.kind == EvidenceKind::kForce &&
                      is_nonlinear_in_parameter(*effect.effect);
   const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
   if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
   Eigen::MatrixXd result;
-  for (std::size_t log = 0; log < suspects; ++log) {
+  for (std::size_t log = first_log; log < last_log; ++log) {
     Eigen::MatrixXd raw;
     if (!effect.effect->columns(series[log], {channel.kind, channel.index}, effect.at, shape, raw))
       continue;
@@ -183,6 +185,26 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   }
   if (result.size() > 0 && result.cwiseAbs().maxCoeff() == 0.0) return {};
   return result;
+}
+
+void Evidence::add_shared(EvidenceChannel& channel) const {
+  channel.shared.clear();
+  for (const AppliedEffect& effect : options.shared) {
+    std::vector<double> linear, shape;
+    const std::vector<EffectParameter>& parameters = effect.effect->info().parameters;
+    for (std::size_t p = 0; p < parameters.size(); ++p)
+      (parameters[p].linear ? linear : shape).push_back(effect.values[p]);
+    Eigen::MatrixXd acting =
+        columns({effect.effect, effect.at}, shape, channel, {}, ActingLogs::kAll);
+    if (acting.size() == 0) continue;
+    const Eigen::Map<const VectorXd> values(linear.data(), static_cast<Index>(linear.size()));
+    channel.shared.push_back({effect.effect, acting * values});
+    acting = acting_columns(acting);
+    for (Index k = 0; k < acting.cols(); ++k) acting.col(k) /= acting.col(k).cwiseAbs().maxCoeff();
+    Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + acting.cols());
+    wider << channel.baseline, acting;
+    channel.baseline = std::move(wider);
+  }
 }
 
 std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
@@ -373,6 +395,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           b.channel.at));
     }
   }
+  for (EvidenceChannel& channel : e.channels) e.add_shared(channel);
   return e;
 }
 

@@ -38,6 +38,12 @@ struct EvidenceChannel {
   /// changes the measured force and thereby the baseline.
   Eigen::VectorXd force_slope;
   double largest_force = 0.0;  ///< [N] largest static force; force channels only
+  /// What the effects add that act in suspect and reference logs alike (EvidenceOptions::shared).
+  struct SharedAction {
+    const Effect* effect = nullptr;
+    Eigen::VectorXd values;  ///< [rows, SI]
+  };
+  std::vector<SharedAction> shared;
   double noise_floor =
       0.0;  ///< [SI] standard deviation of the sensors' noise in y; NaN = not known
 
@@ -47,6 +53,9 @@ struct EvidenceChannel {
 /// Whether an effect rotates the whole machine, so that its force is nonlinear in its only parameter. A joint's offset
 /// is nonlinear too, but is excluded: flows show its derivative alone, so it keeps the linearisation at its usual size.
 bool is_nonlinear_in_parameter(const Effect& effect);
+
+/// Logs in which an effect acts.
+enum class ActingLogs { kSuspects, kReferences, kAll };
 
 struct Evidence {
   std::vector<MachineSeries> series;  ///< suspect logs first, then references
@@ -60,13 +69,15 @@ struct Evidence {
   bool has_reference() const { return series.size() > suspects; }
   const EvidenceChannel* find(EvidenceKind kind, int index) const;
 
-  /// Signature: what one SI unit of each linear parameter adds to a channel, filtered like y; zero in reference logs.
+  /// Signature: what one SI unit of each linear parameter adds to a channel, filtered like y; zero in logs in which the
+  /// effect does not act.
   /// @param shape nonlinear parameters [SI]
   /// @param about linear parameters [SI] at which a force that is nonlinear in them (an angle) is linearised by its
   ///        secant from zero; empty: at their usual size
   /// @return [rows x linear parameters]; no columns when the effect does not act there
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
-                          const EvidenceChannel& channel, std::span<const double> about = {}) const;
+                          const EvidenceChannel& channel, std::span<const double> about = {},
+                          ActingLogs where = ActingLogs::kSuspects) const;
 
   /// The same evidence with the load-sensing leaders that follow from the model's effects and, in suspect logs, from
   /// `found`. A line loss can make another cylinder the leader, which signatures built with the former leaders do not
@@ -93,6 +104,8 @@ struct Evidence {
   }
   /// Sum of what the effects of the model add. [samples, SI]
   Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
+  /// Adds the columns of the shared effects to a channel's baseline.
+  void add_shared(EvidenceChannel& channel) const;
   /// Baseline of a pump: one margin for each cylinder as leader, and standby. [samples x (cylinders fed + 1)]
   Eigen::MatrixXd margins(std::size_t log, int pump) const;
 };

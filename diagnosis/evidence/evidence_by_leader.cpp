@@ -75,6 +75,7 @@ std::optional<Evidence> Evidence::with_leaders_of(std::span<const AppliedEffect>
       }
     }
     channel.baseline = acting_columns(channel.baseline);
+    out.add_shared(channel);
   }
   return out;
 }

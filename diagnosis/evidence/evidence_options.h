@@ -1,6 +1,9 @@
 #pragma once
 /// Thresholds of the evidence: which samples form a channel, which branch of a valve law holds in them, what its noise
 /// model may contain. An Evidence keeps the options that it was collected with.
+#include <vector>
+
+#include "models/effects/effect.h"
 
 namespace sparflow {
 
@@ -95,6 +98,9 @@ struct EvidenceOptions {
   /// Uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
   /// (sharpest_window) that it distorts nothing.
   bool whole_motions = false;
+  /// Effects of the model that act in reference and suspect logs alike. Their linear parameters are estimated anew in
+  /// each channel, as columns of its baseline: an error of their values is no difference between the logs.
+  std::vector<AppliedEffect> shared;
 
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows

@@ -229,7 +229,7 @@ std::string why_stopped(const Diagnosis& d) {
              (d.unexplained ? ": " + d.unexplained->sentence : std::string());
     case Verdict::kBadData:
       return "data is bad: " +
-             (d.bad.empty() ? std::string() : bad_channel_sentence(d.bad.front()));
+             (d.set_aside.empty() ? std::string() : bad_channel_sentence(d.set_aside.front()));
     case Verdict::kMissing:
       return "the effects that the diagnosis names are in the model already";
   }

@@ -102,6 +102,10 @@ EffectAction effect_action(const Evidence& evidence,
           form_share(*designs[k]->effect.effect, options) / noise * acts_in(k, c);
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
+    for (const EvidenceChannel::SharedAction& s : channel.shared) {
+      const VectorXd wrong = form_share(*s.effect, options) / noise * s.values;
+      form += (wrong.cwiseProduct(own) / noise).squaredNorm();
+    }
   }
   action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
   if (form > 0.0) action.over_form = std::sqrt(fourth / form);

@@ -87,7 +87,8 @@ class Estimator {
         leave_out_(std::move(logs.leave_out)) {
     if (sharp_) sharpen_all();
     std::erase_if(base_.effects, [&](const AppliedEffect& a) {
-      return std::any_of(wanted.begin(), wanted.end(),
+      return !options_.differences &&
+             std::any_of(wanted.begin(), wanted.end(),
                          [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
     });
     in_references_ = logs.in_references.value_or(base_.effects);
@@ -164,7 +165,7 @@ class Estimator {
         std::find_if(model.effects.begin(), model.effects.end(),
                      [&](const AppliedEffect& a) { return a.effect == e.effect && a.at == e.at; });
     std::vector<EffectDesign> acting;
-    if (known != model.effects.end()) {
+    if (known != model.effects.end() && !options_.differences) {
       acting.push_back(make_design(evidence_, e, shape_of(*known)));
       if (!acting.back().acts()) acting.clear();
     } else {

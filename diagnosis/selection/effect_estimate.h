@@ -14,6 +14,8 @@ namespace sparflow {
 
 struct EstimateOptions {
   EvidenceOptions evidence;  ///< those of the diagnosis, so that both see the same rows
+  /// Whether an effect that the model has is estimated as a difference to it, else anew.
+  bool differences = false;
   /// Ratio of the sharpest window of a log to the search's below which values are estimated in it.
   /// @threshold [1] 0..1; chosen: a window that is hardly narrower discounts starts and stops alike
   /// and is noisier

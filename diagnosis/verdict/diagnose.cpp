@@ -11,7 +11,9 @@
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/reference_comparison.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
+#include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 
@@ -77,12 +79,12 @@ bool follows_steps(const Diagnosis& d, const EffectFit& fit, const BadChannel& b
 }
 
 /// The faulty channels whose jumps known physics does not explain.
-std::vector<BadChannel> sensor_faults(const Diagnosis& d, const std::vector<LogFault>& faults) {
-  std::vector<BadChannel> out;
+std::vector<LogFault> sensor_faults(const Diagnosis& d, const std::vector<LogFault>& faults) {
+  std::vector<LogFault> out;
   if (faults.empty()) return out;
   const EffectFit fit = fit_without(d, d.search.found.size());
   for (const LogFault& f : faults) {
-    if (!follows_steps(d, fit, f.channel, f.log)) out.push_back(f.channel);
+    if (!follows_steps(d, fit, f.channel, f.log)) out.push_back(f);
   }
   return out;
 }
@@ -123,6 +125,7 @@ void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signal
   for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
   EstimateOptions options;
   options.evidence = evidence;
+  options.differences = !signals.references.empty();
   const EffectEstimate all = estimate_effects(
       model, wanted,
       {signals.suspects, signals.references, {}, effects_in_references(model, signals.references)},
@@ -158,8 +161,10 @@ std::vector<EffectAt> effects_not_in(const CraneModel& model) {
 /// Searches for the effects that explain the evidence.
 void search(const CraneModel& model, const DiagnoseOptions& options, const SearchProgress& progress,
             Diagnosis& d) {
-  d.search = search_effects(d.evidence,
-                            options.candidates.empty() ? effects_not_in(model) : options.candidates,
+  // with references, another value of an effect that the model has is a change, too
+  const std::vector<EffectAt> catalogue =
+      d.evidence.has_reference() ? candidates(model.machine) : effects_not_in(model);
+  d.search = search_effects(d.evidence, options.candidates.empty() ? catalogue : options.candidates,
                             options.search, progress);
   if (d.search.updated_evidence) d.evidence = *d.search.updated_evidence;
   d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
@@ -179,6 +184,10 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
   for (const ResidualStructure& l : left) {
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
+    if (!exceeds_references(d, l.channel)) {
+      d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
+      continue;
+    }
     const double share = unmodelled_share(d, l);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
     if (share <
@@ -190,7 +199,11 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
     unmodelled.push_back(l);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
-    d.unexplained = describe_unnamed(d);
+    Unexplained unnamed = describe_unnamed(d);
+    if (exceeds_references(d, unnamed.channel))
+      d.unexplained = std::move(unnamed);
+    else
+      d.shared_structure.push_back(std::move(unnamed));
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
     d.unexplained = describe_isolated_event(d, options.isolated_event);
@@ -230,7 +243,8 @@ void design_experiments(const CraneModel& model, const DiagnoseOptions& options,
   }
 }
 
-/// The diagnosis of logs without faulty channels.
+}  // namespace
+
 Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signals,
                          const DiagnoseOptions& options, const SearchProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
@@ -258,8 +272,6 @@ Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signal
   if (progress) progress(1.0, "done");
   return d;
 }
-
-}  // namespace
 
 const char* verdict_name(Verdict verdict) {
   switch (verdict) {
@@ -291,8 +303,17 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
   for (std::size_t i = 0; i < logs.size(); ++i) {
     out.suspects.push_back(make_signals(machine, logs[i], options.signals));
     if (!options.check_data) continue;
+    std::vector<BadChannel> faults, jumps;
     for (BadChannel& b : find_bad_channels(machine, logs[i], out.suspects[i], options.bad_data))
-      out.faults.push_back({i, std::move(b)});
+      (b.kind == BadDataKind::kJumping ? jumps : faults).push_back(std::move(b));
+    if (faults.empty() && jumps.empty()) continue;
+    const Log usable = without_bad_data(logs[i], faults);
+    if (!faults.empty()) out.suspects[i] = make_signals(machine, usable, options.signals);
+    out.set_aside.insert(out.set_aside.end(), faults.begin(), faults.end());
+    if (jumps.empty()) continue;
+    out.without_jumps.resize(logs.size());
+    out.without_jumps[i] = make_signals(machine, without_bad_data(usable, jumps), options.signals);
+    for (BadChannel& b : jumps) out.jumps.push_back({i, std::move(b)});
   }
   for (const Log& log : references)
     out.references.push_back(make_signals(machine, log, options.signals));
@@ -301,25 +322,23 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
 
 Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& signals,
                            const DiagnoseOptions& options, const SearchProgress& progress) {
-  const std::vector<LogFault>& faults = signals.faults;
+  const auto diagnosed = [&](const DiagnosisSignals& used) {
+    return used.references.empty() ? diagnose_sound(model, used, options, progress)
+                                   : diagnose_against_references(model, used, options, progress);
+  };
+  Diagnosis d = diagnosed(signals);
+  d.set_aside = signals.set_aside;
   // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
-  // them, so the diagnosis runs first; with any other fault the data cannot be diagnosed.
-  const bool surely_bad = std::any_of(faults.begin(), faults.end(), [](const LogFault& f) {
-    return f.channel.kind != BadDataKind::kJumping;
-  });
-  if (!surely_bad) {
-    Diagnosis d = diagnose_sound(model, signals, options, progress);
-    d.bad = sensor_faults(d, faults);
-    if (!d.bad.empty() && d.verdict != Verdict::kMissing) d.verdict = Verdict::kBadData;
-    return d;
+  // them, so the diagnosis ran with them first.
+  const std::vector<LogFault> faults = sensor_faults(d, signals.jumps);
+  if (!faults.empty()) {
+    DiagnosisSignals used = signals;
+    for (const LogFault& f : faults) used.suspects[f.log] = signals.without_jumps[f.log];
+    d = diagnosed(used);
+    d.set_aside = signals.set_aside;
+    for (const LogFault& f : faults) d.set_aside.push_back(f.channel);
   }
-  Diagnosis d;
-  d.thresholds = options.verdict;
-  d.verdict = Verdict::kBadData;
-  d.evidence =
-      collect_evidence(model, signals.suspects, signals.references, nullptr, options.evidence);
-  d.notes = d.evidence.notes;
-  for (const LogFault& f : faults) d.bad.push_back(f.channel);
+  if (!d.set_aside.empty() && d.evidence.channels.empty()) d.verdict = Verdict::kBadData;
   return d;
 }
 

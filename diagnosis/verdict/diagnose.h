@@ -30,9 +30,12 @@ struct ChannelGain {
 };
 
 struct DiagnosedEffect {
+  bool change =
+      false;  ///< whether it is another value of an effect that the model or the references have
   EffectAt effect;
-  std::string id, at, stage;  ///< at "" for the whole machine
-  double probability = 0.0;   ///< 0..1 that it is this effect and neither chance nor a rival
+  std::string id, at, stage;     ///< at "" for the whole machine
+  double probability = 0.0;      ///< 0..1 that it is this effect and neither chance nor a rival
+  double set_probability = 0.0;  ///< 0..1 that it is this effect or one of its rivals
   std::vector<ParameterEstimate> parameters;
   AppliedEffect applied;              ///< the same in SI, ready for a model
   std::vector<ChannelGain> channels;  ///< largest improvement first
@@ -52,6 +55,7 @@ struct DiagnosedEffect {
 
 /// A part of the residual that neither model nor catalogue explains.
 struct Unexplained {
+  std::size_t channel = 0;  ///< index into Evidence::channels
   std::string stage, at;
   std::vector<std::string>
       depends_on;      ///< signals, strongest first; "time, 1.13 Hz" for a periodic one
@@ -94,6 +98,14 @@ struct VerdictOptions {
   /// only a member of a set.
   /// @threshold [1] 0..1; derived: more probable than chance and all rivals together.
   double least_probability = 0.5;
+  /// Probability, over all channels together, with which equal residuals are taken for larger ones in the suspect logs
+  /// than in the references (Welch's test on the levels of blocks, Bonferroni's bound over the channels). What is not
+  /// larger is no change.
+  /// @threshold [1] 0..1; chosen: one log in a hundred
+  double structure_false_alarm = 0.01;
+  /// Searches with more effects that the references share.
+  /// @threshold [1] 0..; chosen: each removes what the last one named in both; none needed more on the tuning plants
+  int shared_turns = 3;
   /// Factor by which an effect must reduce a channel's error for that to be stated as evidence.
   /// @threshold [1] 1..; chosen: two percent; a smaller change is no evidence to a reader.
   double least_reduction = 1.02;
@@ -110,9 +122,12 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> indistinguishable;
   std::vector<Experiment> experiments;  ///< one for each of these sets
   std::optional<Unexplained> unexplained;
+  /// What the model lacks in the references as in the suspect logs, so that it is no change: effects and structure.
+  std::vector<DiagnosedEffect> lacking;
+  std::vector<Unexplained> shared_structure;
   /// Largest unmodelled share (unmodelled_structure.h) of the channels in which a found effect acts. 0..1
   double unmodelled_share = 0.0;
-  std::vector<BadChannel> bad;
+  std::vector<BadChannel> set_aside;  ///< faulty channels and stretches, which took no part
   std::vector<std::pair<std::string, double>>
       ranking;  ///< first step: key, penalised gain [nats], best first
   std::vector<std::string> notes;
@@ -123,7 +138,7 @@ struct Diagnosis {
 
   /// Whether an effect is probable enough to be reported by itself.
   bool probable(const DiagnosedEffect& e) const {
-    return e.probability >= thresholds.least_probability;
+    return e.set_probability >= thresholds.least_probability;
   }
   std::string headline() const;  ///< one sentence
   /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
@@ -161,7 +176,7 @@ Diagnosis diagnose(const CraneModel& model, const std::vector<Log>& logs,
                    const std::vector<Log>& references = {}, const DiagnoseOptions& options = {},
                    const SearchProgress& progress = {});
 
-/// A faulty channel of one suspect log.
+/// A channel of one suspect log, with its fault.
 struct LogFault {
   std::size_t log = 0;  ///< index into DiagnosisSignals::suspects
   BadChannel channel;
@@ -172,7 +187,11 @@ struct LogFault {
 struct DiagnosisSignals {
   std::vector<MachineSignals> suspects;
   std::vector<MachineSignals> references = {};
-  std::vector<LogFault> faults = {};  ///< in the order of the logs; empty: none, or not checked
+  /// Faulty channels and stretches of the suspect logs, which `suspects` no longer contain.
+  std::vector<BadChannel> set_aside = {};
+  /// Jumps, which may be physics: in the order of the logs; and the logs without them, empty where a log has none.
+  std::vector<LogFault> jumps = {};
+  std::vector<MachineSignals> without_jumps = {};
 };
 
 /// @param logs, references as in `diagnose`  @throws InputError when there is no log

@@ -28,7 +28,9 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
       {"id", e.id},
       {"at", e.at},
       {"stage", e.stage},
+      {"change", e.change},
       {"probability", e.probability},
+      {"set_probability", e.set_probability},
       {"p_value", e.p_value},
       {"log_likelihood_gain", e.gain},
       {"held_out_gain", {{"value", e.held_out_gain}, {"standard_error", e.held_out_error}}},
@@ -69,10 +71,16 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
 std::string Diagnosis::headline() const {
   switch (verdict) {
     case Verdict::kBadData:
-      return fmt::format(
-          "Bad data: {}{}", bad_channel_sentence(bad.front()),
-          bad.size() > 1 ? fmt::format(" And {} more channel(s).", bad.size() - 1) : "");
+      return fmt::format("Bad data: {}{}", bad_channel_sentence(set_aside.front()),
+                         set_aside.size() > 1
+                             ? fmt::format(" And {} more channel(s).", set_aside.size() - 1)
+                             : "");
     case Verdict::kNone:
+      if (evidence.has_reference())
+        return fmt::format("No difference to the references, as far as these logs can show{}.",
+                           lacking.empty() && shared_structure.empty()
+                               ? ""
+                               : "; what the model lacks, it lacks in both");
       return "Nothing is missing: the residual is noise, as far as these logs can show.";
     case Verdict::kUnknown:
       if (unexplained && unexplained->few_places)
@@ -99,13 +107,16 @@ std::string Diagnosis::headline() const {
 std::string Diagnosis::table() const {
   std::string out = headline() + "\n\n";
   if (verdict == Verdict::kBadData) {
-    for (std::size_t i = 1; i < bad.size(); ++i)  // the headline has the first
-      out += fmt::format("  {}\n", bad_channel_sentence(bad[i]));
+    for (std::size_t i = 1; i < set_aside.size(); ++i)  // the headline has the first
+      out += fmt::format("  {}\n", bad_channel_sentence(set_aside[i]));
     return out;
   }
+  for (const BadChannel& b : set_aside)
+    out += fmt::format("  Set aside: {}\n", bad_channel_sentence(b));
   for (const DiagnosedEffect& e : effects) {
-    out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}\n", e.key(),
-                       e.shown_probability(), e.stage);
+    out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}{}\n", e.key(),
+                       e.shown_probability(), e.stage,
+                       e.change ? "   a change of what the references have" : "");
     for (const ParameterEstimate& p : e.parameters)
       out += fmt::format("      {}\n", with_interval(p));
     for (std::size_t i = 0; i < std::min<std::size_t>(4, e.evidence.size()); ++i) {
@@ -124,6 +135,14 @@ std::string Diagnosis::table() const {
       if (i < experiments.size()) out += fmt::format("        {}\n", experiments[i].sentence());
     }
   }
+  if (!lacking.empty() || !shared_structure.empty())
+    out += "\n  The model lacks this in the references as well, so that it is no change:\n";
+  for (const DiagnosedEffect& e : lacking) {
+    std::vector<std::string> values;
+    for (const ParameterEstimate& p : e.parameters) values.push_back(with_interval(p));
+    out += fmt::format("      {:28s} {}\n", e.key(), fmt::join(values, ", "));
+  }
+  for (const Unexplained& u : shared_structure) out += fmt::format("      {}\n", u.sentence);
   if (unexplained && verdict != Verdict::kUnknown)  // else the headline has it
     out += fmt::format("\n  Not explained: {}\n", unexplained->sentence);
   if (effects.empty() && !ranking.empty()) {
@@ -152,6 +171,12 @@ std::string Diagnosis::json() const {
   for (const DiagnosedEffect& e : effects) {
     if (verdict == Verdict::kMissing && probable(e)) j["effects"].push_back(json_of(e, evidence));
   }
+  j["lacking"] = nlohmann::json::array();
+  for (const DiagnosedEffect& e : lacking) j["lacking"].push_back(json_of(e, evidence));
+  j["unexplained_in_references_too"] = nlohmann::json::array();
+  for (const Unexplained& u : shared_structure)
+    j["unexplained_in_references_too"].push_back(
+        {{"stage", u.stage}, {"at", u.at}, {"sentence", u.sentence}});
   // members of an indistinguishable set, none of which is probable enough by itself
   if (verdict == Verdict::kMissing) {
     for (const DiagnosedEffect& e : effects) {
@@ -180,15 +205,15 @@ std::string Diagnosis::json() const {
                         {"rmse", u.rmse / u.unit.si}, {"unit", u.unit.name},
                         {"sentence", u.sentence}};
   }
-  j["bad_data"] = nlohmann::json::array();
-  for (const BadChannel& b : bad) {
-    j["bad_data"].push_back({{"channel", b.channel},
-                             {"kind", bad_data_word(b.kind)},
-                             {"from_s", b.from_s},
-                             {"to_s", b.to_s},
-                             {"share", b.share},
-                             {"evidence", b.evidence},
-                             {"remedy", b.remedy}});
+  j["set_aside"] = nlohmann::json::array();
+  for (const BadChannel& b : set_aside) {
+    j["set_aside"].push_back({{"channel", b.channel},
+                              {"kind", bad_data_word(b.kind)},
+                              {"from_s", b.from_s},
+                              {"to_s", b.to_s},
+                              {"share", b.share},
+                              {"evidence", b.evidence},
+                              {"remedy", b.remedy}});
   }
   j["ranking"] = nlohmann::json::array();
   for (const auto& [key, gain] : ranking) j["ranking"].push_back({{"effect", key}, {"gain", gain}});

@@ -77,14 +77,17 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   e.held_out_gain = f.held_out;
   e.held_out_error = f.held_out_error;
   e.absorbed = f.absorbed;
-  double odds = 0.0;
+  double odds = 0.0, odds_of_rivals = 0.0;
   const double same = same_within(f, options);
   for (const auto& [rival, worse] : f.alternatives) {
-    odds += std::exp(-std::max(0.0, worse) * options.same_nats / same);
+    const double one = std::exp(-std::max(0.0, worse) * options.same_nats / same);
+    odds += one;
+    if (worse < same) odds_of_rivals += one;
     if (worse < same)
       e.rivals.emplace_back(effect_key(rival.effect->info(), machine, rival.at), worse);
   }
   e.probability = (1.0 - f.p_value) / (1.0 + odds);
+  e.set_probability = (1.0 - f.p_value) * (1.0 + odds_of_rivals) / (1.0 + odds);
 
   const EffectFit without = fit_without(d, index);
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {

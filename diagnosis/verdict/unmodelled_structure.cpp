@@ -7,6 +7,7 @@
 
 #include "diagnosis/residual/isolated_event.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/reference_comparison.h"
 #include "identification/comparison/report_numbers.h"
 #include "models/effects/hydraulics.h"
 
@@ -71,9 +72,12 @@ bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
 
 double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
   const ChannelGain& g = e.channels.front();
-  if (!(g.rmse_after > d.thresholds.far_above_noise * g.noise_floor)) return 1.0;
+  // what stays unexplained in the references as well is no sign against an effect
+  const double shared = reference_rms(d, g.channel);
+  const double floor = std::isfinite(shared) ? std::max(g.noise_floor, shared) : g.noise_floor;
+  if (!(g.rmse_after > d.thresholds.far_above_noise * floor)) return 1.0;
   const double before = suspect_rms(d.evidence, g.channel, d.search.null.residual[g.channel]);
-  const double noise = g.noise_floor * g.noise_floor;
+  const double noise = floor * floor;
   return (before * before - g.rmse_after * g.rmse_after) / (before * before - noise);
 }
 
@@ -85,6 +89,7 @@ Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffec
   const ChannelGain& g = e.channels.front();
   const EvidenceChannel& c = evidence.channels[g.channel];
   Unexplained u;
+  u.channel = g.channel;
   u.stage = evidence_stage(c.kind);
   u.at = c.at;
   u.depends_on = {"no single signal"};
@@ -103,6 +108,7 @@ Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffec
 Unexplained describe_residual_structure(const Evidence& evidence, const ResidualStructure& left) {
   const EvidenceChannel& c = evidence.channels[left.channel];
   Unexplained u;
+  u.channel = left.channel;
   u.stage = evidence_stage(c.kind);
   u.at = c.at;
   u.depends_on = left.depends_on;
@@ -133,6 +139,7 @@ Unexplained describe_unnamed(const Diagnosis& d) {
     }
   }
   const EvidenceChannel& c = d.evidence.channels[worst];
+  u.channel = worst;
   u.stage = evidence_stage(c.kind);
   u.at = c.at;
   u.depends_on = f.design.effect.effect->info().signals;
@@ -156,6 +163,7 @@ Unexplained describe_isolated_event(const Diagnosis& d, const IsolatedEventOptio
       locate_isolated_event(d.evidence, d.search.null, with, options);
   const EvidenceChannel& c = d.evidence.channels[isolated_event.channel];
   Unexplained u;
+  u.channel = isolated_event.channel;
   u.stage = evidence_stage(c.kind);
   u.at = c.at;
   u.depends_on = {"time"};

@@ -154,6 +154,9 @@ struct BadDataOptions {
   /// @threshold [1] 2..10; chosen: a faulty pressure compensator lets it run at up to twice its
   /// speed
   double fastest_following = 2.2;
+  /// Share of a pump's largest flow in the log above which it is exhausted and its cylinders need not follow.
+  /// @threshold [1] 0.5..1; chosen: flows from speeds scatter by some percent
+  double exhausted_share = 0.9;
   /// Share of the observed stroke at either end in which the cylinder need not follow.
   /// @threshold [1] 0..0.2; chosen: end stop and its damping
   double end_share = 0.03;

@@ -270,6 +270,16 @@ std::optional<Finding> check_wild(const CheckContext& context, std::size_t chann
   return found;
 }
 
+/// Flow of the pump that feeds a cylinder, to all that it feeds, from speeds. [samples, m^3/s]
+VectorXd flow_of_its_pump(const CheckContext& context, int cylinder) {
+  VectorXd total = VectorXd::Zero(context.log.samples());
+  const int pump = context.machine.pump_of_cylinder(cylinder);
+  if (pump < 0) return total;
+  for (const int fed : context.machine.pumps[static_cast<std::size_t>(pump)].feeds)
+    total += context.signals.cylinders[static_cast<std::size_t>(fed)].flow;
+  return total;
+}
+
 std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel) {
   const BadDataOptions& options = context.options;
   const CheckedChannel& c = context.channels[channel];
@@ -282,8 +292,12 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
   const double lo = lengths.minCoeff(), hi = lengths.maxCoeff();
   const double end = options.end_share * (hi - lo);
   const UsualSpeed usual[2] = {usual_speed(s, -1, options), usual_speed(s, 1, options)};
+  // A pump whose largest flow is taken leaves the cylinder behind its command.
+  const VectorXd flow = flow_of_its_pump(context, c.cylinder);
+  const double exhausted = options.exhausted_share * flow.maxCoeff();
   const auto off = [&](Index k) {
     if (!(std::abs(u[k]) > options.firm_command)) return false;
+    if (exhausted > 0.0 && flow[k] > exhausted) return false;
     const UsualSpeed& expected = usual[u[k] > 0.0 ? 1 : 0];
     const bool at_end = u[k] > 0.0 ? s.length[k] > hi - end : s.length[k] < lo + end;
     if (!expected.known || at_end) return false;
@@ -297,17 +311,18 @@ std::optional<Finding> check_stuck_command(const CheckContext& context, std::siz
     if (std::abs(u[stretch.begin]) < options.firm_command) continue;
     const double lasts = context.log.time[stretch.end - 1] - context.log.time[stretch.begin];
     if (lasts < options.command_stuck_s) continue;
-    double since = 0.0;
-    bool bad = false;
+    Index first = stretch.begin;  // since when it has not followed
     for (Index k = stretch.begin; k < stretch.end; ++k) {
-      since = off(k) ? since + context.log.step : 0.0;
-      bad = bad || since > options.contradiction_s;
+      if (!off(k)) first = k + 1;
+      const double since = static_cast<double>(k + 1 - first) * context.log.step;
+      // where it does follow, the command is as good as any other
+      if (since > options.contradiction_s)
+        found.affected.segment(first, k + 1 - first).setConstant(true);
       if (since > longest) {
         longest = since;
         value = u[k];
       }
     }
-    if (bad) found.affected.segment(stretch.begin, stretch.size()).setConstant(true);
   }
   if (!found.affected.any()) return {};
   // If the cylinder often does not follow other commands either, the cause is the valve or the pump.

@@ -152,7 +152,7 @@ TEST(DiagnosePage, HasAHeadlineForEveryVerdict) {
   EXPECT_THAT(html, HasSubstr("the residual is 900 N RMS, the sensors\u0026#39; noise 300"));
   d.verdict = Verdict::kBadData;
   d.unexplained.reset();
-  d.bad = {{"pA_arm", BadDataKind::kStuck, 12.0, 15.0, 0.05, "It rests at 81.2 bar for 3 s",
+  d.set_aside = {{"pA_arm", BadDataKind::kStuck, 12.0, 15.0, 0.05, "It rests at 81.2 bar for 3 s",
             "Check the cable"}};
   EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("Check the cable"));
 }
@@ -217,10 +217,10 @@ TEST(DiagnosePageInBrowser, BadChannelIsDrawnOverTimeWithTheFaultMarked) {
   const MachineSignals signals = make_signals(model.machine, log);
   d.evidence = collect_evidence(model, {signals});
   d.verdict = Verdict::kBadData;
-  d.bad = find_bad_channels(model.machine, log, signals);
-  ASSERT_EQ(d.bad.size(), 1u);
-  ASSERT_EQ(d.bad[0].stretches.size(), 1u);
-  const LineChart chart = bad_channel_chart(d.bad[0]);
+  d.set_aside = find_bad_channels(model.machine, log, signals);
+  ASSERT_EQ(d.set_aside.size(), 1u);
+  ASSERT_EQ(d.set_aside[0].stretches.size(), 1u);
+  const LineChart chart = bad_channel_chart(d.set_aside[0]);
   EXPECT_EQ(chart.y_axis.unit, "bar");
   EXPECT_NEAR(chart.series[0].y[from], pressure.values[from] / 1e5, 1e-9);
   ASSERT_EQ(chart.spans.size(), 1u);

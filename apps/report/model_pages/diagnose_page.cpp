@@ -70,8 +70,8 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
       text += fmt::format("; error of the {}", gain_text(d, e.channels.front()));
     text += ". ";
   }
-  for (std::size_t i = 0; i < d.bad.size(); ++i) {  // the headline names the first
-    if (i > 0) text += sentence(bad_channel_sentence(d.bad[i])) + " ";
+  for (std::size_t i = 0; i < d.set_aside.size(); ++i) {  // the headline names the first
+    if (i > 0) text += sentence(bad_channel_sentence(d.set_aside[i])) + " ";
   }
   if (d.verdict == Verdict::kUnknown)
     text +=
@@ -186,21 +186,41 @@ void add_unexplained(Page& page, const Diagnosis& d) {
 }
 
 void add_bad_data(Page& page, const Diagnosis& d) {
-  if (d.bad.empty()) return;
+  if (d.set_aside.empty()) return;
   page.section("Bad data");
   Table table;
   table.title = "Channels with faults of sensor or recording";
   table.columns = {
       {"channel"},  {"kind"},      {"from", "s", 4}, {"to", "s", 4}, {"of the log", "%", 2},
       {"evidence"}, {"what to do"}};
-  for (const BadChannel& b : d.bad) {
+  for (const BadChannel& b : d.set_aside) {
     table.rows.push_back({b.channel, std::string(bad_data_word(b.kind)), b.from_s, b.to_s,
                           100.0 * b.share, b.evidence, b.remedy});
   }
   page.table(std::move(table));
-  for (std::size_t i = 0; i < std::min(kMostBadPictures, d.bad.size()); ++i) {
-    if (d.bad[i].time.size() > 1) page.plot(bad_channel_chart(d.bad[i]));
+  for (std::size_t i = 0; i < std::min(kMostBadPictures, d.set_aside.size()); ++i) {
+    if (d.set_aside[i].time.size() > 1) page.plot(bad_channel_chart(d.set_aside[i]));
   }
+}
+
+/// What the references show as the suspect logs do.
+void add_lacking(Page& page, const Machine& machine, const Diagnosis& d) {
+  if (d.lacking.empty() && d.shared_structure.empty()) return;
+  page.section("What the model lacks in the references, too");
+  page.paragraph(
+      "References and suspect logs show this alike, so that it is no change between them.");
+  if (!d.lacking.empty()) {
+    Table table;
+    table.columns = {{"effect"}, {"parameter"}, {"value", "", 4}, {"unit"}, {"95 %"}};
+    for (const DiagnosedEffect& e : d.lacking) {
+      for (const ParameterEstimate& p : e.parameters)
+        table.rows.push_back(
+            {title_of(machine, e), p.name, p.value, p.unit,
+             display_number(p.lower95, 3) + " .. " + display_number(p.upper95, 3)});
+    }
+    page.table(std::move(table));
+  }
+  for (const Unexplained& u : d.shared_structure) page.paragraph(sentence(u.sentence));
 }
 
 }  // namespace
@@ -221,6 +241,7 @@ Page diagnose_page(const CraneModel& model, const Diagnosis& d, const ExtendResu
   add_sets(page, d);
   add_evidence(page, machine, d);
   add_unexplained(page, d);
+  add_lacking(page, machine, d);
   if (d.verdict == Verdict::kNone) add_remaining_residuals(page, d);
   if (!d.ranking.empty()) {
     page.section("Ranking");

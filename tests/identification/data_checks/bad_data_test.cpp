@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <random>
 
+#include "identification/data_checks/set_aside.h"
 #include "models/files/machine_file.h"
 #include "tests/identification/arm_log.h"
 
@@ -251,6 +252,42 @@ TEST(BadData, ACommandThatTheMachineDoesNotFollowIsStuck) {
   u.head(2000).maxCoeff(&at);
   u.segment(at, 250).setConstant(u[at]);  // the stroke ends 1.2 s later
   EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("u_arm stuck"));
+}
+
+TEST(BadData, OnlyTheStretchInWhichTheMachineDoesNotFollowItsCommandIsAffected) {
+  Log log = noisy_arm();
+  Eigen::VectorXd& u = channel(log, "u_arm").values;
+  Eigen::Index at = 0;
+  u.head(2000).maxCoeff(&at);
+  u.segment(at, 250).setConstant(u[at]);
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_EQ(bad.size(), 1u);
+  // the stroke, in which it follows, ends 1.2 s after the begin of the constant command
+  EXPECT_GT(bad[0].from_s, log.time[at] + 0.5);
+  EXPECT_LE(bad[0].to_s, log.time[at + 250] + 0.1);
+}
+
+TEST(BadData, WhatIsSetAsideIsMissingThereAndNowhereElse) {
+  const Log log = noisy_arm();
+  BadChannel one;
+  one.channel = "pA_arm";
+  one.from_s = 3.0;
+  one.to_s = 9.0;
+  one.stretches = {{3.0, 4.0}, {8.0, 9.0}};
+  const Log left = without_bad_data(log, {one});
+  Eigen::Index missing = 0;
+  for (std::size_t c = 0; c < log.channels.size(); ++c) {
+    const Channel &before = log.channels[c], &after = left.channels[c];
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double t = log.time[k];
+      const bool aside =
+          before.signal == "pA_arm" && ((t >= 3.0 && t <= 4.0) || (t >= 8.0 && t <= 9.0));
+      ASSERT_EQ(after.valid[k], before.valid[k] && !aside) << before.signal << " " << t;
+      ASSERT_EQ(std::isnan(after.values[k]), aside) << before.signal << " " << t;
+      missing += aside ? 1 : 0;
+    }
+  }
+  EXPECT_GT(missing, 20);
 }
 
 // ---- logs of real and simulated cranes -------------------------------------------------------------------------

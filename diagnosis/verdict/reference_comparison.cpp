@@ -1,0 +1,225 @@
+#include "diagnosis/verdict/reference_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/diagnosed_effect.h"
+#include "models/math/nan.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Mean and variance of the mean of the logarithms of the blocks' mean squares.
+struct BlockLevel {
+  double mean = 0.0, variance_of_mean = 0.0;
+  int blocks = 0;
+};
+
+BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
+  const EvidenceChannel& c = d.evidence.channels[channel];
+  const VectorXd& residual = d.search.final.residual[channel];
+  std::vector<double> levels;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
+    const Index length = c.blocks[b].last - c.blocks[b].first;
+    const double square = residual.segment(c.blocks[b].first, length).squaredNorm();
+    levels.push_back(std::log(
+        std::max(square / static_cast<double>(length), std::numeric_limits<double>::min())));
+  }
+  BlockLevel level;
+  level.blocks = static_cast<int>(levels.size());
+  if (levels.size() < 2) return level;
+  const auto n = static_cast<double>(levels.size());
+  const Eigen::Map<const VectorXd> v(levels.data(), static_cast<Index>(levels.size()));
+  level.mean = v.mean();
+  level.variance_of_mean = (v.array() - level.mean).square().sum() / (n - 1.0) / n;
+  return level;
+}
+
+/// Columns of a found effect in other logs than the suspect ones.
+EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
+  EffectDesign design = found;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c)
+    design.columns[c] = found.touches(c) ? evidence.columns(found.effect, found.shape,
+                                                            evidence.channels[c], {}, where)
+                                         : Eigen::MatrixXd();
+  // the same law, with the same parameters absent
+  for (Index k = 0; k < found.linear; ++k) {
+    bool absent = true;
+    for (const Eigen::MatrixXd& m : found.columns)
+      absent = absent && (m.cols() == 0 || m.col(k).isZero(0.0));
+    for (Eigen::MatrixXd& m : design.columns)
+      if (absent && m.cols() > 0) m.col(k).setZero();
+  }
+  return design;
+}
+
+AppliedEffect applied_of(const FoundEffect& f) {
+  return {f.design.effect.effect, f.design.effect.at, f.values, f.lower95, f.upper95};
+}
+
+/// Its channels in another evidence; what that does not have is left out.
+void move_channels(DiagnosedEffect& e, const Evidence& from, const Evidence& to) {
+  std::erase_if(e.channels, [&](ChannelGain& g) {
+    const EvidenceChannel& old = from.channels[g.channel];
+    const EvidenceChannel* now = to.find(old.kind, old.index);
+    if (now == nullptr) return true;
+    g.channel = static_cast<std::size_t>(now - to.channels.data());
+    return false;
+  });
+}
+
+bool same_place(const AppliedEffect& a, const EffectAt& b) {
+  return a.effect == b.effect && a.at == b.at;
+}
+
+}  // namespace
+
+double reference_rms(const Diagnosis& d, std::size_t channel) {
+  const EvidenceChannel& c = d.evidence.channels[channel];
+  double squares = 0.0, n = 0.0;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(c.log[b]) < d.evidence.suspects) continue;
+    const Index length = c.blocks[b].last - c.blocks[b].first;
+    squares += d.search.final.residual[channel].segment(c.blocks[b].first, length).squaredNorm();
+    n += static_cast<double>(length);
+  }
+  return n > 0.0 ? std::sqrt(squares / n) : kNaN;
+}
+
+bool exceeds_references(const Diagnosis& d, std::size_t channel) {
+  if (!d.evidence.has_reference()) return true;
+  const BlockLevel suspect = block_level(d, channel, false),
+                   reference = block_level(d, channel, true);
+  if (std::min(suspect.blocks, reference.blocks) < 2) return true;
+  if (tracing())
+    fmt::print(stderr,
+               "  {}: residual {:.3g}, in the references {:.3g} {}, {:.1f} standard errors, {} and "
+               "{} blocks\n",
+               d.evidence.channels[channel].text,
+               suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
+                   d.evidence.channels[channel].unit.si,
+               reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
+               d.evidence.channels[channel].unit.name,
+               (suspect.mean - reference.mean) /
+                   std::sqrt(suspect.variance_of_mean + reference.variance_of_mean),
+               suspect.blocks, reference.blocks);
+  // Welch and Satterthwaite's degrees of freedom; Student's t as a normal deviate (Abramowitz and Stegun 1964, 26.7.8)
+  const double variance = suspect.variance_of_mean + reference.variance_of_mean;
+  const double t = (suspect.mean - reference.mean) / std::sqrt(variance);
+  const double freedom = variance * variance /
+                         (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
+                          std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
+  const double z = t * (1.0 - 0.25 / freedom) / std::sqrt(1.0 + 0.5 * t * t / freedom);
+  const double chance = 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
+  return chance * static_cast<double>(d.evidence.channels.size()) <
+         d.thresholds.structure_false_alarm;
+}
+
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  const EffectDesign& suspect = d.search.found[found].design;
+  const EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
+  if (!reference.acts()) return InReferences::kNot;
+  EffectDesign all = suspect;
+  double rows = 2.0;
+  for (std::size_t c = 0; c < all.columns.size(); ++c) {
+    if (reference.columns[c].cols() > 0) all.columns[c] += reference.columns[c];
+    if (all.columns[c].cols() > 0)
+      rows = std::max(rows, static_cast<double>(all.columns[c].rows()));
+  }
+  std::vector<const EffectDesign*> others;
+  for (std::size_t i = 0; i < d.search.found.size(); ++i)
+    if (i != found) others.push_back(&d.search.found[i].design);
+  const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
+    std::vector<const EffectDesign*> designs = others;
+    designs.insert(designs.end(), more);
+    return fit_effects(d.evidence, designs, &d.search.final, {});
+  };
+  const EffectFit apart = fit({&suspect, &reference});
+  const double alone = fit({&suspect}).total(), alike = fit({&all}).total();
+  const double least =
+      options.least_gain + 0.5 * static_cast<double>(suspect.linear) * std::log(rows);
+  const VectorXd in_suspects =
+                     apart.theta.segment(apart.theta.size() - 2 * suspect.linear, suspect.linear),
+                 in_reference = apart.theta.tail(suspect.linear);
+  double change = 0.0, shared = 0.0;
+  for (const Eigen::MatrixXd& m : suspect.columns) {
+    if (m.cols() == 0) continue;
+    change += (m * (in_suspects - in_reference)).squaredNorm() / m.squaredNorm();
+    shared += (m * in_reference).squaredNorm() / m.squaredNorm();
+  }
+  const double form = form_share(*suspect.effect.effect, options.regression);
+  if (tracing()) {
+    fmt::print(
+        stderr,
+        "  {} in the references: apart {:.1f}, alike {:.1f}, suspects alone {:.1f}; suspects "
+        "[{:.4g}] references [{:.4g}]\n",
+        effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
+        apart.total(), alike, alone, fmt::join(in_suspects, " "), fmt::join(in_reference, " "));
+  }
+  const bool differs =
+      apart.total() - alike > least && std::sqrt(change) > form * std::sqrt(shared);
+  if (!differs) return alike >= alone ? InReferences::kAlike : InReferences::kNot;
+  return apart.total() - alone > least ? InReferences::kOther : InReferences::kNot;
+}
+
+Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
+                                      const DiagnoseOptions& options,
+                                      const SearchProgress& progress) {
+  const auto part = [&](double from, double to) -> SearchProgress {
+    if (!progress) return {};
+    return [=, &progress](double share, const std::string& what) {
+      progress(from + share * (to - from), what);
+    };
+  };
+  const Diagnosis before = diagnose_sound(model, {signals.references}, options, part(0.0, 0.4));
+  CraneModel with = model;
+  DiagnoseOptions now = options;
+  now.evidence.shared = effects_in_references(model, signals.references);
+  const auto add = [&](const AppliedEffect& e) {
+    with.effects.push_back(e);
+    now.evidence.shared.push_back(e);
+  };
+  for (const FoundEffect& f : before.search.found) add(applied_of(f));
+  std::vector<std::pair<DiagnosedEffect, Evidence>> lacking;
+  for (const DiagnosedEffect& e : before.effects) lacking.emplace_back(e, before.evidence);
+  Diagnosis d;
+  for (int turn = 0;; ++turn) {
+    d = diagnose_sound(with, signals, now, part(0.4, 1.0));
+    if (turn == now.verdict.shared_turns) break;
+    bool more = false;
+    for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+      const FoundEffect& f = d.search.found[i];
+      const bool known =
+          std::any_of(now.evidence.shared.begin(), now.evidence.shared.end(),
+                      [&](const AppliedEffect& e) { return same_place(e, f.design.effect); });
+      if (known || in_references(d, i, now.search) != InReferences::kAlike) continue;
+      add(applied_of(f));
+      const auto described =
+          std::find_if(d.effects.begin(), d.effects.end(),
+                       [&](const DiagnosedEffect& e) { return e.effect == f.design.effect; });
+      if (described != d.effects.end()) lacking.emplace_back(*described, d.evidence);
+      more = true;
+    }
+    if (!more) break;
+  }
+  for (DiagnosedEffect& e : d.effects)
+    e.change = std::any_of(with.effects.begin(), with.effects.end(),
+                           [&](const AppliedEffect& known) { return same_place(known, e.effect); });
+  for (auto& [effect, evidence] : lacking) {
+    move_channels(effect, evidence, d.evidence);
+    d.lacking.push_back(std::move(effect));
+  }
+  return d;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,34 @@
+#pragma once
+/// What suspect and reference logs show alike is no change: effects that the model lacks in both, and structure that stays
+/// unexplained in both. Used by diagnose.cpp and its parts only.
+#include <optional>
+
+#include "diagnosis/verdict/diagnose.h"
+
+namespace sparflow {
+
+/// The diagnosis of signals without faulty channels, where effects act in the suspect logs alone (diagnose.cpp).
+Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signals,
+                         const DiagnoseOptions& options, const SearchProgress& progress);
+
+/// RMS of a channel's final residual in the reference logs [SI]; NaN where they do not have the channel.
+double reference_rms(const Diagnosis& d, std::size_t channel);
+
+/// Whether a channel's final residual is larger in the suspect logs than in the references: Welch's (1947) test on the
+/// logarithms of the blocks' mean squares. True where there is no reference to compare with.
+bool exceeds_references(const Diagnosis& d, std::size_t channel);
+
+/// Whether the references show a found effect as the suspect logs do, by profile likelihood with separate and with common
+/// linear parameters. An effect counts as the same where its difference is not significant or lies within the
+/// model-form error of its law, which depends on the motion.
+enum class InReferences { kNot, kOther, kAlike };
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options);
+
+/// Diagnosis of suspect logs against references, in three steps: what the model lacks in the references alone; the
+/// difference of the suspect logs, with those effects estimated in all logs; and again, where an effect that was found
+/// as a difference is seen in the references as well.
+Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
+                                      const DiagnoseOptions& options,
+                                      const SearchProgress& progress);
+
+}  // namespace sparflow

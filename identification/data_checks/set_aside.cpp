@@ -1,0 +1,28 @@
+#include "identification/data_checks/set_aside.h"
+
+#include <algorithm>
+
+#include "models/math/nan.h"
+
+namespace sparflow {
+
+Log without_bad_data(Log log, const std::vector<BadChannel>& bad) {
+  for (const BadChannel& b : bad) {
+    const auto channel = std::find_if(log.channels.begin(), log.channels.end(),
+                                      [&](const Channel& c) { return c.signal == b.channel; });
+    if (channel == log.channels.end()) continue;
+    std::vector<std::pair<double, double>> stretches = b.stretches;
+    if (stretches.empty()) stretches.emplace_back(b.from_s, b.to_s);
+    for (Eigen::Index i = 0; i < log.samples(); ++i) {
+      const double t = log.time[i];
+      const bool faulty = std::any_of(stretches.begin(), stretches.end(),
+                                      [t](const auto& s) { return t >= s.first && t <= s.second; });
+      if (!faulty) continue;
+      channel->values[i] = kNaN;
+      channel->valid[i] = false;
+    }
+  }
+  return log;
+}
+
+}  // namespace sparflow

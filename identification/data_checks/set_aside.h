@@ -1,0 +1,14 @@
+#pragma once
+/// Sets aside what the data checks found faulty, so that the rest of a log can be judged.
+#include <vector>
+
+#include "identification/data_checks/bad_data.h"
+#include "identification/log/log.h"
+
+namespace sparflow {
+
+/// The log without the faulty stretches of these channels: their values are NaN and not valid there, the whole channel
+/// where no stretch is known. Other channels stay as they are.
+Log without_bad_data(Log log, const std::vector<BadChannel>& bad);
+
+}  // namespace sparflow

@@ -1,0 +1,270 @@
+// Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
+// between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/plant_verdicts.md.
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [-v] [--json FILE]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "diagnosis/verdict/diagnose.h"
+#include "identification/learning/fit.h"
+#include "models/files/machine_file.h"
+#include "models/math/error.h"
+#include "models/math/parallel.h"
+#include "simulator/plant/parameters/parameter_table.h"
+#include "simulator/plant/run/plant_run.h"
+#include "simulator/programmes/programmes.h"
+#include "simulator/random/random.h"
+#include "simulator/sensors/log_writer.h"
+#include "studies/share.h"
+
+namespace sparflow::bench {
+namespace {
+
+using plant::PlantParameters;
+using simulator::Random;
+
+struct Arguments {
+  int plants = 20;
+  std::uint64_t seed = 1;
+  double seconds = 200.0;
+  std::string only, json;
+  bool no_reference = false, verbose = false;
+};
+
+/// A change of the plant, with what may be named for it.
+struct Change {
+  const char* name;
+  const char* key;                 ///< of parameter_table.h; empty: the payload that the log tells
+  double factor, plus;             ///< new value = factor * old + plus, in the table's unit
+  std::vector<const char*> named;  ///< ids, each of them a right answer at the place
+};
+
+const std::vector<Change>& changes() {
+  static const std::vector<Change> all = {
+      {"coulomb_friction", "coulomb_friction_N", 2.5, 0.0, {"coulomb_friction"}},
+      {"viscous_friction", "viscous_friction_N_s_m", 5.0, 0.0, {"viscous_friction"}},
+      {"leakage", "leakage_lpm_100bar", 1.0, 1.5, {"leakage"}},
+      {"line_loss", "line_drop_bar", 3.0, 5.0, {"line_loss"}},
+      {"valve_lag", "spool_frequency_Hz", 0.25, 0.0, {"valve_lag"}},
+      {"valve_deadband", "dead_band_extend", 1.0, 0.06, {"valve_deadband"}},
+      {"pump_lag", "response_s", 4.0, 0.2, {"pump_lag"}},
+      {"flow_saturation", "max_flow_lpm", 0.5, 0.0, {"flow_saturation"}},
+      {"pressure_offset", "pressure_offset_bar", 1.0, 4.0, {"pressure_offset"}},
+      {"return_back_pressure", "tank_drop_bar", 4.0, 0.0, {"return_back_pressure"}},
+      {"payload_error", "", 1.0, 0.0, {"payload_error", "unmodelled_mass"}},
+  };
+  return all;
+}
+
+/// A plant of a machine: what its makers' data sheets leave open is drawn anew, within a factor of 1.6 both ways.
+PlantParameters drawn_plant(const Machine& machine, Random& random) {
+  PlantParameters p = plant::default_parameters(machine);
+  p.flex_angle = 0.0;
+  p.pressure_offset.assign(machine.cylinders.size(), 0.0);
+  p.sensors.delay = p.sensors.drop_out = 0.0;
+  for (plant::PumpParameters& pump : p.pumps) pump.flow_sharing = random.chance(0.5) ? 1.0 : 0.0;
+  if (random.chance(0.5)) p.pendulum.rope_length = 0.0;
+  for (const char* key : {"bulk_modulus_MPa", "air_fraction", "viscosity_40_mm2_s", "tank_drop_bar",
+                          "hose_volume_l", "hose_modulus_MPa", "line_drop_bar", "return_drop_bar",
+                          "spool_frequency_Hz", "dead_band_extend", "dead_band_retract",
+                          "hysteresis", "coulomb_friction_N", "viscous_friction_N_s_m",
+                          "leakage_lpm_100bar", "response_s", "line_delay_s", "compensator_bar"}) {
+    const plant::ParameterRow& row = *plant::find_parameter(key);
+    const std::size_t count = row.place == plant::Place::kPlant      ? 1
+                              : row.place == plant::Place::kCylinder ? machine.cylinders.size()
+                                                                     : machine.pumps.size();
+    for (std::size_t i = 0; i < count; ++i) row.value(p, i) *= std::pow(1.6, random.uniform(-1, 1));
+  }
+  return p;
+}
+
+/// A log of the plant at an operator's work. @param told factor of the payload that the log tells
+std::string plant_log(const Machine& machine, const PlantParameters& p, std::uint64_t seed,
+                      double seconds, double told) {
+  const auto work = plant::operator_work(machine, p, {seed, seconds, 0.02, std::nullopt});
+  plant::LogWriter log(machine, p, seed, "");
+  plant::PlantRun run(machine, p, work->start(), work->start_payload());
+  while (run.time() < seconds && run.status() == plant::RunStatus::kRunning) {
+    const plant::ProgrammeStep step = work->step(run.record());
+    if (step.end) break;
+    if (step.payload) run.set_payload(*step.payload);
+    plant::Record row = run.record();
+    row.command = step.command;
+    row.payload *= told;
+    log.add(row);
+    run.advance(step.command);
+  }
+  if (run.status() != plant::RunStatus::kRunning)
+    throw InputError({}, "plant", "the run ended early: " + run.message());
+  return log.text("");
+}
+
+struct Case {
+  std::uint64_t seed = 0;
+  std::string machine, change, at, verdict, answer, left_out;
+  bool right = false;
+  double seconds = 0.0;
+};
+
+/// Hidden change and place of a case. Index 0 of each plant has none.
+struct Hidden {
+  const Change* change = nullptr;
+  std::size_t place = 0;
+  std::string at;
+};
+
+Hidden drawn_change(const Machine& machine, const Arguments& a, Random& random) {
+  std::vector<const Change*> possible;
+  for (const Change& c : changes())
+    if (a.only.empty() || a.only == c.name) possible.push_back(&c);
+  Hidden h;
+  h.change = possible[static_cast<std::size_t>(random.below(static_cast<int>(possible.size())))];
+  std::vector<std::size_t> hydraulic;
+  for (std::size_t c = 0; c < machine.cylinders.size(); ++c)
+    if (machine.cylinders[c].hydraulic()) hydraulic.push_back(c);
+  if (*h.change->key == '\0') return h;
+  const plant::ParameterRow& row = *plant::find_parameter(h.change->key);
+  if (row.place == plant::Place::kCylinder) {
+    h.place = hydraulic[static_cast<std::size_t>(random.below(static_cast<int>(hydraulic.size())))];
+    h.at = machine.cylinders[h.place].name;
+  } else if (row.place == plant::Place::kPump) {
+    h.at = machine.pumps[0].name;
+  }
+  return h;
+}
+
+void judge(const Diagnosis& d, const Machine& machine, const Hidden& hidden, Case& c) {
+  c.verdict = verdict_name(d.verdict);
+  bool truth = false, untrue = false;
+  for (const DiagnosedEffect& e : d.effects) {
+    if (d.verdict != Verdict::kMissing) break;
+    c.answer += e.key() + " ";
+    bool mine = false;
+    if (hidden.change != nullptr) {
+      for (const char* id : hidden.change->named) {
+        const auto same = [&](const std::string& key) {
+          if (key == id) return true;
+          return key.rfind(std::string(id) + ":", 0) == 0 &&
+                 (hidden.at.empty() || key == std::string(id) + ":" + hidden.at);
+        };
+        mine = mine || same(e.key());
+        for (const auto& [rival, worse] : e.rivals) mine = mine || same(rival);
+      }
+    }
+    (mine ? truth : untrue) = true;
+  }
+  c.right = hidden.change != nullptr ? truth && !untrue : d.verdict == Verdict::kNone;
+  if (d.verdict == Verdict::kUnknown && d.unexplained) c.answer += "? " + d.unexplained->sentence;
+  if (d.verdict == Verdict::kBadData && !d.set_aside.empty())
+    c.answer += "bad " + d.set_aside.front().channel + " " + bad_data_word(d.set_aside.front().kind);
+  (void)machine;
+}
+
+/// Two cases of one plant: nothing changed, one change.
+std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
+  constexpr const char* kMachines[] = {"loader_crane", "three_axis", "excavator", "swing_crane"};
+  std::vector<Case> cases;
+  Random random(seed, "plant verdicts");
+  const char* name = kMachines[seed % std::size(kMachines)];
+  try {
+    const Machine machine =
+        load_machine(std::string(SPARFLOW_SOURCE_DIR) + "/problems/machines/" + name + ".yaml");
+    const PlantParameters as_built = drawn_plant(machine, random);
+    const Hidden hidden = drawn_change(machine, a, random);
+    PlantParameters changed = as_built;
+    double told = 1.0;
+    if (*hidden.change->key == '\0') {
+      told = 0.8;
+    } else {
+      const plant::ParameterRow& row = *plant::find_parameter(hidden.change->key);
+      double& value = row.value(changed, hidden.place);
+      value = hidden.change->factor * value + hidden.change->plus * row.scale;
+    }
+    const auto log = [&](const PlantParameters& p, std::uint64_t work, double factor) {
+      return log_from_text(fmt::format("work{}.csv", work),
+                           plant_log(machine, p, 100 * seed + work, a.seconds, factor), machine);
+    };
+    const std::vector<Log> reference = {log(as_built, 1, 1.0)};
+    FitOptions fit_options;
+    fit_options.hold_out_every = 0;
+    const CraneModel model = fit(machine, reference, {}, fit_options).model;
+    for (const bool clean : {true, false}) {
+      Case c;
+      c.seed = seed;
+      c.machine = name;
+      c.change = clean ? "none" : hidden.change->name;
+      c.at = clean ? "" : hidden.at;
+      const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
+      const Diagnosis d =
+          diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference);
+      judge(d, machine, clean ? Hidden{} : hidden, c);
+      c.seconds = d.seconds;
+      if (a.verbose) c.answer += "\n" + d.table();
+      cases.push_back(std::move(c));
+    }
+  } catch (const InputError& e) {
+    Case c;
+    c.seed = seed;
+    c.machine = name;
+    c.left_out = e.what();
+    cases.push_back(std::move(c));
+  }
+  return cases;
+}
+
+int run(const Arguments& a) {
+  std::mutex mutex;
+  std::vector<Case> all;
+  parallel(static_cast<std::size_t>(a.plants), [&](std::size_t i) {
+    std::vector<Case> cases = plant_cases(a.seed + i, a);
+    const std::lock_guard lock(mutex);
+    for (Case& c : cases) {
+      if (!c.left_out.empty()) {
+        fmt::print("  left out: {} {}: {}\n", c.seed, c.machine, c.left_out);
+        continue;
+      }
+      fmt::print("{} {:4} {:13} {:32} {:8} {}\n", c.right ? " " : "X", c.seed, c.machine,
+                 c.at.empty() ? c.change : c.change + ":" + c.at, c.verdict, c.answer);
+      std::fflush(stdout);
+      all.push_back(std::move(c));
+    }
+  });
+  nlohmann::json json;
+  for (const bool clean : {false, true}) {
+    int right = 0, count = 0, bad = 0;
+    for (const Case& c : all) {
+      if ((c.change == "none") != clean) continue;
+      ++count;
+      right += c.right ? 1 : 0;
+      bad += c.verdict == "bad_data" ? 1 : 0;
+    }
+    const char* row =
+        clean ? "nothing changed: verdict none" : "change named, nothing untrue beside it";
+    fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
+    json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
+  }
+  if (!a.json.empty()) std::ofstream(a.json) << json.dump(1) << "\n";
+  return 0;
+}
+
+}  // namespace
+}  // namespace sparflow::bench
+
+int main(int argc, char** argv) {
+  sparflow::bench::Arguments a;
+  CLI::App app("verdicts on logs of dynamic plants");
+  app.add_option("--plants", a.plants, "number of plants")->capture_default_str();
+  app.add_option("--seed", a.seed, "of the first plant")->capture_default_str();
+  app.add_option("--seconds", a.seconds, "of each log")->capture_default_str();
+  app.add_option("--only", a.only, "one change alone");
+  app.add_option("--json", a.json, "file for the counts");
+  app.add_flag("--no-reference", a.no_reference, "diagnose without the reference log");
+  app.add_flag("-v", a.verbose, "whole diagnoses");
+  CLI11_PARSE(app, argc, argv);
+  return sparflow::bench::run(a);
+}
