@@ -180,11 +180,11 @@ std::string systematic_errors_text(const CompareResult& result) {
   std::string text = "\nsystematic errors";
   text += fmt::format(" ({} tests on {} blocks of motion; chance of any false alarm {:.0f} %)\n",
                       tests.tested, tests.blocks, 100.0 * tests.alarm);
-  const std::string undecided = tests.undecided_sentence();
+  const std::vector<std::string> undecided = tests.undecided();
   if (tests.smallest_p() > tests.alarm) {
-    return text + (undecided.empty()
-                       ? "  none: no significant bias, no significant dependence on a signal\n"
-                       : wrapped("none is significant, but " + undecided));
+    text += undecided.empty()
+                ? "  none: no significant bias, no significant dependence on a signal\n"
+                : "  none that is significant\n";
   }
   std::size_t shown = 0, alarms = 0;
   for (const ResidualTest& t : tests.tests) {
@@ -194,7 +194,7 @@ std::string systematic_errors_text(const CompareResult& result) {
     shown += shown < kMost ? 1 : 0;
   }
   if (alarms > shown) text += fmt::format("  and {} more, in --json\n", alarms - shown);
-  if (!undecided.empty()) text += wrapped(undecided);
+  for (std::size_t i = 0; i < std::min(undecided.size(), kMost); ++i) text += wrapped(undecided[i]);
   return text;
 }
 

@@ -108,20 +108,28 @@ MatrixXd max_t_sign_flip(const MatrixXd& sums, int flips, unsigned seed) {
   return out;
 }
 
-const ResidualTest* ResidualTests::undecided() const {
-  const ResidualTest* out = nullptr;
+std::vector<std::string> ResidualTests::undecided() const {
+  std::vector<const ResidualTest*> largest;  // by quantity
   for (const ResidualTest& t : tests) {
     if (t.least_p <= alarm || t.share_explained < large_share) continue;
-    if (out == nullptr || t.share_explained > out->share_explained) out = &t;
+    const auto same = std::find_if(largest.begin(), largest.end(), [&](const ResidualTest* o) {
+      return o->stage == t.stage && o->at == t.at && o->regime == t.regime;
+    });
+    if (same == largest.end()) {
+      largest.push_back(&t);
+    } else if (t.share_explained > (*same)->share_explained) {
+      *same = &t;
+    }
   }
+  std::stable_sort(largest.begin(), largest.end(), [](const auto* a, const auto* b) {
+    return a->share_explained > b->share_explained;
+  });
+  std::vector<std::string> out;
+  out.reserve(largest.size());
+  for (const ResidualTest* t : largest)
+    out.push_back(fmt::format("{} blocks of motion are too few to decide whether {}", t->blocks,
+                              t->sentence));
   return out;
-}
-
-std::string ResidualTests::undecided_sentence() const {
-  const ResidualTest* t = undecided();
-  if (t == nullptr) return "";
-  return fmt::format("{} blocks of motion are too few to decide whether {}", t->blocks,
-                     t->sentence);
 }
 
 double effective_samples(const VectorXd& values, const std::vector<int>& block,

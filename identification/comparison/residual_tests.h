@@ -77,10 +77,9 @@ struct ResidualTests {
   double alarm = ResidualTestOptions().alarm;
   double smallest_p() const { return tests.empty() ? 1.0 : tests.front().p_value; }
   double large_share = ResidualTestOptions().large_share;  ///< that of the options
-  /// The largest part of an error that could not be an alarm, because its quantity moves in too few blocks; null: none of
-  /// the share that is told.
-  const ResidualTest* undecided() const;
-  std::string undecided_sentence() const;  ///< says so, without a full stop; "" when there is none
+  /// Sentences without a full stop on errors that could not be alarms, because their quantities move in too few blocks: of
+  /// each quantity the largest part, where it is large enough to be told, the largest first.
+  std::vector<std::string> undecided() const;
 };
 
 ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,

@@ -75,14 +75,15 @@ void add_tests(Page& page, const CompareResult& result) {
   constexpr std::size_t kMost = 12;
   const ResidualTests& tests = result.tests;
   if (tests.tests.empty()) return;
-  const std::string undecided = tests.undecided_sentence();
+  std::string undecided;
+  for (const std::string& sentence : tests.undecided()) undecided += sentence + ". ";
   if (tests.smallest_p() > tests.alarm) {
-    page.paragraph(fmt::format(
-        "{}: {} tests of bias and of dependence on signals, over {} blocks of motion, "
-        "found no more than autocorrelated noise would show.{}",
-        undecided.empty() ? "No part of the error is systematic"
-                          : "No part of the error is significantly systematic",
-        tests.tested, tests.blocks, undecided.empty() ? "" : " " + capitalised(undecided) + "."));
+    page.paragraph(
+        fmt::format("{}: {} tests of bias and of dependence on signals, over {} blocks of motion, "
+                    "found no more than autocorrelated noise would show. {}",
+                    undecided.empty() ? "No part of the error is systematic"
+                                      : "No part of the error is significantly systematic",
+                    tests.tested, tests.blocks, undecided));
     return;
   }
   Table table;
@@ -113,6 +114,7 @@ void add_tests(Page& page, const CompareResult& result) {
       {"explained", Eigen::Map<VectorXd>(shares.data(), static_cast<Index>(shares.size()))}};
   page.plot(std::move(chart));
   page.table(std::move(table));
+  if (!undecided.empty()) page.paragraph(undecided);
 }
 
 /// Appends the errors by regime of the stage at fault, or of the first stage; the JSON result has all stages.

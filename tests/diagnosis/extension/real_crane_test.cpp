@@ -141,6 +141,10 @@ TEST_P(RealCraneImproved, NamesMassAndDryFrictionAndPredictsTheRunLeftOut) {
   const CraneModel model = fit(machine, logs).model;
   ExtendOptions options;
   options.max_steps = 6;  // the effects that are checked, and a few more
+  // What is published concerns forces; DiagnoseRealCrane searches the whole catalogue.
+  for (const EffectAt& c : candidates(machine)) {
+    if (c.effect->info().stage == EffectStage::kForce) options.diagnose.candidates.push_back(c);
+  }
   const ExtendResult r = improve(model, {logs, {}, test}, options);
   expect_published(r);
   const double before = r.steps.front().before.find("force", "main")->rmse;

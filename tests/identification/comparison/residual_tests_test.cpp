@@ -116,16 +116,12 @@ TEST(ResidualTests, WhatTooFewBlocksCannotDecideIsToldAndNotDenied) {
   }
   const ResidualTests few = test_residuals(parts, 6);
   EXPECT_GT(few.smallest_p(), few.alarm);
-  ASSERT_NE(few.undecided(), nullptr);
-  EXPECT_EQ(few.undecided()->depends_on, "");
-  EXPECT_GT(few.undecided()->share_explained, 0.98);  // 1 - 1 / (1 + 10^2)
-  EXPECT_THAT(few.undecided_sentence(),
-              testing::StartsWith("6 blocks of motion are too few to decide whether the working "
-                                  "pressure of arm is predicted 10"));
+  EXPECT_THAT(few.undecided(), testing::Contains(testing::StartsWith(
+                                   "6 blocks of motion are too few to decide whether "
+                                   "the working pressure of arm is predicted 10")));
   const ResidualTests enough = test_residuals(ar_parts(5, 10.0), 30);
   EXPECT_LE(enough.smallest_p(), enough.alarm);
-  EXPECT_EQ(enough.undecided(), nullptr);
-  EXPECT_EQ(enough.undecided_sentence(), "");
+  EXPECT_THAT(enough.undecided(), testing::IsEmpty());
 }
 
 TEST(ResidualTests, FlipsWithBlocksOfOneSignReachTheSmallestPossibleValue) {
