@@ -1,6 +1,7 @@
 #pragma once
 /// Thresholds of the evidence: which samples form a channel, which branch of a valve law holds in them, what its noise
 /// model may contain. An Evidence keeps the options that it was collected with.
+#include "diagnosis/evidence/mechanisms.h"
 
 namespace sparflow {
 
@@ -89,6 +90,7 @@ struct CavitationOptions {
 };
 
 struct EvidenceOptions {
+  Mechanisms mechanisms;  ///< of the diagnosis that uses the evidence
   BranchOptions branches;
   NoiseOptions noise;
   CavitationOptions cavitation;

@@ -40,7 +40,8 @@ CandidateScore shaped(const SearchState& search, const std::vector<const EffectD
   for (const CandidateScore& o : others) pointers.push_back(&o);
   const CandidateScore* better =
       best_by_least_squares(search, base, pointers, search.design_of(score));
-  return better == nullptr ? score : *better;
+  const bool acts = search.mechanisms().act(Mechanism::kSquaresShape, better != nullptr);
+  return acts ? *better : score;
 }
 
 }  // namespace
@@ -64,7 +65,7 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
   const CandidateScore* first = passing.front();
   const CandidateScore* larger =
       best_by_least_squares(search, base, passing, search.design_of(*first));
-  if (larger != nullptr) {
+  if (search.mechanisms().act(Mechanism::kSquaresChoice, larger != nullptr)) {
     if (tracing())
       fmt::print(stderr, "  {} leaves less than {}\n",
                  search.key(search.candidates[larger->candidate].effect),
@@ -75,8 +76,12 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
   for (const CandidateScore* s : passing) {
     const EffectAt& e = search.candidates[s->candidate].effect;
     if (e.at != best.at || e.effect->info().id != best.effect->info().refines) continue;
-    if (s->gain > search.options.plainer_share * first->gain ||
-        !better_by_least_squares(search, base, search.design_of(*first), search.design_of(*s))) {
+    const bool plainer =
+        s->gain > search.options.plainer_share * first->gain ||
+        search.mechanisms().act(
+            Mechanism::kSquaresPlainer,
+            !better_by_least_squares(search, base, search.design_of(*first), search.design_of(*s)));
+    if (search.mechanisms().act(Mechanism::kPlainer, plainer)) {
       return shaped(search, base, *s);
     }
   }

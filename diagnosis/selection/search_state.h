@@ -24,6 +24,7 @@ struct SearchState {
   SearchScores scores;
   std::vector<bool> refused;  ///< by candidate: failed an acceptance test in this search
 
+  const Mechanisms& mechanisms() const { return evidence.options.mechanisms; }
   void report(std::size_t found, const std::string& what) const;
   std::string key(const EffectAt& e) const;
   const EffectDesign& design_of(const CandidateScore& score) const {

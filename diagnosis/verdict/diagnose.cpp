@@ -199,6 +199,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const std::vector<MachineSig
     if (share <
         (l.event ? d.thresholds.largest_event_share : d.thresholds.largest_unmodelled_share))
       continue;
+    if (l.event && !d.evidence.options.mechanisms.act(Mechanism::kEvent)) continue;
     if (!d.unexplained || (touched && !in_touched))
       d.unexplained = describe_residual_structure(d.evidence, l);
     in_touched = in_touched || touched;
