@@ -63,7 +63,7 @@ class Search {
     bool between = false;
     for (const CandidateScore& s : scores) {
       const double p = null.p_value(s.gain, s.candidate);
-      between = between || (p >= further && p < first);
+      between = between || (p >= further && p < first && s.gain >= search_.options.least_gain);
       if (p < first) record_optional(search_, s);
     }
     if (found == 0) return first;
