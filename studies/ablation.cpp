@@ -65,7 +65,7 @@ struct Options {
   std::uint64_t seed = 71000;
   BlindCase how;
   std::vector<std::string> rows = {"none", "clear", "small", "pairs"};
-  std::vector<std::string> without;
+  std::vector<std::string> without, together;
   std::string json;
 };
 
@@ -87,12 +87,23 @@ bool oil_decides(const PreparedCase& prepared, const DiagnoseOptions& all,
                      });
 }
 
-DiagnoseOptions options_without(const Named& one) {
+constexpr const char* kTogether = "together";
+
+template <class List>
+bool contains(const List& list, const std::string& name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
+
+/// Options with the named mechanisms switched off.
+DiagnoseOptions options_without(const std::vector<std::string>& names) {
   DiagnoseOptions options;
-  if (one.mechanism)
-    options.evidence.mechanisms.switch_off(*one.mechanism);
-  else
-    options.evidence.branches.least_oil_range = 1e9;  // K, more than any oil changes
+  for (const Named& one : kMechanisms) {
+    if (!contains(names, one.name)) continue;
+    if (one.mechanism)
+      options.evidence.mechanisms.switch_off(*one.mechanism);
+    else
+      options.evidence.branches.least_oil_range = 1e9;  // K, more than any oil changes
+  }
   return options;
 }
 
@@ -133,13 +144,18 @@ class Study {
         line["acted"] = json::array();
         for (const Named& m : kMechanisms) {
           const bool acted = m.mechanism ? all.evidence.mechanisms.acted(*m.mechanism)
-                                         : oil_decides(prepared, all, options_without(m));
+                                         : oil_decides(prepared, all, options_without({m.name}));
           if (acted) line["acted"].push_back(m.name);
         }
         add(std::move(line));
       }
-      for (const Named* m : missing(asked, runs_.at(key_of(asked)))) {
-        if (stopped == 0) add(diagnosed(prepared, asked, options_without(*m), m->name));
+      for (const std::string& name : missing(asked, runs_.at(key_of(asked)))) {
+        if (stopped != 0) continue;
+        const bool all = name == kTogether;
+        json line = diagnosed(prepared, asked,
+                              options_without(all ? options_.together : std::vector{name}), name);
+        if (all) line["off"] = options_.together;
+        add(std::move(line));
       }
     } catch (const InputError& error) {
       BlindRun run;
@@ -154,16 +170,20 @@ class Study {
   }
 
   /// The mechanisms that acted in a case and whose diagnosis without them the file lacks.
-  std::vector<const Named*> missing(const BlindCase& asked, const json& whole) const {
-    std::vector<const Named*> out;
+  std::vector<std::string> missing(const BlindCase& asked, const json& whole) const {
+    std::vector<std::string> out;
+    const json& acted = whole.at("acted");
+    const auto lacks = [&](const std::string& name) {
+      return !runs_.contains(key_of(asked, name));
+    };
+    bool one_of_all = false;
     for (const Named& m : kMechanisms) {
-      const bool wanted = options_.without.empty() ||
-                          std::count(options_.without.begin(), options_.without.end(), m.name) > 0;
-      const json& acted = whole.at("acted");
-      if (wanted && std::count(acted.begin(), acted.end(), m.name) > 0 &&
-          !runs_.contains(key_of(asked, m.name)))
-        out.push_back(&m);
+      if (!contains(acted, m.name)) continue;
+      const bool wanted = options_.without.empty() || contains(options_.without, m.name);
+      if (wanted && lacks(m.name)) out.emplace_back(m.name);
+      one_of_all = one_of_all || contains(options_.together, m.name);
     }
+    if (one_of_all && lacks(kTogether)) out.emplace_back(kTogether);
     return out;
   }
 
@@ -254,7 +274,6 @@ void print_line(const std::string& name, const std::string& row, const Effect1& 
 }
 
 void print_table(const std::map<std::string, json>& runs) {
-  std::map<std::string, std::vector<BlindRun>> none;
   std::map<std::string, std::vector<const json*>> rows;
   for (const auto& [key, r] : runs) {
     if (r.at("without") != "" || r.at("left_out") != "") continue;
@@ -270,7 +289,10 @@ void print_table(const std::map<std::string, json>& runs) {
   fmt::print("{:20s} {:24s} {:>4s} {:>4s} {:>4s}  {:28s}  {:28s}  {:5s}  {:9s} {:9s} {:>6s}\n",
              "without", "row", "runs", "acts", "diff", "right", "exact", "error", "with", "without",
              "time");
-  for (const Named& m : kMechanisms) {
+  std::vector<std::string> names;
+  for (const Named& m : kMechanisms) names.emplace_back(m.name);
+  names.emplace_back(kTogether);
+  for (const std::string& name : names) {
     Effect1 pooled;
     for (const auto& [row, all] : rows) {
       Effect1 sum;
@@ -279,17 +301,17 @@ void print_table(const std::map<std::string, json>& runs) {
         c.row = with->at("row");
         c.only = with->at("only");
         c.seed = with->at("seed");
-        const json& acted = with->at("acted");
-        const bool acts = std::count(acted.begin(), acted.end(), m.name) > 0;
-        const auto without = runs.find(key_of(c, m.name));
+        const auto without = runs.find(key_of(c, name));
+        const bool acts =
+            name == kTogether ? without != runs.end() : contains(with->at("acted"), name);
         if (acts && without == runs.end()) continue;  // not run
         const json& other = acts ? without->second : *with;
         compare(*with, other, sum);
         if (c.only.empty()) compare(*with, other, pooled);
       }
-      if (sum.acted > 0) print_line(m.name, row, sum);
+      if (sum.acted > 0) print_line(name, row, sum);
     }
-    print_line(m.name, "all drawn", pooled);
+    print_line(name, "all drawn", pooled);
   }
 }
 
@@ -301,6 +323,8 @@ int run(int argc, char** argv) {
   app.add("--rows", options.rows, "none, clear, small, pairs, outside");
   app.add("--only", options.how.only, "id of the only effect to hide");
   app.add("--without", options.without, "mechanisms to switch off; empty = all that acted");
+  app.add("--together", options.together,
+          "mechanisms to switch off at once, where one of them acted");
   app.add("--json", options.json, "file with one run a line; runs that it has are not repeated")
       .required();
   if (const auto code = app.parse(argc, argv)) return *code;
