@@ -224,15 +224,16 @@ struct Pairs {
   int both = 0, with = 0, without = 0, neither = 0;
   void count(bool a, bool b) { ++(a ? (b ? both : with) : (b ? without : neither)); }
   int runs() const { return both + with + without + neither; }
+  /// "+ 5 - 1  1.0 (-0.4 ..  2.7)": runs right only with it, only without it, difference [%] with 95 % limits.
   std::string text() const {
     const PairedDifference d = paired_difference(both, with, without, neither);
-    return fmt::format("{:3d} -{:2d}  {:5.1f} ({:5.1f} .. {:4.1f})", with, without, 100.0 * d.value,
+    return fmt::format("+{:2d} -{:2d} {:5.1f} ({:5.1f} ..{:5.1f})", with, without, 100.0 * d.value,
                        100.0 * d.lower, 100.0 * d.upper);
   }
 };
 
 /// What a mechanism changed in one row.
-struct Effect1 {
+struct RowSum {
   int acted = 0, changed = 0;
   Pairs right, exact;
   int held_with = 0, held_without = 0, intervals_with = 0, intervals_without = 0;
@@ -241,10 +242,11 @@ struct Effect1 {
 };
 
 bool only_the_truth(const json& r) {
-  return r.at("row") == "none" ? r.at("good").get<bool>() : r.at("exact").get<bool>();
+  const bool named = r.at("row") != "none" && r.at("row") != "outside";
+  return r.at(named ? "exact" : "good").get<bool>();
 }
 
-void compare(const json& with, const json& without, Effect1& sum) {
+void compare(const json& with, const json& without, RowSum& sum) {
   sum.right.count(with.at("good"), without.at("good"));
   sum.exact.count(only_the_truth(with), only_the_truth(without));
   if (&with == &without) return;
@@ -265,12 +267,14 @@ void compare(const json& with, const json& without, Effect1& sum) {
   }
 }
 
-void print_line(const std::string& name, const std::string& row, const Effect1& e) {
-  fmt::print("{:20s} {:24s} {:4d} {:4d} {:4d}  {}   {}  {}  {:4d}/{:<4d} {:4d}/{:<4d} {:6.2f}\n",
-             name, row, e.right.runs(), e.acted, e.changed, e.right.text(), e.exact.text(),
-             e.errors == 0 ? "     " : fmt::format("{:5.2f}", std::exp(e.log_errors / e.errors)),
-             e.held_with, e.intervals_with, e.held_without, e.intervals_without,
-             e.acted == 0 ? 0.0 : e.core_without / e.core_with);
+void print_line(const std::string& name, const std::string& row, const RowSum& e) {
+  if (e.right.runs() == 0) return;
+  fmt::print("{:20s} {:21s} {:4d} {:4d} {:4d}  {}  {}  {:>5s} {:>9s} {:>9s} {:>5s}\n", name, row,
+             e.right.runs(), e.acted, e.changed, e.right.text(), e.exact.text(),
+             e.errors == 0 ? "" : fmt::format("{:.2f}", std::exp(e.log_errors / e.errors)),
+             e.acted == 0 ? "" : fmt::format("{}/{}", e.held_with, e.intervals_with),
+             e.acted == 0 ? "" : fmt::format("{}/{}", e.held_without, e.intervals_without),
+             e.acted == 0 ? "" : fmt::format("{:.2f}", e.core_without / e.core_with));
 }
 
 void print_table(const std::map<std::string, json>& runs) {
@@ -281,21 +285,22 @@ void print_table(const std::map<std::string, json>& runs) {
     rows[r.at("row").get<std::string>() + (only.empty() ? "" : " " + only)].push_back(&r);
   }
   fmt::print(
-      "right: as the blind test counts; exact: the truth and nothing else. With the mechanism "
-      "alone, without it "
-      "alone, difference in percent (95 %)\nerror: of parameters without / with; intervals that "
-      "hold the truth "
-      "with, without; core time without / with; last three of runs in which it acted\n\n");
-  fmt::print("{:20s} {:24s} {:>4s} {:>4s} {:>4s}  {:28s}  {:28s}  {:5s}  {:9s} {:9s} {:>6s}\n",
+      "acts: runs in which it decides something; diff: of these, with another answer without it\n"
+      "right: as the blind test counts; exact: the truth and nothing else; + right only with it, - "
+      "only without it,\ndifference in percent with 95 % limits\n"
+      "in runs in which it acts: error of parameters without / with, intervals that hold the "
+      "truth, "
+      "core time without / with\n\n");
+  fmt::print("{:20s} {:21s} {:>4s} {:>4s} {:>4s}  {:26s}  {:26s}  {:>5s} {:>9s} {:>9s} {:>5s}\n",
              "without", "row", "runs", "acts", "diff", "right", "exact", "error", "with", "without",
              "time");
   std::vector<std::string> names;
   for (const Named& m : kMechanisms) names.emplace_back(m.name);
   names.emplace_back(kTogether);
   for (const std::string& name : names) {
-    Effect1 pooled;
+    RowSum pooled;
     for (const auto& [row, all] : rows) {
-      Effect1 sum;
+      RowSum sum;
       for (const json* with : all) {
         BlindCase c;
         c.row = with->at("row");
