@@ -1,6 +1,6 @@
 #pragma once
 /// Mechanisms of the diagnosis that can be switched off one by one, and a record of those that acted. The ablation study
-/// (studies/ablation.cpp, docs/ablation.md) uses both: a run in which a mechanism decided nothing has the same result
+/// (studies/ablation/ablation.cpp, docs/ablation.md) uses both: a run in which a mechanism decided nothing has the same result
 /// without it.
 #include <atomic>
 #include <cstdint>
@@ -28,7 +28,6 @@ enum class Mechanism : unsigned {
   kSquaresChoice,    ///< least-squares comparison of the best candidates
   kSquaresPlainer,   ///< least-squares comparison of a refinement with the plainer effect
   kSquaresShape,     ///< least-squares comparison of points of the grid
-  kSquaresRival,     ///< least-squares comparison of an effect with its rival
   kPlainer,          ///< the plainer effect comes before its refinement
   kMerge,            ///< one effect for two
   kReshape,          ///< another variant of a law

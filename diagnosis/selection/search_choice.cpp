@@ -28,6 +28,15 @@ const CandidateScore* best_by_least_squares(const SearchState& search,
              : rivals[static_cast<std::size_t>(most - advantage.begin())];
 }
 
+/// Whether the least-squares comparison prefers `one` to `other` significantly.
+bool better_by_least_squares(const SearchState& search,
+                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
+                             const EffectDesign& other) {
+  return least_squares_advantage(search.evidence, search.scores.least_squares(base, one),
+                                 search.scores.least_squares(base, other),
+                                 search.options.regression) > 0.0;
+}
+
 /// The same candidate at that point of its grid which the least-squares comparison prefers significantly, if any.
 CandidateScore shaped(const SearchState& search, const std::vector<const EffectDesign*>& base,
                       const CandidateScore& score) {
@@ -45,14 +54,6 @@ CandidateScore shaped(const SearchState& search, const std::vector<const EffectD
 }
 
 }  // namespace
-
-bool better_by_least_squares(const SearchState& search,
-                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
-                             const EffectDesign& other) {
-  return least_squares_advantage(search.evidence, search.scores.least_squares(base, one),
-                                 search.scores.least_squares(base, other),
-                                 search.options.regression) > 0.0;
-}
 
 CandidateScore chosen(const SearchState& search, const std::vector<CandidateScore>& scores,
                       const NullDistribution& null, double level,

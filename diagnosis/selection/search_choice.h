@@ -13,15 +13,4 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
                       const NullDistribution& null, double level,
                       const std::vector<const EffectDesign*>& base);
 
-/// Records that a candidate with optional parameters is among those that count.
-inline void record_optional(const SearchState& search, const CandidateScore& score) {
-  search.mechanisms().act(Mechanism::kOptional,
-                          search.candidates[score.candidate].designs.back().optional);
-}
-
-/// Whether the least-squares comparison prefers `one` to `other` significantly.
-bool better_by_least_squares(const SearchState& search,
-                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
-                             const EffectDesign& other);
-
 }  // namespace sparflow

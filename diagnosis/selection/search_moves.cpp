@@ -6,7 +6,6 @@
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/acceptance_tests.h"
-#include "diagnosis/selection/search_choice.h"
 
 namespace sparflow {
 namespace {
@@ -123,12 +122,8 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
       search.scores.gain_instead(f.design, f.design, others, without) - search.penalty_of(f.design);
   f.gain = own;
   const CandidateScore* challenger = nullptr;
-  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain &&
-      !search.mechanisms().act(
-          Mechanism::kSquaresRival,
-          better_by_least_squares(search, others, f.design, search.design_of(scores.front())))) {
+  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain)
     challenger = &scores.front();
-  }
   if (challenger != nullptr) {
     FoundEffect rival;
     rival.design = search.scores.refined(others, *challenger, without);

@@ -43,6 +43,12 @@ struct SearchState {
                 const EffectFit* start = nullptr) const;
 };
 
+/// Records that a candidate with optional parameters is among those that count.
+inline void record_optional(const SearchState& search, const CandidateScore& score) {
+  search.mechanisms().act(Mechanism::kOptional,
+                          search.candidates[score.candidate].designs.back().optional);
+}
+
 std::vector<const EffectDesign*> designs_of(const std::vector<FoundEffect>& found,
                                             std::size_t without = static_cast<std::size_t>(-1));
 
