@@ -25,7 +25,6 @@ enum class Mechanism : unsigned {
   kProven,           ///< exemption from joint significance by the gain on motions left out
   kLeastGain,        ///< least gain beside the threshold of the null distribution
   kFurther,          ///< lower false-alarm rate of every further effect
-  kSquaresChoice,    ///< least-squares comparison of the best candidates
   kSquaresPlainer,   ///< least-squares comparison of a refinement with the plainer effect
   kSquaresShape,     ///< least-squares comparison of points of the grid
   kPlainer,          ///< the plainer effect comes before its refinement
