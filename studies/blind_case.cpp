@@ -20,8 +20,19 @@
 #include "studies/stable_hash.h"
 
 namespace sparflow::bench {
+
+/// A case as a user has it: logs that are read from text, and a fitted model.
+struct PreparedCase::Crane {
+  std::vector<simulator::HiddenTruth> truth;
+  std::string shown;  // visibility of the effects, for the details
+  std::vector<Log> train, references, tests;
+  CraneModel model;
+  double rows = 0.0;
+};
+
 namespace {
 
+using Crane = PreparedCase::Crane;
 using simulator::CaseRequest;
 using simulator::GeneratedCase;
 using simulator::HiddenEffect;
@@ -113,15 +124,6 @@ CaseRequest draw_case(const BlindCase& asked, std::string& shown) {
       return request;
   }
 }
-
-/// A case as a user has it: logs that are read from text, and a fitted model.
-struct Crane {
-  std::vector<HiddenTruth> truth;
-  std::string shown;  // visibility of the effects, for the details
-  std::vector<Log> train, references, tests;
-  CraneModel model;
-  double rows = 0.0;
-};
 
 Crane prepare(const BlindCase& asked) {
   std::string shown;
@@ -386,6 +388,35 @@ BlindRun run_blind(const BlindCase& asked) {
     run.left_out = error.what();
   }
   return run;
+}
+
+PreparedCase::PreparedCase(const BlindCase& asked)
+    : asked_(asked), crane_(std::make_unique<Crane>(prepare(asked))) {}
+PreparedCase::~PreparedCase() = default;
+
+BlindRun PreparedCase::diagnosed(const DiagnoseOptions& options) const {
+  BlindRun run;
+  run.asked = asked_;
+  run.rms_ratio = run.energy_before = run.energy_after = kNotJudged;
+  run.machine = crane_->model.machine.name;
+  run.rows = crane_->rows;
+  const auto start = std::chrono::steady_clock::now();
+  const Diagnosis d = diagnose(crane_->model, crane_->train, crane_->references, options);
+  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  judge_answer(d, crane_->truth, run);
+  return run;
+}
+
+Evidence PreparedCase::evidence(const DiagnoseOptions& options) const {
+  const auto signals = [&](const std::vector<Log>& logs) {
+    std::vector<MachineSignals> out;
+    out.reserve(logs.size());
+    for (const Log& log : logs)
+      out.push_back(make_signals(crane_->model.machine, log, options.signals));
+    return out;
+  };
+  return collect_evidence(crane_->model, signals(crane_->train), signals(crane_->references),
+                          nullptr, options.evidence);
 }
 
 double time_of_diagnosis(std::uint64_t seed) {

@@ -2,9 +2,11 @@
 /// One run of the blind test: a log with a hidden effect from simulator/hidden_effects, the results of fit, diagnose
 /// and extend on it as a user would call them, and their difference from the truth.
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "diagnosis/verdict/diagnose.h"
 #include "studies/baseline_methods.h"
 
 namespace sparflow::bench {
@@ -60,6 +62,27 @@ struct BlindRun {
 
   /// Whether the answer is right for the case's row.
   bool good() const;
+};
+
+/// A case that is drawn and fitted once and can be diagnosed in several ways.
+class PreparedCase {
+ public:
+  /// @throws InputError when the case cannot be fitted
+  explicit PreparedCase(const BlindCase& asked);
+  ~PreparedCase();
+  PreparedCase(const PreparedCase&) = delete;
+  PreparedCase& operator=(const PreparedCase&) = delete;
+
+  /// Diagnosis by the method of the program, judged without the test log.
+  BlindRun diagnosed(const DiagnoseOptions& options) const;
+  /// The evidence of that diagnosis.
+  Evidence evidence(const DiagnoseOptions& options) const;
+
+  struct Crane;
+
+ private:
+  BlindCase asked_;
+  std::unique_ptr<Crane> crane_;
 };
 
 /// Runs one case. A case that cannot be judged throws nothing but sets `left_out`.

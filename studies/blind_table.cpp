@@ -279,6 +279,7 @@ nlohmann::json run_json(const BlindRun& r) {
           {"answer", r.answer},
           {"verdict", r.verdict},
           {"good", r.good()},
+          {"exact", r.exact},
           {"in_set", r.in_set},
           {"set_size", r.set_size},
           {"named", named},

@@ -3,6 +3,7 @@
 /// model may contain. An Evidence keeps the options that it was collected with.
 #include <vector>
 
+#include "diagnosis/evidence/mechanisms.h"
 #include "models/effects/effect.h"
 
 namespace sparflow {
@@ -92,6 +93,7 @@ struct CavitationOptions {
 };
 
 struct EvidenceOptions {
+  Mechanisms mechanisms;  ///< of the diagnosis that uses the evidence
   BranchOptions branches;
   NoiseOptions noise;
   CavitationOptions cavitation;

@@ -25,27 +25,31 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
   found.held_out_share = held.improved;
 }
 
-std::string why_not_named(const FoundEffect& found, const SearchOptions& options) {
+std::string why_not_named(const FoundEffect& found, const SearchOptions& options,
+                          const Mechanisms& mechanisms) {
   const EffectStage stage = found.design.effect.effect->info().stage;
   const bool behind_process = stage == EffectStage::kPressure || stage == EffectStage::kPump;
-  if (behind_process && found.absorbed_where_seen > options.largest_absorbed) {
+  if (mechanisms.act(Mechanism::kAbsorbed,
+                     behind_process && found.absorbed_where_seen > options.largest_absorbed)) {
     return fmt::format(
         "its absorbed share is {:.0f} % (learning pressure models, margins and gains again would "
         "take that part over); a reference log would decide",
         100.0 * found.absorbed_where_seen);
   }
-  if (found.size < options.smallest_effect) {
+  if (mechanisms.act(Mechanism::kSize, found.size < options.smallest_effect)) {
     return fmt::format("where it acts it is {:.2f} times the noise, too small to be named",
                        found.size);
   }
-  if (found.at_bound) return "a parameter lies on the bound of its plausible range";
-  if (found.over_form < options.smallest_over_form) {
+  if (mechanisms.act(Mechanism::kBound, found.at_bound))
+    return "a parameter lies on the bound of its plausible range";
+  if (mechanisms.act(Mechanism::kFormSize, found.over_form < options.smallest_over_form)) {
     return fmt::format(
         "it compensates model-form error: it is only {:.1f} times that of the other effects there",
         found.over_form);
   }
-  if (found.held_out <= options.held_out_errors * found.held_out_error &&
-      !(found.held_out > 0.0 && found.held_out_share > options.improved_share)) {
+  const bool predicts = found.held_out > options.held_out_errors * found.held_out_error ||
+                        (found.held_out > 0.0 && found.held_out_share > options.improved_share);
+  if (mechanisms.act(Mechanism::kHeldOut, !predicts)) {
     return fmt::format("its gain on motions left out, {:.1f} +- {:.1f} nats, is not significant",
                        found.held_out, found.held_out_error);
   }

@@ -14,6 +14,7 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
                   FoundEffect& found);
 
 /// @return the reason why an effect is not named, as part of a sentence; empty when it passes all acceptance tests
-std::string why_not_named(const FoundEffect& found, const SearchOptions& options);
+std::string why_not_named(const FoundEffect& found, const SearchOptions& options,
+                          const Mechanisms& mechanisms);
 
 }  // namespace sparflow

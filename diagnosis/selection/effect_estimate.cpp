@@ -111,7 +111,7 @@ class Estimator {
     std::vector<FoundEffect> found = with_intervals();
     for (int turn = 0; turn < kLeaderTurns; ++turn) {
       std::optional<Evidence> updated = evidence_.with_leaders_of(applied(found));
-      if (!updated) break;
+      if (!acts(Mechanism::kEstimateLeaders, updated.has_value())) break;
       evidence_ = std::move(*updated);
       designs_ = rebuilt_designs(evidence_, designs_);
       for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
@@ -134,6 +134,9 @@ class Estimator {
   }
 
  private:
+  bool acts(Mechanism m, bool decides) const {
+    return options_.evidence.mechanisms.act(m, decides);
+  }
   /// Whether positions are measured so finely in every log that a much shorter window than the search's suffices.
   bool can_sharpen(const std::vector<MachineSignals>& logs) const {
     return std::all_of(logs.begin(), logs.end(), [&](const MachineSignals& s) {
@@ -278,8 +281,8 @@ class Estimator {
         exact.effects.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
     }
     Evidence left = collect(exact);
-    if (std::optional<Evidence> updated = left.with_leaders_of(applied(found, false)))
-      left = std::move(*updated);
+    std::optional<Evidence> updated = left.with_leaders_of(applied(found, false));
+    if (acts(Mechanism::kEstimateLeaders, updated.has_value())) left = std::move(*updated);
     if (left.channels.size() != evidence_.channels.size()) return false;
     for (std::size_t c = 0; c < left.channels.size(); ++c) {
       EvidenceChannel& channel = left.channels[c];

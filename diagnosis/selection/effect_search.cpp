@@ -37,7 +37,8 @@ class Search {
         reshaped = reshape(search_, found, i, current) || reshaped;
       relinearise_angles(found, current);
       prune(search_, found, current);
-      while (merge(search_, found, current)) prune(search_, found, current);
+      while (search_.mechanisms().enabled(Mechanism::kMerge) && merge(search_, found, current))
+        prune(search_, found, current);
       if (reshaped) {
         for (std::size_t i = 0; i < found.size(); ++i) search_.judge(found, i, current);
       }
@@ -52,6 +53,24 @@ class Search {
   }
 
  private:
+  bool lets(Mechanism m, bool decides) const { return search_.mechanisms().act(m, decides); }
+
+  /// False-alarm rate of the next step.
+  double level_of(std::size_t found, const std::vector<CandidateScore>& scores,
+                  const NullDistribution& null) const {
+    const double first = search_.options.false_alarm;
+    const double further = search_.options.further_false_alarm * first;
+    bool between = false;
+    for (const CandidateScore& s : scores) {
+      const double p = null.p_value(s.gain, s.candidate);
+      between = between || (p >= further && p < first && s.gain >= search_.options.least_gain);
+      if (p < first) record_optional(search_, s);
+    }
+    if (found == 0) return first;
+    lets(Mechanism::kFurther, between);
+    return search_.mechanisms().enabled(Mechanism::kFurther) ? further : first;
+  }
+
   /// Adds the best candidate while one passes the threshold and the acceptance tests.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     const int most_steps = search_.options.steps_per_effect * search_.options.max_effects;
@@ -72,9 +91,7 @@ class Search {
       const NullDistribution null = simulate_null_distribution(
           search_.evidence, null_candidates, base, current, search_.options.simulations, random_,
           search_.options.regression);
-      const double level = found.empty()
-                               ? search_.options.false_alarm
-                               : search_.options.further_false_alarm * search_.options.false_alarm;
+      const double level = level_of(found.size(), scores, null);
       const CandidateScore best = chosen(search_, scores, null, level, base);
       const double p = null.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(search_, step, scores, null);
@@ -84,9 +101,9 @@ class Search {
         result.p_value = p;
         result.simulations = search_.options.simulations;
       }
-      if (p >= level || best.gain < search_.options.least_gain) {
-        if (found.empty() &&
-            best.gain > search_.options.surely_something * search_.options.least_gain)
+      if (p >= level || lets(Mechanism::kLeastGain, best.gain < search_.options.least_gain)) {
+        if (lets(Mechanism::kOnce, found.empty() && best.gain > search_.options.surely_something *
+                                                                    search_.options.least_gain))
           result.once = search_.scores.refined(base, best, current);
         break;
       }
@@ -96,12 +113,15 @@ class Search {
       found.push_back(std::move(f));
       EffectFit next = search_.fit(designs_of(found));
       fix_share_at_one(found, next, best.gain);
-      if (follows_ && (result.updated_evidence = with_leaders_of_found(search_, found, next)))
+      if (follows_ && search_.mechanisms().enabled(Mechanism::kLeaders) &&
+          (result.updated_evidence = with_leaders_of_found(search_, found, next))) {
+        lets(Mechanism::kLeaders, true);
         return;
+      }
       search_.judge(found, found.size() - 1, next);
       if (tracing()) trace_found(search_, found, next);
       found.back().gain = best.gain;
-      std::string why = why_not_named(found.back(), search_.options);
+      std::string why = why_not_named(found.back(), search_.options, search_.mechanisms());
       if (why.empty()) why = compensates_model_form(found, found.size() - 1, next);
       if (!why.empty()) {
         result.notes.push_back(fmt::format("{} fits best but is not named: {}",
@@ -127,12 +147,13 @@ class Search {
     for (FoundEffect& f : found) {
       const double about = fit.theta[first];
       first += f.design.linear;
-      if (!is_nonlinear_in_parameter(*f.design.effect.effect)) continue;
+      if (!is_nonlinear_in_parameter(*f.design.effect.effect) || !lets(Mechanism::kAngles, true))
+        continue;
       f.design = make_design(search_.evidence, f.design.effect, f.design.shape, {&about, 1},
                              f.design.optional);
       any = true;
     }
-    if (any) fit = search_.fit(designs_of(found), &fit);
+    if (lets(Mechanism::kAngles, any)) fit = search_.fit(designs_of(found), &fit);
   }
 
   /// Fixes a share at one where the log does not determine it. Only the product of share and time of a short lag is
@@ -144,7 +165,8 @@ class Search {
     constexpr int kHalvings = 9;
     EffectDesign& design = found.back().design;
     const EffectParameter& share = design.effect.effect->info().parameters.front();
-    if (!share.linear || share.name != "share" || design.shape.empty() || design.linear != 1 ||
+    if (!search_.mechanisms().enabled(Mechanism::kShareAtOne) || !share.linear ||
+        share.name != "share" || design.shape.empty() || design.linear != 1 ||
         !rests_on_bound(design, fit.theta.tail(1)))
       return;
     const EffectDesign before = design;
@@ -181,7 +203,8 @@ class Search {
       fmt::print(stderr, "  share fixed at one with [{:.4g}]: {:.1f} nats\n",
                  fmt::join(design.shape, " "), whole.total() - fit.total());
     }
-    if (whole.total() > least && !rests_on_bound(design, whole.theta.tail(1))) {
+    if (lets(Mechanism::kShareAtOne,
+             whole.total() > least && !rests_on_bound(design, whole.theta.tail(1)))) {
       fit = std::move(whole);
     } else {
       design = before;
@@ -204,7 +227,7 @@ class Search {
       first += other.design.linear;
       if (i == index || other.gain < one.gain || !meets(other.design)) continue;
       const double form = form_share(*other.design.effect.effect, search_.options.regression);
-      if (one.gain <= form * form * other.gain) {
+      if (lets(Mechanism::kFormGain, one.gain <= form * form * other.gain)) {
         return fmt::format(
             "its gain of {:.0f} nats compensates model-form error of {}, whose gain is {:.0f}",
             one.gain, search_.key(other.design.effect), other.gain);
@@ -214,7 +237,7 @@ class Search {
       powers.push_back(std::move(power));
       names.push_back(search_.key(other.design.effect));
     }
-    if (powers.empty()) return {};
+    if (powers.empty() || !search_.mechanisms().enabled(Mechanism::kFormPower)) return {};
     std::vector<const EffectDesign*> without = designs_of(found, index), with = designs_of(found);
     for (const EffectDesign& p : powers) {
       without.push_back(&p);
@@ -225,7 +248,7 @@ class Search {
     if (tracing())
       fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n",
                  search_.key(one.design.effect), fmt::join(names, ", "), gain);
-    if (gain > search_.options.least_gain) return {};
+    if (!lets(Mechanism::kFormPower, gain <= search_.options.least_gain)) return {};
     return fmt::format("a slightly different exponent in the law of {} explains the same",
                        fmt::join(names, ", "));
   }
@@ -233,13 +256,14 @@ class Search {
   /// Drops an effect that fails an acceptance test since later effects were found. @return whether one was dropped
   bool drop_failing(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     for (std::size_t i = 0; i < found.size(); ++i) {
-      std::string why = why_not_named(found[i], search_.options);
+      std::string why = why_not_named(found[i], search_.options, search_.mechanisms());
       if (why.empty()) why = compensates_model_form(found, i, current);
       // for an effect that refines no other, a clear gain on motions left out outweighs the joint significance test
       const bool refinement = !found[i].design.effect.effect->info().refines.empty();
       const bool proven = !refinement && found[i].held_out > search_.options.proven_errors *
                                                                  found[i].held_out_error;
-      if (why.empty() && found[i].not_significant && !proven) {
+      const bool doubtful = why.empty() && found[i].not_significant;
+      if (doubtful && !lets(Mechanism::kProven, proven) && lets(Mechanism::kJoint, true)) {
         why = "it fails the joint significance test: its 95 % region contains zero";
       }
       if (why.empty()) continue;

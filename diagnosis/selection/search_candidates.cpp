@@ -86,7 +86,7 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
     c.linear = independent_columns(c.designs);
     const bool optional = std::any_of(c.designs.begin(), c.designs.end(),
                                       [](const EffectDesign& d) { return d.optional; });
-    if (optional) {
+    if (optional && evidence.options.mechanisms.enabled(Mechanism::kOptional)) {
       std::vector<EffectDesign> all_designs;
       all_designs.reserve(2 * c.designs.size());
       for (const EffectDesign& d : c.designs) all_designs.push_back(without_optional(d));

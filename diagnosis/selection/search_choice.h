@@ -4,18 +4,13 @@
 
 namespace sparflow {
 
-/// The candidate with the largest gain of those that pass the threshold (of all if none does), replaced by one that the
-/// least-squares comparison prefers significantly. If that choice refines a plainer effect that explains most of the
-/// same, the plainer effect is chosen: later steps decide whether the refinement is needed, and `prune` drops whichever
-/// becomes superfluous.
+/// The candidate with the largest gain of those that pass the threshold (of all if none does). If it refines a plainer
+/// effect that explains most of the same, the plainer effect is chosen: later steps decide whether the refinement is
+/// needed, and `prune` drops whichever becomes superfluous. Where the least-squares comparison significantly prefers
+/// another point of the chosen effect's grid, that one is taken.
 /// @param level false-alarm rate  @param base effects already found
 CandidateScore chosen(const SearchState& search, const std::vector<CandidateScore>& scores,
                       const NullDistribution& null, double level,
                       const std::vector<const EffectDesign*>& base);
-
-/// Whether the least-squares comparison prefers `one` to `other` significantly.
-bool better_by_least_squares(const SearchState& search,
-                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
-                             const EffectDesign& other);
 
 }  // namespace sparflow

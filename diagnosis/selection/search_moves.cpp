@@ -6,7 +6,6 @@
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/acceptance_tests.h"
-#include "diagnosis/selection/search_choice.h"
 
 namespace sparflow {
 namespace {
@@ -35,7 +34,8 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
   if (gain < pair) return false;
   search.judge(trial, trial.size() - 1, fit);
   trial.back().gain = gain;
-  if (!why_not_named(trial.back(), search.options).empty()) return false;
+  if (!why_not_named(trial.back(), search.options, search.mechanisms()).empty()) return false;
+  if (!search.mechanisms().act(Mechanism::kMerge)) return false;
   found = std::move(trial);
   current = std::move(fit);
   return true;
@@ -49,7 +49,8 @@ void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit
     for (std::size_t i = 0; i < found.size(); ++i) {
       const EffectFit without = search.fit(designs_of(found, i));
       found[i].gain = current.total() - without.total() - search.penalty_of(found[i].design);
-      if (found[i].gain > search.options.least_gain) continue;
+      if (!search.mechanisms().act(Mechanism::kPrune, found[i].gain <= search.options.least_gain))
+        continue;
       if (tracing())
         fmt::print(stderr, "  dropped {} ({:.1f})\n", search.key(found[i].design.effect),
                    found[i].gain);
@@ -96,7 +97,7 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
     s.gain = search.scores.gain(others, search.design_of(s), without);
     if (s.gain > most) most = s.gain, best = &s;
   }
-  if (best == nullptr) return false;
+  if (!search.mechanisms().act(Mechanism::kReshape, best != nullptr)) return false;
   FoundEffect variant;
   variant.design = search.scores.refined(others, *best, without);
   variant.p_value = found[i].p_value;
@@ -121,10 +122,8 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
       search.scores.gain_instead(f.design, f.design, others, without) - search.penalty_of(f.design);
   f.gain = own;
   const CandidateScore* challenger = nullptr;
-  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain &&
-      !better_by_least_squares(search, others, f.design, search.design_of(scores.front()))) {
+  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain)
     challenger = &scores.front();
-  }
   if (challenger != nullptr) {
     FoundEffect rival;
     rival.design = search.scores.refined(others, *challenger, without);
@@ -133,7 +132,8 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
     trial[i] = rival;
     const EffectFit fit = search.fit(designs_of(trial));
     search.judge(trial, i, fit);
-    if (why_not_named(trial[i], search.options).empty() && fit.total() > current.total()) {
+    if (why_not_named(trial[i], search.options, search.mechanisms()).empty() &&
+        fit.total() > current.total() && search.mechanisms().act(Mechanism::kSwap)) {
       if (tracing())
         fmt::print(stderr, "  {} replaces {}\n", search.key(rival.design.effect),
                    search.key(f.design.effect));
@@ -145,6 +145,7 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
   f.alternatives.clear();
   for (const CandidateScore& s : scores) {
     if (s.gain < own - search.options.largest_alternative_loss) break;
+    record_optional(search, s);
     f.alternatives.emplace_back(search.candidates[s.candidate].effect, own - s.gain);
   }
   return false;

@@ -24,6 +24,7 @@ struct SearchState {
   SearchScores scores;
   std::vector<bool> refused;  ///< by candidate: failed an acceptance test in this search
 
+  const Mechanisms& mechanisms() const { return evidence.options.mechanisms; }
   void report(std::size_t found, const std::string& what) const;
   std::string key(const EffectAt& e) const;
   const EffectDesign& design_of(const CandidateScore& score) const {
@@ -41,6 +42,12 @@ struct SearchState {
   EffectFit fit(const std::vector<const EffectDesign*>& designs,
                 const EffectFit* start = nullptr) const;
 };
+
+/// Records that a candidate with optional parameters is among those that count.
+inline void record_optional(const SearchState& search, const CandidateScore& score) {
+  search.mechanisms().act(Mechanism::kOptional,
+                          search.candidates[score.candidate].designs.back().optional);
+}
 
 std::vector<const EffectDesign*> designs_of(const std::vector<FoundEffect>& found,
                                             std::size_t without = static_cast<std::size_t>(-1));

@@ -193,6 +193,7 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
     if (share <
         (l.event ? d.thresholds.largest_event_share : d.thresholds.largest_unmodelled_share))
       continue;
+    if (l.event && !d.evidence.options.mechanisms.act(Mechanism::kEvent)) continue;
     if (!d.unexplained || (touched && !in_touched))
       d.unexplained = describe_residual_structure(d.evidence, l);
     in_touched = in_touched || touched;

@@ -82,7 +82,8 @@ double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
 }
 
 bool is_minor_effect(const Diagnosis& d, const DiagnosedEffect& e) {
-  return explained_share(d, e) < d.thresholds.least_explained_share;
+  return d.evidence.options.mechanisms.act(
+      Mechanism::kMinor, explained_share(d, e) < d.thresholds.least_explained_share);
 }
 
 Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffect& e) {
