@@ -367,8 +367,8 @@ Transcription reference_transcription(std::shared_ptr<const ReferenceProblem> pr
   spec.t = Eigen::VectorXd::LinSpaced(n + 1, 0.0, p.duration);
   spec.knot = std::make_shared<ReferenceKnot>(problem);
   spec.terminal = std::make_shared<ReferenceGoal>(problem);
-  spec.bounds = TranscriptionBounds::uniform(n, vec(p.q_lb), vec(p.q_ub), vec(p.qd_lb),
-                                             vec(p.qd_ub), vec(p.qdd_lb), vec(p.qdd_ub));
+  spec.bounds = TranscriptionBounds::uniform(
+      n, {vec(p.q_lb), vec(p.q_ub)}, {vec(p.qd_lb), vec(p.qd_ub)}, {vec(p.qdd_lb), vec(p.qdd_ub)});
   spec.bounds.rest_to_rest(vec(p.q_start));
   spec.acceleration_weight = Eigen::VectorXd::Constant(3, p.w_acc);
   spec.acceleration_weight_times_step = false;

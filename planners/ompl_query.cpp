@@ -40,13 +40,21 @@ class SilentOmpl {
 /// Path simplification by shortcuts until a round no longer shortens the path. simplify() is not used because it is bounded
 /// by time and so not reproducible, simplifyMax() because its B-splines add states.
 void shorten(og::PathSimplifier& simplifier, og::PathGeometric& path, const QueryLimits& limits) {
+  /// Attempts of a round of shortcuts, and of those without success after which it ends.
+  /// @threshold [1] 10..10000; chosen: rounds repeat until the path settles
   constexpr unsigned kSteps = 100;
   double length = path.length();
-  for (int round = 0; round < 10; ++round) {
+  /// Largest number of rounds.
+  /// @threshold [1] 1..100; chosen: a round that gains nothing ends it sooner
+  constexpr int kMostRounds = 10;
+  /// Length over that before the round, above which the path no longer became shorter.
+  /// @threshold [1] 0.9..1; chosen: a thousandth of the way is worth no further round
+  constexpr double kShortened = 0.999;
+  for (int round = 0; round < kMostRounds; ++round) {
     simplifier.reduceVertices(path, kSteps, kSteps, 1.0);
     simplifier.shortcutPath(path, kSteps, kSteps, 1.0, 0.005);
     const double shorter = path.length();
-    if (shorter > 0.999 * length) break;
+    if (shorter > kShortened * length) break;
     length = shorter;
     if (std::chrono::steady_clock::now() > limits.deadline) break;
   }
@@ -59,16 +67,15 @@ const char* name(PathPlanner planner) {
   return planner == PathPlanner::kRrtConnect ? "RRT-Connect" : "BIT*";
 }
 
-std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathPlanner planner,
-                                          const Eigen::VectorXd& start,
-                                          const std::vector<Eigen::VectorXd>& ends,
-                                          std::uint32_t seed, const QueryLimits& limits) {
-  if (ends.empty()) return std::nullopt;
+std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space,
+                                          const Eigen::VectorXd& start, const PathQuery& query,
+                                          const QueryLimits& limits) {
+  if (query.ends.empty()) return std::nullopt;
   const std::scoped_lock guard(ompl_lock());
   const SilentOmpl silent;
   // Every generator created from here on takes its seed from this one. OMPL's warning that numbers were drawn before
   // concerns existing generators; none of ours outlives a query.
-  ompl::RNG::setSeed(seed == 0 ? 1 : seed);
+  ompl::RNG::setSeed(query.seed == 0 ? 1 : query.seed);
 
   const auto& information = space.information();
   auto definition = std::make_shared<ob::ProblemDefinition>(information);
@@ -76,7 +83,7 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathP
   space.write(start, state.get());
   definition->addStartState(state);
   auto goal = std::make_shared<ob::GoalStates>(information);
-  for (const Eigen::VectorXd& end : ends) {
+  for (const Eigen::VectorXd& end : query.ends) {
     space.write(end, state.get());
     goal->addState(state.get());
   }
@@ -85,7 +92,7 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathP
       std::make_shared<ob::PathLengthOptimizationObjective>(information));
 
   ob::PlannerPtr solver;
-  if (planner == PathPlanner::kBitStar) {
+  if (query.planner == PathPlanner::kBitStar) {
     solver = std::make_shared<og::BITstar>(information);
   } else {
     solver = std::make_shared<og::RRTConnect>(information);
@@ -109,14 +116,14 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space, PathP
   // Scaling rounds the coordinates, so the end is replaced by the exact goal configuration.
   Eigen::Index nearest = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (std::size_t e = 0; e < ends.size(); ++e) {
-    const double d = (rows.bottomRows(1).transpose() - ends[e]).norm();
+  for (std::size_t e = 0; e < query.ends.size(); ++e) {
+    const double d = (rows.bottomRows(1).transpose() - query.ends[e]).norm();
     if (d < least) {
       least = d;
       nearest = static_cast<Eigen::Index>(e);
     }
   }
-  rows.bottomRows(1) = ends[static_cast<std::size_t>(nearest)].transpose();
+  rows.bottomRows(1) = query.ends[static_cast<std::size_t>(nearest)].transpose();
   return rows;
 }
 

@@ -21,12 +21,19 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kLimitSlack = 1e-9;  // [rad] or [m] rounding of the user's numbers
-constexpr double kSameEnd =
-    0.02;  // share of every joint's range below which two ends count as equal
+/// Excess of a position limit up to which a posture is within.
+/// @threshold [rad or m] 0..1e-6; numerical: rounding of the user's numbers
+constexpr double kLimitSlack = 1e-9;
+/// Share of every joint's range below which two ends count as equal.
+/// @threshold [1] 0..0.5; chosen: planning to both would give the same path twice
+constexpr double kSameEnd = 0.02;
 constexpr const char* kStraight = "straight line";
-constexpr int kBitStarShare = 10;      // BIT* gains little after iterations / 10, and is slow
-constexpr int kDeformationSteps = 32;  // pairs of postures tested between two paths
+/// Divisor of the iterations that BIT* gets.
+/// @threshold [1] 1..1000; chosen: it gains little after that, and is slow
+constexpr int kBitStarShare = 10;
+/// Pairs of postures tested between two paths.
+/// @threshold [1] 4..1000; chosen: links move less than an obstacle's size between two
+constexpr int kDeformationSteps = 32;
 
 /// "boom: 1.5 rad, limits are [-0.2, 1.35] rad", or "" when all joints are within.
 std::string beyond_limits(const MotionProblem& problem, const VectorXd& q) {
@@ -239,11 +246,7 @@ class Search {
 
   void sampling_planners() {
     const ConfigurationSpace space(problem_, clearance_);
-    struct Query {
-      PathPlanner planner;
-      std::vector<VectorXd> ends;
-    };
-    std::vector<Query> queries;
+    std::vector<PathQuery> queries;
     // One query goes to all goal configurations except the chosen ends, which have queries of their own.
     std::vector<VectorXd> others;
     for (const VectorXd& q : postures_) {
@@ -252,6 +255,8 @@ class Search {
     if (!others.empty()) queries.push_back({PathPlanner::kRrtConnect, others});
     if (!blocked_.empty() && space.has_volume()) queries.push_back({PathPlanner::kBitStar, ends_});
     // Each blocked end gets several queries, because other random trees can find other homotopy classes.
+    /// Queries to each blocked end.
+    /// @threshold [1] 1..100; chosen: other random trees can find other homotopy classes
     constexpr int kTries = 3;
     for (int t = 0; t < kTries; ++t) {
       for (const VectorXd& end : blocked_) queries.push_back({PathPlanner::kRrtConnect, {end}});
@@ -264,9 +269,9 @@ class Search {
       if (queries[i].planner == PathPlanner::kBitStar)
         own.iterations = options_.iterations / kBitStarShare;
       // The factor 2654435761 keeps the queries of neighbouring user seeds apart.
-      const auto seed =
+      queries[i].seed =
           static_cast<std::uint32_t>((options_.random_seed * 2654435761u + i) % 0x7fffffffu);
-      auto path = query_path(space, queries[i].planner, problem_.start, queries[i].ends, seed, own);
+      auto path = query_path(space, problem_.start, queries[i], own);
       if (path) add(std::move(*path), name(queries[i].planner));
     }
   }

@@ -11,13 +11,20 @@
 namespace sparflow {
 
 struct SeedOptions {
-  int count = 8;  ///< largest number of paths
-  double seconds =
-      5.0;  ///< time limit of the search; SeedResult::out_of_time says whether it was hit
-  std::uint64_t random_seed =
-      1;                   ///< the same seed gives the same paths unless the time limit is hit
-  int goal_samples = 200;  ///< random initial postures with which the goal region is sampled
-  int iterations = 20000;  ///< iteration limit of each sampling planner
+  /// Largest number of paths.
+  /// @threshold [paths] 1..1000; chosen: each is a start of the optimiser, which takes much longer
+  int count = 8;
+  /// Time limit of the search; SeedResult::out_of_time says whether it was hit.
+  /// @threshold [s] 0.1..1e5; chosen: as long as a user waits for a start
+  double seconds = 5.0;
+  /// The same seed gives the same paths unless the time limit is hit.
+  std::uint64_t random_seed = 1;  // no threshold: any seed serves
+  /// Random initial postures with which the goal region is sampled.
+  /// @threshold [1] 1..1e6; chosen: a branch that one sample misses is met by another
+  int goal_samples = 200;
+  /// Iteration limit of each sampling planner.
+  /// @threshold [iterations] 10..1e8; chosen: more find narrower passages and take longer
+  int iterations = 20000;
   /// Called with the share of the work done and what is being done; may be empty.
   std::function<void(double, const std::string&)> progress;
 };

@@ -16,8 +16,12 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kConverged = 1e-11;  // [m]
-constexpr double kSame = 1e-3;        // [s] distance below which two postures count as equal
+/// Distance of the tip at which the iteration stops.
+/// @threshold [m] 1e-14..1e-8; numerical: rounding of a tip position is near 1e-15 m
+constexpr double kConverged = 1e-11;
+/// Distance, in seconds at full speed, below which two postures count as equal.
+/// @threshold [s] 1e-6..0.1; chosen: a millimetre of travel
+constexpr double kSame = 1e-3;
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -81,8 +85,11 @@ Posture TipSolver::solve(const VectorXd& from, const Vector3d& target, int froze
   }
   best.tip = tip(best.q);
   VectorXd residual = moving_.transpose() * (best.tip - target);
+  /// Largest number of damped steps.
+  /// @threshold [1] 20..10000; numerical: a local minimum of the distance ends it sooner
+  constexpr int kMostSteps = 200;
   double damping = 1e-3;
-  for (int iteration = 0; iteration < 200 && residual.norm() > kConverged; ++iteration) {
+  for (int iteration = 0; iteration < kMostSteps && residual.norm() > kConverged; ++iteration) {
     const MatrixXd jacobian =
         moving_.transpose() *
         point_jacobian_matrix(machine_, best.q, machine_.tip.joint, machine_.tip.xyz);
@@ -93,7 +100,10 @@ Posture TipSolver::solve(const VectorXd& from, const Vector3d& target, int froze
     const Vector3d next_tip = tip(next);
     const VectorXd next_residual = moving_.transpose() * (next_tip - target);
     if (next_residual.norm() < residual.norm()) {
-      const bool stalled = residual.norm() - next_residual.norm() < 1e-13;
+      /// Progress of a step below which it has stalled.
+      /// @threshold [m] 0..1e-9; numerical: rounding of a tip position
+      constexpr double kNoProgress = 1e-13;
+      const bool stalled = residual.norm() - next_residual.norm() < kNoProgress;
       best.q = next;
       best.tip = next_tip;
       residual = next_residual;
@@ -101,7 +111,10 @@ Posture TipSolver::solve(const VectorXd& from, const Vector3d& target, int froze
       if (stalled) break;
     } else {
       damping = std::max(1e-6, damping * 10.0);
-      if (damping > 1e8) break;  // no descent is possible: a local minimum of the distance
+      /// Damping beyond which no descent is possible.
+      /// @threshold [1] 1e4..1e12; numerical: a step then is a rounding error long: a local minimum of the distance
+      constexpr double kMostDamping = 1e8;
+      if (damping > kMostDamping) break;  // no descent is possible: a local minimum of the distance
     }
   }
   best.distance = (best.tip - target).norm();
@@ -112,7 +125,10 @@ Posture TipSolver::pull_towards(const Posture& posture, const VectorXd& anchor,
                                 const Vector3d& target) const {
   Posture best = posture;
   double length = distance(best.q, anchor, scale_);
-  for (double share = 1.0; share > 1e-3;) {
+  /// Share of the step to the anchor below which no shorter one is tried.
+  /// @threshold [1] 1e-6..0.1; chosen: ten halvings
+  constexpr double kLeastShare = 1e-3;
+  for (double share = 1.0; share > kLeastShare;) {
     // The step goes straight to the anchor, less its part that would move the tip.
     const MatrixXd jacobian =
         moving_.transpose() *

@@ -11,6 +11,8 @@
 namespace sparflow {
 
 /// Distance from the goal within which the tip counts as there [m]; samples usually are within 1e-9.
+/// Distance from the goal within which the tip counts as there; samples usually are within 1e-9.
+/// @threshold [m] 1e-6..0.1; chosen: a millimetre
 inline constexpr double kTipTolerance = 1e-3;
 
 /// Length of a polyline in the metric of all planners: Euclidean over joint coordinates divided by speed_scale(), so in

@@ -11,9 +11,15 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kSpacing = 0.1;  // [m] distance of waypoints in the first division
-constexpr double kOnLine = 1e-6;  // [m] largest distance of a waypoint's tip from the line
-constexpr int kFinest = 2048;     // largest number of waypoints
+/// Distance of waypoints in the first division.
+/// @threshold [m] 0.01..1; chosen: it is halved until the path keeps to the line
+constexpr double kSpacing = 0.1;
+/// Largest distance of a waypoint's tip from the line.
+/// @threshold [m] 1e-9..1e-3; numerical: far below any tolerance of a line
+constexpr double kOnLine = 1e-6;
+/// Largest number of waypoints.
+/// @threshold [1] 16..1e6; chosen: four millimetres on a line of eight metres
+constexpr int kFinest = 2048;
 
 /// Gives the next posture from the one before, the tip's target and the share of the line done.
 using Advance = std::function<Posture(const VectorXd&, const Vector3d&, double)>;
@@ -84,7 +90,11 @@ TipLinePaths follow_tip_line(const MotionProblem& problem, const TipSolver& solv
       MatrixXd path = walk(problem.start, from, to, pieces, way);
       result.furthest = std::max(result.furthest, static_cast<double>(path.rows() - 1) / pieces);
       if (path.rows() <= pieces) break;  // a finer division would meet the same limit
-      if (deviation_between(path, solver, from, to) > 0.25 * tolerance && 2 * pieces <= kFinest) {
+      /// Share of the tolerance that the path between waypoints may use.
+      /// @threshold [1] 0.05..1; chosen: the rest is left for the optimised motion
+      constexpr double kShareOfTolerance = 0.25;
+      if (deviation_between(path, solver, from, to) > kShareOfTolerance * tolerance &&
+          2 * pieces <= kFinest) {
         continue;
       }
       const bool arrived =

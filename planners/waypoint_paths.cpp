@@ -9,7 +9,11 @@
 namespace sparflow {
 
 SeedResult find_paths_through_waypoints(const MotionProblem& problem, const SeedOptions& options) {
-  constexpr std::size_t kKept = 4;  // number of partial paths that are continued
+  /// Number of partial paths that are continued.
+  /// @threshold [1] 1..100; chosen: paths of each leg multiply
+  constexpr std::size_t kKept = 4;
+  /// Paths of each leg.
+  /// @threshold [1] 1..100; chosen: paths of each leg multiply
   constexpr int kOfALeg = 3;
   const Eigen::VectorXd scale = speed_scale(problem);
   std::vector<SeedPath> ways(1);

@@ -54,8 +54,7 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
       for (Eigen::Index j = 0; j < m->cols(); ++j)
         fmt::format_to(std::back_inserter(text), ",{:.12g}", (*m)(k, j));
     }
-    const MachineState& state =
-        chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
+    const MachineState& state = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
     for (const CylinderState& c : state.cylinders) {
       fmt::format_to(std::back_inserter(text), ",{:.6g}", c.flow / units::kLitrePerMinute);
     }

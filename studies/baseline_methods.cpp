@@ -146,7 +146,7 @@ MatrixXd RawEvidence::columns(const EffectAt& effect, const std::vector<double>&
   MatrixXd all;
   for (std::size_t log = 0; log < evidence_.suspects; ++log) {
     MatrixXd one;
-    if (!effect.effect->columns(evidence_.series[log], channel.kind, channel.index, effect.at,
+    if (!effect.effect->columns(evidence_.series[log], {channel.kind, channel.index}, effect.at,
                                 shape, one)) {
       continue;
     }

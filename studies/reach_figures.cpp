@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bench/planned_seeds.h"
+#include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/grid/driven_grid_path.h"
 #include "optimizer/solve/child_processes.h"

@@ -8,6 +8,7 @@
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/motion_page.h"
 #include "models/math/error.h"
+#include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/grid/driven_grid_path.h"
 #include "problems/motion_table.h"

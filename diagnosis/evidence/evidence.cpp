@@ -146,7 +146,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   Eigen::MatrixXd result;
   for (std::size_t log = 0; log < suspects; ++log) {
     Eigen::MatrixXd raw;
-    if (!effect.effect->columns(series[log], channel.kind, channel.index, effect.at, shape, raw))
+    if (!effect.effect->columns(series[log], {channel.kind, channel.index}, effect.at, shape, raw))
       continue;
     if (chord) {
       raw = effect_series({effect.effect, effect.at, {about[0]}, {}, {}}, series[log], channel.kind,
@@ -155,8 +155,8 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     }
     Eigen::MatrixXd through_force;  // effect of a sensor's error through the measured force
     if (effect.effect->info().stage == EffectStage::kSensor && channel.force_slope.size() > 0 &&
-        !effect.effect->columns(series[log], EvidenceKind::kForce, channel.index, effect.at, shape,
-                                through_force)) {
+        !effect.effect->columns(series[log], {EvidenceKind::kForce, channel.index}, effect.at,
+                                shape, through_force)) {
       through_force.resize(0, 0);
     }
     if (!effect.effect->columns_filtered()) {

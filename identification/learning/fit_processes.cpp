@@ -30,7 +30,7 @@ struct ProcessData {
   void subtract_back(const Cylinder& cylinder, int side, const GaussianProcess& process) {
     for (Index k = 0; k < back.size(); ++k) {
       const double q = set.flow[k], f = set.force[k];
-      set.pressure[k] = measured[k] - supply_rise<double>(process, cylinder, side,
+      set.pressure[k] = measured[k] - supply_rise<double>({process, cylinder, side},
                                                           process.mean(q, f), q, f, back[k]);
     }
   }

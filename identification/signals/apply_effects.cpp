@@ -219,8 +219,8 @@ void ChainInputs::set(const MachineSignals& signals, Index k) {
 }
 
 const MachineState& ChainInputs::evaluate(Chain& chain, bool with_std) const {
-  return chain.evaluate_pressures(speed.data(), force.data(), with_std, 1e-9, pressure.data(),
-                                  demand.data(), back.data());
+  return chain.evaluate_pressures(speed.data(), force.data(), with_std, 1e-9,
+                                  {pressure.data(), demand.data(), back.data()});
 }
 
 double working_pressure_effect(const CraneModel& model, const MachineSignals& signals, int cylinder,
@@ -233,7 +233,7 @@ double working_pressure_effect(const CraneModel& model, const MachineSignals& si
   const GaussianProcess& process = c.direction[k] > 0 ? learned.extend : learned.retract;
   if (process.empty()) return own;
   const double mean = process.mean(c.flow[k], c.model_force[k]);
-  return own + supply_rise<double>(process, model.machine.cylinders[i], c.direction[k], mean,
+  return own + supply_rise<double>({process, model.machine.cylinders[i], c.direction[k]}, mean,
                                    c.flow[k], c.model_force[k], back);
 }
 

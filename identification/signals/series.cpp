@@ -170,7 +170,7 @@ VectorXd effect_series(const AppliedEffect& effect, const MachineSeries& log, Ev
     (law.info().parameters[p].linear ? linear : shape).push_back(effect.values[p]);
   }
   Eigen::MatrixXd columns;
-  if (!law.columns(log, kind, index, effect.at, shape, columns)) return {};
+  if (!law.columns(log, {kind, index}, effect.at, shape, columns)) return {};
   SPARFLOW_CHECK(
       columns.cols() == static_cast<Index>(linear.size()) && columns.rows() == log.samples(),
       "an effect's columns have the wrong shape");

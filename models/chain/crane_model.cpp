@@ -57,19 +57,19 @@ Chain::Chain(const CraneModel& model)
   added_pump_.resize(model.pumps.size());
 }
 
-const MachineState& Chain::evaluate(const double* q, const double* qd, double payload,
-                                    bool with_std, double rest_speed, const double* qdd) {
-  statics_.update(q, payload, 0);
+const MachineState& Chain::evaluate(const JointState& joints, double payload, bool with_std,
+                                    double rest_speed) {
+  statics_.update(joints.q, payload, 0);
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {
     CylinderState& c = state_.cylinders[i];
     const Taylor3& x = statics_.length(static_cast<int>(i));
     c.length = x.value;
     c.rate = x.d1;
-    c.speed = x.d1 * qd[machine_->cylinders[i].joint];
+    c.speed = x.d1 * joints.qd[machine_->cylinders[i].joint];
     c.force = c.total_force = statics_.force()[static_cast<Eigen::Index>(i)];
     set_flow(i, rest_speed);
   }
-  if (!laws_.empty()) add_force_effects(q, qd, qdd, payload);
+  if (!laws_.empty()) add_force_effects(joints, payload);
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) set_pressure(i, with_std);
   if (laws_.empty()) {
     pump_stage(nullptr);
@@ -85,21 +85,19 @@ const MachineState& Chain::evaluate(const double* q, const double* qd, double pa
 
 const MachineState& Chain::evaluate_pressures(const double* speed, const double* force,
                                               bool with_std, double rest_speed,
-                                              const double* added_pressure,
-                                              const double* added_demand,
-                                              const double* added_return) {
+                                              const AddedPressures& added) {
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {
     CylinderState& c = state_.cylinders[i];
     c.speed = speed[i];
     c.force = c.total_force = force[i];
     set_flow(i, rest_speed);
     set_pressure(i, with_std);
-    if (added_return != nullptr) raise_by_return(i, added_return[i]);
-    if (added_pressure != nullptr && c.moving && machine_->cylinders[i].hydraulic()) {
-      c.pressure += added_pressure[i];
+    if (added.back != nullptr) raise_by_return(i, added.back[i]);
+    if (added.pressure != nullptr && c.moving && machine_->cylinders[i].hydraulic()) {
+      c.pressure += added.pressure[i];
     }
   }
-  pump_stage(added_demand);
+  pump_stage(added.demand);
   return state_;
 }
 
@@ -132,18 +130,17 @@ void Chain::raise_by_return(std::size_t cylinder, double rise) {
   const GaussianProcess& process = side > 0 ? learned.extend : learned.retract;
   if (process.empty()) return;
   c.pressure +=
-      supply_rise<double>(process, geometry, side, c.pressure, c.flow, c.total_force, rise);
+      supply_rise<double>({process, geometry, side}, c.pressure, c.flow, c.total_force, rise);
 }
 
-void Chain::add_force_effects(const double* q, const double* qd, const double* qdd,
-                              double payload) {
+void Chain::add_force_effects(const JointState& joints, double payload) {
   Instant<double>& s = instant_;
   s.payload = payload;
   s.oil = oil;
   for (std::size_t j = 0; j < s.q.size(); ++j) {
-    s.q[j] = q[j];
-    s.qd[j] = qd[j];
-    s.qdd[j] = qdd == nullptr ? 0.0 : qdd[j];
+    s.q[j] = joints.q[j];
+    s.qd[j] = joints.qd[j];
+    s.qdd[j] = joints.qdd == nullptr ? 0.0 : joints.qdd[j];
     s.static_torque[j] = statics_.torque()[static_cast<Eigen::Index>(j)];
   }
   for (std::size_t i = 0; i < state_.cylinders.size(); ++i) {

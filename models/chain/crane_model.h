@@ -128,7 +128,22 @@ struct MachineState {
 };
 
 /// |dx/dt| up to which a cylinder counts as at rest [m/s]; it covers rounding only.
+/// @threshold [m/s] 0..1e-6; numerical: rounding of a rate times a speed
 inline constexpr double kRestSpeed = 1e-9;
+
+/// Motion of the joints at one instant, an array by joint each. Nothing is owned.
+struct JointState {
+  const double* q = nullptr;    ///< [rad] or [m]
+  const double* qd = nullptr;   ///< [rad/s] or [m/s]
+  const double* qdd = nullptr;  ///< [rad/s^2] or [m/s^2], for inertia; nullptr = 0
+};
+
+/// What effects add to the pressures, an array by cylinder each; nullptr = 0. Nothing is owned. [Pa]
+struct AddedPressures {
+  const double* pressure = nullptr;  ///< to the working pressure
+  const double* demand = nullptr;    ///< to the demand on the pump
+  const double* back = nullptr;      ///< to the pressure in the return chamber
+};
 
 /// Evaluates the exact law of the chain. Each thread needs its own object; nothing is allocated after construction.
 ///
@@ -145,25 +160,18 @@ class Chain {
 
   double oil = 40.0;  ///< [degC] oil temperature, for effects that depend on it
 
-  /// @param q, qd by joint  @param payload [kg]  @param with_std also predictive standard deviations
+  /// @param joints motion of the joints  @param payload [kg]  @param with_std also predictive standard deviations
   /// @param rest_speed |dx/dt| up to which a cylinder counts as at rest [m/s]. The default covers rounding only,
   ///        as the exact law demands. Measured speeds need a threshold above their noise.
-  /// @param qdd by joint, for inertia; nullptr = 0
   /// @throws std::domain_error when a four-bar cannot close at q
-  const MachineState& evaluate(const double* q, const double* qd, double payload,
-                               bool with_std = false, double rest_speed = kRestSpeed,
-                               const double* qdd = nullptr);
+  const MachineState& evaluate(const JointState& joints, double payload, bool with_std = false,
+                               double rest_speed = kRestSpeed);
 
   /// The pressure stages alone and without effects, from given speeds and total forces of all cylinders [m/s],
   /// [N]: for logs, where effects are series (identification/signals/series.h).
-  /// @param added_pressure [Pa] by cylinder, added to its working pressure; nullptr = 0
-  /// @param added_demand [Pa] by cylinder, added to its demand on the pump; nullptr = 0
-  /// @param added_return [Pa] by cylinder, added to its return chamber; nullptr = 0
   const MachineState& evaluate_pressures(const double* speed, const double* force,
                                          bool with_std = false, double rest_speed = kRestSpeed,
-                                         const double* added_pressure = nullptr,
-                                         const double* added_demand = nullptr,
-                                         const double* added_return = nullptr);
+                                         const AddedPressures& added = {});
 
   /// The effective machine, whose forces are evaluated.
   const Machine& machine() const { return *machine_; }
@@ -172,7 +180,7 @@ class Chain {
   void set_flow(std::size_t cylinder, double rest_speed);
   void set_pressure(std::size_t cylinder, bool with_std);
   void raise_by_return(std::size_t cylinder, double rise);
-  void add_force_effects(const double* q, const double* qd, const double* qdd, double payload);
+  void add_force_effects(const JointState& joints, double payload);
   void add_pressure_effects();
   void pump_stage(const double* added_demand);
   void add_pump_effects();

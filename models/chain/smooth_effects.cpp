@@ -157,8 +157,8 @@ void SmoothEffects::evaluate_side(bool other) {
     const Jet flow = area * cylinders_[i].size;
     s.pressure[i] = process_mean(process, flow, s.force[i]);
     if (nothing(added_[i])) continue;
-    s.pressure[i] +=
-        supply_rise<Jet>(process, geometry, s.side[i], s.pressure[i], flow, s.force[i], added_[i]);
+    s.pressure[i] += supply_rise<Jet>({process, geometry, s.side[i]}, s.pressure[i], flow,
+                                      s.force[i], added_[i]);
   }
   std::fill(added_.begin(), added_.end(), Jet(0.0));
   for (const AppliedEffect& e : laws_) e.effect->add_pressure(s, e.at, e.values, added_);

@@ -7,11 +7,16 @@
 namespace sparflow {
 namespace {
 
+/// The speed m(v) that takes oil, with its derivatives by v. [m/s], [-], [s/m]
+struct FlowSpeed {
+  double m, m1, m2;
+};
+
 /// Derivatives of a process of (flow, force) with respect to (speed, force), with Q = area m(v).
-GpDerivatives in_speed(const GaussianProcess& process, double area, double m, double m1, double m2,
+GpDerivatives in_speed(const GaussianProcess& process, double area, const FlowSpeed& speed,
                        double force) {
-  const GpDerivatives g = process.mean_derivatives(area * m, force);
-  const double q1 = area * m1, q2 = area * m2;
+  const GpDerivatives g = process.mean_derivatives(area * speed.m, force);
+  const double q1 = area * speed.m1, q2 = area * speed.m2;
   return {g.value,
           g.d_flow * q1,
           g.d_force,
@@ -70,7 +75,7 @@ void SmoothPower::demand(int cylinder, double speed, double force, CylinderMode 
       out.d = process.mean(area * sign * speed, force) + learned.margin;
       return;
     }
-    const GpDerivatives g = in_speed(process, area, sign * speed, sign, 0.0, force);
+    const GpDerivatives g = in_speed(process, area, {sign * speed, sign, 0.0}, force);
     out.d = g.value + learned.margin;
     out.v = g.d_flow;
     out.f = g.d_force;
@@ -105,9 +110,9 @@ void SmoothPower::demand(int cylinder, double speed, double force, CylinderMode 
     b.d_flow_force += s1 * g.d_force + s * g.d_flow_force;
     b.d_force_force += s * g.d_force_force;
   };
-  if (need_extend) blend(in_speed(learned.extend, c.area_piston(), m, m1, m2, force), w, w1, w2);
+  if (need_extend) blend(in_speed(learned.extend, c.area_piston(), {m, m1, m2}, force), w, w1, w2);
   if (need_retract)
-    blend(in_speed(learned.retract, c.area_rod(), m, m1, m2, force), other, -w1, -w2);
+    blend(in_speed(learned.retract, c.area_rod(), {m, m1, m2}, force), other, -w1, -w2);
   const double a = t * t, a1 = 2.0 * t * t1, a2 = 2.0 * (t1 * t1 + t * t2);
   out.d = a * b.value;
   out.v = a1 * b.value + a * b.d_flow;

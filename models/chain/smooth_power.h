@@ -17,6 +17,7 @@ enum class CylinderMode : unsigned char { kFree, kRest, kExtend, kRetract };
 
 /// Below this share the pressure of a direction changes the demand by less than 1e-11 bar for pressures up to 1000 bar,
 /// far below any tolerance of the solver, so its pressure model is not evaluated.
+/// @threshold [1] 0..1e-10; derived: 1e-14 of 1000 bar is 1e-11 bar
 inline constexpr double kNegligibleShare = 1e-14;
 
 struct Smoothing {

@@ -76,11 +76,11 @@ std::vector<double> Effect::grid(const MachineSeries&, int, int shape_index) con
   return {};
 }
 
-bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                      std::span<const double> shape, Eigen::MatrixXd& columns) const {
   const std::vector<EvidenceKind> kinds = shows_in();
-  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) return false;
-  if (kind != EvidenceKind::kForce && kind != EvidenceKind::kPump) return false;
+  if (std::find(kinds.begin(), kinds.end(), measured.kind) == kinds.end()) return false;
+  if (measured.kind != EvidenceKind::kForce && measured.kind != EvidenceKind::kPump) return false;
   const Eigen::Index n = log.samples();
   std::vector<double> p;
   Eigen::Index linear = 0;
@@ -92,7 +92,7 @@ bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int
   }
   p.insert(p.end(), shape.begin(), shape.end());
   columns.setZero(n, linear);
-  if (kind == EvidenceKind::kForce && changes_machine()) {
+  if (measured.kind == EvidenceKind::kForce && changes_machine()) {
     const Matrix nominal = forces_of(*log.machine, log);
     for (Eigen::Index k = 0; k < linear; ++k) {
       // The step is the typical value: exact for masses, the secant for angles.
@@ -101,13 +101,15 @@ bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int
       std::vector<double> unit = p;
       unit[static_cast<std::size_t>(k)] = size;
       change_machine(changed, at, unit);
-      columns.col(k) = (forces_of(changed, log).col(index) - nominal.col(index)) / size;
+      columns.col(k) =
+          (forces_of(changed, log).col(measured.index) - nominal.col(measured.index)) / size;
     }
     return columns.array().abs().maxCoeff() > 0.0 || !columns.allFinite();
   }
   Instant<double> instant = make_instant(*log.machine);
-  const auto count = static_cast<std::size_t>(
-      kind == EvidenceKind::kForce ? log.machine->cylinder_count() : log.machine->pump_count());
+  const auto count =
+      static_cast<std::size_t>(measured.kind == EvidenceKind::kForce ? log.machine->cylinder_count()
+                                                                     : log.machine->pump_count());
   std::vector<double> out(count), demand(static_cast<std::size_t>(log.machine->cylinder_count()));
   bool any = false;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -116,17 +118,17 @@ bool Effect::columns(const MachineSeries& log, EvidenceKind kind, int index, int
       std::fill(out.begin(), out.end(), 0.0);
       std::fill(demand.begin(), demand.end(), 0.0);
       p[static_cast<std::size_t>(k)] = 1.0;
-      if (kind == EvidenceKind::kForce) {
+      if (measured.kind == EvidenceKind::kForce) {
         add_force(instant, at, p, out);
       } else {
         add_pump(instant, at, p, out);
         add_demand(instant, at, p, demand);
-        const int leader = instant.leader[static_cast<std::size_t>(index)];
+        const int leader = instant.leader[static_cast<std::size_t>(measured.index)];
         if (leader >= 0)
-          out[static_cast<std::size_t>(index)] += demand[static_cast<std::size_t>(leader)];
+          out[static_cast<std::size_t>(measured.index)] += demand[static_cast<std::size_t>(leader)];
       }
       p[static_cast<std::size_t>(k)] = 0.0;
-      columns(i, k) = out[static_cast<std::size_t>(index)];
+      columns(i, k) = out[static_cast<std::size_t>(measured.index)];
       any = any || columns(i, k) != 0.0;
     }
   }

@@ -81,6 +81,12 @@ struct Instant {
   std::vector<int> leader;
 };
 
+/// One measured quantity of a log: what `kind` says of cylinder or pump `index`.
+struct MeasuredQuantity {
+  EvidenceKind kind;
+  int index;  ///< cylinder, or pump where the kind is one of the pump
+};
+
 class Effect {
  public:
   virtual ~Effect() = default;
@@ -140,12 +146,12 @@ class Effect {
 
   /// Evidence channels in which the effect can show.
   virtual std::vector<EvidenceKind> shows_in() const = 0;
-  /// Signature of the effect: what one unit (SI) of each linear parameter adds to the measured quantity `kind` of
-  /// cylinder or pump `index`, not filtered. The default evaluates the laws above sample by sample.
+  /// Signature of the effect: what one unit (SI) of each linear parameter adds to the measured quantity, not
+  /// filtered. The default evaluates the laws above sample by sample.
   /// @param shape values of the nonlinear parameters, in their order
   /// @param columns [samples x linear parameters], resized; NaN where not valid
   /// @return false when the effect does not act on this quantity or the log lacks a channel it needs
-  virtual bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  virtual bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                        std::span<const double> shape, Eigen::MatrixXd& columns) const;
   /// Values of the nonlinear parameter `shape_index` (counted among the nonlinear ones) to search on this log [SI]. The
   /// default is the parameter's own grid; limits and thresholds depend on the range of the log. Empty: the log lacks
@@ -172,8 +178,8 @@ std::string effect_key(const EffectInfo& info, const Machine& machine, int at);
 
 }  // namespace sparflow
 
-/// Gives a class that has `template <class T> void NAME_law(const Instant<T>&, int, std::span<const double>,
-/// std::span<T>) const` both overloads of a law.
+// Gives a class that has `template <class T> void NAME_law(const Instant<T>&, int, std::span<const double>,
+// std::span<T>) const` both overloads of a law.
 #define SPARFLOW_EFFECT_LAW(NAME)                                                               \
   void NAME(const Instant<double>& s, int at, std::span<const double> p, std::span<double> out) \
       const override {                                                                          \

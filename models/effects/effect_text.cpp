@@ -12,6 +12,7 @@
 namespace sparflow {
 namespace {
 
+// no threshold: layout of the text
 constexpr std::size_t kWidth = 100;
 constexpr std::size_t kIndent = 15;  // columns before an entry's text
 

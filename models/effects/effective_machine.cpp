@@ -78,7 +78,9 @@ bool acts_in_motion(const Effect& effect) {
 bool uses_acceleration(const Machine& machine, std::span<const AppliedEffect> effects) {
   std::mt19937 random(1);
   Instant<double> s = make_instant(machine);
-  constexpr int kStates = 16;  // enough for laws with conditions to meet both of their branches
+  /// Random states at which an effect is tried for a dependence on acceleration.
+  /// @threshold [1] 4..1000; chosen: enough for laws with conditions to meet both of their branches
+  constexpr int kStates = 16;
   for (const AppliedEffect& e : effects) {
     if (!acts_in_motion(*e.effect)) continue;
     for (int state = 0; state < kStates; ++state) {

@@ -9,6 +9,7 @@
 namespace sparflow {
 
 namespace units {
+// no threshold: units
 inline constexpr double kBarPerLpm = kBar / kLitrePerMinute;  ///< [Pa s/m^3] in one bar/(l/min)
 inline constexpr double kBarPerLpm2 =
     kBar / (kLitrePerMinute * kLitrePerMinute);  ///< [Pa s^2/m^6] in one bar/(l/min)^2

@@ -78,7 +78,9 @@ std::string nearest_effect(const std::string& id) {
   ids.reserve(effect_catalogue().size());
   for (const auto& known : effect_catalogue()) ids.push_back(known->info().id);
   const std::string near = nearest_word(id, ids);
-  constexpr std::size_t kAWord = 4;  // letters; shorter beginnings fit too many ids
+  /// Shortest beginning of an id that is completed.
+  /// @threshold [letters] 2..20; chosen: shorter beginnings fit too many ids
+  constexpr std::size_t kAWord = 4;
   if (!near.empty() || id.size() < kAWord) return near;
   for (const std::string& full : ids) {  // "coulomb" is far from coulomb_friction by edit distance
     if (full.starts_with(id)) return full;

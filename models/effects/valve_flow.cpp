@@ -11,8 +11,11 @@ namespace sparflow {
 namespace {
 
 /// With fewer commanded samples than this the machine file gives the better gain.
+/// @threshold [samples] 2..1000; chosen: a line through them has an error of a fifth of their scatter
 constexpr int kFewest = 20;
-constexpr double kWidest = 0.5;  ///< [-] upper end of the search for a dead band
+/// Upper end of the search for a dead band, as share of full command.
+/// @threshold [1] 0..1; chosen: a valve with a wider one would be useless
+constexpr double kWidest = 0.5;
 
 double file_gain(const Machine& machine, int cylinder, int side) {
   const Valve* valve = machine.valve_of_cylinder(cylinder);
@@ -44,7 +47,10 @@ Samples of_side(const MachineSeries& log, int cylinder, const Eigen::VectorXd& c
   Samples s;
   for (Eigen::Index k = 0; k < log.samples(); ++k) {
     const double u = command[k] * side, v = c.speed[k] * side;
-    if (!(u > 1e-6) || !std::isfinite(v)) continue;
+    /// Command up to which a valve is closed.
+    /// @threshold [1] 0..1e-2; numerical: rounding of a logged zero
+    constexpr double kNoCommand = 1e-6;
+    if (!(u > kNoCommand) || !std::isfinite(v)) continue;
     s.command.push_back(u);
     s.speed.push_back(v);
   }
@@ -60,6 +66,8 @@ double best_dead_band(const Samples& s) {
   // A dead band near the largest command would leave nothing to fit.
   const double most =
       std::min(kWidest, 0.8 * *std::max_element(s.command.begin(), s.command.end()));
+  /// Steps of the first search.
+  /// @threshold [1] 5..1000; chosen: a fiftieth of full command, narrower than the cost's minimum
   constexpr int kSteps = 25;
   int best = 0;
   double lowest = cost(0.0);
@@ -67,8 +75,12 @@ double best_dead_band(const Samples& s) {
     const double c = cost(most * k / kSteps);
     if (c < lowest) lowest = c, best = k;
   }
-  constexpr int kMostSections = 40;  // the width ends it first
-  constexpr double kFinest = 1e-4;   // of the command: far below what a log resolves
+  /// Largest number of golden sections.
+  /// @threshold [1] 5..100; numerical: the width ends it first
+  constexpr int kMostSections = 40;
+  /// Width at which the golden sections end, as share of full command.
+  /// @threshold [1] 1e-8..1e-2; chosen: far below what a log resolves
+  constexpr double kFinest = 1e-4;
   const double lo = most * std::max(0, best - 1) / kSteps,
                hi = most * std::min(kSteps, best + 1) / kSteps;
   const GoldenSection found = golden_section(lo, hi, kMostSections, cost, kFinest);

@@ -51,6 +51,8 @@ const std::vector<Named>& named_units() {
 }
 
 constexpr const char* kExponent = "expected an exponent from -12 to 12 after ^, as in m^2 or s^-1";
+/// Largest exponent of a unit.
+/// @threshold [1] 2..100; chosen: higher ones do not occur
 constexpr double kMaxExponent = 12.0;
 
 const Named* find_unit(const std::string& name) {
@@ -158,7 +160,10 @@ Dimension Dimension::power(double exponent) const {
   Dimension r;
   for (std::size_t i = 0; i < r.twice.size(); ++i) {
     const double exact = twice[i] * exponent;
-    const bool large = std::abs(exact) > 1000.0;
+    /// Twice the largest exponent of a dimension.
+    /// @threshold [1] 100..1e5; chosen: far beyond any unit, far within a whole number
+    constexpr double kLargestPower = 1000.0;
+    const bool large = std::abs(exact) > kLargestPower;
     if (large || exact != std::round(exact)) {
       throw TextError(
           0, fmt::format("{} to the power {} has {}", in_brackets(*this), exponent,
@@ -172,7 +177,10 @@ Dimension Dimension::power(double exponent) const {
 std::string Dimension::text() const {
   // Masses and densities are written in kg and the rest in N or Pa, whichever is shorter, as is usual in the field.
   const int mass = twice[1];
-  const bool in_kg = twice[2] == 0 && std::abs(twice[0]) <= 6;
+  /// Twice the largest power of a length that stands beside kg.
+  /// @threshold [1] 2..12; derived: kg/m^3 and kg m^3
+  constexpr int kHeaviestLength = 6;
+  const bool in_kg = twice[2] == 0 && std::abs(twice[0]) <= kHeaviestLength;
   struct Head {
     const char* name;
     Dimension dimension;

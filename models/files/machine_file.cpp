@@ -130,7 +130,10 @@ class MachineReader {
       const YamlValue axis =
           map.need("axis", "the direction [x, y, z] in the joint's frame (or dh)");
       joint.axis = axis.vector3(kDirection);
-      if (joint.axis.norm() < 1e-9) {
+      /// Length of an axis up to which it is no direction.
+      /// @threshold [1] 0..1e-3; numerical: rounding of the file's numbers
+      constexpr double kNoDirection = 1e-9;
+      if (joint.axis.norm() < kNoDirection) {
         axis.fail("got [0, 0, 0], expected a direction such as [0, -1, 0]");
       }
       joint.axis.normalize();

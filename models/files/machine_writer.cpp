@@ -28,7 +28,10 @@ std::string quoted(const std::string& text) {
 /// Roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Vector3d rpy(const Eigen::Matrix3d& r) {
   const double pitch = std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2)));
-  if (std::hypot(r(2, 1), r(2, 2)) < 1e-12) {  // gimbal lock: roll and yaw have the same axis
+  /// Cosine of the pitch up to which roll and yaw have the same axis.
+  /// @threshold [1] 1e-16..1e-6; numerical: rounding of a rotation's entries
+  constexpr double kGimbalLock = 1e-12;
+  if (std::hypot(r(2, 1), r(2, 2)) < kGimbalLock) {  // gimbal lock: roll and yaw have the same axis
     return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
   }
   return {std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))};

@@ -10,6 +10,7 @@
 namespace sparflow {
 
 /// Version of the file's layout that this program writes, and the newest it reads.
+// no threshold: number of a version
 inline constexpr int kModelFileVersion = 1;
 
 /// "0.1.0"

@@ -32,7 +32,10 @@ class ModelCursor {
             ? fmt::format("{} of {} element(s)", value_->is_array() ? "a list" : "an object",
                           value_->size())
             : value_->dump(-1, ' ', false, ModelJson::error_handler_t::replace);
-    if (found.size() > 60) found = found.substr(0, 57) + "...";
+    /// Longest text that a message quotes.
+    /// @threshold [characters] 10..1000; chosen: a line with what was expected
+    constexpr std::size_t kLongestQuote = 60;
+    if (found.size() > kLongestQuote) found = found.substr(0, kLongestQuote - 3) + "...";
     fail("got " + found + ", expected " + expected);
   }
   bool is_null() const { return value_->is_null(); }
@@ -79,8 +82,11 @@ class ModelCursor {
     return v;
   }
   long whole(const std::string& expected) const {
+    /// Largest whole number that is read.
+    /// @threshold [1] 1e9..9e15; derived: below 2^53, up to which doubles hold whole numbers
+    constexpr double kLargestWhole = 1e15;
     if (!value_->is_number_integer() || value_->get<double>() < 0.0 ||
-        value_->get<double>() > 1e15) {
+        value_->get<double>() > kLargestWhole) {
       fail_expected(expected);
     }
     return value_->get<long>();

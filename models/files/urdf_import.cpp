@@ -170,7 +170,10 @@ class Importer {
                                   from.mimic->joint_name));
     }
     joint.axis = Eigen::Vector3d(from.axis.x, from.axis.y, from.axis.z);
-    if (joint.axis.norm() < 1e-9) fail(key(from), "its axis is zero; expected a direction");
+    /// Length of an axis up to which it is no direction.
+    /// @threshold [1] 0..1e-3; numerical: rounding of the file's numbers
+    constexpr double kZeroAxis = 1e-9;
+    if (joint.axis.norm() < kZeroAxis) fail(key(from), "its axis is zero; expected a direction");
     joint.axis.normalize();
     set_limits(from, joint);
     return joint;

@@ -21,6 +21,7 @@ struct BranchCorner {
 };
 
 /// Pressure over which max(0, S - V) is rounded, as in models/hydraulics/loads_beyond.h. [Pa]
+/// @threshold [Pa] 1e3..1e6; chosen: two bar, small beside the pressures on either side
 inline constexpr double kCornerRounded = 2e5;
 
 /// Increase of the supply pressure [Pa] when the static branch increases by `rise` [Pa], of either sign: zero on the

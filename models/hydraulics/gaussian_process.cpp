@@ -109,12 +109,13 @@ double GaussianProcess::mean(double flow, double force) const {
 GpDerivatives GaussianProcess::mean_derivatives(double flow, double force) const {
   if (!is_beyond(force)) return learned_derivatives(flow, force);
   const Jet q = Jet::variable(flow, 0, 2);
-  const Jet p = pressure_beyond(parameters_.beyond, Jet::variable(force, 1, 2),
-                                parameters_.force_min, parameters_.force_max, [&](const Jet& f) {
-                                  const GpDerivatives g = learned_derivatives(flow, f.value);
-                                  return Jet::chain(q, f, g.value, g.d_flow, g.d_force,
-                                                    g.d_flow_flow, g.d_flow_force, g.d_force_force);
-                                });
+  const Jet p = pressure_beyond(
+      parameters_.beyond, Jet::variable(force, 1, 2), parameters_.force_min, parameters_.force_max,
+      [&](const Jet& f) {
+        const GpDerivatives g = learned_derivatives(flow, f.value);
+        return Jet::chain(
+            q, f, {g.value, g.d_flow, g.d_force, g.d_flow_flow, g.d_flow_force, g.d_force_force});
+      });
   return {p.value, p.gradient(0), p.gradient(1), p.hessian(0, 0), p.hessian(1, 0), p.hessian(1, 1)};
 }
 

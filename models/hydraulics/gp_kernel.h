@@ -15,6 +15,7 @@ enum class KernelIsa { kBaseline, kAvx2, kAvx512 };
 
 /// Arrays must hold a multiple of kKernelPadding values: pad x and y with any finite number and
 /// `weight` with zero. No alignment is required. The arrays are not owned.
+// no threshold: width of the largest vector
 inline constexpr std::size_t kKernelPadding = 8;
 struct KernelCentres {
   const double* x = nullptr;

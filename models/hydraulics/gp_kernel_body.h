@@ -37,6 +37,7 @@ struct KernelLoops {
   /// exp(a) for a <= 0: a = n ln2 + f, |f| <= ln2/2; 1 + f + f^2 q(f) with q through the Chebyshev
   /// nodes (degree 9, truncation 1.6e-17 relative); 2^n by adding n to the exponent bits.
   static inline Vec exp_negative(const Vec& a) {
+    // no threshold: exponent of the smallest result and mathematics
     constexpr double kLog2e = 1.4426950408889634;
     constexpr double kShift = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
     constexpr double kLn2Hi = 0.6931471787393093;  // 24 trailing zero bits: n * kLn2Hi is exact

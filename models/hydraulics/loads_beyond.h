@@ -27,9 +27,12 @@ struct LoadsBeyond {
 
 namespace loads_beyond {
 
-/// Static pressure over which the law passes from the learned loads to the continuation, and over which corners are
-/// rounded. [Pa]
-inline constexpr double kCornerWidth = 10e5, kRounded = 2e5;
+/// Static pressure over which the law passes from the learned loads to the continuation.
+/// @threshold [Pa] 1e5..1e7; chosen: ten bar, less than loads of a log differ
+inline constexpr double kCornerWidth = 10e5;
+/// Static pressure over which corners are rounded.
+/// @threshold [Pa] 1e3..1e6; chosen: two bar, small beside the pressures on either side
+inline constexpr double kRounded = 2e5;
 
 /// Range of force over which the law passes to the continuation. [N]
 inline double bend(const LoadsBeyond& b) { return kCornerWidth / b.static_slope; }

@@ -21,6 +21,16 @@
 
 namespace sparflow {
 
+/// The side of a cylinder that the pump feeds, with its pressure model. The members outlive it.
+struct FedSide {
+  const GaussianProcess& process;  ///< of this side, not empty
+  const Cylinder& cylinder;
+  int side;  ///< +1 extends, -1 retracts
+  /// [m^2] area of the chamber that is fed, and of the other one
+  double supply() const { return side > 0 ? cylinder.area_piston() : cylinder.area_rod(); }
+  double other() const { return side > 0 ? cylinder.area_rod() : cylinder.area_piston(); }
+};
+
 /// Mean of a process, with derivatives where its arguments have them. [Pa]
 inline double process_mean(const GaussianProcess& process, double flow, double force) {
   return process.mean(flow, force);
@@ -30,24 +40,35 @@ inline Jet process_mean(const GaussianProcess& process, const Jet& flow, const J
     return process.mean(flow.value, force.value);
   }
   const GpDerivatives g = process.mean_derivatives(flow.value, force.value);
-  return Jet::chain(flow, force, g.value, g.d_flow, g.d_force, g.d_flow_flow, g.d_flow_force,
-                    g.d_force_force);
+  return Jet::chain(flow, force,
+                    {g.value, g.d_flow, g.d_force, g.d_flow_flow, g.d_flow_force, g.d_force_force});
 }
 
 namespace return_rise {
 
-/// Loads by A_supply: the least change of load over which the slope is evaluated, and the least range of loads that a
-/// pressure model must have learned for it. [Pa]
-inline constexpr double kLeastLoad = 5e5, kLeastSeen = 3e5;
-/// A pressure model of a single load has no slope; a supply pressure this far above the static branch is then taken for
-/// that of a valve, with a transition of the second width. [Pa]
-inline constexpr double kValveFrom = 15e5, kValveSpread = 2e5;
+/// Load by A_supply: the least change of load over which the slope is evaluated.
+/// @threshold [Pa] 1e4..1e7; chosen: five bar, above the noise of a pressure model
+inline constexpr double kLeastLoad = 5e5;
+/// Load by A_supply: the least range of loads that a pressure model must have learned for a slope.
+/// @threshold [Pa] 1e4..1e7; chosen: three bar, above the noise of a pressure model
+inline constexpr double kLeastSeen = 3e5;
+/// A pressure model of a single load has no slope; a supply pressure this far above the static branch is then taken
+/// for that of a valve.
+/// @threshold [Pa] 1e5..1e8; chosen: return lines and friction raise it by less
+inline constexpr double kValveFrom = 15e5;
+/// Width of that transition.
+/// @threshold [Pa] 1e4..1e7; chosen: two bar, so that the law stays smooth
+inline constexpr double kValveSpread = 2e5;
 /// Usual pressure of a return line. [Pa]
+/// @threshold [Pa] 0..1e7; chosen: filter and line take a few bar
 inline constexpr double kReturnLine = 6e5;
 
-/// Share of a larger load that the supply takes up: at most the first where a valve is active, at least the second on the
-/// static branch (a force that is wrong by a tenth changes the share as much).
-inline constexpr double kSteepestValve = 0.6, kFlattestLoad = 0.9;
+/// Share of a larger load that the supply takes up, at most, where a valve is active.
+/// @threshold [1] 0..1; chosen: pilot ratios leave far less
+inline constexpr double kSteepestValve = 0.6;
+/// Share of a larger load that the supply takes up, at least, on the static branch.
+/// @threshold [1] 0..1; chosen: a force that is wrong by a tenth changes the share as much
+inline constexpr double kFlattestLoad = 0.9;
 
 /// max(0, x) with its corner rounded over about `rounded`.
 template <class T>
@@ -58,24 +79,24 @@ T positive(const T& x, double rounded = 0.02) {
 
 /// The weight w above, 0..1. @param above supply pressure minus that which balances the load alone [Pa]
 template <class T>
-T static_share(const GaussianProcess& process, int side, double supply, double other,
-               const T& above, const T& flow, const T& force, const T& rise) {
+T static_share(const FedSide& fed, const T& above, const T& flow, const T& force, const T& rise) {
   using std::exp;
   using std::sqrt;
-  const GpParameters& p = process.parameters();
+  const GpParameters& p = fed.process.parameters();
+  const double supply = fed.supply(), other = fed.other();
   const double seen = p.force_max - p.force_min;  // 0: not known
   if (seen > 0.0 && seen < kLeastSeen * supply)
     return 1.0 / (1.0 + exp((above - T(kValveFrom)) / kValveSpread));
   const double least = kLeastLoad * supply;
   T width = sqrt(other * other * rise * rise + T(least * least));
   if (seen > 0.0 && width > T(seen)) width = seen;
-  const bool upwards = (side > 0) == (rise >= T(0.0));
+  const bool upwards = (fed.side > 0) == (rise >= T(0.0));
   T from = upwards ? force : T(force - width);
   if (seen > 0.0 && from > T(p.force_max - width)) from = p.force_max - width;
   if (seen > 0.0 && from < T(p.force_min)) from = p.force_min;
   const T slope =
-      (process_mean(process, flow, T(from + width)) - process_mean(process, flow, from)) *
-      (side * supply) / width;
+      (process_mean(fed.process, flow, T(from + width)) - process_mean(fed.process, flow, from)) *
+      (fed.side * supply) / width;
   return (positive<T>(slope - kSteepestValve) - positive<T>(slope - kFlattestLoad)) /
          (kFlattestLoad - kSteepestValve);
 }
@@ -84,21 +105,21 @@ T static_share(const GaussianProcess& process, int side, double supply, double o
 
 /// Increase of the supply pressure. Corners are rounded, consistently in values and derivatives. Beyond the learned loads
 /// the branch is that at their border. [Pa]
-/// @param process of this side, not empty  @param own its mean at (flow, force) [Pa]
+/// @param own mean of the side's process at (flow, force) [Pa]
 /// @param force total force [N]  @param rise of the return chamber, of either sign [Pa]
 template <class T>
-T supply_rise(const GaussianProcess& process, const Cylinder& cylinder, int side, const T& own,
-              const T& flow, const T& force, const T& rise) {
-  const double supply = side > 0 ? cylinder.area_piston() : cylinder.area_rod();
-  const double other = side > 0 ? cylinder.area_rod() : cylinder.area_piston();
+T supply_rise(const FedSide& fed, const T& own, const T& flow, const T& force, const T& rise) {
+  const double supply = fed.supply(), other = fed.other();
   const T whole = (other / supply) * rise;
-  const BranchCorner& corner = process.parameters().corner;
+  const BranchCorner& corner = fed.process.parameters().corner;
   if (corner.there()) return rise_across<T>(corner, flow, force, whole);
-  const T above = own - (side / supply) * force;
-  const T share = return_rise::static_share(process, side, supply, other, above, flow, force, rise);
+  const T above = own - (fed.side / supply) * force;
+  const T share = return_rise::static_share(fed, above, flow, force, rise);
   if (rise <= T(0.0)) return share * whole;
   // On the valve's branch the part beyond the gap counts; it is zero without a rise.
-  constexpr double kRounded = 2e4;  // [Pa]
+  /// Pressure over which the gap's corner is rounded.
+  /// @threshold [Pa] 1e3..1e6; numerical: a fifth of a bar, so that the law stays smooth
+  constexpr double kRounded = 2e4;
   const T gap =
       return_rise::positive<T>(above - T(other / supply * return_rise::kReturnLine), kRounded);
   const T beyond =

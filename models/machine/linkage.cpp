@@ -99,13 +99,16 @@ double joint_at_stroke(const Machine& machine, int cylinder, double stroke, doub
       return false;
     }
   };
-  for (double s = slack; s > 1e-3; s *= 0.5) {
+  /// Extension of the range below which none is tried.
+  /// @threshold [rad or m] 1e-6..0.1; chosen: a linkage that ends so near its range has a dead centre there
+  constexpr double kLeastSlack = 1e-3;
+  for (double s = slack; s > kLeastSlack; s *= 0.5) {
     if (good(lo - s)) {
       lo -= s;
       break;
     }
   }
-  for (double s = slack; s > 1e-3; s *= 0.5) {
+  for (double s = slack; s > kLeastSlack; s *= 0.5) {
     if (good(hi + s)) {
       hi += s;
       break;
@@ -118,13 +121,19 @@ double joint_at_stroke(const Machine& machine, int cylinder, double stroke, doub
     throw std::domain_error("no joint coordinate has this stroke");
   }
   double q = 0.5 * (lo + hi);
-  for (int iteration = 0; iteration < 100; ++iteration) {
+  /// Largest number of steps.
+  /// @threshold [1] 60..1000; numerical: each halves the bracket at least where Newton's step leaves it
+  constexpr int kMostSteps = 100;
+  /// Step below which the iteration has converged.
+  /// @threshold [rad or m] 1e-16..1e-8; numerical: some units in the last place
+  constexpr double kSettled = 1e-13;
+  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
     const Taylor3 x = linkage_rates(machine, cylinder, q);
     const double r = sign * (x.value - length);
     (r > 0.0 ? hi : lo) = q;
     double next = q - r / (sign * x.d1);
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
-    if (std::abs(next - q) < 1e-13) return next;
+    if (std::abs(next - q) < kSettled) return next;
     q = next;
   }
   return q;

@@ -14,8 +14,10 @@ namespace {
 
 /// Number of positions at which a linkage is checked. A dead centre or an opening narrower than 1/400 of the range is
 /// at one of its ends, and the ends are checked.
+/// @threshold [1] 11..100001; chosen: a 400th of the range
 constexpr int kSamples = 401;
 /// [-] Below this share of its largest value |dx/dq| counts as a dead centre, where the force is a hundredfold.
+/// @threshold [1] 0..0.5; chosen: no cylinder holds that
 constexpr double kDeadCentreShare = 0.01;
 
 class Checker {
@@ -70,11 +72,14 @@ class Checker {
   }
 
   void check_gravity() {
+    /// Gravity beyond which a machine is warned of.
+    /// @threshold [m/s^2] 9.9..1000; chosen: three times that of the earth
+    constexpr double kLargestGravity = 30.0;
     const double g = machine_.gravity.norm();
     if (g == 0.0) {
       warn({}, 0, "gravity",
            "is zero, so no load presses on any cylinder; expected about 9.81 m/s^2");
-    } else if (g < 1.0 || g > 30.0) {
+    } else if (g < 1.0 || g > kLargestGravity) {
       warn({}, 0, "gravity", fmt::format("its size is {:.4g}; expected about 9.81 m/s^2", g));
     }
   }
@@ -183,7 +188,10 @@ class Checker {
     const Eigen::Vector3d axis = joint.origin.linear() * joint.axis;
     const double off = std::max(std::abs(axis.dot(joint.origin * bar->coupler - bar->rocker)),
                                 std::abs(axis.dot(bar->barrel - bar->rocker)));
-    if (off > 1e-3) {
+    /// Distance of a four-bar's pins from its plane beyond which a machine is warned of.
+    /// @threshold [m] 0..0.1; chosen: a millimetre is rounding of a drawing
+    constexpr double kFlat = 1e-3;
+    if (off > kFlat) {
       warn(places_.cylinders, i, fmt::format("cylinders[{}].linkage", cylinder.name),
            fmt::format("its pins lie up to {:.3f} m apart along the axis of {}; a four-bar is flat",
                        off, joint.name));
@@ -193,7 +201,10 @@ class Checker {
   /// Position between `good` and `bad` where the predicate changes, by bisection.
   template <class Predicate>
   static double border(double good, double bad, const Predicate& holds) {
-    for (int k = 0; k < 60; ++k) {
+    /// Halvings of the interval.
+    /// @threshold [1] 53..200; derived: 53 bits of a double are exhausted
+    constexpr int kHalvings = 60;
+    for (int k = 0; k < kHalvings; ++k) {
       const double middle = 0.5 * (good + bad);
       (holds(middle) ? good : bad) = middle;
     }
@@ -251,8 +262,11 @@ class Checker {
                        "the range or correct the pins",
                        at(joint, q), range(joint)));
     }
+    /// Largest rate up to which a linkage does not move at all.
+    /// @threshold [m/rad] 0..1e-3; numerical: rounding of pins in millimetres
+    constexpr double kNoRate = 1e-6;
     for (std::size_t k = 0; k < rate.size(); ++k) {
-      if (std::abs(rate[k]) > kDeadCentreShare * largest && largest > 1e-6) continue;
+      if (std::abs(rate[k]) > kDeadCentreShare * largest && largest > kNoRate) continue;
       fail(places_.cylinders, i, key,
            fmt::format("nearly a dead centre: dx/dq is only {:.2g} at {}, its largest is {:.2g}; "
                        "narrow the range or correct the pins",
@@ -269,6 +283,8 @@ class Checker {
     const double at_hi = cylinder_length(machine_, static_cast<int>(i), joint.position.hi);
     const double shortest = std::min(at_lo, at_hi), longest = std::max(at_lo, at_hi);
     // [m] A fraction of a millimetre is rounding of the file's numbers.
+    /// Excess of a length up to which it is within the stroke.
+    /// @threshold [m] 0..0.01; numerical: a fraction of a millimetre is rounding of the file's numbers
     constexpr double kTolerance = 5e-4;
     if (cylinder.length_at_zero_stroke && shortest < *cylinder.length_at_zero_stroke - kTolerance) {
       warn(places_.cylinders, i, key + ".length_at_zero_stroke",

@@ -14,6 +14,7 @@ struct GoldenSection {
 /// @param width at which it ends before all steps are done
 template <class F>
 GoldenSection golden_section(double lo, double hi, int steps, const F& f, double width = 0.0) {
+  // no threshold: mathematics
   constexpr double kShare = 0.6180339887498949;  // (sqrt(5) - 1) / 2
   double x1 = hi - kShare * (hi - lo), x2 = lo + kShare * (hi - lo);
   double f1 = f(x1), f2 = f(x2);

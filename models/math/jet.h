@@ -15,6 +15,7 @@ namespace sparflow {
 class Jet {
  public:
   /// Largest number of variables: q, qd and qdd of seven joints.
+  // no threshold: size of an array
   static constexpr int kMax = 21;
 
   double value = 0.0;
@@ -37,7 +38,8 @@ class Jet {
     return j;
   }
 
-  /// From known derivatives. @param gradient(i), hessian(i, j) callables, the second called for j <= i only
+  /// From known derivatives. @param gradient called as gradient(i)  @param hessian called as
+  /// hessian(i, j), for j <= i only
   template <class Gradient, class Hessian>
   static Jet of(double v, int count, const Gradient& gradient, const Hessian& hessian) {
     Jet r(v);
@@ -74,9 +76,13 @@ class Jet {
     return r;
   }
 
-  /// f(a, b) from its value and partial derivatives.
-  static Jet chain(const Jet& a, const Jet& b, double f0, double fa, double fb, double faa,
-                   double fab, double fbb) {
+  /// Value and partial derivatives of a function of two variables a and b.
+  struct Partials {
+    double f0, fa, fb, faa, fab, fbb;
+  };
+  /// f(a, b).
+  static Jet chain(const Jet& a, const Jet& b, const Partials& f) {
+    const auto [f0, fa, fb, faa, fab, fbb] = f;
     if (b.n_ == 0) return a.chain(f0, fa, faa);
     if (a.n_ == 0) return b.chain(f0, fb, fbb);
     Jet r(f0);

@@ -20,14 +20,18 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kMostLines =
-    16;  // number of goal configurations to which straight lines are tried
+/// Largest number of goal configurations to which straight lines are tried.
+/// @threshold [1] 1..1000; chosen: as many as a goal region gives that differ visibly
+constexpr std::size_t kMostLines = 16;
 
 /// Joint position at which the cylinder has length x, between two positions that enclose it.
 double position_at_length(const Machine& machine, int cylinder, double x, double a, double b) {
   const bool grows =
       linkage_rates(machine, cylinder, b).value > linkage_rates(machine, cylinder, a).value;
-  for (int i = 0; i < 60; ++i) {
+  /// Halvings of the joint's range.
+  /// @threshold [1] 53..200; derived: 53 bits of a double are exhausted
+  constexpr int kHalvings = 60;
+  for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (a + b);
     if ((linkage_rates(machine, cylinder, middle).value < x) == grows) {
       a = middle;
@@ -78,10 +82,17 @@ MatrixXd pseudo_inverse_line(const Machine& machine, const MotionProblem& proble
     const Eigen::Vector3d wanted = first + (goal - first) * (static_cast<double>(k) / pieces);
     std::vector<bool> held(static_cast<std::size_t>(q.size()), false);
     double miss = 0.0;
-    for (int i = 0; i < 40; ++i) {
+    /// Largest number of Newton steps to one point of the line.
+    /// @threshold [1] 10..200; chosen: from a neighbouring point Newton's method converges in a few; steps that hit a
+    /// joint limit begin anew
+    constexpr int kNewtonSteps = 40;
+    for (int i = 0; i < kNewtonSteps; ++i) {
       const Eigen::Vector3d error = wanted - tip_position<double>(machine, q);
       miss = error.norm();
-      if (miss < 1e-10) break;
+      /// Distance of the tip at which Newton's method stops.
+      /// @threshold [m] 1e-13..1e-7; numerical: rounding of a tip position is near 1e-15 m
+      constexpr double kConvergedTip = 1e-10;
+      if (miss < kConvergedTip) break;
       Eigen::Matrix3Xd weighted =
           point_jacobian_matrix(machine, q, machine.tip.joint, machine.tip.xyz) *
           speed.asDiagonal();
@@ -99,7 +110,10 @@ MatrixXd pseudo_inverse_line(const Machine& machine, const MotionProblem& proble
         held[static_cast<std::size_t>(j)] = true;
       }
     }
-    if (!(miss < 1e-7)) {
+    /// Distance beyond which a point of the line is not reached.
+    /// @threshold [m] 1e-10..1e-4; numerical: far below what a limit check sees, far above what convergence leaves
+    constexpr double kOnTheLine = 1e-7;
+    if (!(miss < kOnTheLine)) {
       *share = static_cast<double>(k - 1) / pieces;
       return path.topRows(k);
     }
@@ -287,13 +301,20 @@ BaselineMotion BaselineSet::at_own_best(const std::string& kind, double idle_pow
                      : std::numeric_limits<double>::infinity();
   };
   // Bracketing by steps of 15 % and golden section suffice, because the cost is nearly convex in the duration.
+  /// Longest duration tried, in units of the first.
+  /// @threshold [1] 2..100; chosen: at a twelfth of the speed the flow losses are gone, a longer motion only costs
+  /// idle power
+  constexpr double kLongestShare = 12.0;
+  /// Cost over the least, from which longer durations are no longer tried.
+  /// @threshold [1] 1..2; chosen: beyond a shallow second minimum of a nearly convex cost
+  constexpr double kPastTheMinimum = 1.05;
   double best = first, least = cost(first), step = 1.15;
-  for (double t = first * step; t < 12.0 * first; t *= step) {
+  for (double t = first * step; t < kLongestShare * first; t *= step) {
     const double value = cost(t);
     if (value < least) {
       least = value;
       best = t;
-    } else if (value > 1.05 * least) {
+    } else if (value > kPastTheMinimum * least) {
       break;
     }
   }

@@ -36,14 +36,22 @@ struct BaselineMotion {
 };
 
 struct BaselineOptions {
+  /// Of the motions' mesh.
+  /// @threshold [intervals] 10..1000; chosen: as OptimizeOptions::intervals
   int intervals = 100;
-  int polished_orders =
-      4;  ///< number of orders whose legs are optimised (optimize_with_modes), cheapest first
-  int most_orders = 24;  ///< largest number of orders considered, cheapest first
-  int tip_speed_levels =
-      2;  ///< number of trapezoidal time laws tried for the tip line of best redundancy
-  double limit_tolerance = 1e-5;  ///< relative overshoot that still counts as kept
-  OptimizeOptions optimize;       ///< for the legs
+  /// Number of orders whose legs are optimised (optimize_with_modes), cheapest first.
+  /// @threshold [1] 0..1000; chosen: time grows with it; estimates rank the orders well enough
+  int polished_orders = 4;
+  /// Largest number of orders considered, cheapest first.
+  /// @threshold [1] 1..1000; chosen: all orders of four joints
+  int most_orders = 24;
+  /// Number of trapezoidal time laws tried for the tip line of best redundancy.
+  /// @threshold [1] 1..20; chosen: time grows with it
+  int tip_speed_levels = 2;
+  /// Relative overshoot that still counts as kept.
+  /// @threshold [1] 0..1e-2; chosen: as OptimizeOptions::limit_tolerance
+  double limit_tolerance = 1e-5;
+  OptimizeOptions optimize;  ///< for the legs
 };
 
 /// A motion along a fixed path at its fastest; driven slower, it keeps the limits of speed and flow, too.

@@ -18,13 +18,27 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kStill = 1e-4;  // [rad] or [m] below which a joint counts as at rest throughout
-constexpr double kSameEnd =
-    1e-3;  // [rad] or [m] below which two goal configurations count as equal
-constexpr int kRedundancyCuts = 13;  // values of each joint at which goal configurations are sought
+/// Travel below which a joint counts as at rest throughout.
+/// @threshold [rad or m] 1e-9..1e-2; chosen: no machine moves a joint by 0.1 mm on purpose
+constexpr double kStill = 1e-4;
+/// Distance below which two goal configurations count as equal.
+/// @threshold [rad or m] 1e-9..1e-1; chosen: a millimetre of stroke changes no energy visibly
+constexpr double kSameEnd = 1e-3;
+/// Number of values of each joint at which goal configurations are sought.
+/// @threshold [1] 3..100; chosen: a twelfth of the range between two cuts, quick enough for four joints
+constexpr int kRedundancyCuts = 13;
+/// Largest number of goal configurations for which orders are estimated.
+/// @threshold [1] 1..1000; chosen: each takes all orders of its joints, at most 120
 constexpr std::size_t kMostEnds = 120;
+/// Largest number of goal configurations kept for one order.
+/// @threshold [1] 1..100; chosen: else the cheapest order's neighbours displace every other order
 constexpr std::size_t kEndsOfAnOrder = 3;
+/// Mesh intervals of one leg.
+/// @threshold [intervals] 8..200; chosen: one joint that accelerates, cruises and stops
 constexpr int kLegIntervals = 24;
+/// Largest number of moving joints whose orders are enumerated.
+/// @threshold [legs] 1..8; chosen: 120 orders for five; 720 for six
+constexpr std::size_t kMostLegs = 5;
 
 /// Quasi-static estimate of one joint's move.
 struct LegEstimate {
@@ -32,9 +46,18 @@ struct LegEstimate {
   double shortest = 0.0;  // [s]
 };
 
+struct LegMove {
+  const VectorXd& from;  // posture
+  int joint;
+  double to;
+};
+
 /// Estimates the move of one joint at constant speed, half of the highest that flows allow everywhere on its travel.
 LegEstimate estimate_leg(const MotionProblem& problem, Chain& chain, LimitRatios& ratios,
-                         const VectorXd& from, int joint, double to) {
+                         const LegMove& move) {
+  const auto& [from, joint, to] = move;
+  /// Positions of a leg at which the estimate is taken.
+  /// @threshold [1] 3..100; chosen: midpoints of a tenth of the travel; estimates only rank orders
   constexpr int kSamples = 10;
   const double way = to - from[joint];
   VectorXd q = from, qd = VectorXd::Zero(from.size());
@@ -52,7 +75,7 @@ LegEstimate estimate_leg(const MotionProblem& problem, Chain& chain, LimitRatios
   qd[joint] = way * slow;
   for (int i = 0; i < kSamples; ++i) {
     q[joint] = from[joint] + way * (i + 0.5) / kSamples;
-    leg.energy += chain.evaluate(q.data(), qd.data(), problem.payload).power / (slow * kSamples);
+    leg.energy += chain.evaluate({q.data(), qd.data()}, problem.payload).power / (slow * kSamples);
   }
   return leg;
 }
@@ -104,14 +127,22 @@ Trajectory joined(const std::vector<Trajectory>& legs) {
 
 std::vector<double> shared_time(const CraneModel& model, double payload,
                                 const std::vector<Trajectory>& legs, double duration) {
-  constexpr int kUnits = 60, kTableSize = 7;
+  /// Equal parts into which the spare time is cut to be shared out.
+  /// @threshold [1] 10..1000; chosen: a part is a sixtieth of the spare time, below what the energy feels
+  constexpr int kUnits = 60;
+  /// Durations at which a leg's energy is tabulated.
+  /// @threshold [1] 3..60; chosen: the energy is smooth and nearly convex in the duration
+  constexpr int kTableSize = 7;
   double shortest = 0.0;
   for (const Trajectory& leg : legs) shortest += leg.duration();
   const double spare = std::max(0.0, duration - shortest), unit = spare / kUnits;
   std::vector<double> times;
   times.reserve(legs.size());
   for (const Trajectory& leg : legs) times.push_back(leg.duration());
-  if (spare <= 1e-9 * shortest || legs.size() == 1) {
+  /// Spare time over the shortest time, up to which there is none.
+  /// @threshold [1] 0..1e-6; numerical: rounding of the sum of the legs' durations
+  constexpr double kNoSpare = 1e-9;
+  if (spare <= kNoSpare * shortest || legs.size() == 1) {
     times.back() += duration - shortest;
     return times;
   }
@@ -172,7 +203,10 @@ void BaselineSet::find_end_postures(const std::vector<VectorXd>& given) {
   for (VectorXd q : given) {
     if (!solve_end_posture(model_.machine, problem_.limits, goal, all_free, q)) continue;
     add(q);
-    if (starts.size() < 4) starts.push_back(q);
+    /// Largest number of given end postures from which further ones are sought.
+    /// @threshold [1] 1..100; chosen: the time grows with it, and further ones rarely lead to new postures
+    constexpr std::size_t kMostGivenStarts = 4;
+    if (starts.size() < kMostGivenStarts) starts.push_back(q);
   }
   if (VectorXd q = problem_.start;
       solve_end_posture(model_.machine, problem_.limits, goal, all_free, q)) {
@@ -180,8 +214,11 @@ void BaselineSet::find_end_postures(const std::vector<VectorXd>& given) {
     starts.push_back(q);
   }
   // Goal configurations with every set of joints at rest.
+  /// Largest number of joints whose sets at rest are enumerated.
+  /// @threshold [joints] 1..10; chosen: 126 sets for seven joints; twice as many for each further joint
+  constexpr int kMostEnumerated = 7;
   for (const VectorXd& from : starts) {
-    for (unsigned still = 1; still < (1u << n) - 1u && n <= 7; ++still) {
+    for (unsigned still = 1; still < (1u << n) - 1u && n <= kMostEnumerated; ++still) {
       std::vector<bool> free(static_cast<std::size_t>(n));
       VectorXd q = from;
       for (int j = 0; j < n; ++j) {
@@ -220,13 +257,13 @@ void BaselineSet::make_sequences() {
     for (int j = 0; j < machine.joint_count(); ++j) {
       if (std::abs(ends_[e][j] - problem_.start[j]) > kStill) order.push_back(j);
     }
-    if (order.empty() || order.size() > 5) continue;
+    if (order.empty() || order.size() > kMostLegs) continue;
     do {
       SequenceEstimate s{order, e, {}};
       VectorXd q = problem_.start;
       bool clear = true;
       for (const int j : order) {
-        const LegEstimate leg = estimate_leg(problem_, chain, ratios, q, j, ends_[e][j]);
+        const LegEstimate leg = estimate_leg(problem_, chain, ratios, {q, j, ends_[e][j]});
         s.sum.energy += leg.energy;
         s.sum.shortest += leg.shortest;
         VectorXd next = q;
@@ -368,8 +405,9 @@ BaselineMotion BaselineSet::polished(const BaselineMotion& from, const DrivenPat
   OptimizeOptions options = options_.optimize;
   options.overlap = 0.0;
   const StartResult solved = optimize_with_phases(
-      model_, problem_, candidate.name, plan_of(candidate.modes, from.motion.t), from.motion,
-      TimeWindow::fixed(from.duration), false, options);
+      model_, problem_,
+      {candidate.name, plan_of(candidate.modes, from.motion.t), from.motion, false},
+      TimeWindow::fixed(from.duration), options);
   if (!solved.usable(options_.limit_tolerance) || solved.energy_exact >= from.energy.total)
     return from;
   BaselineMotion better = from;

@@ -9,11 +9,18 @@
 namespace sparflow {
 namespace {
 
-constexpr double kFirstLineDuration = 10.0;  // [s] first duration tried where none is known
-constexpr int kDoublings = 3;                // largest number of doublings until a motion is found
+/// First duration tried where none is known.
+/// @threshold [s] 1..1000; chosen: usual duration of a crane's motion; it is doubled where too short
+constexpr double kFirstLineDuration = 10.0;
+/// Largest number of doublings until a motion is found.
+/// @threshold [1] 0..10; chosen: a line that needs more than eight times the first duration is none a driver would
+/// take
+constexpr int kDoublings = 3;
 
 /// The motion compressed in time as far as speeds, flows and accelerations allow.
 Trajectory at_its_fastest(const MotionProblem& problem, const Trajectory& motion) {
+  /// Parts of a mesh interval at which the limits are judged.
+  /// @threshold [1] 2..64; chosen: as OptimizeOptions::refine, by which the motion is judged in the end
   constexpr int kInstants = 16;
   LimitRatios limits(problem);
   const Trajectory fine = motion.refined(kInstants);

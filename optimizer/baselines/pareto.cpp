@@ -11,8 +11,10 @@
 namespace sparflow {
 namespace {
 
-constexpr double kVerySlow =
-    30.0;  // multiple of the shortest duration at which flow losses are negligible
+/// Multiple of the shortest duration at which motions count as arbitrarily slow.
+/// @threshold [1] 10..1000; derived: losses fall with the flow squared: a thousandth of those of the fastest motion
+/// is left
+constexpr double kVerySlow = 30.0;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double energy_or_none(const std::vector<StrategyOutcome>& all, const std::string& kind) {
@@ -101,7 +103,10 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   std::vector<StrategyOutcome> first;
   for (const std::string& kind : BaselineSet::kinds()) {
     const double own = baselines.shortest(kind);
-    if (kind == kSequential || own <= 0.0 || own > 1.5 * anchor) continue;
+    /// Multiple of the shortest duration up to which a baseline starts the search of the fastest motion.
+    /// @threshold [1] 1..5; chosen: a slower one is no neighbour of it
+    constexpr double kNearTheShortest = 1.5;
+    if (kind == kSequential || own <= 0.0 || own > kNearTheShortest * anchor) continue;
     const BaselineMotion m = baselines.at(kind, own);
     if (m.found())
       first.push_back({kind, m.detail, m.motion, m.duration, own, "", "", m.energy, {}, {}});

@@ -34,10 +34,16 @@ struct ParetoCurve {
 };
 
 struct ParetoOptions {
-  int points = 14;       ///< number of durations
-  double longest = 6.0;  ///< largest duration, in units of the shortest
+  /// Number of durations.
+  /// @threshold [1] 2..1000; chosen: enough for a smooth curve
+  int points = 14;
+  /// Largest duration, in units of the shortest.
+  /// @threshold [1] 1..100; chosen: beyond it the flow losses hardly change
+  double longest = 6.0;
   std::vector<double> idle_powers = {1e3, 2e3, 5e3, 10e3, 15e3};  ///< [W]
-  int grid_nodes = 20000;  ///< nodes of the joint grid for grid_limit; 0 = not computed
+  /// Nodes of the joint grid for grid_limit; 0 = not computed.
+  /// @threshold [nodes] 0..1e7; chosen: half of EnergyGridOptions::nodes, as one path is wanted only
+  int grid_nodes = 20000;
   StrategyOptions strategies;
   /// Called with the share done and what is being solved; false interrupts.
   std::function<bool(double, const std::string&)> progress;

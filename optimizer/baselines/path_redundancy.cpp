@@ -21,13 +21,18 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNoCost = std::numeric_limits<double>::infinity();
-constexpr int kFirstStages = 25;  // control points of the first grid
-constexpr double kFirstLineSpacing =
-    0.4;  // spacing of the first grid, in stages: at full speed a joint moves 2.5 values in a stage
-constexpr double kSameValue =
-    1e-9;  // [s at full speed] a smaller step of a joint is Newton's residual
-constexpr double kFlowMargin =
-    2e-3;  // relative, for flows between the knots where limits are judged
+/// Control points of the first grid.
+/// @threshold [1] 5..1000; chosen: the grid is refined until the energy settles
+constexpr int kFirstStages = 25;
+/// Spacing of the first grid's values of a joint, in what a joint travels at full speed in a stage.
+/// @threshold [stages] 0.05..1; chosen: at full speed a joint passes 2.5 values in a stage
+constexpr double kFirstLineSpacing = 0.4;
+/// Step of a joint, in seconds at full speed, below which it is at rest.
+/// @threshold [s] 1e-12..1e-6; numerical: a smaller step is Newton's residual
+constexpr double kSameValue = 1e-9;
+/// Share of a flow limit that is kept free at the knots.
+/// @threshold [1] 0..0.1; chosen: limits are judged between the knots, where flows can be slightly larger
+constexpr double kFlowMargin = 2e-3;
 
 /// The tip's progress in a duration of 1: shares of the line at equally spaced instants.
 struct TipLaw {
@@ -77,6 +82,13 @@ struct LineFound {
   int stage = 0;  // last stage that was reached
 };
 
+/// Where the postures of a stage are sought.
+struct LineGrid {
+  double spacing;          // [s at full speed]
+  const MatrixXd& around;  // control points near which to search, empty = everywhere
+  double reach;            // distance from them [s at full speed]
+};
+
 class LineProgram {
  public:
   LineProgram(const CraneModel& model, const MotionProblem& problem, double duration,
@@ -91,6 +103,9 @@ class LineProgram {
     if (!problem.obstacles.empty()) clearance_ = std::make_unique<ClearanceModel>(problem);
     if (line.size() > 2) known_ = spline_controls(line);
   }
+
+  const MotionProblem& problem() const { return problem_; }
+  double duration() const { return duration_; }
 
   /// The time law of the motion given as `line`.
   std::optional<TipLaw> known_law() const {
@@ -121,7 +136,7 @@ class LineProgram {
     for (std::size_t k = 1; k < states.size(); ++k) {
       const double time = static_cast<double>(k) / (stages - 1);
       const Eigen::Vector3d tip = from_ + law.at(time) * (to_ - from_);
-      place(tip, time, spacing, around, reach, states[k - 1], states[k]);
+      place(tip, time, {spacing, around, reach}, states[k - 1], states[k]);
       extend(k, h, states, steps);
       found.stage = static_cast<int>(k);
       if (steps[k].empty()) return found;
@@ -186,8 +201,10 @@ class LineProgram {
   }
 
   /// Collects the postures of one stage.
-  void place(const Eigen::Vector3d& tip, double time, double spacing, const MatrixXd& around,
-             double reach, const std::vector<VectorXd>& before, std::vector<VectorXd>& states) {
+  void place(const Eigen::Vector3d& tip, double time, const LineGrid& grid,
+             const std::vector<VectorXd>& before, std::vector<VectorXd>& states) {
+    const auto& [spacing_of, around, reach] = grid;
+    const double spacing = spacing_of;  // a lambda cannot capture the name above
     const auto begin = [&](VectorXd z, double far) {
       if (!postures_.project(tip, -1, z)) return;
       if (!postures_.within_range(z)) return;
@@ -279,7 +296,8 @@ class LineProgram {
     qd_ = postures_.joints(d) / h;
     if (ratios_.speed(q_, qd_, nullptr) > 1.0 - kFlowMargin) return kNoCost;
     const double trusted = problem_.limits.pressure_std;
-    const MachineState& s = chain_.evaluate(q_.data(), qd_.data(), problem_.payload, trusted > 0.0);
+    const MachineState& s =
+        chain_.evaluate({q_.data(), qd_.data()}, problem_.payload, trusted > 0.0);
     for (const CylinderState& c : s.cylinders) {
       if (trusted > 0.0 && c.pressure_std > trusted) return kNoCost;
     }
@@ -292,7 +310,9 @@ class LineProgram {
     return h * s.power;
   }
 
-  static constexpr double kWholeCurve = 1e3;  // [s at full speed] longer than any self-motion
+  /// Length of a trace, in seconds at full speed, that no self-motion reaches.
+  /// @threshold [s] 10..1e6; numerical: no joint takes a quarter of an hour for its range
+  static constexpr double kWholeCurve = 1e3;
 
   const MotionProblem& problem_;
   double duration_;
@@ -306,9 +326,10 @@ class LineProgram {
 };
 
 /// Solves on a sequence of refined grids, each around the result of the one before.
-PathRedundancy refined_line(const CraneModel& model, const MotionProblem& problem, double duration,
-                            LineProgram& program, const TipLaw& law, LineFound coarse,
-                            const PathRedundancyOptions& options) {
+PathRedundancy refined_line(const CraneModel& model, LineProgram& program, const TipLaw& law,
+                            LineFound coarse, const PathRedundancyOptions& options) {
+  const MotionProblem& problem = program.problem();
+  const double duration = program.duration();
   PathRedundancy best;
   best.top_speed = law.top_speed;
   double spacing = kFirstLineSpacing * duration / kFirstStages, last = kNoCost;
@@ -406,8 +427,7 @@ PathRedundancy best_redundancy_line(const CraneModel& model, const MotionProblem
     // Refined are the best time law and the line's own, with which the result is compared.
     const bool own = laws[i].table.size() > 0;
     if (result.found() && !own) continue;
-    PathRedundancy one =
-        refined_line(model, problem, duration, program, laws[i], std::move(coarse[i]), options);
+    PathRedundancy one = refined_line(model, program, laws[i], std::move(coarse[i]), options);
     if (!one.found()) {
       if (!result.found()) result.why = one.why;
       continue;

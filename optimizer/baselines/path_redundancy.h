@@ -19,13 +19,24 @@
 namespace sparflow {
 
 struct PathRedundancyOptions {
-  int intervals = 100;  ///< of the motion
+  /// Of the motion.
+  /// @threshold [intervals] 10..1000; chosen: as OptimizeOptions::intervals
+  int intervals = 100;
   /// Number of trapezoidal time laws tried, >= 1: the tip's top speed from 1.12 to 2 times its mean, in equal steps.
+  /// @threshold [1] 1..20; chosen: time grows with it
   int speed_levels = 2;
-  double energy_change = 5e-3;  ///< relative change between two grids below which refinement ends
+  /// Relative change of the energy between two grids below which refinement ends.
+  /// @threshold [1] 1e-6..0.5; chosen: far below what separates strategies
+  double energy_change = 5e-3;
+  /// Largest number of grids.
+  /// @threshold [1] 1..20; chosen: each takes several times as long as the one before
   int most_grids = 6;
+  /// Relative overshoot that still counts as kept.
+  /// @threshold [1] 0..1e-2; chosen: as OptimizeOptions::limit_tolerance
   double limit_tolerance = 1e-5;
-  int refine = 16;  ///< samples per mesh interval at which limits are checked
+  /// Samples per mesh interval at which limits are checked.
+  /// @threshold [1] 1..100; chosen: as OptimizeOptions::refine
+  int refine = 16;
 };
 
 struct PathRedundancy {

@@ -11,12 +11,18 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kProjectionError = 1e-11;  // [m] at which Newton's method stops
-constexpr int kMostTraceSteps = 4000;       // largest number of steps of a trace in one direction
-constexpr double kTraceShare =
-    0.6;  // step as share of the grid's spacing, so that a step passes at most one value of a joint
-constexpr Eigen::Index kMostTracedJoints =
-    4;  // three directions of the tip and one redundant joint
+/// Distance of the tip at which Newton's method stops.
+/// @threshold [m] 1e-14..1e-8; numerical: rounding of a tip position is near 1e-15 m
+constexpr double kProjectionError = 1e-11;
+/// Largest number of steps of a trace in one direction.
+/// @threshold [1] 100..1e6; numerical: ends a trace that never closes; ranges are left far sooner
+constexpr int kMostTraceSteps = 4000;
+/// Step of a trace as share of the grid's spacing.
+/// @threshold [1] 0.1..1; derived: a step then passes at most one value of a joint, the growth by projection included
+constexpr double kTraceShare = 0.6;
+/// Largest number of joints of which self-motions are traced.
+/// @threshold [joints] 1..4; derived: three directions of the tip and one redundant joint give a curve
+constexpr Eigen::Index kMostTracedJoints = 4;
 
 using SquareSystem = std::array<std::array<double, kMostTracedJoints + 1>, kMostTracedJoints>;
 
@@ -27,7 +33,10 @@ bool eliminate_square(SquareSystem& a, std::size_t n) {
     for (std::size_t r = c + 1; r < n; ++r) {
       if (std::abs(a[r][c]) > std::abs(a[pivot][c])) pivot = r;
     }
-    if (!(std::abs(a[pivot][c]) > 1e-12)) return false;
+    /// Pivot below which the system counts as singular.
+    /// @threshold [1] 1e-15..1e-6; numerical: rounding of entries near one, cancelled over some steps
+    constexpr double kSingularPivot = 1e-12;
+    if (!(std::abs(a[pivot][c]) > kSingularPivot)) return false;
     std::swap(a[c], a[pivot]);
     for (std::size_t r = 0; r < n; ++r) {
       if (r == c) continue;
@@ -58,7 +67,11 @@ SelfMotion::SelfMotion(const MotionProblem& problem)
   for (int axis = 0; axis < 3 && all.size() < 3; ++axis) {
     Eigen::Vector3d d = Eigen::Vector3d::Unit(axis);
     for (const Eigen::Vector3d& e : all) d -= e * e.dot(d);
-    if (d.norm() > 0.4) all.push_back(d.normalized());  // the largest is at least 1 / sqrt 3
+    /// Length of a unit vector's remainder from which it is a new direction.
+    /// @threshold [1] 0..0.57; derived: the largest of the three is at least 1/sqrt(3) = 0.58, so one is always found
+    constexpr double kLeastRemainder = 0.4;
+    if (d.norm() > kLeastRemainder)
+      all.push_back(d.normalized());  // the largest is at least 1 / sqrt 3
   }
   basis_.resize(static_cast<Eigen::Index>(all.size() - fixed.size()), 3);
   for (std::size_t i = fixed.size(); i < all.size(); ++i) {
@@ -117,7 +130,10 @@ VectorXd SelfMotion::tangent() const {
 
 bool SelfMotion::project(const Eigen::Vector3d& tip, int held, VectorXd& z) {
   const auto n = static_cast<std::size_t>(z.size());
-  for (int i = 0; i < 15; ++i) {
+  /// Largest number of Newton steps.
+  /// @threshold [1] 5..100; chosen: near a solution each step doubles the digits
+  constexpr int kNewtonSteps = 15;
+  for (int i = 0; i < kNewtonSteps; ++i) {
     derivative(z);
     const Eigen::Vector3d error = tip - tip_;
     SquareSystem a{};
@@ -153,8 +169,11 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
   const auto sample_at = [&](VectorXd guess, Eigen::Index joint, double value) {
     const VectorXd before = guess;
     guess[joint] = value;
+    /// Distance from its guess beyond which a projected posture belongs to another branch.
+    /// @threshold [spacings] 1..10; chosen: twice the grid's spacing
+    constexpr double kLongestStep = 2.0;
     if (project(tip, static_cast<int>(joint), guess) && within_range(guess) &&
-        (guess - before).norm() < 2.0 * spacing) {
+        (guess - before).norm() < kLongestStep * spacing) {
       samples.push_back(std::move(guess));
     }
   };
@@ -162,9 +181,12 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
     VectorXd z = from;
     derivative(z);
     VectorXd direction = sign * tangent();
+    /// Length of a traced step over the wanted one, beyond which the trace has left its branch.
+    /// @threshold [steps] 1..10; chosen: a curve that turns this quickly is a singularity
+    constexpr double kLongestTraceStep = 2.0;
     for (int i = 0; i < steps; ++i) {
       VectorXd next = z + step * direction;
-      if (!project(tip, -1, next) || (next - z).norm() > 2.0 * step) break;
+      if (!project(tip, -1, next) || (next - z).norm() > kLongestTraceStep * step) break;
       for (Eigen::Index j = 0; j < z.size(); ++j) {
         const double cell = std::floor((z[j] - origin_[j]) / spacing),
                      other = std::floor((next[j] - origin_[j]) / spacing);
@@ -181,8 +203,11 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
       derivative(next);
       VectorXd turn = tangent();
       if (turn.dot(direction) < 0.0) turn = -turn;
+      /// Steps before a closed curve is looked for.
+      /// @threshold [steps] 2..20; derived: the first few are near the start on every curve
+      constexpr int kStepsBeforeClosing = 4;
       // The trace of a closed curve ends where it began.
-      if (i > 4 && (next - from).norm() < 0.5 * step) break;
+      if (i > kStepsBeforeClosing && (next - from).norm() < 0.5 * step) break;
       direction = turn;
       z = next;
     }

@@ -20,22 +20,23 @@ void add_pump_pressures(const CraneModel& model, double payload, StrategyOutcome
   outcome.peak_pressure.assign(pumps, 0.0);
   outcome.mean_pressure.assign(pumps, 0.0);
   if (!outcome.found()) return;
+  /// Parts of a mesh interval at which mean and peak pressures are taken.
+  /// @threshold [1] 1..64; chosen: reported figures only; pressures vary little within an interval
   constexpr int kParts = 4;
   std::vector<double> delivering(pumps, 0.0);
   Chain chain(model);
-  for_each_instant(outcome.motion, kParts,
-                   [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
-                       const Eigen::VectorXd& qdd, double step) {
-                     const MachineState& s = chain.evaluate(q.data(), qd.data(), payload, false,
-                                                            kRestSpeed, qdd.data());
-                     for (std::size_t p = 0; p < pumps; ++p) {
-                       outcome.peak_pressure[p] =
-                           std::max(outcome.peak_pressure[p], s.pumps[p].pressure);
-                       if (s.pumps[p].flow <= 0.0) continue;
-                       delivering[p] += step;
-                       outcome.mean_pressure[p] += step * s.pumps[p].pressure;
-                     }
-                   });
+  for_each_instant(
+      outcome.motion, kParts,
+      [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
+          double step) {
+        const MachineState& s = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
+        for (std::size_t p = 0; p < pumps; ++p) {
+          outcome.peak_pressure[p] = std::max(outcome.peak_pressure[p], s.pumps[p].pressure);
+          if (s.pumps[p].flow <= 0.0) continue;
+          delivering[p] += step;
+          outcome.mean_pressure[p] += step * s.pumps[p].pressure;
+        }
+      });
   for (std::size_t p = 0; p < pumps; ++p) {
     if (delivering[p] > 0.0) outcome.mean_pressure[p] /= delivering[p];
   }
@@ -144,7 +145,10 @@ StrategyOutcome OptimumSearch::at(double duration, const std::vector<StrategyOut
   StrategyOutcome best = solved(kOptimal, problem_, starts_from(known, thorough),
                                 TimeWindow::fixed(duration), thorough);
   for (const StrategyOutcome& o : known) {
-    if (!o.found() || std::abs(o.duration - duration) > 1e-9 * duration) continue;
+    /// Relative difference up to which two durations are equal.
+    /// @threshold [1] 0..1e-6; numerical: rounding
+    constexpr double kSameDuration = 1e-9;
+    if (!o.found() || std::abs(o.duration - duration) > kSameDuration * duration) continue;
     if (best.found() && best.energy.total <= o.energy.total) continue;
     best.motion = o.motion;
     best.energy = o.energy;
@@ -267,7 +271,10 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
     std::vector<StrategyOutcome> first;
     for (std::size_t i = 0; i < shortest.size(); ++i) {
       const std::string& kind = BaselineSet::kinds()[i];
-      if (shortest[i] > 0.0 && shortest[i] < 1.5 * out.shortest && kind != kSequential)
+      /// Multiple of the shortest duration below which a baseline starts the search of the fastest motion.
+      /// @threshold [1] 1..5; chosen: a slower one is no neighbour of it
+      constexpr double kNearTheFastest = 1.5;
+      if (shortest[i] > 0.0 && shortest[i] < kNearTheFastest * out.shortest && kind != kSequential)
         first.push_back(outcome_of(model, problem, baselines.at(kind, shortest[i]), shortest[i]));
     }
     fastest = search.fastest(first);
@@ -312,8 +319,12 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
   std::sort(factors.rbegin(), factors.rend());
   for (const double factor : factors) {
     if (out.shortest <= 0.0) break;
+    /// Multiple of the shortest duration up to which the search is thorough.
+    /// @threshold [1] 1..5; chosen: where time is short, optima differ from those at longer durations, of which one
+    /// starts the next
+    constexpr double kThoroughUpTo = 1.5;
     out.rows.push_back(rows_at(fmt::format("{:g} x shortest", factor), factor, factor * anchor,
-                               factor <= 1.5 || factor == factors.front()));
+                               factor <= kThoroughUpTo || factor == factors.front()));
   }
   if (options.own_time && out.shortest > 0.0) {
     StrategyRow row{"own", 0.0, 0.0, {}};

@@ -61,7 +61,9 @@ struct StrategyOptions {
   bool shortest_time =
       true;  ///< optimise the shortest duration, else take that of the baselines and seeds
   bool least_control = true;  ///< solve for the least squared commands at equal duration
-  int smooth_seeds = 2;       ///< seeds of a thorough search, also solved with the smooth law
+  /// Seeds of a thorough search, also solved with the smooth law.
+  /// @threshold [1] 0..100; chosen: as OptimizeOptions::smooth_starts
+  int smooth_seeds = 2;
   BaselineOptions baselines;
   OptimizeOptions optimize;
 };

@@ -44,6 +44,8 @@ SignedRank signed_rank_test(const std::vector<double>& differences) {
   }
   test.w_plus = 0.5 * plus;
   test.w_minus = 0.5 * (total - plus);
+  /// Number of pairs up to which the distribution is computed exactly.
+  /// @threshold [pairs] 20..1000; chosen: the normal approximation is usual from some twenty pairs on
   constexpr std::size_t kExactUpTo = 60;
   if (n <= kExactUpTo) {
     // Probability of each sum when both signs are equally likely.

@@ -11,6 +11,8 @@ double cost_with_idling(const StrategyOutcome& outcome, double idle_power) {
 
 PairedSummary paired(const std::vector<StrategyComparison>& all, const std::string& row,
                      const std::string& kind, const std::string& against) {
+  /// Relative difference of costs up to which two strategies count as equal.
+  /// @threshold [1] 0..0.1; chosen: below what solver and mesh leave
   constexpr double kSame = 1e-3;
   PairedSummary s;
   s.kind = kind;

@@ -34,7 +34,10 @@ double largest_slope_ratio(const MotionProblem& problem, const EnergyPotential& 
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       const double most = slope[j] > 0.0 ? price(j, 0) : price(j, 1);
       const double rise = std::abs(slope[j]);
-      if (rise > 1e-9) worst = std::max(worst, rise / std::max(most, 1e-12));
+      /// Slope of the potential below which it counts as flat.
+      /// @threshold [J/rad or J/m] 0..1e-3; numerical: rounding of values of some kJ
+      constexpr double kFlat = 1e-9;
+      if (rise > kFlat) worst = std::max(worst, rise / std::max(most, 1e-12));
     }
   }
   return worst;
@@ -92,6 +95,9 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
     bound.lines.push_back(static_cast<int>(lines.size()));
   }
   // The allowances are estimated from the grid's own nodes, so the inequality is sampled away from the nodes.
+  /// Random postures at which the inequality is checked between the nodes.
+  /// @threshold [postures] 100..1e6; chosen: the scale is taken from the worst; the bound is called estimated for
+  /// that reason
   constexpr int kSamples = 4000;
   const double ratio = largest_slope_ratio(problem, potential, weights, kSamples);
   if (ratio > 1.0) {

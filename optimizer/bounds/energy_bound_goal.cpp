@@ -13,6 +13,7 @@ namespace {
 using Eigen::VectorXd;
 
 /// Distance from the goal within which a tip counts as there, as in the check of a motion's end. [m]
+/// @threshold [m] 1e-9..1e-3; derived: the check of a motion's end accepts the same distance
 constexpr double kAtGoal = 1e-5;
 
 /// Decides whether the tip can be at the goal anywhere in a box.
@@ -165,6 +166,9 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
   }
   if (open.empty()) return result;
   result.reachable = true;
+  /// Boxes after which the search ends.
+  /// @threshold [boxes] 1000..1e8; chosen: ends a search that no longer narrows; the least value of the open boxes is
+  /// a bound at any time
   constexpr long kMostBoxes = 400000;
   while (true) {
     PostureBox box = open.top();

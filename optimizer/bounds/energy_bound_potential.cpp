@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 std::size_t ix(long i) { return static_cast<std::size_t>(i); }
 
 /// Share of the largest rate dx/dq below which a cylinder's length is not used as coordinate (near its dead centre).
+/// @threshold [1] 0..1; chosen: there the length hardly changes with the joint, and its inverse is steep
 constexpr double kLeastRate = 0.15;
 
 /// Replaces each node's value by the largest of it and its two neighbours along one axis.
@@ -114,7 +115,10 @@ std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, cons
   const std::size_t n = losses.size();
   std::vector<double> lines(n);
   for (std::size_t j = 0; j < n; ++j) {
-    const bool varies = losses[j][0] > 1e-9 || losses[j][1] > 1e-9;
+    /// Relative loss by interpolation above which prices vary along an axis.
+    /// @threshold [1] 0..1e-6; numerical: rounding of second differences
+    constexpr double kNoLoss = 1e-9;
+    const bool varies = losses[j][0] > kNoLoss || losses[j][1] > kNoLoss;
     // Two cells suffice along an axis that changes no price; on others second differences must be computable.
     lines[j] = varies ? 7.0 : 3.0;
   }
@@ -124,13 +128,18 @@ std::vector<int> balanced_cells(const std::vector<Eigen::Vector2d>& losses, cons
   };
   double count = 1.0;
   for (const double l : lines) count *= l;
+  /// Factor by which an axis' number of lines grows in a step.
+  /// @threshold [1] 1.001..1.5; chosen: two per cent, far below a line of any axis
   constexpr double kGrowth = 1.02;
+  /// Gain below which no axis gets further lines.
+  /// @threshold [1] 0..1e-3; numerical: nothing varies along any axis then
+  constexpr double kLeastGain = 1e-7;
   while (count < nodes) {
     std::size_t best = 0;
     for (std::size_t j = 1; j < n; ++j) {
       if (gain(j) > gain(best)) best = j;
     }
-    if (!(gain(best) > 1e-7)) break;
+    if (!(gain(best) > kLeastGain)) break;
     lines[best] *= kGrowth;
     count *= kGrowth;
   }
@@ -233,6 +242,8 @@ void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
   // The allowance covers what linear interpolation along each axis can exceed the price by: h^2/8 times a smooth second
   // derivative; at a kink (standby, tabulated least demand) half the larger of the second differences of the cell's
   // nodes times h^2. The latter is four times the former, so it is used for both.
+  /// Factor on the second difference of the nodes.
+  /// @threshold [1] 0.125..0.5; derived: a smooth function needs an eighth of it, a kink half
   constexpr double kShare = 0.5;
   std::vector<float> allowance(ix(lattice_.nodes), 0.0F);
   for (int k = 0; k < n; ++k) {
@@ -379,6 +390,7 @@ void EnergyPotential::over_corners(const VectorXd& q, const Function& function) 
   const int n = lattice_.joints();
   long base = 0;
   std::array<double, 8> share{};
+  // no threshold: size of the array
   SPARFLOW_CHECK(n <= 8, "a grid has at most eight joints");
   for (int j = 0; j < n; ++j) {
     const int cell = cell_of(j, q[j]);

@@ -7,8 +7,10 @@
 
 #include "models/effects/effective_machine.h"
 #include "models/math/linear_algebra.h"
+#include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_goal.h"
 #include "optimizer/bounds/energy_bound_time_guide.h"
+#include "optimizer/bounds/energy_bound_time_weights.h"
 #include "optimizer/grid/energy_grid.h"
 
 namespace sparflow {
@@ -94,7 +96,9 @@ class TimedSearch {
   /// begin better, from constant ones too. @param x constant shares and the price
   std::vector<Found> posture_shares(const TimedGrid& g, const VectorXd& x) {
     const double constant = objective(g, x), price = shares_.price;
-    constexpr double kShortTime = 0.01;  // below this share the bound of unlimited time is as good
+    /// Share of the constant price's bound below which time costs too little for a search.
+    /// @threshold [1] 0..0.1; chosen: the bound of unlimited time is as good
+    constexpr double kShortTime = 0.01;
     if (energy_weight_ > 0.0 && price * duration_ < kShortTime * constant) return {{base_, x}};
     TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
     double guide_price = price;
@@ -102,8 +106,9 @@ class TimedSearch {
       double best = guide.solve(price) - price * duration_;
       for (const double factor : {1.6, 1.0 / 1.6}) {
         const double before = best;
-        constexpr int kMost =
-            4;  // the guide's shortest time may exceed the duration: no price is best then
+        /// Steps in the price of time in either direction.
+        /// @threshold [1] 1..20; chosen: the guide's shortest time may exceed the duration: no price is best then
+        constexpr int kMost = 4;
         for (int k = 0; k < kMost; ++k) {
           const double next = guide_price * factor, value = guide.solve(next) - next * duration_;
           if (!(value > best)) break;
@@ -116,7 +121,11 @@ class TimedSearch {
     guide.solve(guide_price);
     const TimeShares found = guide.shares(shares_);
     const Eigen::MatrixX2d constant_base = base_;
+    /// First step of the search in the logarithms of the shares.
+    /// @threshold [1] 0.1..2; chosen: a factor of two
     constexpr double kStep = 0.7;
+    /// Times the search begins anew with its first step.
+    /// @threshold [1] 1..10; chosen: a simplex can degenerate before it is at a maximum
     constexpr int kTimes = 3;
     const auto searched = [&](const Eigen::MatrixX2d& base, const VectorXd& from) -> Found {
       base_ = base;
@@ -142,7 +151,9 @@ class TimedSearch {
   void set(const VectorXd& x) {
     shares_.price = energy_weight_ > 0.0 ? std::exp(x[n_]) : 1.0;
     const double top = x.head(n_).maxCoeff();
-    constexpr double kLeastLog = -6.0;  // a smaller share has no influence
+    /// Logarithm of a share over the largest, below which it stays.
+    /// @threshold [1] -20..-2; chosen: a share of 0.25 per cent has no influence
+    constexpr double kLeastLog = -6.0;
     shares_.share =
         (x.head(n_).array() - top).cwiseMax(kLeastLog).exp().matrix().asDiagonal() * base_;
     shares_.tilt.resize(0, 0);
@@ -165,7 +176,12 @@ class TimedSearch {
   double objective(const TimedGrid& g, const VectorXd& x) {
     set(x);
     const EnergyPotential potential(*loaded_, problem_, *weights_, g.lattice, g.forces);
-    constexpr double kRough = 5e-3, kRoughTip = 0.02;
+    /// Relative accuracy of the least potential at the goal while shares are searched.
+    /// @threshold [1] 1e-4..0.1; chosen: the final bound is computed with the finer one
+    constexpr double kRough = 5e-3;
+    /// Resolution of the goal set while shares are searched.
+    /// @threshold [m] 1e-3..0.2; chosen: a tenth of a cell; the final bound is computed with the finer one
+    constexpr double kRoughTip = 0.02;
     const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kRough, kRoughTip);
     return value_of(least.lower, shares_.price);
   }
@@ -174,6 +190,8 @@ class TimedSearch {
   /// ends of a motion speeds are small, and the Hamiltonian is at most ramp_gain t; the part of the constant price above
   /// that is subtracted from what the price of time costs.
   double value_of(double least, double price) const {
+    /// Factor on the ramp's gain for postures between the nodes.
+    /// @threshold [1] 1..1.2; chosen: two per cent for what lies between
     constexpr double kBetweenNodes = 1.02;
     price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
@@ -234,6 +252,8 @@ class TimedSearch {
     for (const VectorXd& lines : g.lattice.lines) {
       bound.lines.push_back(static_cast<int>(lines.size()));
     }
+    /// Relative accuracy of the least potential at the goal for the bound that is reported.
+    /// @threshold [1] 1e-6..1e-2; chosen: as EnergyBoundOptions::goal_accuracy
     constexpr double kAccuracy = 2e-4;
     const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kAccuracy);
     bound.valid = least.reachable;
@@ -256,6 +276,9 @@ class TimedSearch {
     VectorXd q(n_);
     Eigen::MatrixX2d price;
     double worst = 0.0;
+    /// Random postures at which the Hamiltonian is checked between the nodes.
+    /// @threshold [postures] 100..1e6; chosen: the scale is taken from the worst; the bound is called estimated for
+    /// that reason
     constexpr int kSamples = 4000;
     for (int i = 0; i < kSamples; ++i) {
       for (Eigen::Index j = 0; j < n_; ++j) {

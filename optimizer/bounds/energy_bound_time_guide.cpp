@@ -37,7 +37,9 @@ struct LogFit {
   }
   /// Value in the middle of the ranges, then slopes; a ridge keeps slopes small that the way does not determine.
   VectorXd solved() const {
-    constexpr double kRidge = 3e-3;  // of a posture's share of its range, squared
+    /// Ridge on the slopes, relative to the weight, of a posture's share of its range squared.
+    /// @threshold [1] 1e-6..0.1; chosen: slopes that the way does not determine stay small, others hardly change
+    constexpr double kRidge = 3e-3;
     Eigen::MatrixXd a = square;
     a.diagonal().tail(a.rows() - 1).array() += kRidge * weight;
     return a.ldlt().solve(right);
@@ -110,10 +112,14 @@ double TimeGuide::update(long node) {
     set_moves(node, value);
     return gain_.of(moves_, weights_.pump_flow()) - price_;
   };
+  /// Excess over the price at which a node's value is accepted, relative to the price.
+  /// @threshold [1] 1e-6..1e-2; chosen: the guide only proposes shares; whatever it proposes is a bound
   constexpr double kEnough = 1e-3;
   double left = -price_, right = over(high);
   if (right <= kEnough * price_) return high;
   int last = 0;  // false position (Illinois)
+  /// Largest number of steps of false position.
+  /// @threshold [1] 10..100; numerical: the Illinois method converges superlinearly; this ends it on rounding only
   constexpr int kMost = 30;
   for (int i = 0; i < kMost; ++i) {
     const double middle = (low * right - high * left) / (right - left);
@@ -135,6 +141,8 @@ double TimeGuide::update(long node) {
 }
 
 bool TimeGuide::sweep(unsigned order) {
+  /// Relative change of a node's value from which a sweep has changed something.
+  /// @threshold [1] 1e-9..1e-2; chosen: far below the accuracy of the guide's grid
   constexpr double kNews = 1e-5;
   bool any = false;
   for (long count = 0; count < lattice_.nodes; ++count) {
@@ -157,6 +165,8 @@ double TimeGuide::solve(double price) {
   value_.assign(place(lattice_.nodes), kFar);
   value_[place(lattice_.nearest_node(problem_.start))] = 0.0;
   const unsigned orders = 1u << lattice_.joints();
+  /// Largest number of sweeps.
+  /// @threshold [sweeps] 10..1e4; numerical: ends sweeps that only rounding keeps going
   constexpr unsigned kMost = 200;
   for (unsigned quiet = 0, k = 0; quiet < orders && k < kMost; ++k) {
     quiet = sweep(k % orders) ? 0 : quiet + 1;
@@ -168,7 +178,12 @@ double TimeGuide::solve(double price) {
   std::vector<double> values = value_;
   for (double& v : values) v = std::isfinite(v) ? v : 10.0 * top;
   potential_.replace(std::move(values));
-  constexpr double kRough = 1e-3, kRoughTip = 0.01;
+  /// Relative accuracy of the least time at the goal.
+  /// @threshold [1] 1e-5..1e-2; chosen: the guide only proposes shares
+  constexpr double kRough = 1e-3;
+  /// Resolution of the goal set.
+  /// @threshold [m] 1e-4..0.1; chosen: the guide only proposes shares
+  constexpr double kRoughTip = 0.01;
   const LeastOnGoal least = least_on_goal(problem_, loaded_, potential_, kRough, kRoughTip);
   end_ = least.q;
   return least.reachable ? least.lower : kFar;
@@ -187,7 +202,10 @@ TimeShares TimeGuide::shares(const TimeShares& like) {
   double total = 0.0;
   for (const long node : order) {
     const double through = flow[place(node)];
-    if (!(through > 1e-9) || !std::isfinite(value_[place(node)])) continue;
+    /// Share of the way that passes through a node, up to which it is left out.
+    /// @threshold [1] 0..1e-3; numerical: rounding of shares of one
+    constexpr double kNoFlow = 1e-9;
+    if (!(through > kNoFlow) || !std::isfinite(value_[place(node)])) continue;
     set_moves(node, value_[place(node)]);
     if (moves_.empty()) continue;
     const double gain = gain_.of(moves_, weights_.pump_flow());
@@ -195,6 +213,9 @@ TimeShares TimeGuide::shares(const TimeShares& like) {
     std::vector<double> rate(moves_.size());
     double rates = 0.0;
     for (std::size_t i = 0; i < moves_.size(); ++i) {
+      /// Relative step of the difference quotient by a slope.
+      /// @threshold [1] 1e-6..0.1; numerical: the gain is piecewise smooth, so one side suffices, and rounding stays
+      /// below 1e-10
       constexpr double kStep = 1e-3;
       const double slope = moves_[i].slope;
       moves_[i].slope *= 1.0 - kStep;
@@ -211,6 +232,8 @@ TimeShares TimeGuide::shares(const TimeShares& like) {
     for (std::size_t i = 0; i < moves_.size(); ++i) {
       flow[place(upwind(node, moves_[i].joint).node)] += through * rate[i] / rates;
       alone[0] = moves_[i];
+      /// Least share of the price that a joint is fitted with.
+      /// @threshold [1] 0..0.5; chosen: the logarithm of a smaller one has no influence
       constexpr double kLeastShare = 0.02;
       const double share = gain_.of(alone, weights_.pump_flow()) / price_;
       fits[place(2 * moves_[i].joint + moves_[i].direction)].add(
@@ -220,7 +243,9 @@ TimeShares TimeGuide::shares(const TimeShares& like) {
   TimeShares shares = like;
   shares.share = Eigen::MatrixX2d::Zero(n, 2);
   shares.tilt = Eigen::MatrixXd::Zero(2 * n, n);
-  constexpr double kSeldom = 0.01;  // of the time
+  /// Share of the time below which a joint's moves give no share of their own.
+  /// @threshold [1] 0..0.5; chosen: too few postures for a fit
+  constexpr double kSeldom = 0.01;
   for (int j = 0; j < n; ++j) {
     for (const int direction : {0, 1}) {
       const int row = 2 * j + direction;

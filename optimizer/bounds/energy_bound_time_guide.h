@@ -1,7 +1,7 @@
 #pragma once
 /// First guess of the shares for a bound at a given duration, from dynamic programming on a coarse grid. Its accuracy
 /// does not matter for the bound's validity: any shares give a bound.
-#include "optimizer/bounds/energy_bound_time.h"
+#include "optimizer/bounds/energy_bound_time_weights.h"
 
 namespace sparflow {
 

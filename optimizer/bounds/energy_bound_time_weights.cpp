@@ -1,8 +1,8 @@
+#include "optimizer/bounds/energy_bound_time_weights.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "optimizer/bounds/energy_bound_time.h"
 
 namespace sparflow {
 
@@ -115,6 +115,8 @@ void TimedWeights::prices(const double* q, const double* force, const double* ra
     double low = 0.0, under = -shares_.price, reached = under;
     int last = 0;
     double alpha = alpha_ratio_ * high;  // the previous posture mostly is a neighbour
+    /// Largest number of steps of false position.
+    /// @threshold [1] 10..200; numerical: the Illinois method converges superlinearly; this ends it on rounding only
     constexpr int kMost = 40;
     for (int i = 0; i < kMost && reached < -enough; ++i) {
       const double value = surplus(alpha);

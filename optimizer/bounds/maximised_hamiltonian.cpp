@@ -146,10 +146,14 @@ MaximisedHamiltonian::At MaximisedHamiltonian::at(double pressure, double low, d
 
 double MaximisedHamiltonian::between(double low, double high, double pump_flow) {
   // Between two breaks the value is a minimum of functions concave in the pressure, so tangents bound it from above.
+  /// Relative gap between upper and lower bound at which the search between two breaks ends.
+  /// @threshold [1] 1e-8..1e-2; chosen: a twentieth of kPriceTolerance; the upper bound is returned
   constexpr double kEnough = 2e-5;
   const double from = low, to = high;
   At left = at(low, from, to, pump_flow), right = at(high, from, to, pump_flow);
   double best = std::max(left.gain, right.gain), most = best;
+  /// Largest number of tangents.
+  /// @threshold [1] 10..1000; numerical: the upper bound is returned at any time
   constexpr int kMost = 60;
   for (int i = 0; i < kMost; ++i) {
     if (left.slope <= 0.0 || right.slope >= 0.0) return std::max(left.gain, right.gain);

@@ -15,9 +15,13 @@ using namespace knot_units;
 namespace {
 
 // Rows lie within 2 cm of the exact distance: with 5 cm goals beside an obstacle were lost, 2 cm doubles the rows.
-constexpr double kRowInflation = 0.02;  // [m]
+/// Inflation of the smooth clearance rows.
+/// @threshold [m] 0..0.1; chosen: with 5 cm goals beside an obstacle were lost, 2 cm doubles the rows
+constexpr double kRowInflation = 0.02;
 // A row further from zero than this along the start is left out: solves have not moved a link that far.
-constexpr double kNearRow = 0.5;  // [m]
+/// A row further from zero than this along the start is left out.
+/// @threshold [m] 0.1..10; chosen: solves have not moved a link that far; the exact distance is checked afterwards
+constexpr double kNearRow = 0.5;
 
 }  // namespace
 

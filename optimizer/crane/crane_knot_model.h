@@ -48,9 +48,10 @@ struct CraneKnotOptions {
   /// Whether to impose the pumps' pressure limits. Their rows need a second evaluation of the pressure models, so they
   /// are added only after a motion without them came too near a limit.
   bool limit_pressure = false;
-  double trust_share =
-      1.0;  ///< share of the largest standard deviation allowed (MotionLimits::pressure_std)
-  double oil = 40.0;  ///< oil temperature for effects that depend on it [degC]
+  /// Share of the largest standard deviation allowed (MotionLimits::pressure_std).
+  double trust_share = 1.0;
+  /// Oil temperature for effects that depend on it. [degC]
+  double oil = 40.0;  // no threshold: a state of the machine, kReference of oil_temperature.cpp
 };
 
 /// Cost is in kW, flows in l/s, speeds in units of the limit, pressures in 100 bar, lengths in m, so that all values are

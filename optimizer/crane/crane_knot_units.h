@@ -6,6 +6,7 @@
 
 namespace sparflow::knot_units {
 
+// no threshold: units
 constexpr double kPowerUnit = 1e3;     // kW
 constexpr double kFlowUnit = 1e-3;     // l/s
 constexpr double kPressureUnit = 1e7;  // 100 bar

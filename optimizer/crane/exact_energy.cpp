@@ -36,7 +36,7 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
       [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
           double step) {
         const MachineState& state =
-            chain.evaluate(q.data(), qd.data(), payload, true, kRestSpeed, qdd.data());
+            chain.evaluate({q.data(), qd.data(), qdd.data()}, payload, true);
         energy.total += step * state.power;
         for (std::size_t p = 0; p < state.pumps.size(); ++p) {
           energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
@@ -75,44 +75,55 @@ double exact_total_energy(const CraneModel& model, const Trajectory& motion, dou
       motion, refine,
       [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
           double step) {
-        total += step *
-                 chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data()).power;
+        total += step * chain.evaluate({q.data(), qd.data(), qdd.data()}, payload).power;
       });
   return total;
 }
 
 namespace {
 
+/// A quantity at one instant, with its limit.
+struct Seen {
+  double value, limit;
+  double over;   // violation, value - limit for an upper limit
+  double scale;  // by which `over` becomes a relative excess
+  const char* unit;
+  double time;
+};
+
 /// Collects the worst instant of each limit, named by quantity and part. The name is composed once only, because see() is
 /// called at every instant of every check.
 class LimitBook {
  public:
-  /// @param over violation, value - limit for an upper limit  @param scale by which `over` becomes a relative excess
-  void see(const char* what, const std::string& part, double value, double limit, double over,
-           double scale, const char* unit, double time) {
-    const double excess = over / scale;
+  void see(const char* what, const std::string& part, const Seen& now) {
+    const double excess = now.over / now.scale;
     if (++next_ >= entries_.size()) next_ = 0;  // limits are passed in the same order every time
     if (next_ < entries_.size() && !entries_[next_].is(what, part)) {
       next_ = 0;
       while (next_ < entries_.size() && !entries_[next_].is(what, part)) ++next_;
     }
     if (next_ == entries_.size()) {
-      entries_.push_back({what, part, {what + part, value, limit, unit, time, excess}});
+      entries_.push_back(
+          {what, part, {what + part, now.value, now.limit, now.unit, now.time, excess}});
       return;
     }
     LimitCheck& check = entries_[next_].check;
     if (excess <= check.excess) return;
-    check.value = value;
-    check.limit = limit;
-    check.unit = unit;
-    check.time = time;
+    check.value = now.value;
+    check.limit = now.limit;
+    check.unit = now.unit;
+    check.time = now.time;
     check.excess = excess;
   }
-  void range(const char* what, const std::string& part, double value, const Range& r, double scale,
-             const char* unit, double time) {
+  /// Of a value that belongs in a range; the excess is relative to the range's width.
+  static Seen range(double value, const Range& r, const char* unit, double time) {
     const bool high = value - r.hi > r.lo - value;
-    see(what, part, value, high ? r.hi : r.lo, std::max(value - r.hi, r.lo - value), scale, unit,
-        time);
+    return {value,
+            high ? r.hi : r.lo,
+            std::max(value - r.hi, r.lo - value),
+            std::max(r.hi - r.lo, 1e-12),
+            unit,
+            time};
   }
   std::vector<LimitCheck> sorted() const {
     std::vector<LimitCheck> checks;
@@ -135,21 +146,38 @@ class LimitBook {
   std::size_t next_ = 0;
 };
 
+void check_joints(const MotionProblem& problem, const Machine& machine, const Trajectory& fine,
+                  Eigen::Index k, LimitBook& book) {
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    const bool turns = machine.joints[i].type == JointType::kRevolute;
+    const std::string& name = machine.joints[i].name;
+    const MotionLimits& l = problem.limits;
+    book.see("position of joint ", name,
+             LimitBook::range(fine.q(k, j), l.position[i], turns ? "rad" : "m", fine.t[k]));
+    book.see("velocity of joint ", name,
+             LimitBook::range(fine.qd(k, j), l.velocity[i], turns ? "rad/s" : "m/s", fine.t[k]));
+    book.see(
+        "acceleration of joint ", name,
+        LimitBook::range(fine.qdd(k, j), l.acceleration[i], turns ? "rad/s2" : "m/s2", fine.t[k]));
+  }
+}
+
 void check_ends(const MotionProblem& problem, const Machine& machine, const Trajectory& motion,
                 LimitBook& book) {
   const Eigen::Index last = motion.size() - 1;
   const Eigen::VectorXd first_q = motion.q.row(0), last_q = motion.q.row(last);
   const double start_error = (first_q - problem.start).cwiseAbs().maxCoeff();
-  book.see("distance from the start posture", "", start_error, 0.0, start_error - 1e-9, 1.0,
-           "rad or m", motion.t[0]);
+  book.see("distance from the start posture", "",
+           {start_error, 0.0, start_error - 1e-9, 1.0, "rad or m", motion.t[0]});
   if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
     const double error = (tip_position<double>(machine, last_q) - goal->tip).norm();
-    book.see("distance of the tip from its goal", "", error, 0.0, error - 1e-5, 1.0, "m",
-             motion.t[last]);
+    book.see("distance of the tip from its goal", "",
+             {error, 0.0, error - 1e-5, 1.0, "m", motion.t[last]});
   } else {
     const double error = (last_q - std::get<JointGoal>(problem.goal).q).cwiseAbs().maxCoeff();
-    book.see("distance from the goal posture", "", error, 0.0, error - 1e-6, 1.0, "rad or m",
-             motion.t[last]);
+    book.see("distance from the goal posture", "",
+             {error, 0.0, error - 1e-6, 1.0, "rad or m", motion.t[last]});
   }
   // Waypoints are passed at knots, so the nearest knots are sought, in order.
   Eigen::Index from = 0;
@@ -163,14 +191,14 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
       nearest = distance;
       best = k;
     }
-    book.see("distance of the tip from waypoint ", std::to_string(w + 1), nearest, 0.0,
-             nearest - 1e-5, 1.0, "m", motion.t[best]);
+    book.see("distance of the tip from waypoint ", std::to_string(w + 1),
+             {nearest, 0.0, nearest - 1e-5, 1.0, "m", motion.t[best]});
     from = best;
   }
   const double speed =
       std::max(motion.qd.row(0).cwiseAbs().maxCoeff(), motion.qd.row(last).cwiseAbs().maxCoeff());
-  book.see("speed at start and end", "", speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s",
-           motion.t[last]);
+  book.see("speed at start and end", "",
+           {speed, 0.0, speed - 1e-9, 1.0, "rad/s or m/s", motion.t[last]});
 }
 
 }  // namespace
@@ -192,27 +220,15 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
     line_direction = (end - line_start).normalized();
   }
   const double trusted = problem.limits.pressure_std;
-  const auto width = [](const Range& r) { return std::max(r.hi - r.lo, 1e-12); };
   Eigen::VectorXd q(fine.q.cols()), qd(fine.q.cols()), qdd(fine.q.cols());
   for (Eigen::Index k = 0; k < fine.size(); ++k) {
     q = fine.q.row(k);
     qd = fine.qd.row(k);
     qdd = fine.qdd.row(k);
     const double t = fine.t[k];
-    for (int j = 0; j < machine.joint_count(); ++j) {
-      const auto i = static_cast<std::size_t>(j);
-      const bool turns = machine.joints[i].type == JointType::kRevolute;
-      const std::string& name = machine.joints[i].name;
-      const MotionLimits& l = problem.limits;
-      book.range("position of joint ", name, q[j], l.position[i], width(l.position[i]),
-                 turns ? "rad" : "m", t);
-      book.range("velocity of joint ", name, qd[j], l.velocity[i], width(l.velocity[i]),
-                 turns ? "rad/s" : "m/s", t);
-      book.range("acceleration of joint ", name, fine.qdd(k, j), l.acceleration[i],
-                 width(l.acceleration[i]), turns ? "rad/s2" : "m/s2", t);
-    }
+    check_joints(problem, machine, fine, k, book);
     const MachineState& state =
-        chain.evaluate(q.data(), qd.data(), problem.payload, trusted > 0.0, kRestSpeed, qdd.data());
+        chain.evaluate({q.data(), qd.data(), qdd.data()}, problem.payload, trusted > 0.0);
     using units::kBar;
     using units::kLitrePerMinute;
     for (int c = 0; c < machine.cylinder_count(); ++c) {
@@ -220,7 +236,7 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const double deviation = state.cylinders[i].pressure_std;
       if (trusted > 0.0 && machine.cylinders[i].hydraulic())
         book.see("standard deviation of the pressure of ", machine.cylinders[i].name,
-                 deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t);
+                 {deviation / kBar, trusted / kBar, deviation - trusted, trusted, "bar", t});
       const Valve* valve = machine.valve_of_cylinder(c);
       if (valve == nullptr) continue;
       const double full =
@@ -228,8 +244,8 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const double limit = problem.limits.valve_fraction * full;
       if (limit <= 0.0) continue;
       const double flow = state.cylinders[i].flow;
-      book.see("flow through valve ", machine.cylinders[i].name, flow / kLitrePerMinute,
-               limit / kLitrePerMinute, flow - limit, limit, "l/min", t);
+      book.see("flow through valve ", machine.cylinders[i].name,
+               {flow / kLitrePerMinute, limit / kLitrePerMinute, flow - limit, limit, "l/min", t});
     }
     for (int p = 0; p < machine.pump_count(); ++p) {
       const auto i = static_cast<std::size_t>(p);
@@ -238,23 +254,27 @@ std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProble
       const double pressure_limit = problem.limits.pump_max_pressure[i];
       const PumpState& s = state.pumps[i];
       if (flow_limit > 0.0) {
-        book.see("flow of pump ", machine.pumps[i].name, s.flow / kLitrePerMinute,
-                 flow_limit / kLitrePerMinute, s.flow - flow_limit, flow_limit, "l/min", t);
+        book.see("flow of pump ", machine.pumps[i].name,
+                 {s.flow / kLitrePerMinute, flow_limit / kLitrePerMinute, s.flow - flow_limit,
+                  flow_limit, "l/min", t});
       }
       if (pressure_limit > 0.0 && machine.pumps[i].type == PumpType::kLoadSensing) {
-        book.see("pressure of pump ", machine.pumps[i].name, s.pressure / kBar,
-                 pressure_limit / kBar, s.pressure - pressure_limit, pressure_limit, "bar", t);
+        book.see("pressure of pump ", machine.pumps[i].name,
+                 {s.pressure / kBar, pressure_limit / kBar, s.pressure - pressure_limit,
+                  pressure_limit, "bar", t});
       }
     }
     if (clearance) {
       const double distance = clearance->nearest(q.data()).distance;
-      book.see("clearance beyond the required distance", "", distance, 0.0, -distance, 1.0, "m", t);
+      book.see("clearance beyond the required distance", "",
+               {distance, 0.0, -distance, 1.0, "m", t});
     }
     if (problem.tip_line) {
       Eigen::Vector3d off = tip_position<double>(machine, q) - line_start;
       off -= line_direction * line_direction.dot(off);
-      book.see("distance of the tip from its line", "", off.norm(), problem.tip_line->tolerance,
-               off.norm() - problem.tip_line->tolerance, problem.tip_line->tolerance, "m", t);
+      book.see("distance of the tip from its line", "",
+               {off.norm(), problem.tip_line->tolerance, off.norm() - problem.tip_line->tolerance,
+                problem.tip_line->tolerance, "m", t});
     }
   }
   check_ends(problem, machine, motion, book);

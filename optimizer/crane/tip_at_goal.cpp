@@ -12,7 +12,10 @@ TipAtGoal::TipAtGoal(const Machine& machine, const Eigen::Vector3d& goal)
     Eigen::Vector3d d = Eigen::Vector3d::Unit(axis);
     for (const Eigen::Vector3d& f : fixed) d -= f * f.dot(d);
     for (const Eigen::Vector3d& e : directions_) d -= e * e.dot(d);
-    if (d.norm() > 1e-6) directions_.push_back(d.normalized());
+    /// Length of a unit vector's remainder up to which it is no direction of its own.
+    /// @threshold [1] 1e-12..0.1; numerical: rounding of the goal's free directions as a user writes them
+    constexpr double kDependent = 1e-6;
+    if (d.norm() > kDependent) directions_.push_back(d.normalized());
   }
 }
 

@@ -20,6 +20,8 @@ DrivenGridPath driven_grid_path(const CraneModel& model, const MotionProblem& pr
     out.message = "no path of the grid is this fast";
     return out;
   }
+  /// Parts of a mesh interval at which limits are judged.
+  /// @threshold [1] 2..64; chosen: as OptimizeOptions::refine
   constexpr int kDensity = 16;
   const Trajectory motion = timed_grid_path(model, problem, path, duration);
   const std::vector<LimitCheck> checks = check_limits(model, problem, motion, kDensity);

@@ -14,6 +14,8 @@ struct DrivenGridPath {
 };
 
 /// Relative overshoot up to which a limit counts as kept on a path that was not optimised.
+/// @threshold [1] 0..0.1; chosen: a path between nodes is no finished motion, so more is granted than
+/// OptimizeOptions::limit_tolerance
 inline constexpr double kGridTolerance = 1e-3;
 
 /// @param duration [s] of the motion whose energy is wanted

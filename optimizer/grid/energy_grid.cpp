@@ -64,9 +64,12 @@ class EnergyGrid::Search {
       GridPath path = cheapest(price);
       const bool fast = path.found && path.duration_s <= duration * (1.0 + 1e-9);
       if (!path.found) return std::pair{false, path.message};
+      /// Distance up to which two paths have the same corners.
+      /// @threshold [rad or m] 0..1e-3; numerical: rounding; corners are nodes
+      constexpr double kSameCorners = 1e-6;
       const bool known = std::any_of(found.begin(), found.end(), [&](const auto& other) {
         return other.second.corners.rows() == path.corners.rows() &&
-               (other.second.corners - path.corners).cwiseAbs().maxCoeff() < 1e-6;
+               (other.second.corners - path.corners).cwiseAbs().maxCoeff() < kSameCorners;
       });
       if (!known) {
         const auto begin = std::chrono::steady_clock::now();
@@ -90,15 +93,23 @@ class EnergyGrid::Search {
     // approximately contained in the graph's times, so the path at the highest price need not be the fastest.
     double lo = 10.0, hi = 1e6;
     if (!enough) {
+      /// Price of time below which no fast path is looked for any more.
+      /// @threshold [W] 1..1e6; chosen: below 10 kW time is cheap beside the power of a pump
+      constexpr double kLowestFirstPrice = 1e4;
       bool fast = false;
-      for (; !fast && hi > 1e4; hi /= fast ? 1.0 : 3.0) fast = offer(hi).first;
+      for (; !fast && hi > kLowestFirstPrice; hi /= fast ? 1.0 : 3.0) fast = offer(hi).first;
       if (!fast) return found;
     }
-    constexpr int kSteps = 9;  // 1e5 in 9 halvings of the logarithm: 2 %
+    /// Halvings of the price's logarithm.
+    /// @threshold [1] 3..30; derived: five decades in nine halvings: two per cent
+    constexpr int kSteps = 9;
     for (int step = 0; step < kSteps; ++step) {
       const double middle = std::sqrt(lo * hi);
       (offer(middle).first ? hi : lo) = middle;
-      if (enough && step >= 3)
+      /// Halvings before the search may end with enough paths.
+      /// @threshold [1] 1..9; chosen: an eighth of the five decades
+      constexpr int kLeastSteps = 3;
+      if (enough && step >= kLeastSteps)
         break;  // the cheapest path is fast enough: a few alternatives suffice
     }
     return found;
@@ -139,7 +150,12 @@ class EnergyGrid::Search {
 
   /// Distributes the lines to the axes along which forces vary; the other axes get a few.
   std::vector<int> cells_by_axis(int wanted) const {
-    constexpr int kProbe = 5, kFew = 4;
+    /// Positions of each axis at which forces are compared.
+    /// @threshold [1] 3..50; chosen: a force that varies does so over the whole range
+    constexpr int kProbe = 5;
+    /// Cells of an axis along which no force varies.
+    /// @threshold [cells] 1..20; chosen: collisions and corners still need some
+    constexpr int kFew = 4;
     std::vector<bool> varies(static_cast<std::size_t>(n_), false);
     int many = 0;
     for (int j = 0; j < n_; ++j) {
@@ -178,7 +194,10 @@ class EnergyGrid::Search {
       }
       for (int c = 0; c < lo.size(); ++c) {
         // A cylinder's own force also varies with its linkage.
-        if (hi[c] - lo[c] > 1e-3 * all[c] + 1.0) return true;
+        /// Variation of a force, as share of the largest, from which it varies along an axis.
+        /// @threshold [1] 0..0.1; chosen: a smaller one changes no energy visibly
+        constexpr double kForceVaries = 1e-3;
+        if (hi[c] - lo[c] > kForceVaries * all[c] + 1.0) return true;
       }
     }
     return false;
@@ -370,6 +389,9 @@ class EnergyGrid::Search {
     GridPath path;
     path.price_W = price;
     RawPath raw = dijkstra(price);
+    /// Searches after which no further blocked edges are taken out.
+    /// @threshold [1] 10..1e5; chosen: each blocks at least one edge that collides; ends a search among ever new
+    /// collisions
     constexpr int kMostBlocked = 400;
     for (int tries = 0; raw.found && block(raw) && tries < kMostBlocked; ++tries) {
       raw = dijkstra(price);
@@ -395,6 +417,8 @@ class EnergyGrid::Search {
       ramp = std::max(ramp, problem_.limits.velocity[i].hi / std::min(a.hi, -a.lo));
     }
     // A corner costs a ramp's time, and at least the error of the energy on so coarse a grid.
+    /// Cost of a corner as share of the path's energy.
+    /// @threshold [1] 0..0.1; chosen: at least the error of the energy on so coarse a grid
     constexpr double kCoarseness = 1e-3;
     legs.leg_penalty = kCoarseness * raw.cost + price * std::min(ramp, 2.0);
     if (clearance_) {
@@ -418,10 +442,14 @@ class EnergyGrid::Search {
   /// Removes points that lie on a straight line between their neighbours.
   static MatrixXd straight_runs(const MatrixXd& points) {
     std::vector<Eigen::Index> kept = {0};
+    /// Difference of two unit directions up to which there is no corner.
+    /// @threshold [1] 0..1e-6; numerical: rounding
+    constexpr double kStraightOn = 1e-9;
     for (Eigen::Index k = 1; k + 1 < points.rows(); ++k) {
       const VectorXd a = (points.row(k) - points.row(k - 1)).transpose();
       const VectorXd b = (points.row(k + 1) - points.row(k)).transpose();
-      if (b.norm() == 0.0 || a.norm() == 0.0 || (a.normalized() - b.normalized()).norm() > 1e-9) {
+      if (b.norm() == 0.0 || a.norm() == 0.0 ||
+          (a.normalized() - b.normalized()).norm() > kStraightOn) {
         kept.push_back(k);
       }
     }

@@ -35,8 +35,12 @@ struct GridPath {
 };
 
 struct EnergyGridOptions {
-  int nodes = 40000;    ///< approximate number of nodes
-  int most_joints = 4;  ///< with more joints a grid has too many nodes, and no path is returned
+  /// Approximate number of nodes.
+  /// @threshold [nodes] 100..1e8; chosen: the path becomes better and the time grows with it
+  int nodes = 40000;
+  /// With more joints no path is returned.
+  /// @threshold [joints] 1..8; chosen: a grid has too many nodes then
+  int most_joints = 4;
 };
 
 /// A mutable workspace that refers to model and problem; each thread needs its own.

@@ -36,7 +36,10 @@ class GoalNewton {
     for (int i = 0; i < iterations; ++i) {
       const Eigen::Matrix3Xd j = jacobian(q);
       const Eigen::Vector3d error = goal_ - chain_.point(machine_.tip.joint, machine_.tip.xyz);
-      if (error.norm() < 1e-9) return true;
+      /// Distance of the tip at which Newton's method stops.
+      /// @threshold [m] 1e-13..1e-7; numerical: far below what counts as reached
+      constexpr double kTipConverged = 1e-9;
+      if (error.norm() < kTipConverged) return true;
       Eigen::Matrix3Xd scaled = j * scale.asDiagonal();
       for (Eigen::Index k = 0; k < q.size(); ++k) {
         if (frozen >> k & 1u) scaled.col(k).setZero();
@@ -45,15 +48,22 @@ class GoalNewton {
       const double small = 1e-10 * std::max(normal.trace(), 1e-12);
       VectorXd step =
           scaled.transpose() * solve_symmetric(normal + small * Eigen::Matrix3d::Identity(), error);
+      /// Longest step of a joint.
+      /// @threshold [cells] 1..20; chosen: a linearised arm is wrong far from its node
+      constexpr double kLongestStep = 3.0;
       const double length = step.cwiseAbs().maxCoeff();
-      if (length > 3.0) step *= 3.0 / length;  // a step is at most three cells long
+      if (length > kLongestStep)
+        step *= kLongestStep / length;  // a step is at most three cells long
       q += scale.cwiseProduct(step);
       for (Eigen::Index k = 0; k < q.size(); ++k) {
         const Range& r = limits_[static_cast<std::size_t>(k)];
         q[k] = std::clamp(q[k], r.lo, r.hi);
       }
     }
-    return (goal_ - tip(q)).norm() < 1e-7;
+    /// Distance of the tip beyond which the goal was not reached.
+    /// @threshold [m] 1e-10..1e-4; numerical: far below what the check of a motion's end accepts
+    constexpr double kTipReached = 1e-7;
+    return (goal_ - tip(q)).norm() < kTipReached;
   }
 
  private:
@@ -71,9 +81,12 @@ std::vector<VectorXd> anchor_postures(const MotionProblem& problem, const Machin
   const Eigen::Vector3d goal = std::get<TipGoal>(problem.goal).tip;
   const int n = machine.joint_count();
   std::vector<VectorXd> ends;
+  /// Distance below which two end postures count as equal.
+  /// @threshold [rad or m] 1e-9..1e-2; chosen: a tenth of a millimetre of stroke
+  constexpr double kSamePosture = 1e-4;
   const auto add = [&](const VectorXd& q) {
     for (const VectorXd& known : ends) {
-      if ((known - q).cwiseAbs().maxCoeff() < 1e-4) return;
+      if ((known - q).cwiseAbs().maxCoeff() < kSamePosture) return;
     }
     ends.push_back(q);
   };
@@ -117,14 +130,23 @@ std::vector<GoalEnd> goal_ends(const MotionProblem& problem, const Machine& mach
     // Cheap test: the tip cannot travel further within a cell than its joints' travels add up to.
     const Eigen::Matrix3Xd& jacobian = newton.jacobian(from);
     const double reach = (jacobian.cwiseAbs() * cell).norm();
-    if (error.norm() > 1.2 * reach) continue;
+    /// Factor on the tip's largest travel within a cell, for what is not linear.
+    /// @threshold [1] 1..2; chosen: the linearisation errs by less than a fifth within a cell
+    constexpr double kBeyondLinear = 1.2;
+    if (error.norm() > kBeyondLinear * reach) continue;
     for (unsigned frozen = 0; frozen < (1u << n) - 1u; ++frozen) {
       VectorXd q = from;
       if (!newton.solve(q, frozen, cell, 8)) continue;
-      if (((q - from).cwiseAbs().array() > 1.05 * cell.array()).any()) continue;
+      /// Distance of an end posture from its node up to which it belongs to it.
+      /// @threshold [cells] 1..2; chosen: the neighbouring node may miss it by rounding
+      constexpr double kBesideCell = 1.05;
+      if (((q - from).cwiseAbs().array() > kBesideCell * cell.array()).any()) continue;
       for (int j = 0; j < n; ++j) {
         // A joint's step of this size is Newton's residual, not a move.
-        if (std::abs(q[j] - from[j]) < 1e-8) q[j] = from[j];
+        /// Step of a joint that is Newton's residual, not a move.
+        /// @threshold [rad or m] 1e-12..1e-5; numerical: ten times what convergence of the tip leaves
+        constexpr double kNoMove = 1e-8;
+        if (std::abs(q[j] - from[j]) < kNoMove) q[j] = from[j];
       }
       ends.push_back({node, q});
     }

@@ -47,7 +47,10 @@ Eigen::VectorXd axis_lines(const Range& range, const std::vector<double>& on_lin
   std::vector<double> lines = {stops.front()};
   for (const double stop : stops) {
     const double gap = stop - lines.back();
-    if (gap <= 1e-9 * width) continue;
+    /// Gap, as share of the range, up to which two lines are one.
+    /// @threshold [1] 0..1e-3; numerical: rounding
+    constexpr double kSameLine = 1e-9;
+    if (gap <= kSameLine * width) continue;
     const double from = lines.back();
     const int parts =
         std::max(1, static_cast<int>(std::lround(gap / width * static_cast<double>(cells))));

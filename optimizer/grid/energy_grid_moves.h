@@ -8,6 +8,7 @@
 namespace sparflow {
 
 /// Shares of a move's highest speed at which its energy is tabulated.
+/// @threshold [1] 0.05..1; chosen: full speed, about half and crawling; the law is convex in the speed between them
 inline constexpr double kMoveSpeeds[3] = {1.0, 0.45, 0.12};
 
 /// Energies are +infinity where a pump would exceed its pressure.

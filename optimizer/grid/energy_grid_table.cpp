@@ -51,8 +51,9 @@ DemandTable::DemandTable(const GaussianProcess& process, double margin, double f
       force_curve = std::max({force_curve, at.d_force_force, between.d_force_force});
     }
   }
-  constexpr double kSafety =
-      1.5;  // samples an eighth of a length scale apart miss less than this factor of a maximum
+  /// Factor on the largest sampled second derivative.
+  /// @threshold [1] 1..4; chosen: samples an eighth of a length scale apart miss less than this factor of a maximum
+  constexpr double kSafety = 1.5;
   allowance_ = kSafety / 8.0 *
                (flow_step_ * flow_step_ * flow_curve + force_step_ * force_step_ * force_curve);
   least_ = demand_.colwise().minCoeff().transpose().array() - allowance_;
@@ -153,6 +154,8 @@ std::vector<CylinderDemand> cylinder_demands(const CraneModel& model, const Moti
     const Range& q = problem.limits.position[static_cast<std::size_t>(d.joint)];
     const Range& v = problem.limits.velocity[static_cast<std::size_t>(d.joint)];
     double rate = 0.0;
+    /// Positions of a joint at which the largest rate of its cylinder is taken.
+    /// @threshold [1] 9..1000; chosen: rates of a linkage are smooth over the range
     constexpr int kSamples = 65;
     for (int k = 0; k < kSamples; ++k) {
       const double at = q.lo + (q.hi - q.lo) * k / (kSamples - 1);

@@ -10,6 +10,7 @@
 namespace sparflow {
 
 /// Number of flows besides zero at which DemandTable::rising() is given.
+/// @threshold [1] 2..100; chosen: demands rise smoothly with the flow
 inline constexpr std::size_t kFlowKnots = 10;
 
 /// Demand d = P(Q, F) + margin of one cylinder in one direction, without effects. Immutable.

@@ -17,7 +17,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLongestRamp = 0.45;  // share of a leg
+/// Longest ramp as share of a leg.
+/// @threshold [1] 0.1..0.5; derived: two ramps of a leg must leave a part at constant speed
+constexpr double kLongestRamp = 0.45;
 
 /// Speed at the corners: 0 where a joint stops or reverses, else the lower of the two legs' mean speeds.
 MatrixXd corner_speeds(const MatrixXd& corners, const VectorXd& durations) {
@@ -95,6 +97,8 @@ namespace {
 
 /// Factor by which a leg's duration must grow so that it keeps its limits.
 double leg_ratio(LimitRatios& ratios, const Trajectory& motion, Eigen::Index leg) {
+  /// Parts of an interval at which a leg's limits are judged.
+  /// @threshold [1] 2..64; chosen: finer than driven_grid_path() judges them
   constexpr int kFine = 24;
   double worst = 1e-3;
   for (Eigen::Index at = 3 * leg; at < 3 * leg + 3; ++at) {
@@ -130,6 +134,8 @@ VectorXd shortest_leg_durations(const CraneModel& model, const MotionProblem& pr
     const auto way = (corners.row(k + 1) - corners.row(k)).transpose().array().abs();
     durations[k] = std::max(1e-3, (way / scale.array()).maxCoeff() * 1.5);
   }
+  /// Rounds in which the legs' durations are adapted.
+  /// @threshold [1] 3..100; chosen: changes are then below the last stretching
   constexpr int kRounds = 12;
   double worst = 1.0;
   VectorXd ratio(legs);
@@ -142,6 +148,8 @@ VectorXd shortest_leg_durations(const CraneModel& model, const MotionProblem& pr
     for (Eigen::Index k = 0; k < legs; ++k) durations[k] *= std::clamp(ratio[k], 0.6, 2.0);
   }
   // The remaining violation is removed by stretching all legs: a factor r divides speeds by r and accelerations by r^2.
+  /// Factor on all durations for what lies between the samples.
+  /// @threshold [1] 1..1.01; chosen: a fifth of kGridTolerance
   constexpr double kBetweenSamples = 1.0 + 2e-4;
   return durations * std::max(1.0, worst) * kBetweenSamples;
 }

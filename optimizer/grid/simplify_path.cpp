@@ -12,8 +12,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr Eigen::Index kLongestJump =
-    60;  // largest number of corners skipped between two chosen ones
+/// Largest number of corners skipped between two chosen ones.
+/// @threshold [corners] 2..1e4; chosen: the time grows with it; a straight leg rarely replaces more
+constexpr Eigen::Index kLongestJump = 60;
 
 struct Jump {
   std::vector<VectorXd> corners;  // without the first
@@ -41,7 +42,10 @@ class LegChooser {
     for (Eigen::Index j = 0; j < a.size(); ++j) {
       if (a[j] != b[j]) moving.push_back(j);
     }
-    if (moving.size() < 2 || moving.size() > 4) return best;
+    /// Largest number of joints that are moved one after another between two corners.
+    /// @threshold [joints] 2..7; chosen: 24 orders
+    constexpr std::size_t kMostInTurn = 4;
+    if (moving.size() < 2 || moving.size() > kMostInTurn) return best;
     do {
       std::vector<VectorXd> way;
       VectorXd q = a;

@@ -14,8 +14,11 @@ namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// A scaled column below this consists of rounding errors, since its terms were near one before they cancelled.
+/// @threshold [1] 1e-16..1e-10; numerical: some fifty units in the last place
 constexpr double kVanished = 1e-14;
 /// A pivot of at least this share of its column is taken at once, a smaller one only if there is no better one.
+/// @threshold [1] 0.001..0.5; chosen: entries of L stay below ten; the growth is that of a threshold pivoting usual
+/// in sparse codes
 constexpr double kGoodPivot = 0.1;
 
 /// 2^-k with k half the exponent of `largest`; scaling by it causes no rounding.
@@ -141,12 +144,10 @@ bool ChainLdl::eliminate(int candidates, int size, double threshold, bool last) 
   const long stride = stride_;
   int k = 0;
   while (k < candidates) {
-    int width = 0;
-    bool vanished = false;
-    if (!choose_pivot(k, candidates, size, last ? 0.0 : threshold, width, vanished)) {
-      if (vanished || last) return false;
-      break;
-    }
+    const Pivot pivot = choose_pivot(k, candidates, size, last ? 0.0 : threshold);
+    if (pivot == Pivot::kVanished || (pivot == Pivot::kNone && last)) return false;
+    if (pivot == Pivot::kNone) break;
+    const int width = pivot == Pivot::kPair ? 2 : 1;
     double* l1 = f + k * stride;
     double* w1 = product_.data() + k * stride;
     std::copy(l1 + k, l1 + size + detail::kLdlPadding, w1 + k);
@@ -187,9 +188,7 @@ bool ChainLdl::eliminate(int candidates, int size, double threshold, bool last) 
 }
 
 /// Finds the next pivot and moves it to position k.
-/// @return false when no candidate passes `threshold`; `vanished` is set when one has a zero column
-bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, int& width,
-                            bool& vanished) {
+ChainLdl::Pivot ChainLdl::choose_pivot(int k, int candidates, int size, double threshold) {
   const double* f = work_.data();
   const long stride = stride_;
   const auto entry = [&](int i, int j) { return i >= j ? f[j * stride + i] : f[i * stride + j]; };
@@ -220,8 +219,7 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
   const double first = std::abs(f[k * stride + k]);
   if (first > kVanished &&
       first >= kGoodPivot * detail::ldl_kernel().largest(size - k - 1, f + k * stride + k + 1)) {
-    width = 1;
-    return true;
+    return Pivot::kOne;
   }
   // Otherwise the pair that pair_up() formed is tried, if it is still adjacent.
   if (k + 1 < candidates) {
@@ -232,8 +230,7 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
         pair_quality(l1[k], l1[k + 1], l2[k + 1], detail::ldl_kernel().largest(below, l1 + k + 2),
                      detail::ldl_kernel().largest(below, l2 + k + 2));
     if (quality >= kGoodPivot) {
-      width = 2;
-      return true;
+      return Pivot::kPair;
     }
   }
   double best = 0.0;
@@ -242,8 +239,7 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
     int partner = -1, ignored = -1;
     const double own = std::abs(f[c * stride + c]), beside = largest(c, -1, partner);
     if (std::max(own, beside) <= kVanished) {
-      vanished = true;
-      return false;
+      return Pivot::kVanished;
     }
     if (own > kVanished && own > best * beside) {
       best = beside > 0.0 ? own / beside : 1.0 / kGoodPivot;
@@ -261,11 +257,11 @@ bool ChainLdl::choose_pivot(int k, int candidates, int size, double threshold, i
       best_second = partner;
     }
   }
-  if (best_first < 0 || best < threshold) return false;
-  width = best_second < 0 ? 1 : 2;
+  if (best_first < 0 || best < threshold) return Pivot::kNone;
   swap(k, best_first, size);
-  if (width == 2) swap(k + 1, best_second == k ? best_first : best_second, size);
-  return true;
+  if (best_second < 0) return Pivot::kOne;
+  swap(k + 1, best_second == k ? best_first : best_second, size);
+  return Pivot::kPair;
 }
 
 /// Exchanges unknowns a < b of the front, also in the rows of columns already eliminated.

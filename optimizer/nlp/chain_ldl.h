@@ -72,7 +72,9 @@ class ChainLdl {
   void assemble(int number, int delayed, const double* value);
   int take_contributions(const Front& front);
   bool eliminate(int candidates, int size, double threshold, bool last);
-  bool choose_pivot(int k, int candidates, int size, double threshold, int& width, bool& vanished);
+  /// Pivot of one or two rows, or why there is none: no candidate passes the threshold, or one has a zero column.
+  enum class Pivot { kOne, kPair, kNone, kVanished };
+  Pivot choose_pivot(int k, int candidates, int size, double threshold);
   void swap(int a, int b, int size);
   void keep_panel(Front& front);
   void push_contribution(int number, int delayed);

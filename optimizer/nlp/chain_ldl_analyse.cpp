@@ -70,7 +70,12 @@ std::vector<int> ChainLdl::pair_up(const double* value) const {
       ++degree[place_at(j)];
     }
   }
-  constexpr double kNoDiagonal = 1e-6, kWeak = 1e-3;
+  /// Diagonal entry below which a row is a constraint.
+  /// @threshold [1] 1e-12..1e-2; numerical: Ipopt's regularisation of constraints is 1e-8
+  constexpr double kNoDiagonal = 1e-6;
+  /// Coupling, as share of the largest of its row, below which it is no partner of a pivot.
+  /// @threshold [1] 1e-6..0.1; chosen: such a pair would be a bad pivot
+  constexpr double kWeak = 1e-3;
   std::vector<std::vector<Coupling>> couplings(place_at(order_));
   std::vector<int> constraints;
   for (int i = 0; i < order_; ++i) {
@@ -190,6 +195,8 @@ void ChainLdl::make_fronts(const Tree& tree) {
       place_.push_back(place[place_at(rows_[place_at(front.first_row + k)])]);
   }
   // Half of the predicted storage is reserved in addition, for delayed pivots.
+  /// Entries reserved for delayed pivots in any case.
+  /// @threshold [entries] 0..1e6; chosen: half of a tiny matrix is less than one front
   constexpr std::size_t kSpare = 4096;
   factor_.resize(place_at(static_cast<int>(room)) * 3 / 2 + kSpare);
   index_.resize(rows_.size() * 3 / 2 + kSpare);

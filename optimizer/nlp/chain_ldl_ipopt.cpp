@@ -13,11 +13,14 @@ namespace {
 ChainLdlSession* current_session = nullptr;
 
 /// Above this front size the matrix is not a chain, and MUMPS with its blocked kernels is faster.
+/// @threshold [rows] 50..5000; chosen: a chain's fronts hold a few knots and the border
 constexpr int kLargestFront = 320;
 
 // Entries of INFO that Ipopt 3.11 reads (IpMa27TSolverInterface.cpp), 0-based.
+// no threshold: interface of MA27
 constexpr int kFlag = 0, kRealsNeeded = 4, kIntegersNeeded = 5, kCompressedReals = 11,
               kCompressedIntegers = 12, kNegative = 14, kInfoSize = 20;
+// no threshold: interface of MA27
 constexpr int kSingularFlag = -5;  // Ipopt adds to the diagonal and tries again
 constexpr int kFatalFlag = -1;     // Ipopt gives up
 
@@ -27,7 +30,9 @@ constexpr int kFatalFlag = -1;     // Ipopt gives up
 /// to factorisation and `iw` from there to the solution; their first entries hold the index of the ChainLdl object.
 struct ChainLdlRoutines {
   static void defaults(ipfint* icntl, double* cntl) {
+    // no threshold: sizes of the arrays of MA27
     for (int i = 0; i < 30; ++i) icntl[i] = 0;
+    // no threshold: as above
     for (int i = 0; i < 5; ++i) cntl[i] = 0.0;
   }
 

@@ -6,6 +6,7 @@ namespace sparflow::detail {
 namespace {
 
 typedef double LdlLanes __attribute__((vector_size(32)));
+// no threshold: width of a vector
 constexpr int kLanes = 4;
 
 #define SPARFLOW_INLINE inline __attribute__((always_inline))

@@ -3,6 +3,7 @@
 /// All columns are padded: a loop may read and write up to kLdlPadding entries beyond a column's last row.
 namespace sparflow::detail {
 
+// no threshold: width of the widest loop
 inline constexpr int kLdlPadding = 8;
 /// Rows rounded up to whole vectors.
 inline int ldl_padded(int rows) { return (rows + 3) / 4 * 4; }

@@ -20,7 +20,15 @@ struct Growing {
 /// Estimated cost of a front in multiply-adds. The overhead of a front (index lists, assembly, loops too short to
 /// vectorise) was tuned on the motions' KKT systems: with a larger or smaller value they become slower.
 double front_cost(int own, int updated) {
-  constexpr double kFront = 300.0, kRow = 12.0, kAssembled = 2.0;
+  /// Overhead of a front.
+  /// @threshold [multiply-adds] 0..1e5; tuned: on the motions' KKT systems
+  constexpr double kFront = 300.0;
+  /// Overhead of a row.
+  /// @threshold [multiply-adds] 0..1000; tuned: on the motions' KKT systems
+  constexpr double kRow = 12.0;
+  /// Cost of an entry that is assembled.
+  /// @threshold [multiply-adds] 0..100; tuned: on the motions' KKT systems
+  constexpr double kAssembled = 2.0;
   double sum = kFront + kRow * (own + updated) + kAssembled * 0.5 * updated * (updated + 1);
   for (int k = 0; k < own; ++k) {
     const double below = own + updated - k;
@@ -78,7 +86,12 @@ std::vector<int> elimination_order(const Graph& graph) {
   std::vector<int> position(at(size), -1);
   // Nodes of the border are ordered last at once, because otherwise their couplings would count in every degree. A posture
   // with very many rows of its own (clearances) does not belong to it: its share of all unknowns is that of one knot.
-  constexpr double kLeast = 48.0, kShare = 0.05;
+  /// Number of couplings from which a node belongs to the border.
+  /// @threshold [couplings] 1..1000; chosen: unknowns of a knot couple with some twenty
+  constexpr double kLeast = 48.0;
+  /// The same as share of all unknowns.
+  /// @threshold [1] 0..1; chosen: a posture with very many rows of its own (clearances) has the share of one knot
+  constexpr double kShare = 0.05;
   const double many = std::max(kLeast, kShare * size);
   std::vector<int> border, inner(at(size), -1), node;
   for (int i = 0; i < size; ++i) {

@@ -12,9 +12,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Eigen::VectorXi;
 
+struct SparseEntries {
+  const VectorXi &row, &column;
+  const VectorXd& value;
+};
+
 /// Dense matrix of sparse values; values with equal indices are added.
-MatrixXd dense(int rows, int columns, const VectorXi& row, const VectorXi& column,
-               const VectorXd& value, bool symmetric) {
+MatrixXd dense(int rows, int columns, const SparseEntries& entries, bool symmetric) {
+  const auto& [row, column, value] = entries;
   MatrixXd matrix = MatrixXd::Zero(rows, columns);
   for (int i = 0; i < value.size(); ++i) {
     matrix(row[i], column[i]) += value[i];
@@ -46,13 +51,21 @@ struct Everything {
   }
 };
 
-void compare(double exact, double numeric, double scale, double& worst, std::string& where,
-             const std::string& row, const std::string& column) {
+struct WorstDerivative {
+  double& error;
+  std::string& where;
+};
+struct DerivativeName {
+  const std::string &row, &column;
+};
+
+void compare(double exact, double numeric, double scale, const WorstDerivative& worst,
+             const DerivativeName& name) {
   const double error = std::abs(exact - numeric) / scale;
-  if (error <= worst) return;  // false for a NaN, which is recorded below
-  worst = std::isnan(error) ? kNoBound : error;
-  where =
-      fmt::format("d {} / d {}: {:.12g}, differences give {:.12g}", row, column, exact, numeric);
+  if (error <= worst.error) return;  // false for a NaN, which is recorded below
+  worst.error = std::isnan(error) ? kNoBound : error;
+  worst.where = fmt::format("d {} / d {}: {:.12g}, differences give {:.12g}", name.row, name.column,
+                            exact, numeric);
 }
 
 }  // namespace
@@ -78,11 +91,11 @@ DerivativeCheck check_derivatives(NlpProblem& problem, const VectorXd& x, double
   problem.gradient(x, gradient);
   problem.jacobian(x, all.jacobian_value);
   const MatrixXd jacobian =
-      dense(m, n, all.jacobian_row, all.jacobian_column, all.jacobian_value, false);
+      dense(m, n, {all.jacobian_row, all.jacobian_column, all.jacobian_value}, false);
   VectorXi hessian_row(size.hessian_nonzeros), hessian_column(size.hessian_nonzeros);
   problem.hessian_structure(hessian_row, hessian_column);
   problem.hessian(x, all.factor, all.multiplier, hessian_value);
-  const MatrixXd hessian = dense(n, n, hessian_row, hessian_column, hessian_value, true);
+  const MatrixXd hessian = dense(n, n, {hessian_row, hessian_column, hessian_value}, true);
 
   DerivativeCheck result;
   VectorXd moved = x;
@@ -103,17 +116,18 @@ DerivativeCheck check_derivatives(NlpProblem& problem, const VectorXd& x, double
     const auto scale_of = [](const auto& column) {
       return column.size() == 0 ? 1.0 : std::max(1.0, column.cwiseAbs().maxCoeff());
     };
-    compare(gradient[j], numeric[0], std::max(1.0, std::abs(numeric[0])), result.gradient_error,
-            result.worst_gradient, "objective", name);
+    compare(gradient[j], numeric[0], std::max(1.0, std::abs(numeric[0])),
+            {result.gradient_error, result.worst_gradient}, {"objective", name});
     const double jacobian_scale = scale_of(numeric.segment(1, m));
     for (int i = 0; i < m; ++i) {
-      compare(jacobian(i, j), numeric[1 + i], jacobian_scale, result.jacobian_error,
-              result.worst_jacobian, problem.constraint_name(i), name);
+      compare(jacobian(i, j), numeric[1 + i], jacobian_scale,
+              {result.jacobian_error, result.worst_jacobian}, {problem.constraint_name(i), name});
     }
     const double hessian_scale = scale_of(numeric.tail(n));
     for (int i = 0; i < n; ++i) {
-      compare(hessian(i, j), numeric[1 + m + i], hessian_scale, result.hessian_error,
-              result.worst_hessian, "L_" + problem.variable_name(i), name);
+      compare(hessian(i, j), numeric[1 + m + i], hessian_scale,
+              {result.hessian_error, result.worst_hessian},
+              {"L_" + problem.variable_name(i), name});
     }
   }
   return result;

@@ -154,6 +154,8 @@ std::string crossed_bounds(const NlpProblem& problem, const Bounds& bounds) {
 }
 
 void find_violation(const NlpProblem& problem, const Bounds& bounds, NlpResult& result) {
+  /// Violation up to which no constraint is named.
+  /// @threshold [1] 0..1e-6; numerical: rounding
   constexpr double kWorthNaming = 1e-12;
   auto look = [&](const Eigen::VectorXd& value, const Eigen::VectorXd& lower,
                   const Eigen::VectorXd& upper, auto name) {

@@ -43,18 +43,24 @@ struct NlpIteration {
 };
 
 struct NlpOptions {
+  /// Relative tolerance of the optimality conditions.
+  /// @threshold [1] 1e-12..1e-2; chosen: the energy then changes by less than its mesh error
   double tolerance = 1e-6;
   /// Absent = Ipopt's own default (1e-6, 1e-4 for the unscaled violation).
   std::optional<double> acceptable_tolerance;
   std::optional<double> constraint_tolerance;
+  /// Largest number of iterations.
+  /// @threshold [iterations] 1..1e6; chosen: Ipopt's own default
   int max_iterations = 3000;
-  double max_seconds =
-      std::numeric_limits<double>::infinity();  ///< wall time, checked in every iteration
+  /// Wall time, checked in every iteration.
+  double max_seconds = std::numeric_limits<double>::infinity();
   /// Start of the barrier parameter; absent = 0.1 cold (Ipopt's default), warm_start_mu warm.
   std::optional<double> mu_init;
-  /// Used when the problem has start_multipliers(): barrier parameter, and how far start values are
-  /// pushed off their bounds.
+  /// Barrier parameter at the start where the problem has start_multipliers().
+  /// @threshold [1] 1e-12..0.1; chosen: the start is nearly optimal, so the barrier may be low
   double warm_start_mu = 1e-5;
+  /// How far start values are then pushed off their bounds.
+  /// @threshold [1] 1e-16..0.1; chosen: values at a bound shall stay there
   double warm_start_push = 1e-8;
   int print_level = 0;  ///< Ipopt's table on stdout; 0 = silent
   KktSolver kkt_solver = KktSolver::kChain;

@@ -45,28 +45,36 @@ double full_speed(const CraneModel& model, const MotionProblem& problem, int cyl
   return std::max(std::abs(v.lo), std::abs(v.hi)) * std::abs(rate);
 }
 
+/// Signed travel of a rod in each interval. [m]
+Eigen::VectorXd travels(const Machine& machine, int c, const Trajectory& motion) {
+  const int j = machine.cylinders[static_cast<std::size_t>(c)].joint;
+  Eigen::VectorXd way(motion.size() - 1);
+  for (Eigen::Index k = 0; k < way.size(); ++k) {
+    way[k] = linkage_rates(machine, c, motion.q(k + 1, j)).value -
+             linkage_rates(machine, c, motion.q(k, j)).value;
+  }
+  return way;
+}
+
+/// Travel lost by rest below which a cylinder keeps its modes.
+/// @threshold [m] 0..0.1; chosen: two millimetres
+constexpr double kLeastLost = 2e-3;
+
 /// Gives a cylinder that covered much of its stroke creeping a window around its fastest interval, long enough to cover
 /// that stroke at half speed.
-void concentrate(ModeTable& modes, int c, const Trajectory& motion, const CraneModel& model,
-                 const MotionProblem& problem, const ModeOptions& options) {
-  const int j = model.machine.cylinders[static_cast<std::size_t>(c)].joint;
+/// @param way signed travel of the rod in each interval [m]  @param full_way at full speed [m]
+void concentrate(ModeTable& modes, int c, const Eigen::VectorXd& way, double full_way,
+                 double lost_share) {
   const Eigen::Index intervals = modes.rows();
-  Eigen::VectorXd way(intervals);  // signed travel of the rod [m]
-  for (Eigen::Index k = 0; k < intervals; ++k) {
-    way[k] = linkage_rates(model.machine, c, motion.q(k + 1, j)).value -
-             linkage_rates(model.machine, c, motion.q(k, j)).value;
-  }
   double lost = 0.0;
   for (Eigen::Index k = 0; k < intervals; ++k) {
     if (modes(k, c) == CylinderMode::kRest) lost += way[k];
   }
   const double total = way.cwiseAbs().sum();
-  if (std::abs(lost) < std::max(options.lost_share * total, 2e-3)) return;
-  const double full = full_speed(model, problem, c, motion);
+  if (std::abs(lost) < std::max(lost_share * total, kLeastLost)) return;
   const CylinderMode mode = lost > 0.0 ? CylinderMode::kExtend : CylinderMode::kRetract;
-  const double step = (motion.t[intervals] - motion.t[0]) / static_cast<double>(intervals);
   const auto length = std::clamp<Eigen::Index>(
-      static_cast<Eigen::Index>(std::abs(lost) / (0.5 * full * step)) + 4, 4, intervals);
+      static_cast<Eigen::Index>(std::abs(lost) / (0.5 * full_way)) + 4, 4, intervals);
   Eigen::Index best = 0;
   double most = -1.0;
   for (Eigen::Index begin = 0; begin + length <= intervals; ++begin) {
@@ -92,7 +100,8 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
   for (int c = 0; c < cylinders; ++c) {
     const Cylinder& cylinder = model.machine.cylinders[static_cast<std::size_t>(c)];
     if (!cylinder.hydraulic()) continue;
-    const double creep = options.rest_share * full_speed(model, problem, c, motion);
+    const double full = full_speed(model, problem, c, motion);
+    const double creep = options.rest_share * full;
     const int j = cylinder.joint;
     for (Eigen::Index k = 0; k < intervals; ++k) {
       const double middle = 0.5 * (motion.q(k, j) + motion.q(k + 1, j));
@@ -114,11 +123,15 @@ ModeTable modes_of(const CraneModel& model, const MotionProblem& problem, const 
     for (const Run& run : runs_of(modes, c)) {
       if (run.end - run.begin < options.shortest_move) fill(modes, c, run, CylinderMode::kRest);
     }
-    concentrate(modes, c, motion, model, problem, options);
+    const double step = (motion.t[intervals] - motion.t[0]) / static_cast<double>(intervals);
+    concentrate(modes, c, travels(model.machine, c, motion), full * step, options.lost_share);
     // A joint with a net travel must be allowed to move; if it creeps throughout, it moves where it is fastest.
     const double travel = motion.q(intervals, j) - motion.q(0, j);
+    /// Net travel up to which a joint is at rest.
+    /// @threshold [rad or m] 0..1e-6; numerical: rounding
+    constexpr double kNoTravel = 1e-9;
     const bool must_move =
-        std::holds_alternative<JointGoal>(problem.goal) && std::abs(travel) > 1e-9;
+        std::holds_alternative<JointGoal>(problem.goal) && std::abs(travel) > kNoTravel;
     if (must_move && (modes.col(c).array() == CylinderMode::kRest).all()) {
       const double rate = linkage_rates(model.machine, c, motion.q(0, j)).d1;
       const CylinderMode mode =

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include "models/effects/effective_machine.h"
 #include "models/math/linear_algebra.h"
@@ -28,6 +29,8 @@ double joint_speed(const CraneModel& model, const MotionProblem& problem, int jo
   if (!cylinder.hydraulic()) return speed;
   const Valve* valve = model.machine.valve_of_cylinder(c);
   const int pump = model.machine.pump_of_cylinder(c);
+  /// Positions of a leg at which the highest speed is taken.
+  /// @threshold [1] 3..100; chosen: an initial guess only
   constexpr int kSamples = 9;
   for (int i = 0; i < kSamples; ++i) {
     const double q = from + (to - from) * i / (kSamples - 1);
@@ -50,7 +53,9 @@ double joint_speed(const CraneModel& model, const MotionProblem& problem, int jo
   return speed;
 }
 
-constexpr double kDeepestGuess = 0.05;  // [m] by which a guess may violate the clearance
+/// Depth by which a guess may violate the clearance.
+/// @threshold [m] 0..0.5; chosen: a guess this near is worth a solve
+constexpr double kDeepestGuess = 0.05;
 
 struct Leg {
   int joint = 0;
@@ -101,17 +106,20 @@ void integrate(const VectorXd& start, Trajectory& motion) {
   motion.qdd.row(motion.size() - 1) = motion.qdd.row(motion.size() - 2);
 }
 
-/// Builds modes and guess of legs driven one after another over the whole mesh. @return false when time is too short
-bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd& times,
-           const std::vector<Leg>& legs, ClearanceModel* clearance, ModeCandidate& out) {
+/// Modes and guess of legs driven one after another over the whole mesh. @return nothing when time is too short
+std::optional<ModeCandidate> build(const CraneModel& model, const MotionProblem& problem,
+                                   const VectorXd& times, const std::vector<Leg>& legs,
+                                   ClearanceModel* clearance) {
   const double total = times[times.size() - 1];
   // Each leg gets two more intervals, because its trapezoid can start and stop at knots only.
   const double slack = 2.0 * total / static_cast<double>(times.size() - 1);
   const double needed = std::accumulate(legs.begin(), legs.end(), 0.0, [&](double s, const Leg& l) {
     return s + l.shortest + slack;
   });
-  if (needed - slack * static_cast<double>(legs.size()) > total || legs.empty()) return false;
+  if (needed - slack * static_cast<double>(legs.size()) > total || legs.empty())
+    return std::nullopt;
   const Eigen::Index intervals = times.size() - 1;
+  ModeCandidate out;
   out.modes = ModeTable::Constant(intervals, model.machine.cylinder_count(), CylinderMode::kRest);
   Trajectory& m = out.guess;
   m.t = times;
@@ -124,7 +132,7 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
     Eigen::Index end = begin;
     while (end < intervals && times[end] < until - 1e-9) ++end;
     if (i + 1 == legs.size()) end = intervals;
-    if (end - begin < 3) return false;
+    if (end - begin < 3) return std::nullopt;
     drive(legs[i], times, begin, end, m);
     const int c = model.machine.cylinder_of_joint(legs[i].joint);
     if (c >= 0) {
@@ -137,9 +145,10 @@ bool build(const CraneModel& model, const MotionProblem& problem, const VectorXd
   }
   integrate(problem.start, m);
   // With fixed modes the solver rarely moves a guess out of an obstacle.
-  if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess) return false;
+  if (clearance != nullptr && clearance->nearest_on(m, 1).distance < -kDeepestGuess)
+    return std::nullopt;
   out.energy = exact_total_energy(model, m, problem.payload, 2);
-  return true;
+  return out;
 }
 
 std::string order_name(const Machine& machine, const std::vector<Leg>& legs) {
@@ -154,9 +163,15 @@ std::string order_name(const Machine& machine, const std::vector<Leg>& legs) {
 
 bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
                        const Eigen::Vector3d& goal, const std::vector<bool>& free, VectorXd& q) {
-  for (int iteration = 0; iteration < 60; ++iteration) {
+  /// Largest number of Newton steps to an end posture.
+  /// @threshold [1] 10..500; chosen: steps of at most 0.3 rad cross any range in twenty
+  constexpr int kNewtonSteps = 60;
+  for (int iteration = 0; iteration < kNewtonSteps; ++iteration) {
     const Eigen::Vector3d error = goal - tip_position<double>(machine, q);
-    if (error.norm() < 1e-9) return true;
+    /// Distance of the tip at which Newton's method stops.
+    /// @threshold [m] 1e-13..1e-6; numerical: far below the end's tolerance
+    constexpr double kTipConverged = 1e-9;
+    if (error.norm() < kTipConverged) return true;
     Eigen::Matrix3Xd jacobian =
         point_jacobian_matrix(machine, q, machine.tip.joint, machine.tip.xyz);
     for (Eigen::Index j = 0; j < q.size(); ++j) {
@@ -177,15 +192,21 @@ bool solve_end_posture(const Machine& machine, const MotionLimits& limits,
         pushes = true;
       }
     }
+    /// Longest step of a joint.
+    /// @threshold [rad or m] 0.05..1; chosen: a linearised arm is wrong beyond some 20 degrees
+    constexpr double kLongestStep = 0.3;
     const double length = step.cwiseAbs().maxCoeff();
-    if (length > 0.3) step *= 0.3 / length;
+    if (length > kLongestStep) step *= kLongestStep / length;
     q += step;
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       const Range& r = limits.position[static_cast<std::size_t>(j)];
       q[j] = std::clamp(q[j], r.lo, r.hi);
     }
   }
-  return (goal - tip_position<double>(machine, q)).norm() < 1e-6;
+  /// Distance of the tip beyond which the goal was not reached.
+  /// @threshold [m] 1e-9..1e-4; numerical: a tenth of what the check of a motion's end accepts
+  constexpr double kTipReached = 1e-6;
+  return (goal - tip_position<double>(machine, q)).norm() < kTipReached;
 }
 
 std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
@@ -195,13 +216,20 @@ std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
                                                  int most) {
   const int n = model.machine.joint_count();
   std::vector<ModeCandidate> found;
-  if (n > 7) return found;  // 7! orders are the most that is worth enumerating
+  /// Largest number of joints whose motions are put in order.
+  /// @threshold [joints] 1..10; chosen: 7! orders are the most that is worth enumerating
+  constexpr int kMostOrdered = 7;
+  if (n > kMostOrdered)
+    return found;  // kMostOrdered! orders are the most that is worth enumerating
   std::unique_ptr<ClearanceModel> clearance;
   if (!problem.obstacles.empty()) clearance = std::make_unique<ClearanceModel>(problem);
   std::vector<VectorXd> ends;
+  /// Distance below which two end postures count as equal.
+  /// @threshold [rad or m] 1e-9..0.1; chosen: a millimetre of stroke changes no energy visibly
+  constexpr double kSamePosture = 1e-3;
   const auto add_end = [&](const VectorXd& q) {
     for (const VectorXd& known : ends) {
-      if ((known - q).cwiseAbs().maxCoeff() < 1e-3) return;
+      if ((known - q).cwiseAbs().maxCoeff() < kSamePosture) return;
     }
     ends.push_back(q);
   };
@@ -222,19 +250,25 @@ std::vector<ModeCandidate> sequential_candidates(const CraneModel& model,
     }
   }
   for (const VectorXd& end : ends) {
+    /// Travel up to which a joint is at rest.
+    /// @threshold [rad or m] 1e-9..1e-2; chosen: no machine moves a joint by 0.1 mm on purpose
+    constexpr double kStandsStill = 1e-4;
     std::vector<Leg> legs;
     for (int j = 0; j < n; ++j) {
-      if (std::abs(end[j] - problem.start[j]) > 1e-4)
+      if (std::abs(end[j] - problem.start[j]) > kStandsStill)
         legs.push_back(make_leg(model, problem, j, problem.start[j], end[j]));
     }
-    if (legs.size() > 5) continue;
+    /// Largest number of legs whose orders are enumerated.
+    /// @threshold [legs] 1..8; chosen: 120 orders for five; 720 for six
+    constexpr std::size_t kMostLegsInOrder = 5;
+    if (legs.size() > kMostLegsInOrder) continue;
     std::sort(legs.begin(), legs.end(),
               [](const Leg& a, const Leg& b) { return a.joint < b.joint; });
     do {
-      ModeCandidate candidate;
-      candidate.name = order_name(model.machine, legs);
-      if (build(model, problem, times, legs, clearance.get(), candidate))
-        found.push_back(std::move(candidate));
+      std::optional<ModeCandidate> candidate = build(model, problem, times, legs, clearance.get());
+      if (!candidate) continue;
+      candidate->name = order_name(model.machine, legs);
+      found.push_back(std::move(*candidate));
     } while (std::next_permutation(legs.begin(), legs.end(),
                                    [](const Leg& a, const Leg& b) { return a.joint < b.joint; }));
   }

@@ -34,7 +34,11 @@ bool Tightening::tighten_bounds(const MotionProblem& problem, const std::vector<
 bool split_where_it_touches(const MotionProblem& problem, const Trajectory& motion, int parts,
                             int most, PhaseMesh& mesh) {
   if (problem.obstacles.empty() || mesh.modes.rows() == 0) return false;
-  constexpr double kDeep = 5e-3;  // [m]
+  /// Depth of a violation between two knots from which the interval is split.
+  /// @threshold [m] 0..0.1; chosen: a smaller one is cured by tightening the row
+  constexpr double kDeep = 5e-3;
+  /// Parts into which such an interval is cut.
+  /// @threshold [1] 2..16; chosen: the sag of a curved path between knots falls to a sixteenth
   constexpr int kParts = 4;
   if (motion.size() > most) return false;
   ClearanceModel clearance(problem);

@@ -29,13 +29,16 @@ bool same_plan(const PhasePlan& a, const PhasePlan& b) {
 }
 
 /// Below this multiple of the shortest duration some cylinders must move together: sequential motions need about twice.
+/// @threshold [1] 1..10; chosen: below it sequences with overlap are started from slower motions, too
 constexpr double kShortOfTime = 2.0;
 
 /// Where time is short, mode sequences of motions with these multiples of the duration are tried too.
+/// @threshold [1] 1..5; chosen: about a quarter and two thirds more time, up to the duration of sequential motions
 constexpr double kSlower[] = {1.25, 1.6};
 
-constexpr double kRoomForTheRows =
-    0.04;  // [m] inflation of the smooth clearance rows, and sag between two knots
+/// Distance that starts keep from obstacles beyond the clearance.
+/// @threshold [m] 0..0.5; chosen: inflation of the smooth clearance rows, and sag between two knots
+constexpr double kRoomForTheRows = 0.04;
 
 /// All solves for one problem in one window of durations.
 class Search {
@@ -137,7 +140,9 @@ class Search {
       if (problem.objective.energy > 0.0) {
         paths = grid.paths_for_duration(wanted, most);
       } else if (time_is_everything(problem)) {
-        constexpr double kTimeIsEverything = 1e7;  // [W]
+        /// Price of time of a path that is only fast.
+        /// @threshold [W] 1e6..1e12; derived: ten megawatts, far above the power of any pump
+        constexpr double kTimeIsEverything = 1e7;
         paths.push_back(grid.cheapest_path(kTimeIsEverything));
       }
       for (const GridPath& path : paths) {
@@ -205,8 +210,9 @@ class Search {
           return i == 0 || plan.count() == 0
                      ? optimize_from(model_, problem_, {name, slow, shortest.duration, false}, time,
                                      coarse_)
-                     : optimize_with_phases(model_, problem_, name + ", its phases", plan, slow,
-                                            time, true, coarse_);
+                     : optimize_with_phases(model_, problem_,
+                                            {name + ", its phases", plan, slow, true}, time,
+                                            coarse_);
         },
         [&](int) { return name; });
   }
@@ -233,7 +239,10 @@ class Search {
       const double best_before = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
       for (const int i : ranked) {
         const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
-        if (s.plan.count() == 0 || s.cost > 1.05 * best_before) continue;
+        /// Cost over the best up to which a motion's neighbours are searched.
+        /// @threshold [1] 1..2; chosen: a motion dearer by more would have to gain as much by one change
+        constexpr double kWorthSearching = 1.05;
+        if (s.plan.count() == 0 || s.cost > kWorthSearching * best_before) continue;
         if (searched++ == searched_) break;
         for (PhasePlan& plan : neighbours(s.plan)) {
           if (known(plan)) continue;
@@ -250,13 +259,16 @@ class Search {
             const Job& job = jobs[static_cast<std::size_t>(i)];
             const StartResult& s = from[static_cast<std::size_t>(job.from)];
             const TimeWindow time{s.duration, time_.lower, time_.upper};
-            return optimize_with_phases(model_, problem_,
-                                        "sequence " + plan_text(model_.machine, job.plan), job.plan,
-                                        s.motion, time, true, coarse_);
+            return optimize_with_phases(
+                model_, problem_,
+                {"sequence " + plan_text(model_.machine, job.plan), job.plan, s.motion, true}, time,
+                coarse_);
           },
           [&](int i) { return "sequence " + std::to_string(i + 1); });
       const std::vector<int> now = ranking(result_, options_.limit_tolerance);
-      constexpr double kWorthAnotherRound = 1e-3;  // relative
+      /// Relative gain of a round from which another one follows.
+      /// @threshold [1] 0..0.1; chosen: ten times the mesh error
+      constexpr double kWorthAnotherRound = 1e-3;
       if (now.empty() || result_.starts[static_cast<std::size_t>(now.front())].cost >
                              (1.0 - kWorthAnotherRound) * best_before)
         return;
@@ -290,11 +302,19 @@ class Search {
     for (const int i : best) {
       const StartResult& s = result_.starts[static_cast<std::size_t>(i)];
       const double least = result_.starts[static_cast<std::size_t>(best.front())].cost;
-      if (s.plan.count() > 0 && s.same_as < 0 && s.cost < 1.005 * least) chosen.push_back(i);
+      /// Cost over the best up to which a motion is solved on the finer mesh.
+      /// @threshold [1] 1..1.2; chosen: errors of the coarse mesh may exchange motions this close
+      constexpr double kWorthRefining = 1.005;
+      if (s.plan.count() > 0 && s.same_as < 0 && s.cost < kWorthRefining * least)
+        chosen.push_back(i);
       if (static_cast<int>(chosen.size()) == searched_) break;
     }
+    /// Largest number of meshes.
+    /// @threshold [meshes] 1..10; derived: each halves the intervals: at most eight times the first, as
+    /// OptimizeOptions::intervals says
+    constexpr int kMostMeshes = 4;
     for (int intervals = options_.intervals, round = 0;
-         !chosen.empty() && round < 4 && !interrupted(); intervals *= 2, ++round) {
+         !chosen.empty() && round < kMostMeshes && !interrupted(); intervals *= 2, ++round) {
       OptimizeOptions fine = options_;
       fine.intervals = intervals;
       expected_ = static_cast<int>(result_.starts.size() + chosen.size());
@@ -312,7 +332,7 @@ class Search {
           [&](int i) {
             const StartResult& s = source(i);
             const TimeWindow time{s.duration, time_.lower, time_.upper};
-            return optimize_with_phases(model_, problem_, name(i), s.plan, s.motion, time, false,
+            return optimize_with_phases(model_, problem_, {name(i), s.plan, s.motion, false}, time,
                                         fine);
           },
           name);

@@ -34,37 +34,71 @@ struct TimeWindow {
 };
 
 struct OptimizeOptions {
-  int intervals =
-      100;  ///< of the result's first mesh; refined to at most eight times that, see `mesh_error`
-  int search_intervals = 50;  ///< of the mesh on which starts and sequences are compared
-  double mesh_error =
-      1e-4;  ///< |energy of the solve - exact energy| / exact energy, without the smoothing of the maximum
-  int smooth_starts = 2;  ///< number of seeds that are also solved with the smooth law
+  /// Of the result's first mesh; refined to at most eight times that, see `mesh_error`.
+  /// @threshold [intervals] 10..1000; chosen: refined where mesh_error asks for it
+  int intervals = 100;
+  /// Of the mesh on which starts and sequences are compared.
+  /// @threshold [intervals] 10..1000; chosen: half of the first mesh; starts need only be compared
+  int search_intervals = 50;
+  /// Largest relative difference of the solve's energy, without the smoothing of the maximum, from the exact energy.
+  /// @threshold [1] 1e-8..0.1; chosen: far below what models know
+  double mesh_error = 1e-4;
+  /// Number of seeds that are also solved with the smooth law.
+  /// @threshold [1] 0..100; chosen: bounds the time
+  int smooth_starts = 2;
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the solution of the one before.
   std::vector<Smoothing> schedule = {{20e-3, 10e5}};
   /// Iteration limit of a smooth stage; its motion only supplies the modes, so it need not converge.
+  /// @threshold [iterations] 10..10000; chosen: the motion only supplies the modes
   int smooth_iterations = 100;
-  int phase_iterations = 300;  ///< iteration limit of a solve with phases; half of it in the search
-  int sequential_starts =
-      6;  ///< sequential motions tried besides the seeds, those with the cheapest guesses
-  int grid_starts = 3;      ///< paths of the joint grid tried as starts (energy_grid.h)
-  int grid_nodes = 15000;   ///< of that grid
+  /// Iteration limit of a solve with phases; half of it in the search.
+  /// @threshold [iterations] 10..10000; chosen: bounds the time of a start
+  int phase_iterations = 300;
+  /// Sequential motions tried besides the seeds, those with the cheapest guesses.
+  /// @threshold [1] 0..100; chosen: time grows with it
+  int sequential_starts = 6;
+  /// Paths of the joint grid tried as starts (energy_grid.h).
+  /// @threshold [1] 0..100; chosen: time grows with it
+  int grid_starts = 3;
+  /// Number of nodes of that grid.
+  /// @threshold [nodes] 100..1e7; chosen: half the path becomes better and the time grows with it
+  int grid_nodes = 15000;
   bool modes = true;        ///< solve with fixed modes at last; false: the smooth NLP alone
   bool free_phases = true;  ///< durations of phases are variables; false: as in the start
-  double overlap =
-      0.3;  ///< overlap inserted between two phases, share of the shorter one's duration
-  int phase_intervals = 5;  ///< smallest number of intervals of a phase
+  /// Overlap inserted between two phases, as share of the shorter one's duration.
+  /// @threshold [1] 0..1; chosen: the solve changes it where phases are free
+  double overlap = 0.3;
+  /// Smallest number of intervals of a phase.
+  /// @threshold [intervals] 2..100; chosen: start, stop and three between them
+  int phase_intervals = 5;
   /// Largest number of rounds of the local search over mode sequences (neighbours() of phases.h).
+  /// @threshold [1] 0..100; chosen: bounds the time; a round without gain ends it sooner
   int sequence_rounds = 3;
-  int searched_starts = 2;  ///< number of different motions from which that search begins
+  /// Number of different motions from which that search begins.
+  /// @threshold [1] 1..100; chosen: time grows with it
+  int searched_starts = 2;
   ModeOptions mode_options;
-  double pressure_in_modes = 0.3e5;  ///< beta of the solves with fixed modes [Pa]
-  double tolerance = 1e-6;           ///< of the last solve
-  int refine = 16;                   ///< samples per mesh interval at which limits are checked
-  double limit_tolerance = 1e-5;     ///< relative overshoot between knots that counts as kept
-  int tightenings = 5;               ///< solves with bound tightening in one start, at most
-  int processes = 2;                 ///< number of starts solved in parallel
-  double max_seconds = 60.0;         ///< time limit of one start [s]
+  /// Smoothing beta of the solves with fixed modes.
+  /// @threshold [Pa] 1e3..1e6; chosen: 0.3 bar is below what pressure models know
+  double pressure_in_modes = 0.3e5;
+  /// Relative tolerance of the last solve.
+  /// @threshold [1] 1e-12..1e-2; chosen: as NlpOptions::tolerance
+  double tolerance = 1e-6;
+  /// Samples per mesh interval at which limits are checked.
+  /// @threshold [1] 1..100; chosen: a sixteenth of an interval
+  int refine = 16;
+  /// Relative overshoot between knots that counts as kept.
+  /// @threshold [1] 0..1e-2; chosen: ten times the tolerance of the solve
+  double limit_tolerance = 1e-5;
+  /// Solves with bound tightening in one start, at most.
+  /// @threshold [1] 0..100; chosen: bounds the time of a start
+  int tightenings = 5;
+  /// Number of starts solved in parallel.
+  /// @threshold [1] 1..1000; chosen: as many as a small computer has cores
+  int processes = 2;
+  /// Time limit of one start.
+  /// @threshold [s] 1..1e6; chosen: bounds the time of the whole
+  double max_seconds = 60.0;
   std::map<std::string, std::string> ipopt;  ///< further solver options by name
   /// Replaces the crane's knot model at every solve, for comparisons of derivatives; empty = no replacement.
   std::function<std::shared_ptr<KnotModel>(const CraneKnotOptions&, std::shared_ptr<KnotModel>)>
@@ -159,11 +193,16 @@ StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& pr
                                 const ModeCandidate& candidate, const TimeWindow& time,
                                 const OptimizeOptions& options);
 
-/// Solves one start with given phases. @param guess a motion whose phases are driven in the plan's durations
-/// @param overlaps whether overlaps are inserted between the phases
+struct PhasedStart {
+  std::string name;
+  PhasePlan plan;
+  Trajectory guess;  ///< a motion whose phases are driven in the plan's durations
+  bool overlaps;     ///< whether overlaps are inserted between the phases
+};
+
+/// Solves one start with given phases.
 StartResult optimize_with_phases(const CraneModel& model, const MotionProblem& problem,
-                                 const std::string& name, const PhasePlan& plan,
-                                 const Trajectory& guess, const TimeWindow& time, bool overlaps,
+                                 const PhasedStart& start, const TimeWindow& time,
                                  const OptimizeOptions& options);
 
 /// Solves all starts (seeds, sequential motions, grid paths) at one duration, in child processes, and returns the best by

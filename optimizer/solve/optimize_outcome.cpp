@@ -9,11 +9,18 @@ namespace sparflow {
 
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
   if (a.size() < 2 || b.size() < 2) return false;
-  if (std::abs(a.duration() - b.duration()) > 1e-3 * a.duration()) return false;
+  /// Relative difference of durations from which motions differ.
+  /// @threshold [1] 0..0.1; chosen: ten times the mesh error
+  constexpr double kSameDuration = 1e-3;
+  if (std::abs(a.duration() - b.duration()) > kSameDuration * a.duration()) return false;
   const Eigen::MatrixXd other = resampled(b, a.t).q;
+  /// Difference of a joint's position, as share of its range, from which motions differ.
+  /// @threshold [1] 0..0.1; chosen: ten times the mesh error
+  constexpr double kSamePosition = 1e-3;
   for (Eigen::Index j = 0; j < a.q.cols(); ++j) {
     const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
-    if ((a.q.col(j) - other.col(j)).cwiseAbs().maxCoeff() > 1e-3 * (r.hi - r.lo)) return false;
+    if ((a.q.col(j) - other.col(j)).cwiseAbs().maxCoeff() > kSamePosition * (r.hi - r.lo))
+      return false;
   }
   return true;
 }
@@ -42,8 +49,9 @@ std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
 void set_baselines(const CraneModel& model, const MotionProblem& problem,
                    const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
   result.best_seed_energy = result.straight_line_energy = result.nearest_line_energy = 0.0;
-  constexpr double kSeedTolerance =
-      1e-3;  // time scaling of a seed on its own mesh: see time_parametrise
+  /// Relative excess up to which a seed keeps the limits.
+  /// @threshold [1] 0..0.1; chosen: time scaling of a seed on its own mesh: see time_parametrise
+  constexpr double kSeedTolerance = 1e-3;
   bool first_line = true;
   for (const SeedMotion& s : seeds) {
     const bool nearest = s.straight_line && first_line;

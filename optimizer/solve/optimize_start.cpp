@@ -40,7 +40,10 @@ class Start {
   StartResult run(const SeedMotion& seed) {
     result_.seed = seed.name;
     const Trajectory timed = with_duration(seed.motion, time_.guess);
-    result_.seed_feasible = worst_excess(verdict(timed).checks) <= 1e-3;
+    /// Relative excess up to which a seed keeps the limits.
+    /// @threshold [1] 0..0.1; chosen: time scaling of a seed on its own mesh: see time_parametrise
+    constexpr double kSeedExcess = 1e-3;
+    result_.seed_feasible = worst_excess(verdict(timed).checks) <= kSeedExcess;
     if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
     keep_clear_ends(timed);
     if (options_.modes) offer(timed, false);  // so no start ends with more energy than its seed
@@ -81,7 +84,11 @@ class Start {
   }
 
   static bool usable(const NlpResult& r) {
-    return r.solved() || (r.status == NlpStatus::kIterationLimit && r.max_violation < 1e-6);
+    /// Violation up to which a solve that was cut short is used.
+    /// @threshold [1] 0..1e-3; chosen: OptimizeOptions::tolerance
+    constexpr double kUsableViolation = 1e-6;
+    return r.solved() ||
+           (r.status == NlpStatus::kIterationLimit && r.max_violation < kUsableViolation);
   }
 
   /// Sets a mesh of equal intervals without phases.
@@ -187,8 +194,8 @@ class Start {
         hi[d][j] = r.hi - inset;
       }
     }
-    spec.bounds = TranscriptionBounds::uniform(static_cast<int>(mesh_.times.size()) - 1, lo[0],
-                                               hi[0], lo[1], hi[1], lo[2], hi[2]);
+    spec.bounds = TranscriptionBounds::uniform(static_cast<int>(mesh_.times.size()) - 1,
+                                               {lo[0], hi[0]}, {lo[1], hi[1]}, {lo[2], hi[2]});
     spec.bounds.rest_to_rest(problem_.start);
     if (const auto* goal = std::get_if<TipGoal>(&problem_.goal)) {
       spec.terminal = std::make_shared<TipAtGoal>(model_.machine, goal->tip);
@@ -419,10 +426,10 @@ StartResult optimize_with_modes(const CraneModel& model, const MotionProblem& pr
 }
 
 StartResult optimize_with_phases(const CraneModel& model, const MotionProblem& problem,
-                                 const std::string& name, const PhasePlan& plan,
-                                 const Trajectory& guess, const TimeWindow& time, bool overlaps,
+                                 const PhasedStart& start, const TimeWindow& time,
                                  const OptimizeOptions& options) {
-  return Start(model, problem, time, options).run(name, plan, guess, overlaps);
+  return Start(model, problem, time, options)
+      .run(start.name, start.plan, start.guess, start.overlaps);
 }
 
 StartResult optimize_from(const CraneModel& model, const MotionProblem& problem,

@@ -26,13 +26,11 @@ struct TranscriptionBounds {
   Eigen::MatrixXd qd_lower, qd_upper;    ///< [rad/s] or [m/s]
   Eigen::MatrixXd qdd_lower, qdd_upper;  ///< [rad/s^2] or [m/s^2]
 
-  /// The same bounds at every instant; vectors [n].
-  static TranscriptionBounds uniform(int intervals, const Eigen::VectorXd& q_lower,
-                                     const Eigen::VectorXd& q_upper,
-                                     const Eigen::VectorXd& qd_lower,
-                                     const Eigen::VectorXd& qd_upper,
-                                     const Eigen::VectorXd& qdd_lower,
-                                     const Eigen::VectorXd& qdd_upper);
+  struct Box {
+    Eigen::VectorXd lower, upper;  ///< [n]
+  };
+  /// The same bounds at every instant.
+  static TranscriptionBounds uniform(int intervals, const Box& q, const Box& qd, const Box& qdd);
   void fix_q(int knot, const Eigen::VectorXd& q);
   void fix_qd(int knot, const Eigen::VectorXd& qd);
   /// Fixes the start at rest in q_start and the end at rest.

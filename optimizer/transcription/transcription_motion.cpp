@@ -10,17 +10,14 @@ namespace sparflow {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-TranscriptionBounds TranscriptionBounds::uniform(int intervals, const VectorXd& q_lower,
-                                                 const VectorXd& q_upper, const VectorXd& qd_lower,
-                                                 const VectorXd& qd_upper,
-                                                 const VectorXd& qdd_lower,
-                                                 const VectorXd& qdd_upper) {
+TranscriptionBounds TranscriptionBounds::uniform(int intervals, const Box& q, const Box& qd,
+                                                 const Box& qdd) {
   const auto rows = [](const VectorXd& v, int count) -> MatrixXd {
     return v.transpose().replicate(count, 1);
   };
-  return {rows(q_lower, intervals + 1),  rows(q_upper, intervals + 1),
-          rows(qd_lower, intervals + 1), rows(qd_upper, intervals + 1),
-          rows(qdd_lower, intervals),    rows(qdd_upper, intervals)};
+  return {rows(q.lower, intervals + 1),  rows(q.upper, intervals + 1),
+          rows(qd.lower, intervals + 1), rows(qd.upper, intervals + 1),
+          rows(qdd.lower, intervals),    rows(qdd.upper, intervals)};
 }
 
 void TranscriptionBounds::fix_q(int knot, const VectorXd& q) {

@@ -92,7 +92,9 @@ void Transcription::make_defects() {
         // With free times a defect is left out only if it holds for every step.
         const double moving = velocity ? b.qdd_lower(k, i) : std::max(std::abs(qd0), std::abs(qd1));
         if (phase_count_ > 0 && moving != 0.0) all_fixed = false;
-        constexpr double kRounding = 1e-14;  // some 50 units in the last place of the terms
+        /// Residual, as share of its terms, up to which a defect holds for every value.
+        /// @threshold [1] 1e-16..1e-10; numerical: some 50 units in the last place of the terms
+        constexpr double kRounding = 1e-14;
         if (all_fixed && std::abs(residual) <= kRounding * scale) continue;
         defects_.push_back({k, i, velocity});
       }

@@ -1,24 +1,29 @@
 #!/bin/bash
-# Makes docs/thresholds.md from the headers: every field with a line `@threshold [UNIT] LO..HI; KIND: reason` in the comment
-# above it. `thresholds.sh` writes the page, `thresholds.sh --check` says whether it is up to date; both refuse a line of
-# another form. `thresholds.sh [--check] TREE` does so in another tree.
+# Makes docs/thresholds.md from the sources: every field or constant with a line `@threshold [UNIT] LO..HI; KIND: reason` in
+# the comment above it. `thresholds.sh` writes the page, `thresholds.sh --check` says whether it is up to date; both refuse a
+# line of another form. `thresholds.sh [--check] TREE` does so in another tree.
+# In the rooms of `complete` both also refuse a number that decides and has no such line: a constant (constexpr) with a
+# literal value, a field of a struct ...Options with one, and a literal in a comparison. Numbers that structure gives are free
+# there: whole numbers to 4, 0.5 and 2.0; any other that is no threshold (a unit, exact mathematics, a layout) has a comment
+# "no threshold: what it is" in its line or directly above the constants in a row.
 set -euo pipefail
 check=
 if [ "${1-}" = --check ]; then check=1 && shift; fi
 cd "${1:-$(dirname "$(readlink -f "$0")")/../..}"
 page=docs/thresholds.md
 rooms="models identification diagnosis problems planners optimizer simulator"
+complete="models planners optimizer"
 
-headers() { # in the order of the rooms
+sources() { # in the order of the rooms
   local room
   for room in $rooms; do
-    if [ -d "$room" ]; then find "$room" -name '*.h' -type f | LC_ALL=C sort; fi
+    if [ -d "$room" ]; then find "$room" \( -name '*.h' -o -name '*.cpp' \) -type f | LC_ALL=C sort; fi
   done
 }
 
 table() {
-  # shellcheck disable=SC2046  # one word a header
-  awk '
+  # shellcheck disable=SC2046  # one word a file
+  awk -v complete=" $complete " '
     function fault(line, text) { printf "%s:%d: %s\n", FILENAME, line, text >"/dev/stderr"; bad = 1 }
     function trim(text) { gsub(/^[ \t]+|[ \t]+$/, "", text); return text }
     function cell(text) { gsub(/\|/, "\\|", text); return text }
@@ -31,12 +36,31 @@ table() {
       }
       return out text
     }
+    # numbers of the present line that decide without a word on them
+    function bare(   text, number, room) {
+      room = FILENAME; sub(/\/.*/, "", room)
+      if (index(complete, " " room " ") == 0 || spec != "") return
+      if (code ~ /(^|[ \t])constexpr (unsigned|double|int|long|float|std::[a-z0-9_]+|Eigen::Index) k[A-Za-z0-9]+(\[[^\]]*\])? = *\{?-?[0-9]/ ||
+          code ~ /(^|[ \t])constexpr (unsigned|double|int|long|float|std::[a-z0-9_]+|Eigen::Index) k[A-Za-z0-9]+ =[ \t]*$/)
+        { if (!free) fault(FNR, "a constant that decides has no line @threshold (or \"no threshold: what it is\")"); return }
+      if (free) { if (code !~ /constexpr / && code ~ /[;{}][ \t]*$/) free = 0; return }
+      if (depth > 0 && name[depth] ~ /Options$/ && code ~ /^[ \t]*(unsigned|double|int|long|float|std::[a-z0-9_]+|Eigen::Index) [a-z_0-9]+ *(= *\{?-?[0-9]|=[ \t]*$)/ && code !~ /= *(0|0\.0|1\.0);/) {
+        fault(FNR, "a field of options that decides has no line @threshold"); return
+      }
+      text = code
+      while (match(text, /[ \t][<>]=? +-?[0-9][0-9.]*(e-?[0-9]+)?/)) {
+        number = substr(text, RSTART, RLENGTH); text = substr(text, RSTART + RLENGTH)
+        sub(/^[ \t][<>]=? +-?/, "", number)
+        if (number !~ /^([0-4]|0\.0|0\.5|1\.0|2\.0)$/)
+          fault(FNR, "the number " number " decides: let it be a field of options or a constant with a line @threshold")
+      }
+    }
     # the structs around the present line
     function around(   k, names) {
       for (k = 1; k <= depth; k++) if (name[k] != "") names = names name[k] "::"
       return names
     }
-    function finish(   unit, range, kind, reason, rest, value, option, folder) {
+    function finish(   unit, range, kind, reason, rest, value, option, folder, names) {
       rest = trim(substr(spec, length("@threshold") + 1))
       if (!match(rest, /^\[[^\]]+\]/)) { fault(at, "@threshold without a unit in brackets"); return }
       unit = substr(rest, 2, RLENGTH - 2); rest = trim(substr(rest, RLENGTH + 1))
@@ -53,11 +77,14 @@ table() {
       }
       value = trim(value); gsub(/[ \t]+/, " ", value)
       if (value == "" || field !~ / / || field ~ /[()]/) { fault(at, "@threshold above something that is no field with a value"); return }
-      if (value ~ /, [a-z_0-9]+ = /) { fault(at, "@threshold above two fields: one line declares one field"); return }
+      if (value ~ /, [A-Za-z_0-9]+ = /) { fault(at, "@threshold above two fields: one line declares one field"); return }
       option = field; sub(/\[[^\]]*\]$/, "", option); sub(/^.*[ \t&*]/, "", option)
       folder = FILENAME; sub(/\/[^\/]*$/, "", folder)
+      if (field ~ /constexpr /) { # a constant stands in a file, a field in a struct
+        names = FILENAME; sub(/^.*\//, "", names); option = names " " option
+      } else option = around() option
       if (!(folder in rows)) folders[++count] = folder
-      rows[folder] = rows[folder] sprintf("| `%s%s` | %s | %s | %s | %s | %s | %s |\n", around(), option, cell(value), cell(unit), cell(range), kind, linked(cell(trim(sentence))), linked(cell(reason)))
+      rows[folder] = rows[folder] sprintf("| `%s` | %s | %s | %s | %s | %s | %s |\n", option, cell(value), cell(unit), cell(range), kind, linked(cell(trim(sentence))), linked(cell(reason)))
       of_kind[kind]++; all++
     }
     BEGIN {
@@ -66,7 +93,8 @@ table() {
       means["derived"] = "from statistics or from the data"; means["cited"] = "by an author"; means["tuned"] = "on the data that the reason names"
       means["numerical"] = "guards rounding or ends an iteration"; means["chosen"] = "by engineering, without a study"
     }
-    FNR == 1 { depth = 0; pending = ""; spec = ""; sentence = ""; field = ""; in_comment = 0 }
+    FNR == 1 { depth = 0; pending = ""; spec = ""; sentence = ""; field = ""; in_comment = 0; free = 0 }
+    /\/\/.*no threshold: ./ { free = 1 }
     /^[ \t]*\/\/\/($|[^<])/ {
       if (spec != "" && !in_comment) { fault(at, "@threshold without a field below it"); spec = "" }
       if (!in_comment) { sentence = ""; spec = "" }
@@ -84,6 +112,7 @@ table() {
       in_comment = 0
       code = $0
       gsub(/"([^"\\]|\\.)*"/, "\"\"", code); sub(/\/\/.*/, "", code)
+      if (trim(code) != "") bare(); else if (trim($0) == "") free = 0
       if (spec != "") {
         field = field " " trim(code)
         if (field ~ /;/) { finish(); spec = ""; sentence = ""; field = "" }
@@ -104,21 +133,23 @@ table() {
       if (bad) exit 1
       print "# Thresholds\n"
       print "Every number that decides something (which effect is named, which data is bad, which branch holds, which candidate is kept, when a"
-      print "search ends) is a field of an options struct, and what is said of it here stands above it in its header. `tests/architecture/thresholds.sh`"
-      print "makes this page from the headers, and `./run lint` says when it is older than they are.\n"
+      print "search ends) is a field of an options struct or, where nobody should set it, a constant in its file, and what is said of it here stands"
+      print "above it. `tests/architecture/thresholds.sh` makes this page from the sources, and `./run lint` says when it is older than they are. In"
+      print "models/, planners/ and optimizer/ it also finds constants, fields of options and literals in comparisons without such words; literals"
+      print "elsewhere in an expression (a clamp, a factor) it does not see.\n"
       print "| kind | the value comes | thresholds |\n|---|---|---|"
       for (k = 1; k <= kinds; k++) printf "| %s | %s | %d |\n", kind_at[k], means[kind_at[k]], of_kind[kind_at[k]]
       printf "| all | | %d |\n", all
       for (k = 1; k <= count; k++) {
-        printf "\n## %s\n\n| option | value | unit | range | kind | what it decides | reason |\n|---|---|---|---|---|---|---|\n", folders[k]
+        printf "\n## %s\n\n| option or constant | value | unit | range | kind | what it decides | reason |\n|---|---|---|---|---|---|---|\n", folders[k]
         printf "%s", rows[folders[k]]
       }
-    }' $(headers)
+    }' $(sources)
 }
 
 text=$(table) || exit 1
 if [ -z "$check" ]; then
   printf '%s\n' "$text" >"$page"
 elif [ "$text" != "$(cat "$page" 2>/dev/null)" ]; then
-  echo "$page is older than the thresholds in the headers: run tests/architecture/thresholds.sh" && exit 1
+  echo "$page is older than the thresholds in the sources: run tests/architecture/thresholds.sh" && exit 1
 fi

@@ -12,12 +12,11 @@
 namespace sparflow::test_support {
 
 inline Joint make_joint(std::string name, JointType type, Eigen::Vector3d xyz, Eigen::Vector3d axis,
-                        Range position, Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity()) {
+                        Range position) {
   Joint joint;
   joint.name = std::move(name);
   joint.type = type;
   joint.origin.translation() = xyz;
-  joint.origin.linear() = rotation;
   joint.axis = axis.normalized();
   joint.position = position;
   joint.velocity = {-0.2, 0.2};
@@ -147,11 +146,11 @@ inline Machine swing_crane() {
   m.name = "swing-crane";
   const Eigen::Matrix3d slope =
       Eigen::AngleAxisd(0.06, Eigen::Vector3d(1.0, 0.4, 0.0).normalized()).toRotationMatrix();
-  m.joints = {
-      make_joint("swing", JointType::kRevolute, {0.1, -0.2, 0.8}, {0, 0, 1}, {-2.0, 2.0}, slope),
-      make_joint("boom", JointType::kRevolute, {0.25, 0.05, 1.3}, {0, -1, 0}, {0.0, 1.2}),
-      make_joint("jib", JointType::kRevolute, {2.8, 0, 0.1}, {0, -1, 0}, {-1.6, -0.1}),
-      make_joint("extension", JointType::kPrismatic, {1.9, 0, 0}, {1, 0, 0}, {0.0, 2.5})};
+  m.joints = {make_joint("swing", JointType::kRevolute, {0.1, -0.2, 0.8}, {0, 0, 1}, {-2.0, 2.0}),
+              make_joint("boom", JointType::kRevolute, {0.25, 0.05, 1.3}, {0, -1, 0}, {0.0, 1.2}),
+              make_joint("jib", JointType::kRevolute, {2.8, 0, 0.1}, {0, -1, 0}, {-1.6, -0.1}),
+              make_joint("extension", JointType::kPrismatic, {1.9, 0, 0}, {1, 0, 0}, {0.0, 2.5})};
+  m.joints[0].origin.linear() = slope;
   m.tip = {3, {0.2, 0.05, -0.15}};
   m.links = {
       make_link("column", 0, 450, {0.05, 0.02, 0.6}), make_link("boom", 1, 520, {1.3, 0.03, 0.12}),
@@ -205,7 +204,8 @@ inline Machine random_machine(int joints, unsigned seed, bool linkage_masses = t
         Eigen::AngleAxisd(random.uniform(-3.0, 3.0), random.direction()).toRotationMatrix();
     m.joints.push_back(make_joint("joint-" + std::to_string(k),
                                   prismatic ? JointType::kPrismatic : JointType::kRevolute,
-                                  random.vector(2.0), random.direction(), {-1.2, 1.2}, turn));
+                                  random.vector(2.0), random.direction(), {-1.2, 1.2}));
+    m.joints.back().origin.linear() = turn;
     const Joint& joint = m.joints.back();
     for (int i = random.integer(1, 2); i > 0; --i) {
       m.links.push_back(make_link("link", k, random.uniform(20, 400), random.vector(1.0)));

@@ -9,17 +9,22 @@
 
 namespace sparflow::arms {
 
+/// Limits of a joint; speed and acceleration are the same in both directions.
+struct JointLimits {
+  Range position;
+  double velocity, acceleration;
+};
+
 inline Joint joint(const std::string& name, JointType type, const Eigen::Vector3d& origin,
-                   const Eigen::Vector3d& axis, Range position, double velocity,
-                   double acceleration) {
+                   const Eigen::Vector3d& axis, const JointLimits& limits) {
   Joint j;
   j.name = name;
   j.type = type;
   j.origin.translation() = origin;
   j.axis = axis;
-  j.position = position;
-  j.velocity = {-velocity, velocity};
-  j.acceleration = {-acceleration, acceleration};
+  j.position = limits.position;
+  j.velocity = {-limits.velocity, limits.velocity};
+  j.acceleration = {-limits.acceleration, limits.acceleration};
   return j;
 }
 
@@ -28,9 +33,10 @@ inline Machine loader_crane() {
   constexpr double kLpm = 1.0 / 6e4;
   Machine m;
   m.name = "loader-crane";
-  m.joints = {joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {-0.2, 1.35}, 0.11, 0.3),
-              joint("jib", JointType::kRevolute, {3.4, 0, 0}, {0, -1, 0}, {-2.3, 0.05}, 0.18, 0.45),
-              joint("extension", JointType::kPrismatic, {3, 0, 0}, {1, 0, 0}, {0, 6}, 0.3, 0.6)};
+  m.joints = {
+      joint("boom", JointType::kRevolute, {0, 0, 2}, {0, -1, 0}, {{-0.2, 1.35}, 0.11, 0.3}),
+      joint("jib", JointType::kRevolute, {3.4, 0, 0}, {0, -1, 0}, {{-2.3, 0.05}, 0.18, 0.45}),
+      joint("extension", JointType::kPrismatic, {3, 0, 0}, {1, 0, 0}, {{0, 6}, 0.3, 0.6})};
   m.tip.joint = 2;
   Cylinder boom;
   boom.name = "boom";
@@ -74,7 +80,7 @@ inline Machine slewing_crane() {
   Machine m = loader_crane();
   m.joints[0].origin.translation() = Eigen::Vector3d(0.2, 0, 2);
   m.joints.insert(m.joints.begin(), joint("slew", JointType::kRevolute, {0, 0, 0.3}, {0, 0, 1},
-                                          {-2.5, 2.5}, 0.4, 0.5));
+                                          {{-2.5, 2.5}, 0.4, 0.5}));
   for (Cylinder& c : m.cylinders) ++c.joint;
   m.tip.joint = 3;
   m.tip.xyz = {0.1, 0, -0.2};
@@ -85,8 +91,8 @@ inline Machine slewing_crane() {
 inline Machine two_link() {
   Machine m;
   m.name = "two-link";
-  m.joints = {joint("upper", JointType::kRevolute, {0, 0, 0}, {0, -1, 0}, {-3, 3}, 1, 2),
-              joint("lower", JointType::kRevolute, {2, 0, 0}, {0, -1, 0}, {-3, 3}, 1, 2)};
+  m.joints = {joint("upper", JointType::kRevolute, {0, 0, 0}, {0, -1, 0}, {{-3, 3}, 1, 2}),
+              joint("lower", JointType::kRevolute, {2, 0, 0}, {0, -1, 0}, {{-3, 3}, 1, 2})};
   m.tip.joint = 1;
   m.tip.xyz = {1.5, 0, 0};
   return m;

@@ -51,8 +51,7 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
     q = fine.q.row(k);
     qd = fine.qd.row(k);
     qdd = fine.qdd.row(k);
-    const MachineState& s =
-        chain.evaluate(q.data(), qd.data(), payload, false, kRestSpeed, qdd.data());
+    const MachineState& s = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
     for (Eigen::Index i = 0; i < cylinders; ++i) {
       const CylinderState& cylinder = s.cylinders[static_cast<std::size_t>(i)];
       c.flow(k, i) = cylinder.flow / units::kLitrePerMinute;

@@ -130,7 +130,7 @@ void add_powers(Page& page, const CraneModel& model, const MotionProblem& proble
     for (Eigen::Index k = 0; k < kSamples; ++k) {
       q = m.q.row(k);
       qd = m.qd.row(k);
-      power[k] = chain.evaluate(q.data(), qd.data(), problem.payload).power / 1e3;
+      power[k] = chain.evaluate({q.data(), qd.data()}, problem.payload).power / 1e3;
     }
     LineSeries series;
     series.name = strategy_title(kind);

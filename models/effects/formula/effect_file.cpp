@@ -16,8 +16,12 @@ namespace {
 using Stage = EffectStage;
 using Place = EffectPlace;
 
+/// Values of a shape parameter that are searched where the file gives none.
+/// @threshold [1] 2..100; chosen: a refinement follows
 constexpr int kGridPoints = 7;
-constexpr std::size_t kQuoted = 300;  // [characters] of a law in a message
+/// Longest part of a law that a message quotes.
+/// @threshold [characters] 20..10000; chosen: three lines
+constexpr std::size_t kQuoted = 300;
 
 constexpr const char* kNameRule = "of letters, digits and _ that does not begin with a digit";
 
@@ -31,7 +35,10 @@ bool plain_name(const std::string& word) {
 /// Values at equal steps over the bounds, at equal ratios where they are positive and span more than a decade.
 std::vector<double> default_grid(const EffectParameter& p) {
   std::vector<double> grid;
-  const bool by_ratio = p.lower > 0.0 && p.upper > 10.0 * p.lower;
+  /// Ratio of the bounds above which values are at equal ratios.
+  /// @threshold [1] 1..1000; chosen: a decade, within which equal steps cover small values as well
+  constexpr double kDecade = 10.0;
+  const bool by_ratio = p.lower > 0.0 && p.upper > kDecade * p.lower;
   for (int i = 0; i < kGridPoints; ++i) {
     const double f = static_cast<double>(i) / (kGridPoints - 1);
     grid.push_back(by_ratio ? p.lower * std::pow(p.upper / p.lower, f)

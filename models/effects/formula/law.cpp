@@ -13,6 +13,8 @@ namespace {
 
 using Op = ExpressionNode::Op;
 
+/// Largest number of parameters of a law.
+/// @threshold [1] 1..20; derived: all groups of them are tried for linearity, a thousand
 constexpr std::size_t kMaxParameters = 10;
 
 /// Reads `v`, `q.boom`, `q.'jib-2'` (returned without its quotes); "" where no name begins.

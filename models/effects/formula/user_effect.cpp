@@ -54,12 +54,12 @@ class UserEffect final : public Effect {
   SPARFLOW_EFFECT_LAW(add_pressure)
   SPARFLOW_EFFECT_LAW(add_pump)
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const std::vector<EvidenceKind> kinds = shows_in();
-    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) return false;
-    if (at >= 0 && at != index) return false;
-    const auto i = static_cast<std::size_t>(index);
+    if (std::find(kinds.begin(), kinds.end(), measured.kind) == kinds.end()) return false;
+    if (at >= 0 && at != measured.index) return false;
+    const auto i = static_cast<std::size_t>(measured.index);
     const Cylinder* cylinder = at_stage(EffectStage::kPump) ? nullptr : &log.machine->cylinders[i];
     if (cylinder != nullptr && !at_stage(EffectStage::kForce) && !cylinder->hydraulic()) {
       return false;
@@ -77,11 +77,11 @@ class UserEffect final : public Effect {
     columns.setZero(log.samples(), static_cast<Eigen::Index>(linear));
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       fill_instant(log, k, instant);
-      read_signals(instant, index, signals);
+      read_signals(instant, measured.index, signals);
       for (std::size_t c = 0; c < logged.size(); ++c) {
         if (logged[c].size() > 0) signals[c] = logged[c][k];
       }
-      const double scale = cylinder ? in_evidence(*cylinder, kind, instant.side[i]) : 1.0;
+      const double scale = cylinder ? in_evidence(*cylinder, measured.kind, instant.side[i]) : 1.0;
       for (std::size_t c = 0; c < linear; ++c) {
         p[c] = 1.0;  // The derivative, because the law is proportional to these parameters.
         columns(k, static_cast<Eigen::Index>(c)) = scale * spec_.law.evaluate<double>(signals, p);

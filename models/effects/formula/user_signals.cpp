@@ -18,6 +18,8 @@ T rod_acceleration(const Instant<T>& s, const SignalPlace& at) {
     const Taylor3 x = rates(q);
     return x.d1 * qdd + x.d2 * qd * qd;
   } else {
+    /// Step of the difference quotient of the third derivative.
+    /// @threshold [rad or m] 1e-6..1e-2; numerical: truncation h^2 and rounding 1e-16/h are both below 1e-8
     constexpr double kStep = 1e-4;
     const Taylor3 x = rates(q.value);
     const double d4 = (rates(q.value + kStep).d3 - rates(q.value - kStep).d3) / (2.0 * kStep);

@@ -171,7 +171,7 @@ TEST_F(UserEffect, ShowsInTheEvidenceOfItsStage) {
         id, stage, unit);
     const Effect* e = register_user_effects(text, "m.yaml", machine).front();
     Eigen::MatrixXd x;
-    return e->columns(series, kind, 0, 0, {}, x) ? x : Eigen::MatrixXd();
+    return e->columns(series, {kind, 0}, 0, {}, x) ? x : Eigen::MatrixXd();
   };
   const Cylinder& c = machine.cylinders[0];
   const Eigen::VectorXi& side = series.cylinders[0].direction;

@@ -44,7 +44,7 @@ Log log_of(const CraneModel& truth, double noise = 0.0, unsigned seed = 1) {
     const double q = s.q(k, 0), qdd = s.qdd(k, 0);
     // Where the command is zero the small speed that the filter leaves is no motion.
     const double qd = s.cylinders[0].direction[k] == 0 ? 0.0 : s.qd(k, 0);
-    const MachineState& state = chain.evaluate(&q, &qd, s.payload[k], false, kRestSpeed, &qdd);
+    const MachineState& state = chain.evaluate({&q, &qd, &qdd}, s.payload[k]);
     const CylinderState& x = state.cylinders[0];
     const bool retracts = x.speed < 0.0;
     pa[k] += retracts ? (x.total_force + x.pressure * b) / a : x.pressure;
@@ -94,8 +94,7 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
     for (Index k = 0; k < s.samples(); ++k) {
       if (!s.usable[k] || s.edge[k] || !s.cylinders[0].driven[k]) continue;
       const double q = s.q(k, 0), qd = s.qd(k, 0), qdd = s.qdd(k, 0);
-      const double force =
-          chain.evaluate(&q, &qd, s.payload[k], false, kRestSpeed, &qdd).cylinders[0].total_force;
+      const double force = chain.evaluate({&q, &qd, &qdd}, s.payload[k]).cylinders[0].total_force;
       difference = std::max(difference, std::abs(force - s.cylinders[0].model_force[k]));
       largest = std::max(
           largest, std::abs(force - without.evaluate(&q, &qd, s.payload[k]).cylinders[0].force));

@@ -78,7 +78,7 @@ TEST(CraneModel, FlowsAndPressuresByHand) {
   const double q[] = {0.4, -1.1, 2.0};
   const double qd[] = {0.05, -0.08, 0.1};
   const double payload = 700;
-  const MachineState& s = chain.evaluate(q, qd, payload);
+  const MachineState& s = chain.evaluate({q, qd}, payload);
   const Eigen::VectorXd force =
       static_force<double>(machine, Eigen::Vector3d(q[0], q[1], q[2]), payload);
   double demand = 22 * kBar, total_flow = 0.0;
@@ -142,8 +142,8 @@ TEST(CraneModel, AtRestFlowIsZeroAndThePumpIsAtStandby) {
   const CraneModel model = trained(test_support::loader_crane());
   Chain chain(model);
   const double q[] = {0.4, -1.1, 2.0}, moving[] = {0.1, 0.1, 0.1}, rest[] = {0, 0, 0};
-  chain.evaluate(q, moving, 500, true);  // Its values must not survive in the next call.
-  const MachineState& s = chain.evaluate(q, rest, 500, true);
+  chain.evaluate({q, moving}, 500, true);  // Its values must not survive in the next call.
+  const MachineState& s = chain.evaluate({q, rest}, 500, true);
   for (const CylinderState& c : s.cylinders) {
     EXPECT_FALSE(c.moving);
     EXPECT_EQ(c.flow, 0.0);
@@ -190,7 +190,7 @@ TEST(CraneModel, PumpPowerIsUsefulPowerPlusThrottling) {
       const Eigen::VectorXd q = random_configuration(machine, random);
       Eigen::VectorXd qd(q.size());
       for (Eigen::Index j = 0; j < q.size(); ++j) qd[j] = random.uniform(-0.15, 0.15);
-      const MachineState& s = chain.evaluate(q.data(), qd.data(), 600);
+      const MachineState& s = chain.evaluate({q.data(), qd.data()}, 600);
       double useful = 0.0, lost = 0.0;
       for (int i = 0; i < machine.cylinder_count(); ++i) {
         const CylinderState& c = s.cylinders[static_cast<std::size_t>(i)];
@@ -281,7 +281,7 @@ TEST(CraneModel, WithoutHydraulicsThereIsForceButNoFlow) {
   EXPECT_TRUE(model.complete());
   Chain chain(model);
   const double q = 0.1, qd = 0.2;
-  const MachineState& s = chain.evaluate(&q, &qd, 0);
+  const MachineState& s = chain.evaluate({&q, &qd}, 0);
   EXPECT_NEAR(s.cylinders[0].force, 95.0, 1e-12);
   EXPECT_EQ(s.cylinders[0].speed, 0.2);
   EXPECT_EQ(s.cylinders[0].flow, 0.0);

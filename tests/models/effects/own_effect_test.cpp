@@ -95,11 +95,11 @@ TEST(OwnEffect, ActsInTheModel) {
   const int n = model.machine.joint_count();
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(n, 0.3), qd = Eigen::VectorXd::Zero(n);
   Chain without(model);
-  const CylinderState before = without.evaluate(q.data(), qd.data(), 0.0).cylinders[0];
+  const CylinderState before = without.evaluate({q.data(), qd.data()}, 0.0).cylinders[0];
   const double loose = before.length - 0.1;
   model.effects = {{balance_spring(), 0, {20e3, loose}, {}, {}}};
   Chain with(model);
-  const CylinderState after = with.evaluate(q.data(), qd.data(), 0.0).cylinders[0];
+  const CylinderState after = with.evaluate({q.data(), qd.data()}, 0.0).cylinders[0];
   EXPECT_NEAR(after.total_force - before.total_force, 20e3 * 0.1, 1e-6);
 }
 
@@ -115,12 +115,12 @@ TEST(OwnEffect, ColumnsComeFromItsLaw) {
   const MachineSeries log = test_support::log_of(machine, motion, 2.0, 0.1, 0.0);
   const double loose[] = {log.cylinders[0].length.mean()};
   Eigen::MatrixXd columns;
-  ASSERT_TRUE(balance_spring()->columns(log, EvidenceKind::kForce, 0, 0, loose, columns));
+  ASSERT_TRUE(balance_spring()->columns(log, {EvidenceKind::kForce, 0}, 0, loose, columns));
   ASSERT_EQ(columns.cols(), 1);
   for (Eigen::Index k = 0; k < log.samples(); ++k) {
     EXPECT_NEAR(columns(k, 0), std::max(0.0, log.cylinders[0].length[k] - loose[0]), 1e-12) << k;
   }
-  EXPECT_FALSE(balance_spring()->columns(log, EvidenceKind::kForce, 1, 0, loose, columns));
+  EXPECT_FALSE(balance_spring()->columns(log, {EvidenceKind::kForce, 1}, 0, loose, columns));
 }
 
 /// Text between a mark and its end, without the lines of the marks.

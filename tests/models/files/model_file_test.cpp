@@ -176,8 +176,8 @@ TEST(ModelFile, ContainsUserEffects) {
   const double q = 0.4, qd = 0.03;
   const CraneModel bare = small_model();
   Chain with(read), without(bare);
-  const CylinderState c = with.evaluate(&q, &qd, 0.0).cylinders[0];
-  EXPECT_EQ(c.force, without.evaluate(&q, &qd, 0.0).cylinders[0].force);
+  const CylinderState c = with.evaluate({&q, &qd}, 0.0).cylinders[0];
+  EXPECT_EQ(c.force, without.evaluate({&q, &qd}, 0.0).cylinders[0].force);
   EXPECT_NEAR(c.total_force - c.force, 2500.0 * std::tanh(c.speed / 4e-3), 1e-9);
 
   // in a process that does not have it yet, the file itself brings it: here under another name

@@ -66,7 +66,7 @@ TEST(BranchCorner, GivesTheShareOfReturnPressureThatReachesTheSupply) {
   const double ratio = cylinder.area_rod() / cylinder.area_piston();
   // S - V is -46, 34 and, near the corner, 2 bar
   const auto rise = [&](double force, double of_return) {
-    return supply_rise<double>(process, cylinder, 1, process.mean(1e-4, force), 1e-4, force,
+    return supply_rise<double>({process, cylinder, 1}, process.mean(1e-4, force), 1e-4, force,
                                of_return);
   };
   for (const double of_return : {-12e5, 12e5}) {

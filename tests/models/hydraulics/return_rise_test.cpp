@@ -60,7 +60,7 @@ class ReturnRise : public ::testing::TestWithParam<int> {
   template <class T>
   T rise_of(const T& flow, const T& load, const T& rise) const {
     const T force = side() * load;
-    return supply_rise<T>(process_, cylinder_, side(), process_mean(process_, flow, force), flow,
+    return supply_rise<T>({process_, cylinder_, side()}, process_mean(process_, flow, force), flow,
                           force, rise);
   }
 

@@ -205,7 +205,7 @@ TEST(EnergyBound, PricesAreTheLeastOfSingleMoves) {
           VectorXd qd = VectorXd::Zero(3);
           qd[j] = share * (direction == 0 ? v.hi : v.lo);
           const double power =
-              chain.evaluate(q.data(), qd.data(), c.problem.payload).power / std::abs(qd[j]);
+              chain.evaluate({q.data(), qd.data()}, c.problem.payload).power / std::abs(qd[j]);
           least = std::min(least, power);
         }
         EXPECT_LE(price(j, direction), least * (1.0 + 1e-9));

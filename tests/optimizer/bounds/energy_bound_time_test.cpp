@@ -12,7 +12,9 @@
 
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
+#include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time_guide.h"
+#include "optimizer/bounds/energy_bound_time_weights.h"
 #include "optimizer/crane/exact_energy.h"
 #include "optimizer/grid/energy_grid.h"
 #include "problems/bundled.h"
@@ -86,7 +88,8 @@ TEST(TimedBound, NoAdmissibleSpeedExceedsTheMaximisedHamiltonian) {
         }
         const double ratio = ratios.speed(q, v, nullptr);
         if (ratio > 1.0) v /= ratio;
-        const double gain = p.dot(v) - chain.evaluate(q.data(), v.data(), c.problem.payload).power;
+        const double gain =
+            p.dot(v) - chain.evaluate({q.data(), v.data()}, c.problem.payload).power;
         ASSERT_LE(gain, said * (1.0 + 1e-9) + 1e-6) << reach;
         if (said > 100.0) nearest = std::max(nearest, gain / said);
       }
@@ -434,7 +437,7 @@ TEST(TimedBound, IsCloselyBelowDynamicProgrammingInTimeOfTwoCylinders) {
         const Eigen::Vector2d q(0.1, 0.1), v(a * way[0] / kWay / dt, b * way[1] / kWay / dt);
         stage(a, b) = ratios.speed(q, v, nullptr) > 1.0 + 1e-9
                           ? std::numeric_limits<double>::infinity()
-                          : chain.evaluate(q.data(), v.data(), 0.0).power * dt;
+                          : chain.evaluate({q.data(), v.data()}, 0.0).power * dt;
       }
     }
     Eigen::MatrixXd best =

@@ -181,7 +181,7 @@ TEST_P(EveryMachine, ModesAgreeWithTheExactLaw) {
   for (int trial = 0; trial < 20; ++trial) {
     Vector z = random_state(model_.machine, random);
     z[n + trial % n] = 0.0;
-    const MachineState& exact = chain.evaluate(z.data(), z.data() + n, problem.payload);
+    const MachineState& exact = chain.evaluate({z.data(), z.data() + n}, problem.payload);
     options.modes = ModeTable::Constant(1, m, CylinderMode::kRest);
     double flow = 0.0;
     for (int c = 0; c < m; ++c) {
@@ -219,7 +219,8 @@ TEST_P(EveryMachine, WholeEnergyOfATrajectoryMatchesFiniteDifferences) {
     spec.terminal =
         std::make_shared<TipAtGoal>(model_.machine, std::get<TipGoal>(problem.goal).tip);
     const Vector wide = Vector::Constant(n, 100.0);
-    spec.bounds = TranscriptionBounds::uniform(intervals, -wide, wide, -wide, wide, -wide, wide);
+    spec.bounds =
+        TranscriptionBounds::uniform(intervals, {-wide, wide}, {-wide, wide}, {-wide, wide});
     spec.acceleration_weight = Vector::Constant(n, 1e-3);
     Transcription transcription(spec);
     Vector x(transcription.size().variables);

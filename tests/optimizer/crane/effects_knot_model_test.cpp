@@ -64,7 +64,8 @@ void check_whole_energy(const CraneModel& model, bool held, const std::string& w
   spec.t = Eigen::Vector3d(0.0, 0.2, 0.5);
   spec.knot = std::make_shared<CraneKnotModel>(model, problem, options);
   const Vector wide = Vector::Constant(n, 100.0);
-  spec.bounds = TranscriptionBounds::uniform(intervals, -wide, wide, -wide, wide, -wide, wide);
+  spec.bounds =
+      TranscriptionBounds::uniform(intervals, {-wide, wide}, {-wide, wide}, {-wide, wide});
   Transcription transcription(spec);
   std::mt19937 random(41);
   Vector x(transcription.size().variables);
@@ -105,7 +106,7 @@ Vector clear_state(const CraneModel& model, std::mt19937& random) {
   for (;;) {
     const Vector z = random_state(model.machine, random);
     bool clear = true;
-    for (const CylinderState& c : chain.evaluate(z.data(), z.data() + n, 0.0).cylinders) {
+    for (const CylinderState& c : chain.evaluate({z.data(), z.data() + n}, 0.0).cylinders) {
       clear = clear && std::abs(c.speed) > 5e-4;
     }
     if (clear) return z;
@@ -133,8 +134,8 @@ TEST_P(EffectsOnMachine, SmoothLawTendsToTheExactOne) {
       Vector z(3 * n);
       z.head(2 * n) = clear_state(model, random);
       for (int j = 0; j < n; ++j) z[2 * n + j] = 0.3 * std::sin(trial + 2.0 * j);
-      const MachineState& exact = chain.evaluate(z.data(), z.data() + n, problem.payload, false,
-                                                 kRestSpeed, z.data() + 2 * n);
+      const MachineState& exact =
+          chain.evaluate({z.data(), z.data() + n, z.data() + 2 * n}, problem.payload);
       for (const bool held : {false, true}) {
         CraneKnotOptions options;
         options.smoothing = {2e-5, 1e3};  // 0.02 mm/s, 0.01 bar
@@ -191,8 +192,8 @@ TEST_P(EffectsOnMachine, AnEffectOfZeroStrengthChangesNothing) {
       EXPECT_LT((hw.topLeftCorner(2 * n, 2 * n) - h).cwiseAbs().maxCoeff(),
                 1e-10 * (1.0 + h.cwiseAbs().maxCoeff()))
           << key(e);
-      const double p = exact_without.evaluate(z.data(), z.data() + n, 300.0).power;
-      EXPECT_NEAR(exact.evaluate(z.data(), z.data() + n, 300.0).power, p,
+      const double p = exact_without.evaluate({z.data(), z.data() + n}, 300.0).power;
+      EXPECT_NEAR(exact.evaluate({z.data(), z.data() + n}, 300.0).power, p,
                   1e-12 * std::max(1.0, std::abs(p)))
           << key(e);
     }

@@ -57,7 +57,8 @@ void check_whole_energy(const CraneModel& model, const std::string& what) {
   spec.t = Eigen::Vector3d(0.0, 0.2, 0.5);
   spec.knot = std::make_shared<CraneKnotModel>(model, problem, options);
   const Vector wide = Vector::Constant(n, 100.0);
-  spec.bounds = TranscriptionBounds::uniform(intervals, -wide, wide, -wide, wide, -wide, wide);
+  spec.bounds =
+      TranscriptionBounds::uniform(intervals, {-wide, wide}, {-wide, wide}, {-wide, wide});
   Transcription transcription(spec);
   std::mt19937 random(43);
   Vector x(transcription.size().variables);

@@ -297,8 +297,8 @@ TEST(ChainLdl, InertiaAndSolutionOfACranesMotion) {
   spec.phases.upper = VectorXd::Constant(2, 7.0);
   spec.phases.total_upper = 8.0;
   const VectorXd one = VectorXd::Ones(n);
-  spec.bounds = TranscriptionBounds::uniform(intervals, 0.5 * one, 0.9 * one, -0.1 * one, 0.1 * one,
-                                             -0.2 * one, 0.2 * one);
+  spec.bounds = TranscriptionBounds::uniform(intervals, {0.5 * one, 0.9 * one},
+                                             {-0.1 * one, 0.1 * one}, {-0.2 * one, 0.2 * one});
   spec.acceleration_weight = 1e-3 * one;
   Transcription nlp(std::move(spec));
   std::mt19937 random(5);

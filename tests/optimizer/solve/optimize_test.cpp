@@ -82,8 +82,7 @@ double simpson_energy(const Case& c, const Trajectory& motion) {
         (motion.q.row(k) + dt * motion.qd.row(k) + 0.5 * dt * dt * motion.qdd.row(k)).transpose();
     const VectorXd qd = (motion.qd.row(k) + dt * motion.qdd.row(k)).transpose();
     const VectorXd qdd = motion.qdd.row(k).transpose();
-    return chain.evaluate(q.data(), qd.data(), c.problem.payload, false, kRestSpeed, qdd.data())
-        .power;
+    return chain.evaluate({q.data(), qd.data(), qdd.data()}, c.problem.payload).power;
   };
   for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
     const double h = motion.t[k + 1] - motion.t[k];

@@ -142,7 +142,7 @@ class Product final : public TerminalModel {
 
 TranscriptionBounds wide(int intervals, int joints) {
   const VectorXd ten = VectorXd::Constant(joints, 10.0);
-  return TranscriptionBounds::uniform(intervals, -ten, ten, -ten, ten, -ten, ten);
+  return TranscriptionBounds::uniform(intervals, {-ten, ten}, {-ten, ten}, {-ten, ten});
 }
 
 VectorXd uneven_times() {

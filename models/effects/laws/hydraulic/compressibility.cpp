@@ -9,6 +9,7 @@ namespace sparflow {
 namespace {
 
 /// [-] Oil volume in hose and ports as a share of the full chamber.
+/// @threshold [1] 0..1; chosen: hoses are some metres of a fifth of the piston's diameter
 constexpr double kDeadVolume = 0.05;
 
 /// Shortest and longest length the joint's range (or the stated stroke) allows. [m]
@@ -68,9 +69,9 @@ class Compressibility final : public Effect {
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
   bool columns_of_readings() const override { return true; }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kFlow || index != at) return false;
+    if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
     // Unfiltered pressures are preferred, because a filter mixes samples before and after the supply chamber changes.

@@ -84,10 +84,10 @@ class Counterbalance final : public Effect {
 
   /// The force has passed the filter already; filtered twice, its noise would explain that of the chamber pressure.
   bool columns_filtered() const override { return true; }
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    const int side = supply_side(kind);
-    if (side == 0 || index != at || side != side_of(shape[0])) return false;
+    const int side = supply_side(measured.kind);
+    if (side == 0 || measured.index != at || side != side_of(shape[0])) return false;
     const auto i = static_cast<std::size_t>(at);
     const CylinderSeries& c = log.cylinders[i];
     const double area = return_area(log.machine->cylinders[i], side);

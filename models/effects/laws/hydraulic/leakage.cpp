@@ -50,9 +50,9 @@ class Leakage final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kFlow || index != at) return false;
+    if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const auto i = static_cast<std::size_t>(at);
     const Cylinder& c = log.machine->cylinders[i];
     const Eigen::VectorXd& force = carried_force(log.cylinders[i]);

@@ -5,6 +5,7 @@ namespace sparflow {
 namespace {
 
 /// [degC] The losses contained in the learned pressure models and margins are referred to this temperature.
+/// @threshold [degC] 20..60; chosen: usual temperature of warm oil
 constexpr double kReference = 40.0;
 
 /// Lines are sized for the flow of their section, so that losses at rated flow are alike. The law therefore has one
@@ -87,16 +88,16 @@ class OilTemperature final : public Effect {
   SPARFLOW_EFFECT_LAW(add_return)
   SPARFLOW_EFFECT_LAW(add_demand)
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (log.oil.size() == 0) return false;
-    const int side = return_side(kind);
-    if (side == 0) return Effect::columns(log, kind, index, at, shape, columns);
-    const Cylinder& c = log.machine->cylinders[static_cast<std::size_t>(index)];
+    const int side = return_side(measured.kind);
+    if (side == 0) return Effect::columns(log, measured, at, shape, columns);
+    const Cylinder& c = log.machine->cylinders[static_cast<std::size_t>(measured.index)];
     if (!c.hydraulic()) return false;
-    const CylinderSeries& series = log.cylinders[static_cast<std::size_t>(index)];
-    const double full =
-        rated_flow(*log.machine, index, side) * return_area(c, side) / supply_area(c, side);
+    const CylinderSeries& series = log.cylinders[static_cast<std::size_t>(measured.index)];
+    const double full = rated_flow(*log.machine, measured.index, side) * return_area(c, side) /
+                        supply_area(c, side);
     columns.setZero(log.samples(), 2);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       columns(k, 0) = series.return_flow[k] / full * factor(log.oil[k], shape[0]);

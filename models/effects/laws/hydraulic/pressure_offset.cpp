@@ -55,16 +55,16 @@ class PressureOffset final : public Effect {
             EvidenceKind::kSupplyExtend, EvidenceKind::kSupplyRetract, EvidenceKind::kPump};
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     if (c.pressure_a.size() == 0 || c.pressure_b.size() == 0)
       return false;  // The force is measured directly.
     const double a = share_a(shape[0]), b = share_b(shape[0]);
-    if (kind == EvidenceKind::kPump) {
+    if (measured.kind == EvidenceKind::kPump) {
       // The pump pressure is compared with the demand of the measured pressures.
-      if (log.machine->pump_of_cylinder(at) != index) return false;
-      const Eigen::VectorXi& leader = log.pumps[static_cast<std::size_t>(index)].leader;
+      if (log.machine->pump_of_cylinder(at) != measured.index) return false;
+      const Eigen::VectorXi& leader = log.pumps[static_cast<std::size_t>(measured.index)].leader;
       if (leader.size() == 0) return false;
       columns.setZero(log.samples(), 1);
       for (Eigen::Index k = 0; k < log.samples(); ++k) {
@@ -72,14 +72,14 @@ class PressureOffset final : public Effect {
       }
       return true;
     }
-    if (index != at) return false;
+    if (measured.index != at) return false;
     double value = 0.0;
-    if (kind == EvidenceKind::kForce) {
+    if (measured.kind == EvidenceKind::kForce) {
       const Cylinder& cylinder = log.machine->cylinders[static_cast<std::size_t>(at)];
       value = cylinder.area_piston() * a - cylinder.area_rod() * b;
     } else {
-      const bool supply = supply_side(kind) != 0;
-      const int side = supply ? supply_side(kind) : return_side(kind);
+      const bool supply = supply_side(measured.kind) != 0;
+      const int side = supply ? supply_side(measured.kind) : return_side(measured.kind);
       value = (side > 0) == supply ? a : b;
     }
     // The column is zero in the chamber whose sensor is right: the other's error acts there by way of the force only.

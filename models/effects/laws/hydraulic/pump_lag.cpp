@@ -43,9 +43,9 @@ class PumpLag final : public Effect {
     return info;
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kPump}; }
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kPump || index != at) return false;
+    if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
     columns = first_order_lag(log, demand, shape[0]) - demand;

@@ -52,10 +52,10 @@ class ReturnBackPressure final : public Effect {
   }
   SPARFLOW_EFFECT_LAW(add_return)
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int, std::span<const double>,
-               Eigen::MatrixXd& columns) const override {
-    if (return_side(kind) == 0) return false;
-    if (!log.machine->cylinders[static_cast<std::size_t>(index)].hydraulic()) return false;
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int,
+               std::span<const double>, Eigen::MatrixXd& columns) const override {
+    if (return_side(measured.kind) == 0) return false;
+    if (!log.machine->cylinders[static_cast<std::size_t>(measured.index)].hydraulic()) return false;
     columns = total_return_flow(log).array().square().matrix();
     return true;
   }

@@ -9,6 +9,7 @@
 namespace sparflow {
 namespace {
 
+// no threshold: upper bound of a number in a file
 constexpr double kMostJoints = 30.0;  ///< The parameter `late` numbers joints up to here.
 
 /// With positions late by d, q_log(t) = q(t - d), the force at t is that of the pose logged d later,
@@ -77,21 +78,22 @@ class SensorDelay final : public Effect {
     return values;
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     const bool positions = shape[1] > 0.0;
     const auto alone = static_cast<Eigen::Index>(std::lround(shape[1])) - 2;  // < 0: all
-    if (kind == EvidenceKind::kPump)
-      return !positions && switching_late(log, static_cast<std::size_t>(index), shape[0], columns);
-    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(index)];
+    if (measured.kind == EvidenceKind::kPump)
+      return !positions &&
+             switching_late(log, static_cast<std::size_t>(measured.index), shape[0], columns);
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(measured.index)];
     const double shift = positions ? -shape[0] : shape[0];
-    if (kind == EvidenceKind::kForce) {
+    if (measured.kind == EvidenceKind::kForce) {
       if (alone >= 0) return pose_late_in_one(log, c, alone, shape[0], columns);
       columns = delayed(log, c.static_force, shift) - c.static_force;
       return true;
     }
-    if (kind != EvidenceKind::kFlow || !positions) return false;
-    const int joint = log.machine->cylinders[static_cast<std::size_t>(index)].joint;
+    if (measured.kind != EvidenceKind::kFlow || !positions) return false;
+    const int joint = log.machine->cylinders[static_cast<std::size_t>(measured.index)].joint;
     if (alone >= 0 && joint != alone) return false;
     columns = c.speed - delayed(log, c.speed, shift);
     if (c.command.size() > 0) keep_changes(log, c.command, shape[0], columns);
@@ -103,8 +105,12 @@ class SensorDelay final : public Effect {
   /// noise in a regressor biases its coefficient towards zero.
   static void keep_changes(const MachineSeries& log, const Eigen::VectorXd& command, double delay,
                            Eigen::MatrixXd& columns) {
-    constexpr double kSettled_s = 0.4;  // Filters and accelerations have settled by then.
-    constexpr double kSame = 2e-3;      // share of the full command: the logger's resolution
+    /// Time after a change of the command from which a sample tells nothing.
+    /// @threshold [s] 0.05..5; chosen: filters and accelerations have settled by then
+    constexpr double kSettled_s = 0.4;
+    /// Change of the command, as share of full command, up to which it is the same.
+    /// @threshold [1] 0..0.1; chosen: the logger's resolution
+    constexpr double kSame = 2e-3;
     for (const auto& [first, last] : log.runs) {
       Eigen::Index since = first;  // the command has been `level` from here on
       double level = command[first];

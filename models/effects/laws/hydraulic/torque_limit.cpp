@@ -8,6 +8,7 @@ namespace sparflow {
 namespace {
 
 /// [s] Window over which the demand is averaged, because clipping a noisy signal leaves a bias like the effect.
+/// @threshold [s] 0..5; chosen: longer than the noise, shorter than a motion
 constexpr double kWindow = 0.3;
 
 class TorqueLimit final : public Effect {
@@ -78,9 +79,9 @@ class TorqueLimit final : public Effect {
     return powers;
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kPump || index != at) return false;
+    if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd demand = smooth_demand(log, at);
     if (demand.size() == 0) return false;
     const Eigen::VectorXd flow = pump_flow(log, at);

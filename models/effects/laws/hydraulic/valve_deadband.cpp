@@ -55,9 +55,9 @@ class ValveDeadband final : public Effect {
     }
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kFlow || index != at) return false;
+    if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
     if (command.size() == 0) return false;
     const SectionFit fit = fit_dead_bands(log, at);

@@ -61,16 +61,22 @@ class ValveLag final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kFlow || index != at) return false;
+    if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     // Inside a dead band that the model contains the command has no flow that could be delayed.
     const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
     if (command.size() == 0) return false;
+    /// Value of the form above which the lag is a pure delay.
+    /// @threshold [1] 0.5..1; derived: the grid's values are 0, 0.5 and 1
+    constexpr double kDelayFrom = 0.75;
+    /// Value of the form below which the lag is of first order.
+    /// @threshold [1] 0..0.5; derived: the grid's values are 0, 0.5 and 1
+    constexpr double kFirstOrderTo = 0.25;
     const auto late = [&](const Eigen::VectorXd& x) {
-      if (shape[1] > 0.75) return delayed(log, x, shape[0]);
-      if (shape[1] < 0.25) return first_order_lag(log, x, shape[0]);
+      if (shape[1] > kDelayFrom) return delayed(log, x, shape[0]);
+      if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
     };
     // The gains are fitted to the delayed command; fitted to the command itself they would be biased towards zero.

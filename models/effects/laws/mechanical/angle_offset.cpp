@@ -57,13 +57,13 @@ class AngleOffset final : public Effect {
     joint.origin = joint.origin * Eigen::AngleAxisd(p[0], joint.axis);
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kFlow) {
-      return Effect::columns(log, kind, index, at, shape, columns);
+    if (measured.kind != EvidenceKind::kFlow) {
+      return Effect::columns(log, measured, at, shape, columns);
     }
     const Machine& machine = *log.machine;
-    if (machine.cylinders[static_cast<std::size_t>(index)].joint != at) return false;
+    if (machine.cylinders[static_cast<std::size_t>(measured.index)].joint != at) return false;
     // The measured rod speed is dx/dq at the logged angle times dq/dt: the true speed less d2x/dq2 offset dq/dt.
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
@@ -71,7 +71,7 @@ class AngleOffset final : public Effect {
       columns(k, 0) = std::numeric_limits<double>::quiet_NaN();
       if (!std::isfinite(q)) continue;
       try {
-        columns(k, 0) = -linkage_rates(machine, index, q).d2 * log.qd(k, at);
+        columns(k, 0) = -linkage_rates(machine, measured.index, q).d2 * log.qd(k, at);
       } catch (const std::domain_error&) {
         continue;  // The four-bar cannot close at this angle.
       }

@@ -8,6 +8,7 @@ namespace sparflow {
 namespace {
 
 /// [-] Sine of 20 degrees, within which an axis counts as horizontal, so that a crane on a slope has a luffing joint.
+/// @threshold [1] 0..1; chosen: the steepest slope on which a crane works
 constexpr double kHorizontal = 0.35;
 
 Eigen::Vector3d luffing_axis(const Machine& machine, int joint) {

@@ -39,6 +39,7 @@ Range length_range(const Machine& machine, int cylinder) {
 }
 
 /// [-] Cushion lengths to search, by stroke: cushions take a few per cent of it, soft stops more.
+/// @threshold [1] 0.005..0.5; chosen: steps of a factor of 1.6
 constexpr double kShares[] = {0.02, 0.035, 0.06, 0.10, 0.15};
 
 class EndCushion final : public Effect {
@@ -109,12 +110,18 @@ class EndCushion final : public Effect {
       std::vector<double> zones;
       for (const double share : kShares) {
         const double zone = std::clamp(share * stroke, 0.01, 0.9 * stroke);
-        if (std::min(above, below) < 0.7 * zone) zones.push_back(zone);
+        /// Share of a cushion's length up to which the log must come to the stop.
+        /// @threshold [1] 0..1; chosen: a force seen only at the cushion's edge gives no law
+        constexpr double kReached = 0.7;
+        if (std::min(above, below) < kReached * zone) zones.push_back(zone);
       }
       return zones;
     }
+    /// Share of the longest cushion up to which the log must come to a stop.
+    /// @threshold [1] 0..1; chosen: a force seen only at the cushion's edge gives no law
+    constexpr double kReachedOfLongest = 0.7;
     const double zone = kShares[std::size(kShares) - 1] * stroke;
-    const bool up = above < 0.7 * zone, down = below < 0.7 * zone;
+    const bool up = above < kReachedOfLongest * zone, down = below < kReachedOfLongest * zone;
     if (up && down) return {0.0, 1.0, -1.0};
     if (up) return {1.0};
     return down ? std::vector<double>{-1.0} : std::vector<double>{};

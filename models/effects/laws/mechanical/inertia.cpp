@@ -7,6 +7,7 @@ namespace {
 
 /// [-] Masses are known to a few per cent and inertias to a factor; a scale below an eighth has another cause (a
 /// structure that oscillates).
+/// @threshold [1] 0..1; chosen: a structure that oscillates explains smaller scales
 constexpr double kLeastShare = 0.125;
 
 class Inertia final : public Effect {

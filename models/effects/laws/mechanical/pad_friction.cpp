@@ -8,6 +8,7 @@ namespace sparflow {
 namespace {
 
 /// [N m] This rounds |moment| where the moment changes sign; moments are of the order of kN m.
+/// @threshold [N m] 0..1000; numerical: a per cent of usual moments
 constexpr double kRounding = 10.0;
 
 /// Distance of a sliding joint's frame from its parent's; the guide lies somewhere along it. [m]
@@ -106,7 +107,10 @@ class PadFriction final : public Effect {
   std::vector<double> grid(const MachineSeries& log, int at, int) const override {
     const int joint = log.machine->cylinders[static_cast<std::size_t>(at)].joint;
     const double length = guide_length(*log.machine, joint);
-    if (length < 0.05) return {0.0};
+    /// Length of a guide below which its place is not searched.
+    /// @threshold [m] 0..1; chosen: the pads' lever then changes by less than their own length
+    constexpr double kShortestGuide = 0.05;
+    if (length < kShortestGuide) return {0.0};
     return {0.0, 0.25 * length, 0.5 * length, 0.75 * length, length};
   }
 

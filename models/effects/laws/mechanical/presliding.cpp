@@ -50,9 +50,9 @@ class Presliding final : public Effect {
   }
   SPARFLOW_EFFECT_LAW(add_force)
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int at,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kForce || index != at) return false;
+    if (measured.kind != EvidenceKind::kForce || measured.index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     columns.setZero(log.samples(), 1);
     for (const auto& [first, last] : log.runs) {

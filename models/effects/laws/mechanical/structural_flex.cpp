@@ -139,9 +139,9 @@ class StructuralFlex final : public Effect {
     }
   }
 
-  bool columns(const MachineSeries& log, EvidenceKind kind, int index, int,
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (kind != EvidenceKind::kForce) return false;
+    if (measured.kind != EvidenceKind::kForce) return false;
     const Machine& machine = *log.machine;
     const int first = first_luffing_joint(machine);
     columns.setConstant(log.samples(), 2, std::numeric_limits<double>::quiet_NaN());
@@ -178,7 +178,7 @@ class StructuralFlex final : public Effect {
           const double p[] = {c == 0 ? kappa : 0.0, c == 1 ? kappa : 0.0, shape[0]};
           std::fill(out.begin(), out.end(), 0.0);
           add_bent<double>(statics, instant, p, out);
-          columns(k, c) = out[static_cast<std::size_t>(index)] / kappa;
+          columns(k, c) = out[static_cast<std::size_t>(measured.index)] / kappa;
         }
       } catch (const std::domain_error&) {
         columns.row(k).setConstant(std::numeric_limits<double>::quiet_NaN());

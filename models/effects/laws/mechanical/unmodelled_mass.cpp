@@ -56,7 +56,10 @@ Eigen::Vector3d link_direction(const Machine& machine, int joint) {
                       : machine.tip.joint == joint ? machine.tip.xyz
                                                    : Eigen::Vector3d::Zero().eval();
   const Joint& own = machine.joints[static_cast<std::size_t>(joint)];
-  if (d.norm() < 1e-6)
+  /// Distance of the tip from the joint up to which it gives no direction.
+  /// @threshold [m] 0..1e-2; numerical: rounding of the file's numbers
+  constexpr double kNoLever = 1e-6;
+  if (d.norm() < kNoLever)
     d = own.type == JointType::kPrismatic ? own.axis : Eigen::Vector3d::UnitX().eval();
   return d.normalized();
 }

@@ -27,7 +27,7 @@ class FlowEffects : public ::testing::Test {
   MatrixXd columns(const std::string& id, int cylinder, int at,
                    const std::vector<double>& shape = {}) const {
     MatrixXd c;
-    EXPECT_TRUE(effect_named(id).columns(log, EvidenceKind::kFlow, cylinder, at, shape, c)) << id;
+    EXPECT_TRUE(effect_named(id).columns(log, {EvidenceKind::kFlow, cylinder}, at, shape, c)) << id;
     return c;
   }
   double residual(const MatrixXd& x, const VectorXd& y) const {
@@ -206,10 +206,10 @@ TEST_F(FlowEffects, ActOnHydraulicCylindersAndNeedACommand) {
   for (const char* id : {"valve_deadband", "valve_lag", "leakage", "compressibility"}) {
     EXPECT_EQ(effect_named(id).places(machine), (std::vector<int>{0, 1})) << id;
     MatrixXd c;
-    EXPECT_FALSE(effect_named(id).columns(log, EvidenceKind::kForce, 0, 0,
+    EXPECT_FALSE(effect_named(id).columns(log, {EvidenceKind::kForce, 0}, 0,
                                           std::vector<double>{0.1, 0.0}, c));
-    EXPECT_FALSE(
-        effect_named(id).columns(log, EvidenceKind::kFlow, 1, 0, std::vector<double>{0.1, 0.0}, c));
+    EXPECT_FALSE(effect_named(id).columns(log, {EvidenceKind::kFlow, 1}, 0,
+                                          std::vector<double>{0.1, 0.0}, c));
   }
   Machine dry = machine;
   dry.cylinders[0].bore = 0.0;
@@ -217,8 +217,8 @@ TEST_F(FlowEffects, ActOnHydraulicCylindersAndNeedACommand) {
   log.cylinders[0].command.resize(0);
   MatrixXd c;
   for (const char* id : {"valve_deadband", "valve_lag", "flow_saturation"}) {
-    EXPECT_FALSE(
-        effect_named(id).columns(log, EvidenceKind::kFlow, 0, 0, std::vector<double>{0.1, 0.0}, c))
+    EXPECT_FALSE(effect_named(id).columns(log, {EvidenceKind::kFlow, 0}, 0,
+                                          std::vector<double>{0.1, 0.0}, c))
         << id;
   }
 }

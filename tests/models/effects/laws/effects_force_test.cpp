@@ -60,10 +60,10 @@ MachineSeries swinging_log(const Machine& machine, double payload = 300.0) {
 }
 
 /// The static force of a machine with an effect's masses, gravity or angles.
-VectorXd changed_force(const Machine& machine, const Effect& e, int at, std::vector<double> p,
-                       const VectorXd& q, double payload) {
+VectorXd changed_force(const Machine& machine, const AppliedEffect& e, const VectorXd& q,
+                       double payload) {
   Machine changed = machine;
-  e.change_machine(changed, at, p);
+  e.effect->change_machine(changed, e.at, e.values);
   return static_force<double>(changed, q, payload);
 }
 
@@ -197,13 +197,15 @@ TEST(MachineEffects, EqualTheMachineTheyDescribe) {
   const auto near = [](const VectorXd& a, const VectorXd& b) {
     return (a - b).norm() < 1e-9 * (1.0 + b.norm());
   };
-  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {37.0, 0.02}, q, payload),
-                   static_force<double>(machine, q, 1.02 * payload + 37.0)));
-  EXPECT_TRUE(near(changed_force(machine, effect("payload_error"), -1, {0.0, 0.02}, q, payload),
-                   static_force<double>(machine, q, 1.02 * payload)));
+  EXPECT_TRUE(
+      near(changed_force(machine, {&effect("payload_error"), -1, {37.0, 0.02}, {}, {}}, q, payload),
+           static_force<double>(machine, q, 1.02 * payload + 37.0)));
+  EXPECT_TRUE(
+      near(changed_force(machine, {&effect("payload_error"), -1, {0.0, 0.02}, {}, {}}, q, payload),
+           static_force<double>(machine, q, 1.02 * payload)));
   VectorXd turned = q;
   turned[2] += 0.02;
-  EXPECT_TRUE(near(changed_force(machine, effect("angle_offset"), 2, {0.02}, q, payload),
+  EXPECT_TRUE(near(changed_force(machine, {&effect("angle_offset"), 2, {0.02}, {}, {}}, q, payload),
                    static_force<double>(machine, turned, payload)));
   // The boom is the first luffing joint: a tilt of the base equals an angle of the boom except for the linkage.
   const Machine crane = test_support::loader_crane();
@@ -222,7 +224,7 @@ TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
   const MachineSeries log = swinging_log(machine);
   const Effect& e = effect("angle_offset");
   MatrixXd column;
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kFlow, 0, 0, {}, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kFlow, 0}, 0, {}, column));
   const double offset = 1e-5;
   for (Index k = 0; k < log.samples(); k += 20) {
     // The computed speed is dx/dq(q) qd, the true one dx/dq(q + offset) qd.
@@ -231,7 +233,7 @@ TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
                  right = linkage_rates(machine, 0, q + offset).d1 * qd;
     EXPECT_NEAR(column(k, 0) * offset, wrong - right, 1e-3 * std::abs(wrong - right) + 1e-12);
   }
-  EXPECT_FALSE(e.columns(log, EvidenceKind::kFlow, 1, 0, {}, column));
+  EXPECT_FALSE(e.columns(log, {EvidenceKind::kFlow, 1}, 0, {}, column));
 }
 
 // --- over the registry ---------------------------------------------------------------------------------------
@@ -302,7 +304,7 @@ TEST(ForceEffects, ZeroParametersChangeNothing) {
         EXPECT_EQ(added(*e, s, at, p).norm(), 0.0) << e->info().id;
         if (!e->changes_machine()) continue;
         const VectorXd same =
-            changed_force(machine, *e, at, p, x.head(machine.joint_count()), 250.0);
+            changed_force(machine, {e.get(), at, p, {}, {}}, x.head(machine.joint_count()), 250.0);
         EXPECT_LT((same - force).norm(), 1e-9 * (1.0 + force.norm())) << e->info().id;
       }
     }
@@ -328,14 +330,14 @@ TEST(ForceEffects, ColumnsAreTheLaw) {
         for (int i = 0; i < machine.cylinder_count(); ++i) {
           SCOPED_TRACE(machine.name + " " + info.id + " " + std::to_string(at));
           MatrixXd columns;
-          const bool shows = e->columns(log, EvidenceKind::kForce, i, at, shape, columns);
+          const bool shows = e->columns(log, {EvidenceKind::kForce, i}, at, shape, columns);
           double worst = 0.0, largest = 0.0;
           for (Index k = 0; k < log.samples(); k += 7) {
             const VectorXd q = log.q.row(k).transpose();
             const VectorXd x = stacked(q, log.qd.row(k).transpose(), log.qdd.row(k).transpose());
             const VectorXd law =
                 e->changes_machine()
-                    ? VectorXd(changed_force(machine, *e, at, p, q, log.payload[k]) -
+                    ? VectorXd(changed_force(machine, {e.get(), at, p, {}, {}}, q, log.payload[k]) -
                                static_force<double>(machine, q, log.payload[k]))
                     : added(*e, instant_at(machine, x, log.payload[k]), at, p);
             double sum = 0.0;
@@ -367,8 +369,9 @@ TEST(Presliding, ReversalBuildsUpOverItsDistance) {
       2.0, 0.01, 0.0);
   MatrixXd column;
   const double distance = 4e-3;
-  ASSERT_TRUE(effect("presliding")
-                  .columns(log, EvidenceKind::kForce, 2, 2, std::vector<double>{distance}, column));
+  ASSERT_TRUE(
+      effect("presliding")
+          .columns(log, {EvidenceKind::kForce, 2}, 2, std::vector<double>{distance}, column));
   EXPECT_NEAR(column(99, 0), 1.0, 1e-9);  // 25 distances after the start
   for (int k = 1; k < 8; ++k) {           // exact: dz/dx = (sign - z)/distance from z = 1
     EXPECT_NEAR(column(100 + k, 0), -1.0 + 2.0 * std::exp(-1e-3 * k / distance), 1e-6);
@@ -384,22 +387,22 @@ TEST(PressureOffset, ShowsInForceChambersAndPump) {
   const Effect& e = effect("pressure_offset");
   const std::vector<double> a{1.0}, b{-1.0};
   MatrixXd column;
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, 0, 0, a, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, 0}, 0, a, column));
   EXPECT_DOUBLE_EQ(column(3, 0), machine.cylinders[0].area_piston());
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, 0, 0, b, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, 0}, 0, b, column));
   EXPECT_DOUBLE_EQ(column(3, 0), -machine.cylinders[0].area_rod());
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kSupplyExtend, 0, 0, a, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kSupplyExtend, 0}, 0, a, column));
   EXPECT_EQ(column(3, 0), 1.0);
   // The chamber whose sensor is right shows it only by way of the force (Evidence::columns).
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, a, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kReturnExtend, 0}, 0, a, column));
   EXPECT_EQ(column(3, 0), 0.0);
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kReturnExtend, 0, 0, b, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kReturnExtend, 0}, 0, b, column));
   EXPECT_EQ(column(3, 0), 1.0);
-  ASSERT_TRUE(e.columns(log, EvidenceKind::kPump, 0, 0, a, column));
+  ASSERT_TRUE(e.columns(log, {EvidenceKind::kPump, 0}, 0, a, column));
   for (Index k = 0; k < n; k += 5) {  // the demand follows the wrong measurement while extending
     EXPECT_EQ(column(k, 0), log.cylinders[0].direction[k] > 0 ? -1.0 : 0.0);
   }
-  EXPECT_FALSE(e.columns(log, EvidenceKind::kForce, 1, 0, a, column));
+  EXPECT_FALSE(e.columns(log, {EvidenceKind::kForce, 1}, 0, a, column));
 }
 
 /// With positions late by d, the difference between the true force and that of the logged pose determines d.
@@ -412,7 +415,7 @@ TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
       MatrixXd column;
       const std::vector<double> positions{delay, 1.0};
       ASSERT_TRUE(
-          effect("sensor_delay").columns(log, EvidenceKind::kForce, i, -1, positions, column));
+          effect("sensor_delay").columns(log, {EvidenceKind::kForce, i}, -1, positions, column));
       double xy = 0.0, xx = 0.0;
       for (Index k = 0; k < log.samples(); ++k) {
         if (!std::isfinite(column(k, 0))) continue;
@@ -454,8 +457,8 @@ TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
   for (int i = 0; i < 2; ++i) {
     double left = 0.0, by_one = 0.0, by_all = 0.0;
     MatrixXd alone, together;
-    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, one, alone));
-    ASSERT_TRUE(e.columns(log, EvidenceKind::kForce, i, -1, all, together));
+    ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, i}, -1, one, alone));
+    ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, i}, -1, all, together));
     for (Index k = 0; k + 10 < log.samples(); ++k) {  // samples after the end are not known
       const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
                                .static_force[static_cast<std::size_t>(i)];
@@ -468,7 +471,7 @@ TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
     EXPECT_GT(by_all, 0.1 * left) << i;
     MatrixXd speed;
     const bool own = machine.cylinders[static_cast<std::size_t>(i)].joint == joint;
-    EXPECT_EQ(e.columns(log, EvidenceKind::kFlow, i, -1, one, speed), own);
+    EXPECT_EQ(e.columns(log, {EvidenceKind::kFlow, i}, -1, one, speed), own);
   }
   const std::vector<double> grid = e.grid(log, -1, 1);
   EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
@@ -483,8 +486,9 @@ TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
   c.command.setZero(log.samples());
   c.command.tail(250).setConstant(0.5);  // step at 5 s
   MatrixXd column;
-  ASSERT_TRUE(effect("sensor_delay")
-                  .columns(log, EvidenceKind::kFlow, 0, -1, std::vector<double>{0.1, 1.0}, column));
+  ASSERT_TRUE(
+      effect("sensor_delay")
+          .columns(log, {EvidenceKind::kFlow, 0}, -1, std::vector<double>{0.1, 1.0}, column));
   EXPECT_EQ(column.topRows(220).cwiseAbs().maxCoeff(), 0.0);
   EXPECT_EQ(column.bottomRows(220).cwiseAbs().maxCoeff(), 0.0);
   EXPECT_GT(column.middleRows(250, 20).cwiseAbs().minCoeff(), 0.0);

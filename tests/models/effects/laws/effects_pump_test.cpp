@@ -60,8 +60,8 @@ TEST_F(PumpEffects, TankLineRaisesEveryReturnChamberThatMoves) {
 TEST_F(PumpEffects, TankLineIsRecoveredFromTheOthersFlow) {
   const double k = 8e-4 * kBarPerLpm2;
   MatrixXd c;
-  ASSERT_TRUE(
-      effect_named("return_back_pressure").columns(log, EvidenceKind::kReturnExtend, 0, -1, {}, c));
+  ASSERT_TRUE(effect_named("return_back_pressure")
+                  .columns(log, {EvidenceKind::kReturnExtend, 0}, -1, {}, c));
   const VectorXd& own = log.cylinders[0].return_flow;
   const VectorXd all = own + log.cylinders[1].return_flow;
   const VectorXd y =
@@ -84,7 +84,7 @@ TEST_F(PumpEffects, LineLossAddsToDemandOrToForce) {
   EXPECT_NEAR(force[0], a * loss, 1e-6);
   MatrixXd c;
   const double at_cylinder[] = {0.0};
-  ASSERT_TRUE(effect_named("line_loss").columns(log, EvidenceKind::kPump, 0, 1, at_cylinder, c));
+  ASSERT_TRUE(effect_named("line_loss").columns(log, {EvidenceKind::kPump, 0}, 1, at_cylinder, c));
   for (Index i = 0; i < log.samples(); ++i) {
     const double flow = log.pumps[0].leader[i] == 1 ? log.cylinders[1].flow[i] : 0.0;
     ASSERT_NEAR(c(i, 0), flow * flow, 1e-15);
@@ -111,9 +111,9 @@ TEST_F(PumpEffects, CounterbalanceOpensAtItsBalance) {
   MatrixXd c;
   const double lowers[] = {-1.0}, lifts[] = {1.0};
   EXPECT_FALSE(
-      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lifts, c));
+      effect_named("counterbalance").columns(log, {EvidenceKind::kSupplyRetract, 1}, 1, lifts, c));
   ASSERT_TRUE(
-      effect_named("counterbalance").columns(log, EvidenceKind::kSupplyRetract, 1, 1, lowers, c));
+      effect_named("counterbalance").columns(log, {EvidenceKind::kSupplyRetract, 1}, 1, lowers, c));
   for (Index i = 0; i < log.samples(); ++i) {
     const bool there = log.cylinders[1].direction[i] < 0;
     ASSERT_EQ(c(i, 0), there ? 1.0 : 0.0);
@@ -134,14 +134,14 @@ TEST_F(PumpEffects, ColdOilRaisesLossesAndTheReferenceTemperatureDoesNot) {
   log.oil.resize(0);
   MatrixXd c;
   const double beta[] = {0.03};
-  EXPECT_FALSE(effect_named("oil_temperature").columns(log, EvidenceKind::kPump, 0, -1, beta, c));
+  EXPECT_FALSE(effect_named("oil_temperature").columns(log, {EvidenceKind::kPump, 0}, -1, beta, c));
 }
 
 TEST_F(PumpEffects, OilTemperatureIsRecoveredFromTheReturnChamber) {
   MatrixXd c;
   const double beta[] = {0.03};
   ASSERT_TRUE(
-      effect_named("oil_temperature").columns(log, EvidenceKind::kReturnExtend, 0, -1, beta, c));
+      effect_named("oil_temperature").columns(log, {EvidenceKind::kReturnExtend, 0}, -1, beta, c));
   const VectorXd& own = log.cylinders[0].return_flow;
   const double full = 1.2e-3 * b / a;
   const VectorXd y =
@@ -158,7 +158,8 @@ TEST_F(PumpEffects, MarginGrowsWithTheWholeFlowButNotBelowStandby) {
   EXPECT_NEAR(out[0], k * q * q, 1e-6);
   EXPECT_NEAR(out[1], k * q * q, 1e-6);
   MatrixXd c;
-  ASSERT_TRUE(effect_named("flow_dependent_margin").columns(log, EvidenceKind::kPump, 0, 0, {}, c));
+  ASSERT_TRUE(
+      effect_named("flow_dependent_margin").columns(log, {EvidenceKind::kPump, 0}, 0, {}, c));
   const VectorXd flow = pump_flow(log, 0);
   for (Index i = 0; i < log.samples(); ++i) {
     ASSERT_NEAR(c(i, 0), log.pumps[0].leader[i] < 0 ? 0.0 : flow[i] * flow[i], 1e-15);
@@ -186,7 +187,7 @@ TEST_F(PumpEffects, PowerLimitIsRecoveredAndItsGridCoversTheLog) {
   }
   MatrixXd c;
   const double shape[] = {power};
-  ASSERT_TRUE(effect_named("torque_limit").columns(log, EvidenceKind::kPump, 0, 0, shape, c));
+  ASSERT_TRUE(effect_named("torque_limit").columns(log, {EvidenceKind::kPump, 0}, 0, shape, c));
   EXPECT_NEAR(scaled_least_squares(c, cut)[0], 1.0, 0.02);  // the demand is averaged over 0.3 s
   const std::vector<double> grid = effect_named("torque_limit").grid(log, 0, 0);
   ASSERT_FALSE(grid.empty());
