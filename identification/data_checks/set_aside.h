@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "identification/data_checks/bad_data.h"
-#include "identification/log/log.h"
 
 namespace sparflow {
 
