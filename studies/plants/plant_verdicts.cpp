@@ -1,5 +1,5 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
-// between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/plant_verdicts.md.
+// between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
 //   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [-v] [--json FILE]
 #include <fmt/format.h>
 
