@@ -32,7 +32,7 @@ void run(int argc, char** argv) {
 
   const Diagnosis result = diagnose(model, {load_log(path, model.machine)});
   for (const std::string& note : result.notes) fmt::print("note: {}\n", note);
-  for (const BadChannel& bad : result.bad) fmt::print("bad data: {}\n", bad.channel);
+  for (const BadChannel& bad : result.set_aside) fmt::print("set aside: {}\n", bad.channel);
   for (const auto& set : result.indistinguishable)
     fmt::print("not told apart by this log: {}\n", fmt::join(set, ", "));
   fmt::print("{}\nprobability of this evidence if nothing were missing: {}\n", result.headline(),

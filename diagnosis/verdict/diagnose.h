@@ -55,7 +55,6 @@ struct DiagnosedEffect {
 
 /// A part of the residual that neither model nor catalogue explains.
 struct Unexplained {
-  std::size_t channel = 0;  ///< index into Evidence::channels
   std::string stage, at;
   std::vector<std::string>
       depends_on;      ///< signals, strongest first; "time, 1.13 Hz" for a periodic one
@@ -65,6 +64,7 @@ struct Unexplained {
   std::string sentence;  ///< where and how large it is
   bool few_places =
       false;  ///< whether it is an isolated event, which an effect would explain (isolated_event.h)
+  std::size_t channel = 0;  ///< index into Evidence::channels
 };
 
 /// Thresholds by which a verdict follows from effects found and unmodelled structure.

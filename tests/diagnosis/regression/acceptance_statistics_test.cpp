@@ -226,8 +226,8 @@ class Ramp final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool columns_filtered() const override { return true; }  // no filter in a hand-made log
-  bool columns(const MachineSeries& log, EvidenceKind, int, int, std::span<const double> shape,
-               MatrixXd& columns) const override {
+  bool columns(const MachineSeries& log, const MeasuredQuantity&, int,
+               std::span<const double> shape, MatrixXd& columns) const override {
     columns = (log.time.array() / shape[0]).tanh().matrix();
     return true;
   }

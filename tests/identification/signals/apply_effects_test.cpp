@@ -98,7 +98,7 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
       const double force = chain.evaluate({&q, &qd, &qdd}, s.payload[k]).cylinders[0].total_force;
       difference = std::max(difference, std::abs(force - s.cylinders[0].model_force[k]));
       largest = std::max(
-          largest, std::abs(force - without.evaluate(&q, &qd, s.payload[k]).cylinders[0].force));
+          largest, std::abs(force - without.evaluate({&q, &qd}, s.payload[k]).cylinders[0].force));
     }
     // Rounding of forces of 10 kN; on logs flex is taken as proportional to its parameters, which is an approximation.
     EXPECT_LT(difference, info.id == "structural_flex" ? 5e-2 * largest : 1e-4) << key;
