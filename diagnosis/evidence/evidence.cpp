@@ -277,7 +277,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
         const VectorXd y =
             e.filter(log, EvidenceKind::kForce, c.force - e.known(log, EvidenceKind::kForce, i)) -
             c.static_force;
-        if (log < e.suspects) b.channel.raw.push_back(c.force - c.static_force);
+        b.channel.raw.resize(signals.size());
+        b.channel.raw[log] = c.force - c.static_force;
         for (const double f : c.static_force) {
           if (std::isfinite(f))
             b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
@@ -381,7 +382,8 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
           e.filter(log, EvidenceKind::kPump,
                    s.pressure - series.demand - e.known(log, EvidenceKind::kPump, p));
       b.add(log, signals[log]->usable && !signals[log]->edge, y, e.margins(log, p), 0);
-      if (log < e.suspects) b.channel.raw.push_back(s.pressure - series.demand);
+      b.channel.raw.resize(signals.size());
+      b.channel.raw[log] = s.pressure - series.demand;
       if (log < e.suspects) noise.add(s.pressure, gain_pressure[log]);
     }
     b.channel.index = p;

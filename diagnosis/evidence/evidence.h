@@ -32,7 +32,8 @@ struct EvidenceChannel {
   std::vector<NoiseBlock> blocks;    ///< stretches of motion
   std::vector<int> log;              ///< [blocks] index into Evidence::series
   std::vector<Eigen::Index> sample;  ///< [rows] sample index in that log
-  /// Force and pump channels, by suspect log: y before the filter [samples, SI], in which oscillations are searched.
+  /// Force and pump channels, by log: y before the filter [samples, SI], in which oscillations are searched; empty where
+  /// the log does not measure it.
   std::vector<Eigen::VectorXd> raw;
   /// Supply channels: change of the baseline with the measured force [rows, Pa/N]. An error of a pressure sensor also
   /// changes the measured force and thereby the baseline.

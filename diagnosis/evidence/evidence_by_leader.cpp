@@ -56,11 +56,11 @@ std::optional<Evidence> Evidence::with_leaders_of(std::span<const AppliedEffect>
     if (channel.kind != EvidenceKind::kPump) continue;
     const auto p = static_cast<std::size_t>(channel.index);
     channel.baseline.setZero(channel.rows(), series[0].machine->pumps[p].feeds.size() + 1);
-    for (std::size_t log = 0, seen = 0; log < series.size(); ++log) {
+    for (std::size_t log = 0; log < series.size(); ++log) {
       const PumpSeries& before = series[log].pumps[p];
       if (before.demand.size() == 0 || before.pressure.size() == 0) continue;
       const VectorXd less = before.demand - pumps[log][p].demand;
-      if (log < suspects && seen < channel.raw.size()) channel.raw[seen++] += less;
+      if (log < channel.raw.size() && channel.raw[log].size() > 0) channel.raw[log] += less;
       const VectorXd y = filter(log, channel.kind,
                                 less + known(log, channel.kind, channel.index) -
                                     out.known(log, channel.kind, channel.index));

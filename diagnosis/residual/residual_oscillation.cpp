@@ -20,7 +20,8 @@ constexpr double kNormalDeviation = 1.4826;
 Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel,
                                   const ResidualModelOptions& options) {
   Oscillation best;
-  for (std::size_t log = 0; log < channel.raw.size(); ++log) {
+  for (std::size_t log = 0; log < std::min(evidence.suspects, channel.raw.size()); ++log) {
+    if (channel.raw[log].size() == 0) continue;  // not measured there
     const MachineSeries& s = evidence.series[log];
     const auto half = static_cast<Index>(std::lround(options.oscillation_half_width / s.step));
     const auto longest = static_cast<Index>(std::lround(options.longest_lag / s.step)),

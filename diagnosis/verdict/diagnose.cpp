@@ -179,12 +179,14 @@ void search(const CraneModel& model, const DiagnoseOptions& options, const Searc
 std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, Diagnosis& d) {
   const std::vector<ResidualStructure> left = find_residual_structure(
       d.evidence, fit_with_other_powers(d, options.search.regression), options.residual);
+  const std::vector<bool> shared = shared_structure(d, left, options);
   std::vector<ResidualStructure> unmodelled;
   bool in_touched = false;
-  for (const ResidualStructure& l : left) {
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const ResidualStructure& l = left[i];
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
-    if (!exceeds_references(d, l.channel)) {
+    if (shared[i]) {
       d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
       continue;
     }

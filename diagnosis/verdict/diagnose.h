@@ -103,6 +103,11 @@ struct VerdictOptions {
   /// larger is no change.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double structure_false_alarm = 0.01;
+  /// RMS of a structure in the references, or of what they leave in that channel beyond the sensors' noise, over that of
+  /// a structure in the suspect logs, from which the latter may be shared.
+  /// @threshold [1] 0..; chosen: half of the squared error; a structure near the residual models' own limits is found in
+  /// one log and missed in the other
+  double shared_structure_ratio = 0.7;
   /// Searches with more effects that the references share.
   /// @threshold [1] 0..; chosen: each removes what the last one named in both; none needed more on the tuning plants
   int shared_turns = 3;

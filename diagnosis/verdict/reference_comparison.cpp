@@ -78,6 +78,22 @@ void move_channels(DiagnosedEffect& e, const Evidence& from, const Evidence& to)
   });
 }
 
+/// The same rows with references in the place of suspect logs, and these in theirs.
+Evidence references_first(const Evidence& evidence) {
+  Evidence out = evidence;
+  std::rotate(out.series.begin(),
+              out.series.begin() + static_cast<std::ptrdiff_t>(evidence.suspects),
+              out.series.end());
+  const auto suspects = static_cast<int>(evidence.suspects);
+  const auto references = static_cast<int>(evidence.series.size()) - suspects;
+  out.suspects = static_cast<std::size_t>(references);
+  for (EvidenceChannel& c : out.channels) {
+    for (int& log : c.log) log = log < suspects ? log + references : log - suspects;
+    if (!c.raw.empty()) std::rotate(c.raw.begin(), c.raw.begin() + suspects, c.raw.end());
+  }
+  return out;
+}
+
 bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
@@ -123,6 +139,30 @@ bool exceeds_references(const Diagnosis& d, std::size_t channel) {
   const double chance = 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
   return chance * static_cast<double>(d.evidence.channels.size()) <
          d.thresholds.structure_false_alarm;
+}
+
+std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
+                                   const DiagnoseOptions& options) {
+  std::vector<bool> shared(left.size(), false);
+  if (left.empty() || !d.evidence.has_reference()) return shared;
+  const std::vector<ResidualStructure> there =
+      find_residual_structure(references_first(d.evidence), d.search.final, options.residual);
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
+      return r.channel == left[i].channel &&
+             r.rms >= d.thresholds.shared_structure_ratio * left[i].rms;
+    });
+    const std::size_t channel = left[i].channel;
+    const double floor = d.evidence.channels[channel].noise_floor;
+    const double rms = reference_rms(d, channel);
+    // an oscillation is measured before the filter, so after it the residual limits it
+    const double here =
+        std::min(left[i].rms, suspect_rms(d.evidence, channel, d.search.final.residual[channel]));
+    const bool room = rms * rms - (std::isfinite(floor) ? floor * floor : 0.0) >=
+                      std::pow(d.thresholds.shared_structure_ratio * here, 2);
+    shared[i] = (found || room) && !exceeds_references(d, channel);
+  }
+  return shared;
 }
 
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {

@@ -3,6 +3,7 @@
 /// unexplained in both. Used by diagnose.cpp and its parts only.
 #include <optional>
 
+#include "diagnosis/residual/residual_model.h"
 #include "diagnosis/verdict/diagnose.h"
 
 namespace sparflow {
@@ -17,6 +18,12 @@ double reference_rms(const Diagnosis& d, std::size_t channel);
 /// Whether a channel's final residual is larger in the suspect logs than in the references: Welch's (1947) test on the
 /// logarithms of the blocks' mean squares. True where there is no reference to compare with.
 bool exceeds_references(const Diagnosis& d, std::size_t channel);
+
+/// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in
+/// the same channel by the same residual models, or leave about as much beyond the sensors' noise there, and the residual of the
+/// suspect logs is not larger (exceeds_references).
+std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
+                                   const DiagnoseOptions& options);
 
 /// Whether the references show a found effect as the suspect logs do, by profile likelihood with separate and with common
 /// linear parameters. An effect counts as the same where its difference is not significant or lies within the
