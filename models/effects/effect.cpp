@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include "models/effects/instant.h"
 #include "models/machine/static_force.h"
@@ -112,7 +113,7 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
                                                                      : log.machine->pump_count());
   std::vector<double> out(count), demand(static_cast<std::size_t>(log.machine->cylinder_count()));
   bool any = false;
-  for (Eigen::Index i = 0; i < n; ++i) {
+  const auto set_row = [&](Eigen::Index i) {
     fill_instant(log, i, instant);
     for (Eigen::Index k = 0; k < linear; ++k) {
       std::fill(out.begin(), out.end(), 0.0);
@@ -130,6 +131,15 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
       p[static_cast<std::size_t>(k)] = 0.0;
       columns(i, k) = out[static_cast<std::size_t>(measured.index)];
       any = any || columns(i, k) != 0.0;
+    }
+  };
+  for (Eigen::Index i = 0; i < n; ++i) {
+    try {
+      set_row(i);
+    } catch (const std::
+                 domain_error&) {  // the position is not known, or a four-bar does not close there
+      columns.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+      std::fill(p.begin(), p.begin() + linear, 0.0);
     }
   }
   return any;

@@ -228,6 +228,19 @@ TEST(Diagnose, ADriftingSensorIsNotInTheCatalogue) {
   }
 }
 
+TEST(Diagnose, APositionThatIsSetAsideForSecondsDoesNotStopTheLaws) {
+  HiddenCase logs = hidden_case(crane(), {}, {kSeed, kSeconds});
+  const auto q = std::find_if(logs.train.channels.begin(), logs.train.channels.end(),
+                              [](const Channel& c) { return c.signal == "q_jib"; });
+  ASSERT_NE(q, logs.train.channels.end());
+  const Eigen::Index from = logs.train.samples() / 3, count = logs.train.samples() / 5;
+  q->values.segment(from, count).setConstant(q->values[from]);  // stuck for twenty seconds
+  const Diagnosis d = diagnose(reference_model(), {logs.train}, {logs.reference});
+  ASSERT_EQ(d.set_aside.size(), 1u) << d.table();
+  EXPECT_EQ(d.set_aside.front().channel, "q_jib");
+  EXPECT_EQ(d.verdict, Verdict::kNone) << d.table();
+}
+
 TEST(Diagnose, ABrokenSensorIsSetAsideAndTheRestIsJudged) {
   for (const int law : {0, 1, 2}) {
     const HiddenCase logs =
