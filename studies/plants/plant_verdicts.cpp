@@ -161,7 +161,8 @@ void judge(const Diagnosis& d, const Machine& machine, const Hidden& hidden, Cas
   c.right = hidden.change != nullptr ? truth && !untrue : d.verdict == Verdict::kNone;
   if (d.verdict == Verdict::kUnknown && d.unexplained) c.answer += "? " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData && !d.set_aside.empty())
-    c.answer += "bad " + d.set_aside.front().channel + " " + bad_data_word(d.set_aside.front().kind);
+    c.answer +=
+        "bad " + d.set_aside.front().channel + " " + bad_data_word(d.set_aside.front().kind);
   (void)machine;
 }
 

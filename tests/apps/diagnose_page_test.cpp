@@ -153,7 +153,7 @@ TEST(DiagnosePage, HasAHeadlineForEveryVerdict) {
   d.verdict = Verdict::kBadData;
   d.unexplained.reset();
   d.set_aside = {{"pA_arm", BadDataKind::kStuck, 12.0, 15.0, 0.05, "It rests at 81.2 bar for 3 s",
-            "Check the cable"}};
+                  "Check the cable"}};
   EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("Check the cable"));
 }
 
