@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/cli/console.h"
+#include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/model_pages/simulation_page.h"

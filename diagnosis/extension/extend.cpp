@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "diagnosis/extension/refit_context.h"
+#include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -216,6 +217,13 @@ std::string stands_for(const DiagnosedEffect& e) {
                      e.key(), rivals);
 }
 
+/// The logs without what the data checks set aside, which takes part in no estimate.
+ExtendLogs without_faults(ExtendLogs logs, const std::vector<LogFault>& faults) {
+  for (const LogFault& f : faults)
+    logs.suspects[f.log] = without_bad_data(std::move(logs.suspects[f.log]), {f.channel});
+  return logs;
+}
+
 /// Why no effect is added after a diagnosis, as a phrase.
 std::string why_stopped(const Diagnosis& d) {
   switch (d.verdict) {
@@ -382,10 +390,11 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect, const Ex
 ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const ExtendOptions& options,
                      const SearchProgress& progress) {
   const auto start = Clock::now();
-  const RefitContext context(model, logs, options);
   // the machine stays while effects come, so what is seen of the logs and their faults serves every diagnosis
   const DiagnosisSignals signals =
       diagnosis_signals(model.machine, logs.suspects, logs.references, options.diagnose);
+  const ExtendLogs usable = without_faults(logs, signals.set_aside);
+  const RefitContext context(model, usable, options);
   // the number of rounds is unknown, so each advances by a share of the remaining progress
   double done = 0.0;
   const auto round = [&](double width) {
@@ -394,6 +403,8 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
     };
   };
   ExtendResult result;
+  for (const LogFault& f : signals.set_aside)
+    result.notes.push_back("set aside: " + bad_channel_sentence(f.channel));
   Judged current = context.as_it_is(model, result.notes, round(0.05));
   done = 0.05;
   const auto steps_left = [&] { return static_cast<int>(result.steps.size()) < options.max_steps; };

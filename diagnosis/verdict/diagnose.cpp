@@ -312,7 +312,7 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
     if (faults.empty() && jumps.empty()) continue;
     const Log usable = without_bad_data(logs[i], faults);
     if (!faults.empty()) out.suspects[i] = make_signals(machine, usable, options.signals);
-    out.set_aside.insert(out.set_aside.end(), faults.begin(), faults.end());
+    for (const BadChannel& b : faults) out.set_aside.push_back({i, b});
     if (jumps.empty()) continue;
     out.without_jumps.resize(logs.size());
     out.without_jumps[i] = make_signals(machine, without_bad_data(usable, jumps), options.signals);
@@ -330,7 +330,6 @@ Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& sign
                                    : diagnose_against_references(model, used, options, progress);
   };
   Diagnosis d = diagnosed(signals);
-  d.set_aside = signals.set_aside;
   // Jumps in a single channel may come from its sensor or from a late pump. They are physics when an effect explains
   // them, so the diagnosis ran with them first.
   const std::vector<LogFault> faults = sensor_faults(d, signals.jumps);
@@ -338,9 +337,9 @@ Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& sign
     DiagnosisSignals used = signals;
     for (const LogFault& f : faults) used.suspects[f.log] = signals.without_jumps[f.log];
     d = diagnosed(used);
-    d.set_aside = signals.set_aside;
-    for (const LogFault& f : faults) d.set_aside.push_back(f.channel);
   }
+  for (const auto* aside : {&signals.set_aside, &faults})
+    for (const LogFault& f : *aside) d.set_aside.push_back(f.channel);
   if (!d.set_aside.empty() && d.evidence.channels.empty()) d.verdict = Verdict::kBadData;
   return d;
 }

@@ -193,7 +193,7 @@ struct DiagnosisSignals {
   std::vector<MachineSignals> suspects;
   std::vector<MachineSignals> references = {};
   /// Faulty channels and stretches of the suspect logs, which `suspects` no longer contain.
-  std::vector<BadChannel> set_aside = {};
+  std::vector<LogFault> set_aside = {};
   /// Jumps, which may be physics: in the order of the logs; and the logs without them, empty where a log has none.
   std::vector<LogFault> jumps = {};
   std::vector<MachineSignals> without_jumps = {};

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <random>
 
 #include "diagnosis/selection/effect_estimate.h"
 #include "models/files/model_file.h"
@@ -211,6 +212,28 @@ TEST(Improve, AddsTheFrictionAndStops) {
   // its evidence still refers to an existing machine
   EXPECT_EQ(r.last->evidence.series.front().machine->name, "lift");
   EXPECT_EQ(r.model.steps.back().stopped_because, r.stopped_because);
+}
+
+TEST(Improve, WhatTheDataChecksSetAsideTakesPartInNoEstimate) {
+  ExtendLogs logs = logs_with_friction();
+  Eigen::VectorXd& pressure = testing_support::channel(logs.suspects[0], "pA_arm").values;
+  const Eigen::Index from = pressure.size() / 2, count = pressure.size() / 10;
+  // a loose shield: noise of 10 bar in a tenth of the log
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal(0.0, 10e5);
+  for (Eigen::Index k = from; k < from + count; ++k) pressure[k] += normal(random);
+  const ExtendResult r = improve(ignorant_model(), logs);
+  EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("set aside: pA_arm")));
+  const ExtendResult sound = improve(ignorant_model(), logs_with_friction());
+  ASSERT_EQ(r.model.effects.size(), sound.model.effects.size()) << r.stopped_because;
+  for (std::size_t i = 0; i < sound.model.effects.size(); ++i) {
+    const AppliedEffect &with = r.model.effects[i], &without = sound.model.effects[i];
+    EXPECT_EQ(with.effect, without.effect);
+    // a tenth of the log less, so that the estimates differ by a part of their own intervals
+    for (std::size_t k = 0; k < without.values.size(); ++k)
+      EXPECT_NEAR(with.values[k], without.values[k],
+                  0.5 * (without.upper95[k] - without.lower95[k]));
+  }
 }
 
 TEST(Improve, AddsNothingWhereNothingIsMissing) {
