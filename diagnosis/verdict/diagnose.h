@@ -108,9 +108,13 @@ struct VerdictOptions {
   /// @threshold [1] 0..; chosen: half of the squared error; a structure near the residual models' own limits is found in
   /// one log and missed in the other
   double shared_structure_ratio = 0.7;
-  /// Searches with more effects that the references share.
-  /// @threshold [1] 0..; chosen: each removes what the last one named in both; none needed more on the tuning plants
-  int shared_turns = 3;
+  /// Probability, over all effects found together, with which an effect is taken for a change although its size differs
+  /// from that in the references no more than from motion to motion.
+  /// @threshold [1] 0..1; chosen: one log in a hundred
+  double difference_false_alarm = 0.01;
+  /// Searches in which an effect that the references share joins what acts in all logs.
+  /// @threshold [1] 1..; chosen: each removes what the last one named in both; plants of the simulator need up to six
+  int shared_turns = 10;
   /// Factor by which an effect must reduce a channel's error for that to be stated as evidence.
   /// @threshold [1] 1..; chosen: two percent; a smaller change is no evidence to a reader.
   double least_reduction = 1.02;

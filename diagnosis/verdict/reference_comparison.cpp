@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/regression/size_by_logs.h"
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/nan.h"
@@ -16,6 +17,7 @@ namespace sparflow {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Mean and variance of the mean of the logarithms of the blocks' mean squares.
@@ -94,6 +96,15 @@ Evidence references_first(const Evidence& evidence) {
   return out;
 }
 
+/// Whether both have the same nonlinear parameters and therefore proportional columns.
+bool same_shape(const AppliedEffect& a, const FoundEffect& b) {
+  std::vector<double> shape;
+  const std::vector<EffectParameter>& parameters = a.effect->info().parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p)
+    if (!parameters[p].linear) shape.push_back(a.values[p]);
+  return shape == b.design.shape;
+}
+
 bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
@@ -165,17 +176,12 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
   return shared;
 }
 
-InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
+                           const SearchOptions& options) {
   const EffectDesign& suspect = d.search.found[found].design;
-  const EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
-  if (!reference.acts()) return InReferences::kNot;
-  EffectDesign all = suspect;
-  double rows = 2.0;
-  for (std::size_t c = 0; c < all.columns.size(); ++c) {
-    if (reference.columns[c].cols() > 0) all.columns[c] += reference.columns[c];
-    if (all.columns[c].cols() > 0)
-      rows = std::max(rows, static_cast<double>(all.columns[c].rows()));
-  }
+  EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
+  if (shared)
+    for (MatrixXd& m : reference.columns) m.resize(0, 0);
   std::vector<const EffectDesign*> others;
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     if (i != found) others.push_back(&d.search.found[i].design);
@@ -184,32 +190,44 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
     designs.insert(designs.end(), more);
     return fit_effects(d.evidence, designs, &d.search.final, {});
   };
-  const EffectFit apart = fit({&suspect, &reference});
-  const double alone = fit({&suspect}).total(), alike = fit({&all}).total();
-  const double least =
-      options.least_gain + 0.5 * static_cast<double>(suspect.linear) * std::log(rows);
-  const VectorXd in_suspects =
-                     apart.theta.segment(apart.theta.size() - 2 * suspect.linear, suspect.linear),
-                 in_reference = apart.theta.tail(suspect.linear);
-  double change = 0.0, shared = 0.0;
-  for (const Eigen::MatrixXd& m : suspect.columns) {
+  const bool both = reference.acts();
+  const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
+  const Index first = apart.theta.size() - (both ? 2 : 1) * suspect.linear;
+  const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
+  const SizeByLogs sizes = size_by_logs(d.evidence, suspect, reference, in_suspects, others, apart);
+  // two-sided, Bonferroni's bound over the effects found
+  const auto significant = [&](double z) {
+    return std::erfc(std::abs(z) / std::numbers::sqrt2) *
+               static_cast<double>(d.search.found.size()) <
+           d.thresholds.difference_false_alarm;
+  };
+  if (tracing()) {
+    const auto in = [](const SizeInLogs& s) {
+      return fmt::format("{:.3g} +- {:.2g} in {} blocks", s.size, s.standard_error, s.blocks);
+    };
+    fmt::print(
+        stderr, "  {}{}: size {}, in the references {}, variation {:.2g}, difference {:.3g}\n",
+        shared ? "change of " : "",
+        effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
+        in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
+  }
+  if (shared) return significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries;
+  const SizeInLogs &here = sizes.suspects, &there = sizes.references;
+  if (here.blocks > 0 && !significant(here.size / here.standard_error))
+    return InReferences::kVaries;
+  if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
+    return InReferences::kNot;
+  const VectorXd in_reference = apart.theta.tail(suspect.linear);
+  double change = 0.0, common = 0.0;
+  for (const MatrixXd& m : suspect.columns) {
     if (m.cols() == 0) continue;
     change += (m * (in_suspects - in_reference)).squaredNorm() / m.squaredNorm();
-    shared += (m * in_reference).squaredNorm() / m.squaredNorm();
+    common += (m * in_reference).squaredNorm() / m.squaredNorm();
   }
   const double form = form_share(*suspect.effect.effect, options.regression);
-  if (tracing()) {
-    fmt::print(
-        stderr,
-        "  {} in the references: apart {:.1f}, alike {:.1f}, suspects alone {:.1f}; suspects "
-        "[{:.4g}] references [{:.4g}]\n",
-        effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
-        apart.total(), alike, alone, fmt::join(in_suspects, " "), fmt::join(in_reference, " "));
-  }
-  const bool differs =
-      apart.total() - alike > least && std::sqrt(change) > form * std::sqrt(shared);
-  if (!differs) return alike >= alone ? InReferences::kAlike : InReferences::kNot;
-  return apart.total() - alone > least ? InReferences::kOther : InReferences::kNot;
+  if (!significant(sizes.difference()) || std::sqrt(change) <= form * std::sqrt(common))
+    return InReferences::kAlike;
+  return significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot;
 }
 
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
@@ -232,25 +250,32 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
   for (const FoundEffect& f : before.search.found) add(applied_of(f));
   std::vector<std::pair<DiagnosedEffect, Evidence>> lacking;
   for (const DiagnosedEffect& e : before.effects) lacking.emplace_back(e, before.evidence);
+  if (now.candidates.empty()) now.candidates = candidates(model.machine);
   Diagnosis d;
-  for (int turn = 0;; ++turn) {
+  for (int turn = 0; turn < now.verdict.shared_turns; ++turn) {
     d = diagnose_sound(with, signals, now, part(0.4, 1.0));
-    if (turn == now.verdict.shared_turns) break;
-    bool more = false;
+    bool again = false;
     for (std::size_t i = 0; i < d.search.found.size(); ++i) {
       const FoundEffect& f = d.search.found[i];
-      const bool known =
-          std::any_of(now.evidence.shared.begin(), now.evidence.shared.end(),
-                      [&](const AppliedEffect& e) { return same_place(e, f.design.effect); });
-      if (known || in_references(d, i, now.search) != InReferences::kAlike) continue;
+      const bool shared = std::any_of(now.evidence.shared.begin(), now.evidence.shared.end(),
+                                      [&](const AppliedEffect& e) {
+                                        return same_place(e, f.design.effect) && same_shape(e, f);
+                                      });
+      const InReferences there = in_references(d, i, shared, now.search);
+      if (there != InReferences::kAlike && there != InReferences::kVaries) continue;
+      again = true;
+      if (shared) {
+        std::erase(now.candidates, f.design.effect);
+        continue;
+      }
       add(applied_of(f));
       const auto described =
           std::find_if(d.effects.begin(), d.effects.end(),
                        [&](const DiagnosedEffect& e) { return e.effect == f.design.effect; });
-      if (described != d.effects.end()) lacking.emplace_back(*described, d.evidence);
-      more = true;
+      if (described != d.effects.end() && there == InReferences::kAlike)
+        lacking.emplace_back(*described, d.evidence);
     }
-    if (!more) break;
+    if (!again) break;
   }
   for (DiagnosedEffect& e : d.effects)
     e.change = std::any_of(with.effects.begin(), with.effects.end(),

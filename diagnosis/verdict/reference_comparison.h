@@ -25,11 +25,17 @@ bool exceeds_references(const Diagnosis& d, std::size_t channel);
 std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
                                    const DiagnoseOptions& options);
 
-/// Whether the references show a found effect as the suspect logs do, by profile likelihood with separate and with common
-/// linear parameters. An effect counts as the same where its difference is not significant or lies within the
-/// model-form error of its law, which depends on the motion.
-enum class InReferences { kNot, kOther, kAlike };
-InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options);
+/// How a found effect appears in the references. Its size is compared by a random-effects model (size_by_logs.h): a law that
+/// is not exact has another size in every motion, and only a difference beyond that is a change.
+enum class InReferences {
+  kNot,    ///< not there, or the references cannot tell
+  kOther,  ///< there with another size
+  kAlike,  ///< not significantly different, or within the model-form error of its law
+  kVaries  ///< its size in the suspect logs is not even significant beside its variation from motion to motion
+};
+/// @param shared whether the same columns act in all logs already, so that the effect found is a difference
+InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
+                           const SearchOptions& options);
 
 /// Diagnosis of suspect logs against references, in three steps: what the model lacks in the references alone; the
 /// difference of the suspect logs, with those effects estimated in all logs; and again, where an effect that was found

@@ -6,13 +6,45 @@
 namespace sparflow {
 
 Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double tau) {
+  return first_order_lag(log, x, tau, tau);
+}
+
+Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double rising,
+                                double falling) {
   Eigen::VectorXd y = x;
   for (const auto& [first, last] : log.runs) {
     for (Eigen::Index i = first + 1; i < last; ++i) {
       if (!std::isfinite(y[i - 1])) continue;  // Without a value before, the run starts here.
-      const double keep = std::exp(-(log.time[i] - log.time[i - 1]) / tau);
       const double target = std::isfinite(x[i]) ? x[i] : y[i - 1];
+      // y approaches a constant target from one side.
+      const double tau = target > y[i - 1] ? rising : falling;
+      const double keep = std::exp(-(log.time[i] - log.time[i - 1]) / tau);
       y[i] = target + keep * (y[i - 1] - target);
+    }
+  }
+  return y;
+}
+
+Eigen::VectorXd second_order_lag(const MachineSeries& log, const Eigen::VectorXd& x,
+                                 double frequency, double damping) {
+  const double decay = damping * frequency;
+  const double swing = frequency * std::sqrt(1.0 - damping * damping);
+  Eigen::VectorXd y = x;
+  for (const auto& [first, last] : log.runs) {
+    double slope = 0.0, target = first < last ? x[first] : 0.0;
+    for (Eigen::Index i = first + 1; i < last; ++i) {
+      if (!std::isfinite(y[i - 1])) {  // Without a value before, the run starts here.
+        target = x[i];
+        continue;
+      }
+      if (std::isfinite(x[i])) target = x[i];
+      // e = y - target swings freely over the interval: e'' + 2 decay e' + frequency^2 e = 0.
+      const double dt = log.time[i] - log.time[i - 1];
+      const double keep = std::exp(-decay * dt), c = std::cos(swing * dt),
+                   s = std::sin(swing * dt) / swing;
+      const double e = y[i - 1] - target;
+      y[i] = target + keep * (e * (c + decay * s) + slope * s);
+      slope = keep * (slope * (c - decay * s) - e * frequency * frequency * s);
     }
   }
   return y;

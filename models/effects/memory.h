@@ -9,6 +9,17 @@ namespace sparflow {
 /// @param tau [s] > 0
 Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double tau);
 
+/// The same with a time constant of its own while y falls.
+/// @param rising, falling [s] > 0
+Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double rising,
+                                double falling);
+
+/// Solves y'' / w^2 + 2 d y' / w + y = x exactly for x constant over each interval, from y = x and y' = 0 at the start of
+/// every run. Where x is NaN, y follows its last value.
+/// @param frequency undamped natural frequency w [rad/s] > 0  @param damping ratio d, 0 < d < 1
+Eigen::VectorXd second_order_lag(const MachineSeries& log, const Eigen::VectorXd& x,
+                                 double frequency, double damping);
+
 /// x(t - delay), linear between samples; a run's first and last values continue beyond its ends.
 /// @param delay [s], of either sign
 Eigen::VectorXd delayed(const MachineSeries& log, const Eigen::VectorXd& x, double delay);

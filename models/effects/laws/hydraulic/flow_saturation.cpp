@@ -26,6 +26,17 @@ class FlowSaturation final : public Effect {
                         "share of the excess demand that is not delivered, about 1",
                         true,
                         {}},
+                       {"margin",
+                        "bar",
+                        units::kBar,
+                        0.0,
+                        60 * units::kBar,
+                        15 * units::kBar,
+                        "pressure difference over the metering edges that is lost with the flow",
+                        true,
+                        {},
+                        false,
+                        true},
                        {"limit",
                         "l/min",
                         units::kLitrePerMinute,
@@ -47,9 +58,11 @@ class FlowSaturation final : public Effect {
                         {0.0, 1.0},
                         true}},
         .equation =
-            "Q_i = Q_i(u) min(1, limit / sum of Q(u)), soft: (1 + (sum / limit)^12)^(-1/12)",
+            "Q_i = s Q_i(u), s = min(1, limit / sum of Q(u)), soft: (1 + (sum / "
+            "limit)^12)^(-1/12); "
+            "pump pressure - margin (1 - s^2)",
         .signals = {"commands", "position"},
-        .confused_with = {"torque_limit", "valve_deadband"},
+        .confused_with = {"torque_limit", "valve_deadband", "pump_lag"},
         .separated_by = "each cylinder alone at full command, then all together",
         .citation =
             "H. Murrenhoff (2011), Grundlagen der Fluidtechnik, Teil 1: Hydraulik (sections "
@@ -65,9 +78,11 @@ class FlowSaturation final : public Effect {
     }
     return found;
   }
-  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  std::vector<EvidenceKind> shows_in() const override {
+    return {EvidenceKind::kFlow, EvidenceKind::kPump};
+  }
   double flow_limit(const Machine&, int pump, int at, std::span<const double> p) const override {
-    return pump == at ? p[1] : std::numeric_limits<double>::infinity();
+    return pump == at ? p[2] : std::numeric_limits<double>::infinity();
   }
 
   std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const override {
@@ -83,14 +98,22 @@ class FlowSaturation final : public Effect {
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
-    if (measured.kind != EvidenceKind::kFlow || log.machine->pump_of_cylinder(measured.index) != at)
+    const bool pump = measured.kind == EvidenceKind::kPump;
+    if (pump ? measured.index != at
+             : measured.kind != EvidenceKind::kFlow ||
+                   log.machine->pump_of_cylinder(measured.index) != at)
       return false;
     const Demand demand(log, at, shape[0], shape.size() > 1 && shape[1] > 0.5);
     if (!demand.known) return false;
+    columns.setZero(log.samples(), 2);
+    if (pump) {
+      // An edge of constant opening carries s Q at s^2 of its pressure difference.
+      columns.col(1) = (demand.served.array().square() - 1.0).matrix();
+      return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
+    }
     const Eigen::VectorXd& command =
         log.cylinders[static_cast<std::size_t>(measured.index)].command;
     const SectionFit& fit = demand.fits[static_cast<std::size_t>(measured.index)];
-    columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       columns(k, 0) = fit.gain(command[k]) * command[k] * (demand.served[k] - 1.0);
     }

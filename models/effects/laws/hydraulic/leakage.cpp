@@ -14,27 +14,30 @@ class Leakage final : public Effect {
         .title = "internal leakage",
         .stage = EffectStage::kFlow,
         .place = EffectPlace::kCylinder,
-        .parameters =
-            {{"k",
-              "l/min per 100 bar",
-              units::kLitrePerMinute / (100 * units::kBar),
-              0.0,
-              20 * units::kLitrePerMinute / (100 * units::kBar),
-              0.5 * units::kLitrePerMinute / (100 * units::kBar),
-              "laminar leakage out of the chamber that holds the load",
-              true,
-              {}},
-             {"moving",
-              "-",
-              1.0,
-              0.0,
-              1.0,
-              0.0,
-              "0: past the closed spool, at rest only; 1: past the piston, in motion as well",
-              false,
-              {0.0, 1.0},
-              true}},
-        .equation = "dx/dt = Q_valve/A - sign(F) k p_load/A_hold, p_load = |F|/A_hold",
+        .parameters = {{"k",
+                        "l/min per 100 bar",
+                        units::kLitrePerMinute / (100 * units::kBar),
+                        0.0,
+                        20 * units::kLitrePerMinute / (100 * units::kBar),
+                        0.5 * units::kLitrePerMinute / (100 * units::kBar),
+                        "laminar leakage: out of the chamber that holds the load at rest, from A "
+                        "to B in motion",
+                        true,
+                        {}},
+                       {"moving",
+                        "-",
+                        1.0,
+                        0.0,
+                        2.0,
+                        0.0,
+                        "0: past the closed spool, at rest only; 1: past the piston, at rest as "
+                        "well; 2: past "
+                        "the piston with tight ports, in motion only",
+                        false,
+                        {0.0, 1.0, 2.0},
+                        true}},
+        .equation =
+            "at rest dx/dt = -F k/A_hold^2; in motion dx/dt = Q_valve/A - k (p_A - p_B)/A_supply",
         .signals = {"position", "command"},
         .confused_with = {"valve_deadband", "compressibility"},
         .separated_by = "holding a load at zero command for a minute, at two payloads",
@@ -55,14 +58,22 @@ class Leakage final : public Effect {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const auto i = static_cast<std::size_t>(at);
     const Cylinder& c = log.machine->cylinders[i];
-    const Eigen::VectorXd& force = carried_force(log.cylinders[i]);
-    const Eigen::VectorXi& direction = log.cylinders[i].direction;
+    const CylinderSeries& log_cylinder = log.cylinders[i];
+    const Eigen::VectorXd& force = carried_force(log_cylinder);
+    const Eigen::VectorXi& direction = log_cylinder.direction;
+    const bool chambers = log_cylinder.pressure_a.size() > 0 && log_cylinder.pressure_b.size() > 0;
+    const bool at_rest = shape[0]<1.5, in_motion = shape[0]> 0.5;
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
-      if (shape[0] < 0.5 && direction[k] != 0) continue;
-      const double area =
-          supply_area(c, force[k] > 0.0 ? 1 : -1);  // of the chamber that holds the load
-      columns(k, 0) = -force[k] / (area * area);
+      const double load_area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // holds the load
+      if (direction[k] == 0) {
+        if (at_rest) columns(k, 0) = -force[k] / (load_area * load_area);
+      } else if (in_motion) {
+        // The valve delivers into the supply chamber, from which or into which the oil passes the piston.
+        const double across = chambers ? log_cylinder.pressure_a[k] - log_cylinder.pressure_b[k]
+                                       : force[k] / load_area;
+        columns(k, 0) = -across / supply_area(c, direction[k]);
+      }
     }
     return true;
   }

@@ -1,0 +1,119 @@
+#include "diagnosis/regression/size_by_logs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/math/linear_algebra.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Size and information in one stretch of motion.
+struct BlockSize {
+  double size, information;
+};
+
+double weighted_mean(const std::vector<BlockSize>& blocks, double variance, double& weights) {
+  double sum = 0.0;
+  weights = 0.0;
+  for (const BlockSize& b : blocks) {
+    const double w = 1.0 / (1.0 / b.information + variance);
+    weights += w;
+    sum += w * b.size;
+  }
+  return weights > 0.0 ? sum / weights : 0.0;
+}
+
+/// Cochran's Q beyond its expectation and the factor of the variance in it.
+void add_moments(const std::vector<BlockSize>& blocks, double& excess, double& factor) {
+  if (blocks.size() < 2) return;
+  double weights = 0.0, squares = 0.0, q = 0.0;
+  const double mean = weighted_mean(blocks, 0.0, weights);
+  for (const BlockSize& b : blocks) {
+    squares += b.information * b.information;
+    q += b.information * std::pow(b.size - mean, 2);
+  }
+  excess += q - static_cast<double>(blocks.size() - 1);
+  factor += weights - squares / weights;
+}
+
+SizeInLogs effect_size(const std::vector<BlockSize>& blocks, double variance) {
+  SizeInLogs s;
+  s.blocks = static_cast<int>(blocks.size());
+  double weights = 0.0;
+  s.size = weighted_mean(blocks, variance, weights);
+  s.standard_error = weights > 0.0 ? 1.0 / std::sqrt(weights) : 0.0;
+  return s;
+}
+
+}  // namespace
+
+double SizeByLogs::difference() const {
+  if (suspects.blocks == 0 || references.blocks == 0) return 0.0;
+  return (suspects.size - references.size) /
+         std::hypot(suspects.standard_error, references.standard_error);
+}
+
+double SizeByLogs::mean() const {
+  double weights = 0.0, sum = 0.0;
+  for (const SizeInLogs* s : {&suspects, &references}) {
+    if (s->blocks == 0) continue;
+    const double w = 1.0 / (s->standard_error * s->standard_error);
+    weights += w;
+    sum += w * s->size;
+  }
+  return weights > 0.0 ? sum / std::sqrt(weights) : 0.0;
+}
+
+SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
+                        const EffectDesign& reference, const VectorXd& direction,
+                        const std::vector<const EffectDesign*>& others, const EffectFit& fit) {
+  std::vector<BlockSize> suspects, references;
+  double strongest = 0.0;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = evidence.channels[c];
+    VectorXd x = VectorXd::Zero(channel.rows());
+    if (suspect.touches(c)) x += suspect.columns[c] * direction;
+    if (reference.touches(c)) x += reference.columns[c] * direction;
+    if (x.isZero(0.0)) continue;
+    Index width = 1;
+    for (const EffectDesign* d : others) width += d->columns[c].cols();
+    MatrixXd columns(channel.rows(), width);
+    Index at = 0;
+    for (const EffectDesign* d : others) {
+      columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
+      at += d->columns[c].cols();
+    }
+    columns.col(at) = x;
+    const MatrixXd rows = whitened_rows(channel, fit.noise[c], columns);
+    const MatrixXd own = at > 0 ? without_projection(rows.rightCols(2), rows.leftCols(at))
+                                : MatrixXd(rows.rightCols(2));
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      const Index first = channel.blocks[b].first, length = channel.blocks[b].last - first;
+      const auto column = own.col(0).segment(first, length);
+      const double information = column.squaredNorm() / fit.noise[c].variance;
+      if (!(information > 0.0)) continue;
+      strongest = std::max(strongest, information);
+      const double size =
+          column.dot(own.col(1).segment(first, length)) / fit.noise[c].variance / information;
+      (static_cast<std::size_t>(channel.log[b]) < evidence.suspects ? suspects : references)
+          .push_back({size, information});
+    }
+  }
+  // A stretch in which the effect does not act has only what the projection left of the others, which is rounding.
+  constexpr double kRounding = 1e-9;
+  for (auto* blocks : {&suspects, &references})
+    std::erase_if(*blocks,
+                  [&](const BlockSize& b) { return b.information < kRounding * strongest; });
+  double excess = 0.0, factor = 0.0;
+  add_moments(suspects, excess, factor);
+  add_moments(references, excess, factor);
+  const double variance = factor > 0.0 ? std::max(0.0, excess / factor) : 0.0;
+  return {effect_size(suspects, variance), effect_size(references, variance), std::sqrt(variance)};
+}
+
+}  // namespace sparflow

@@ -1,0 +1,36 @@
+#pragma once
+/// Size of an effect in suspect and in reference logs, where it varies from motion to motion as no law is exact.
+#include <vector>
+
+#include "diagnosis/regression/effect_fit.h"
+
+namespace sparflow {
+
+/// Estimates of one group of logs by the random-effects model of DerSimonian and Laird (1986, Control. Clin. Trials 7,
+/// 177): size_b = size + u_b + e_b in every stretch of motion b, with e_b from the noise model and u_b of variance
+/// `variation`^2, which both groups have in common and their scatter tells.
+struct SizeInLogs {
+  double size = 0.0;  ///< [1] relative to the direction given
+  double standard_error = 0.0;
+  int blocks = 0;  ///< in which the effect acts
+};
+
+struct SizeByLogs {
+  SizeInLogs suspects, references;
+  double variation = 0.0;  ///< [1] standard deviation of the size between stretches of motion
+
+  /// Difference over its standard error; 0 where a group has no estimate.
+  double difference() const;
+  /// Mean of both groups over its standard error; 0 without any estimate.
+  double mean() const;
+};
+
+/// @param suspect, reference signatures of one effect in the suspect and in the reference logs
+/// @param direction linear parameters [SI] that have size one
+/// @param others effects that are estimated beside it, once for both groups
+/// @param fit its noise models weight the rows
+SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
+                        const EffectDesign& reference, const Eigen::VectorXd& direction,
+                        const std::vector<const EffectDesign*>& others, const EffectFit& fit);
+
+}  // namespace sparflow
