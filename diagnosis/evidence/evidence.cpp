@@ -150,6 +150,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     Eigen::MatrixXd raw;
     if (!effect.effect->columns(series[log], {channel.kind, channel.index}, effect.at, shape, raw))
       continue;
+    if (where != ActingLogs::kAll) subtract_shared(log, effect, shape, channel, raw);
     if (chord) {
       raw = effect_series({effect.effect, effect.at, {about[0]}, {}, {}}, series[log], channel.kind,
                           channel.index) /
@@ -185,6 +186,27 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   }
   if (result.size() > 0 && result.cwiseAbs().maxCoeff() == 0.0) return {};
   return result;
+}
+
+void Evidence::subtract_shared(std::size_t log, const EffectAt& effect,
+                               std::span<const double> shape, const EvidenceChannel& channel,
+                               Eigen::MatrixXd& columns) const {
+  for (const AppliedEffect& known : options.shared) {
+    if (known.effect != effect.effect || known.at != effect.at) continue;
+    std::vector<double> before;
+    bool on = false;  // a linear parameter that cannot be zero multiplies the whole law
+    const std::vector<EffectParameter>& parameters = known.effect->info().parameters;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (!parameters[p].linear) before.push_back(known.values[p]);
+      on = on || (parameters[p].linear && parameters[p].lower > 0.0);
+    }
+    Eigen::MatrixXd there;
+    const bool other = !std::equal(before.begin(), before.end(), shape.begin(), shape.end());
+    if (on && other &&
+        known.effect->columns(series[log], {channel.kind, channel.index}, known.at, before, there))
+      columns -= there;
+    return;
+  }
 }
 
 void Evidence::add_shared(EvidenceChannel& channel) const {

@@ -105,6 +105,11 @@ struct Evidence {
   }
   /// Sum of what the effects of the model add. [samples, SI]
   Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
+  /// A change of an effect that acts in all logs and has a parameter which switches it on (a lag's share) replaces the law of
+  /// before: its signature is the difference of both.
+  /// @param columns [samples x linear parameters] of the effect with its present shape, changed in place
+  void subtract_shared(std::size_t log, const EffectAt& effect, std::span<const double> shape,
+                       const EvidenceChannel& channel, Eigen::MatrixXd& columns) const;
   /// Adds the columns of the shared effects to a channel's baseline.
   void add_shared(EvidenceChannel& channel) const;
   /// Baseline of a pump: one margin for each cylinder as leader, and standby. [samples x (cylinders fed + 1)]

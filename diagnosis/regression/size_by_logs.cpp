@@ -70,17 +70,21 @@ double SizeByLogs::mean() const {
 }
 
 SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
-                        const EffectDesign& reference, const VectorXd& direction,
-                        const std::vector<const EffectDesign*>& others, const EffectFit& fit) {
+                        const EffectDesign& reference, const VectorXd& common,
+                        const VectorXd& direction, const std::vector<const EffectDesign*>& others,
+                        const EffectFit& fit) {
   std::vector<BlockSize> suspects, references;
   double strongest = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = evidence.channels[c];
-    VectorXd x = VectorXd::Zero(channel.rows());
-    if (suspect.touches(c)) x += suspect.columns[c] * direction;
-    if (reference.touches(c)) x += reference.columns[c] * direction;
-    if (x.isZero(0.0)) continue;
-    Index width = 1;
+    MatrixXd x = MatrixXd::Zero(channel.rows(), 2);
+    for (const EffectDesign* d : {&suspect, &reference}) {
+      if (!d->touches(c)) continue;
+      x.col(0) += d->columns[c] * common;
+      x.col(1) += d->columns[c] * direction;
+    }
+    if (x.col(1).isZero(0.0)) continue;
+    Index width = 2;
     for (const EffectDesign* d : others) width += d->columns[c].cols();
     MatrixXd columns(channel.rows(), width);
     Index at = 0;
@@ -88,10 +92,11 @@ SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
       columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
       at += d->columns[c].cols();
     }
-    columns.col(at) = x;
+    columns.rightCols(2) = x;
     const MatrixXd rows = whitened_rows(channel, fit.noise[c], columns);
-    const MatrixXd own = at > 0 ? without_projection(rows.rightCols(2), rows.leftCols(at))
-                                : MatrixXd(rows.rightCols(2));
+    MatrixXd own(rows.rows(), 2);
+    own << rows.col(at + 1), rows.col(at + 2) - rows.col(at);
+    if (at > 0) own = without_projection(own, rows.leftCols(at));
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
       const Index first = channel.blocks[b].first, length = channel.blocks[b].last - first;
       const auto column = own.col(0).segment(first, length);

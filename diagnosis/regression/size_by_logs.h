@@ -26,11 +26,13 @@ struct SizeByLogs {
 };
 
 /// @param suspect, reference signatures of one effect in the suspect and in the reference logs
+/// @param common linear parameters [SI] that act in both groups and are subtracted first
 /// @param direction linear parameters [SI] that have size one
 /// @param others effects that are estimated beside it, once for both groups
 /// @param fit its noise models weight the rows
 SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
-                        const EffectDesign& reference, const Eigen::VectorXd& direction,
+                        const EffectDesign& reference, const Eigen::VectorXd& common,
+                        const Eigen::VectorXd& direction,
                         const std::vector<const EffectDesign*>& others, const EffectFit& fit);
 
 }  // namespace sparflow

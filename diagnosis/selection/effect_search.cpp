@@ -157,7 +157,7 @@ class Search {
   }
 
   /// Fixes a share at one where the log does not determine it. Only the product of share and time of a short lag is
-  /// observable, and likewise share and excess of a limit that is hardly reached. Where the share lies on its bound, a
+  /// observable, and likewise share and excess of a limit that is hardly reached. Where the share is far from one, a
   /// share of one with another time or limit explains nearly the same and is plausible.
   void fix_share_at_one(std::vector<FoundEffect>& found, EffectFit& fit, double gain) const {
     // factors within which the share may cross one, and halvings of that interval; a limit beyond all flows has no effect
@@ -166,8 +166,11 @@ class Search {
     EffectDesign& design = found.back().design;
     const EffectParameter& share = design.effect.effect->info().parameters.front();
     if (!search_.mechanisms().enabled(Mechanism::kShareAtOne) || !share.linear ||
-        share.name != "share" || design.shape.empty() || design.linear != 1 ||
-        !rests_on_bound(design, fit.theta.tail(1)))
+        share.name != "share" || design.shape.empty())
+      return;
+    const double found_share = fit.theta[fit.theta.size() - design.linear];
+    if (found_share > search_.options.share_near_one &&
+        found_share < 1.0 / search_.options.share_near_one)
       return;
     const EffectDesign before = design;
     const auto share_at = [&](double factor) {
@@ -175,12 +178,12 @@ class Search {
       shape[0] *= factor;
       design = make_design(search_.evidence, before.effect, std::move(shape), {}, before.optional);
       if (!design.acts()) return std::numeric_limits<double>::quiet_NaN();
-      design.lower = {-std::numeric_limits<double>::max()};
-      design.upper = {std::numeric_limits<double>::max()};
+      design.lower[0] = -std::numeric_limits<double>::max();
+      design.upper[0] = std::numeric_limits<double>::max();
       FitControl control;
       control.noise_passes = 1;
       const EffectFit f = fit_effects(search_.evidence, designs_of(found), &fit, control);
-      return f.theta[f.theta.size() - 1];
+      return f.theta[f.theta.size() - design.linear];
     };
     const double at_one = share_at(1.0);
     double a = 1.0, b = 1.0;  // the share crosses one between these factors
@@ -204,7 +207,7 @@ class Search {
                  fmt::join(design.shape, " "), whole.total() - fit.total());
     }
     if (lets(Mechanism::kShareAtOne,
-             whole.total() > least && !rests_on_bound(design, whole.theta.tail(1)))) {
+             whole.total() > least && !rests_on_bound(design, whole.theta.tail(design.linear)))) {
       fit = std::move(whole);
     } else {
       design = before;

@@ -84,6 +84,9 @@ struct SearchOptions {
   /// instead.
   /// @threshold [1] 0..1; chosen: refining its nonlinear parameters may add the rest
   double merge_share = 0.9;
+  /// Share, or its inverse, beyond which it is tried whether a share of one explains as much.
+  /// @threshold [1] 0..1; chosen: laws with shares within a third of one have not been seen to be undetermined
+  double share_near_one = 0.72;
   /// Loss of log-likelihood up to which a share is fixed at one (fix_share_at_one in
   /// effect_search.cpp).
   /// @threshold [nat] 0..; chosen: below same_nats, so that both laws are indistinguishable

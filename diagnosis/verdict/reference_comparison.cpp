@@ -194,7 +194,9 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
   const Index first = apart.theta.size() - (both ? 2 : 1) * suspect.linear;
   const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
-  const SizeByLogs sizes = size_by_logs(d.evidence, suspect, reference, in_suspects, others, apart);
+  const VectorXd nothing = VectorXd::Zero(suspect.linear);
+  const SizeByLogs sizes =
+      size_by_logs(d.evidence, suspect, reference, nothing, in_suspects, others, apart);
   // two-sided, Bonferroni's bound over the effects found
   const auto significant = [&](double z) {
     return std::erfc(std::abs(z) / std::numbers::sqrt2) *
@@ -217,15 +219,13 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
     return InReferences::kVaries;
   if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
     return InReferences::kNot;
-  const VectorXd in_reference = apart.theta.tail(suspect.linear);
-  double change = 0.0, common = 0.0;
-  for (const MatrixXd& m : suspect.columns) {
-    if (m.cols() == 0) continue;
-    change += (m * (in_suspects - in_reference)).squaredNorm() / m.squaredNorm();
-    common += (m * in_reference).squaredNorm() / m.squaredNorm();
-  }
   const double form = form_share(*suspect.effect.effect, options.regression);
-  if (!significant(sizes.difference()) || std::sqrt(change) <= form * std::sqrt(common))
+  // of several parameters only one may have changed
+  const VectorXd in_reference = apart.theta.tail(suspect.linear);
+  const SizeByLogs change = size_by_logs(d.evidence, suspect, reference, in_reference,
+                                         in_suspects - in_reference, others, apart);
+  const double difference = suspect.linear > 1 ? change.difference() : sizes.difference();
+  if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size)
     return InReferences::kAlike;
   return significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot;
 }
