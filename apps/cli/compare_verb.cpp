@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
@@ -64,7 +65,7 @@ int run(const CompareArguments& a) {
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   note_undefined_energies(result);
-  fmt::print("{}\n", compare_table(result));
+  tell(fmt::format("{}\n", compare_table(result)));
   return kDone;
 }
 

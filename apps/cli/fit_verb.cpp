@@ -56,7 +56,7 @@ std::string fit_json(const FitResult& result) {
   json["train"] = nlohmann::json::parse(compare_json(result.train));
   if (result.test) json["test"] = nlohmann::json::parse(compare_json(*result.test));
   if (result.held_out) json["held_out"] = nlohmann::json::parse(compare_json(*result.held_out));
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 /// Whether any channel of any log has this role.
@@ -151,7 +151,7 @@ int run(const FitArguments& a) {
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
-  fmt::print("{}\nmodel written to {}\n", result.full(), a.output);
+  tell(fmt::format("{}\nmodel written to {}\n", result.full(), a.output));
   return kDone;
 }
 

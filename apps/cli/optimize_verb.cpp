@@ -119,8 +119,9 @@ int run(const OptimizeArguments& a) {
   if (!a.outputs.report.empty()) {
     motion_page(model, problem, result, compared_motion(seeds, result)).write(a.outputs.report);
   }
-  fmt::print("{}", optimize_table(model, problem, result));
-  if (result.motion.size() > 1 && !a.output.empty()) fmt::print("motion written to {}\n", a.output);
+  tell(optimize_table(model, problem, result));
+  if (result.motion.size() > 1 && !a.output.empty())
+    tell(fmt::format("motion written to {}\n", a.output));
   return exit_code(result.status);
 }
 

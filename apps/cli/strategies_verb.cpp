@@ -195,7 +195,7 @@ int run(const StrategiesArguments& a) {
                     one ? &tasks.front().problem : nullptr)
         .write(a.outputs.report);
   }
-  fmt::print("{}", strategies_table(all));
+  tell(strategies_table(all));
   if (interrupted()) return kInterrupted;
   return std::any_of(all.begin(), all.end(), has_optimum) ? kDone : kNotSolved;
 }

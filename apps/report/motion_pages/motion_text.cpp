@@ -236,7 +236,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
                                {"excess", c.excess}});
     }
   }
-  return out.dump(2) + "\n";
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,

@@ -171,7 +171,7 @@ std::string pareto_json(const MotionProblem& problem, const ParetoCurve& curve) 
                 {"grid_J", number_or_null(curve.grid_limit)}}}};
   if (curve.shortest > 0.0) out["shortest_s"] = curve.shortest;
   if (!curve.message.empty()) out["message"] = curve.message;
-  return out.dump(1) + "\n";
+  return out.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string pareto_csv(const ParetoCurve& curve) {

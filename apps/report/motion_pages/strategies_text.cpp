@@ -130,7 +130,9 @@ std::string strategies_json(const std::vector<StrategyComparison>& all,
     p["orders"] = std::move(orders);
     problems.push_back(std::move(p));
   }
-  return json({{"problems", problems}, {"summary", summary_json(all)}}).dump(1) + "\n";
+  return json({{"problems", problems}, {"summary", summary_json(all)}})
+             .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
+         "\n";
 }
 
 std::string strategies_table(const std::vector<StrategyComparison>& all) {
