@@ -9,6 +9,7 @@
 #include "models/files/model_file.h"
 #include "models/math/door.h"
 #include "models/math/error.h"
+#include "models/math/interruption.h"
 #include "models/math/text_encoding.h"
 
 namespace sparflow::cli {
@@ -67,6 +68,9 @@ int run(CLI::App& app, int argc, char** argv, const int& code) {
 int report(const std::exception_ptr& thrown) {
   try {
     std::rethrow_exception(thrown);
+  } catch (const Interruption&) {
+    note("interrupted: nothing was found yet that could be kept");
+    return kInterrupted;
   } catch (const UsageError& e) {
     note(fmt::format("sparflow: {}", e.what()));
     return kUsage;

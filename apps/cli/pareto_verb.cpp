@@ -72,7 +72,7 @@ int run(const ParetoArguments& a) {
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, pareto_json(problem, curve));
   if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
   tell(pareto_table(problem, curve));
-  if (interrupted()) return kInterrupted;
+  if (curve.interrupted || interrupted()) return kInterrupted;
   return curve.points.empty() ? kNotSolved : kDone;
 }
 

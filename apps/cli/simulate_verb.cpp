@@ -247,6 +247,7 @@ nlohmann::json simulation_json(const SimulateArguments& a, const Machine& machin
                    : s.run->status() == plant::RunStatus::kKinematicsEnd ? "kinematics_end"
                                                                          : "failed";
   json["message"] = s.run->message();
+  json["interrupted"] = s.cut;
   json["seconds"] = s.run->time();
   json["samples"] = s.rows;
   json["seed"] = a.seed;

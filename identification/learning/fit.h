@@ -83,8 +83,8 @@ struct FitResult {
       notes;  ///< what was not learned, why, and what to record; whole sentences
   double seconds = 0.0;
 
-  std::string brief() const;  ///< one line
-  std::string full() const;   ///< one screen
+  std::string brief(bool timed = true) const;  ///< one line
+  std::string full() const;                    ///< one screen
 };
 
 /// @param progress called with a share 0..1 and the current step, from one thread at a time; may be empty

@@ -165,7 +165,102 @@ TEST_F(HostileCli, SigtermEndsLikeCtrlC) {
   const Outcome o = shell("$S simulate -m " + kCrane +
                           " --seconds 100000 -o l.csv & sleep 0.3; kill -TERM $!; wait $!");
   EXPECT_EQ(o.code, 130);
-  EXPECT_FALSE(fs::exists(at("l.csv")));
+}
+
+/// Work that a signal ends: what it leaves says so.
+class InterruptedCli : public HostileCli {
+ protected:
+  InterruptedCli() { write("p.yaml", reach("loader_crane_lift")); }
+  /// Ends `arguments` by Ctrl-C after a while.
+  Outcome interrupted_after(double seconds, const std::string& arguments) const {
+    return shell("$S " + arguments + " & p=$!; sleep " + std::to_string(seconds) +
+                 "; kill -INT $p; wait $p");
+  }
+  json document(const std::string& name) const { return json::parse(slurp(folder_ / name)); }
+};
+
+TEST_F(InterruptedCli, ParetoSaysThatItIsNotWhole) {
+  const Outcome o = interrupted_after(
+      1.5, "pareto -p p.yaml --model " + model() + " --points 150 --json c.json --report c.html");
+  EXPECT_EQ(o.code, 130);
+  EXPECT_EQ(document("c.json").at("interrupted"), true);
+  EXPECT_NE(document("c.json").at("status"), "optimal");
+  EXPECT_THAT(slurp(at("c.html")), HasSubstr("Interrupted: "));
+}
+
+TEST_F(InterruptedCli, StrategiesSayThatTheyAreNotWhole) {
+  write("q.yaml", reach("loader_crane_lift"));
+  const Outcome o = interrupted_after(
+      0.7, "strategies -p p.yaml q.yaml --time equal,1.1,1.2,1.3,1.5,2,3,4 --model " + model() +
+               " --json s.json --report s.html");
+  EXPECT_EQ(o.code, 130);
+  EXPECT_EQ(document("s.json").at("interrupted"), true);
+  EXPECT_THAT(slurp(at("s.html")), HasSubstr("Interrupted: "));
+}
+
+TEST_F(InterruptedCli, AWholeResultSaysThatToo) {
+  EXPECT_EQ(
+      shell("$S optimize -p p.yaml --model " + model() + " --json o.json --report o.html").code, 0);
+  EXPECT_EQ(document("o.json").at("interrupted"), false);
+  EXPECT_THAT(slurp(at("o.html")), Not(HasSubstr("Interrupted: ")));
+}
+
+TEST_F(InterruptedCli, TheBoundEndsWithinASecond) {
+  const auto begin = std::chrono::steady_clock::now();
+  // the solve takes about a second and a half, the bound several more
+  const Outcome o = interrupted_after(
+      3.0, "optimize -p p.yaml --bound --model " + model() + " --json o.json --report o.html");
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  EXPECT_EQ(o.code, 130);
+  EXPECT_EQ(document("o.json").at("interrupted"), true);
+  EXPECT_FALSE(document("o.json").contains("lower_bound_J"));
+  EXPECT_LT(took.count(), 5.5);  // three seconds of waiting, one to end, one for a busy machine
+}
+
+TEST_F(InterruptedCli, AChildThatWasKilledIsNoSuccess) {
+  write("q.yaml", reach("loader_crane_lift"));
+  const Outcome o =
+      shell("$S strategies -p p.yaml q.yaml --processes 2 --model " + model() +
+            " --json s.json & p=$!; sleep 0.4; kill -KILL $(pgrep -P $p | head -1); wait $p");
+  EXPECT_EQ(o.code, 4);
+  EXPECT_THAT(o.err, HasSubstr("ended by signal 9"));
+}
+
+TEST_F(InterruptedCli, PagesAreTheSameFromRunToRun) {
+  write_short_log(6000);
+  std::string first;
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(shell(fit("-o m.json --report f.html")).code, 0);
+    EXPECT_EQ(shell("$S optimize -p p.yaml --model m.json --report o.html").code, 0);
+    EXPECT_EQ(shell("$S compare --model m.json -l short.csv --report c.html").code, 0);
+    const std::string all = slurp(at("f.html")) + slurp(at("o.html")) + slurp(at("c.html"));
+    if (i == 0) {
+      first = all;
+    } else {
+      EXPECT_TRUE(first == all);
+    }
+  }
+}
+
+TEST_F(InterruptedCli, ImproveKeepsTheStepsDone) {
+  const std::string logs = kData + "/logs/loader_crane_friction_";
+  ASSERT_EQ(shell("$S fit -m " + kCrane + " -l " + logs + "train.csv -o off.json").code, 0);
+  const std::string command = "improve --model off.json --log " + logs + "train.csv --test " +
+                              logs + "test.csv -o better.json --json i.json --report i.html";
+  ASSERT_EQ(shell("$S " + command).code, 0);
+  const json whole = document("i.json");
+  EXPECT_EQ(whole.at("interrupted"), false);
+  ASSERT_FALSE(whole.at("steps").empty());
+  // after half of the time the first step is done or is being made
+  const Outcome o = interrupted_after(0.5 * whole.at("seconds").get<double>(), command);
+  EXPECT_EQ(o.code, 130);
+  const json cut = document("i.json");
+  EXPECT_EQ(cut.at("interrupted"), true);
+  EXPECT_THAT(slurp(at("i.html")), HasSubstr("Interrupted: "));
+  EXPECT_LE(cut.at("steps").size(), whole.at("steps").size());
+  for (std::size_t i = 0; i < cut.at("steps").size(); ++i)
+    EXPECT_EQ(cut.at("steps")[i].at("added"), whole.at("steps")[i].at("added"));
+  EXPECT_TRUE(json::accept(slurp(at("better.json"))));
 }
 
 }  // namespace
