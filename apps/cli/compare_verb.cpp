@@ -59,8 +59,7 @@ int run(const CompareArguments& a) {
   const CraneModel model = a.model.empty()
                                ? CraneModel::untrained(load_machine_with_warnings(a.machine))
                                : load_model_with_warnings(a.model);
-  const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
-  CompareResult result = compare(model, logs);
+  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
   if (a.model.empty()) keep_geometric_stages(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
