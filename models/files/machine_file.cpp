@@ -245,7 +245,7 @@ class MachineReader {
     const YamlMap map = kinematics.map("kinematics {urdf, limits}", {"urdf", "limits"});
     const YamlValue urdf = map.need("urdf", "the URDF file");
     const std::filesystem::path path = std::filesystem::path(folder_) / urdf.text("the URDF file");
-    if (!std::filesystem::is_regular_file(path)) {
+    if (!is_file(path)) {
       urdf.fail(fmt::format("there is no file {}; the path is relative to the machine file",
                             path.string()));
     }

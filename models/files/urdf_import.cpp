@@ -56,6 +56,17 @@ class Importer {
            const FilePlace& place)
       : path_(path), limits_(limits), place_(place) {}
 
+  /// Links own their children, so those in a circle would keep each other.
+  ~Importer() {
+    if (!model_) return;
+    for (const auto& [name, link] : model_->links_) {
+      link->child_links.clear();
+      link->child_joints.clear();
+    }
+  }
+  Importer(const Importer&) = delete;
+  Importer& operator=(const Importer&) = delete;
+
   UrdfChain import(const std::string& tip_link) {
     const std::string text = read_text(path_);
     check_xml(text, path_);

@@ -55,6 +55,12 @@ struct OpenFile {
 
 }  // namespace
 
+bool is_file(const std::string& path) {
+  struct stat about {};
+  return path.find('\0') == std::string::npos && ::stat(path.c_str(), &about) == 0 &&
+         S_ISREG(about.st_mode);
+}
+
 void set_door_listener(std::function<void(const std::string&)> heard) {
   const std::lock_guard lock(listener().mutex);
   listener().heard = std::move(heard);

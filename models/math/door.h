@@ -35,6 +35,10 @@ struct DoorLimits {
   int machine_parts = 256;
 };
 
+/// Whether there is a regular file of this name. A name that no file can have (too long, with a zero byte, without
+/// permission to look) means no, since names come from files as well.
+bool is_file(const std::string& path);
+
 /// Where warnings of the doors go (a file that is not UTF-8); without a listener they are dropped.
 void set_door_listener(std::function<void(const std::string&)> listener);
 

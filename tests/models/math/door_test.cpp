@@ -64,6 +64,13 @@ TEST_F(Door, AFolderIsNamedAsOne) {
   EXPECT_THAT(message([&] { read_bytes(folder_.string(), 1000); }), HasSubstr("this is a folder"));
 }
 
+TEST_F(Door, ANameThatNoFileCanHaveIsNoFile) {
+  EXPECT_TRUE(is_file(file("x")));
+  EXPECT_FALSE(is_file(folder_.string()));
+  EXPECT_FALSE(is_file(std::string(5000, 'x')));
+  EXPECT_FALSE(is_file(file("x") + std::string("\0y", 2)));
+}
+
 TEST_F(Door, APipeIsRead) {
   const std::string pipe = (folder_ / "pipe").string();
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
