@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "models/math/door.h"
 #include "models/math/error.h"
 
 // Set by the build: the `problems` folder of the source tree, and where `cmake --install` puts its copy.
@@ -42,7 +43,7 @@ std::string data_folder() {
 
 std::string bundled_file(const std::string& relative_path) {
   const fs::path path = fs::path(data_folder()) / relative_path;
-  if (!fs::is_regular_file(path)) {
+  if (!is_file(path)) {
     throw InputError({path.string(), 0, 0}, "", "there is no such bundled file");
   }
   return path.string();

@@ -10,6 +10,7 @@
 #include "models/files/file_quantities.h"
 #include "models/files/machine_file.h"
 #include "models/machine/kinematics.h"
+#include "models/math/door.h"
 #include "models/yaml/yaml_reader.h"
 #include "problems/bundled.h"
 #include "problems/obstacle_file.h"
@@ -89,7 +90,7 @@ class ProblemReader {
   void read_machine(const YamlMap& root, const ChooseMachine& choose) {
     if (const auto model = root.find("model")) {
       problem_.model_path = resolved(model->text("the fitted model's file"));
-      if (!fs::is_regular_file(problem_.model_path)) {
+      if (!is_file(problem_.model_path)) {
         model->fail(fmt::format("there is no file {}; the path is relative to the problem file",
                                 problem_.model_path));
       }
@@ -115,7 +116,7 @@ class ProblemReader {
   /// Path of a machine file beside the problem, or of the bundled machine of that name; empty: there is neither.
   std::string machine_file_of(const std::string& given) const {
     const std::string beside = resolved(given);
-    return fs::is_regular_file(beside) ? beside : bundled_machine(given);
+    return is_file(beside) ? beside : bundled_machine(given);
   }
 
   static std::string bundled_machine(const std::string& name) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
@@ -58,13 +59,12 @@ int run(const CompareArguments& a) {
   const CraneModel model = a.model.empty()
                                ? CraneModel::untrained(load_machine_with_warnings(a.machine))
                                : load_model_with_warnings(a.model);
-  const std::vector<Log> logs = load_logs(a.logs, model.machine, a.mapping);
-  CompareResult result = compare(model, logs);
+  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
   if (a.model.empty()) keep_geometric_stages(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   note_undefined_energies(result);
-  fmt::print("{}\n", compare_table(result));
+  tell(fmt::format("{}\n", compare_table(result)));
   return kDone;
 }
 

@@ -1,23 +1,36 @@
 #include "apps/cli/console.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <new>
 
 #include "apps/cli/verbs.h"
 #include "models/math/error.h"
+#include "models/math/text_encoding.h"
 
 namespace sparflow::cli {
 namespace {
 
 constexpr std::chrono::seconds kPrintPeriod{10};
+/// Longest line of progress.
+/// @threshold [byte] 40..200; chosen: fits most terminals
+constexpr std::size_t kLine = 107;
+
+/// Carriage returns of the program's own pass; the rest of the line is printable already.
+void rewrite_line(const std::string& line) {
+  if (::write(STDERR_FILENO, line.data(), line.size()) < 0) return;
+}
 /// In memory shared with the child processes. A Ctrl-C at a terminal reaches all of them, one sent by another program
 /// reaches this process only; therefore only this process counts, and the children read the count.
 std::atomic<int>* interrupt_count = nullptr;
@@ -34,6 +47,11 @@ void on_interrupt(int) {
   if (::write(2, kText, sizeof kText - 1) < 0) return;
 }
 
+std::string& work() {
+  static std::string what = "this command";
+  return what;
+}
+
 }  // namespace
 
 void catch_interrupts() {
@@ -42,17 +60,66 @@ void catch_interrupts() {
                         MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of interrupts");
   interrupt_count = new (shared) std::atomic<int>(0);
-  std::signal(SIGINT, on_interrupt);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, on_interrupt);
 }
 void finish_on_interrupt() { finish_first = 1; }
 bool interrupted() { return interrupt_count->load() > 0; }
 
-void warn(const std::string& sentence) { fmt::print(stderr, "warning: {}\n", sentence); }
-void note(const std::string& sentence) { fmt::print(stderr, "{}\n", sentence); }
+void secure_standard_streams() {
+  std::signal(SIGPIPE, SIG_IGN);
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // A call that opens gives the lowest free number, which is that of the closed stream.
+    if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", O_RDONLY) < 0) ::_exit(kInternal);
+  }
+}
+
+void complain(const std::string& text) {
+  const std::string safe = harmless(text);
+  std::size_t done = 0;
+  while (done < safe.size()) {
+    const ssize_t n = ::write(STDERR_FILENO, safe.data() + done, safe.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    done += static_cast<std::size_t>(n);
+  }
+}
+
+void tell(const std::string& text) {
+  const std::string safe = harmless(text);
+  const bool taken = std::fwrite(safe.data(), 1, safe.size(), stdout) == safe.size();
+  if (taken && std::fflush(stdout) == 0) return;
+  const int reason = errno;
+  throw InputError({"standard output", 0, 0}, "",
+                   fmt::format("cannot write: {}", std::strerror(reason)));
+}
+
+void begin_work(const std::string& what) { work() = what; }
+const std::string& current_work() { return work(); }
+
+std::string memory_in_words() {
+  struct rlimit limit {};
+  const bool limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  if (limited) {
+    return fmt::format(" (its limit, ulimit -v, is {:.2g} GB)",
+                       static_cast<double>(limit.rlim_cur) / 1e9);
+  }
+  const long pages = ::sysconf(_SC_PHYS_PAGES), size = ::sysconf(_SC_PAGESIZE);
+  if (pages <= 0 || size <= 0) return "";
+  return fmt::format(" (the machine has {:.2g} GB)",
+                     static_cast<double>(pages) * static_cast<double>(size) / 1e9);
+}
+
+void warn(const std::string& sentence) {
+  complain(fmt::format("warning: {}\n", harmless(sentence, QuoteOptions{}.sentence)));
+}
+void note(const std::string& sentence) {
+  complain(harmless(sentence, QuoteOptions{}.sentence) + "\n");
+}
 
 Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(2) == 1) {
+  begin_work(what_);
   if (terminal_) return;
-  fmt::print(stderr, "{} ...\n", what_);
+  complain(what_ + " ...\n");
   printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
 }
 
@@ -61,13 +128,13 @@ void Progress::print_periodically(const std::stop_token& stop) {
   while (!ended_.wait_for(lock, stop, kPrintPeriod, [&] { return stop.stop_requested(); })) {
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    fmt::print(stderr, "{}: {:.0f} s, {:.0f} %{}{}\n", what_, seconds, 100.0 * share_,
-               doing_.empty() ? "" : ", ", doing_);
+    complain(fmt::format("{}: {:.0f} s, {:.0f} %{}{}\n", what_, seconds, 100.0 * share_,
+                         doing_.empty() ? "" : ", ", doing_));
   }
 }
 
 Progress::~Progress() {
-  if (terminal_ && width_ > 0) fmt::print(stderr, "\r{:{}}\r", "", width_);
+  if (terminal_ && width_ > 0) rewrite_line(fmt::format("\r{:{}}\r", "", width_));
 }
 
 void Progress::operator()(double share, const std::string& what) {
@@ -80,9 +147,8 @@ void Progress::operator()(double share, const std::string& what) {
   if (share < 1.0 && std::abs(share - last_) < 0.005) return;
   last_ = share;
   const std::string line =
-      fmt::format("{} {:3.0f} %  {}", what_, 100.0 * share, what).substr(0, 110);
-  fmt::print(stderr, "\r{:{}}", line, std::max(width_, line.size()));
-  std::fflush(stderr);
+      printable(fmt::format("{} {:3.0f} %  {}", what_, 100.0 * share, what), kLine);
+  rewrite_line(fmt::format("\r{:{}}", line, std::max(width_, line.size())));
   width_ = line.size();
 }
 

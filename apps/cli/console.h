@@ -34,13 +34,27 @@ class Progress {
   std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
 };
 
-/// Lets Ctrl-C end the program with exit code 130 from now on.
+/// Lets Ctrl-C (SIGINT), SIGTERM and SIGHUP end the program with exit code 130 from now on.
 void catch_interrupts();
 /// Lets the first Ctrl-C only set interrupted() from now on, so that the verb finishes with the best result so far;
 /// the second ends the program.
 void finish_on_interrupt();
 /// True once Ctrl-C was pressed, in child processes too.
 bool interrupted();
+
+/// Opens /dev/null for reading in place of standard streams that are closed, so that no file of the program takes their
+/// place and what is written to them fails instead; a reader that goes away ends no run.
+void secure_standard_streams();
+/// Writes text to stderr, harmless for a terminal. A full or closed stderr is no reason to end: then it is lost.
+void complain(const std::string& text);
+/// Writes a result to stdout, harmless for a terminal. @throws InputError when stdout takes it no more
+void tell(const std::string& text);
+
+/// Says what the program is at, for the case that memory ends. Progress says it too.
+void begin_work(const std::string& what);
+const std::string& current_work();
+/// " (16 GB are free, of which a limit allows 2 GB)", or "" when that is not known
+std::string memory_in_words();
 
 /// Prints "warning: " and the sentence on stderr.
 void warn(const std::string& sentence);

@@ -79,7 +79,7 @@ int run(const std::string& folder) {
   const auto in = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
   check_writable(in("index.html"));
 
-  fmt::print(
+  tell(
       "Sparflow demo: from a measured log to an energy-optimal motion, on a simulated 21 t.m "
       "loader crane.\n\n");
   const Machine machine = load_machine_with_warnings(bundled_file("machines/loader_crane.yaml"));
@@ -87,29 +87,29 @@ int run(const std::string& folder) {
       load_logs({bundled_file("logs/loader_crane_train.csv")}, machine, "");
   const std::vector<Log> test =
       load_logs({bundled_file("logs/loader_crane_test.csv")}, machine, "");
-  fmt::print("1. Learn pressures from {} ({} rows, {:.0f} s of work)\n", train[0].file,
-             train[0].samples(), train[0].duration());
+  tell(fmt::format("1. Learn pressures from {} ({} rows, {:.0f} s of work)\n", train[0].file,
+                   train[0].samples(), train[0].duration()));
   const FitResult fitted = learn(machine, train, test);
   save_model(fitted.model, in("model.json"));
-  fmt::print("   {}\n\n", fitted.brief());
+  tell(fmt::format("   {}\n\n", fitted.brief()));
 
-  fmt::print("2. Compare with a test log ({}, {} rows)\n{}\n", test[0].file, test[0].samples(),
-             compare_table(*fitted.test));
+  tell(fmt::format("2. Compare with a test log ({}, {} rows)\n{}\n", test[0].file,
+                   test[0].samples(), compare_table(*fitted.test)));
 
   const MotionProblem problem =
       load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &machine);
-  fmt::print("3. Optimise a reach: {}, {} kg\n", problem.name, problem.payload);
+  tell(fmt::format("3. Optimise a reach: {}, {} kg\n", problem.name, problem.payload));
   Seeds seeds;
   const OptimizeResult result = optimize_from_seeds(fitted.model, problem, seeds);
-  fmt::print("{}\n", optimize_table(fitted.model, problem, result));
+  tell(fmt::format("{}\n", optimize_table(fitted.model, problem, result)));
   if (result.status == OptimizeStatus::kInterrupted) return kInterrupted;
   if (result.motion.size() < 2) return kNotSolved;
   write_file_atomically(in("motion.csv"), motion_csv(fitted.model, result.motion, problem.payload));
   demo_page(fitted, problem, seeds, result, train[0].samples()).write(in("index.html"));
-  fmt::print(
+  tell(fmt::format(
       "Written to {}: index.html (open it in a browser), model.json, motion.csv; {:.1f} s in "
       "all.\n",
-      folder, seconds());
+      folder, seconds()));
   return kDone;
 }
 

@@ -49,16 +49,17 @@ int run(const DiagnoseArguments& a) {
   if (!outputs.json.empty()) {
     nlohmann::ordered_json json = nlohmann::ordered_json::parse(result.json());
     if (tested) json["test"] = nlohmann::ordered_json::parse(tested->json());
-    write_file_atomically(outputs.json, json.dump(2) + "\n");
+    write_file_atomically(
+        outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
   if (!outputs.report.empty()) {
     Page page = diagnose_page(files.model, result, tested ? &*tested : nullptr);
     files.write_provenance(page);
     page.write(outputs.report);
   }
-  fmt::print("{}", result.table());
+  tell(result.table());
   if (tested)
-    fmt::print("\nOn the test logs, with these effects in the model:\n{}", tested->table());
+    tell(fmt::format("\nOn the test logs, with these effects in the model:\n{}", tested->table()));
   return kDone;
 }
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
@@ -23,7 +24,7 @@ int run(const EffectsArguments& a) {
   a.own.load(nullptr);
   const std::string text = a.effect.empty() ? effect_table() : effect_entry(a.effect);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, effects_json(a.effect));
-  fmt::print("{}", text);
+  tell(text);
   return kDone;
 }
 

@@ -47,7 +47,7 @@ void write_extended(const DiagnosisInputs& inputs, const ExtendResult& result) {
   const Outputs& outputs = inputs.outputs();
   if (!outputs.json.empty()) write_file_atomically(outputs.json, result.json());
   if (!outputs.report.empty()) improve_page(result).write(outputs.report);
-  fmt::print("{}model written to {}\n", result.table(), inputs.output());
+  tell(fmt::format("{}model written to {}\n", result.table(), inputs.output()));
 }
 
 void add_extend_verb(CLI::App& app, int& code) {

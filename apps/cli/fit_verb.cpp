@@ -56,20 +56,19 @@ std::string fit_json(const FitResult& result) {
   json["train"] = nlohmann::json::parse(compare_json(result.train));
   if (result.test) json["test"] = nlohmann::json::parse(compare_json(*result.test));
   if (result.held_out) json["held_out"] = nlohmann::json::parse(compare_json(*result.held_out));
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-/// Whether any channel of any log has this role.
-bool measured(const std::vector<Log>& logs, Role role) {
-  return std::any_of(logs.begin(), logs.end(), [&](const Log& log) {
-    return std::any_of(log.channels.begin(), log.channels.end(),
-                       [&](const Channel& c) { return c.role == role && c.valid.any(); });
-  });
+/// Whether the signals of any log have this quantity of any part of the machine.
+template <class Has>
+bool measured(const FitResult& r, const Has& has) {
+  return std::any_of(r.train.logs.begin(), r.train.logs.end(),
+                     [&](const LogComparison& log) { return has(log.signals); });
 }
 
 /// Names what the logs lack when nothing could be learned from them; empty when something was learned, or when the
 /// machine has no hydraulic cylinder.
-std::string why_nothing_learned(const FitResult& r, const std::vector<Log>& logs) {
+std::string why_nothing_learned(const FitResult& r) {
   const auto identified = [](const std::optional<LearnedPump>& p) {
     return p && (p->standby_identified ||
                  std::any_of(p->margins.begin(), p->margins.end(),
@@ -80,16 +79,25 @@ std::string why_nothing_learned(const FitResult& r, const std::vector<Log>& logs
                        std::any_of(r.pumps.begin(), r.pumps.end(), identified) || !r.valves.empty();
   if (learned || r.processes.empty()) return "";
   std::vector<std::string> missing;
-  if (!measured(logs, Role::kPressureA) && !measured(logs, Role::kPressureB))
+  const auto cylinders = [&](const auto& has) {
+    return measured(r, [&](const MachineSignals& s) {
+      return std::any_of(s.cylinders.begin(), s.cylinders.end(), has);
+    });
+  };
+  if (!cylinders([](const CylinderSignals& c) {
+        return c.pressure_a.array().isFinite().any() || c.pressure_b.array().isFinite().any();
+      }))
     missing.emplace_back("chamber pressures (pA_<cylinder>_bar, pB_<cylinder>_bar)");
-  if (!measured(logs, Role::kPumpPressure)) missing.emplace_back("pump pressure (p_<pump>_bar)");
-  if (!measured(logs, Role::kCommand)) missing.emplace_back("commands (u_<cylinder>)");
-  const bool moves =
-      std::any_of(r.train.logs.begin(), r.train.logs.end(), [](const LogComparison& log) {
-        return std::any_of(log.signals.cylinders.begin(), log.signals.cylinders.end(),
-                           [](const CylinderSignals& c) { return c.driven.any(); });
-      });
-  if (!moves) missing.emplace_back("motion (no cylinder is driven faster than 2 mm/s)");
+  if (!measured(r, [](const MachineSignals& s) {
+        return std::any_of(s.pumps.begin(), s.pumps.end(), [](const PumpSignals& p) {
+          return p.pressure.array().isFinite().any();
+        });
+      }))
+    missing.emplace_back("pump pressure (p_<pump>_bar)");
+  if (!cylinders([](const CylinderSignals& c) { return c.command.array().isFinite().any(); }))
+    missing.emplace_back("commands (u_<cylinder>)");
+  if (!cylinders([](const CylinderSignals& c) { return c.driven.any(); }))
+    missing.emplace_back("motion (no cylinder is driven faster than 2 mm/s)");
   if (missing.empty()) {
     return fmt::format("the logs have too few samples of each motion ({} in all)", r.train.samples);
   }
@@ -125,16 +133,17 @@ int run(const FitArguments& a) {
   check_files(a);
   const Machine machine = load_machine_with_warnings(a.machine);
   a.own.load(&machine);  // before the fit, so that a wrong file is found at once
-  const std::vector<Log> logs = load_logs(a.logs, machine, a.mapping);
-  const std::vector<Log> tests = load_logs(a.tests, machine, a.mapping);
+  std::vector<Log> logs = load_logs(a.logs, machine, a.mapping);
+  std::vector<Log> tests = load_logs(a.tests, machine, a.mapping);
   FitOptions options;
   options.threads = a.threads;
+  options.keep_held_out_series = !a.outputs.report.empty();
   FitResult result = [&] {
     Progress progress("fit");
-    return fit(machine, logs, tests, options,
+    return fit(machine, std::move(logs), std::move(tests), options,
                [&](double share, const std::string& what) { progress(share, what); });
   }();
-  const std::string lacking = why_nothing_learned(result, logs);
+  const std::string lacking = why_nothing_learned(result);
   if (!lacking.empty()) {
     for (const std::string& n : result.notes) note("  " + n);
     throw InputError({a.logs.size() == 1 ? a.logs.front() : "", 0, 0}, "fit",
@@ -151,7 +160,7 @@ int run(const FitArguments& a) {
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
-  fmt::print("{}\nmodel written to {}\n", result.full(), a.output);
+  tell(fmt::format("{}\nmodel written to {}\n", result.full(), a.output));
   return kDone;
 }
 

@@ -2,6 +2,7 @@
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/cli/verbs.h"
 #include "diagnosis/extension/extend.h"
+#include "models/math/interruption.h"
 
 namespace sparflow::cli {
 namespace {
@@ -19,13 +20,16 @@ int run(const ImproveArguments& a) {
   options.max_steps = a.max_steps;
   options.date = today();
   options.diagnose.candidates = files.candidates;
+  finish_on_interrupt();
   const ExtendResult result = [&] {
     Progress progress("improve");
-    return improve(files.model, files.logs, options,
-                   [&](double share, const std::string& what) { progress(share, what); });
+    return improve(files.model, files.logs, options, [&](double share, const std::string& what) {
+      progress(share, what);
+      if (interrupted()) throw Interruption();
+    });
   }();
   write_extended(a.inputs, result);
-  return kDone;
+  return result.interrupted ? kInterrupted : kDone;
 }
 
 }  // namespace

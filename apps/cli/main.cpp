@@ -1,15 +1,105 @@
 #include <fmt/format.h>
 
 #include <exception>
+#include <new>
+#include <sstream>
 
 #include "apps/cli/console.h"
 #include "apps/cli/verbs.h"
 #include "models/files/model_file.h"
+#include "models/math/door.h"
 #include "models/math/error.h"
+#include "models/math/interruption.h"
+#include "models/math/text_encoding.h"
+
+namespace sparflow::cli {
+namespace {
+
+/// An empty value (`--json "$file"` with an unset variable) would silently mean "not given".
+void refuse_empty_values(CLI::App& app) {
+  for (CLI::App* verb : app.get_subcommands({})) {
+    for (CLI::Option* option : verb->get_options()) {
+      if (option->get_items_expected_max() == 0) continue;  // a flag
+      option->check(CLI::Validator(
+          [](const std::string& value) {
+            return value.empty()
+                       ? std::string("got an empty text; give a value, or leave the option out")
+                       : std::string();
+          },
+          "", "not empty"));
+    }
+  }
+}
+
+void suggest_verb(const CLI::App& app, const std::string& given) {
+  std::vector<std::string> verbs;
+  bool known = false;
+  for (const CLI::App* verb : app.get_subcommands({})) {
+    verbs.push_back(verb->get_name());
+    known = known || verb->get_name() == given;
+  }
+  const std::string near = nearest_word(printable(given), verbs);
+  if (!known && !near.empty()) complain(fmt::format("Did you mean \"sparflow {}\"?\n", near));
+}
+
+/// Prints the help or the error of the command line's library.
+void print_parsed(const CLI::App& app, const CLI::ParseError& e) {
+  std::ostringstream out, err;
+  app.exit(e, out, err);
+  complain(harmless(err.str(), QuoteOptions{}.sentence));
+  tell(out.str());
+}
+
+int run(CLI::App& app, int argc, char** argv, const int& code) {
+  try {
+    app.parse(argc, argv);
+    return code;
+  } catch (const CLI::Success& e) {  // --help, --version
+    print_parsed(app, e);
+    return kDone;
+  } catch (const CLI::ParseError& e) {
+    print_parsed(app, e);
+    if (argc > 1 && argv[1][0] != '-') suggest_verb(app, argv[1]);
+    return kUsage;
+  }
+}
+
+/// Prints the sentence of an exception. @return the exit code
+int report(const std::exception_ptr& thrown) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const Interruption&) {
+    note("interrupted: nothing was found yet that could be kept");
+    return kInterrupted;
+  } catch (const UsageError& e) {
+    note(fmt::format("sparflow: {}", e.what()));
+    return kUsage;
+  } catch (const InputError& e) {
+    note(fmt::format("sparflow: {}", e.what()));
+    return kBadInput;
+  } catch (const std::bad_alloc&) {
+    note(
+        fmt::format("sparflow: out of memory: {} needs more than this process may have{}; give "
+                    "fewer or shorter logs, or use a machine with more memory (docs/limits.md)",
+                    current_work(), memory_in_words()));
+    return kBadInput;
+  } catch (const std::exception& e) {
+    note(
+        fmt::format("sparflow: {}\nThis is a defect of the program; please report it with the "
+                    "command line above.",
+                    e.what()));
+    return kInternal;
+  }
+}
+
+}  // namespace
+}  // namespace sparflow::cli
 
 int main(int argc, char** argv) {
   using namespace sparflow;
+  cli::secure_standard_streams();
   cli::catch_interrupts();
+  set_door_listener(cli::warn);
   CLI::App app{
       "Sparflow identifies the working pressures of a hydraulic machine from its logs and computes "
       "energy-optimal "
@@ -36,35 +126,10 @@ int main(int argc, char** argv) {
   cli::add_optimize_verb(app, code);
   cli::add_strategies_verb(app, code);
   cli::add_pareto_verb(app, code);
+  cli::refuse_empty_values(app);
   try {
-    app.parse(argc, argv);
-    return code;
-  } catch (const CLI::Success& e) {  // --help, --version
-    return app.exit(e);
-  } catch (const CLI::ParseError& e) {
-    app.exit(e);
-    if (argc > 1 && argv[1][0] != '-') {
-      std::vector<std::string> verbs;
-      bool known = false;
-      for (const CLI::App* verb : app.get_subcommands({})) {
-        verbs.push_back(verb->get_name());
-        known = known || verb->get_name() == argv[1];
-      }
-      const std::string near = nearest_word(argv[1], verbs);
-      if (!known && !near.empty()) fmt::print(stderr, "Did you mean \"sparflow {}\"?\n", near);
-    }
-    return cli::kUsage;
-  } catch (const UsageError& e) {
-    fmt::print(stderr, "sparflow: {}\n", e.what());
-    return cli::kUsage;
-  } catch (const InputError& e) {
-    fmt::print(stderr, "sparflow: {}\n", e.what());
-    return cli::kBadInput;
-  } catch (const std::exception& e) {
-    fmt::print(stderr,
-               "sparflow: {}\nThis is a defect of the program; please report it with the command "
-               "line above.\n",
-               e.what());
-    return cli::kInternal;
+    return cli::run(app, argc, argv, code);
+  } catch (...) {
+    return cli::report(std::current_exception());
   }
 }

@@ -58,6 +58,7 @@ std::vector<Log> load_logs(const std::vector<std::string>& paths, const Machine&
   options.mapping_file = mapping;
   std::vector<Log> logs;
   for (const std::string& path : paths) {
+    begin_work("reading " + path);
     logs.push_back(load_log(path, machine, options));
     for (const std::string& sentence : logs.back().warnings)
       warn(logs.back().file + ": " + sentence);

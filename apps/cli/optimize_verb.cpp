@@ -11,6 +11,7 @@
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/grid/driven_grid_path.h"
+#include "optimizer/solve/child_processes.h"
 #include "problems/motion_table.h"
 
 namespace sparflow::cli {
@@ -68,6 +69,36 @@ void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
   }
 }
 
+/// Computes the bound in a process of its own, which can be ended at any time.
+void add_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
+  if (interrupted()) {
+    result.interrupted = true;
+    return;
+  }
+  const Progress progress("bound");
+  const ChildResult child = run_in_child(
+      [&] {
+        OptimizeResult r = result;
+        set_bound(model, problem, r);
+        Packer p;
+        p.number(r.grid_path_energy).number(r.unlimited_energy).number(r.lower_bound);
+        p.number(r.lower_bound_time).text(r.bound_note);
+        return p.bytes();
+      },
+      interrupted);
+  result.interrupted = interrupted();
+  if (!child.ok) {
+    result.bound_note = "no lower bound: " + child.error;
+    return;
+  }
+  Unpacker u(child.bytes);
+  result.grid_path_energy = u.number();
+  result.unlimited_energy = u.number();
+  result.lower_bound = u.number();
+  result.lower_bound_time = u.number();
+  result.bound_note = u.text();
+}
+
 int run(const OptimizeArguments& a) {
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
@@ -110,7 +141,7 @@ int run(const OptimizeArguments& a) {
     result = seeds.motions.empty() ? no_seed(problem, seeds)
                                    : optimize(model, problem, seeds.motions, options);
   }
-  if (a.bound && result.motion.size() > 1) set_bound(model, problem, result);
+  if (a.bound && result.motion.size() > 1) add_bound(model, problem, result);
   if (result.motion.size() > 1 && !a.output.empty()) {
     write_file_atomically(a.output, motion_csv(model, result.motion, problem.payload));
   }
@@ -119,9 +150,10 @@ int run(const OptimizeArguments& a) {
   if (!a.outputs.report.empty()) {
     motion_page(model, problem, result, compared_motion(seeds, result)).write(a.outputs.report);
   }
-  fmt::print("{}", optimize_table(model, problem, result));
-  if (result.motion.size() > 1 && !a.output.empty()) fmt::print("motion written to {}\n", a.output);
-  return exit_code(result.status);
+  tell(optimize_table(model, problem, result));
+  if (result.motion.size() > 1 && !a.output.empty())
+    tell(fmt::format("motion written to {}\n", a.output));
+  return result.interrupted ? kInterrupted : exit_code(result.status);
 }
 
 }  // namespace

@@ -26,6 +26,12 @@ void check_writable(const std::string& path) {
   std::error_code error;
   if (fs::is_directory(path, error))
     throw InputError({path, 0, 0}, "", "cannot write: this is a folder; give a file name");
+  if (fs::exists(path, error)) {
+    // Devices and FIFOs are written through, whatever their folder allows.
+    if (::access(path.c_str(), W_OK) != 0)
+      throw InputError({path, 0, 0}, "", "cannot write: no permission to change this file");
+    if (!fs::is_regular_file(path, error)) return;
+  }
   if (!fs::is_directory(folder, error)) {
     throw InputError(
         {path, 0, 0}, "",

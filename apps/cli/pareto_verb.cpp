@@ -71,8 +71,8 @@ int run(const ParetoArguments& a) {
     write_file_atomically(a.output, pareto_csv(curve));
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, pareto_json(problem, curve));
   if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
-  fmt::print("{}", pareto_table(problem, curve));
-  if (interrupted()) return kInterrupted;
+  tell(pareto_table(problem, curve));
+  if (curve.interrupted || interrupted()) return kInterrupted;
   return curve.points.empty() ? kNotSolved : kDone;
 }
 

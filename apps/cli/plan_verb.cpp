@@ -51,10 +51,10 @@ int run(const PlanArguments& a) {
   nlohmann::json json = {{"message", seeds.paths.message},
                          {"solve_s", seeds.paths.solve_s},
                          {"paths", nlohmann::json::array()}};
-  fmt::print("{}: {}\n", problem.name, seeds.paths.message);
+  tell(fmt::format("{}: {}\n", problem.name, seeds.paths.message));
   if (!seeds.motions.empty())
-    fmt::print("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints",
-               "shortest duration");
+    tell(fmt::format("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints",
+                     "shortest duration"));
   for (std::size_t i = 0; i < seeds.paths.paths.size(); ++i) {
     const SeedPath& path = seeds.paths.paths[i];
     const std::string name = fmt::format("{} {}", path.planner, i + 1);
@@ -72,9 +72,10 @@ int run(const PlanArguments& a) {
                              turns ? 1 : 2, turns ? "deg" : "m");
       end[joint.name] = q;
     }
-    fmt::print("  {:<18} {:>9} {:>20}    {}\n", name, path.path.rows(),
-               shortest > 0.0 ? fmt::format("{:.2f} s", shortest) : std::string("cannot be driven"),
-               posture);
+    tell(fmt::format(
+        "  {:<18} {:>9} {:>20}    {}\n", name, path.path.rows(),
+        shortest > 0.0 ? fmt::format("{:.2f} s", shortest) : std::string("cannot be driven"),
+        posture));
     json["paths"].push_back({{"name", name},
                              {"planner", path.planner},
                              {"waypoints", path.path.rows()},
@@ -84,7 +85,9 @@ int run(const PlanArguments& a) {
   for (const std::string& r : seeds.refused) warn(r);
   if (!a.output.empty())
     write_file_atomically(a.output, path_csv(problem.machine, seeds.paths.paths));
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, json.dump(2) + "\n");
+  if (!a.outputs.json.empty())
+    write_file_atomically(
+        a.outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   return seeds.paths.status == SeedStatus::kFound ? kDone : kNotSolved;
 }
 

@@ -33,7 +33,7 @@ int run(const SelftestArguments& a) {
     files.write_provenance(page);
     page.write(outputs.report);
   }
-  fmt::print("{}", result.table());
+  tell(result.table());
   return kDone;
 }
 

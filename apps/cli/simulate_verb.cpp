@@ -247,6 +247,7 @@ nlohmann::json simulation_json(const SimulateArguments& a, const Machine& machin
                    : s.run->status() == plant::RunStatus::kKinematicsEnd ? "kinematics_end"
                                                                          : "failed";
   json["message"] = s.run->message();
+  json["interrupted"] = s.cut;
   json["seconds"] = s.run->time();
   json["samples"] = s.rows;
   json["seed"] = a.seed;
@@ -429,8 +430,10 @@ int run(const SimulateArguments& a) {
   write_file_atomically(a.output, log.text(mark));
   nlohmann::json json = simulation_json(a, machine, s);
   const std::string errors = write_comparison(a, machine, s, rows, json);
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, json.dump(2) + "\n");
-  fmt::print("{}{}", errors, summary(machine, s, a.output));
+  if (!a.outputs.json.empty())
+    write_file_atomically(
+        a.outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  tell(fmt::format("{}{}", errors, summary(machine, s, a.output)));
   if (s.cut) return kInterrupted;
   return s.run->status() == plant::RunStatus::kRunning ? kDone : kNotSolved;
 }
@@ -478,7 +481,7 @@ void add_simulate_verb(CLI::App& app, int& code) {
   verb->add_flag_callback(
       "--list-effects",
       [] {
-        fmt::print("{}", plant::effects_help());
+        tell(plant::effects_help());
         throw CLI::Success();
       },
       "list the effects that can be switched, and end");

@@ -115,28 +115,40 @@ std::vector<ProblemAndModel> load_tasks(const StrategiesArguments& a,
   return tasks;
 }
 
+/// A problem for which nothing was found, and why.
+StrategyComparison without_rows(const ProblemAndModel& task, const StrategyOptions& options,
+                                const std::string& why) {
+  StrategyComparison c;
+  c.problem = task.problem.name;
+  c.file = task.problem.file;
+  c.payload = task.problem.payload;
+  c.idle_power = options.idle_power;
+  c.message = why;
+  return c;
+}
+
 StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
                               StrategyOptions options) {
   options.idle_power = idle_power(a, task);
+  if (interrupted()) {
+    StrategyComparison none = without_rows(task, options, "interrupted before it began");
+    none.interrupted = true;
+    return none;
+  }
   options.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
   options.baselines.intervals = options.optimize.intervals;
   options.baselines.optimize = options.optimize;
   const Seeds seeds = make_seeds(task.problem, a.seeds, options.optimize.intervals);
   if (!seeds.motions.empty())
     return compare_strategies(task.model, task.problem, seeds.motions, options);
-  StrategyComparison c;
-  c.problem = task.problem.name;
-  c.file = task.problem.file;
-  c.payload = task.problem.payload;
-  c.idle_power = options.idle_power;
-  c.message = "infeasible. " + seeds.paths.message;
-  return c;
+  return without_rows(task, options, "infeasible. " + seeds.paths.message);
 }
 
 /// Compares the strategies of every problem, each in a process of its own.
+/// @param broken gets the number of processes that ended without a result
 std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& tasks,
                                             const StrategiesArguments& a,
-                                            const StrategyOptions& options) {
+                                            const StrategyOptions& options, int& broken) {
   const int count = static_cast<int>(tasks.size());
   const int processes = a.processes > 0 ? a.processes : usable_processors();
   const auto work = [&](int index) {
@@ -160,6 +172,9 @@ std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& 
     all.back().problem = tasks[i].problem.name;
     all.back().file = tasks[i].problem.file;
     all.back().message = children[i].error;
+    all.back().interrupted = interrupted();
+    ++broken;
+    note(fmt::format("{}: {}", tasks[i].problem.file, children[i].error));
   }
   return all;
 }
@@ -183,7 +198,8 @@ int run(const StrategiesArguments& a) {
   options.optimize.interrupted = interrupted;
   const std::vector<ProblemAndModel> tasks = load_tasks(a, files, options.own_time);
   finish_on_interrupt();
-  const std::vector<StrategyComparison> all = compare_all(tasks, a, options);
+  int broken = 0;
+  const std::vector<StrategyComparison> all = compare_all(tasks, a, options, broken);
   std::vector<Machine> machines;
   machines.reserve(tasks.size());
   for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
@@ -195,8 +211,9 @@ int run(const StrategiesArguments& a) {
                     one ? &tasks.front().problem : nullptr)
         .write(a.outputs.report);
   }
-  fmt::print("{}", strategies_table(all));
+  tell(strategies_table(all));
   if (interrupted()) return kInterrupted;
+  if (broken > 0) return kNotSolved;
   return std::any_of(all.begin(), all.end(), has_optimum) ? kDone : kNotSolved;
 }
 

@@ -10,6 +10,7 @@
 #include "diagnosis/extension/refit_context.h"
 #include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
+#include "models/math/interruption.h"
 
 namespace sparflow {
 namespace {
@@ -411,43 +412,48 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
   std::vector<EffectAt> aside;  // effects not kept since the last step that was kept
   std::size_t rejected = 0;
   DiagnoseOptions diagnose_options = options.diagnose;
-  while (result.reason.empty()) {
-    diagnose_options.candidates = choices(options, current.model, aside);
-    if (diagnose_options.candidates.empty()) {  // an empty list would mean the whole catalogue
-      result.reason = "no other effect is left to try";
-      break;
-    }
-    const std::shared_ptr<const Diagnosis> diagnosis = std::make_shared<const Diagnosis>(
-        diagnose_signals(current.model, signals, diagnose_options, round(0.4)));
-    done += (1.0 - done) * 0.4;
-    result.last = diagnosis;
-    const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
-    if (wanted.empty()) result.reason = why_stopped(*diagnosis);
-    for (const DiagnosedEffect* e : wanted) {
-      if (!steps_left()) {
-        result.reason =
-            fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
-                        effect_title(e->effect.effect->info(), model.machine, e->effect.at));
+  try {
+    while (result.reason.empty()) {
+      diagnose_options.candidates = choices(options, current.model, aside);
+      if (diagnose_options.candidates.empty()) {  // an empty list would mean the whole catalogue
+        result.reason = "no other effect is left to try";
         break;
       }
-      TriedStep tried = try_beside_others(context, current, e->effect, round(0.15));
-      done += (1.0 - done) * 0.2;
-      tried.step.diagnosis = diagnosis;
-      if (!worth_keeping(tried.step, options.change)) {
-        aside.push_back(e->effect);
-        if (helps_here_and_harms_elsewhere(tried.step, options.change))
-          add_indistinguishable(*diagnosis, e->effect, aside);  // they would do the same
-        ++rejected;
-        result.rejected.push_back(std::move(tried.step));
-        continue;
+      const std::shared_ptr<const Diagnosis> diagnosis = std::make_shared<const Diagnosis>(
+          diagnose_signals(current.model, signals, diagnose_options, round(0.4)));
+      done += (1.0 - done) * 0.4;
+      result.last = diagnosis;
+      const std::vector<const DiagnosedEffect*> wanted = to_add(*diagnosis, current.model);
+      if (wanted.empty()) result.reason = why_stopped(*diagnosis);
+      for (const DiagnosedEffect* e : wanted) {
+        if (!steps_left()) {
+          result.reason =
+              fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
+                          effect_title(e->effect.effect->info(), model.machine, e->effect.at));
+          break;
+        }
+        TriedStep tried = try_beside_others(context, current, e->effect, round(0.15));
+        done += (1.0 - done) * 0.2;
+        tried.step.diagnosis = diagnosis;
+        if (!worth_keeping(tried.step, options.change)) {
+          aside.push_back(e->effect);
+          if (helps_here_and_harms_elsewhere(tried.step, options.change))
+            add_indistinguishable(*diagnosis, e->effect, aside);  // they would do the same
+          ++rejected;
+          result.rejected.push_back(std::move(tried.step));
+          continue;
+        }
+        aside.clear();
+        if (!e->rivals.empty()) tried.notes.push_back(stands_for(*e));
+        keep(std::move(tried), context, current, result);
+        if (shapes_opening(current.model.effects.back())) break;
       }
-      aside.clear();
-      if (!e->rivals.empty()) tried.notes.push_back(stands_for(*e));
-      keep(std::move(tried), context, current, result);
-      if (shapes_opening(current.model.effects.back())) break;
+      if (rejected > options.most_rejected && result.reason.empty())
+        result.reason = "the effects found do not improve data that took no part";
     }
-    if (rejected > options.most_rejected && result.reason.empty())
-      result.reason = "the effects found do not improve data that took no part";
+  } catch (const Interruption&) {  // what was kept so far stays
+    result.interrupted = true;
+    result.reason = "it was interrupted";
   }
   name_rejected(options.change, result);
   finish(std::move(current), start, result);

@@ -37,6 +37,7 @@ struct ExtendResult {
   std::string reason;                     ///< the same without these effects
   std::shared_ptr<const Diagnosis> last;  ///< the diagnosis after the last step; `improve` only
   std::vector<std::string> notes;         ///< whole sentences
+  bool interrupted = false;               ///< `improve` ended early; the steps done are kept
   double seconds = 0.0;
 
   std::string brief() const;  ///< one sentence
@@ -87,6 +88,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
 /// (error_change.h), and when the interval of the effect, estimated with the others, excludes zero. If the error rises, it
 /// is tried once more with the other effects unchanged, because in a joint estimate they may reduce an error of one place
 /// at the cost of another. Effects not kept are excluded until another step is kept.
+/// @param progress may throw Interruption: then the steps kept so far are the result
 ExtendResult improve(const CraneModel& model, const ExtendLogs& logs,
                      const ExtendOptions& options = {}, const SearchProgress& progress = {});
 

@@ -222,9 +222,13 @@ std::string ExtendResult::json() const {
     effects.push_back(e.key(model.machine));
     now.push_back({{"effect", e.key(model.machine)}, {"parameters", parameters_json(e)}});
   }
-  Json root = {{"steps", list},       {"stopped_because", stopped_because},
-               {"not_kept", tried},   {"effects", effects},
-               {"in_the_model", now}, {"notes", notes},
+  Json root = {{"steps", list},
+               {"stopped_because", stopped_because},
+               {"not_kept", tried},
+               {"effects", effects},
+               {"in_the_model", now},
+               {"notes", notes},
+               {"interrupted", interrupted},
                {"seconds", seconds}};
   if (last) root["last_diagnosis"] = Json::parse(last->json());
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

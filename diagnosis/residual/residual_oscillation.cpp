@@ -15,6 +15,35 @@ using Eigen::VectorXd;
 /// Ratio of the standard deviation to the median absolute value of a normal distribution.
 constexpr double kNormalDeviation = 1.4826;
 
+/// Power of a series at the frequencies k f for k below `count`, by the sums of its products with sine and cosine.
+/// The phases of one sample at successive frequencies follow from each other by one rotation, so that sine and cosine are
+/// computed once a sample and not once a sample and frequency; thousands of rotations lose less than 1e-8
+/// of the phase in a log of a day.
+/// @param time [samples] [s]  @param value [samples]  @param frequency f [Hz]
+/// @return [count], the first of them zero
+VectorXd power_at_multiples(const VectorXd& time, const VectorXd& value, double frequency,
+                            int count) {
+  VectorXd c = VectorXd::Zero(count), d = VectorXd::Zero(count);
+  /// Samples that are rotated together.
+  /// @threshold [1] 8..4096; numerical: their phases stay in the processor's first cache
+  constexpr Index kTogether = 256;
+  for (Index first = 0; first < time.size(); first += kTogether) {
+    const Index n = std::min(kTogether, time.size() - first);
+    const Eigen::ArrayXd step = 2.0 * std::numbers::pi * frequency * time.segment(first, n).array();
+    const Eigen::ArrayXd turn_cos = step.cos(), turn_sin = step.sin();
+    Eigen::ArrayXd along = value.segment(first, n).array(), across = Eigen::ArrayXd::Zero(n),
+                   next(n);
+    for (int k = 1; k < count; ++k) {
+      next = along * turn_cos - across * turn_sin;
+      across = along * turn_sin + across * turn_cos;
+      along.swap(next);
+      c[k] += along.sum();
+      d[k] += across.sum();
+    }
+  }
+  return 2.0 * (c.cwiseAbs2() + d.cwiseAbs2()) / static_cast<double>(time.size());
+}
+
 }  // namespace
 
 Oscillation strongest_oscillation(const Evidence& evidence, const EvidenceChannel& channel,
@@ -94,7 +123,7 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
   const double highest = options.highest_frequency / step;
   const auto count =
       static_cast<int>(std::min(options.most_frequencies, options.oversampling * highest * span));
-  std::vector<double> power(static_cast<std::size_t>(count), 0.0);
+  VectorXd power = VectorXd::Zero(std::max(count, 0));
   std::vector<std::vector<Index>> by_log(evidence.suspects);
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
     if (static_cast<std::size_t>(channel.log[b]) >= evidence.suspects) continue;
@@ -105,34 +134,29 @@ Line strongest_line(const Evidence& evidence, const EvidenceChannel& channel,
   const double mean = residual(rows).mean();
   const double total = (residual(rows).array() - mean).square().sum();
   if (total <= 0.0) return {};
-  for (int k = 1; k < count; ++k) {
-    const double f = highest * k / count;
-    for (std::size_t log = 0; log < by_log.size(); ++log) {
-      const MachineSeries& s = evidence.series[log];
-      double c = 0.0, d = 0.0;
-      if (by_log[log].size() < options.fewest_rows_of_log) continue;
-      for (const Index i : by_log[log]) {
-        const double phase =
-            2.0 * std::numbers::pi * f * s.time[channel.sample[static_cast<std::size_t>(i)]];
-        c += (residual[i] - mean) * std::cos(phase);
-        d += (residual[i] - mean) * std::sin(phase);
-      }
-      power[static_cast<std::size_t>(k)] +=
-          2.0 * (c * c + d * d) / static_cast<double>(by_log[log].size());
+  for (std::size_t log = 0; log < by_log.size(); ++log) {
+    if (by_log[log].size() < options.fewest_rows_of_log) continue;
+    const auto m = static_cast<Index>(by_log[log].size());
+    VectorXd time(m), value(m);
+    for (Index r = 0; r < m; ++r) {
+      const Index i = by_log[log][static_cast<std::size_t>(r)];
+      time[r] = evidence.series[log].time[channel.sample[static_cast<std::size_t>(i)]];
+      value[r] = residual[i] - mean;
     }
+    power += power_at_multiples(time, value, highest / count, count);
   }
   Line best;
   for (int k = 1; k < count; ++k) {
     const int half = std::max(options.fewest_around, count / options.surroundings);
     const int lo = std::max(1, k - half), hi = std::min(count, k + half);
-    std::vector<double> around(power.begin() + lo, power.begin() + hi);
+    std::vector<double> around(power.data() + lo, power.data() + hi);
     std::nth_element(around.begin(),
                      around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
     const double median = around[around.size() / 2];
-    const double share = power[static_cast<std::size_t>(k)] / total;
+    const double share = power[k] / total;
     // lines with few periods in the log are slow drifts, which are left to the flexible model
     if (highest * k / count * span > options.fewest_periods &&
-        power[static_cast<std::size_t>(k)] > options.line_ratio * median && share > best.share) {
+        power[k] > options.line_ratio * median && share > best.share) {
       best = {highest * k / count, share};
     }
   }

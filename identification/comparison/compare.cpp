@@ -300,18 +300,37 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   return result;
 }
 
+namespace {
+
+/// Makes the signals of a log and looks for its bad channels.
+void add_log(const CraneModel& model, const Log& log, const CompareOptions& options,
+             std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>>& out) {
+  out.first.push_back(make_signals(model.machine, log, options.signals));
+  for (BadChannel& b : find_bad_channels(model.machine, log, out.first.back(), options.bad_data))
+    out.second.push_back({log.file, std::move(b)});
+}
+
+}  // namespace
+
 CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
                       const CompareOptions& options) {
-  std::vector<MachineSignals> signals;
-  signals.reserve(logs.size());
-  std::vector<BadChannelOfLog> bad;
-  for (const Log& log : logs) {
-    signals.push_back(make_signals(model.machine, log, options.signals));
-    for (BadChannel& b : find_bad_channels(model.machine, log, signals.back(), options.bad_data))
-      bad.push_back({log.file, std::move(b)});
+  std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>> seen;
+  for (const Log& log : logs) add_log(model, log, options, seen);
+  CompareResult result = compare_signals(model, std::move(seen.first), {}, options);
+  result.bad_data = std::move(seen.second);
+  return result;
+}
+
+CompareResult compare(const CraneModel& model, std::vector<Log>&& logs,
+                      const CompareOptions& options) {
+  std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>> seen;
+  for (Log& log : logs) {
+    const Log one = std::move(log);
+    log = Log();
+    add_log(model, one, options, seen);
   }
-  CompareResult result = compare_signals(model, std::move(signals), {}, options);
-  result.bad_data = std::move(bad);
+  CompareResult result = compare_signals(model, std::move(seen.first), {}, options);
+  result.bad_data = std::move(seen.second);
   return result;
 }
 

@@ -143,6 +143,10 @@ struct CompareResult {
 CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
                       const CompareOptions& options = {});
 
+/// The same, but each log is given back as soon as its signals are made: long logs are in memory once only.
+CompareResult compare(const CraneModel& model, std::vector<Log>&& logs,
+                      const CompareOptions& options = {});
+
 /// Compares with signals that exist already.
 /// @param only [logs] mask of the samples that count; empty = all
 CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignals> signals,

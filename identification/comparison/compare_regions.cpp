@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace sparflow {
 namespace {
@@ -121,6 +122,18 @@ Candidate scan(const ErrorGroup& group, const BinnedSignal& a, const BinnedSigna
   return best;
 }
 
+/// @return indices of the `most` largest scores, in their order; of equal ones the first
+std::vector<std::size_t> best_scores(const std::vector<double>& scores, std::size_t most) {
+  std::vector<std::size_t> order(scores.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (order.size() <= most) return order;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
+  order.resize(most);
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
 Candidate best_of(const ErrorGroup& group, const std::vector<BinnedSignal>& signals,
                   const Pool& pool, const RegionOptions& options) {
   Candidate whole;
@@ -128,11 +141,16 @@ Candidate best_of(const ErrorGroup& group, const std::vector<BinnedSignal>& sign
   whole.samples = static_cast<double>(group.squared_error.size());
   whole.score = judged(whole.error, whole.samples, pool, options);
   Candidate one, two;
-  for (std::size_t i = 0; i < signals.size(); ++i) {
-    const Candidate c = scan(group, signals[i], nullptr, pool, options);
+  std::vector<double> alone;
+  for (const BinnedSignal& signal : signals) {
+    const Candidate c = scan(group, signal, nullptr, pool, options);
+    alone.push_back(c.score);
     if (c.score > one.score) one = c;
-    for (std::size_t j = i + 1; j < signals.size(); ++j) {
-      const Candidate d = scan(group, signals[i], &signals[j], pool, options);
+  }
+  const std::vector<std::size_t> tried = best_scores(alone, options.paired);
+  for (std::size_t i = 0; i < tried.size(); ++i) {
+    for (std::size_t j = i + 1; j < tried.size(); ++j) {
+      const Candidate d = scan(group, signals[tried[i]], &signals[tried[j]], pool, options);
       if (d.score > two.score) two = d;
     }
   }

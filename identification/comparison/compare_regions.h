@@ -71,6 +71,10 @@ struct RegionOptions {
   /// @threshold [1] 1.3..5; derived: pure noise stays below 1.3 in the smallest region of a log of
   /// 10 000 samples, all regions tried
   double contrast = 1.41;
+  /// Largest number of signals that are tried in pairs; of more, those with the best intervals of their own.
+  /// @threshold [signals] 10..100; chosen: pose, speeds, loads and a dozen columns; of hundreds of further columns the
+  /// pairs, which grow with the square, would take minutes
+  std::size_t paired = 24;
   /// Factor by which a further signal must raise the score.
   /// @threshold [1] 1..3; chosen: keeps descriptions short
   double gain_per_signal = 1.25;

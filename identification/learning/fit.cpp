@@ -69,6 +69,36 @@ std::vector<MachineSignals> all_signals(const Machine& machine, const std::vecto
   return out;
 }
 
+/// The same; each log is emptied when its signals are there.
+std::vector<MachineSignals> all_signals(const Machine& machine, std::vector<Log>&& logs,
+                                        const SignalOptions& options) {
+  std::vector<MachineSignals> out;
+  out.reserve(logs.size());
+  for (Log& log : logs) {
+    const Log one = std::move(log);
+    log = Log();
+    out.push_back(make_signals(machine, one, options));
+  }
+  return out;
+}
+
+std::vector<DataSource> sources(const std::vector<Log>& logs, const char* use) {
+  std::vector<DataSource> out;
+  for (const Log& log : logs) out.push_back({log.file, log.sha256, log.samples(), use});
+  return out;
+}
+
+/// What a report says of a log without its samples: name, number of samples, filter.
+MachineSignals outline_of(const MachineSignals& signals) {
+  MachineSignals out;
+  out.file = signals.file;
+  out.sha256 = signals.sha256;
+  out.step = signals.step;
+  out.window = signals.window;
+  out.time = signals.time;
+  return out;
+}
+
 /// @return usable samples away from the runs' ends, where one-sided windows give inaccurate speeds
 std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   std::vector<Mask> out;
@@ -78,8 +108,9 @@ std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
 }
 
 /// Judges a model that is learned without the held-out blocks of motion on these blocks.
+/// @param signals lent to the comparison where they come back as they were, which spares a copy
 std::optional<CompareResult> judge_held_out(const Machine& machine,
-                                            const std::vector<MachineSignals>& signals,
+                                            std::vector<MachineSignals>& signals,
                                             const FitOptions& options,
                                             std::vector<std::string>& notes) {
   const std::vector<Mask> held = held_out_samples(signals, options);
@@ -96,8 +127,27 @@ std::optional<CompareResult> judge_held_out(const Machine& machine,
   CompareOptions compare_options;
   compare_options.signals = options.signals;
   compare_options.find_regions = false;
-  return compare_signals(pass.model, signals, held, compare_options);
+  if (options.keep_held_out_series) {
+    return compare_signals(pass.model, signals, held, compare_options);
+  }
+  const bool lent = pass.model.effects.empty();  // effects change what they act on
+  CompareResult result =
+      lent ? compare_signals(pass.model, std::move(signals), held, compare_options)
+           : compare_signals(pass.model, signals, held, compare_options);
+  if (lent) signals.clear();
+  for (LogComparison& log : result.logs) {
+    log.series.clear();
+    MachineSignals outline = outline_of(log.signals);
+    if (lent) signals.push_back(std::move(log.signals));
+    log.signals = std::move(outline);
+  }
+  return result;
 }
+
+struct FitInputs {
+  std::vector<MachineSignals> signals, tests;
+  std::vector<DataSource> data;  ///< of both
+};
 
 }  // namespace
 
@@ -159,17 +209,15 @@ double integrated_autocorrelation(const VectorXd& residual, const std::vector<In
   return sum;
 }
 
-FitResult fit(const Machine& machine, const std::vector<Log>& logs,
-              const std::vector<Log>& test_logs, const FitOptions& options,
-              const Progress& progress) {
-  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
-  const auto start = std::chrono::steady_clock::now();
+namespace {
+
+FitResult fit_signals(const Machine& machine, FitInputs inputs, const FitOptions& options,
+                      const Progress& progress) {
   const auto tell = [&](double share, const std::string& what) {
     if (progress) progress(share, what);
   };
-  tell(0.0, "speeds and forces");
-  std::vector<MachineSignals> signals = all_signals(machine, logs, options.signals);
-  const bool hold_out = test_logs.empty() && options.hold_out_every > 1;
+  std::vector<MachineSignals>& signals = inputs.signals;
+  const bool hold_out = inputs.tests.empty() && options.hold_out_every > 1;
   FitPass pass =
       learn(machine, signals, inside(signals), options, [&](double share, const std::string& what) {
         tell(0.05 + (hold_out ? 0.4 : 0.8) * share, what);
@@ -184,9 +232,8 @@ FitResult fit(const Machine& machine, const std::vector<Log>& logs,
   tell(0.9, "errors");
   CompareOptions compare_options;
   compare_options.signals = options.signals;
-  if (!test_logs.empty()) {
-    result.test = compare_signals(pass.model, all_signals(machine, test_logs, options.signals), {},
-                                  compare_options);
+  if (!inputs.tests.empty()) {
+    result.test = compare_signals(pass.model, std::move(inputs.tests), {}, compare_options);
   }
   result.train = compare_signals(pass.model, std::move(signals), {}, compare_options);
 
@@ -194,10 +241,7 @@ FitResult fit(const Machine& machine, const std::vector<Log>& logs,
   result.processes = std::move(pass.processes);
   result.pumps = std::move(pass.pumps);
   result.valves = std::move(pass.valves);
-  for (const Log& log : logs)
-    result.model.data.push_back({log.file, log.sha256, log.samples(), "train"});
-  for (const Log& log : test_logs)
-    result.model.data.push_back({log.file, log.sha256, log.samples(), "test"});
+  result.model.data.insert(result.model.data.end(), inputs.data.begin(), inputs.data.end());
   const auto keep = [&](const CompareResult& r, const char* name) {
     const std::vector<StageQuality> q = stage_quality(r, name);
     result.model.quality.insert(result.model.quality.end(), q.begin(), q.end());
@@ -205,8 +249,40 @@ FitResult fit(const Machine& machine, const std::vector<Log>& logs,
   keep(result.train, "train");
   if (result.test) keep(*result.test, "test");
   if (result.held_out) keep(*result.held_out, "held out");
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   tell(1.0, "done");
+  return result;
+}
+
+}  // namespace
+
+FitResult fit(const Machine& machine, const std::vector<Log>& logs,
+              const std::vector<Log>& test_logs, const FitOptions& options,
+              const Progress& progress) {
+  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
+  const auto start = std::chrono::steady_clock::now();
+  if (progress) progress(0.0, "speeds and forces");
+  FitInputs inputs;
+  inputs.data = sources(logs, "train");
+  for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
+  inputs.signals = all_signals(machine, logs, options.signals);
+  inputs.tests = all_signals(machine, test_logs, options.signals);
+  FitResult result = fit_signals(machine, std::move(inputs), options, progress);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+FitResult fit(const Machine& machine, std::vector<Log>&& logs, std::vector<Log>&& test_logs,
+              const FitOptions& options, const Progress& progress) {
+  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
+  const auto start = std::chrono::steady_clock::now();
+  if (progress) progress(0.0, "speeds and forces");
+  FitInputs inputs;
+  inputs.data = sources(logs, "train");
+  for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
+  inputs.signals = all_signals(machine, std::move(logs), options.signals);
+  inputs.tests = all_signals(machine, std::move(test_logs), options.signals);
+  FitResult result = fit_signals(machine, std::move(inputs), options, progress);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
 

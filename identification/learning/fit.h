@@ -51,6 +51,9 @@ struct FitOptions {
   /// @threshold [Pa] 10..1e5; numerical: ends the alternate updates, at a hundredth of a bar
   double settled = 1e3;
   int threads = 0;  ///< 0 = one for each processor
+  /// Whether signals and series of held-out motions stay in the result, for charts. Without them two million samples take
+  /// a gigabyte less; all scores are the same.
+  bool keep_held_out_series = true;
 };
 
 /// How one pressure model was learned.
@@ -83,14 +86,18 @@ struct FitResult {
       notes;  ///< what was not learned, why, and what to record; whole sentences
   double seconds = 0.0;
 
-  std::string brief() const;  ///< one line
-  std::string full() const;   ///< one screen
+  std::string brief(bool timed = true) const;  ///< one line
+  std::string full() const;                    ///< one screen
 };
 
 /// @param progress called with a share 0..1 and the current step, from one thread at a time; may be empty
 /// @throws InputError when there is no log
 FitResult fit(const Machine& machine, const std::vector<Log>& logs,
               const std::vector<Log>& test_logs = {}, const FitOptions& options = {},
+              const std::function<void(double share, const std::string& what)>& progress = {});
+/// The same, but each log is given back as soon as its signals are made: long logs are in memory once only.
+FitResult fit(const Machine& machine, std::vector<Log>&& logs, std::vector<Log>&& test_logs,
+              const FitOptions& options = {},
               const std::function<void(double share, const std::string& what)>& progress = {});
 
 /// @return [logs] masks of the samples held out for FitResult; all false when fewer than two blocks of motion

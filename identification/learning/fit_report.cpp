@@ -99,11 +99,12 @@ std::string supply_lines(const FitResult& r) {
 
 }  // namespace
 
-std::string FitResult::brief() const {
+std::string FitResult::brief(bool timed) const {
   const auto learned = std::count_if(processes.begin(), processes.end(),
                                      [](const ProcessFit& f) { return f.report.failure.empty(); });
-  std::string text = fmt::format("{} of {} pressure models identified from {} samples in {:.1f} s",
-                                 learned, processes.size(), train.samples, seconds);
+  std::string text = fmt::format("{} of {} pressure models identified from {} samples", learned,
+                                 processes.size(), train.samples);
+  if (timed) text += fmt::format(" in {:.1f} s", seconds);
   if (test) return text + "; on the test logs: " + figures(*test);
   if (held_out) return text + "; on held-out motions: " + figures(*held_out);
   return text + "; on the training logs: " + figures(train);

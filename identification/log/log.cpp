@@ -13,6 +13,7 @@
 #include "identification/log/log_mapping.h"
 #include "identification/log/log_matlab.h"
 #include "identification/log/log_time.h"
+#include "models/math/door.h"
 #include "models/math/error.h"
 #include "models/math/sha256.h"
 
@@ -149,7 +150,53 @@ void require_positions(const RawTable& table, const std::vector<InterpretedColum
   }
 }
 
-Channel make_channel(const InterpretedColumn& column, const std::vector<std::size_t>& rows) {
+/// The rows of a table that become samples.
+struct KeptRows {
+  std::vector<std::size_t> rows;
+  std::vector<SampleRange>
+      groups;  ///< of `rows`, each the mean of a sample; empty: each row is a sample
+
+  std::size_t samples() const { return groups.empty() ? rows.size() : groups.size(); }
+  /// Row in the middle of a sample's group.
+  std::size_t row(std::size_t sample) const {
+    if (groups.empty()) return rows[sample];
+    return rows[static_cast<std::size_t>((groups[sample].begin + groups[sample].end) / 2)];
+  }
+  /// @return mean of the sample's values that are not missing; NaN where half of them or more are
+  double value(const std::vector<double>& values, std::size_t sample) const {
+    if (groups.empty()) return values[rows[sample]];
+    const SampleRange& group = groups[sample];
+    double sum = 0.0;
+    Eigen::Index count = 0;
+    for (Eigen::Index i = group.begin; i < group.end; ++i) {
+      const double v = values[rows[static_cast<std::size_t>(i)]];
+      if (std::isnan(v)) continue;
+      sum += v;
+      ++count;
+    }
+    return 2 * count > group.size() ? sum / static_cast<double>(count)
+                                    : std::numeric_limits<double>::quiet_NaN();
+  }
+};
+
+/// @throws InputError at the first value of a column with a meaning that no machine can have
+void refuse_absurd(const RawTable& table, const InterpretedColumn& column, const KeptRows& kept,
+                   const LogOptions& options) {
+  if (column.meaning.role == Role::kCandidate) return;
+  for (const std::size_t row : kept.rows) {
+    const double v = column.meaning.factor * column.raw->values[row] + column.meaning.offset;
+    if (!(std::abs(v) > options.largest_value)) continue;
+    throw InputError(
+        table.place(row), column.raw->name,
+        fmt::format(
+            "got {:.4g}{}, which no machine has; check the unit, or give a mark for missing "
+            "values under `missing` in a mapping file",
+            column.raw->values[row],
+            table.lines.empty() ? fmt::format(" in row {}", row + 1) : ""));
+  }
+}
+
+Channel make_channel(const InterpretedColumn& column, const KeptRows& kept) {
   const ColumnMeaning& meaning = column.meaning;
   Channel channel;
   channel.column = column.raw->name;
@@ -157,10 +204,10 @@ Channel make_channel(const InterpretedColumn& column, const std::vector<std::siz
   channel.role = meaning.role;
   channel.index = meaning.index;
   channel.unit = meaning.unit;
-  channel.values.resize(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  channel.values.resize(static_cast<Eigen::Index>(kept.samples()));
+  for (std::size_t i = 0; i < kept.samples(); ++i) {
     channel.values[static_cast<Eigen::Index>(i)] =
-        meaning.factor * column.raw->values[rows[i]] + meaning.offset;
+        meaning.factor * kept.value(column.raw->values, i) + meaning.offset;
   }
   return channel;
 }
@@ -196,11 +243,18 @@ void note_holes(const RawColumn& raw, const Channel& channel, std::int64_t fille
   }
 }
 
-void add_channels(const std::vector<InterpretedColumn>& columns,
-                  const std::vector<std::size_t>& rows, const LogOptions& options, Log* log) {
+void add_channels(const RawTable& table, const std::vector<InterpretedColumn>& columns,
+                  const KeptRows& kept, const LogOptions& options, Log* log) {
   for (const InterpretedColumn& column : columns) {
     if (column.meaning.is_time) continue;
-    Channel channel = make_channel(column, rows);
+    refuse_absurd(table, column, kept, options);
+    Channel channel = make_channel(column, kept);
+    if (column.meaning.role == Role::kCandidate &&
+        (channel.values.array().abs() > options.largest_value).any()) {
+      log->warnings.push_back(fmt::format("column {} left out: it holds values beyond {:g}",
+                                          column.raw->name, options.largest_value));
+      continue;
+    }
     if (!is_usable(column, channel, log)) continue;
     if (!column.meaning.suggestion.empty() &&
         std::none_of(columns.begin(), columns.end(), [&](const InterpretedColumn& c) {
@@ -234,6 +288,42 @@ void note_runs(Log* log) {
       log->runs.size() - 1, log->runs.size() == 2 ? "gap" : "gaps", log->runs.size(), longest, at));
 }
 
+void set_times(const RawTable& table, const std::vector<double>& time, const KeptRows& kept,
+               Log* log) {
+  log->time.resize(static_cast<Eigen::Index>(kept.samples()));
+  log->line.resize(kept.samples());
+  for (std::size_t i = 0; i < kept.samples(); ++i) {
+    log->time[static_cast<Eigen::Index>(i)] = kept.value(time, i);
+    log->line[i] = table.line(kept.row(i));
+  }
+  log->step = median_step(log->time);
+}
+
+struct Clock {
+  std::string column;
+  const std::vector<double>* time;  ///< [s] of the table's rows
+};
+
+/// Takes means of neighbouring samples where the log is sampled faster than needed. @throws InputError where nothing is left
+void thin(const RawTable& table, const Clock& clock, const LogOptions& options, KeptRows* kept,
+          Log* log) {
+  kept->groups = thinning(log->time, log->step, log->runs, options);
+  if (kept->groups.empty()) return;
+  const double before = log->step;
+  if (kept->groups.size() < 2) {
+    throw InputError({table.file, table.header_line, 0}, clock.column,
+                     fmt::format("the log lasts {:.3g} s with samples {:.3g} s apart; expected a "
+                                 "motion, or another unit of time",
+                                 log->duration(), before));
+  }
+  set_times(table, *clock.time, *kept, log);
+  log->runs = runs_between_gaps(log->time, log->step, options);
+  log->warnings.push_back(
+      fmt::format("sampled every {:.3g} s, faster than needed; thinned from {} to {} samples by "
+                  "means over {:.3g} s",
+                  before, kept->rows.size(), kept->groups.size(), log->step));
+}
+
 Log clean_log(const RawTable& table, const std::string& path, const std::string& sha256,
               const Machine& machine, const LogOptions& options) {
   Log log;
@@ -252,18 +342,13 @@ Log clean_log(const RawTable& table, const std::string& path, const std::string&
   require_positions(table, columns, machine);
   make_names_unique(&columns, &log.warnings);
 
-  const std::vector<std::size_t> rows =
-      rows_in_time(table, clock.raw->name, time, &log.counts, &log.warnings);
-  log.time.resize(static_cast<Eigen::Index>(rows.size()));
-  log.line.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    log.time[static_cast<Eigen::Index>(i)] = time[rows[i]];
-    log.line[i] = table.line(rows[i]);
-  }
-  log.step = median_step(log.time);
+  KeptRows kept;
+  kept.rows = rows_in_time(table, clock.raw->name, time, &log.counts, &log.warnings);
+  set_times(table, time, kept, &log);
   log.runs = runs_between_gaps(log.time, log.step, options);
+  thin(table, {clock.raw->name, &time}, options, &kept, &log);
   note_runs(&log);
-  add_channels(columns, rows, options, &log);
+  add_channels(table, columns, kept, options, &log);
   check_plausible(machine, &log);
   return log;
 }
@@ -297,9 +382,9 @@ Eigen::MatrixXd Log::matrix(Role role, int count) const {
 }
 
 Log load_log(const std::string& path, const Machine& machine, const LogOptions& options) {
-  std::string bytes = read_file(path);
+  std::string bytes = read_bytes(path, options.limits.log_bytes);
   if (!is_matlab(bytes, path)) return log_from_text(path, std::move(bytes), machine, options);
-  RawTable table = read_matlab(path);
+  RawTable table = read_matlab(path, bytes, options.limits);
   apply_mapping(mapping_of(options), &table);
   return clean_log(table, path, sha256_hex(bytes), machine, options);
 }
@@ -308,7 +393,7 @@ Log log_from_text(const std::string& path, std::string bytes, const Machine& mac
                   const LogOptions& options) {
   const LogMapping mapping = mapping_of(options);
   const std::string sha256 = sha256_hex(bytes);
-  RawTable table = read_delimited(path, std::move(bytes), mapping.dialect);
+  RawTable table = read_delimited(path, std::move(bytes), mapping.dialect, options.limits);
   apply_mapping(mapping, &table);
   return clean_log(table, path, sha256, machine, options);
 }

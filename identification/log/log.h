@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "models/machine/machine.h"
+#include "models/math/door.h"
 
 namespace sparflow {
 
@@ -92,6 +93,14 @@ struct LogOptions {
   double gap_s = 0.2;        ///< [s] steps and longer than this
   int hole_samples = 3;      ///< up to so many missing values in a row are interpolated, and those
   double hole_s = 0.1;       ///< [s] between valid neighbours no further apart than this
+  DoorLimits limits;
+  /// A log that is sampled at least twice as fast is thinned to about this interval by means of neighbouring samples.
+  /// @threshold [s] 1e-4..0.01; chosen: a hundredth of the shortest smoothing window; hydraulic cylinders move no faster
+  double finest_step = 1e-3;
+  /// Largest magnitude of a value with a meaning, in SI.
+  /// @threshold [SI] 1e13..1e30; chosen: pressures in Pa taken for bar stay below it and get a warning; squares and
+  /// products of such values stay finite
+  double largest_value = 1e15;
 };
 
 /// Reads a text or MATLAB log.

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "identification/log/log_number.h"
-#include "identification/log/text_encoding.h"
+#include "models/math/text_encoding.h"
 
 namespace sparflow {
 namespace {
@@ -142,8 +142,10 @@ std::string delimiter_in_words(char delimiter) {
 /// Reads header, units row and rows of a text log.
 class DelimitedReader {
  public:
-  DelimitedReader(const std::string& file, std::string_view text, const DialectOptions& options)
+  DelimitedReader(const std::string& file, std::string_view text, const DialectOptions& options,
+                  const DoorLimits& limits)
       : options_(options),
+        limits_(limits),
         lines_(text),
         text_size_(text.size()),
         cells_of_(options.decimal, options.missing) {
@@ -195,6 +197,11 @@ class DelimitedReader {
                                         printable(trimmed(line), 60)));
     }
     table_.header_line = lines_.number();
+    if (static_cast<std::int64_t>(names.size()) > limits_.log_columns) {
+      fail(table_.header_line,
+           fmt::format("{} columns, the limit is {} (docs/limits.md); is this a log?", names.size(),
+                       limits_.log_columns));
+    }
     for (std::size_t i = 0; i < names.size(); ++i) {
       RawColumn column;
       column.name = names[i].empty() ? fmt::format("column {}", i + 1) : printable(names[i]);
@@ -228,6 +235,12 @@ class DelimitedReader {
       for (std::size_t i = 0; i < width; ++i) row[i] = number(cells[i], &table_.columns[i]);
       for (std::size_t i = 0; i < width; ++i) table_.columns[i].values.push_back(row[i]);
       table_.lines.push_back(lines_.number());
+      if (static_cast<std::int64_t>(table_.lines.size() * width) > limits_.log_values) {
+        fail(lines_.number(),
+             fmt::format("{} rows of {} columns up to here, the limit is {:g} values "
+                         "(docs/limits.md); cut the log, or leave columns out",
+                         table_.lines.size(), width, static_cast<double>(limits_.log_values)));
+      }
     } while (lines_.next_filled(&line));
   }
 
@@ -322,6 +335,7 @@ class DelimitedReader {
   }
 
   const DialectOptions& options_;
+  const DoorLimits& limits_;
   Lines lines_;
   std::size_t text_size_;
   CellReader cells_of_;
@@ -341,9 +355,13 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-RawTable read_delimited(const std::string& file, std::string bytes, const DialectOptions& options) {
-  const std::string text = text_as_utf8(file, std::move(bytes));
-  return DelimitedReader(file, text, options).read();
+RawTable read_delimited(const std::string& file, std::string bytes, const DialectOptions& options,
+                        const DoorLimits& limits) {
+  std::vector<std::string> warnings;
+  const std::string text = text_as_utf8(file, std::move(bytes), &warnings);
+  RawTable table = DelimitedReader(file, text, options, limits).read();
+  table.warnings.insert(table.warnings.begin(), warnings.begin(), warnings.end());
+  return table;
 }
 
 }  // namespace sparflow

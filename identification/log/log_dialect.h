@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "identification/log/log_table.h"
+#include "models/math/door.h"
 
 namespace sparflow {
 
@@ -24,7 +25,7 @@ struct DialectOptions {
 /// @throws InputError when there is no header, no data, more than one row in a hundred of the wrong width,
 ///   or numbers that can be read two ways (thousands separators, points and commas mixed)
 RawTable read_delimited(const std::string& file, std::string bytes,
-                        const DialectOptions& options = {});
+                        const DialectOptions& options = {}, const DoorLimits& limits = {});
 
 /// @return `text` without the blanks, tabs and carriage returns at its ends
 std::string_view trimmed(std::string_view text);

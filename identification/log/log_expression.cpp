@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "identification/log/log_mapping.h"
-#include "identification/log/text_encoding.h"
 #include "models/expression/expression.h"
+#include "models/math/text_encoding.h"
 #include "models/math/units.h"
 
 namespace sparflow {

@@ -124,7 +124,7 @@ LogMapping read_log_mapping(const std::string& path) {
 
 LogMapping parse_log_mapping(const std::string& path, const std::string& text) {
   try {
-    return read_root(path, YAML::Load(text));
+    return read_root(path, first_document(text, path));
   } catch (const YAML::Exception& error) {
     const FilePlace place = error.mark.is_null()
                                 ? FilePlace{path, 0, 0}

@@ -11,7 +11,8 @@
 #include <memory>
 
 #include "identification/log/log_dialect.h"
-#include "identification/log/text_encoding.h"
+#include "identification/log/mat_file.h"
+#include "models/math/text_encoding.h"
 
 namespace sparflow {
 namespace {
@@ -24,81 +25,60 @@ struct FreeVariable {
 };
 using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 
-/// A numeric array in column-major order.
-struct Array {
-  std::string name;
-  std::size_t rows = 0, columns = 0;
-  std::vector<double> values;
-  bool vector() const { return rows == 1 || columns == 1; }
-};
-
 template <class T>
 void copy_values(const matvar_t& variable, std::size_t count, std::vector<double>* out) {
   const T* data = static_cast<const T*>(variable.data);
   out->resize(count);
-  std::transform(data, data + count, out->begin(), [](T v) { return static_cast<double>(v); });
+  std::transform(data, data + count, out->begin(), [](T v) {
+    const auto value = static_cast<double>(v);
+    return std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN();
+  });
 }
 
-/// @return false when the variable is not a real, dense, numeric array of two dimensions
-bool read_array(const matvar_t& variable, Array* array) {
-  if (variable.rank != 2 || variable.isComplex || variable.data == nullptr) return false;
-  array->rows = variable.dims[0];
-  array->columns = variable.dims[1];
-  if (array->columns != 0 &&
-      array->rows > std::numeric_limits<std::size_t>::max() / array->columns) {
-    return false;
-  }
-  const std::size_t count = array->rows * array->columns;
-  if (variable.data_size <= 0 ||
-      variable.nbytes / static_cast<std::size_t>(variable.data_size) < count) {
-    return false;  // a damaged file whose size does not match its data
-  }
+/// @return false when the variable is not a real, dense, numeric array
+bool copy_numbers(const matvar_t& variable, std::size_t count, std::vector<double>* out) {
+  if (variable.isComplex || variable.data == nullptr || variable.data_size <= 0) return false;
+  if (variable.nbytes / static_cast<std::size_t>(variable.data_size) < count) return false;
   switch (variable.class_type) {
     case MAT_C_DOUBLE:
-      copy_values<double>(variable, count, &array->values);
-      break;
+      copy_values<double>(variable, count, out);
+      return true;
     case MAT_C_SINGLE:
-      copy_values<float>(variable, count, &array->values);
-      break;
+      copy_values<float>(variable, count, out);
+      return true;
     case MAT_C_INT8:
-      copy_values<std::int8_t>(variable, count, &array->values);
-      break;
+      copy_values<std::int8_t>(variable, count, out);
+      return true;
     case MAT_C_UINT8:
-      copy_values<std::uint8_t>(variable, count, &array->values);
-      break;
+      copy_values<std::uint8_t>(variable, count, out);
+      return true;
     case MAT_C_INT16:
-      copy_values<std::int16_t>(variable, count, &array->values);
-      break;
+      copy_values<std::int16_t>(variable, count, out);
+      return true;
     case MAT_C_UINT16:
-      copy_values<std::uint16_t>(variable, count, &array->values);
-      break;
+      copy_values<std::uint16_t>(variable, count, out);
+      return true;
     case MAT_C_INT32:
-      copy_values<std::int32_t>(variable, count, &array->values);
-      break;
+      copy_values<std::int32_t>(variable, count, out);
+      return true;
     case MAT_C_UINT32:
-      copy_values<std::uint32_t>(variable, count, &array->values);
-      break;
+      copy_values<std::uint32_t>(variable, count, out);
+      return true;
     case MAT_C_INT64:
-      copy_values<std::int64_t>(variable, count, &array->values);
-      break;
+      copy_values<std::int64_t>(variable, count, out);
+      return true;
     case MAT_C_UINT64:
-      copy_values<std::uint64_t>(variable, count, &array->values);
-      break;
+      copy_values<std::uint64_t>(variable, count, out);
+      return true;
     default:
       return false;
   }
-  for (double& v : array->values) {
-    if (!std::isfinite(v)) v = std::numeric_limits<double>::quiet_NaN();
-  }
-  if (variable.name != nullptr) array->name = variable.name;
-  return true;
 }
 
 /// @return row `row` of a char array
-std::string read_text(const matvar_t& variable, std::size_t row) {
+std::string read_line(const matvar_t& variable, std::size_t row) {
   std::string text;
-  if (variable.class_type != MAT_C_CHAR || variable.rank != 2 || variable.data == nullptr)
-    return text;
+  if (variable.data == nullptr) return text;
   const std::size_t rows = variable.dims[0], columns = variable.dims[1];
   const std::size_t size =
       variable.data_size > 0 ? static_cast<std::size_t>(variable.data_size) : 1;
@@ -107,21 +87,82 @@ std::string read_text(const matvar_t& variable, std::size_t row) {
     if ((at + 1) * size > variable.nbytes) break;
     const unsigned code = size == 2 ? static_cast<const std::uint16_t*>(variable.data)[at]
                                     : static_cast<const std::uint8_t*>(variable.data)[at];
-    text += code < 0x80 ? static_cast<char>(code) : '?';
+    text += code > 0 && code < 0x80 ? static_cast<char>(code) : '?';
   }
   return std::string(trimmed(text));
 }
 
-std::vector<std::string> read_names(matvar_t* variable) {
-  std::vector<std::string> names;
-  if (variable->class_type == MAT_C_CHAR && variable->rank == 2) {
-    for (std::size_t i = 0; i < variable->dims[0]; ++i) names.push_back(read_text(*variable, i));
-  } else if (variable->class_type == MAT_C_CELL && variable->rank == 2) {
-    const std::size_t count = variable->dims[0] * variable->dims[1];
-    for (std::size_t i = 0; i < count; ++i) {
-      const matvar_t* cell = Mat_VarGetCell(variable, static_cast<int>(i));
-      names.push_back(cell == nullptr ? "" : read_text(*cell, 0));
+/// What matio read, as the reader of the older versions gives it. Null pointers stand for what matio could not read.
+MatValue from_matio(matvar_t* variable, int depth, const DoorLimits& limits) {
+  MatValue value;
+  if (variable == nullptr) return value;
+  if (variable->name != nullptr) value.name = variable->name;
+  if (variable->rank != 2 || variable->dims == nullptr || depth > limits.nesting) return value;
+  value.rows = variable->dims[0], value.columns = variable->dims[1];
+  if (value.columns != 0 &&
+      value.rows > static_cast<std::size_t>(limits.log_values) / value.columns)
+    return value;
+  const std::size_t count = value.rows * value.columns;
+  if (variable->class_type == MAT_C_CHAR) {
+    value.kind = MatValue::Kind::kText;
+    for (std::size_t i = 0; i < value.rows && i * variable->dims[1] < variable->nbytes; ++i) {
+      value.lines.push_back(read_line(*variable, i));
     }
+  } else if (variable->class_type == MAT_C_CELL) {
+    value.kind = MatValue::Kind::kCells;
+    if (variable->data == nullptr || count > variable->nbytes / sizeof(matvar_t*)) return value;
+    for (std::size_t i = 0; i < count; ++i) {
+      value.children.push_back(
+          from_matio(Mat_VarGetCell(variable, static_cast<int>(i)), depth + 1, limits));
+    }
+  } else if (variable->class_type == MAT_C_STRUCT) {
+    value.kind = MatValue::Kind::kStruct;
+    char* const* const fields = Mat_VarGetStructFieldnames(variable);
+    const unsigned number = Mat_VarGetNumberOfFields(variable);
+    for (unsigned i = 0; count == 1 && fields != nullptr && i < number; ++i) {
+      matvar_t* field = Mat_VarGetStructFieldByIndex(variable, i, 0);
+      if (field == nullptr || fields[i] == nullptr) continue;
+      value.children.push_back(from_matio(field, depth + 1, limits));
+      value.children.back().name = fields[i];
+    }
+  } else if (copy_numbers(*variable, count, &value.numbers)) {
+    value.kind = MatValue::Kind::kNumbers;
+  }
+  return value;
+}
+
+/// The variables of a file of version 7.3. @throws InputError when HDF5 cannot open it
+std::vector<MatValue> read_mat_73(const std::string& path, const DoorLimits& limits) {
+  static const bool quiet = [] {  // the library would write its own messages to stderr
+    Mat_LogInitFunc("sparflow", [](int, char*) {});
+    return true;
+  }();
+  static_cast<void>(quiet);
+  const std::unique_ptr<mat_t, CloseFile> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
+  if (!file) {
+    throw InputError({path, 0, 0}, "",
+                     "cannot be read as a MATLAB file; save it again, e.g. save('log.mat', '-v7')");
+  }
+  std::vector<MatValue> variables;
+  while (const Variable variable{Mat_VarReadNext(file.get())}) {
+    variables.push_back(from_matio(variable.get(), 1, limits));
+  }
+  return variables;
+}
+
+/// A numeric array in column-major order.
+struct Array {
+  std::string name;
+  std::size_t rows = 0, columns = 0;
+  std::vector<double> values;
+  bool vector() const { return rows == 1 || columns == 1; }
+};
+
+std::vector<std::string> read_names(const MatValue& variable) {
+  if (variable.kind == MatValue::Kind::kText) return variable.lines;
+  std::vector<std::string> names;
+  for (const MatValue& cell : variable.children) {
+    names.push_back(cell.lines.empty() ? "" : cell.lines.front());
   }
   return names;
 }
@@ -132,7 +173,10 @@ std::string shape(const Array& array) {
 
 class MatlabReader {
  public:
-  explicit MatlabReader(const std::string& path) { table_.file = path; }
+  MatlabReader(const std::string& path, std::vector<MatValue> variables)
+      : variables_(std::move(variables)) {
+    table_.file = path;
+  }
 
   RawTable read() {
     read_variables();
@@ -150,25 +194,16 @@ class MatlabReader {
   }
 
   void read_variables() {
-    static const bool quiet = [] {  // the library would write its own messages to stderr
-      Mat_LogInitFunc("sparflow", [](int, char*) {});
-      return true;
-    }();
-    static_cast<void>(quiet);
-    const std::unique_ptr<mat_t, CloseFile> file(Mat_Open(table_.file.c_str(), MAT_ACC_RDONLY));
-    if (!file)
-      fail("", "cannot be read as a MATLAB file; save it again, e.g. save('log.mat', '-v7')");
-    table_.dialect = Mat_GetVersion(file.get()) == MAT_FT_MAT73 ? "MATLAB v7.3" : "MATLAB";
     int structs = 0;
-    while (const Variable variable{Mat_VarReadNext(file.get())}) {
-      if (variable->class_type == MAT_C_STRUCT) {
+    for (MatValue& variable : variables_) {
+      if (variable.kind == MatValue::Kind::kStruct) {
         if (++structs > 1) {
-          fail(printable(variable->name == nullptr ? "" : variable->name),
+          fail(printable(variable.name),
                "a second struct; expected all signals as fields of one struct");
         }
-        read_struct(variable.get());
+        read_struct(variable);
       } else {
-        read_variable(variable.get());
+        read_variable(variable);
       }
     }
     if (arrays_.empty()) {
@@ -180,32 +215,24 @@ class MatlabReader {
     }
   }
 
-  void read_struct(matvar_t* variable) {
-    const std::string name = printable(variable->name == nullptr ? "" : variable->name);
-    if (variable->rank != 2 || variable->dims[0] * variable->dims[1] != 1) {
-      fail(name, "a struct array, expected one struct whose fields are vectors");
+  void read_struct(MatValue& variable) {
+    if (variable.rows * variable.columns != 1) {
+      fail(printable(variable.name),
+           "a struct array, expected one struct whose fields are vectors");
     }
-    const unsigned count = Mat_VarGetNumberOfFields(variable);
-    char* const* const fields = Mat_VarGetStructFieldnames(variable);
-    for (unsigned i = 0; i < count; ++i) {
-      matvar_t* field = Mat_VarGetStructFieldByIndex(variable, i, 0);
-      if (field != nullptr) read_variable(field, fields[i]);
-    }
+    for (MatValue& field : variable.children) read_variable(field);
   }
 
-  void read_variable(matvar_t* variable, const char* field_name = nullptr) {
-    const char* raw_name = field_name != nullptr ? field_name : variable->name;
-    const std::string name = printable(raw_name == nullptr ? "" : raw_name);
+  void read_variable(MatValue& variable) {
+    const std::string name = printable(variable.name);
     if (name.starts_with('#')) return;  // internal to the library
     if (name == "names") {
       names_ = read_names(variable);
       if (names_.empty()) fail(name, "expected a cell array of char, or a char matrix");
       return;
     }
-    Array array;
-    if (read_array(*variable, &array)) {
-      array.name = name;
-      arrays_.push_back(std::move(array));
+    if (variable.kind == MatValue::Kind::kNumbers) {
+      arrays_.push_back({name, variable.rows, variable.columns, std::move(variable.numbers)});
     } else {
       others_ += (others_.empty() ? "" : ", ") + name;
       table_.warnings.push_back(
@@ -281,6 +308,7 @@ class MatlabReader {
   }
 
   RawTable table_;
+  std::vector<MatValue> variables_;
   std::vector<Array> arrays_;
   std::vector<std::string> names_;
   std::string others_;
@@ -293,6 +321,12 @@ bool is_matlab(std::string_view bytes, const std::string& path) {
          bytes.starts_with("\x89HDF\r\n") || path.ends_with(".mat");
 }
 
-RawTable read_matlab(const std::string& path) { return MatlabReader(path).read(); }
+RawTable read_matlab(const std::string& path, std::string_view bytes, const DoorLimits& limits) {
+  const bool before = is_mat_before_73(bytes);
+  RawTable table =
+      MatlabReader(path, before ? read_mat(bytes, path, limits) : read_mat_73(path, limits)).read();
+  table.dialect = before ? "MATLAB" : "MATLAB v7.3";
+  return table;
+}
 
 }  // namespace sparflow

@@ -106,6 +106,23 @@ double median_step(const Eigen::VectorXd& time) {
   return *middle;
 }
 
+std::vector<SampleRange> thinning(const Eigen::VectorXd& time, double step,
+                                  const std::vector<SampleRange>& runs, const LogOptions& options) {
+  if (!(2.0 * step <= options.finest_step * (1.0 + 1e-9))) return {};
+  std::vector<SampleRange> groups;
+  const double width =
+      options.finest_step - 0.5 * step;  // half a step keeps rounding out of the count
+  for (const SampleRange& run : runs) {
+    Eigen::Index begin = run.begin;
+    for (Eigen::Index i = run.begin + 1; i <= run.end; ++i) {
+      if (i < run.end && time[i] - time[begin] < width) continue;
+      groups.push_back({begin, i});
+      begin = i;
+    }
+  }
+  return groups;
+}
+
 std::vector<SampleRange> runs_between_gaps(const Eigen::VectorXd& time, double step,
                                            const LogOptions& options) {
   const double gap = std::max(options.gap_steps * step, options.gap_s);

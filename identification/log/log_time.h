@@ -17,6 +17,12 @@ std::vector<std::size_t> rows_in_time(const RawTable& table, const std::string& 
                                       const std::vector<double>& time, LogCounts* counts,
                                       std::vector<std::string>* warnings);
 
+/// Groups of neighbouring samples whose means thin a log.
+/// @param time [s] increasing  @param step median interval [s]  @param runs no group reaches across a gap between them
+/// @return one range of samples for each sample of the thinned log; empty where the log is no faster than needed
+std::vector<SampleRange> thinning(const Eigen::VectorXd& time, double step,
+                                  const std::vector<SampleRange>& runs, const LogOptions& options);
+
 /// @param time [s] increasing  @param step median interval [s]
 /// @return the stretches between gaps, in order of time
 std::vector<SampleRange> runs_between_gaps(const Eigen::VectorXd& time, double step,

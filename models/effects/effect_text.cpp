@@ -222,7 +222,9 @@ std::string effects_json(const std::string& id) {
     for (const auto& effect : effect_catalogue()) list.push_back(as_json(*effect));
     list.push_back(fault_json());
   }
-  return nlohmann::json{{"effects", list}}.dump(1) + "\n";
+  return nlohmann::json{{"effects", list}}.dump(1, ' ', false,
+                                                nlohmann::json::error_handler_t::replace) +
+         "\n";
 }
 
 }  // namespace sparflow

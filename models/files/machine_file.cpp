@@ -9,6 +9,7 @@
 #include "models/files/file_quantities.h"
 #include "models/files/urdf_import.h"
 #include "models/machine/machine_check.h"
+#include "models/math/door.h"
 #include "models/yaml/yaml_reader.h"
 
 namespace sparflow {
@@ -16,6 +17,7 @@ namespace {
 
 using namespace quantities;
 
+const int kParts = DoorLimits{}.machine_parts;
 constexpr Quantity kDirection{"component of the axis", ""};
 constexpr Quantity kGravity{"component of gravity", "m/s^2"};
 constexpr Quantity kInertia{"moment of inertia", "kg m^2", Sign::kNonNegative};
@@ -38,16 +40,16 @@ class MachineReader {
       read_urdf(root);
     } else {
       for (const YamlValue& v : root.need("joints", "the joints, base to tip (or kinematics)")
-                                    .list("joints, base to tip")) {
+                                    .list("joints, base to tip", kParts)) {
         read_joint(v);
       }
       read_tip(root.need("tip", "the point that carries the payload {joint, xyz}"));
       if (const auto links = root.find("links")) {
-        for (const YamlValue& v : links->list("links")) read_link(v);
+        for (const YamlValue& v : links->list("links", kParts)) read_link(v);
       }
     }
     if (const auto cylinders = root.find("cylinders")) {
-      for (const YamlValue& v : cylinders->list("cylinders")) {
+      for (const YamlValue& v : cylinders->list("cylinders", kParts)) {
         const Cylinder cylinder = read_cylinder(v, machine_.joints, frames_);
         must_be_new(v, cylinder.name, machine_.cylinders, places_.cylinders);
         machine_.cylinders.push_back(cylinder);
@@ -55,10 +57,10 @@ class MachineReader {
       }
     }
     if (const auto pumps = root.find("pumps")) {
-      for (const YamlValue& v : pumps->list("pumps")) read_pump(v);
+      for (const YamlValue& v : pumps->list("pumps", kParts)) read_pump(v);
     }
     if (const auto valves = root.find("valves")) {
-      for (const YamlValue& v : valves->list("valves")) read_valve(v);
+      for (const YamlValue& v : valves->list("valves", kParts)) read_valve(v);
     }
     const std::vector<std::string> found = check_machine(machine_, places_);
     warnings_.insert(warnings_.end(), found.begin(), found.end());
@@ -243,7 +245,7 @@ class MachineReader {
     const YamlMap map = kinematics.map("kinematics {urdf, limits}", {"urdf", "limits"});
     const YamlValue urdf = map.need("urdf", "the URDF file");
     const std::filesystem::path path = std::filesystem::path(folder_) / urdf.text("the URDF file");
-    if (!std::filesystem::is_regular_file(path)) {
+    if (!is_file(path)) {
       urdf.fail(fmt::format("there is no file {}; the path is relative to the machine file",
                             path.string()));
     }

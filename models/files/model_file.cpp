@@ -33,13 +33,13 @@ void write(const Json& value, int indent, std::string& out) {
   };
   if (value.is_object() && !value.empty()) {
     block('{', '}', [&](const auto& it) {
-      out += Json(it.key()).dump() + ": ";
+      out += Json(it.key()).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + ": ";
       write(it.value(), indent + 1, out);
     });
   } else if (value.is_array() && !value.empty() && value.front().is_structured()) {
     block('[', ']', [&](const auto& it) { write(*it, indent + 1, out); });
   } else {
-    out += value.dump();
+    out += value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   }
 }
 

@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <mutex>
+#include <set>
 
+#include "models/files/xml_outline.h"
+#include "models/math/door.h"
 #include "models/yaml/yaml_reader.h"
 
 namespace sparflow {
@@ -52,8 +56,20 @@ class Importer {
            const FilePlace& place)
       : path_(path), limits_(limits), place_(place) {}
 
+  /// Links own their children, so those in a circle would keep each other.
+  ~Importer() {
+    if (!model_) return;
+    for (const auto& [name, link] : model_->links_) {
+      link->child_links.clear();
+      link->child_joints.clear();
+    }
+  }
+  Importer(const Importer&) = delete;
+  Importer& operator=(const Importer&) = delete;
+
   UrdfChain import(const std::string& tip_link) {
-    const std::string text = read_file(path_);
+    const std::string text = read_text(path_);
+    check_xml(text, path_);
     {
       CaughtMessages messages;
       model_ = urdf::parseURDF(text);
@@ -62,6 +78,7 @@ class Importer {
                                           : "not readable as URDF: " + messages.first());
       }
     }
+    require_tree(text);
     find_chain(tip_link.empty() ? only_leaf() : tip_link);
     walk(model_->getRoot(), -1, Eigen::Isometry3d::Identity());
     for (const auto& [name, limit] : limits_) {
@@ -80,6 +97,53 @@ class Importer {
  private:
   [[noreturn]] void fail(const std::string& key, const std::string& message) const {
     throw InputError({path_, 0, 0}, key, message);
+  }
+
+  /// Line of the element of this kind and name, 0 when it is not found.
+  static int line_of(const std::string& text, const std::string& element, const std::string& name) {
+    for (const char quote : {'"', '\''}) {
+      const std::string wanted = fmt::format("name={}{}{}", quote, name, quote);
+      for (std::size_t at = text.find(wanted); at != std::string::npos;
+           at = text.find(wanted, at + 1)) {
+        const std::size_t begin = text.rfind('<', at);
+        if (begin == std::string::npos || text.compare(begin + 1, element.size(), element) != 0)
+          continue;
+        return 1 + static_cast<int>(std::count(
+                       text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+      }
+    }
+    return 0;
+  }
+
+  /// The library checks that one link has no parent, and nothing of the others: joints may form a circle beside the tree,
+  /// and two joints may lead to one link.
+  void require_tree(const std::string& text) const {
+    std::map<std::string, std::string> parent_of;  // joint that leads to a link
+    for (const auto& [name, joint] : model_->joints_) {
+      const auto [before, first] = parent_of.emplace(joint->child_link_name, name);
+      if (first) continue;
+      throw InputError({path_, line_of(text, "joint", name), 0}, key(*joint),
+                       fmt::format("leads to link \"{}\", as joint \"{}\" does; expected one joint "
+                                   "to each link",
+                                   joint->child_link_name, before->second));
+    }
+    std::set<std::string> reached;
+    std::vector<std::string> left = {model_->getRoot()->name};
+    while (!left.empty()) {
+      const urdf::LinkConstSharedPtr link = model_->getLink(left.back());
+      left.pop_back();
+      if (!link || !reached.insert(link->name).second) continue;
+      for (const urdf::JointSharedPtr& joint : link->child_joints)
+        left.push_back(joint->child_link_name);
+    }
+    for (const auto& [name, link] : model_->links_) {
+      if (reached.count(name) > 0) continue;
+      throw InputError(
+          {path_, line_of(text, "link", name), 0}, fmt::format("link[{}]", name),
+          fmt::format("not reached from the root link \"{}\"; the joints around it form a "
+                      "circle, expected a tree",
+                      model_->getRoot()->name));
+    }
   }
 
   static std::string key(const urdf::Joint& joint) { return fmt::format("joint[{}]", joint.name); }

@@ -1,15 +1,12 @@
 #include "models/math/error.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <numeric>
-#include <sstream>
+
+#include "models/math/door.h"
+#include "models/math/text_encoding.h"
 
 namespace sparflow {
 namespace {
@@ -20,7 +17,7 @@ std::string sentence(const FilePlace& where, const std::string& key, const std::
   if (where.line > 0 && where.column > 0) text += fmt::format(":{}", where.column);
   if (!text.empty()) text += ": ";
   if (!key.empty()) text += key + ": ";
-  return text + message;
+  return harmless(text + message, QuoteOptions{}.sentence);
 }
 
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -63,35 +60,6 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
   return best;
 }
 
-void write_file_atomically(const std::string& path, const std::string& content) {
-  const std::string aside = fmt::format("{}.{}.tmp", path, ::getpid());
-  {
-    std::ofstream out(aside, std::ios::binary);
-    if (out) out.write(content.data(), static_cast<std::streamsize>(content.size()));
-    out.flush();
-    if (!out) {
-      const std::string reason = std::strerror(errno);
-      std::remove(aside.c_str());
-      throw InputError({path, 0, 0}, "", fmt::format("cannot write: {}", reason));
-    }
-  }
-  if (std::rename(aside.c_str(), path.c_str()) != 0) {
-    const std::string reason = std::strerror(errno);
-    std::remove(aside.c_str());
-    throw InputError({path, 0, 0}, "", fmt::format("cannot write: {}", reason));
-  }
-}
-
-std::string read_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) {
-    throw InputError({path, 0, 0}, "",
-                     fmt::format("cannot read: {}; check the path", std::strerror(errno)));
-  }
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (in.bad()) throw InputError({path, 0, 0}, "", "cannot read: is it a folder?");
-  return text.str();
-}
+std::string read_file(const std::string& path) { return read_text(path); }
 
 }  // namespace sparflow

@@ -42,11 +42,13 @@ class UsageError : public std::runtime_error {
 /// The candidate nearest to `word` (edit distance), or "" when none is near enough to suggest.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates);
 
-/// Writes `content` beside `path` and renames it, so that no incomplete file is ever visible.
-/// @throws InputError when the folder cannot be written
+/// Writes a file whole or not at all: `content` goes to a new file of unpredictable name in the same folder, to disk, and
+/// then in the place of `path`, whose mode is kept. A link is followed to its target; a device, a FIFO and the program's
+/// own output are written through.
+/// @throws InputError when that fails; what was at `path` before is then still there
 void write_file_atomically(const std::string& path, const std::string& content);
 
-/// The whole file as bytes. @throws InputError when it cannot be read
+/// The whole text of a file as UTF-8 (door.h). @throws InputError when it cannot be read
 std::string read_file(const std::string& path);
 
 }  // namespace sparflow

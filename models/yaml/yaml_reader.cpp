@@ -8,6 +8,10 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
+
+#include "models/math/text_encoding.h"
+#include "models/yaml/yaml_guard.h"
 
 namespace sparflow {
 namespace {
@@ -21,7 +25,7 @@ FilePlace place_of(const YAML::Mark& mark, const std::string& file) {
 std::string shown(const YAML::Node& node) {
   switch (node.Type()) {
     case YAML::NodeType::Scalar: {
-      const std::string& word = node.Scalar();
+      const std::string word = printable(node.Scalar());
       const bool plain =
           !word.empty() && word.find_first_not_of("0123456789+-.eE") == std::string::npos;
       return plain ? word : fmt::format("\"{}\"", word);
@@ -73,6 +77,17 @@ std::string line_of(const std::string& text, int line) {
   }
   if (line < 0 || start == std::string::npos) return "";
   return text.substr(start, text.find('\n', start) - start);
+}
+
+/// Whether the first line that is neither empty nor a comment begins with blanks.
+bool first_key_indented(const std::string& text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::size_t content = text.find_first_not_of(" \t\r", at);
+    if (content < end && text[content] != '#') return content > at;
+    at = end + 1;
+  }
+  return false;
 }
 
 bool tab_indents(const std::string& text, int line) {
@@ -239,12 +254,16 @@ std::string YamlValue::text(const std::string& what) const {
 
 std::string YamlValue::name(const std::string& what) const {
   const std::string word = text(what);
-  for (const char c : word) {
+  for (std::size_t i = 0; i < word.size(); ++i) {
+    const char c = word[i];
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-' && c != '.') {
+      // a character of several bytes is named whole
+      std::size_t character = 1;
+      while (i + character < word.size() && (word[i + character] & 0xC0) == 0x80) ++character;
       fail(
           fmt::format("got \"{}\", expected {} of letters, digits, `_`, `-` and `.` (it names log "
                       "columns); replace \"{}\"",
-                      word, what, c));
+                      printable(word), what, printable(word.substr(i, character))));
     }
   }
   if (word == "base") {
@@ -287,8 +306,11 @@ Range YamlValue::range(const Quantity& what) const {
   return r;
 }
 
-std::vector<YamlValue> YamlValue::list(const std::string& what) const {
+std::vector<YamlValue> YamlValue::list(const std::string& what, int most) const {
   if (!node_->IsSequence()) fail_expected(fmt::format("a list of {}", what));
+  if (most > 0 && node_->size() > static_cast<std::size_t>(most)) {
+    fail_expected(fmt::format("at most {} {}", most, what));
+  }
   std::vector<YamlValue> values;
   std::size_t index = 0;
   for (const YAML::Node& element : *node_) {
@@ -297,7 +319,7 @@ std::vector<YamlValue> YamlValue::list(const std::string& what) const {
       for (const char* key : {"name", "cylinder", "joint", "id"}) {
         const YAML::Node named = element[key];
         if (named && named.IsScalar() && !named.Scalar().empty()) {
-          label = named.Scalar();
+          label = printable(named.Scalar());
           break;
         }
       }
@@ -314,18 +336,18 @@ YamlMap YamlValue::map(const std::string& what, const std::vector<std::string>& 
 
 YamlMap::YamlMap(YamlValue value, std::vector<std::string> keys)
     : value_(std::move(value)), keys_(std::move(keys)) {
+  std::unordered_map<std::string, int> lines;  // of the keys so far
   for (const auto& pair : *value_.node_) {
     if (!pair.first.IsScalar()) {
       value_.child(pair.first, value_.path_).fail("a key must be a plain word");
     }
     const std::string key = pair.first.Scalar();
     FilePlace place = place_of(pair.first.Mark(), value_.place_.file);
-    for (const Entry& earlier : entries_) {
-      if (earlier.key == key) {
-        throw InputError(place, value_.path_,
-                         fmt::format("key \"{}\" occurs here and on line {}; keep one of them", key,
-                                     earlier.place.line));
-      }
+    const auto [earlier, first] = lines.emplace(key, place.line);
+    if (!first) {
+      throw InputError(place, value_.path_,
+                       fmt::format("key \"{}\" occurs here and on line {}; keep one of them",
+                                   printable(key), earlier->second));
     }
     YamlValue child = value_.child(pair.second, key_path(key));
     if (pair.second.IsNull()) child.place_ = place;  // A missing value has no place of its own.
@@ -346,13 +368,13 @@ void YamlMap::check_keys() const {
                  [&](const std::string& key) { return !present(key); });
     const std::string hint = suggestion(entry.key, absent);
     throw InputError(entry.place, value_.path_,
-                     fmt::format("unknown key \"{}\"{}", entry.key,
+                     fmt::format("unknown key \"{}\"{}", printable(entry.key),
                                  hint.empty() ? "; known here: " + listed(keys_) : hint));
   }
 }
 
 std::string YamlMap::key_path(const std::string& key) const {
-  return value_.path_.empty() ? key : value_.path_ + "." + key;
+  return value_.path_.empty() ? printable(key) : value_.path_ + "." + printable(key);
 }
 
 std::optional<YamlValue> YamlMap::find(const std::string& key) const {
@@ -390,27 +412,32 @@ std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() const {
   return all;
 }
 
-YamlValue parse_yaml(const std::string& text, const std::string& file) {
-  std::vector<YAML::Node> documents;
+YAML::Node first_document(const std::string& text, const std::string& file) {
   try {
     // With the end mark yaml-cpp reports a quote that is not closed; without it the rest would be taken as text.
-    documents = YAML::LoadAll(text + "\n...\n");
+    const std::string ended = text + "\n...\n";
+    const YamlOutline outline = yaml_outline(ended, file);
+    if (outline.empty && !outline.second) {
+      throw InputError({file, 0, 0}, "", "the file is empty; expected `key: value` lines");
+    }
+    if (outline.second) {
+      const bool marked = text.starts_with("---") || text.find("\n---") != std::string::npos;
+      throw InputError(outline.second_place, "",
+                       marked ? "a second document starts here; remove the `---` line"
+                       : first_key_indented(text)
+                           ? "this line is indented less than the first key; check its "
+                             "indentation: every key of the file starts in the first column"
+                           : "this fits no mapping; is the file YAML?");
+    }
+    return YAML::Load(ended);
   } catch (const YAML::Exception& error) {
     throw InputError(place_of(error.mark, file), "",
                      explained_yaml_error(error.msg, text, error.mark.line));
   }
-  if (documents.empty() || documents[0].IsNull()) {
-    throw InputError({file, 0, 0}, "", "the file is empty; expected `key: value` lines");
-  }
-  if (documents.size() > 1) {
-    const YAML::Mark mark = documents[1].Mark();
-    const bool marked = text.starts_with("---") || text.find("\n---") != std::string::npos;
-    throw InputError(place_of(mark, file), "",
-                     marked ? "a second document starts here; remove the `---` line"
-                            : "this line is indented less than the first key; check its "
-                              "indentation: every key of the file starts in the first column");
-  }
-  return YamlValue(documents[0], file, "");
+}
+
+YamlValue parse_yaml(const std::string& text, const std::string& file) {
+  return YamlValue(first_document(text, file), file, "");
 }
 
 }  // namespace sparflow

@@ -64,7 +64,8 @@ class YamlValue {
   /// [lo, hi] with lo < hi, SI.
   Range range(const Quantity& what) const;
   /// Elements; their path names them by `name`, `cylinder`, `joint` or `id` where they have one.
-  std::vector<YamlValue> list(const std::string& what) const;
+  /// @param most largest number of elements; 0: any number
+  std::vector<YamlValue> list(const std::string& what, int most = 0) const;
   /// @param keys all keys that it may contain; empty: the keys are names (of joints, of pumps)
   /// @throws InputError at the first key that is unknown, with the nearest known one, or that occurs twice
   YamlMap map(const std::string& what, const std::vector<std::string>& keys) const;
@@ -117,6 +118,10 @@ class YamlMap {
   std::vector<Entry> entries_;
   std::vector<std::string> keys_;
 };
+
+/// The only document of a text, within the limits of door.h. @param file name of the text in messages
+/// @throws InputError at the place where the text is not valid YAML or beyond the limits, and when it is empty
+YAML::Node first_document(const std::string& text, const std::string& file);
 
 /// The document's root value. @param file name of the text in messages
 /// @throws InputError at the place where the text is not valid YAML, or when it is empty

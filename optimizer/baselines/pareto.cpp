@@ -55,6 +55,8 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   for (const SeedMotion& s : seeds)
     ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
   const BaselineSet baselines(model, problem, ends, options.strategies.baselines);
+  const std::function<bool()>& stop = options.strategies.optimize.interrupted;
+  const auto stopped = [&] { return curve.interrupted = curve.interrupted || (stop && stop()); };
   double anchor = 0.0;
   for (const std::string& kind : BaselineSet::kinds()) {
     const double shortest = baselines.shortest(kind);
@@ -75,7 +77,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   }
   EnergyGridOptions grid;
   grid.nodes = options.grid_nodes;
-  if (options.grid_nodes > 0 && problem.machine.joint_count() <= grid.most_joints &&
+  if (!stopped() && options.grid_nodes > 0 && problem.machine.joint_count() <= grid.most_joints &&
       !problem.tip_line) {
     const GridPath path = EnergyGrid(model, problem, grid).cheapest_path(0.0);
     if (path.found) curve.grid_limit = path.slow_energy_J;
@@ -94,8 +96,9 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     p.optimal = search.at(duration, known, thorough);
     ++done;
     if (options.progress) {
-      go_on = options.progress(std::min(1.0, static_cast<double>(done) / options.points),
-                               fmt::format("{:.2f} s", duration));
+      go_on =
+          !stopped() && options.progress(std::min(1.0, static_cast<double>(done) / options.points),
+                                         fmt::format("{:.2f} s", duration));
     }
     return p;
   };
@@ -115,7 +118,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   double low = fastest.found() ? std::min(anchor, fastest.duration) : anchor;
   if (!problem.duration.fixed()) low = std::max(low, problem.duration.min);
   // Points are dense near the shortest duration, where the curve is steep; each optimum starts the next.
-  for (int i = options.points - 1; i >= 0 && go_on; --i) {
+  for (int i = options.points - 1; i >= 0 && go_on && !stopped(); --i) {
     const double share = static_cast<double>(i) / std::max(1, options.points - 1);
     ParetoPoint p = evaluate(low * std::pow(options.longest, std::pow(share, 1.4)),
                              i == options.points - 1 || i == options.points / 2 || i <= 1);
@@ -124,7 +127,8 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
   std::sort(curve.points.begin(), curve.points.end(),
             [](const ParetoPoint& a, const ParetoPoint& b) { return a.duration < b.duration; });
   if (curve.points.empty()) {
-    curve.message = "no motion was found at any duration tried";
+    curve.message = stopped() ? "interrupted before any motion was found"
+                              : "no motion was found at any duration tried";
     return curve;
   }
   curve.shortest = curve.points.front().duration;
@@ -144,6 +148,7 @@ ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& pr
     p.optimal.detail = "shorter time";
   }
   curve.idle = idle_choices(curve.points, options.idle_powers);
+  curve.interrupted = stopped() || !go_on;
   return curve;
 }
 

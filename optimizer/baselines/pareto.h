@@ -30,7 +30,8 @@ struct ParetoCurve {
   double simultaneous_limit = 0.0;  ///< [J] the cheapest straight joint line driven very slowly
   double grid_limit = 0.0;          ///< [J] cheapest path of the joint grid, unlimited time
   std::vector<IdleChoice> idle;
-  std::string message;  ///< why there is no point
+  std::string message;       ///< why there is no point
+  bool interrupted = false;  ///< durations are missing, and the energies of some could still fall
 };
 
 struct ParetoOptions {

@@ -317,8 +317,11 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
   // Long durations come first: each optimum starts the next, and overlaps appear as the duration is shortened.
   std::vector<double> factors = options.factors;
   std::sort(factors.rbegin(), factors.rend());
+  const auto stopped = [&] {
+    return options.optimize.interrupted && options.optimize.interrupted();
+  };
   for (const double factor : factors) {
-    if (out.shortest <= 0.0) break;
+    if (out.shortest <= 0.0 || stopped()) break;
     /// Multiple of the shortest duration up to which the search is thorough.
     /// @threshold [1] 1..5; chosen: where time is short, optima differ from those at longer durations, of which one
     /// starts the next
@@ -326,7 +329,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
     out.rows.push_back(rows_at(fmt::format("{:g} x shortest", factor), factor, factor * anchor,
                                factor <= kThoroughUpTo || factor == factors.front()));
   }
-  if (options.own_time && out.shortest > 0.0) {
+  if (options.own_time && out.shortest > 0.0 && !stopped()) {
     StrategyRow row{"own", 0.0, 0.0, {}};
     double first = 2.0 * anchor, least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < shortest.size(); ++i) {
@@ -347,6 +350,7 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
   }
   if (out.shortest <= 0.0 && out.message.empty())
     out.message = "no kind of motion tried reaches the goal within the limits at any duration";
+  out.interrupted = stopped();
   out.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

@@ -49,7 +49,8 @@ struct StrategyComparison {
   std::vector<StrategyRow> rows;
   std::vector<BaselineMotion>
       orders;  ///< sequential motions of every order at equal duration, trajectories removed
-  double solve_s = 0.0;  ///< wall time [s]
+  double solve_s = 0.0;      ///< wall time [s]
+  bool interrupted = false;  ///< rows may be missing, and the energies of others could still fall
   const StrategyRow* row(const std::string& name) const;
 };
 

@@ -51,6 +51,7 @@ std::string packed(const StrategyComparison& c) {
   Packer p;
   p.text(c.problem).text(c.file).text(c.message).text(c.shortest_of);
   p.number(c.payload).number(c.idle_power).number(c.shortest).number(c.solve_s);
+  p.number(c.interrupted ? 1.0 : 0.0);
   p.number(static_cast<double>(c.rows.size()));
   for (const StrategyRow& row : c.rows) {
     p.text(row.name).number(row.factor).number(row.duration);
@@ -82,6 +83,7 @@ StrategyComparison unpacked_comparison(const std::string& bytes) {
   c.idle_power = u.number();
   c.shortest = u.number();
   c.solve_s = u.number();
+  c.interrupted = u.number() != 0.0;
   c.rows.resize(static_cast<std::size_t>(u.number()));
   for (StrategyRow& row : c.rows) {
     row.name = u.text();

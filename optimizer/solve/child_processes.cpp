@@ -12,6 +12,7 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <new>
 
 #include "models/math/error.h"
 
@@ -39,6 +40,8 @@ void write_all(int fd, const std::string& bytes) {
 std::string run_here(const std::function<std::string(int)>& work, int index) {
   try {
     return "\1" + work(index);
+  } catch (const std::bad_alloc&) {
+    return std::string(1, '\0') + "out of memory; solve fewer problems at once (--processes)";
   } catch (const std::exception& e) {
     return std::string(1, '\0') + e.what();
   }
@@ -128,6 +131,29 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
     }
   }
   return results;
+}
+
+ChildResult run_in_child(const std::function<std::string()>& work,
+                         const std::function<bool()>& stop) {
+  Child child = start_child([&](int) { return work(); }, 0, {});
+  /// Time between two questions whether to stop.
+  /// @threshold [ms] 1..1000; chosen: answers within a second, and costs nothing
+  constexpr int kAskEvery = 100;
+  bool stopped = false;
+  for (;;) {
+    stopped = stopped || stop();
+    if (stopped) ::kill(child.pid, SIGKILL);
+    pollfd poll{child.pipe, POLLIN, 0};
+    if (::poll(&poll, 1, stopped ? -1 : kAskEvery) <= 0) continue;
+    char buffer[65536];
+    const ssize_t n = ::read(child.pipe, buffer, sizeof buffer);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    child.received.append(buffer, static_cast<std::size_t>(n));
+  }
+  ::close(child.pipe);
+  const std::string end = fate(child.pid);
+  return decode(stopped ? std::string() : child.received, stopped ? "interrupted" : end);
 }
 
 int usable_processors() {

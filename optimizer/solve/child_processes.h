@@ -21,6 +21,10 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
                                          const std::function<std::string(int)>& work,
                                          const std::function<void(int, int)>& on_done = {});
 
+/// Runs `work` in a forked child until it is done or `stop` says so (asked ten times a second), which ends the child.
+ChildResult run_in_child(const std::function<std::string()>& work,
+                         const std::function<bool()>& stop);
+
 /// Number of processors this process may use.
 int usable_processors();
 

@@ -174,7 +174,8 @@ struct OptimizeResult {
   std::string straight_line_name;
   /// [s] shortest motion found within all limits; it is sought when no start keeps them in the duration asked for. 0 = none.
   double shortest_duration = 0.0;
-  double solve_s = 0.0;  ///< wall time of everything
+  bool interrupted = false;  ///< the search or what was asked beside it ended early
+  double solve_s = 0.0;      ///< wall time of everything
   double evaluated_durations = 1;
 };
 

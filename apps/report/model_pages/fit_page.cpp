@@ -196,7 +196,7 @@ void set_verdict(Page& page, const FitResult& r) {
     tone = learned == 0 ? Tone::kBad : Tone::kWarning;
   }
   if (all == 0) headline = "The machine has no hydraulics: only forces are compared";
-  std::string text = r.brief() + ".";
+  std::string text = r.brief(false) + ".";
   const std::vector<JudgedScore> judged = judge_scores(r.model.machine, judged_on(r));
   const JudgedScore* worst = worst_score(judged);
   if (worst != nullptr && worst->tone == Tone::kBad) {

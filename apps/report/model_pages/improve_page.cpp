@@ -323,6 +323,9 @@ Page improve_page(const ExtendResult& result) {
                                 ? ""
                                 : fmt::format(", {} tried and not kept", result.rejected.size())));
   set_verdict(page, result);
+  if (result.interrupted) {
+    page.banner("Interrupted: the steps shown are whole, and more effects may be missing.");
+  }
   add_steps(page, result);
   if (result.last) add_last(page, *result.last);
   page.provenance("program", std::string("sparflow ") + program_version());

@@ -232,7 +232,6 @@ void add_tables(Page& page, const OptimizeResult& result) {
                     {"initial guess", "kJ"},
                     {"optimised", "kJ"},
                     {"iterations", "", 5},
-                    {"solver", "s", 3},
                     {"note"}};
   starts.note =
       "Energies by the exact law. \"Initial guess\" is the energy of the seed path driven in the "
@@ -253,7 +252,7 @@ void add_tables(Page& page, const OptimizeResult& result) {
     starts.rows.push_back({s.seed, usable ? std::string("kept all limits") : in_words(s.status),
                            s.duration, s.seed_feasible ? s.seed_energy / 1e3 : std::nan(""),
                            usable ? s.energy_exact / 1e3 : std::nan(""),
-                           static_cast<double>(s.iterations), s.solve_s, note});
+                           static_cast<double>(s.iterations), note});
   }
   starts.highlighted_row = result.best_start;
   page.table(std::move(starts));
@@ -333,6 +332,11 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                      ? fmt::format("Infeasible: no motion was found that keeps all limits{}", in)
                      : std::string(to_string(result.status)),
                  why);
+  }
+  if (result.status == OptimizeStatus::kInterrupted) {
+    page.banner("Interrupted: this is the best motion so far, and a cheaper one may exist.");
+  } else if (result.interrupted) {
+    page.banner("Interrupted: the motion is whole, the lower bound is missing.");
   }
   add_motion(page, model, problem, result, baseline);
   page.provenance("program", std::string("sparflow ") + program_version());

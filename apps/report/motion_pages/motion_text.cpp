@@ -185,6 +185,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
   nlohmann::json out = {
       {"problem", problem.name},
       {"status", r.status == OptimizeStatus::kInterrupted ? "failed" : to_string(r.status)},
+      {"interrupted", r.interrupted || r.status == OptimizeStatus::kInterrupted},
       {"message", r.message},
       {"duration_s", r.duration},
       {"solve_s", r.solve_s}};
@@ -236,7 +237,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
                                {"excess", c.excess}});
     }
   }
-  return out.dump(2) + "\n";
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,

@@ -100,6 +100,9 @@ LineChart moving_chart(const ParetoCurve& curve) {
 
 Page pareto_page(const CraneModel& model, const MotionProblem& problem, const ParetoCurve& curve) {
   Page page("Energy against time: " + problem.name);
+  if (curve.interrupted) {
+    page.banner("Interrupted: durations are missing, and the energies shown could still fall.");
+  }
   if (curve.points.empty()) {
     page.verdict(Tone::kBad, "No motion was found", curve.message);
     return page;
@@ -161,7 +164,10 @@ std::string pareto_json(const MotionProblem& problem, const ParetoCurve& curve) 
                     {"at_end", c.at_end}});
   }
   json out = {{"name", problem.name},
-              {"status", curve.points.empty() ? "infeasible" : "optimal"},
+              {"status", curve.interrupted      ? "interrupted"
+                         : curve.points.empty() ? "infeasible"
+                                                : "optimal"},
+              {"interrupted", curve.interrupted},
               {"points", points},
               {"idle", idle},
               {"shortest_s", nullptr},
@@ -171,7 +177,7 @@ std::string pareto_json(const MotionProblem& problem, const ParetoCurve& curve) 
                 {"grid_J", number_or_null(curve.grid_limit)}}}};
   if (curve.shortest > 0.0) out["shortest_s"] = curve.shortest;
   if (!curve.message.empty()) out["message"] = curve.message;
-  return out.dump(1) + "\n";
+  return out.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string pareto_csv(const ParetoCurve& curve) {

@@ -345,6 +345,11 @@ Page strategies_page(const std::vector<StrategyComparison>& all, const CraneMode
   Page page(all.size() == 1 ? "Strategies: " + all.front().problem
                             : fmt::format("Strategies over {} problems", all.size()));
   set_verdict(page, all);
+  if (any_interrupted(all)) {
+    page.banner(
+        "Interrupted: strategies or whole problems are missing, and the energies shown could still "
+        "fall.");
+  }
   if (all.size() == 1 && model != nullptr && problem != nullptr) {
     if (!all.front().message.empty()) page.paragraph(all.front().message);
     add_one(page, all.front(), *model, *problem);

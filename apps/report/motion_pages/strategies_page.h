@@ -10,6 +10,9 @@ namespace sparflow {
 Page strategies_page(const std::vector<StrategyComparison>& all, const CraneModel* model,
                      const MotionProblem* problem);
 
+/// Whether the comparison of any problem ended early.
+bool any_interrupted(const std::vector<StrategyComparison>& all);
+
 /// Returns the result of `strategies` as JSON (keys: docs/strategies.md).
 /// @param machines one for each comparison, for the names of cylinders and pumps
 std::string strategies_json(const std::vector<StrategyComparison>& all,

@@ -1,6 +1,7 @@
 /// The texts of strategies: a table for the terminal, JSON.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -90,15 +91,24 @@ json summary_json(const std::vector<StrategyComparison>& all) {
 
 }  // namespace
 
+bool any_interrupted(const std::vector<StrategyComparison>& all) {
+  return std::any_of(all.begin(), all.end(),
+                     [](const StrategyComparison& c) { return c.interrupted; });
+}
+
 std::string strategies_json(const std::vector<StrategyComparison>& all,
                             const std::vector<Machine>& machines) {
   json problems = json::array();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const StrategyComparison& c = all[i];
-    json p = {{"name", c.problem},           {"file", c.file},
-              {"payload_kg", c.payload},     {"idle_power_W", c.idle_power},
-              {"solve_s", c.solve_s},        {"shortest_s", nullptr},
-              {"strategies", json::object()}};
+    json p = {{"name", c.problem},
+              {"file", c.file},
+              {"payload_kg", c.payload},
+              {"idle_power_W", c.idle_power},
+              {"solve_s", c.solve_s},
+              {"shortest_s", nullptr},
+              {"strategies", json::object()},
+              {"interrupted", c.interrupted}};
     if (c.shortest > 0.0) {
       p["shortest_s"] = c.shortest;
       p["shortest_of"] = c.shortest_of;
@@ -130,7 +140,11 @@ std::string strategies_json(const std::vector<StrategyComparison>& all,
     p["orders"] = std::move(orders);
     problems.push_back(std::move(p));
   }
-  return json({{"problems", problems}, {"summary", summary_json(all)}}).dump(1) + "\n";
+  return json({{"problems", problems},
+               {"summary", summary_json(all)},
+               {"interrupted", any_interrupted(all)}})
+             .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
+         "\n";
 }
 
 std::string strategies_table(const std::vector<StrategyComparison>& all) {

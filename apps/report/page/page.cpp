@@ -167,6 +167,8 @@ void Page::verdict(Tone tone, std::string headline, std::string text) {
   verdict_text_ = std::move(text);
 }
 
+void Page::banner(std::string text) { banner_ = std::move(text); }
+
 void Page::provenance(std::string name, std::string value) {
   provenance_.emplace_back(std::move(name), std::move(value));
 }
@@ -238,6 +240,10 @@ std::string Page::html() const {
       html_escape(title_));
   if (!subtitle_.empty())
     head += fmt::format("<p class=\"subtitle\">{}</p>\n", html_escape(subtitle_));
+  if (!banner_.empty()) {
+    head += fmt::format("<div class=\"verdict {} banner\"><strong>{}</strong></div>\n",
+                        tone_class(Tone::kWarning), html_escape(banner_));
+  }
   if (!verdict_headline_.empty()) {
     head += fmt::format("<div class=\"verdict {}\"><strong>{}</strong> {}</div>\n",
                         tone_class(verdict_tone_), html_escape(verdict_headline_),

@@ -46,6 +46,8 @@ class Page {
   void subtitle(std::string text);
   /// Sets the main result, which stands in a box above everything else.
   void verdict(Tone tone, std::string headline, std::string text);
+  /// Adds a line above everything else that says the result is not whole ("Interrupted: ..."). Empty text: none.
+  void banner(std::string text);
   /// Adds a line to the footer (program version, input files and their hashes, seed ...), in the order of the calls.
   void provenance(std::string name, std::string value);
 
@@ -88,7 +90,7 @@ class Page {
 
   std::string title_, subtitle_;
   Tone verdict_tone_ = Tone::kNeutral;
-  std::string verdict_headline_, verdict_text_;
+  std::string banner_, verdict_headline_, verdict_text_;
   std::vector<std::pair<std::string, std::string>> provenance_;
   std::vector<Item> items_;
 };

@@ -83,6 +83,19 @@ TEST(Fit, WithoutTestLogsWholeMotionsAreHeldOut) {
   EXPECT_THAT(r.brief(), HasSubstr("held-out motions"));
 }
 
+TEST(Fit, WithoutHeldOutSeriesAllScoresAreTheSame) {
+  FitOptions options;
+  const FitResult whole = fit(arm_machine(), {arm_log(0.3, 1)}, {}, options);
+  options.keep_held_out_series = false;
+  std::vector<Log> logs = {arm_log(0.3, 1)};
+  const FitResult lean = fit(arm_machine(), std::move(logs), std::vector<Log>(), options);
+  EXPECT_EQ(compare_json(*lean.held_out), compare_json(*whole.held_out));
+  EXPECT_EQ(compare_json(lean.train), compare_json(whole.train));
+  EXPECT_EQ(model_to_json(lean.model), model_to_json(whole.model));
+  EXPECT_TRUE(lean.held_out->logs.at(0).series.empty());
+  EXPECT_FALSE(whole.held_out->logs.at(0).series.empty());
+}
+
 TEST(Fit, BlocksCoverEveryMotionOnce) {
   const MachineSignals s = make_signals(arm_machine(), arm_log());
   Mask covered = Mask::Constant(s.samples(), false);

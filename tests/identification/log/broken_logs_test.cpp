@@ -8,7 +8,10 @@ namespace sparflow {
 namespace {
 
 using test::LogFiles;
+using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 struct BrokenLog {
@@ -264,7 +267,58 @@ TEST_F(LogFiles, OtherEncodingsArePrintable) {
   // Latin-1 degree sign in a unit, a stray byte in a text column: messages must be valid UTF-8.
   const Log log = load("t_s;q_boom [\xB0];q_extension_m;note\n0;45;1;\xFF\x01\n0.02;45;1;b\n");
   EXPECT_NEAR(log.find(Role::kJointPosition, 0)->values[0], 0.7853981633974483, 1e-15);
-  EXPECT_THAT(log.warnings, ElementsAre("column note left out: it holds text (\"ÿ?\" in line 2)"));
+  EXPECT_THAT(log.warnings, ElementsAre(HasSubstr("line 1 is not UTF-8 (nor are 1 later ones)"),
+                                        "column note left out: it holds text (\"ÿ?\" in line 2)"));
+}
+
+TEST_F(LogFiles, ALogThatIsFasterThanNeededIsThinnedByMeans) {
+  std::string text = "t_s,q_boom_rad,q_extension_m,pA_boom_bar\n";
+  for (int i = 0; i < 20'000; ++i) {
+    // a ripple of the pressure at half the sampling rate vanishes in the means
+    text +=
+        fmt::format("{:.4f},{:.5f},1,{}\n", 1e-4 * i, 0.5 + 1e-5 * i, 80 + (i % 2 == 0 ? 3 : -3));
+  }
+  const Log log = load(text);
+  EXPECT_EQ(log.samples(), 2000);
+  EXPECT_NEAR(log.step, 1e-3, 1e-9);
+  EXPECT_THAT(log.warnings, Contains(HasSubstr("thinned from 20000 to 2000 samples")));
+  const Channel& p = *log.find(Role::kPressureA, 0);
+  EXPECT_LT((p.values.array() - 80e5).abs().maxCoeff(), 1.0);
+  // value and time are means over the same samples, so that a ramp stays one
+  const Channel& q = *log.find(Role::kJointPosition, 0);
+  EXPECT_LT((q.values.array() - 0.5 - 0.1 * log.time.array()).abs().maxCoeff(), 1e-9);
+}
+
+TEST_F(LogFiles, AThousandSamplesASecondStayAsTheyAre) {
+  std::string text = "t_s,q_boom_rad,q_extension_m\n";
+  for (int i = 0; i < 500; ++i) text += fmt::format("{:.3f},{:.5f},1\n", 1e-3 * i, 0.5 + 1e-4 * i);
+  EXPECT_EQ(load(text).samples(), 500);
+}
+
+TEST_F(LogFiles, FiftyRowsOfAMicrosecondAreNoMotion) {
+  std::string text = "t_s,q_boom_rad,q_extension_m\n";
+  for (int i = 0; i < 50; ++i) text += fmt::format("{:.6f},0.5,1\n", 1e-6 * i);
+  EXPECT_THAT(error_of(text), HasSubstr("the log lasts"));
+}
+
+TEST_F(LogFiles, ValuesThatNoMachineHasAreNamedWithTheirLine) {
+  EXPECT_THAT(error_of("t_s,q_boom_rad,q_extension_m,pA_boom_bar\n0,0.5,1,80\n0.02,0.5,1,80e300\n"),
+              AllOf(HasSubstr("log.csv:3: pA_boom_bar: got 8e+301"), HasSubstr("unit")));
+}
+
+TEST_F(LogFiles, TooManyColumnsAreRefused) {
+  std::string header = "t_s,q_boom_rad,q_extension_m", row = "0,0.5,1";
+  for (int i = 0; i < 10'000; ++i) header += fmt::format(",c{}", i), row += ",1";
+  EXPECT_THAT(error_of(header + "\n" + row + "\n"), HasSubstr("columns, the limit is 10000"));
+}
+
+TEST_F(LogFiles, AFolderIsNoEmptyLog) {
+  try {
+    load_log(std::filesystem::temp_directory_path().string(), test::small_crane());
+    FAIL() << "nothing thrown";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("this is a folder"));
+  }
 }
 
 TEST_F(LogFiles, ZeroBytesAtTheEndAreLeftOut) {

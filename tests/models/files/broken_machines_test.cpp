@@ -468,8 +468,9 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenUrdfFile{"no file", kUrdfMachine, "",
                        "m.yaml:2:20: kinematics.urdf: there is no file {}/r.urdf; the path is "
                        "relative to the machine file"},
-        BrokenUrdfFile{"not XML", kUrdfMachine, "boom",
-                       "{}/r.urdf: not readable as URDF: Error document empty."},
+        BrokenUrdfFile{
+            "not XML", kUrdfMachine, "boom",
+            "{}/r.urdf: not readable as URDF: no XML element in it, expected <robot ...>"},
         BrokenUrdfFile{"joints beside it", kUrdfMachine + "joints: []\n", kGoodUrdf,
                        "m.yaml:3:9: joints: is given beside kinematics, whose URDF defines the "
                        "joints; remove one"},
