@@ -69,26 +69,23 @@ double SizeByLogs::mean() const {
   return weights > 0.0 ? sum / std::sqrt(weights) : 0.0;
 }
 
-SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
-                        const EffectDesign& reference, const VectorXd& common,
-                        const VectorXd& direction, const std::vector<const EffectDesign*>& others,
+SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
                         const EffectFit& fit) {
   std::vector<BlockSize> suspects, references;
-  double strongest = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = evidence.channels[c];
     MatrixXd x = MatrixXd::Zero(channel.rows(), 2);
-    for (const EffectDesign* d : {&suspect, &reference}) {
+    for (const EffectDesign* d : {&effect.suspect, &effect.reference}) {
       if (!d->touches(c)) continue;
-      x.col(0) += d->columns[c] * common;
-      x.col(1) += d->columns[c] * direction;
+      x.col(0) += d->columns[c] * effect.common;
+      x.col(1) += d->columns[c] * effect.direction;
     }
     if (x.col(1).isZero(0.0)) continue;
     Index width = 2;
-    for (const EffectDesign* d : others) width += d->columns[c].cols();
+    for (const EffectDesign* d : effect.others) width += d->columns[c].cols();
     MatrixXd columns(channel.rows(), width);
     Index at = 0;
-    for (const EffectDesign* d : others) {
+    for (const EffectDesign* d : effect.others) {
       columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
       at += d->columns[c].cols();
     }
@@ -99,21 +96,17 @@ SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
     if (at > 0) own = without_projection(own, rows.leftCols(at));
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
       const Index first = channel.blocks[b].first, length = channel.blocks[b].last - first;
+      // where it does not act it has no size, although the baseline's projection leaves a column there
+      if (x.col(1).segment(first, length).isZero(0.0)) continue;
       const auto column = own.col(0).segment(first, length);
       const double information = column.squaredNorm() / fit.noise[c].variance;
       if (!(information > 0.0)) continue;
-      strongest = std::max(strongest, information);
       const double size =
           column.dot(own.col(1).segment(first, length)) / fit.noise[c].variance / information;
       (static_cast<std::size_t>(channel.log[b]) < evidence.suspects ? suspects : references)
           .push_back({size, information});
     }
   }
-  // A stretch in which the effect does not act has only what the projection left of the others, which is rounding.
-  constexpr double kRounding = 1e-9;
-  for (auto* blocks : {&suspects, &references})
-    std::erase_if(*blocks,
-                  [&](const BlockSize& b) { return b.information < kRounding * strongest; });
   double excess = 0.0, factor = 0.0;
   add_moments(suspects, excess, factor);
   add_moments(references, excess, factor);

@@ -25,14 +25,19 @@ struct SizeByLogs {
   double mean() const;
 };
 
-/// @param suspect, reference signatures of one effect in the suspect and in the reference logs
-/// @param common linear parameters [SI] that act in both groups and are subtracted first
-/// @param direction linear parameters [SI] that have size one
-/// @param others effects that are estimated beside it, once for both groups
+/// What is compared.
+struct ComparedEffect {
+  const EffectDesign& suspect;
+  const EffectDesign&
+      reference;  ///< signatures of one effect in the suspect and in the reference logs
+  Eigen::VectorXd
+      common;  ///< [SI] linear parameters that act in both groups and are subtracted first
+  Eigen::VectorXd direction;                       ///< [SI] linear parameters that have size one
+  const std::vector<const EffectDesign*>& others;  ///< estimated beside it, once for both groups
+};
+
 /// @param fit its noise models weight the rows
-SizeByLogs size_by_logs(const Evidence& evidence, const EffectDesign& suspect,
-                        const EffectDesign& reference, const Eigen::VectorXd& common,
-                        const Eigen::VectorXd& direction,
-                        const std::vector<const EffectDesign*>& others, const EffectFit& fit);
+SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
+                        const EffectFit& fit);
 
 }  // namespace sparflow

@@ -196,7 +196,7 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
   const VectorXd nothing = VectorXd::Zero(suspect.linear);
   const SizeByLogs sizes =
-      size_by_logs(d.evidence, suspect, reference, nothing, in_suspects, others, apart);
+      size_by_logs(d.evidence, {suspect, reference, nothing, in_suspects, others}, apart);
   // two-sided, Bonferroni's bound over the effects found
   const auto significant = [&](double z) {
     return std::erfc(std::abs(z) / std::numbers::sqrt2) *
@@ -222,8 +222,8 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const double form = form_share(*suspect.effect.effect, options.regression);
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
-  const SizeByLogs change = size_by_logs(d.evidence, suspect, reference, in_reference,
-                                         in_suspects - in_reference, others, apart);
+  const SizeByLogs change = size_by_logs(
+      d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
   const double difference = suspect.linear > 1 ? change.difference() : sizes.difference();
   if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size)
     return InReferences::kAlike;

@@ -110,6 +110,8 @@ TEST(ReferenceComparison, ChangesOfAForeignPlantAreNamedAlone) {
   EXPECT_THAT(named("d1.csv"), ElementsAre("leakage:lift"));
   EXPECT_THAT(named("hl1.csv"), ElementsAre("line_loss:lift"));
   EXPECT_THAT(named("j1.csv"), ElementsAre("pressure_offset:lift"));
+  EXPECT_THAT(named("i1.csv"), ElementsAre("flow_saturation:main"));
+  EXPECT_THAT(named("clean2.csv"), IsEmpty());
 }
 
 }  // namespace

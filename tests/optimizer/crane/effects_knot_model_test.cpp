@@ -286,7 +286,7 @@ TEST(EffectsInKnots, SaturationLowersThePumpsFlowLimit) {
   AppliedEffect saturation = applied("flow_saturation:main", model.machine);
   const double own = problem.limits.pump_max_flow[0];
   for (const double limit : {0.6 * own, 1.5 * own}) {
-    saturation.values[1] = limit;
+    saturation.values[2] = limit;
     model.effects = {saturation};
     const double expected = std::min(own, limit);
     EXPECT_DOUBLE_EQ(effect_flow_limit(model.machine, model.effects, 0, own), expected);

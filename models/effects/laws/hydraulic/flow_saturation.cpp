@@ -225,9 +225,11 @@ class FlowSaturation final : public Effect {
           const double missing = series.asked(k, f) - p;
           return missing > 0.0 ? std::sqrt(std::max(0.0, 1.0 - missing / edge[f])) : 1.0;
         };
-        // The sum of flows rises with the pressure; halving the interval 30 times leaves less than 0.1 Pa.
+        // The sum of flows rises with the pressure.
+        constexpr double kResolved_Pa =
+            0.1;  // no threshold: rounding of a pressure of 1e7 Pa is 1e-9 Pa
         double low = 0.0, high = highest;
-        for (int step = 0; step < 30; ++step) {
+        while (high - low > kResolved_Pa) {
           const double p = 0.5 * (low + high);
           double sum = 0.0;
           for (Eigen::Index f = 0; f < asked.cols(); ++f)

@@ -37,7 +37,8 @@ class Leakage final : public Effect {
                         {0.0, 1.0, 2.0},
                         true}},
         .equation =
-            "at rest dx/dt = -F k/A_hold^2; in motion dx/dt = Q_valve/A - k (p_A - p_B)/A_supply",
+            "dx/dt = Q_valve/A - F k/A_hold^2; tight ports: dx/dt = Q_valve/A - k (p_A - "
+            "p_B)/A_supply in motion",
         .signals = {"position", "command"},
         .confused_with = {"valve_deadband", "compressibility"},
         .separated_by = "holding a load at zero command for a minute, at two payloads",
@@ -62,17 +63,18 @@ class Leakage final : public Effect {
     const Eigen::VectorXd& force = carried_force(log_cylinder);
     const Eigen::VectorXi& direction = log_cylinder.direction;
     const bool chambers = log_cylinder.pressure_a.size() > 0 && log_cylinder.pressure_b.size() > 0;
-    const bool at_rest = shape[0]<1.5, in_motion = shape[0]> 0.5;
+    const bool tight = shape[0] > 1.5, at_rest_only = shape[0] < 0.5;  // no threshold: 0, 1 or 2
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       const double load_area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // holds the load
-      if (direction[k] == 0) {
-        if (at_rest) columns(k, 0) = -force[k] / (load_area * load_area);
-      } else if (in_motion) {
+      const bool rests = direction[k] == 0;
+      if (tight && !rests) {
         // The valve delivers into the supply chamber, from which or into which the oil passes the piston.
         const double across = chambers ? log_cylinder.pressure_a[k] - log_cylinder.pressure_b[k]
                                        : force[k] / load_area;
         columns(k, 0) = -across / supply_area(c, direction[k]);
+      } else if (!tight && (rests || !at_rest_only)) {
+        columns(k, 0) = -force[k] / (load_area * load_area);
       }
     }
     return true;

@@ -133,17 +133,74 @@ TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
   }
   ASSERT_GT((served.array() < 1.0).count(), 100);
   for (int i = 0; i < 2; ++i) {
-    const VectorXd b = scaled_least_squares(
-        gains_and(columns("flow_saturation", i, 0, {limit}), static_cast<std::size_t>(i)),
-        log.cylinders[static_cast<std::size_t>(i)].speed);
+    const VectorXd b =
+        scaled_least_squares(gains_and(columns("flow_saturation", i, 0, {limit}).leftCols(1),
+                                       static_cast<std::size_t>(i)),
+                             log.cylinders[static_cast<std::size_t>(i)].speed);
     EXPECT_NEAR(b[2], 1.0, 0.02);  // The alternating fit of gains and share converges to about 1 %.
   }
   const std::vector<double> grid = effect_named("flow_saturation").grid(log, 0, 0);
   ASSERT_FALSE(grid.empty());
   EXPECT_LT(grid.front(), limit);
   EXPECT_GT(grid.back(), limit);
-  const double values[] = {1.0, limit};
+  const double values[] = {1.0, 0.0, limit};
   EXPECT_EQ(effect_named("flow_saturation").flow_limit(machine, 0, 0, values), limit);
+  // The edges lose pressure with the square of their flow.
+  MatrixXd pump;
+  ASSERT_TRUE(effect_named("flow_saturation")
+                  .columns(log, {EvidenceKind::kPump, 0}, 0, std::vector{limit, 0.0}, pump));
+  const VectorXd lost = (served.array().square() - 1.0).matrix();
+  // the gains and with them the share of the demand are fitted to about 1 %
+  EXPECT_LT((pump.col(1) - lost).norm(), 0.03 * lost.norm());
+  EXPECT_TRUE(pump.col(0).isZero(0.0));
+}
+
+// Sections that do not share: where both ask for too much, the pump's pressure p takes the value at which their edges, each with
+// the root of its share of 15 bar, let the limit through.
+TEST_F(FlowEffects, SaturationWithoutSharingStarvesTheHighestLoad) {
+  const double limit = 1.3e-3, edge = 15e5;
+  log.pumps[0].asked.resize(log.samples(), 2);
+  VectorXd pressure = log.pumps[0].demand;
+  std::vector<VectorXd> served(2, VectorXd::Ones(log.samples()));
+  int saturated = 0, starved = 0;
+  for (Index k = 0; k < log.samples(); ++k) {
+    double asked[2], load[2];
+    for (std::size_t i = 0; i < 2; ++i) {
+      const CylinderSeries& c = log.cylinders[i];
+      load[i] = c.direction[k] > 0 ? c.pressure_a[k] : c.pressure_b[k];
+      asked[i] = c.direction[k] == 0 ? 0.0 : c.flow[k];
+      log.pumps[0].asked(k, static_cast<Index>(i)) =
+          c.direction[k] == 0 ? std::nan("") : load[i] + edge;
+    }
+    if (asked[0] + asked[1] <= limit) continue;
+    ++saturated;
+    const auto share = [&](std::size_t i, double p) {
+      return std::sqrt(std::clamp((p - load[i]) / edge, 0.0, 1.0));
+    };
+    // the second path: a scan in steps of 50 Pa from above
+    double p = std::max(load[0], load[1]) + edge;
+    while (asked[0] * share(0, p) + asked[1] * share(1, p) > limit) p -= 50.0;
+    pressure[k] = p;
+    for (std::size_t i = 0; i < 2; ++i) served[i][k] = share(i, p);
+    starved += std::min(served[0][k], served[1][k]) < 0.5 ? 1 : 0;
+  }
+  ASSERT_GT(saturated, 100);
+  ASSERT_GT(starved, 5);
+  for (std::size_t i = 0; i < 2; ++i)
+    log.cylinders[i].speed = log.cylinders[i].speed.cwiseProduct(served[i]);
+  for (int i = 0; i < 2; ++i) {
+    const VectorXd b =
+        scaled_least_squares(gains_and(columns("flow_saturation", i, 0, {limit, 2.0}).leftCols(1),
+                                       static_cast<std::size_t>(i)),
+                             log.cylinders[static_cast<std::size_t>(i)].speed);
+    EXPECT_NEAR(b[2], 1.0,
+                0.03);  // The alternating fit of gains and shares converges to about 1 %.
+  }
+  MatrixXd pump;
+  ASSERT_TRUE(effect_named("flow_saturation")
+                  .columns(log, {EvidenceKind::kPump, 0}, 0, std::vector{limit, 2.0}, pump));
+  const VectorXd lost = pressure - log.pumps[0].demand;
+  EXPECT_LT((pump.col(0) - lost).norm(), 0.05 * lost.norm());
 }
 
 // 0.5 l/min at 100 bar of load pressure lets a 100 mm piston sink by 0.5e-3/60/A.
@@ -163,6 +220,14 @@ TEST_F(FlowEffects, LeakageLowersTheLoad) {
   const MatrixXd closed = columns("leakage", 0, 0, {0.0});
   EXPECT_EQ(closed(0, 0), 0.0);
   EXPECT_EQ(closed(1999, 0), col(1999, 0));
+  // Past the piston with tight ports the rod rests, and in motion the leak takes from the supply chamber what flows from A to B.
+  c.direction.tail(200).setConstant(-1);
+  c.pressure_a.setConstant(80e5);
+  c.pressure_b.setConstant(30e5);
+  const MatrixXd piston = columns("leakage", 0, 0, {2.0});
+  EXPECT_NEAR(piston(0, 0), -50e5 / a, 1e-6 * 50e5 / a);
+  EXPECT_EQ(piston(1500, 0), 0.0);
+  EXPECT_NEAR(piston(1999, 0), -50e5 / b, 1e-6 * 50e5 / b);
 }
 
 // A chamber of 1.0 m + 5 % of 2 m at 1 GPa: 10 bar/s take 1.1 mm/s.

@@ -44,6 +44,45 @@ class PumpEffects : public ::testing::Test {
   }
 };
 
+// The second path integrates p''/w^2 + 2 d p'/w + p = demand, or the stages with their own time constants, in small steps.
+TEST_F(PumpEffects, PumpLagsOfAllFormsFollowTheirDifferentialEquations) {
+  const double tau = 0.2;
+  const VectorXd& demand = log.pumps[0].demand;
+  for (const int form : {0, 1, 2, 3}) {
+    VectorXd late = demand;
+    for (const auto& [first, last] : log.runs) {
+      double x = demand[first], y = x, slope = 0.0;
+      for (Index k = first + 1; k < last; ++k) {
+        constexpr int kSteps = 2000;
+        const double h = log.step / kSteps;
+        for (int i = 0; i < kSteps; ++i) {
+          const auto stage = [&](double in, double out) {
+            const double t = form == 0 ? tau : form == 1 ? 0.5 * tau : (in > out ? 0.2 : 0.8) * tau;
+            return (in - out) / t * h;
+          };
+          if (form == 3) {
+            const double d = 0.3, w = 2.0 * d / tau;
+            slope += (w * w * (demand[k] - y) - 2.0 * d * w * slope) * h;
+            y += slope * h;
+          } else {
+            x += form == 0 ? demand[k] - x : stage(demand[k], x);
+            y += stage(x, y);
+          }
+        }
+        late[k] = y;
+      }
+    }
+    MatrixXd c;
+    ASSERT_TRUE(effect_named("pump_lag")
+                    .columns(log, {EvidenceKind::kPump, 0}, 0,
+                             std::vector{tau, static_cast<double>(form)}, c));
+    const VectorXd exact = late - demand;
+    // Explicit steps of 10 us are accurate to about h / tau; between samples the second stage takes the first one as constant.
+    EXPECT_LT((c.col(0) - exact).norm(), (form == 1 || form == 2 ? 0.15 : 1e-3) * exact.norm())
+        << form;
+  }
+}
+
 TEST_F(PumpEffects, TankLineRaisesEveryReturnChamberThatMoves) {
   Instant<double> s = two_cylinder_instant<double>(machine);
   const double k = 1e-3 * kBarPerLpm2;
