@@ -17,35 +17,53 @@ struct BlockSize {
   double size, information;
 };
 
-double weighted_mean(const std::vector<BlockSize>& blocks, double variance, double& weights) {
+/// Variances of the sizes: factor / information + added.
+struct Variation {
+  double factor = 1.0, added = 0.0;
+  double variance(const BlockSize& b) const { return factor / b.information + added; }
+};
+
+double weighted_mean(const std::vector<BlockSize>& blocks, const Variation& v, double& weights) {
   double sum = 0.0;
   weights = 0.0;
   for (const BlockSize& b : blocks) {
-    const double w = 1.0 / (1.0 / b.information + variance);
+    const double w = 1.0 / v.variance(b);
     weights += w;
     sum += w * b.size;
   }
   return weights > 0.0 ? sum / weights : 0.0;
 }
 
-/// Cochran's Q beyond its expectation and the factor of the variance in it.
-void add_moments(const std::vector<BlockSize>& blocks, double& excess, double& factor) {
+/// Cochran's Q of one group, its degrees of freedom, and the factor of an added variance in its expectation.
+struct Moments {
+  double q = 0.0, freedom = 0.0, factor = 0.0;
+};
+
+void add_moments(const std::vector<BlockSize>& blocks, Moments& m) {
   if (blocks.size() < 2) return;
-  double weights = 0.0, squares = 0.0, q = 0.0;
-  const double mean = weighted_mean(blocks, 0.0, weights);
+  double weights = 0.0, squares = 0.0;
+  const double mean = weighted_mean(blocks, {}, weights);
   for (const BlockSize& b : blocks) {
     squares += b.information * b.information;
-    q += b.information * std::pow(b.size - mean, 2);
+    m.q += b.information * std::pow(b.size - mean, 2);
   }
-  excess += q - static_cast<double>(blocks.size() - 1);
-  factor += weights - squares / weights;
+  m.freedom += static_cast<double>(blocks.size() - 1);
+  m.factor += weights - squares / weights;
 }
 
-SizeInLogs effect_size(const std::vector<BlockSize>& blocks, double variance) {
+double log_likelihood(const std::vector<BlockSize>& blocks, const Variation& v) {
+  double weights = 0.0, sum = 0.0;
+  const double mean = weighted_mean(blocks, v, weights);
+  for (const BlockSize& b : blocks)
+    sum -= 0.5 * (std::log(v.variance(b)) + std::pow(b.size - mean, 2) / v.variance(b));
+  return sum;
+}
+
+SizeInLogs size_in_logs(const std::vector<BlockSize>& blocks, const Variation& v) {
   SizeInLogs s;
   s.blocks = static_cast<int>(blocks.size());
   double weights = 0.0;
-  s.size = weighted_mean(blocks, variance, weights);
+  s.size = weighted_mean(blocks, v, weights);
   s.standard_error = weights > 0.0 ? 1.0 / std::sqrt(weights) : 0.0;
   return s;
 }
@@ -107,11 +125,17 @@ SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
           .push_back({size, information});
     }
   }
-  double excess = 0.0, factor = 0.0;
-  add_moments(suspects, excess, factor);
-  add_moments(references, excess, factor);
-  const double variance = factor > 0.0 ? std::max(0.0, excess / factor) : 0.0;
-  return {effect_size(suspects, variance), effect_size(references, variance), std::sqrt(variance)};
+  Moments m;
+  add_moments(suspects, m);
+  add_moments(references, m);
+  Variation scaled, added;
+  if (m.freedom > 0.0) scaled.factor = std::max(1.0, m.q / m.freedom);
+  if (m.factor > 0.0) added.added = std::max(0.0, (m.q - m.freedom) / m.factor);
+  const auto likelihood = [&](const Variation& v) {
+    return log_likelihood(suspects, v) + log_likelihood(references, v);
+  };
+  const Variation v = likelihood(scaled) > likelihood(added) ? scaled : added;
+  return {size_in_logs(suspects, v), size_in_logs(references, v), std::sqrt(v.added)};
 }
 
 }  // namespace sparflow

@@ -6,9 +6,10 @@
 
 namespace sparflow {
 
-/// Estimates of one group of logs by the random-effects model of DerSimonian and Laird (1986, Control. Clin. Trials 7,
-/// 177): size_b = size + u_b + e_b in every stretch of motion b, with e_b from the noise model and u_b of variance
-/// `variation`^2, which both groups have in common and their scatter tells.
+/// Estimates of one group of logs. The sizes in the stretches of motion scatter more than the noise model says, for one of two
+/// reasons, of which the more likely is taken, in common for both groups: the law has another size in every motion (random
+/// effects of DerSimonian and Laird 1986, Control. Clin. Trials 7, 177: a variance is added), or other structure disturbs the
+/// estimates (Birge 1932, Phys. Rev. 40, 207: all variances have a common factor).
 struct SizeInLogs {
   double size = 0.0;  ///< [1] relative to the direction given
   double standard_error = 0.0;
@@ -17,7 +18,8 @@ struct SizeInLogs {
 
 struct SizeByLogs {
   SizeInLogs suspects, references;
-  double variation = 0.0;  ///< [1] standard deviation of the size between stretches of motion
+  double variation =
+      0.0;  ///< [1] standard deviation of the size that was added between stretches of motion
 
   /// Difference over its standard error; 0 where a group has no estimate.
   double difference() const;

@@ -221,7 +221,12 @@ void set_verdict(const std::vector<ResidualStructure>& unmodelled, Diagnosis& d)
       std::all_of(d.effects.begin(), d.effects.end(), [&](const DiagnosedEffect& e) {
         return is_doubtful(d.evidence, e, unmodelled) || is_minor_effect(d, e);
       });
-  if (unknown && !d.unexplained)
+  // What remains where effects were found comes before structure elsewhere.
+  const bool elsewhere =
+      d.unexplained &&
+      std::none_of(d.search.found.begin(), d.search.found.end(),
+                   [&](const FoundEffect& f) { return f.design.touches(d.unexplained->channel); });
+  if (unknown && !d.effects.empty() && (!d.unexplained || elsewhere))
     d.unexplained = describe_minor_effect(d.evidence, d.effects.front());
   d.verdict = unknown              ? Verdict::kUnknown
               : !d.effects.empty() ? Verdict::kMissing

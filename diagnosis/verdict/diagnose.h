@@ -112,6 +112,9 @@ struct VerdictOptions {
   /// from that in the references no more than from motion to motion.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double difference_false_alarm = 0.01;
+  /// Absorbed share of an effect from which its size in single motions is not compared, but its parameters in all of them.
+  /// @threshold [1] 0..1; chosen: more of it is learned than left
+  double absorbed_by_learned_laws = 0.5;
   /// Searches in which an effect that the references share joins what acts in all logs.
   /// @threshold [1] 1..; chosen: each removes what the last one named in both; plants of the simulator need up to six
   int shared_turns = 10;

@@ -11,6 +11,7 @@
 #include "diagnosis/regression/size_by_logs.h"
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "models/math/linear_algebra.h"
 #include "models/math/nan.h"
 
 namespace sparflow {
@@ -109,6 +110,37 @@ bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
 
+/// Whether the last two groups of `linear` parameters differ: Wald's test with the covariance that is robust against dependence
+/// inside stretches of motion; its chi-square as a normal deviate (Wilson and Hilferty 1931).
+template <class Significant>
+bool parameters_differ(const EffectFit& fit, Index linear, const Significant& significant) {
+  const Index first = fit.theta.size() - 2 * linear;
+  std::vector<Index> moving;  // a parameter without columns has no variance
+  for (Index k = 0; k < linear; ++k)
+    if (fit.covariance(first + k, first + k) > 0.0 &&
+        fit.covariance(first + linear + k, first + linear + k) > 0.0)
+      moving.push_back(k);
+  if (moving.empty()) return true;
+  const auto n = static_cast<Index>(moving.size());
+  VectorXd change(n);
+  MatrixXd covariance(n, n);
+  for (Index i = 0; i < n; ++i) {
+    const Index a = first + moving[static_cast<std::size_t>(i)], b = a + linear;
+    change[i] = fit.theta[a] - fit.theta[b];
+    for (Index j = 0; j < n; ++j) {
+      const Index c = first + moving[static_cast<std::size_t>(j)], e = c + linear;
+      covariance(i, j) =
+          fit.covariance(a, c) + fit.covariance(b, e) - fit.covariance(a, e) - fit.covariance(b, c);
+    }
+  }
+  const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixXd scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const VectorXd z = scale.cwiseProduct(change);
+  const double k = static_cast<double>(n), share = 2.0 / (9.0 * k);
+  const double chi_square = z.dot(least_squares_of_least_norm(scaled, z));
+  return significant((std::cbrt(chi_square / k) - (1.0 - share)) / std::sqrt(share));
+}
+
 }  // namespace
 
 double reference_rms(const Diagnosis& d, std::size_t channel) {
@@ -188,7 +220,9 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     std::vector<const EffectDesign*> designs = others;
     designs.insert(designs.end(), more);
-    return fit_effects(d.evidence, designs, &d.search.final, {});
+    FitControl control;
+    control.covariance = true;
+    return fit_effects(d.evidence, designs, &d.search.final, control);
   };
   const bool both = reference.acts();
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
@@ -214,6 +248,10 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
         in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
   }
   if (shared) return significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries;
+  // What learned laws take over of an effect, they take over from all motions together, so that it has no size in one of them.
+  if (both && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws)
+    return parameters_differ(apart, suspect.linear, significant) ? InReferences::kNot
+                                                                 : InReferences::kAlike;
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   if (here.blocks > 0 && !significant(here.size / here.standard_error))
     return InReferences::kVaries;
@@ -224,7 +262,8 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(
       d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
-  const double difference = suspect.linear > 1 ? change.difference() : sizes.difference();
+  const double difference = std::max(std::abs(sizes.difference()),
+                                     suspect.linear > 1 ? std::abs(change.difference()) : 0.0);
   if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size)
     return InReferences::kAlike;
   return significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot;

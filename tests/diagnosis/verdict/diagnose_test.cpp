@@ -224,7 +224,7 @@ TEST(Diagnose, ADriftingSensorIsNotInTheCatalogue) {
     const Answer a = with_reference({{"pressure_drift", "boom", 1.0, law}});
     EXPECT_EQ(a.diagnosis.verdict, Verdict::kUnknown) << a.diagnosis.table();
     ASSERT_TRUE(a.diagnosis.unexplained.has_value());
-    EXPECT_EQ(a.diagnosis.unexplained->at, "boom");
+    EXPECT_EQ(a.diagnosis.unexplained->at, "boom") << a.diagnosis.table();
   }
 }
 

@@ -91,9 +91,9 @@ class FlowSaturation final : public Effect {
   }
 
   std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const override {
-    const bool loads = log.pumps[static_cast<std::size_t>(at)].asked.rows() > 0;
     if (shape_index == 1)
-      return loads ? std::vector<double>{0.0, 1.0, 2.0} : std::vector<double>{0.0, 1.0};
+      return loads_known(log, at) ? std::vector<double>{0.0, 1.0, 2.0}
+                                  : std::vector<double>{0.0, 1.0};
     const Demand demand(log, at, std::numeric_limits<double>::infinity(), Form::kShared);
     if (!demand.known || !(demand.largest > 0.0)) return {};
     std::vector<double> limits;
@@ -136,6 +136,16 @@ class FlowSaturation final : public Effect {
  private:
   enum class Form { kShared, kSoft, kUnshared };
 
+  /// Whether the log says which pressure each section asks for and has at its load.
+  static bool loads_known(const MachineSeries& log, int pump) {
+    bool known = log.pumps[static_cast<std::size_t>(pump)].asked.rows() > 0;
+    for (const int i : log.machine->pumps[static_cast<std::size_t>(pump)].feeds) {
+      const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(i)];
+      known = known && c.pressure_a.size() > 0 && c.pressure_b.size() > 0;
+    }
+    return known;
+  }
+
   /// Flow that the valve sections demand. Their gains and the delivered share depend on each other; they are computed
   /// alternately.
   struct Demand {
@@ -157,8 +167,7 @@ class FlowSaturation final : public Effect {
         known = known && log.cylinders[static_cast<std::size_t>(i)].command.size() > 0 &&
                 machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
       }
-      known = known && (form != Form::kUnshared ||
-                        log.pumps[static_cast<std::size_t>(pump)].asked.rows() > 0);
+      known = known && (form != Form::kUnshared || loads_known(log, pump));
       if (!known) return;
       /// Rounds in which flows and supply are brought into agreement.
       /// @threshold [1] 1..100; chosen: the served share changes little from round to round
