@@ -33,8 +33,8 @@ bool is_utf8(std::string_view text);
 std::string printable(std::string_view text, std::size_t limit = QuoteOptions{}.quotation);
 
 /// Makes a whole message, or a table, harmless for a terminal.
-/// @return `text` as UTF-8; line feeds and tabs stay, other control characters are written by their code (x1b after a backslash); longer texts end
-///   after about `limit` bytes with "..."
+/// @return `text` as UTF-8; line feeds and tabs stay, other control characters are written by their code (x1b after a
+///   backslash); longer texts end after about `limit` bytes with "..."
 std::string harmless(std::string_view text, std::size_t limit = std::string_view::npos);
 
 }  // namespace sparflow
