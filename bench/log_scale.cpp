@@ -44,6 +44,7 @@ Used run(const std::vector<std::string>& arguments) {
     ::dup2(nowhere, STDOUT_FILENO);
     ::dup2(nowhere, STDERR_FILENO);
     std::vector<char*> words;
+    words.reserve(arguments.size() + 1);
     for (const std::string& a : arguments) words.push_back(const_cast<char*>(a.c_str()));
     words.push_back(nullptr);
     ::execv(words[0], words.data());
@@ -76,8 +77,8 @@ void write_log(const std::string& path, long rows) {
   out << header << '\n';
   for (long k = 0; k < rows; ++k) {
     const auto& [t, rest] = all[static_cast<std::size_t>(k) % all.size()];
-    out << fmt::format("{:.3f}{}\n",
-                       t + period * static_cast<double>(k / static_cast<long>(all.size())), rest);
+    const long round = k / static_cast<long>(all.size());
+    out << fmt::format("{:.3f}{}\n", t + period * static_cast<double>(round), rest);
   }
 }
 

@@ -84,6 +84,7 @@ std::vector<MachineSignals> all_signals(const Machine& machine, std::vector<Log>
 
 std::vector<DataSource> sources(const std::vector<Log>& logs, const char* use) {
   std::vector<DataSource> out;
+  out.reserve(logs.size());
   for (const Log& log : logs) out.push_back({log.file, log.sha256, log.samples(), use});
   return out;
 }
@@ -131,10 +132,10 @@ std::optional<CompareResult> judge_held_out(const Machine& machine,
     return compare_signals(pass.model, signals, held, compare_options);
   }
   const bool lent = pass.model.effects.empty();  // effects change what they act on
-  CompareResult result =
-      lent ? compare_signals(pass.model, std::move(signals), held, compare_options)
-           : compare_signals(pass.model, signals, held, compare_options);
-  if (lent) signals.clear();
+  std::vector<MachineSignals> given;
+  if (lent) given.swap(signals);
+  CompareResult result = lent ? compare_signals(pass.model, std::move(given), held, compare_options)
+                              : compare_signals(pass.model, signals, held, compare_options);
   for (LogComparison& log : result.logs) {
     log.series.clear();
     MachineSignals outline = outline_of(log.signals);
