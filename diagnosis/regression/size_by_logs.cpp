@@ -104,6 +104,7 @@ SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
     MatrixXd columns(channel.rows(), width);
     Index at = 0;
     for (const EffectDesign* d : effect.others) {
+      if (!d->touches(c)) continue;
       columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
       at += d->columns[c].cols();
     }
