@@ -21,9 +21,7 @@ struct ExtendStep {
   CompareResult before, after;  ///< errors on the data that `judged_on` names
   std::string judged_on;        ///< "test logs", "held-out motions" or "training logs"
   ErrorChange change;
-  bool others_kept = false;  ///< whether the effects added before kept their values
-  std::string same_as;       ///< title of an effect of the model from which it is indistinguishable
-  bool determined = true;    ///< false: its 95 % interval contains no effect at all; `improve` only
+  bool determined = true;  ///< false: its 95 % interval contains no effect at all; `improve` only
   /// The diagnosis that named it, shared by its steps; null when the user asked for the effect.
   std::shared_ptr<const Diagnosis> diagnosis;
 };
@@ -68,11 +66,10 @@ struct ExtendOptions {
   /// @threshold [steps] 0..; chosen: as many as it may keep, because each may need another
   /// diagnosis.
   std::size_t most_rejected = 8;
-  /// Factor by which an interval of an earlier effect widens when a new effect is indistinguishable
-  /// from it.
-  /// @threshold [1] 1..; chosen: effects that are distinguishable widen each other's intervals by a
-  /// few times at most.
-  double blurred = 20.0;
+  /// Folds of the cross-validation by which `improve` judges forces and flows.
+  /// @threshold [folds] 2..10; chosen: two cost least, and half of the motions still determine what
+  /// a diagnosis of all has found
+  int folds = 2;
   std::string date;  ///< "2025-03-14" for the record; empty = not recorded
 };
 
@@ -82,12 +79,13 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
                     const ExtendLogs& logs, const ExtendOptions& options = {},
                     const SearchProgress& progress = {});
 
-/// Adds the effects that `diagnose` names and diagnoses again, until it names none, data is bad, or `max_steps` are
-/// done; `stopped_because` says which. Of several effects the one that reduces an error by the largest factor comes
-/// first. A step is kept when data that took no part is predicted better where the effect acts and nothing else worse
-/// (error_change.h), and when the interval of the effect, estimated with the others, excludes zero. If the error rises, it
-/// is tried once more with the other effects unchanged, because in a joint estimate they may reduce an error of one place
-/// at the cost of another. Effects not kept are excluded until another step is kept.
+/// Adds all effects that a diagnosis names and diagnoses again, until none is named, data is bad, or `max_steps` are done;
+/// `stopped_because` says which. The effects of a diagnosis are estimated together. Then each of them is taken out of the
+/// set in turn: it stays if it reduces the error where it acts, on data that took no part, by more than refitting alone
+/// may, and if its interval excludes zero; that it is no chance finding, the diagnosis has tested. The one that fails
+/// most is removed, and the rest is tested again (backward elimination). At the end the effects of all rounds are tested
+/// once more beside each other. Pressures, margins and gains are learned anew for each step. Effects not kept are
+/// excluded until another round keeps one.
 /// @param progress may throw Interruption: then the steps kept so far are the result
 ExtendResult improve(const CraneModel& model, const ExtendLogs& logs,
                      const ExtendOptions& options = {}, const SearchProgress& progress = {});

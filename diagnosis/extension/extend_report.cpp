@@ -169,7 +169,6 @@ Json step_json(const ExtendStep& step) {
   Json harmed = Json::array();
   for (const HarmedError& h : step.change.harmed) harmed.push_back(h.sentence);
   out["harmed"] = std::move(harmed);
-  out["others_kept"] = step.others_kept;
   out["stages"] = stages_json(step);
   return out;
 }
@@ -191,10 +190,6 @@ std::string ExtendResult::table() const {
   int number_of = 0;
   for (const ExtendStep& s : steps) {
     text += fmt::format("{}. {}\n   {}\n", ++number_of, s.title, parameters_text(s.effect));
-    if (s.others_kept)
-      text +=
-          "   the effects before it keep their values, because a joint estimate increased the "
-          "error\n";
     text += fmt::format("   RMS error on the {}:\n{}", s.judged_on, step_table(s));
   }
   if (steps.size() > 1) {  // a joint estimate changes the values of former steps

@@ -60,6 +60,7 @@ RefitContext::RefitContext(const CraneModel& model, const ExtendLogs& logs,
   const bool any = std::any_of(held_.begin(), held_.end(), [](const Mask& m) { return m.any(); });
   judged_on_ = any ? "held-out motions" : "training logs";
   if (!any) held_.clear();
+  folds_ = held_out_folds(signals_, options.fit, options.folds);
 }
 
 Judged RefitContext::as_it_is(const CraneModel& model, std::vector<std::string>& notes,
@@ -73,8 +74,7 @@ Judged RefitContext::as_it_is(const CraneModel& model, std::vector<std::string>&
         "the model was not learned from these logs; \"before\" is the model learned again from "
         "them without the effect, so that the change shown is due to the effect alone");
   }
-  Judged again =
-      with({model, {}, model.effects}, places_of(model.effects), Others::kEstimatedAnew, progress);
+  Judged again = with({model, {}, model.effects}, places_of(model.effects), progress);
   return {model, std::move(again.error), std::move(again.effects_held_out)};
 }
 
@@ -99,25 +99,20 @@ Judged RefitContext::as_references_say(const CraneModel& model, std::vector<std:
   return out;
 }
 
-EffectEstimate RefitContext::estimate(const Judged& from, const std::vector<EffectAt>& effects,
-                                      Others others, Samples samples,
+EffectEstimate RefitContext::estimate(CraneModel base, const std::vector<EffectAt>& effects,
+                                      const std::vector<Mask>& leave_out,
                                       const SearchProgress& progress) const {
   const auto in = [](const auto& list, const auto& e) {
     return std::any_of(list.begin(), list.end(),
                        [&](const auto& o) { return o.effect == e.effect && o.at == e.at; });
   };
-  CraneModel base = from.model;
-  if (samples == Samples::kNotHeldOut) base.effects = from.effects_held_out;
-  // effects of the model that are not in `effects` are removed
   std::erase_if(base.effects, [&](const AppliedEffect& k) { return !in(effects, k); });
   std::vector<AppliedEffect> in_references = in_references_;
   std::erase_if(in_references, [&](const AppliedEffect& k) { return !in(effects, k); });
   std::vector<EffectAt> wanted = effects;
-  if (others == Others::kKept) wanted = {effects.back()};
   std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
   EstimateOptions how;
   how.evidence = options_.diagnose.evidence;
-  const std::vector<Mask> leave_out = samples == Samples::kAll ? std::vector<Mask>{} : held_;
   EffectEstimate estimate = estimate_effects(
       base, wanted, {signals_, references_, leave_out, std::move(in_references)}, progress, how);
   std::vector<AppliedEffect> all;
@@ -135,18 +130,21 @@ EffectEstimate RefitContext::estimate(const Judged& from, const std::vector<Effe
   return estimate;
 }
 
-Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effects, Others others,
+Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effects,
                           const SearchProgress& progress, std::vector<std::string>* notes) const {
   const auto part = [&](double first, double width) {
     return [&progress, first, width](double share, const std::string& what) {
       if (progress) progress(first + width * share, what);
     };
   };
-  EffectEstimate all = estimate(from, effects, others, Samples::kAll, part(0.0, 0.4));
+  EffectEstimate all = estimate(from.model, effects, {}, part(0.0, 0.4));
   Judged out;
-  out.effects_held_out =
-      held_.empty() ? all.effects
-                    : estimate(from, effects, others, Samples::kNotHeldOut, part(0.4, 0.2)).effects;
+  out.effects_held_out = all.effects;
+  if (!held_.empty()) {
+    CraneModel base = from.model;
+    base.effects = from.effects_held_out;
+    out.effects_held_out = estimate(std::move(base), effects, held_, part(0.4, 0.2)).effects;
+  }
   if (notes != nullptr) *notes = all.notes;
   if (!references_.empty()) {
     out.model = from.model;
@@ -173,6 +171,25 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
   keep_what_was_learned(from.model, out.model);
   out.error = fitted.held_out ? std::move(*fitted.held_out) : judge(out.model);
   return out;
+}
+
+CompareResult RefitContext::measured_errors(const CraneModel& from,
+                                            const std::vector<EffectAt>& effects,
+                                            const SearchProgress& progress) const {
+  // With references everything learned is theirs and stays.
+  const auto model_with = [&](const std::vector<Mask>& left_out) {
+    FitOptions how = options_.fit;
+    how.effects = estimate(from, effects, left_out, progress).effects;
+    if (references_.empty()) return fit_forces_and_flows(machine_, signals_, left_out, how);
+    CraneModel model = from;
+    model.effects = how.effects;
+    return model;
+  };
+  if (folds_.empty()) return judge(model_with({}));
+  std::vector<CompareResult> parts;
+  for (const std::vector<Mask>& fold : folds_)
+    parts.push_back(compare_signals(model_with(fold), signals_, fold, compare_options()));
+  return join_results(machine_, std::move(parts));
 }
 
 std::vector<DataSource> RefitContext::data() const {

@@ -300,6 +300,16 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   return result;
 }
 
+CompareResult join_results(const Machine& machine, std::vector<CompareResult> parts) {
+  CompareResult out;
+  for (CompareResult& part : parts) {
+    out.samples += part.samples;
+    for (LogComparison& log : part.logs) out.logs.push_back(std::move(log));
+  }
+  out.scores = scores(machine, out.logs);
+  return out;
+}
+
 namespace {
 
 /// Makes the signals of a log and looks for its bad channels.

@@ -152,6 +152,10 @@ CompareResult compare(const CraneModel& model, std::vector<Log>&& logs,
 CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignals> signals,
                               const std::vector<Mask>& only, const CompareOptions& options = {});
 
+/// One result of several that were compared on different samples, as of the folds of a cross-validation. It has the logs of
+/// all, and scores over all samples; energies, regions and tests stay empty.
+CompareResult join_results(const Machine& machine, std::vector<CompareResult> parts);
+
 /// @return signals on which a residual of this series may depend, for the search and for charts: pose, speed, load,
 ///   payload, temperature and the log's columns without a known meaning, as far as the log has them
 std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,

@@ -152,15 +152,30 @@ struct FitInputs {
 
 }  // namespace
 
-std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
-                                   const FitOptions& options) {
+CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<MachineSignals>& signals,
+                                const std::vector<Mask>& left_out, const FitOptions& options) {
+  FitPass pass;
+  pass.model = CraneModel::untrained(machine);
+  pass.model.effects = options.effects;
+  const std::vector<MachineSignals> with = all_with_effects(pass.model, signals);
+  TrainingData data{&with, inside(signals)};
+  for (std::size_t l = 0; l < left_out.size(); ++l) data.counts[l] = data.counts[l] && !left_out[l];
+  learn_valves(data, options.valve, pass);
+  return std::move(pass.model);
+}
+
+namespace {
+
+/// Blocks of motion whose number, counted over all logs, is `which` modulo `every`.
+std::vector<Mask> every_nth_block(const std::vector<MachineSignals>& signals,
+                                  const FitOptions& options, int every, int which) {
   std::vector<Mask> held;
   int block = 0, taken = 0;
   for (const MachineSignals& s : signals) {
     held.push_back(Mask::Constant(s.samples(), false));
-    if (options.hold_out_every < 2) continue;
+    if (every < 2) continue;
     for (const SampleRange& r : motion_blocks(s, options.hold_out_block_s)) {
-      if (block++ % options.hold_out_every != options.hold_out_every / 2) continue;
+      if (block++ % every != which) continue;
       held.back().segment(r.begin, r.size()).setConstant(true);
       ++taken;
     }
@@ -169,6 +184,27 @@ std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
     for (Mask& m : held) m.setConstant(false);
   }
   return held;
+}
+
+}  // namespace
+
+std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
+                                   const FitOptions& options) {
+  return every_nth_block(signals, options, options.hold_out_every, options.hold_out_every / 2);
+}
+
+std::vector<std::vector<Mask>> held_out_folds(const std::vector<MachineSignals>& signals,
+                                              const FitOptions& options, int count) {
+  const auto any = [](const std::vector<Mask>& held) {
+    return std::any_of(held.begin(), held.end(), [](const Mask& m) { return m.any(); });
+  };
+  std::vector<std::vector<Mask>> folds;
+  if (!any(held_out_samples(signals, options))) return folds;
+  for (int f = 0; f < count; ++f) {
+    std::vector<Mask> held = every_nth_block(signals, options, count, f);
+    if (any(held)) folds.push_back(std::move(held));
+  }
+  return folds;
 }
 
 std::vector<SampleRange> motion_blocks(const MachineSignals& signals, double block_s) {

@@ -100,10 +100,21 @@ FitResult fit(const Machine& machine, std::vector<Log>&& logs, std::vector<Log>&
               const FitOptions& options = {},
               const std::function<void(double share, const std::string& what)>& progress = {});
 
+/// A model of forces and flows alone, with the options' effects: only the valve gains are learned, which takes a fraction
+/// of the time that the pressure models take.
+/// @param left_out [logs] masks of the samples that do not count; empty = none
+CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<MachineSignals>& signals,
+                                const std::vector<Mask>& left_out, const FitOptions& options);
+
 /// @return [logs] masks of the samples held out for FitResult; all false when fewer than two blocks of motion
 ///   could be held out
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
                                    const FitOptions& options);
+
+/// @return [folds][logs] masks of the samples held out in each of `count` folds, which together are all motions; empty
+///   where held_out_samples() has none
+std::vector<std::vector<Mask>> held_out_folds(const std::vector<MachineSignals>& signals,
+                                              const FitOptions& options, int count);
 
 /// Data is held out by whole blocks of motion, because neighbouring rows are correlated.
 /// @return motion segments in order of time, the long ones cut into equal parts of about `block_s`

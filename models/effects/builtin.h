@@ -12,6 +12,7 @@ std::unique_ptr<Effect> make_base_tilt();
 std::unique_ptr<Effect> make_angle_offset();
 std::unique_ptr<Effect> make_structural_flex();
 std::unique_ptr<Effect> make_inertia();
+std::unique_ptr<Effect> make_payload_sway();
 std::unique_ptr<Effect> make_coulomb_friction();
 std::unique_ptr<Effect> make_viscous_friction();
 std::unique_ptr<Effect> make_stribeck_friction();

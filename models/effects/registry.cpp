@@ -18,6 +18,7 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
     list.push_back(make_angle_offset());
     list.push_back(make_structural_flex());
     list.push_back(make_inertia());
+    list.push_back(make_payload_sway());
     list.push_back(make_coulomb_friction());
     list.push_back(make_viscous_friction());
     list.push_back(make_stribeck_friction());

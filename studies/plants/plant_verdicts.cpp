@@ -1,6 +1,6 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [-v] [--json FILE]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [-v] [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +13,7 @@
 #include "diagnosis/verdict/diagnose.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
+#include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "models/math/parallel.h"
 #include "simulator/plant/parameters/parameter_table.h"
@@ -32,7 +33,7 @@ struct Arguments {
   int plants = 20;
   std::uint64_t seed = 1;
   double seconds = 200.0;
-  std::string only, json;
+  std::string only, json, logs;
   bool no_reference = false, verbose = false;
 };
 
@@ -187,13 +188,16 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       value = hidden.change->factor * value + hidden.change->plus * row.scale;
     }
     const auto log = [&](const PlantParameters& p, std::uint64_t work, double factor) {
-      return log_from_text(fmt::format("work{}.csv", work),
-                           plant_log(machine, p, 100 * seed + work, a.seconds, factor), machine);
+      const std::string text = plant_log(machine, p, 100 * seed + work, a.seconds, factor);
+      const std::string file = fmt::format("plant{}_work{}.csv", seed, work);
+      if (!a.logs.empty()) std::ofstream(a.logs + "/" + file) << text;
+      return log_from_text(file, text, machine);
     };
     const std::vector<Log> reference = {log(as_built, 1, 1.0)};
     FitOptions fit_options;
     fit_options.hold_out_every = 0;
     const CraneModel model = fit(machine, reference, {}, fit_options).model;
+    if (!a.logs.empty()) save_model(model, fmt::format("{}/plant{}_model.json", a.logs, seed));
     for (const bool clean : {true, false}) {
       Case c;
       c.seed = seed;
@@ -264,6 +268,8 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", a.seconds, "of each log")->capture_default_str();
   app.add_option("--only", a.only, "one change alone");
   app.add_option("--json", a.json, "file for the counts");
+  app.add_option("--logs", a.logs, "folder for the logs and the learned models")
+      ->check(CLI::ExistingDirectory);
   app.add_flag("--no-reference", a.no_reference, "diagnose without the reference log");
   app.add_flag("-v", a.verbose, "whole diagnoses");
   CLI11_PARSE(app, argc, argv);

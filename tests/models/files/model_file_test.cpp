@@ -104,8 +104,8 @@ TEST(ModelFile, KeepsEveryEffectAndItsSteps) {
     AppliedEffect e{candidate.effect, candidate.at, {}, {}, {}};
     for (const EffectParameter& p : candidate.effect->info().parameters) {
       e.values.push_back(p.typical / 3.0);
-      e.lower95.push_back(p.typical / 7.0);
-      e.upper95.push_back(p.typical / 1.5);
+      e.lower95.push_back(std::min(p.typical / 7.0, p.typical / 1.5));
+      e.upper95.push_back(std::max(p.typical / 7.0, p.typical / 1.5));
     }
     if (model.effects.size() % 2 == 1) {  // intervals need not be known
       e.lower95.clear();
