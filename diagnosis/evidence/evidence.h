@@ -88,11 +88,7 @@ struct Evidence {
   std::optional<Evidence> with_leaders_of(std::span<const AppliedEffect> found) const;
 
  private:
-  friend Evidence collect_evidence(const CraneModel& model,
-                                   const std::vector<MachineSignals>& suspects,
-                                   const std::vector<MachineSignals>& references,
-                                   const std::vector<AppliedEffect>* in_references,
-                                   const EvidenceOptions& options);
+  friend class EvidenceCollector;
   struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
   };
