@@ -181,8 +181,8 @@ NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
   for (const SearchCandidate& c : all)
     null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
   std::mt19937_64 random(search.seed);
-  return simulate_null_distribution(logs.evidence, null_candidates, {}, logs.fit,
-                                    search.simulations, random, search.regression);
+  return simulate_null_distribution({logs.evidence, logs.fit}, null_candidates, search.simulations,
+                                    random, search.regression);
 }
 
 /// Sorts effects into the order of `wanted`.
