@@ -26,6 +26,9 @@ struct SeedMotion {
       false;  ///< whether it is a straight joint-space line, which is reported as baseline
 };
 
+/// The goal configurations in which the seeds end.
+std::vector<Eigen::VectorXd> end_postures(const std::vector<SeedMotion>& seeds);
+
 /// Range of a motion's duration, and the duration at which the search begins. [s]
 struct TimeWindow {
   double guess = 0.0;
