@@ -173,10 +173,9 @@ void EvidenceCollector::add_kernels(const MachineSignals& signals) {
   if (options().whole_motions) {
     k.force = k.speed = k.pressure = VectorXd::Ones(1);
   } else {
-    const int order = SmoothingOptions{}.order;
-    k.force = low_pass_of(signals.step, signals.window, order, 2);
-    k.speed = low_pass_of(signals.step, signals.window, order, 1);
-    k.pressure = low_pass_of(signals.step, signals.window, order, 0);
+    k.force = low_pass_of(signals.step, signals.window, signals.order, 2);
+    k.speed = low_pass_of(signals.step, signals.window, signals.order, 1);
+    k.pressure = low_pass_of(signals.step, signals.window, signals.order, 0);
   }
   gain_force_.push_back(k.force.norm());
   gain_pressure_.push_back(k.pressure.norm());

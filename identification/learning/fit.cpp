@@ -96,6 +96,7 @@ MachineSignals outline_of(const MachineSignals& signals) {
   out.sha256 = signals.sha256;
   out.step = signals.step;
   out.window = signals.window;
+  out.order = signals.order;
   out.time = signals.time;
   return out;
 }
