@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/search_state.h"
 
@@ -25,6 +27,11 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
   judged.held_out = held.gain;
   judged.held_out_error = held.error;
   judged.held_out_share = held.improved;
+}
+
+double same_within(const FoundEffect& found, const SearchOptions& options) {
+  const double form = form_share(*found.design.effect.effect, options.regression);
+  return std::max(options.same_nats, form * form * found.gain);
 }
 
 std::string why_not_named(const FoundEffect& found, const SearchOptions& options,
