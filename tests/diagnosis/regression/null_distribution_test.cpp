@@ -109,6 +109,7 @@ TEST(NullDistribution, AnEffectPasses) {
         simulate_null_distribution({null.evidence, fit}, null.candidates(), kSimulations, random);
     found += null.p_value(distribution, fit) < 0.05 ? 1 : 0;
   }
+  // One in ten may be hidden by the noise that is drawn.
   EXPECT_GE(found, 36) << "of 40";
 }
 
@@ -146,6 +147,7 @@ TEST(NullDistribution, AnAcceptedEffectCannotBeFoundAgain) {
   std::mt19937_64 random(1);
   const NullDistribution distribution = simulate_null_distribution(
       {null.evidence, fit, {&known}}, {{&null.catalogue[0], 0.0}}, kSimulations, random);
+  // Zero but for rounding, which the ridge of the simulation keeps from growing.
   EXPECT_LT(distribution.normal.back(), 1e-3);
   EXPECT_LT(distribution.flipped.back(), 1e-3);
 }
@@ -165,6 +167,7 @@ TEST(NullDistribution, MoreCandidatesRaiseTheThreshold) {
   std::mt19937_64 c(1);
   const NullDistribution penalised =
       simulate_null_distribution({null.evidence, fit}, one, kSimulations, c);
+  // The same seed gives the same draws; rounding alone differs, here and below.
   EXPECT_NEAR(penalised.threshold(0.05), narrow.threshold(0.05) - 3.0, 1e-9);
   // and so does the penalty of optional parameters for designs that have them
   std::vector<EffectDesign> wider = null.catalogue[0];
