@@ -175,4 +175,15 @@ std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
   return out;
 }
 
+std::vector<EffectAt> effects_not_in(const CraneModel& model) {
+  std::vector<EffectAt> out;
+  for (const EffectAt& c : candidates(model.machine)) {
+    const bool known =
+        std::any_of(model.effects.begin(), model.effects.end(),
+                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
+    if (!known) out.push_back(c);
+  }
+  return out;
+}
+
 }  // namespace sparflow

@@ -127,6 +127,9 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
 std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
                                                  const std::vector<MachineSignals>& references);
 
+/// The catalogue on the model's machine without the effects that the model has.
+std::vector<EffectAt> effects_not_in(const CraneModel& model);
+
 /// "force of boom", "return pressure of jib extending"
 std::string evidence_text(EvidenceKind kind, const std::string& at);
 /// The stage's name in reports: force, flow, pressure, pump.

@@ -155,6 +155,19 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   return d;
 }
 
+MatrixXd columns_of(const std::vector<const EffectDesign*>& designs, std::size_t channel,
+                    Index rows) {
+  Index width = 0, at = 0;
+  for (const EffectDesign* d : designs) width += d->columns[channel].cols();
+  MatrixXd all(rows, width);
+  for (const EffectDesign* d : designs) {
+    const Index w = d->columns[channel].cols();
+    if (w > 0) all.middleCols(at, w) = d->columns[channel];
+    at += w;
+  }
+  return all;
+}
+
 EffectDesign without_optional(EffectDesign design) {
   for (Index k = 0; k < design.linear; ++k) {
     if (!is_optional(design, k)) continue;
@@ -246,15 +259,10 @@ ProfileLikelihood::ProfileLikelihood(const Evidence& evidence,
 
 void ProfileLikelihood::collect_columns(const std::vector<const EffectDesign*>& designs,
                                         std::size_t c) {
-  Index width = 0, first = 0;
-  for (const EffectDesign* d : designs) width += d->columns[c].cols();
-  columns_[c].resize(evidence_.channels[c].rows(), width);
-  Index at = 0;
+  columns_[c] = columns_of(designs, c, evidence_.channels[c].rows());
+  Index first = 0;
   for (const EffectDesign* d : designs) {
-    const Index w = d->columns[c].cols();
-    if (w > 0) columns_[c].middleCols(at, w) = d->columns[c];
-    for (Index k = 0; k < w; ++k) owner_[c].push_back(first + k);
-    at += w;
+    for (Index k = 0; k < d->columns[c].cols(); ++k) owner_[c].push_back(first + k);
     first += d->linear;
   }
 }

@@ -89,15 +89,8 @@ NullSimulation::NullSimulation(const NullModel& null, int count, std::mt19937_64
 
 void NullSimulation::project_accepted(std::size_t c) {
   const EvidenceChannel& channel = null_.evidence.channels[c];
-  Index width = 0;
-  for (const EffectDesign* d : null_.accepted) width += d->columns[c].cols();
-  MatrixXd columns(channel.rows(), width);
-  Index at = 0;
-  for (const EffectDesign* d : null_.accepted) {
-    const Index w = d->columns[c].cols();
-    if (w > 0) columns.middleCols(at, w) = d->columns[c];
-    at += w;
-  }
+  const MatrixXd columns = columns_of(null_.accepted, c, channel.rows());
+  const Index width = columns.cols();
   const MatrixXd rows = whitened_rows(channel, null_.fit.noise[c], columns);
   accepted_[c] = rows.leftCols(width);
   VectorXd r = rows.col(width);

@@ -163,15 +163,7 @@ void note_large_residuals(const SelftestEvidence& logs, const SelftestOptions& o
 
 /// The effects to be tested: those asked for, else the catalogue without the effects of the model.
 std::vector<EffectAt> effects_to_inject(const CraneModel& model, const SelftestOptions& options) {
-  if (!options.candidates.empty()) return options.candidates;
-  std::vector<EffectAt> wanted;
-  for (const EffectAt& c : candidates(model.machine)) {
-    const bool known =
-        std::any_of(model.effects.begin(), model.effects.end(),
-                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
-    if (!known) wanted.push_back(c);
-  }
-  return wanted;
+  return options.candidates.empty() ? effects_not_in(model) : options.candidates;
 }
 
 NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
