@@ -10,9 +10,9 @@
 
 namespace sparflow {
 
-/// Distance from the goal within which the tip counts as there [m]; samples usually are within 1e-9.
 /// Distance from the goal within which the tip counts as there; samples usually are within 1e-9.
-/// @threshold [m] 1e-6..0.1; chosen: a millimetre
+/// @threshold [m] 1e-6..0.1; chosen: a millimetre, below what any of these machines is positioned to; the optimiser
+/// then puts the tip at the goal itself
 inline constexpr double kTipTolerance = 1e-3;
 
 /// Length of a polyline in the metric of all planners: Euclidean over joint coordinates divided by speed_scale(), so in

@@ -340,10 +340,4 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
   return splits;
 }
 
-BranchSplit split_branches(const VectorXd& p_return, const VectorXd& p_supply,
-                           const VectorXd& q_return, const VectorXd& q_supply,
-                           const VectorXd& force, const Mask& moving) {
-  return split_branches({{p_return, p_supply, q_return, q_supply, force, {}, {}, moving}}).front();
-}
-
 }  // namespace sparflow

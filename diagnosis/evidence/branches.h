@@ -46,9 +46,4 @@ std::vector<BranchSplit> split_branches(const std::vector<BranchData>& logs,
                                         std::size_t first_machine = 0,
                                         const BranchOptions& options = {});
 
-/// The same for one log alone.
-BranchSplit split_branches(const Eigen::VectorXd& p_return, const Eigen::VectorXd& p_supply,
-                           const Eigen::VectorXd& q_return, const Eigen::VectorXd& q_supply,
-                           const Eigen::VectorXd& force, const Mask& moving);
-
 }  // namespace sparflow

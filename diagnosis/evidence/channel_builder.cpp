@@ -100,14 +100,15 @@ void ChannelBuilder::add(std::size_t log, const Eigen::Array<bool, Eigen::Dynami
       const Index pieces = std::max<Index>(1, (last - first + longest - 1) / longest);
       for (Index piece = 0; piece < pieces; ++piece) {
         block(log, first + (last - first) * piece / pieces,
-              first + (last - first) * (piece + 1) / pieces, values, base, stride);
+              first + (last - first) * (piece + 1) / pieces, values, base);
       }
     }
   }
 }
 
 void ChannelBuilder::block(std::size_t log, Index first, Index last, const VectorXd& values,
-                           const Eigen::MatrixXd& base, Index stride) {
+                           const Eigen::MatrixXd& base) {
+  const Index stride = evidence_.stride;
   NoiseBlock b{static_cast<Index>(y_.size()), 0};
   for (Index k = first; k < last; k += stride) {
     if (!std::isfinite(values[k]) || !base.row(k).allFinite()) {  // a missing value ends the block

@@ -1,5 +1,5 @@
 #pragma once
-/// Builds one evidence channel from stretches of logs. Used by evidence.cpp only.
+/// Builds one evidence channel from stretches of logs. Used by evidence_collector.cpp only.
 #include <vector>
 
 #include "diagnosis/evidence/evidence.h"
@@ -25,7 +25,7 @@ class ChannelBuilder {
 
  private:
   void block(std::size_t log, Eigen::Index first, Eigen::Index last, const Eigen::VectorXd& values,
-             const Eigen::MatrixXd& base, Eigen::Index stride);
+             const Eigen::MatrixXd& base);
   void close(std::size_t log, const NoiseBlock& b);
 
   const Evidence& evidence_;

@@ -88,11 +88,7 @@ struct Evidence {
   std::optional<Evidence> with_leaders_of(std::span<const AppliedEffect> found) const;
 
  private:
-  friend Evidence collect_evidence(const CraneModel& model,
-                                   const std::vector<MachineSignals>& suspects,
-                                   const std::vector<MachineSignals>& references,
-                                   const std::vector<AppliedEffect>* in_references,
-                                   const EvidenceOptions& options);
+  friend class EvidenceCollector;
   struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
   };
@@ -130,6 +126,9 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
 /// record added from other logs.
 std::vector<AppliedEffect> effects_in_references(const CraneModel& model,
                                                  const std::vector<MachineSignals>& references);
+
+/// The catalogue on the model's machine without the effects that the model has.
+std::vector<EffectAt> effects_not_in(const CraneModel& model);
 
 /// "force of boom", "return pressure of jib extending"
 std::string evidence_text(EvidenceKind kind, const std::string& at);

@@ -22,7 +22,8 @@ struct BranchOptions {
   /// more than this make the fit slower, not better
   int most_fitted = 3000;
   /// Prior share of samples that follow neither law.
-  /// @threshold [1] 0..1; chosen: a small share of starts and stops
+  /// @threshold [1] 0..1; chosen: one sample of fifty, for starts and stops. Half or twice of it changes the odds that a
+  /// sample is an outlier by two, that is by what 0.7 nat of its distance to the laws do
   double outlier_share = 0.02;
   /// Least standard deviation of a law.
   /// @threshold [bar] 0..; chosen: that of the pressure sensors

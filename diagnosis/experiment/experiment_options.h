@@ -23,7 +23,8 @@ struct MotionOptions {
   /// @threshold [1] 0..1; chosen: neither pump nor valve saturates.
   double flow_share = 0.9;
   /// Flow of a valve at full command whose flow neither the model nor the machine file says.
-  /// @threshold [m^3/s] 0..; chosen: 60 l/min.
+  /// @threshold [m^3/s] 0..; chosen: 60 l/min, of the order of a crane's valve; it scales the speed of all motions that are
+  /// compared alike.
   double unknown_valve_flow = 1e-3;
   /// Time in which the speed of a sudden command rises and falls.
   /// @threshold [s] 0..; chosen: a sudden command that a machine can still follow.
@@ -40,13 +41,15 @@ struct MotionOptions {
   /// comparison.
   double return_pressure = 4.0 * units::kBar;
   /// Rise of the return pressure with the square of the return flow.
-  /// @threshold [Pa/(m^3/s)^2] 0..; chosen: 3 bar at 60 l/min.
+  /// @threshold [Pa/(m^3/s)^2] 0..; chosen: 3 bar at 60 l/min in lines and filter; twice of it changes a working
+  /// pressure by some bar.
   double return_loss = 3.0 * units::kBar / (1e-3 * 1e-3);
   /// Supply pressure with an overrunning load, which a valve then holds.
   /// @threshold [Pa] 0..; chosen: 15 bar stand for the pressure that opens a counterbalance valve.
   double least_supply = 15.0 * units::kBar;
   /// Oil temperature of all motions but the one that warms up.
-  /// @threshold [degC] 0..; chosen: warm oil.
+  /// @threshold [degC] 0..; chosen: between the temperatures at which the warming motion begins and ends, nearer to its
+  /// end, where a machine works most of the time.
   double oil = 45.0;
   /// Oil temperature at the start of the motion that warms up.
   /// @threshold [degC] 0..; chosen: oil at the temperature of the air.

@@ -133,17 +133,13 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   std::vector<VectorXd> g(count, VectorXd::Zero(layout.count));
   std::vector<bool> used(channels, false);
   for (std::size_t c = 0; c < channels; ++c) {
-    Index width = 0;
-    for (const EffectDesign* d : designs) width += d->columns[c].cols();
+    const MatrixXd columns = columns_of(designs, c, evidence.channels[c].rows());
+    const Index width = columns.cols();
     if (width == 0) continue;
     used[c] = true;
-    MatrixXd columns(evidence.channels[c].rows(), width);
-    Index at = 0;
     for (std::size_t k = 0; k < designs.size(); ++k) {
-      const Index w = designs[k]->columns[c].cols();
-      if (w > 0) columns.middleCols(at, w) = designs[k]->columns[c];
-      for (Index i = 0; i < w; ++i) owner[c].push_back(layout.first[k] + i);
-      at += w;
+      for (Index i = 0; i < designs[k]->columns[c].cols(); ++i)
+        owner[c].push_back(layout.first[k] + i);
     }
     rows[c] = whitened_rows(evidence.channels[c], fit.noise[c], columns) /
               std::sqrt(fit.noise[c].variance);

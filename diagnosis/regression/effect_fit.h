@@ -31,6 +31,10 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
 /// The same design with the columns of its optional parameters set to zero.
 EffectDesign without_optional(EffectDesign design);
 
+/// The columns of all designs in a channel side by side. [rows x columns]
+Eigen::MatrixXd columns_of(const std::vector<const EffectDesign*>& designs, std::size_t channel,
+                           Eigen::Index rows);
+
 struct EffectFit {
   Eigen::VectorXd theta;          ///< [SI] linear parameters of all designs, in their order
   Eigen::MatrixXd covariance;     ///< covariance of theta, robust against dependence inside blocks

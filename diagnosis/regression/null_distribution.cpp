@@ -40,6 +40,117 @@ MatrixXd flipped_scores(const MatrixXd& x, const VectorXd& residual, const Vecto
   return product(by_block, signs) / std::sqrt(std::max(variance, 1e-300));
 }
 
+/// The simulated residuals of all channels, whitened and orthogonal to the accepted effects.
+class NullSimulation {
+ public:
+  /// @param null must outlive this  @param count simulations of either kind
+  NullSimulation(const NullModel& null, int count, std::mt19937_64& random);
+
+  /// Gains of a design on normal innovations, then on flipped residuals. [2 x simulations, nats]
+  VectorXd gains(const EffectDesign& design) const;
+
+ private:
+  std::size_t channels() const { return null_.evidence.channels.size(); }
+  /// Fills in the span of the accepted effects and the residual beside it.
+  void project_accepted(std::size_t c);
+  /// Whitened columns of a design, orthogonal to the accepted effects, for innovations of unit variance.
+  MatrixXd own_columns(const EffectDesign& design, std::size_t c) const;
+  /// [rows] residual of the accepted effects for innovations of unit variance
+  VectorXd unit_residual(std::size_t c) const {
+    return residual_[c] / std::sqrt(null_.fit.noise[c].variance);
+  }
+
+  const NullModel& null_;
+  int count_;
+  std::vector<MatrixXd> noise_;     // [channels]: [rows x simulations] normal innovations
+  std::vector<MatrixXd> signs_;     // [channels]: [blocks x simulations] -1 or 1
+  std::vector<MatrixXd> accepted_;  // [channels] orthonormal basis of the accepted effects' columns
+  std::vector<VectorXd> residual_;  // [channels]
+};
+
+NullSimulation::NullSimulation(const NullModel& null, int count, std::mt19937_64& random)
+    : null_(null),
+      count_(count),
+      noise_(null.evidence.channels.size()),
+      signs_(null.evidence.channels.size()),
+      accepted_(null.evidence.channels.size()),
+      residual_(null.evidence.channels.size()) {
+  std::normal_distribution<double> normal;
+  for (std::size_t c = 0; c < channels(); ++c) {
+    project_accepted(c);
+    const EvidenceChannel& channel = null.evidence.channels[c];
+    noise_[c].resize(channel.rows(), count);
+    for (Index i = 0; i < noise_[c].size(); ++i) noise_[c].data()[i] = normal(random);
+    signs_[c].resize(static_cast<Index>(channel.blocks.size()), count);
+    for (Index i = 0; i < signs_[c].size(); ++i)
+      signs_[c].data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
+  }
+}
+
+void NullSimulation::project_accepted(std::size_t c) {
+  const EvidenceChannel& channel = null_.evidence.channels[c];
+  const MatrixXd columns = columns_of(null_.accepted, c, channel.rows());
+  const Index width = columns.cols();
+  const MatrixXd rows = whitened_rows(channel, null_.fit.noise[c], columns);
+  accepted_[c] = rows.leftCols(width);
+  VectorXd r = rows.col(width);
+  if (width > 0) {  // orthonormal, so that a projection is one product
+    accepted_[c] = span_of(accepted_[c]);
+    r -= accepted_[c] * (accepted_[c].transpose() * r);
+  }
+  residual_[c] = std::move(r);
+}
+
+MatrixXd NullSimulation::own_columns(const EffectDesign& design, std::size_t c) const {
+  MatrixXd x = whitened_rows(null_.evidence.channels[c], null_.fit.noise[c], design.columns[c])
+                   .leftCols(design.linear);
+  if (accepted_[c].cols() > 0) {
+    const VectorXd whole = x.colwise().squaredNorm();
+    x -= product(accepted_[c], transposed_product(accepted_[c], x));
+    for (Index i = 0; i < x.cols();
+         ++i) {  // in the span of accepted effects: only rounding is left
+      if (x.col(i).squaredNorm() < 1e-16 * whole[i]) x.col(i).setZero();
+    }
+  }
+  x /= std::sqrt(null_.fit.noise[c].variance);
+  return x;
+}
+
+VectorXd NullSimulation::gains(const EffectDesign& design) const {
+  const Index m = design.linear;
+  MatrixXd n = MatrixXd::Zero(m, m), z = MatrixXd::Zero(m, 2 * count_);
+  VectorXd g = VectorXd::Zero(m);
+  std::vector<MatrixXd> columns(channels());
+  for (std::size_t c = 0; c < channels(); ++c) {
+    if (!design.touches(c)) continue;
+    MatrixXd x = own_columns(design, c);
+    n += transposed_product(x, x);
+    z.leftCols(count_) += transposed_product(x, noise_[c]);
+    g += x.transpose() * residual_[c] / std::sqrt(null_.fit.noise[c].variance);
+    columns[c] = std::move(x);
+  }
+  const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  n = scale.asDiagonal() * n * scale.asDiagonal();
+  n.diagonal().array() += 1e-9;
+  const VectorXd own = scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
+  for (std::size_t c = 0; c < channels(); ++c) {
+    if (columns[c].cols() == 0) continue;
+    z.rightCols(count_) += flipped_scores(columns[c], unit_residual(c), own,
+                                          null_.evidence.channels[c].blocks, signs_[c]);
+  }
+  z = scale.asDiagonal() * z;
+  return 0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum().transpose();
+}
+
+/// Ratio of the gains on flipped residuals to those on normal innovations, at least one.
+/// @param gains [2 x simulations] normal, then flipped
+double scale_of(const VectorXd& gains, const RegressionOptions& options) {
+  const Index half = gains.size() / 2;
+  const double usual = value_at(gains.head(half), options.scale_quantile);
+  if (!(usual > 0.0)) return 1.0;
+  return std::max(1.0, value_at(gains.tail(half), options.scale_quantile) / usual);
+}
+
 }  // namespace
 
 double NullDistribution::threshold(double level) const {
@@ -56,89 +167,20 @@ double NullDistribution::p_value(double gain, std::size_t candidate) const {
   return std::max(p_of(normal, scaled), p_of(flipped, scaled));
 }
 
-NullDistribution simulate_null_distribution(const Evidence& evidence,
+NullDistribution simulate_null_distribution(const NullModel& null,
                                             const std::vector<NullCandidate>& candidates,
-                                            const std::vector<const EffectDesign*>& accepted,
-                                            const EffectFit& fit, int simulations,
-                                            std::mt19937_64& random,
+                                            int simulations, std::mt19937_64& random,
                                             const RegressionOptions& options) {
-  const std::size_t channels = evidence.channels.size();
-  std::vector<MatrixXd> noise(channels), signs(channels), fixed(channels);
-  std::vector<VectorXd> residual(channels);
-  std::normal_distribution<double> normal;
-  for (std::size_t c = 0; c < channels; ++c) {
-    const EvidenceChannel& channel = evidence.channels[c];
-    Index width = 0;
-    for (const EffectDesign* d : accepted) width += d->columns[c].cols();
-    MatrixXd columns(channel.rows(), width);
-    Index at = 0;
-    for (const EffectDesign* d : accepted) {
-      const Index w = d->columns[c].cols();
-      if (w > 0) columns.middleCols(at, w) = d->columns[c];
-      at += w;
-    }
-    const MatrixXd rows = whitened_rows(channel, fit.noise[c], columns);
-    fixed[c] = rows.leftCols(width);
-    VectorXd r = rows.col(width);
-    if (width > 0) {  // orthonormal, so that a projection is one product
-      fixed[c] = span_of(fixed[c]);
-      r -= fixed[c] * (fixed[c].transpose() * r);
-    }
-    residual[c] = std::move(r);
-    noise[c].resize(channel.rows(), simulations);
-    for (Index i = 0; i < noise[c].size(); ++i) noise[c].data()[i] = normal(random);
-    signs[c].resize(static_cast<Index>(channel.blocks.size()), simulations);
-    for (Index i = 0; i < signs[c].size(); ++i)
-      signs[c].data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
-  }
+  const NullSimulation simulation(null, simulations, random);
   NullDistribution out;
   VectorXd largest = VectorXd::Constant(2 * simulations, -1e300);
   for (const NullCandidate& candidate : candidates) {
     VectorXd best = VectorXd::Constant(2 * simulations, -1e300);
     for (const EffectDesign& d : *candidate.designs) {
-      MatrixXd n = MatrixXd::Zero(d.linear, d.linear),
-               z = MatrixXd::Zero(d.linear, 2 * simulations);
-      VectorXd g = VectorXd::Zero(d.linear);
-      std::vector<MatrixXd> columns(channels);
-      for (std::size_t c = 0; c < channels; ++c) {
-        if (!d.touches(c)) continue;
-        MatrixXd x =
-            whitened_rows(evidence.channels[c], fit.noise[c], d.columns[c]).leftCols(d.linear);
-        if (fixed[c].cols() > 0) {
-          const VectorXd whole = x.colwise().squaredNorm();
-          x -= product(fixed[c], transposed_product(fixed[c], x));
-          for (Index i = 0; i < x.cols();
-               ++i) {  // in the span of accepted effects: only rounding is left
-            if (x.col(i).squaredNorm() < 1e-16 * whole[i]) x.col(i).setZero();
-          }
-        }
-        x /= std::sqrt(fit.noise[c].variance);
-        n += transposed_product(x, x);
-        z.leftCols(simulations) += transposed_product(x, noise[c]);
-        g += x.transpose() * residual[c] / std::sqrt(fit.noise[c].variance);
-        columns[c] = std::move(x);
-      }
-      const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-      n = scale.asDiagonal() * n * scale.asDiagonal();
-      n.diagonal().array() += 1e-9;
-      const VectorXd own = scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
-      for (std::size_t c = 0; c < channels; ++c) {
-        if (columns[c].cols() == 0) continue;
-        z.rightCols(simulations) +=
-            flipped_scores(columns[c], residual[c] / std::sqrt(fit.noise[c].variance), own,
-                           evidence.channels[c].blocks, signs[c]);
-      }
-      z = scale.asDiagonal() * z;
       const double besides = d.optional ? candidate.optional_penalty : 0.0;
-      const VectorXd gains =
-          0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum().transpose();
-      best = best.cwiseMax((gains.array() - besides).matrix());
+      best = best.cwiseMax((simulation.gains(d).array() - besides).matrix());
     }
-    const double usual = value_at(best.head(simulations), options.scale_quantile);
-    const double scale =
-        usual > 0.0
-            ? std::max(1.0, value_at(best.tail(simulations), options.scale_quantile) / usual)
-            : 1.0;
+    const double scale = scale_of(best, options);
     out.scale.push_back(scale);
     out.penalty.push_back(candidate.penalty);
     best.tail(simulations) /= scale;

@@ -32,13 +32,18 @@ struct NullCandidate {
   double optional_penalty = 0.0;  ///< [nats] further penalty of designs with optional parameters
 };
 
-/// @param accepted effects already in the fit, which the candidates' columns are made orthogonal to
-/// @param fit with the noise models of the channels
-NullDistribution simulate_null_distribution(const Evidence& evidence,
+/// The log without what is missing: evidence, and what is known of it.
+struct NullModel {
+  const Evidence& evidence;
+  const EffectFit& fit;  ///< with the noise models of the channels
+  /// Effects already in the fit, to which the candidates' columns are made orthogonal.
+  std::vector<const EffectDesign*> accepted = {};
+};
+
+/// @param simulations number of simulated residuals of either kind
+NullDistribution simulate_null_distribution(const NullModel& null,
                                             const std::vector<NullCandidate>& candidates,
-                                            const std::vector<const EffectDesign*>& accepted,
-                                            const EffectFit& fit, int simulations,
-                                            std::mt19937_64& random,
+                                            int simulations, std::mt19937_64& random,
                                             const RegressionOptions& options = {});
 
 }  // namespace sparflow

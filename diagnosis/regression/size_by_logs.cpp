@@ -99,16 +99,10 @@ SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
       x.col(1) += d->columns[c] * effect.direction;
     }
     if (x.col(1).isZero(0.0)) continue;
-    Index width = 2;
-    for (const EffectDesign* d : effect.others) width += d->columns[c].cols();
-    MatrixXd columns(channel.rows(), width);
-    Index at = 0;
-    for (const EffectDesign* d : effect.others) {
-      if (!d->touches(c)) continue;
-      columns.middleCols(at, d->columns[c].cols()) = d->columns[c];
-      at += d->columns[c].cols();
-    }
-    columns.rightCols(2) = x;
+    const MatrixXd others = columns_of(effect.others, c, channel.rows());
+    const Index at = others.cols();
+    MatrixXd columns(channel.rows(), at + 2);
+    columns << others, x;
     const MatrixXd rows = whitened_rows(channel, fit.noise[c], columns);
     MatrixXd own(rows.rows(), 2);
     own << rows.col(at + 1), rows.col(at + 2) - rows.col(at);

@@ -20,9 +20,16 @@ struct Window {
   double gain;  // decrease of the sum of squares
 };
 
-std::vector<Window> windows_of(const Evidence& evidence, const EvidenceChannel& channel,
-                               const VectorXd& before, const VectorXd& after,
+/// Residuals of one channel without an effect and with it. [rows, SI]
+struct ResidualChange {
+  std::size_t channel;
+  const VectorXd& before;
+  const VectorXd& after;
+};
+
+std::vector<Window> windows_of(const Evidence& evidence, const ResidualChange& change,
                                const IsolatedEventOptions& options) {
+  const EvidenceChannel& channel = evidence.channels[change.channel];
   const auto length = std::max<Index>(
       2, static_cast<Index>(
              std::lround(options.window / (evidence.stride * evidence.series[0].step))));
@@ -33,17 +40,18 @@ std::vector<Window> windows_of(const Evidence& evidence, const EvidenceChannel& 
     for (Index i = block.first; i < block.last; i += length) {
       const Index n = std::min(length, block.last - i);
       windows.push_back(
-          {b, i, i + n, before.segment(i, n).squaredNorm() - after.segment(i, n).squaredNorm()});
+          {b, i, i + n,
+           change.before.segment(i, n).squaredNorm() - change.after.segment(i, n).squaredNorm()});
     }
   }
   return windows;
 }
 
-IsolatedEvent in_channel(const Evidence& evidence, std::size_t index, const VectorXd& before,
-                         const VectorXd& after, const IsolatedEventOptions& options,
-                         double& inside) {
-  const EvidenceChannel& channel = evidence.channels[index];
-  const std::vector<Window> windows = windows_of(evidence, channel, before, after, options);
+/// @param inside gets the decrease of the sum of squares within the event [SI squared]
+IsolatedEvent in_channel(const Evidence& evidence, const ResidualChange& change,
+                         const IsolatedEventOptions& options, double& inside) {
+  const EvidenceChannel& channel = evidence.channels[change.channel];
+  const std::vector<Window> windows = windows_of(evidence, change, options);
   inside = 0.0;
   if (windows.empty()) return {};
   double all = 0.0;  // decreases only: a wrong effect may increase the error elsewhere
@@ -58,13 +66,15 @@ IsolatedEvent in_channel(const Evidence& evidence, std::size_t index, const Vect
   for (auto w = from; w <= to; ++w) inside += w->gain;
   const Index n = to->last - from->first;
   IsolatedEvent isolated_event;
-  isolated_event.channel = index;
+  isolated_event.channel = change.channel;
   isolated_event.log = static_cast<std::size_t>(channel.log[from->block]);
   const VectorXd& time = evidence.series[isolated_event.log].time;
   isolated_event.from = time[channel.sample[static_cast<std::size_t>(from->first)]];
   isolated_event.to = time[channel.sample[static_cast<std::size_t>(to->last - 1)]];
-  isolated_event.before = before.segment(from->first, n).norm() / std::sqrt(static_cast<double>(n));
-  isolated_event.after = after.segment(from->first, n).norm() / std::sqrt(static_cast<double>(n));
+  isolated_event.before =
+      change.before.segment(from->first, n).norm() / std::sqrt(static_cast<double>(n));
+  isolated_event.after =
+      change.after.segment(from->first, n).norm() / std::sqrt(static_cast<double>(n));
   isolated_event.share = all > 0.0 ? inside / all : 0.0;
   return isolated_event;
 }
@@ -78,7 +88,7 @@ IsolatedEvent locate_isolated_event(const Evidence& evidence, const EffectFit& n
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     double inside = 0.0;
     const IsolatedEvent here =
-        in_channel(evidence, c, null.residual[c], with.residual[c], options, inside);
+        in_channel(evidence, {c, null.residual[c], with.residual[c]}, options, inside);
     const double floor = evidence.channels[c].noise_floor;
     const double noises = inside / (floor > 0.0 ? floor * floor : 1.0);
     if (!(noises > most)) continue;

@@ -29,15 +29,17 @@ struct ResidualModelOptions {
   /// has -1.
   double deepest_dip = -0.3;
   /// RMS of structure in a speed below which it is not reported, however regular.
-  /// @threshold [m/s] 0..; chosen: 0.05 mm/s; smaller structure does not matter to a user.
+  /// @threshold [m/s] 0..; chosen: 0.05 mm/s, half a thousandth of a usual speed (0.1 m/s); it only leaves out structure in
+  /// logs whose noise is smaller still.
   double smallest_speed = 5e-5;
   /// RMS of structure in a pressure below which it is not reported, however regular.
-  /// @threshold [Pa] 0..; chosen: 0.05 bar; smaller structure does not matter to a user.
+  /// @threshold [Pa] 0..; chosen: 0.05 bar, an eighth of the error of usual sensors (0.1 % of 400 bar); it only leaves out
+  /// structure in logs whose noise is smaller still.
   double smallest_pressure = 5e3;
   /// RMS of structure in a force below which it is not reported, as share of the largest static
   /// force.
-  /// @threshold [1] 0..1; chosen: 0.1 % of the largest force; smaller structure does not matter to
-  /// a user.
+  /// @threshold [1] 0..1; chosen: 0.1 % of the largest force, a fraction of the error to which a
+  /// machine file has masses and areas.
   double smallest_force_share = 1e-3;
   /// Rows of suspect logs below which a channel is not searched.
   /// @threshold [rows] 1..; chosen: sixteen rows in each of five folds.
@@ -81,7 +83,8 @@ struct ResidualModelOptions {
   /// @threshold [1] 0..1; chosen: a fifth; signals below it come along with a stronger one.
   double least_share_alone = 0.2;
   /// Share of the structure that a spectral line must hold for the structure to be called periodic.
-  /// @threshold [1] 0..1; chosen: the larger part.
+  /// @threshold [1] 0..1; chosen: the larger part. "Periodic" names a frequency as the cause, which must explain more
+  /// than all other signals together do.
   double least_line_share = 0.5;
   /// Time constants of lagged pump power among the signals. A first-order lag between them is
   /// nearly a linear combination of both.
@@ -103,7 +106,8 @@ struct ResidualModelOptions {
   /// @threshold [s] 0..; chosen: passes what is faster than a second.
   double oscillation_half_width = 0.5;
   /// Shortest lag at which a minimum of the autocorrelation counts, half a period.
-  /// @threshold [s] 0..; chosen: 10 Hz.
+  /// @threshold [s] 0..; chosen: 10 Hz, which is two and a half samples at 50 Hz; at half of it a minimum would rest on
+  /// neighbouring samples alone.
   double shortest_lag = 0.05;
   /// Longest lag at which a minimum of the autocorrelation counts, half a period.
   /// @threshold [s] 0..; chosen: 0.7 Hz, near the slowest that the moving mean leaves.
@@ -174,8 +178,9 @@ struct ResidualModelOptions {
 
 struct IsolatedEventOptions {
   /// Length of the windows in which an effect's reduction of the error is added up.
-  /// @threshold [s] 0..; chosen: half of the pieces in which events are searched, so that an event
-  /// is placed to half a second.
+  /// @threshold [s] 0..; chosen: an event is placed to half a second. It is another question than
+  /// ResidualModelOptions::event_length: that decides whether there is an event, with a threshold (least_event) that was
+  /// tuned on pieces of one second; this only says from when to when a known one lasts.
   double window = 0.5;
   /// Share of the largest window's reduction from which a neighbouring window belongs to the event.
   /// @threshold [1] 0..1; chosen: a tenth of the squared error, a third of the amplitude.

@@ -2,27 +2,36 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "diagnosis/regression/acceptance_statistics.h"
+#include "diagnosis/selection/search_state.h"
 
 namespace sparflow {
 
 using Eigen::Index;
 
 void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
-                  const std::vector<const EffectDesign*>& designs, std::size_t index,
-                  FoundEffect& found) {
+                  std::vector<FoundEffect>& found, std::size_t index) {
+  const std::vector<const EffectDesign*> designs = designs_of(found);
+  FoundEffect& judged = found[index];
   const EffectAction action = effect_action(evidence, designs, index, fit, options.regression);
-  found.size = action.size;
-  found.absorbed = action.absorbed;
-  found.absorbed_where_seen = action.absorbed_where_seen;
-  found.over_form = action.over_form;
+  judged.size = action.size;
+  judged.absorbed = action.absorbed;
+  judged.absorbed_where_seen = action.absorbed_where_seen;
+  judged.over_form = action.over_form;
   Index first = 0;
   for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
-  found.at_bound = rests_on_bound(found.design, fit.theta.segment(first, found.design.linear));
+  judged.at_bound = rests_on_bound(judged.design, fit.theta.segment(first, judged.design.linear));
   const HeldOutGain held = held_out_gain(evidence, designs, index, fit, options.folds);
-  found.held_out = held.gain;
-  found.held_out_error = held.error;
-  found.held_out_share = held.improved;
+  judged.held_out = held.gain;
+  judged.held_out_error = held.error;
+  judged.held_out_share = held.improved;
+}
+
+double same_within(const FoundEffect& found, const SearchOptions& options) {
+  const double form = form_share(*found.design.effect.effect, options.regression);
+  return std::max(options.same_nats, form * form * found.gain);
 }
 
 std::string why_not_named(const FoundEffect& found, const SearchOptions& options,

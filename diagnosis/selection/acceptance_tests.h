@@ -7,11 +7,10 @@
 
 namespace sparflow {
 
-/// Fills in size, absorbed share, held-out gain and whether a parameter of `found` lies on its bound.
-/// @param fit of all `designs`  @param index of `found` among them
+/// Fills in size, absorbed share, held-out gain and whether a parameter of `found[index]` lies on its bound.
+/// @param fit of all `found`
 void judge_effect(const Evidence& evidence, const SearchOptions& options, const EffectFit& fit,
-                  const std::vector<const EffectDesign*>& designs, std::size_t index,
-                  FoundEffect& found);
+                  std::vector<FoundEffect>& found, std::size_t index);
 
 /// @return the reason why an effect is not named, as part of a sentence; empty when it passes all acceptance tests
 std::string why_not_named(const FoundEffect& found, const SearchOptions& options,

@@ -21,8 +21,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 /// Linearisations: the error falls by the share of the nonlinearity each time, a tenth for angles of a few degrees.
 constexpr int kChords = 3;
-constexpr int kSections = 10;  // golden sections, which reduce a bracket to 1 %
-constexpr int kSweeps = 2;     // over all nonlinear parameters
+constexpr int kSweeps = 2;  // over all nonlinear parameters
 
 std::vector<double> shape_of(const AppliedEffect& e) {
   std::vector<double> shape;
@@ -236,7 +235,7 @@ class Estimator {
     const EffectParameter& p = *shape_parameters(*e.effect)[s];
     const double x = designs_[d].shape[s];
     double lo = p.lower, hi = p.upper;
-    for (const double v : e.effect->grid(evidence_.series[0], e.at, static_cast<int>(s))) {
+    for (const double v : e.effect->grid(grid_log(evidence_), e.at, static_cast<int>(s))) {
       if (v < x - 1e-9 * std::abs(x)) lo = std::max(lo, v);
       if (v > x + 1e-9 * std::abs(x)) hi = std::min(hi, v);
     }
@@ -251,8 +250,9 @@ class Estimator {
       const auto [a, b] = bracket(d, s);
       if (!(b > a)) continue;
       const double start = designs_[d].shape[s], at_start = likelihood();
-      const GoldenSection found =
-          golden_section(a, b, kSections, [&](double x) { return -likelihood_at(d, s, x); });
+      const GoldenSection found = golden_section(
+          a, b, kMostShapeSections, [&](double x) { return -likelihood_at(d, s, x); },
+          kShapeWidth * std::max(std::abs(b), 1e-12));
       std::vector<double> shape = designs_[d].shape;
       shape[s] = -found.value > at_start ? found.x : start;
       designs_[d] = make_design(evidence_, designs_[d].effect, std::move(shape));

@@ -89,7 +89,7 @@ class Search {
       for (const SearchCandidate& c : search_.candidates)
         null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
       const NullDistribution null = simulate_null_distribution(
-          search_.evidence, null_candidates, base, current, search_.options.simulations, random_,
+          {search_.evidence, current, base}, null_candidates, search_.options.simulations, random_,
           search_.options.regression);
       const double level = level_of(found.size(), scores, null);
       const CandidateScore best = chosen(search_, scores, null, level, base);

@@ -72,9 +72,10 @@ struct SearchOptions {
   /// Difference of gains above which a rival or another variant of a law replaces a found effect.
   /// @threshold [nat] 0..; chosen: a smaller one would exchange equals, back and forth
   double least_swap_gain = 1.0;
-  /// Difference of gains up to which a rival is listed in FoundEffect::alternatives.
-  /// @threshold [nat] 0..; chosen: far beyond same_nats, so that all indistinguishable ones are
-  /// listed
+  /// Difference of gains up to which a rival is listed in FoundEffect::alternatives; indistinguishable ones
+  /// (same_within) are listed whatever it is. It is another question than same_nats: how far a rival still lowers an
+  /// effect's probability.
+  /// @threshold [nat] 0..; derived: a rival that is worse by 50 nats has odds of e^-50 = 2e-22
   double largest_alternative_loss = 50.0;
   /// Share of a refining effect's gain above which the plainer effect is chosen first.
   /// @threshold [1] 0..1; chosen: it then explains most of the same; later steps decide whether the
@@ -140,6 +141,10 @@ struct FoundEffect {
   /// Other effects that could replace it, best first, with how much smaller their gain is. [nats]
   std::vector<std::pair<EffectAt, double>> alternatives;
 };
+
+/// Difference in gain below which two effects are indistinguishable on these logs: at least `same_nats`, and at least
+/// the gain that model-form error makes, which is the squared form_share of the effect's gain. [nats]
+double same_within(const FoundEffect& found, const SearchOptions& options);
 
 struct SearchResult {
   std::vector<FoundEffect> found;  ///< in the order found

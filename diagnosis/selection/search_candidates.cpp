@@ -16,17 +16,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
-  // grids of limits depend on the range of a log; that of the longest suspect log is taken
-  std::size_t longest = 0;
-  for (std::size_t k = 1; k < evidence.suspects; ++k) {
-    if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
-  }
+  const MachineSeries& log = grid_log(evidence);
   std::vector<std::vector<double>> points = {{}};
   int shape = 0;
   for (const EffectParameter& p : effect.effect->info().parameters) {
     if (p.linear) continue;
-    const std::vector<double> values =
-        effect.effect->grid(evidence.series[longest], effect.at, shape++);
+    const std::vector<double> values = effect.effect->grid(log, effect.at, shape++);
     std::vector<std::vector<double>> next;
     for (const auto& point : points) {
       for (const double v : values) {
@@ -66,6 +61,14 @@ int independent_columns(const std::vector<EffectDesign>& designs) {
 }
 
 }  // namespace
+
+const MachineSeries& grid_log(const Evidence& evidence) {
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < evidence.suspects; ++k) {
+    if (evidence.series[k].samples() > evidence.series[longest].samples()) longest = k;
+  }
+  return evidence.series[longest];
+}
 
 std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
                                                const std::vector<EffectAt>& effects) {

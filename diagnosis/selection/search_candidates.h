@@ -20,6 +20,19 @@ struct SearchCandidate {
   }
 };
 
+/// Width of its interval, as share of the value, at which the golden-section search of a nonlinear parameter ends, in the
+/// search of effects and in the estimate of their values alike.
+/// @threshold [1] 1e-5..0.1; chosen: the search of effects and the estimate had 0.2 % and about 1 %; the finer of both,
+/// because a value is reported with three digits. Half of it takes one or two more fits in each search
+inline constexpr double kShapeWidth = 2e-3;
+/// Largest number of sections of that search.
+/// @threshold [sections] 5..50; numerical: a thousandth of the bracket is left, which ends the search of a value near zero
+inline constexpr int kMostShapeSections = 14;
+
+/// The log on which the grids of nonlinear parameters are made: the longest suspect log, because grids of limits (a
+/// cushion's length, a pump's flow) depend on the range that a log covers.
+const MachineSeries& grid_log(const Evidence& evidence);
+
 /// The candidates that act on some channel of the evidence, in the order given.
 /// Penalty: Schwarz (1978), half the logarithm of the number of rows for each parameter with an independent column.
 std::vector<SearchCandidate> search_candidates(const Evidence& evidence,

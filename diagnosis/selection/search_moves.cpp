@@ -143,8 +143,10 @@ bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::siz
     }
   }
   f.alternatives.clear();
+  const double listed =
+      std::max(search.options.largest_alternative_loss, same_within(f, search.options));
   for (const CandidateScore& s : scores) {
-    if (s.gain < own - search.options.largest_alternative_loss) break;
+    if (s.gain < own - listed) break;
     record_optional(search, s);
     f.alternatives.emplace_back(search.candidates[s.candidate].effect, own - s.gain);
   }

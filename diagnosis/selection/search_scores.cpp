@@ -11,9 +11,7 @@ namespace {
 
 /// Few, because every candidate is fitted in every step; the fits of found effects go to convergence.
 constexpr int kPasses = 2;
-/// Golden-section search of a nonlinear parameter; it ends at an interval of this share of the value.
-constexpr double kGolden = 0.381966, kNarrow = 2e-3;
-constexpr int kMostRefinements = 14;
+constexpr double kGolden = 0.381966;  // share of the golden section
 
 std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
   std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });
@@ -160,7 +158,7 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
     if (here == values.end()) continue;
     double lo = here == values.begin() ? *here : *(here - 1);
     double hi = here + 1 == values.end() ? *here : *(here + 1);
-    for (int i = 0; i < kMostRefinements && hi - lo > kNarrow * std::max(std::abs(hi), 1e-12);
+    for (int i = 0; i < kMostShapeSections && hi - lo > kShapeWidth * std::max(std::abs(hi), 1e-12);
          ++i) {
       const bool right = hi - d.shape[k] > d.shape[k] - lo;
       EffectDesign trial = d;

@@ -59,7 +59,7 @@ std::vector<bool> SearchState::skipped(const std::vector<FoundEffect>& found) co
 
 void SearchState::judge(std::vector<FoundEffect>& found, std::size_t index,
                         const EffectFit& fit) const {
-  judge_effect(evidence, options, fit, designs_of(found), index, found[index]);
+  judge_effect(evidence, options, fit, found, index);
 }
 
 EffectFit SearchState::fit(const std::vector<const EffectDesign*>& designs,

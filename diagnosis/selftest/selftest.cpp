@@ -163,15 +163,7 @@ void note_large_residuals(const SelftestEvidence& logs, const SelftestOptions& o
 
 /// The effects to be tested: those asked for, else the catalogue without the effects of the model.
 std::vector<EffectAt> effects_to_inject(const CraneModel& model, const SelftestOptions& options) {
-  if (!options.candidates.empty()) return options.candidates;
-  std::vector<EffectAt> wanted;
-  for (const EffectAt& c : candidates(model.machine)) {
-    const bool known =
-        std::any_of(model.effects.begin(), model.effects.end(),
-                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
-    if (!known) wanted.push_back(c);
-  }
-  return wanted;
+  return options.candidates.empty() ? effects_not_in(model) : options.candidates;
 }
 
 NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
@@ -181,8 +173,8 @@ NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
   for (const SearchCandidate& c : all)
     null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
   std::mt19937_64 random(search.seed);
-  return simulate_null_distribution(logs.evidence, null_candidates, {}, logs.fit,
-                                    search.simulations, random, search.regression);
+  return simulate_null_distribution({logs.evidence, logs.fit}, null_candidates, search.simulations,
+                                    random, search.regression);
 }
 
 /// Sorts effects into the order of `wanted`.

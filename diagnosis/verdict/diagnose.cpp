@@ -146,18 +146,6 @@ std::vector<EffectAt> rivals_of(const FoundEffect& found, const SearchOptions& o
   return rivals;
 }
 
-/// The catalogue on the model's machine without the effects that the model has.
-std::vector<EffectAt> effects_not_in(const CraneModel& model) {
-  std::vector<EffectAt> out;
-  for (const EffectAt& c : candidates(model.machine)) {
-    const bool known =
-        std::any_of(model.effects.begin(), model.effects.end(),
-                    [&](const AppliedEffect& e) { return e.effect == c.effect && e.at == c.at; });
-    if (!known) out.push_back(c);
-  }
-  return out;
-}
-
 /// Searches for the effects that explain the evidence.
 void search(const CraneModel& model, const DiagnoseOptions& options, const SearchProgress& progress,
             Diagnosis& d) {

@@ -92,7 +92,8 @@ struct VerdictOptions {
   double least_explained_share = 0.8;
   /// RMS of a pump pressure's error inside its jumps over the robust standard deviation of the
   /// rest, up to which known physics explains the jumps and the sensor is not faulty.
-  /// @threshold [1] 1..; chosen: three standard deviations.
+  /// @threshold [1] 1..; chosen: three standard deviations of the rest, as chance alone exceeds them in 0.3 % of samples;
+  /// it was not tuned.
   double largest_in_jumps = 3.0;
   /// Probability from which an effect is one to report by itself and to add to a model, and not
   /// only a member of a set.

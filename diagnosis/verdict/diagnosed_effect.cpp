@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/leader_updates.h"
 #include "identification/comparison/report_numbers.h"
 
@@ -48,11 +47,6 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   FitControl control;
   control.keep_residuals = true;
   return fit_effects(updated ? *updated : d.evidence, pointers, nullptr, control);
-}
-
-double same_within(const FoundEffect& found, const SearchOptions& options) {
-  const double form = form_share(*found.design.effect.effect, options.regression);
-  return std::max(options.same_nats, form * form * found.gain);
 }
 
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,

@@ -11,10 +11,6 @@ double suspect_rms(const Evidence& evidence, std::size_t channel, const Eigen::V
 /// @param index of the found effect to leave out; the number of found effects leaves out none
 EffectFit fit_without(const Diagnosis& d, std::size_t index);
 
-/// Difference in gain below which two effects are indistinguishable on these logs: at least `same_nats`, and at least
-/// the gain that model-form error makes, which is the squared form_share of the effect's gain. [nats]
-double same_within(const FoundEffect& found, const SearchOptions& options);
-
 /// Describes a found effect in words and numbers, with the errors without and with it.
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
                                 const SearchOptions& options);

@@ -89,10 +89,12 @@ struct CompareNoteOptions {
   /// @threshold [1] 1..10; chosen: their error is above average
   double extrapolated_ratio = 1.25;
   /// Least share of the squared error that is the mean's, for an offset everywhere.
-  /// @threshold [1] 0..1; chosen: the offset is the larger part
+  /// @threshold [1] 0..1; chosen: the offset is the larger part of the error. A note on an offset sends the reader to a
+  /// sensor's zero, which cannot mend an error whose larger part varies
   double offset_share = 0.5;
   /// Least share of the samples whose error has the offset's sign.
-  /// @threshold [1] 0.5..1; chosen: nearly everywhere
+  /// @threshold [1] 0.5..1; chosen: normal noise has the other sign in one sample of ten beside an offset of 1.3 of its
+  /// standard deviations; beside a smaller one an error may also follow the motion
   double one_sided_share = 0.9;
 };
 

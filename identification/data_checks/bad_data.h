@@ -197,7 +197,8 @@ struct BadDataOptions {
   double other_noise = 6.0;
   /// Least change of a command from one sample to the next that is a motion of the lever, beyond
   /// its noise.
-  /// @threshold [1] 0..0.05; chosen: full command in 500 samples
+  /// @threshold [1] 0..0.05; chosen: full command in 500 samples, ten seconds at 50 Hz, a slow pull; less is the
+  /// rounding of a logger with nine bits
   double lever_step = 2e-3;
   /// Least size of the steps beside a step, as a share of it, for them to be one ramp.
   /// @threshold [1] 0..1; chosen: steps of one ramp are equal within a factor of two
@@ -261,10 +262,12 @@ struct BadDataOptions {
   /// @threshold [Pa] 0..1e5; chosen: 0.05 bar, far below the noise of usual sensors
   double least_pressure = 5e3;
   /// Least jump of a pressure over `least_pressure`.
-  /// @threshold [1] 1..100; chosen: 1 bar
+  /// @threshold [1] 1..100; chosen: 1 bar. A smaller step does no harm to a learned pressure, whose error is of that size;
+  /// a larger one should not stay hidden
   double pressure_jump_ratio = 20.0;
   /// Least noise of a command.
-  /// @threshold [1] 0..0.2; chosen: three hundredths of full command
+  /// @threshold [1] 0..0.2; chosen: noise of less stays within a usual valve's dead band (0.05 to 0.1), so that it moves
+  /// nothing; twice of it may cross one
   double least_command = 0.03;
   /// Least jump of a command over `least_command`.
   /// @threshold [1] 1..30; chosen: 0.15 of full command, outside any dead band

@@ -96,6 +96,7 @@ MachineSignals outline_of(const MachineSignals& signals) {
   out.sha256 = signals.sha256;
   out.step = signals.step;
   out.window = signals.window;
+  out.order = signals.order;
   out.time = signals.time;
   return out;
 }
@@ -290,37 +291,34 @@ FitResult fit_signals(const Machine& machine, FitInputs inputs, const FitOptions
   return result;
 }
 
-}  // namespace
-
-FitResult fit(const Machine& machine, const std::vector<Log>& logs,
-              const std::vector<Log>& test_logs, const FitOptions& options,
-              const Progress& progress) {
+/// @param logs,test_logs vectors of logs; moved from where they are given as values
+template <class Logs>
+FitResult fit_logs(const Machine& machine, Logs&& logs, Logs&& test_logs, const FitOptions& options,
+                   const Progress& progress) {
   if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
   const auto start = std::chrono::steady_clock::now();
   if (progress) progress(0.0, "speeds and forces");
   FitInputs inputs;
   inputs.data = sources(logs, "train");
   for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
-  inputs.signals = all_signals(machine, logs, options.signals);
-  inputs.tests = all_signals(machine, test_logs, options.signals);
+  inputs.signals = all_signals(machine, std::forward<Logs>(logs), options.signals);
+  inputs.tests = all_signals(machine, std::forward<Logs>(test_logs), options.signals);
   FitResult result = fit_signals(machine, std::move(inputs), options, progress);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
 
+}  // namespace
+
+FitResult fit(const Machine& machine, const std::vector<Log>& logs,
+              const std::vector<Log>& test_logs, const FitOptions& options,
+              const Progress& progress) {
+  return fit_logs(machine, logs, test_logs, options, progress);
+}
+
 FitResult fit(const Machine& machine, std::vector<Log>&& logs, std::vector<Log>&& test_logs,
               const FitOptions& options, const Progress& progress) {
-  if (logs.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
-  const auto start = std::chrono::steady_clock::now();
-  if (progress) progress(0.0, "speeds and forces");
-  FitInputs inputs;
-  inputs.data = sources(logs, "train");
-  for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
-  inputs.signals = all_signals(machine, std::move(logs), options.signals);
-  inputs.tests = all_signals(machine, std::move(test_logs), options.signals);
-  FitResult result = fit_signals(machine, std::move(inputs), options, progress);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
+  return fit_logs(machine, std::move(logs), std::move(test_logs), options, progress);
 }
 
 }  // namespace sparflow

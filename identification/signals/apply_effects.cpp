@@ -108,10 +108,12 @@ VectorXd sensor_effect(const AppliedEffect& e, const MachineSeries& log, int ind
 
 /// Contribution to a cylinder's speed after the low-pass of a filtered speed; unfiltered where the filter reaches beyond
 /// a run. [m/s]
-VectorXd flow_effect(const AppliedEffect& e, const MachineSeries& log, double window, int index) {
+VectorXd flow_effect(const AppliedEffect& e, const MachineSeries& log,
+                     const MachineSignals& signals, int index) {
   VectorXd speed = effect_series(e, log, EvidenceKind::kFlow, index);
-  if (speed.size() == 0 || !e.effect->columns_of_readings() || !(window > 0.0)) return speed;
-  const VectorXd kernel = low_pass_of(log.step, window, SmoothingOptions{}.order, 1);
+  if (speed.size() == 0 || !e.effect->columns_of_readings() || !(signals.window > 0.0))
+    return speed;
+  const VectorXd kernel = low_pass_of(log.step, signals.window, signals.order, 1);
   const VectorXd smooth = convolved(speed, kernel, log.runs);
   return smooth.array().isFinite().select(smooth, speed);
 }
@@ -142,7 +144,7 @@ void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSig
     if (e.effect->info().stage == EffectStage::kSensor) {
       add(sensor_effect(e, log, index), c.pressure_sensor_effect);
     }
-    add(flow_effect(e, log, signals.window, index), c.flow_effect);
+    add(flow_effect(e, log, signals, index), c.flow_effect);
   }
 }
 

@@ -219,6 +219,7 @@ void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOpt
             MachineSignals& out) {
   const Index n = out.samples(), joints = machine.joint_count();
   out.window = filter.window();
+  out.order = filter.order();
   out.edge = edges(out);
   out.q.resize(n, joints);
   out.qd.resize(n, joints);

@@ -95,6 +95,7 @@ struct MachineSignals {
   std::vector<SampleRange> runs;  ///< gap-free stretches
   std::vector<Segment> segments;  ///< motion and rest in turn, covering every sample
   double window = 0.0;            ///< [s] full width of the filter used
+  int order = 0;                  ///< of its polynomial
   Mask edge;                      ///< within half a filter window of either end of a run
   Mask usable;                    ///< pose, speed and payload are known
   bool of_effective_machine =

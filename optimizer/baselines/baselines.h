@@ -46,7 +46,7 @@ struct BaselineOptions {
   /// @threshold [1] 1..1000; chosen: all orders of four joints
   int most_orders = 24;
   /// Number of trapezoidal time laws tried for the tip line of best redundancy.
-  /// @threshold [1] 1..20; chosen: time grows with it
+  /// @threshold [1] 1..20; chosen: as PathRedundancyOptions::speed_levels
   int tip_speed_levels = 2;
   /// Relative overshoot that still counts as kept.
   /// @threshold [1] 0..1e-2; chosen: as OptimizeOptions::limit_tolerance

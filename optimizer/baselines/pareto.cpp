@@ -45,111 +45,151 @@ std::vector<IdleChoice> idle_choices(const std::vector<ParetoPoint>& points,
   return choices;
 }
 
-ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& problem,
-                                const std::vector<SeedMotion>& seeds,
-                                const ParetoOptions& options) {
-  ParetoCurve curve;
-  curve.sequential_limit = curve.simultaneous_limit = curve.grid_limit = kNone;
-  std::vector<Eigen::VectorXd> ends;
-  ends.reserve(seeds.size());
-  for (const SeedMotion& s : seeds)
-    ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
-  const BaselineSet baselines(model, problem, ends, options.strategies.baselines);
-  const std::function<bool()>& stop = options.strategies.optimize.interrupted;
-  const auto stopped = [&] { return curve.interrupted = curve.interrupted || (stop && stop()); };
-  double anchor = 0.0;
-  for (const std::string& kind : BaselineSet::kinds()) {
-    const double shortest = baselines.shortest(kind);
-    if (shortest > 0.0 && (anchor == 0.0 || shortest < anchor)) anchor = shortest;
+namespace {
+
+/// A curve while it is filled, and the searches that fill it.
+class CurveSearch {
+ public:
+  /// All must outlive this.
+  CurveSearch(const CraneModel& model, const MotionProblem& problem,
+              const std::vector<SeedMotion>& seeds, const ParetoOptions& options)
+      : model_(model),
+        problem_(problem),
+        seeds_(seeds),
+        options_(options),
+        baselines_(model, problem, end_postures(seeds), options.strategies.baselines),
+        search_(model, problem, seeds, baselines_, options.strategies) {}
+
+  ParetoCurve filled();
+
+ private:
+  bool stopped() {
+    const std::function<bool()>& stop = options_.strategies.optimize.interrupted;
+    return curve_.interrupted = curve_.interrupted || (stop && stop());
   }
-  for (const SeedMotion& s : seeds) {
-    if (s.shortest_duration > 0.0 && (anchor == 0.0 || s.shortest_duration < anchor))
-      anchor = s.shortest_duration;
-  }
-  if (anchor <= 0.0) {
-    curve.message = "no kind of motion tried reaches the goal within the limits at any duration";
-    return curve;
-  }
-  for (const auto& [kind, limit] :
-       {std::pair{kSequential, &curve.sequential_limit}, {kJointLine, &curve.simultaneous_limit}}) {
-    const BaselineMotion slow = baselines.at(kind, kVerySlow * anchor);
+  double shortest_known() const;  ///< [s] of baselines and seeds; 0 = none
+  /// Energies of motions without a limit of time. @param shortest [s]
+  void set_limits(double shortest);
+  ParetoPoint point_at(double duration, bool thorough);
+  /// Points are dense near the shortest duration, where the curve is steep; each optimum starts the next.
+  /// @param low shortest duration [s]
+  void add_points(double low);
+  /// Where a shorter duration has the cheaper motion, that motion is driven slower.
+  void drive_shorter_slower();
+
+  const CraneModel& model_;
+  const MotionProblem& problem_;
+  const std::vector<SeedMotion>& seeds_;
+  const ParetoOptions& options_;
+  BaselineSet baselines_;
+  OptimumSearch search_;
+  StrategyOutcome fastest_;
+  int done_ = 0;       // durations
+  bool go_on_ = true;  // as the caller's progress says
+  ParetoCurve curve_;
+};
+
+double CurveSearch::shortest_known() const {
+  double least = 0.0;
+  const auto consider = [&](double duration) {
+    if (duration > 0.0 && (least == 0.0 || duration < least)) least = duration;
+  };
+  for (const std::string& kind : BaselineSet::kinds()) consider(baselines_.shortest(kind));
+  for (const SeedMotion& s : seeds_) consider(s.shortest_duration);
+  return least;
+}
+
+void CurveSearch::set_limits(double shortest) {
+  for (const auto& [kind, limit] : {std::pair{kSequential, &curve_.sequential_limit},
+                                    {kJointLine, &curve_.simultaneous_limit}}) {
+    const BaselineMotion slow = baselines_.at(kind, kVerySlow * shortest);
     if (slow.found()) *limit = slow.energy.total;
   }
   EnergyGridOptions grid;
-  grid.nodes = options.grid_nodes;
-  if (!stopped() && options.grid_nodes > 0 && problem.machine.joint_count() <= grid.most_joints &&
-      !problem.tip_line) {
-    const GridPath path = EnergyGrid(model, problem, grid).cheapest_path(0.0);
-    if (path.found) curve.grid_limit = path.slow_energy_J;
+  grid.nodes = options_.grid_nodes;
+  if (!stopped() && options_.grid_nodes > 0 && problem_.machine.joint_count() <= grid.most_joints &&
+      !problem_.tip_line) {
+    const GridPath path = EnergyGrid(model_, problem_, grid).cheapest_path(0.0);
+    if (path.found) curve_.grid_limit = path.slow_energy_J;
   }
-  OptimumSearch search(model, problem, seeds, baselines, options.strategies);
-  StrategyOutcome fastest;
-  int done = 0;
-  bool go_on = true;
-  const auto evaluate = [&](double duration, bool thorough) {
-    std::vector<StrategyOutcome> known = baseline_outcomes(model, problem, baselines, duration);
-    ParetoPoint p;
-    p.duration = duration;
-    p.sequential = energy_or_none(known, kSequential);
-    p.simultaneous = energy_or_none(known, kJointLine);
-    if (fastest.found()) known.push_back(fastest);
-    p.optimal = search.at(duration, known, thorough);
-    ++done;
-    if (options.progress) {
-      go_on =
-          !stopped() && options.progress(std::min(1.0, static_cast<double>(done) / options.points),
-                                         fmt::format("{:.2f} s", duration));
-    }
-    return p;
-  };
-  // The fastest motion is solved first, because the curve begins there.
-  std::vector<StrategyOutcome> first;
-  for (const std::string& kind : BaselineSet::kinds()) {
-    const double own = baselines.shortest(kind);
-    /// Multiple of the shortest duration up to which a baseline starts the search of the fastest motion.
-    /// @threshold [1] 1..5; chosen: a slower one is no neighbour of it
-    constexpr double kNearTheShortest = 1.5;
-    if (kind == kSequential || own <= 0.0 || own > kNearTheShortest * anchor) continue;
-    const BaselineMotion m = baselines.at(kind, own);
-    if (m.found())
-      first.push_back({kind, m.detail, m.motion, m.duration, own, "", "", m.energy, {}, {}});
+}
+
+ParetoPoint CurveSearch::point_at(double duration, bool thorough) {
+  std::vector<StrategyOutcome> known = baseline_outcomes(model_, problem_, baselines_, duration);
+  ParetoPoint p;
+  p.duration = duration;
+  p.sequential = energy_or_none(known, kSequential);
+  p.simultaneous = energy_or_none(known, kJointLine);
+  if (fastest_.found()) known.push_back(fastest_);
+  p.optimal = search_.at(duration, known, thorough);
+  ++done_;
+  if (options_.progress) {
+    go_on_ =
+        !stopped() && options_.progress(std::min(1.0, static_cast<double>(done_) / options_.points),
+                                        fmt::format("{:.2f} s", duration));
   }
-  fastest = search.fastest(first);
-  double low = fastest.found() ? std::min(anchor, fastest.duration) : anchor;
-  if (!problem.duration.fixed()) low = std::max(low, problem.duration.min);
-  // Points are dense near the shortest duration, where the curve is steep; each optimum starts the next.
-  for (int i = options.points - 1; i >= 0 && go_on && !stopped(); --i) {
-    const double share = static_cast<double>(i) / std::max(1, options.points - 1);
-    ParetoPoint p = evaluate(low * std::pow(options.longest, std::pow(share, 1.4)),
-                             i == options.points - 1 || i == options.points / 2 || i <= 1);
-    if (p.optimal.found()) curve.points.push_back(std::move(p));
+  return p;
+}
+
+void CurveSearch::add_points(double low) {
+  for (int i = options_.points - 1; i >= 0 && go_on_ && !stopped(); --i) {
+    const double share = static_cast<double>(i) / std::max(1, options_.points - 1);
+    ParetoPoint p = point_at(low * std::pow(options_.longest, std::pow(share, 1.4)),
+                             i == options_.points - 1 || i == options_.points / 2 || i <= 1);
+    if (p.optimal.found()) curve_.points.push_back(std::move(p));
   }
-  std::sort(curve.points.begin(), curve.points.end(),
+  std::sort(curve_.points.begin(), curve_.points.end(),
             [](const ParetoPoint& a, const ParetoPoint& b) { return a.duration < b.duration; });
-  if (curve.points.empty()) {
-    curve.message = stopped() ? "interrupted before any motion was found"
-                              : "no motion was found at any duration tried";
-    return curve;
-  }
-  curve.shortest = curve.points.front().duration;
-  // Where a shorter duration has the cheaper motion, that motion is driven slower.
-  for (std::size_t i = 1; i < curve.points.size() && go_on; ++i) {
-    ParetoPoint& p = curve.points[i];
-    const StrategyOutcome& before = curve.points[i - 1].optimal;
+}
+
+void CurveSearch::drive_shorter_slower() {
+  for (std::size_t i = 1; i < curve_.points.size() && go_on_; ++i) {
+    ParetoPoint& p = curve_.points[i];
+    const StrategyOutcome& before = curve_.points[i - 1].optimal;
     if (p.optimal.energy.total <= before.energy.total) continue;
     const std::vector<SeedMotion> from = {{"shorter time", before.motion, 0.0, false}};
-    OptimizeOptions with_modes = options.strategies.optimize;
+    OptimizeOptions with_modes = options_.strategies.optimize;
     with_modes.smooth_starts = with_modes.sequential_starts = 0;
     with_modes.grid_starts = with_modes.sequence_rounds = 0;
-    const OptimizeResult r = optimize_at(model, problem, from, p.duration, with_modes);
+    const OptimizeResult r = optimize_at(model_, problem_, from, p.duration, with_modes);
     if (r.best_start < 0 || r.energy.total >= p.optimal.energy.total) continue;
     p.optimal.motion = r.motion;
     p.optimal.energy = r.energy;
     p.optimal.detail = "shorter time";
   }
-  curve.idle = idle_choices(curve.points, options.idle_powers);
-  curve.interrupted = stopped() || !go_on;
-  return curve;
+}
+
+ParetoCurve CurveSearch::filled() {
+  curve_.sequential_limit = curve_.simultaneous_limit = curve_.grid_limit = kNone;
+  const double anchor = shortest_known();
+  if (anchor <= 0.0) {
+    curve_.message = "no kind of motion tried reaches the goal within the limits at any duration";
+    return std::move(curve_);
+  }
+  set_limits(anchor);
+  // The fastest motion is solved first, because the curve begins there.
+  fastest_ = search_.fastest(motions_near_shortest(model_, problem_, baselines_, anchor));
+  double low = fastest_.found() ? std::min(anchor, fastest_.duration) : anchor;
+  if (!problem_.duration.fixed()) low = std::max(low, problem_.duration.min);
+  add_points(low);
+  if (curve_.points.empty()) {
+    curve_.message = stopped() ? "interrupted before any motion was found"
+                               : "no motion was found at any duration tried";
+    return std::move(curve_);
+  }
+  curve_.shortest = curve_.points.front().duration;
+  drive_shorter_slower();
+  curve_.idle = idle_choices(curve_.points, options_.idle_powers);
+  curve_.interrupted = stopped() || !go_on_;
+  return std::move(curve_);
+}
+
+}  // namespace
+
+ParetoCurve energy_against_time(const CraneModel& model, const MotionProblem& problem,
+                                const std::vector<SeedMotion>& seeds,
+                                const ParetoOptions& options) {
+  return CurveSearch(model, problem, seeds, options).filled();
 }
 
 }  // namespace sparflow

@@ -23,7 +23,8 @@ struct PathRedundancyOptions {
   /// @threshold [intervals] 10..1000; chosen: as OptimizeOptions::intervals
   int intervals = 100;
   /// Number of trapezoidal time laws tried, >= 1: the tip's top speed from 1.12 to 2 times its mean, in equal steps.
-  /// @threshold [1] 1..20; chosen: time grows with it
+  /// @threshold [1] 1..20; chosen: the ends of the range of usual trapezoids; each further level between them takes a
+  /// whole dynamic programme
   int speed_levels = 2;
   /// Relative change of the energy between two grids below which refinement ends.
   /// @threshold [1] 1e-6..0.5; chosen: far below what separates strategies

@@ -170,7 +170,8 @@ void SelfMotion::trace(const Eigen::Vector3d& tip, const VectorXd& from, double 
     const VectorXd before = guess;
     guess[joint] = value;
     /// Distance from its guess beyond which a projected posture belongs to another branch.
-    /// @threshold [spacings] 1..10; chosen: twice the grid's spacing
+    /// @threshold [spacings] 1..10; chosen: a guess is a spacing from its neighbour, so that a projection on the same
+    /// branch moves it by about as much; another branch is a joint's folding away, which is many spacings
     constexpr double kLongestStep = 2.0;
     if (project(tip, static_cast<int>(joint), guess) && within_range(guess) &&
         (guess - before).norm() < kLongestStep * spacing) {

@@ -226,6 +226,185 @@ StrategyOutcome OptimumSearch::gentlest(double duration,
   return best;
 }
 
+std::vector<StrategyOutcome> motions_near_shortest(const CraneModel& model,
+                                                   const MotionProblem& problem,
+                                                   const BaselineSet& baselines, double shortest) {
+  /// Multiple of the shortest duration up to which a baseline starts the search of the fastest motion.
+  /// @threshold [1] 1..5; chosen: a slower one is no neighbour of it
+  constexpr double kNearTheFastest = 1.5;
+  std::vector<StrategyOutcome> near;
+  for (const std::string& kind : BaselineSet::kinds()) {
+    const double own = baselines.shortest(kind);
+    if (kind == kSequential || own <= 0.0 || own >= kNearTheFastest * shortest) continue;
+    near.push_back(outcome_of(model, problem, baselines.at(kind, own), own));
+  }
+  return near;
+}
+
+namespace {
+
+/// A comparison while it is filled; the row at equal duration comes first, the one at own durations last.
+class ComparedStrategies {
+ public:
+  /// All must outlive this.
+  ComparedStrategies(const CraneModel& model, const MotionProblem& problem,
+                     const std::vector<SeedMotion>& seeds, const StrategyOptions& options);
+
+  void find_shortest();
+  /// Searches for the fastest motion from the baselines near the shortest duration.
+  void find_fastest();
+  void add_equal_time();
+  /// Long durations come first: each optimum starts the next, and overlaps appear as the duration is shortened.
+  void add_factors();
+  void add_own_time();
+  StrategyComparison finished();
+
+ private:
+  bool stopped() const { return options_.optimize.interrupted && options_.optimize.interrupted(); }
+  /// [s] unit of the durations; one second where no motion is known
+  double anchor() const { return out_.shortest > 0.0 ? out_.shortest : 1.0; }
+  void take_shortest(double duration, const std::string& of);
+  bool keeps_limits(const SeedMotion& seed) const;
+  /// All strategies at one duration. @param factor see StrategyRow  @param thorough see OptimumSearch::at
+  StrategyRow row_at(const std::string& name, double factor, double duration, bool thorough);
+
+  const CraneModel& model_;
+  const MotionProblem& problem_;
+  const std::vector<SeedMotion>& seeds_;
+  const StrategyOptions& options_;
+  BaselineSet baselines_;
+  std::vector<double> shortest_;  // [s] by kind of baseline
+  OptimumSearch search_;
+  StrategyOutcome fastest_;
+  StrategyComparison out_;
+};
+
+ComparedStrategies::ComparedStrategies(const CraneModel& model, const MotionProblem& problem,
+                                       const std::vector<SeedMotion>& seeds,
+                                       const StrategyOptions& options)
+    : model_(model),
+      problem_(problem),
+      seeds_(seeds),
+      options_(options),
+      baselines_(model, problem, end_postures(seeds), options.baselines),
+      search_(model, problem, seeds, baselines_, options) {
+  fastest_.kind = kMinimumTime;
+  out_.problem = problem.name;
+  out_.file = problem.file;
+  out_.payload = problem.payload;
+  out_.idle_power = options.idle_power;
+}
+
+void ComparedStrategies::take_shortest(double duration, const std::string& of) {
+  out_.shortest = duration;
+  out_.shortest_of = of;
+}
+
+bool ComparedStrategies::keeps_limits(const SeedMotion& seed) const {
+  const Trajectory motion = with_duration(seed.motion, seed.shortest_duration);
+  return worst_excess(check_limits(model_, problem_, motion, options_.optimize.refine)) <=
+         options_.optimize.limit_tolerance;
+}
+
+void ComparedStrategies::find_shortest() {
+  const auto is_shorter = [&](double duration) {
+    return duration > 0.0 && !(out_.shortest > 0.0 && out_.shortest <= duration);
+  };
+  for (const std::string& kind : BaselineSet::kinds()) {
+    shortest_.push_back(baselines_.shortest(kind));
+    if (is_shorter(shortest_.back())) take_shortest(shortest_.back(), kind);
+  }
+  for (const SeedMotion& s : seeds_) {
+    if (is_shorter(s.shortest_duration) && keeps_limits(s))
+      take_shortest(s.shortest_duration, s.name);
+  }
+}
+
+void ComparedStrategies::find_fastest() {
+  if (!options_.shortest_time || out_.shortest <= 0.0) return;
+  fastest_ = search_.fastest(motions_near_shortest(model_, problem_, baselines_, out_.shortest));
+  if (fastest_.found() && fastest_.duration < out_.shortest)
+    take_shortest(fastest_.duration, kMinimumTime);
+}
+
+StrategyRow ComparedStrategies::row_at(const std::string& name, double factor, double duration,
+                                       bool thorough) {
+  StrategyRow row{name, factor, duration,
+                  baseline_outcomes(model_, problem_, baselines_, duration)};
+  for (std::size_t i = 0; i < shortest_.size(); ++i) row.outcomes[i].shortest = shortest_[i];
+  std::vector<StrategyOutcome> known = row.outcomes;
+  if (fastest_.found()) known.push_back(fastest_);
+  if (thorough && options_.least_control && factor == 0.0) {
+    row.outcomes.push_back(search_.gentlest(duration, known));
+    known.push_back(row.outcomes.back());
+  }
+  if (thorough && fastest_.found() && factor == 0.0) row.outcomes.push_back(fastest_);
+  row.outcomes.push_back(search_.at(duration, known, thorough));
+  row.outcomes.back().shortest = out_.shortest;
+  return row;
+}
+
+void ComparedStrategies::add_equal_time() {
+  // With a free duration all strategies get twice the shortest one, within the problem's range.
+  const double duration =
+      problem_.duration.fixed()
+          ? problem_.duration.min
+          : std::clamp(2.0 * anchor(), problem_.duration.min, longest_wanted(problem_));
+  out_.rows.push_back(row_at("equal", 0.0, duration, true));
+  for (BaselineMotion& m : baselines_.orders_at(duration)) {
+    const bool found = m.found();
+    m.motion = Trajectory{};
+    if (found) m.why = "kept";
+    out_.orders.push_back(std::move(m));
+  }
+  const StrategyRow& row = out_.rows.back();
+  if (!row.outcomes.back().found()) out_.message = row.outcomes.back().why;
+}
+
+void ComparedStrategies::add_factors() {
+  /// Multiple of the shortest duration up to which the search is thorough.
+  /// @threshold [1] 1..5; chosen: where time is short, optima differ from those at longer durations, of which one
+  /// starts the next
+  constexpr double kThoroughUpTo = 1.5;
+  std::vector<double> factors = options_.factors;
+  std::sort(factors.rbegin(), factors.rend());
+  for (const double factor : factors) {
+    if (out_.shortest <= 0.0 || stopped()) break;
+    out_.rows.push_back(row_at(fmt::format("{:g} x shortest", factor), factor, factor * anchor(),
+                               factor <= kThoroughUpTo || factor == factors.front()));
+  }
+}
+
+void ComparedStrategies::add_own_time() {
+  if (out_.shortest <= 0.0 || stopped()) return;
+  StrategyRow row{"own", 0.0, 0.0, {}};
+  double first = 2.0 * anchor(), least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < shortest_.size(); ++i) {
+    const BaselineMotion m = baselines_.at_own_best(BaselineSet::kinds()[i], options_.idle_power);
+    row.outcomes.push_back(outcome_of(model_, problem_, m, shortest_[i]));
+    const double cost = m.energy.total + options_.idle_power * m.duration;
+    if (m.found() && cost < least) {
+      least = cost;
+      first = m.duration;
+    }
+  }
+  row.outcomes.push_back(
+      options_.idle_power > 0.0
+          ? search_.at_own_best(first, options_.idle_power)
+          : search_.at(anchor(), baseline_outcomes(model_, problem_, baselines_, anchor()), true));
+  row.outcomes.back().shortest = out_.shortest;
+  out_.rows.push_back(std::move(row));
+}
+
+StrategyComparison ComparedStrategies::finished() {
+  if (out_.shortest <= 0.0 && out_.message.empty())
+    out_.message = "no kind of motion tried reaches the goal within the limits at any duration";
+  out_.interrupted = stopped();
+  return std::move(out_);
+}
+
+}  // namespace
+
 StrategyComparison compare_strategies(const CraneModel& model, const MotionProblem& problem,
                                       const std::vector<SeedMotion>& seeds,
                                       const StrategyOptions& options) {
@@ -237,120 +416,13 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
                                  "which that movement occurs",
                                  fmt::join(missing, ", ")));
   }
-  StrategyComparison out;
-  out.problem = problem.name;
-  out.file = problem.file;
-  out.payload = problem.payload;
-  out.idle_power = options.idle_power;
-  std::vector<Eigen::VectorXd> ends;
-  ends.reserve(seeds.size());
-  for (const SeedMotion& s : seeds)
-    ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
-  const BaselineSet baselines(model, problem, ends, options.baselines);
-  std::vector<double> shortest;
-  for (const std::string& kind : BaselineSet::kinds()) {
-    shortest.push_back(baselines.shortest(kind));
-    if (shortest.back() <= 0.0) continue;
-    if (out.shortest > 0.0 && out.shortest <= shortest.back()) continue;
-    out.shortest = shortest.back();
-    out.shortest_of = kind;
-  }
-  for (const SeedMotion& s : seeds) {
-    if (s.shortest_duration <= 0.0) continue;
-    if (out.shortest > 0.0 && out.shortest <= s.shortest_duration) continue;
-    if (worst_excess(check_limits(model, problem, with_duration(s.motion, s.shortest_duration),
-                                  options.optimize.refine)) > options.optimize.limit_tolerance)
-      continue;
-    out.shortest = s.shortest_duration;
-    out.shortest_of = s.name;
-  }
-  OptimumSearch search(model, problem, seeds, baselines, options);
-  StrategyOutcome fastest;
-  fastest.kind = kMinimumTime;
-  if (options.shortest_time && out.shortest > 0.0) {
-    std::vector<StrategyOutcome> first;
-    for (std::size_t i = 0; i < shortest.size(); ++i) {
-      const std::string& kind = BaselineSet::kinds()[i];
-      /// Multiple of the shortest duration below which a baseline starts the search of the fastest motion.
-      /// @threshold [1] 1..5; chosen: a slower one is no neighbour of it
-      constexpr double kNearTheFastest = 1.5;
-      if (shortest[i] > 0.0 && shortest[i] < kNearTheFastest * out.shortest && kind != kSequential)
-        first.push_back(outcome_of(model, problem, baselines.at(kind, shortest[i]), shortest[i]));
-    }
-    fastest = search.fastest(first);
-    if (fastest.found() && fastest.duration < out.shortest) {
-      out.shortest = fastest.duration;
-      out.shortest_of = kMinimumTime;
-    }
-  }
-  const auto rows_at = [&](const std::string& name, double factor, double duration, bool thorough) {
-    StrategyRow row{name, factor, duration, baseline_outcomes(model, problem, baselines, duration)};
-    for (std::size_t i = 0; i < shortest.size(); ++i) row.outcomes[i].shortest = shortest[i];
-    std::vector<StrategyOutcome> known = row.outcomes;
-    if (fastest.found()) known.push_back(fastest);
-    if (thorough && options.least_control && factor == 0.0) {
-      row.outcomes.push_back(search.gentlest(duration, known));
-      known.push_back(row.outcomes.back());
-    }
-    if (thorough && fastest.found() && factor == 0.0) row.outcomes.push_back(fastest);
-    row.outcomes.push_back(search.at(duration, known, thorough));
-    row.outcomes.back().shortest = out.shortest;
-    return row;
-  };
-  const double anchor = out.shortest > 0.0 ? out.shortest : 1.0;
-  if (options.equal_time) {
-    // With a free duration all strategies get twice the shortest one, within the problem's range.
-    const double duration =
-        problem.duration.fixed()
-            ? problem.duration.min
-            : std::clamp(2.0 * anchor, problem.duration.min, longest_wanted(problem));
-    out.rows.push_back(rows_at("equal", 0.0, duration, true));
-    for (BaselineMotion& m : baselines.orders_at(duration)) {
-      const bool found = m.found();
-      m.motion = Trajectory{};
-      if (found) m.why = "kept";
-      out.orders.push_back(std::move(m));
-    }
-    const StrategyRow& row = out.rows.back();
-    if (!row.outcomes.back().found()) out.message = row.outcomes.back().why;
-  }
-  // Long durations come first: each optimum starts the next, and overlaps appear as the duration is shortened.
-  std::vector<double> factors = options.factors;
-  std::sort(factors.rbegin(), factors.rend());
-  const auto stopped = [&] {
-    return options.optimize.interrupted && options.optimize.interrupted();
-  };
-  for (const double factor : factors) {
-    if (out.shortest <= 0.0 || stopped()) break;
-    /// Multiple of the shortest duration up to which the search is thorough.
-    /// @threshold [1] 1..5; chosen: where time is short, optima differ from those at longer durations, of which one
-    /// starts the next
-    constexpr double kThoroughUpTo = 1.5;
-    out.rows.push_back(rows_at(fmt::format("{:g} x shortest", factor), factor, factor * anchor,
-                               factor <= kThoroughUpTo || factor == factors.front()));
-  }
-  if (options.own_time && out.shortest > 0.0 && !stopped()) {
-    StrategyRow row{"own", 0.0, 0.0, {}};
-    double first = 2.0 * anchor, least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < shortest.size(); ++i) {
-      const BaselineMotion m = baselines.at_own_best(BaselineSet::kinds()[i], options.idle_power);
-      row.outcomes.push_back(outcome_of(model, problem, m, shortest[i]));
-      const double cost = m.energy.total + options.idle_power * m.duration;
-      if (m.found() && cost < least) {
-        least = cost;
-        first = m.duration;
-      }
-    }
-    row.outcomes.push_back(
-        options.idle_power > 0.0
-            ? search.at_own_best(first, options.idle_power)
-            : search.at(anchor, baseline_outcomes(model, problem, baselines, anchor), true));
-    row.outcomes.back().shortest = out.shortest;
-    out.rows.push_back(std::move(row));
-  }
-  if (out.shortest <= 0.0 && out.message.empty())
-    out.message = "no kind of motion tried reaches the goal within the limits at any duration";
-  out.interrupted = stopped();
+  ComparedStrategies compared(model, problem, seeds, options);
+  compared.find_shortest();
+  compared.find_fastest();
+  if (options.equal_time) compared.add_equal_time();
+  compared.add_factors();
+  if (options.own_time) compared.add_own_time();
+  StrategyComparison out = compared.finished();
   out.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

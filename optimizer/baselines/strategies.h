@@ -108,6 +108,12 @@ std::vector<StrategyOutcome> baseline_outcomes(const CraneModel& model,
                                                const MotionProblem& problem,
                                                const BaselineSet& baselines, double duration);
 
+/// Baselines at their own shortest duration, where that is near the shortest one known [s]: the search of the fastest
+/// motion begins with them.
+std::vector<StrategyOutcome> motions_near_shortest(const CraneModel& model,
+                                                   const MotionProblem& problem,
+                                                   const BaselineSet& baselines, double shortest);
+
 /// @throws InputError when the model lacks a pressure model; an infeasible problem throws nothing (see `message`)
 StrategyComparison compare_strategies(const CraneModel& model, const MotionProblem& problem,
                                       const std::vector<SeedMotion>& seeds,

@@ -90,71 +90,107 @@ struct PostureBox {
   bool operator>(const PostureBox& other) const { return least > other.least; }
 };
 
-}  // namespace
+/// Best-first branch and bound over boxes of postures that can hold the goal.
+class GoalSearch {
+ public:
+  /// All must outlive this.
+  GoalSearch(const MotionProblem& problem, const Machine& machine, const EnergyPotential& potential)
+      : tips_(problem, machine),
+        potential_(potential),
+        lattice_(potential.lattice()),
+        n_(lattice_.joints()),
+        corner_(n_),
+        variation_(n_),
+        values_(1u << n_) {}
 
-LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
-                          const EnergyPotential& potential, double accuracy, double tip_accuracy) {
-  LeastOnGoal result;
-  if (const auto* goal = std::get_if<JointGoal>(&problem.goal)) {
-    result.reachable = true;
-    result.q = goal->q;
-    result.lower = potential.value(goal->q);
-    return result;
-  }
-  TipBoxes tips(problem, machine);
-  const Lattice& lattice = potential.lattice();
-  const int n = lattice.joints();
-  std::priority_queue<PostureBox, std::vector<PostureBox>, std::greater<>> open;
-  /// Sets a box's least potential and, by joint, the variation along its sides from its corners; the box lies in one cell.
-  VectorXd variation(n), corner(n);
-  std::vector<double> values(1u << n);
-  const auto survey = [&](PostureBox& box) {
-    for (unsigned k = 0; k < values.size(); ++k) {
-      for (int j = 0; j < n; ++j) corner[j] = (k >> j & 1u) != 0 ? box.hi[j] : box.lo[j];
-      values[k] = potential.value(corner);
-    }
-    box.least = *std::min_element(values.begin(), values.end());
-    for (int j = 0; j < n; ++j) {
-      variation[j] = 0.0;
-      for (unsigned k = 0; k < values.size(); ++k) {
-        if ((k >> j & 1u) == 0) {
-          variation[j] = std::max(variation[j], std::abs(values[k | 1u << j] - values[k]));
-        }
-      }
-    }
-  };
-  // Cells that can hold the goal are found by halving ranges of grid lines.
-  struct Block {
+  /// Opens the cells that can hold the goal; they are found by halving ranges of grid lines.
+  void open_cells();
+  /// Cuts the box of the least potential until it is as accurate as wanted.
+  void narrow(double accuracy, double tip_accuracy);
+  const LeastOnGoal& result() const { return result_; }
+
+ private:
+  struct Block {  // of cells: indices of its outer grid lines, by joint
     std::vector<int> from, to;
   };
+  PostureBox box_of(const Block& block) const;
+  /// Joint along whose grid lines the block moves the tip most; -1 for a single cell.
+  int longest_side(const Block& block, const PostureBox& box) const;
+  /// Sets a box's least potential and, by joint, the variation along its sides from its corners; the box lies in one cell.
+  void survey(PostureBox& box);
+  /// Joint along which the box surveyed last is the least accurate, and by how much it is beyond the accuracy wanted.
+  std::pair<int, double> coarsest_side(const PostureBox& box, double accuracy,
+                                       double tip_accuracy) const;
+  /// Opens the halves of the box that can hold the goal.
+  void cut(const PostureBox& box, int joint);
+
+  TipBoxes tips_;
+  const EnergyPotential& potential_;
+  const Lattice& lattice_;
+  int n_;
+  VectorXd corner_, variation_;  // of `survey`
+  std::vector<double> values_;
+  std::priority_queue<PostureBox, std::vector<PostureBox>, std::greater<>> open_;
+  LeastOnGoal result_;
+};
+
+void GoalSearch::survey(PostureBox& box) {
+  for (unsigned k = 0; k < values_.size(); ++k) {
+    for (int j = 0; j < n_; ++j) corner_[j] = (k >> j & 1u) != 0 ? box.hi[j] : box.lo[j];
+    values_[k] = potential_.value(corner_);
+  }
+  box.least = *std::min_element(values_.begin(), values_.end());
+  for (int j = 0; j < n_; ++j) {
+    variation_[j] = 0.0;
+    for (unsigned k = 0; k < values_.size(); ++k) {
+      if ((k >> j & 1u) == 0)
+        variation_[j] = std::max(variation_[j], std::abs(values_[k | 1u << j] - values_[k]));
+    }
+  }
+}
+
+PostureBox GoalSearch::box_of(const Block& block) const {
+  PostureBox box;
+  box.lo.resize(n_);
+  box.hi.resize(n_);
+  for (int j = 0; j < n_; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    box.lo[j] = lattice_.lines[i][block.from[i]];
+    box.hi[j] = lattice_.lines[i][block.to[i]];
+  }
+  return box;
+}
+
+int GoalSearch::longest_side(const Block& block, const PostureBox& box) const {
+  int longest = -1;
+  double way = 0.0;
+  for (int j = 0; j < n_; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    const double side = tips_.side(j, 0.5 * (box.hi[j] - box.lo[j])) + 1e-9;
+    if (block.to[i] - block.from[i] > 1 && side > way) {
+      way = side;
+      longest = j;
+    }
+  }
+  return longest;
+}
+
+void GoalSearch::open_cells() {
   std::vector<Block> blocks(1);
-  for (const VectorXd& lines : lattice.lines) {
+  for (const VectorXd& lines : lattice_.lines) {
     blocks[0].from.push_back(0);
     blocks[0].to.push_back(static_cast<int>(lines.size()) - 1);
   }
   while (!blocks.empty()) {
     Block block = std::move(blocks.back());
     blocks.pop_back();
-    PostureBox box;
-    box.lo.resize(n);
-    box.hi.resize(n);
-    int longest = -1;
-    double way = 0.0;
-    for (int j = 0; j < n; ++j) {
-      const auto i = static_cast<std::size_t>(j);
-      box.lo[j] = lattice.lines[i][block.from[i]];
-      box.hi[j] = lattice.lines[i][block.to[i]];
-      const double side = tips.side(j, 0.5 * (box.hi[j] - box.lo[j])) + 1e-9;
-      if (block.to[i] - block.from[i] > 1 && side > way) {
-        way = side;
-        longest = j;
-      }
-    }
-    ++result.boxes;
-    if (!tips.possible(box.lo, box.hi)) continue;
+    PostureBox box = box_of(block);
+    ++result_.boxes;
+    if (!tips_.possible(box.lo, box.hi)) continue;
+    const int longest = longest_side(block, box);
     if (longest < 0) {
       survey(box);
-      open.push(std::move(box));
+      open_.push(std::move(box));
       continue;
     }
     const auto i = static_cast<std::size_t>(longest);
@@ -164,42 +200,59 @@ LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
     blocks.push_back(std::move(block));
     blocks.push_back(std::move(upper));
   }
-  if (open.empty()) return result;
-  result.reachable = true;
+  result_.reachable = !open_.empty();
+}
+
+std::pair<int, double> GoalSearch::coarsest_side(const PostureBox& box, double accuracy,
+                                                 double tip_accuracy) const {
+  std::pair<int, double> coarsest{0, -1.0};
+  const double scale = std::max(box.least, 1e-9);
+  for (int j = 0; j < n_; ++j) {
+    const double want = std::max(variation_[j] / (accuracy * scale),
+                                 tips_.side(j, 0.5 * (box.hi[j] - box.lo[j])) / tip_accuracy);
+    if (want > coarsest.second) coarsest = {j, want};
+  }
+  return coarsest;
+}
+
+void GoalSearch::cut(const PostureBox& box, int joint) {
+  for (const bool up : {false, true}) {
+    PostureBox part = box;
+    (up ? part.lo : part.hi)[joint] = 0.5 * (box.lo[joint] + box.hi[joint]);
+    if (!tips_.possible(part.lo, part.hi)) continue;
+    survey(part);
+    open_.push(std::move(part));
+  }
+}
+
+void GoalSearch::narrow(double accuracy, double tip_accuracy) {
   /// Boxes after which the search ends.
   /// @threshold [boxes] 1000..1e8; chosen: ends a search that no longer narrows; the least value of the open boxes is
   /// a bound at any time
   constexpr long kMostBoxes = 400000;
-  while (true) {
-    PostureBox box = open.top();
-    result.lower = box.least;
-    result.q = 0.5 * (box.lo + box.hi);
+  while (!open_.empty()) {
+    PostureBox box = open_.top();
+    result_.lower = box.least;
+    result_.q = 0.5 * (box.lo + box.hi);
     survey(box);
-    int cut = 0;
-    double most = -1.0;
-    const double scale = std::max(box.least, 1e-9);
-    for (int j = 0; j < n; ++j) {
-      const double want = std::max(variation[j] / (accuracy * scale),
-                                   tips.side(j, 0.5 * (box.hi[j] - box.lo[j])) / tip_accuracy);
-      if (want > most) {
-        most = want;
-        cut = j;
-      }
-    }
-    if (most <= 1.0 || ++result.boxes > kMostBoxes) return result;
-    open.pop();
-    for (const bool up : {false, true}) {
-      PostureBox part = box;
-      (up ? part.lo : part.hi)[cut] = 0.5 * (box.lo[cut] + box.hi[cut]);
-      if (!tips.possible(part.lo, part.hi)) continue;
-      survey(part);
-      open.push(std::move(part));
-    }
-    if (open.empty()) {  // the last box passed its test by rounding alone
-      result.reachable = false;
-      return result;
-    }
+    const auto [joint, beyond] = coarsest_side(box, accuracy, tip_accuracy);
+    if (beyond <= 1.0 || ++result_.boxes > kMostBoxes) return;
+    open_.pop();
+    cut(box, joint);
   }
+  result_.reachable = false;  // there was no box, or the last one passed its test by rounding alone
+}
+
+}  // namespace
+
+LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
+                          const EnergyPotential& potential, double accuracy, double tip_accuracy) {
+  if (const auto* goal = std::get_if<JointGoal>(&problem.goal))
+    return {true, potential.value(goal->q), goal->q};
+  GoalSearch search(problem, machine, potential);
+  search.open_cells();
+  search.narrow(accuracy, tip_accuracy);
+  return search.result();
 }
 
 }  // namespace sparflow

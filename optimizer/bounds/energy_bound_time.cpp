@@ -122,7 +122,8 @@ class TimedSearch {
     const TimeShares found = guide.shares(shares_);
     const Eigen::MatrixX2d constant_base = base_;
     /// First step of the search in the logarithms of the shares.
-    /// @threshold [1] 0.1..2; chosen: a factor of two
+    /// @threshold [1] 0.1..2; chosen: a factor of two in a share; the simplex then adapts its steps itself. It
+    /// decides how soon the search ends, not whether the bound holds
     constexpr double kStep = 0.7;
     /// Times the search begins anew with its first step.
     /// @threshold [1] 1..10; chosen: a simplex can degenerate before it is at a maximum

@@ -98,6 +98,15 @@ class CraneKnotModel final : public KnotModel {
   double add_commands(const double* z, double* gradient, double* hessian);
   double tip_line(const double* q, double* gradient, double* hessian, double factor);
   void choose_clearance_rows();
+  /// Value of one row at the state last updated. @param gradient [2 n or 3 n] its derivatives in z, zero before; may be null
+  double path_row(const Row& row, const double* z, double* gradient);
+  double pump_flow_row(int pump, double* gradient) const;
+  double valve_row(int cylinder, double* gradient) const;
+  double pump_pressure_row(int pump, double* gradient);
+  double trust_row(int cylinder, double* gradient);
+  /// @param jacobian [clearance rows x size()]; may be null
+  void clearance_rows(const double* z, double* g, double* jacobian);
+  /// @param jacobian [path_count() x size()]; may be null
   void path_all(const double* z, double* g, double* jacobian);
 
   const CraneModel* model_;

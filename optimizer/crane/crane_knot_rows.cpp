@@ -83,6 +83,86 @@ double CraneKnotModel::tip_line(const double* q, double* gradient, double* hessi
   return scale * off.squaredNorm();
 }
 
+double CraneKnotModel::pump_flow_row(int pump, double* gradient) const {
+  double sum = 0.0;
+  for (const int c : model_->machine.pumps[static_cast<std::size_t>(pump)].feeds) {
+    const SmoothPower::Flow f = power_.flow(c, speed_[c], mode_[static_cast<std::size_t>(c)]);
+    sum += f.q;
+    if (gradient == nullptr) continue;
+    const int j = model_->machine.cylinders[static_cast<std::size_t>(c)].joint;
+    gradient[j] += f.d1 * jacobian_(c, j) / kFlowUnit;
+    gradient[n_ + j] += f.d1 * jacobian_(c, n_ + j) / kFlowUnit;
+  }
+  return sum / kFlowUnit;
+}
+
+double CraneKnotModel::valve_row(int cylinder, double* gradient) const {
+  if (gradient != nullptr) {
+    const int j = model_->machine.cylinders[static_cast<std::size_t>(cylinder)].joint;
+    gradient[j] = jacobian_(cylinder, j);
+    gradient[n_ + j] = jacobian_(cylinder, n_ + j);
+  }
+  return speed_[cylinder];
+}
+
+double CraneKnotModel::pump_pressure_row(int pump, double* gradient) {
+  if (effects_) {
+    const Jet& pressure = effects_->pump_pressure(pump);
+    if (gradient != nullptr) add_jet(pressure, 1.0 / kPressureUnit, gradient, nullptr);
+    return pressure.value / kPressureUnit;
+  }
+  if (gradient != nullptr) {
+    scratch_gradient_.setZero();
+    power_.add_pressure_gradient(pump, 1.0 / kPressureUnit, scratch_gradient_.data());
+    chain_gradient(scratch_gradient_.data(), gradient);
+  }
+  return power_.pump_pressure(pump) / kPressureUnit;
+}
+
+double CraneKnotModel::trust_row(int cylinder, double* gradient) {
+  const GpDerivatives d = trust(cylinder);
+  if (gradient != nullptr) {
+    scratch_gradient_.setZero();
+    scratch_gradient_[cylinder] = d.d_flow;
+    scratch_gradient_[m_ + cylinder] = d.d_force;
+    chain_gradient(scratch_gradient_.data(), gradient);
+  }
+  return d.value;
+}
+
+double CraneKnotModel::path_row(const Row& row, const double* z, double* gradient) {
+  switch (row.kind) {
+    case RowKind::kPumpFlow:
+      return pump_flow_row(row.index, gradient);
+    case RowKind::kValve:
+      return valve_row(row.index, gradient);
+    case RowKind::kPumpPressure:
+      return pump_pressure_row(row.index, gradient);
+    case RowKind::kTipLine:
+      return tip_line(z, gradient, nullptr, 1.0);
+    case RowKind::kTrust:
+      return trust_row(row.index, gradient);
+  }
+  return 0.0;
+}
+
+void CraneKnotModel::clearance_rows(const double* z, double* g, double* jacobian) {
+  if (clearance_rows_ == 0) return;
+  if (jacobian == nullptr) {
+    clearance_->values(z, all_clearance_.data());
+  } else {
+    clearance_->jacobian(z, all_clearance_.data(), all_clearance_jacobian_.data());
+  }
+  double* out = jacobian;
+  for (std::size_t r = 0; r < near_rows_.size(); ++r) {
+    g[r] = all_clearance_[near_rows_[r]];
+    if (out == nullptr) continue;
+    for (int k = 0; k < n_; ++k) out[k] = all_clearance_jacobian_(near_rows_[r], k);
+    std::fill(out + n_, out + size(), 0.0);
+    out += size();
+  }
+}
+
 void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
   const bool forces = options_.limit_pressure && !effects_;
   if (options_.limit_pressure && effects_) update_effects(z, jacobian != nullptr);
@@ -94,79 +174,13 @@ void CraneKnotModel::path_all(const double* z, double* g, double* jacobian) {
       power_.value(speed_.data(), force_.data(), mode_.data());
     }
   }
-  const int width = size();
+  double* out = jacobian;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
-    const Row& row = rows_[r];
-    double* out = jacobian == nullptr ? nullptr : jacobian + static_cast<std::ptrdiff_t>(r) * width;
-    if (out != nullptr) std::fill(out, out + width, 0.0);
-    switch (row.kind) {
-      case RowKind::kPumpFlow: {
-        double sum = 0.0;
-        for (const int c : model_->machine.pumps[static_cast<std::size_t>(row.index)].feeds) {
-          const SmoothPower::Flow f = power_.flow(c, speed_[c], mode_[static_cast<std::size_t>(c)]);
-          sum += f.q;
-          if (out == nullptr) continue;
-          const int j = model_->machine.cylinders[static_cast<std::size_t>(c)].joint;
-          out[j] += f.d1 * jacobian_(c, j) / kFlowUnit;
-          out[n_ + j] += f.d1 * jacobian_(c, n_ + j) / kFlowUnit;
-        }
-        g[r] = sum / kFlowUnit;
-        break;
-      }
-      case RowKind::kValve: {
-        const int j = model_->machine.cylinders[static_cast<std::size_t>(row.index)].joint;
-        g[r] = speed_[row.index];
-        if (out != nullptr) {
-          out[j] = jacobian_(row.index, j);
-          out[n_ + j] = jacobian_(row.index, n_ + j);
-        }
-        break;
-      }
-      case RowKind::kPumpPressure: {
-        if (effects_) {
-          const Jet& pressure = effects_->pump_pressure(row.index);
-          g[r] = pressure.value / kPressureUnit;
-          if (out != nullptr) add_jet(pressure, 1.0 / kPressureUnit, out, nullptr);
-          break;
-        }
-        g[r] = power_.pump_pressure(row.index) / kPressureUnit;
-        if (out != nullptr) {
-          scratch_gradient_.setZero();
-          power_.add_pressure_gradient(row.index, 1.0 / kPressureUnit, scratch_gradient_.data());
-          chain_gradient(scratch_gradient_.data(), out);
-        }
-        break;
-      }
-      case RowKind::kTipLine:
-        g[r] = tip_line(z, out, nullptr, 1.0);
-        break;
-      case RowKind::kTrust: {
-        const GpDerivatives d = trust(row.index);
-        g[r] = d.value;
-        if (out == nullptr) break;
-        scratch_gradient_.setZero();
-        scratch_gradient_[row.index] = d.d_flow;
-        scratch_gradient_[m_ + row.index] = d.d_force;
-        chain_gradient(scratch_gradient_.data(), out);
-        break;
-      }
-    }
+    if (out != nullptr) std::fill(out, out + size(), 0.0);
+    g[r] = path_row(rows_[r], z, out);
+    if (out != nullptr) out += size();
   }
-  if (clearance_rows_ == 0) return;
-  double* out =
-      jacobian == nullptr ? nullptr : jacobian + static_cast<std::ptrdiff_t>(rows_.size()) * width;
-  if (out == nullptr) {
-    clearance_->values(z, all_clearance_.data());
-  } else {
-    clearance_->jacobian(z, all_clearance_.data(), all_clearance_jacobian_.data());
-  }
-  for (std::size_t r = 0; r < near_rows_.size(); ++r) {
-    g[rows_.size() + r] = all_clearance_[near_rows_[r]];
-    if (out == nullptr) continue;
-    for (int k = 0; k < n_; ++k) out[k] = all_clearance_jacobian_(near_rows_[r], k);
-    std::fill(out + n_, out + width, 0.0);
-    out += width;
-  }
+  clearance_rows(z, g + rows_.size(), out);
 }
 
 void CraneKnotModel::path(const double* z, double* g) { path_all(z, g, nullptr); }

@@ -43,7 +43,7 @@ class LegChooser {
       if (a[j] != b[j]) moving.push_back(j);
     }
     /// Largest number of joints that are moved one after another between two corners.
-    /// @threshold [joints] 2..7; chosen: 24 orders
+    /// @threshold [joints] 2..7; chosen: 24 orders of four joints, each checked for clearance; five would make 120 of them
     constexpr std::size_t kMostInTurn = 4;
     if (moving.size() < 2 || moving.size() > kMostInTurn) return best;
     do {

@@ -65,9 +65,16 @@ class ChainLdl {
     std::size_t value = 0, index = 0;
   };
   struct Tree;
+  struct Storage;
 
   std::vector<int> pair_up(const double* value) const;
   void make_fronts(const Tree& tree);
+  void place_unknowns(const Tree& tree);
+  void set_places(const Front& front, std::vector<int>& place) const;
+  void place_entries();
+  void place_contributions();
+  Storage predicted_storage();
+  void reserve(const Storage& storage);
   void scale(const double* value);
   void assemble(int number, int delayed, const double* value);
   int take_contributions(const Front& front);

@@ -121,26 +121,34 @@ std::vector<int> ChainLdl::pair_up(const double* value) const {
   return group;
 }
 
-/// Sets the unknowns of every front, the indices at which contributions and values are added, and the storage needed.
+/// Storage that a factorisation needs if no pivot is delayed.
+struct ChainLdl::Storage {
+  long factor = 0;        ///< entries of the panels of L
+  long most_waiting = 0;  ///< entries of the contributions that wait at the same time
+  int most_rows = 0;      ///< rows of the largest front
+};
+
+/// Sets the fronts, the indices at which contributions and values are added, and the storage needed.
 void ChainLdl::make_fronts(const Tree& tree) {
-  const auto count = tree.fronts.size();
-  fronts_.resize(count);
-  first_place_.resize(count);
+  fronts_.resize(tree.fronts.size());
+  place_unknowns(tree);
+  place_entries();
+  place_contributions();
+  reserve(predicted_storage());
+}
+
+/// Sets every front's parent and its unknowns, own first.
+void ChainLdl::place_unknowns(const Tree& tree) {
   rows_.reserve(4 * place_at(order_));
-  std::vector<int> front_of(place_at(order_)), own_place(place_at(order_)),
-      place(place_at(order_), -1);
-  std::vector<int> begin(count);
-  for (std::size_t f = 0; f < count; ++f) {
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
     Front& front = fronts_[f];
     front.first_row = static_cast<int>(rows_.size());
     front.parent = tree.fronts[f].parent;
     if (front.parent >= 0) ++fronts_[place_at(front.parent)].children;
     for (const int position : tree.fronts[f].own) {
-      for (const int i : tree.member[place_at(position)]) {
-        front_of[place_at(i)] = static_cast<int>(f);
-        own_place[place_at(i)] = front.own++;
-        rows_.push_back(i);
-      }
+      const std::vector<int>& member = tree.member[place_at(position)];
+      rows_.insert(rows_.end(), member.begin(), member.end());
+      front.own += static_cast<int>(member.size());
     }
     for (const int position : tree.fronts[f].updated) {
       const std::vector<int>& member = tree.member[place_at(position)];
@@ -148,8 +156,21 @@ void ChainLdl::make_fronts(const Tree& tree) {
     }
     front.rows = static_cast<int>(rows_.size()) - front.first_row;
   }
-  // Each value is assembled in the front in which the first of its two unknowns is eliminated.
-  std::vector<std::vector<int>> entries(count);
+}
+
+/// Places of a front's unknowns in it; those of other unknowns keep the former front's.
+void ChainLdl::set_places(const Front& front, std::vector<int>& place) const {
+  for (int k = 0; k < front.rows; ++k) place[place_at(rows_[place_at(front.first_row + k)])] = k;
+}
+
+/// Each value is assembled in the front in which the first of its two unknowns is eliminated.
+void ChainLdl::place_entries() {
+  std::vector<int> front_of(place_at(order_)), place(place_at(order_), -1);
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    for (int k = 0; k < fronts_[f].own; ++k)
+      front_of[place_at(rows_[place_at(fronts_[f].first_row + k)])] = static_cast<int>(f);
+  }
+  std::vector<std::vector<int>> entries(fronts_.size());
   for (std::size_t e = 0; e < row_.size(); ++e) {
     const int f = std::min(front_of[place_at(row_[e])], front_of[place_at(column_[e])]);
     entries[place_at(f)].push_back(static_cast<int>(e));
@@ -157,53 +178,70 @@ void ChainLdl::make_fronts(const Tree& tree) {
   entry_.reserve(row_.size());
   entry_row_.reserve(row_.size());
   entry_column_.reserve(row_.size());
-  place_.reserve(rows_.size());
-  long room = 0, waiting = 0, most_waiting = 0;
-  int most_rows = 0;
-  std::vector<long> from_below(
-      count, 0);  // storage of the contributions that a front takes from the stack
-  for (std::size_t f = 0; f < count; ++f) {
-    Front& front = fronts_[f];
-    for (int k = 0; k < front.rows; ++k) place[place_at(rows_[place_at(front.first_row + k)])] = k;
-    front.first_entry = static_cast<int>(entry_.size());
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    set_places(fronts_[f], place);
+    fronts_[f].first_entry = static_cast<int>(entry_.size());
     for (const int e : entries[f]) {
       const int r = place[place_at(row_[place_at(e)])], c = place[place_at(column_[place_at(e)])];
       entry_.push_back(e);
       entry_row_.push_back(std::max(r, c));
       entry_column_.push_back(std::min(r, c));
     }
+  }
+}
+
+/// Indices of a front's updated rows in its parent.
+void ChainLdl::place_contributions() {
+  std::vector<int> place(place_at(order_), -1);
+  place_.reserve(rows_.size());
+  first_place_.resize(fronts_.size());
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    first_place_[f] = static_cast<int>(place_.size());
+    const Front& front = fronts_[f];
+    if (front.parent < 0) continue;
+    set_places(fronts_[place_at(front.parent)], place);
+    for (int k = front.own; k < front.rows; ++k)
+      place_.push_back(place[place_at(rows_[place_at(front.first_row + k)])]);
+  }
+}
+
+/// Also counts the operations and sets the statistics.
+ChainLdl::Storage ChainLdl::predicted_storage() {
+  Storage storage;
+  long waiting = 0;
+  // Storage of the contributions that a front takes from the stack.
+  std::vector<long> from_below(fronts_.size(), 0);
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    const Front& front = fronts_[f];
     const long below = front.rows - front.own;
     waiting += below * below - from_below[f];
-    most_waiting = std::max(most_waiting, waiting);
+    storage.most_waiting = std::max(storage.most_waiting, waiting);
     if (front.parent >= 0) from_below[place_at(front.parent)] += below * below;
-    room += static_cast<long>(detail::ldl_padded(front.rows)) * front.own;
-    most_rows = std::max(most_rows, front.rows);
+    storage.factor += static_cast<long>(detail::ldl_padded(front.rows)) * front.own;
+    storage.most_rows = std::max(storage.most_rows, front.rows);
     for (int k = 0; k < front.own; ++k) {
       const double rest = front.rows - k;
       statistics_.multiply_adds += 0.5 * rest * (rest + 1.0);
       statistics_.factor_entries += front.rows - k - 1;
     }
   }
-  // Indices of a front's updated rows in its parent.
-  for (std::size_t f = 0; f < count; ++f) {
-    first_place_[f] = static_cast<int>(place_.size());
-    const Front& front = fronts_[f];
-    if (front.parent < 0) continue;
-    const Front& above = fronts_[place_at(front.parent)];
-    for (int k = 0; k < above.rows; ++k) place[place_at(rows_[place_at(above.first_row + k)])] = k;
-    for (int k = front.own; k < front.rows; ++k)
-      place_.push_back(place[place_at(rows_[place_at(front.first_row + k)])]);
-  }
-  // Half of the predicted storage is reserved in addition, for delayed pivots.
+  statistics_.order = order_;
+  statistics_.fronts = static_cast<int>(fronts_.size());
+  statistics_.largest_front = storage.most_rows;
+  return storage;
+}
+
+/// Half of the predicted storage is reserved in addition, for delayed pivots.
+void ChainLdl::reserve(const Storage& storage) {
   /// Entries reserved for delayed pivots in any case.
   /// @threshold [entries] 0..1e6; chosen: half of a tiny matrix is less than one front
   constexpr std::size_t kSpare = 4096;
-  factor_.resize(place_at(static_cast<int>(room)) * 3 / 2 + kSpare);
+  factor_.resize(place_at(static_cast<int>(storage.factor)) * 3 / 2 + kSpare);
   index_.resize(rows_.size() * 3 / 2 + kSpare);
-  waiting_value_.resize(static_cast<std::size_t>(most_waiting) * 3 / 2 + kSpare);
+  waiting_value_.resize(static_cast<std::size_t>(storage.most_waiting) * 3 / 2 + kSpare);
   waiting_index_.resize(kSpare);
-  waiting_.reserve(count);
-  const int stride = detail::ldl_stride(most_rows + most_rows / 2);
+  waiting_.reserve(fronts_.size());
+  const int stride = detail::ldl_stride(storage.most_rows + storage.most_rows / 2);
   work_.resize(place_at(stride) * place_at(stride));
   product_.resize(place_at(stride) * place_at(stride));
   unknown_.resize(place_at(stride));
@@ -212,9 +250,6 @@ void ChainLdl::make_fronts(const Tree& tree) {
   largest_.resize(place_at(order_));
   pivot_.resize(2 * place_at(order_));
   width_.resize(place_at(order_));
-  statistics_.order = order_;
-  statistics_.fronts = static_cast<int>(count);
-  statistics_.largest_front = most_rows;
 }
 
 }  // namespace sparflow

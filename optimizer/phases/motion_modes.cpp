@@ -57,7 +57,8 @@ Eigen::VectorXd travels(const Machine& machine, int c, const Trajectory& motion)
 }
 
 /// Travel lost by rest below which a cylinder keeps its modes.
-/// @threshold [m] 0..0.1; chosen: two millimetres
+/// @threshold [m] 0..0.1; chosen: two millimetres of stroke are a centimetre or two at the tip, which the solve makes
+/// up for in the phases that remain
 constexpr double kLeastLost = 2e-3;
 
 /// Gives a cylinder that covered much of its stroke creeping a window around its fastest interval, long enough to cover

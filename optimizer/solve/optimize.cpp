@@ -116,12 +116,8 @@ class Search {
         problem_.waypoints.empty()) {
       const Eigen::VectorXd times =
           Eigen::VectorXd::LinSpaced(coarse_.intervals + 1, 0.0, duration);
-      std::vector<Eigen::VectorXd> ends;
-      ends.reserve(seeds_.size());
-      for (const SeedMotion& s : seeds_) {
-        ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
-      }
-      found = sequential_candidates(model_, problem_, times, ends, options_.sequential_starts);
+      found = sequential_candidates(model_, problem_, times, end_postures(seeds_),
+                                    options_.sequential_starts);
     }
     for (ModeCandidate& c : grid_candidates(duration)) found.push_back(std::move(c));
     return found;
@@ -392,6 +388,14 @@ class Search {
 };
 
 }  // namespace
+
+std::vector<Eigen::VectorXd> end_postures(const std::vector<SeedMotion>& seeds) {
+  std::vector<Eigen::VectorXd> ends;
+  ends.reserve(seeds.size());
+  for (const SeedMotion& s : seeds)
+    ends.emplace_back(s.motion.q.row(s.motion.size() - 1).transpose());
+  return ends;
+}
 
 OptimizeResult optimize_in(const CraneModel& model, const MotionProblem& problem,
                            const std::vector<SeedMotion>& seeds, const TimeWindow& time,

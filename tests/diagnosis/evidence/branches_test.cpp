@@ -81,20 +81,9 @@ void check(const Made& m, const BranchSplit& split, double least_named) {
 
 TEST(Branches, BothAreFoundAlsoWhereTheValveActsAgainstTheLoad) {
   const Made m = make({});
+  // The test needs hundreds of samples in which the valve acts against the load, or it would test the sign of the load.
   ASSERT_GT((!m.line && m.data.force.array() > 0.0).count(), 500);
   check(m, split_branches({m.data}).front(), 0.9);
-}
-
-TEST(Branches, OverloadForOneLogEqualsTheGeneralOne) {
-  Made m = make({});
-  m.data.q_return_total.resize(0);
-  m.data.oil.resize(0);
-  const BranchData& d = m.data;
-  const BranchSplit one =
-      split_branches(d.p_return, d.p_supply, d.q_return, d.q_supply, d.force, d.moving);
-  const BranchSplit several = split_branches({d}).front();
-  EXPECT_TRUE((one.return_line == several.return_line).all());
-  EXPECT_TRUE((one.counterbalance == several.counterbalance).all());
 }
 
 // The other cylinder raises the return pressure by 10 bar: a return chamber at 20 bar still follows the return line.

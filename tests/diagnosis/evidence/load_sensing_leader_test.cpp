@@ -90,6 +90,7 @@ TEST(PumpLeaders, ALossIsExactWithTheLeaderThatFollowsFromIt) {
   const std::optional<Evidence> back = updated->with_leaders_of({});
   ASSERT_TRUE(back.has_value());
   const EvidenceChannel* again = back->find(EvidenceKind::kPump, 0);
+  // Rounding of pressures of hundreds of bar is far below 1 Pa, here and in the tests below.
   EXPECT_LT((before->y - again->y).cwiseAbs().maxCoeff(), 1.0);
   EXPECT_EQ(before->baseline, again->baseline);
 }
@@ -138,10 +139,28 @@ TEST(PumpLeaders, ASearchUpdatesThem) {
   EXPECT_EQ(r.found[0].design.effect.at, crane.loss.at);
   ASSERT_TRUE(r.updated_evidence.has_value());
   EXPECT_FALSE(r.updated_evidence->with_leaders_of({&crane.loss, 1}).has_value());
+  // The pump pressure has no noise; only samples whose leader differs with the estimated loss leave an error.
   EXPECT_NEAR(r.found[0].values[0], kLoss, 0.01 * kLoss);
   // null fit and ranking belong to the leaders without the effect
   EXPECT_NEAR(r.null.total(), without_effects(e).total(), 1.0);
   EXPECT_GT(std::abs(without_effects(*r.updated_evidence).total() - r.null.total()), 5.0);
+}
+
+TEST(SearchEffects, IndistinguishableRivalsAreListedHoweverMuchWorse) {
+  const LossyCrane& crane = lossy();
+  const Evidence e = collect_evidence(crane.model, {crane.signals});
+  SearchOptions options;
+  options.largest_alternative_loss = 0.0;
+  const SearchResult few = search_effects(e, pump_effects(crane.machine), options);
+  ASSERT_EQ(few.found.size(), 1u);
+  for (const auto& [rival, worse] : few.found[0].alternatives)
+    EXPECT_LT(worse, same_within(few.found[0], options));
+  options.same_nats = 1e9;  // all effects are indistinguishable
+  const SearchResult all = search_effects(e, pump_effects(crane.machine), options);
+  ASSERT_EQ(all.found.size(), 1u);
+  EXPECT_GT(all.found[0].alternatives.size(), few.found[0].alternatives.size());
+  EXPECT_GT(all.found[0].alternatives.back().second, SearchOptions{}.largest_alternative_loss)
+      << "so that the usual limit would leave it out";
 }
 
 TEST(PumpLeaders, AnEffectThatIsNotNamedDoesNotChangeThem) {
@@ -177,6 +196,7 @@ TEST(PumpLeaders, AnExtensionUpdatesThemToo) {
   const EffectEstimate estimate =
       estimate_effects(crane.model, {{crane.loss.effect, crane.loss.at}}, {{crane.signals}});
   ASSERT_EQ(estimate.effects.size(), 1u);
+  // As for the search above: the log has no noise in the pump pressure.
   EXPECT_NEAR(estimate.effects[0].values[0], kLoss, 0.01 * kLoss);
 }
 

@@ -97,6 +97,7 @@ TEST(BetterMotion, OtherMotionsDistinguishDryFromViscousFriction) {
   const BetterMotion small =
       better_motion(c.model, c.evidence, c.fit, {applied("coulomb_friction:arm", {400.0}), rival});
   EXPECT_THAT(small.words, HasSubstr("arm"));
+  // A motion is advised only if it is better by this factor (ExperimentOptions::better_than_here).
   EXPECT_GT(small.nats_per_minute, 1.5 * small.nats_here);
   EXPECT_THAT(small.apart, SizeIs(1));
   const BetterMotion large =

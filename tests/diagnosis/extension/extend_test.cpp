@@ -67,6 +67,7 @@ TEST(EstimateEffects, AllEffectsTogether) {
   const EffectEstimate e = estimate_effects(
       model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, {signals});
   ASSERT_THAT(e.effects, SizeIs(2));
+  // The mass takes part of the data, so that the friction is less certain than alone (3 % above).
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
   // one joint determines only its moment: 60 kg at 1.5 m
   EXPECT_NEAR(e.effects[1].values[1], 90.0, 9.0);
@@ -87,6 +88,7 @@ TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
   Mask second = Mask::Constant(n, false);
   second.tail(n - half).setConstant(true);
   const EffectEstimate e = estimate_effects(model, {coulomb()}, {signals, {}, {second}});
+  // Half of the samples make the 3 % of the whole log larger by sqrt(2). The other half would add 20 kN.
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
 }
 
@@ -113,6 +115,7 @@ TEST(Extend, ErrorFallsOnTestLogsAndNothingElseRises) {
   EXPECT_EQ(step.judged_on, "test logs");
   // from 5 kN to the noise of one sample, 0.8 bar on both chambers: 1.1 kN
   EXPECT_NEAR(force_error(step.before), kFriction, 0.15 * kFriction);
+  // 1.1 kN is 0.22 of 5 kN; a third more for starts and stops.
   EXPECT_LT(force_error(step.after), 0.3 * kFriction);
   EXPECT_LT(step.change.own, 0.3);
   EXPECT_FALSE(step.change.worse());
@@ -127,6 +130,7 @@ TEST(Extend, ErrorFallsOnTestLogsAndNothingElseRises) {
 TEST(Extend, ModelKeepsEffectAndRecordAndSurvivesItsFile) {
   const CraneModel& model = extended().model;
   ASSERT_THAT(model.effects, SizeIs(1));
+  // As in EstimateEffects.RecoversTheForce, which estimates from the same amount of data.
   EXPECT_NEAR(model.effects[0].values[0], kFriction, 0.03 * kFriction);
   ASSERT_THAT(model.steps, SizeIs(1));
   EXPECT_EQ(model.steps[0].added, "coulomb_friction:arm");
@@ -205,6 +209,7 @@ TEST(Improve, AddsTheFrictionAndStops) {
   const ExtendResult r = improve(ignorant_model(), logs_with_friction());
   ASSERT_FALSE(r.steps.empty());
   EXPECT_THAT(r.steps[0].added, HasSubstr("friction:arm"));
+  // As in Extend.ErrorFallsOnTestLogsAndNothingElseRises.
   EXPECT_LT(force_error(r.steps.back().after), 0.3 * kFriction);
   for (const ExtendStep& s : r.steps) EXPECT_FALSE(s.change.worse()) << s.added;
   EXPECT_FALSE(r.stopped_because.empty());

@@ -79,6 +79,7 @@ TEST_F(RealCrane, FitsAndNotesTheDeadBands) {
   }
   EXPECT_GT(n, 1500.0);
   EXPECT_LT(std::sqrt(squares / n), 5.0 * units::kBar);
+  // One block of four is held out (FitOptions::hold_out_every); blocks and their usable samples differ in number.
   EXPECT_GT(r.held_out->samples, 0.1 * static_cast<double>(r.train.samples));
   EXPECT_LT(r.held_out->samples, 0.3 * static_cast<double>(r.train.samples));
   ASSERT_FALSE(r.held_out->energy.empty());
@@ -120,6 +121,7 @@ void expect_published(const ExtendResult& r) {
   for (const ExtendStep& s : r.steps) EXPECT_THAT(s.added, Not(HasSubstr("viscous"))) << steps;
   const AppliedEffect* main = effect_of(r.model, "coulomb_friction:main");
   ASSERT_NE(main, nullptr) << steps;
+  // 10 % of the published value, as is required of a clear effect (diagnose_test.cpp).
   EXPECT_NEAR(main->values[0], 4000.0, 400.0);
   // friction is the first effect on the main cylinder's force
   for (std::size_t i = 0; i < step_of(r, "coulomb_friction:main"); ++i) {

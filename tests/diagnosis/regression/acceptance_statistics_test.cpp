@@ -51,6 +51,7 @@ TEST(EffectAction, SizeIsMeasuredWhereItActs) {
     fit.noise[0] = NoiseModel{};
     fit.noise[0].variance = 1e4;
     const EffectAction action = effect_action(e, {&d}, 0, fit);
+    // Noise and size are set by hand, so that rounding alone is left, as in the other tolerances of 1e-9 in this file.
     EXPECT_NEAR(action.size, 2.0, 1e-9);
     EXPECT_NEAR(action.absorbed, 0.0, 1e-12) << "nothing is learned here";
   }
@@ -65,6 +66,7 @@ TEST(EffectAction, WhatOneChannelAbsorbsAnotherMayShow) {
   EffectFit fit = fit_effects(e, {&d});
   fit.theta[0] = 1.0;
   const EffectAction action = effect_action(e, {&d}, 0, fit);
+  // (300^2) / (300^2 + 20^2) = 0.9956, with random columns of a thousand rows, whose lengths differ by some per cent.
   EXPECT_GT(action.absorbed, 0.95);
   EXPECT_NEAR(action.absorbed_where_seen, 0.0, 1e-9);
 }
@@ -94,6 +96,7 @@ TEST(EffectAction, IsThatOfTheEffectAtTheIndex) {
   const EffectDesign small = plain_design({0.1 * pulses() / 200.0}), large = plain_design({x});
   EffectFit fit = fit_effects(e, {&small, &large});
   fit.theta << 1.0, 5.0;
+  // The actions are 0.1 and about 5 times the noise of one; the bounds lie far from both.
   EXPECT_LT(effect_action(e, {&small, &large}, 0, fit).size, 1.0);
   EXPECT_GT(effect_action(e, {&small, &large}, 1, fit).size, 3.0);
 }
@@ -129,6 +132,7 @@ TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
   both << v, power.columns[0];
   const VectorXd by_line = bent - v * (v.dot(bent) / v.squaredNorm());
   const VectorXd coefficients = least_squares(both, bent);
+  // What is left is of second order in the change of the exponent, 0.1.
   EXPECT_LT((bent - both * coefficients).norm(), 0.1 * by_line.norm());
   // the coefficient is the change of the exponent, up to second order
   EXPECT_NEAR(coefficients[1], -0.1, 0.03);
@@ -186,6 +190,7 @@ TEST(HeldOutGain, IsThatOfRefittingWithoutTheMotions) {
   for (const std::size_t index : {std::size_t{0}, std::size_t{1}}) {
     const HeldOutGain fast = held_out_gain(e, {&first, &second}, index, fit, 5),
                       dense = by_refitting(e, {&first, &second}, index, fit, 5);
+    // Ridges that keep the systems solvable, 1e-10 to 1e-9 of a parameter's information, differ between both ways.
     EXPECT_NEAR(fast.gain, dense.gain, 1e-4 * (1.0 + std::abs(dense.gain)));
     EXPECT_NEAR(fast.error, dense.error, 1e-4 * (1.0 + dense.error));
   }
@@ -206,6 +211,7 @@ TEST(HeldOutGain, RisesWithAnEffectAndFallsWithoutOne) {
   }
   EXPECT_LT(nothing / 50.0, 0.0)
       << "a superfluous parameter loses about half a nat on motions left out";
+  // Half a nat, with a mean over fifty cases that is certain to a fraction of a nat; worse means an error of the folds.
   EXPECT_GT(nothing / 50.0, -3.0);
   EXPECT_EQ(clear, 50);
 }

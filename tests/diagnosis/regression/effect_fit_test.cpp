@@ -86,6 +86,7 @@ TEST(EffectFit, IsGeneralisedLeastSquares) {
   EXPECT_NEAR(fit.theta[0], dense[0], 1e-7);
   EXPECT_NEAR(fit.theta[1], dense[1], 1e-7);
   const VectorXd residual = y - x * dense;
+  // The parameters' errors of 1e-7 times columns of a few units.
   EXPECT_LT((fit.residual[0] - residual.head(n0)).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_LT((fit.residual[1] - residual.tail(n1)).cwiseAbs().maxCoeff(), 1e-6);
   // log-likelihood of each channel with its most likely scale
@@ -113,6 +114,7 @@ TEST(EffectFit, BoundsHoldAndTheOtherParametersAreOptimalBesideThem) {
   EXPECT_EQ(fit.theta[0], 0.0);
   // with the first at zero the second is estimated as if it were alone
   const EffectFit alone = fit_effects(c.evidence, {&c.single});
+  // Both iterate their noise models, to the same number of passes; rounding and the ridge are left.
   EXPECT_NEAR(fit.theta[1], alone.theta[0], 1e-6);
   EXPECT_NEAR(fit.total(), alone.total(), 1e-4);
   c.shared.lower = {-0.1};
@@ -127,6 +129,7 @@ TEST(EffectFit, UnitsDoNotMatter) {
   c.single.columns[0] *= 1e8;
   c.shared.lower = {-1e20}, c.shared.upper = {1e20};
   const EffectFit scaled = fit_effects(c.evidence, {&c.shared, &c.single});
+  // The solution is computed in scaled parameters, so that rounding alone differs.
   EXPECT_NEAR(scaled.theta[0] * 1e-12, plain.theta[0], 1e-9);
   EXPECT_NEAR(scaled.theta[1] * 1e8, plain.theta[1], 1e-9);
   EXPECT_NEAR(scaled.total(), plain.total(), 1e-6);
@@ -140,6 +143,7 @@ TEST(EffectFit, ChannelsThatAreNotActiveKeepTheirLikelihood) {
   const EffectFit with = fit_effects(c.evidence, {&c.single}, &without, control);
   EXPECT_EQ(with.log_likelihood[1], without.log_likelihood[1]);
   EXPECT_EQ(with.noise[1].variance, without.noise[1].variance);
+  // 0.5 is some eight standard errors (0.06, as below), worth thirty nats.
   EXPECT_GT(with.log_likelihood[0], without.log_likelihood[0] + 1.0);
 }
 
@@ -191,6 +195,7 @@ TEST(WhitenedRows, AreOrthogonalToTheBaseline) {
   columns << c.shared.columns[0], channel.baseline.col(1);
   MatrixXd coefficients;
   const MatrixXd rows = whitened_rows(channel, friction_noise(), columns, nullptr, &coefficients);
+  // The other column keeps its length, of many rows of order one; rounding alone is left of the baseline's own.
   EXPECT_GT(rows.col(0).norm(), 1.0);
   EXPECT_LT(rows.col(1).norm(), 1e-9) << "a column of the baseline itself";
   EXPECT_NEAR(coefficients(1, 1), 1.0, 1e-9);

@@ -51,6 +51,7 @@ TEST(LeastSquaresComparison, PrefersTheLargeEffectToOneWithTheShapeOfTheError) {
   Evidence e;
   e.channels.push_back(plain_channel(s.blocks, y));
   const EffectDesign coulomb = plain_design({s.side}), viscous = plain_design({s.speed});
+  // RegressionOptions::least_advantage of 1200 rows, below which no advantage counts.
   EXPECT_GT(advantage(e, coulomb, viscous), 0.05 * 1200);
   EXPECT_EQ(advantage(e, viscous, coulomb), 0.0);
 }

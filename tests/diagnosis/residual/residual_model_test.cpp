@@ -127,6 +127,7 @@ TEST(ResidualModel, AnOscillationOfVaryingFrequencyIsFound) {
   const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].channel, c);
+  // The phase drifts by sqrt(0.28) = 0.5 rad in half a period, a sixth of it; twice that.
   EXPECT_NEAR(found[0].frequency, hz, 0.3 * hz);
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("oscillation")));
 }
@@ -148,6 +149,7 @@ TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {
   for (Index i = 0; i < raw.size(); ++i)
     raw[i] += 2.5e5 * std::sin(2.0 * std::numbers::pi * hz * series.step * static_cast<double>(i));
   const Oscillation oscillation = strongest_oscillation(left.evidence, channel, {});
+  // Half a period, 0.28 s, is found to a sample of 0.02 s.
   EXPECT_NEAR(oscillation.frequency, hz, 0.1 * hz);
   // standard error of the variance: some 3 % at 2000 samples a run, twice that with third differences
   EXPECT_NEAR(oscillation.noise, size * std::sqrt(5.0), 0.1 * size * std::sqrt(5.0));
@@ -164,6 +166,7 @@ TEST(ResidualModel, AFunctionOfASignalIsFoundAndTheSignalNamed) {
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].channel, c);
   EXPECT_EQ(found[0].depends_on.front(), "q_jib");
+  // The sine has a variance of 1.5^2 / 2, half of the whole; on motions left out the fit explains less.
   EXPECT_GT(found[0].explained, 0.25);
   EXPECT_EQ(found[0].frequency, 0.0);
 }
@@ -217,6 +220,7 @@ TEST(ResidualModel, AnIsolatedEventIsFoundWithItsTime) {
       longest = b;
   }
   const double from = time[e.sample[static_cast<std::size_t>(e.blocks[longest].first)]];
+  // The event of four seconds must lie within the stretch.
   ASSERT_GT(row_s * static_cast<double>(e.blocks[longest].last - e.blocks[longest].first), 4.0);
   // larger than the noise floor and than a thousandth of the largest force, below which nothing is reported
   const double noise = std::max(e.noise_floor, 2e-3 * e.largest_force) / e.unit.si;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/selection/search_candidates.h"
 #include "models/effects/registry.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -50,6 +51,16 @@ TEST(EffectIntervals, JointSignificanceTestHasItsNominalLevel) {
   // 15 %. The robust covariance of twenty blocks is too small by some percent.
   EXPECT_GT(something, 10);
   EXPECT_LT(something, 60);
+}
+
+TEST(SearchCandidates, GridsAreThoseOfTheLongestSuspectLog) {
+  Evidence e;
+  e.series.resize(3);
+  e.suspects = 2;
+  e.series[0].time = VectorXd::Zero(10);
+  e.series[1].time = VectorXd::Zero(20);
+  e.series[2].time = VectorXd::Zero(30);  // a reference
+  EXPECT_EQ(&grid_log(e), &e.series[1]);
 }
 
 }  // namespace

@@ -89,6 +89,7 @@ TEST_F(UserEffect, IsFoundAmongTheCatalogueWithItsParameters) {
   EXPECT_NEAR(p[1], kPlace, 0.1 * kWidth);
   EXPECT_NEAR(p[2], kWidth, 0.1 * kWidth);
   EXPECT_EQ(d.effects[0].parameters[0].unit, "kN");
+  // The same number in another unit, but for rounding.
   EXPECT_NEAR(d.effects[0].parameters[0].value, 1e-3 * p[0], 1e-9);
 }
 

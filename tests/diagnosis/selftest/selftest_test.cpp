@@ -93,6 +93,7 @@ TEST(Selftest, NamesEffectsThatTheMotionExcites) {
   const Selftest t = test_arm(arm_log(0.8));
   const InjectedEffect& friction = effect_of(t, "coulomb_friction:arm");
   EXPECT_EQ(friction.visibility, Visibility::kSeen);
+  // The typical 8 kN are nine times the noise of one sample (0.9 kN), in hundreds of samples: certain to be seen.
   EXPECT_GT(friction.power, 0.99);
   EXPECT_LT(friction.times80, 0.5);
   EXPECT_LE(friction.times80, friction.times95);
@@ -156,6 +157,7 @@ TEST(Selftest, OneJointCannotDistinguishAMassFromItsPayload) {
   std::vector<std::string> keys;
   for (const Confusion& c : mass.confused_with) {
     keys.push_back(c.key);
+    // SearchOptions::same_nats.
     EXPECT_LT(c.nats, 4.0);
   }
   // both act on one joint by the moment m x g cos(q) alone

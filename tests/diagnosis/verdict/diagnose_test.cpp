@@ -108,11 +108,13 @@ TEST(Diagnose, NothingIsMissingWhereNothingIs) {
   for (const Answer& a : {with_reference({}), alone({})}) {
     EXPECT_EQ(a.diagnosis.verdict, Verdict::kNone) << a.diagnosis.table();
     EXPECT_THAT(a.diagnosis.effects, IsEmpty());
+    // SearchOptions::false_alarm.
     EXPECT_GE(a.diagnosis.p_value, 0.05);
   }
 }
 
-// Parameters within 10 %, as required for a clear effect in five minutes of motion, here from less than two minutes.
+// In every test of this file parameters are within 10 %, as required for a clear effect in five minutes of motion, here from
+// less than two minutes.
 TEST(Diagnose, CoulombFriction) {
   const Answer& a = friction_of_bristles();  // not the sign function, which is the catalogue's law
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing);
@@ -120,11 +122,13 @@ TEST(Diagnose, CoulombFriction) {
   EXPECT_LT(a.error("coulomb_friction:boom", "Fc"), 0.1);
   const DiagnosedEffect& e = a.diagnosis.effects[0];
   EXPECT_EQ(e.stage, "force");
+  // Less than one half would make another effect the likelier one.
   EXPECT_GE(e.probability, 0.5);
   EXPECT_LT(e.parameters[0].lower95, e.parameters[0].value);
   EXPECT_GT(e.parameters[0].upper95, e.parameters[0].value);
   EXPECT_LT(e.absorbed, 1e-9) << "nothing is learned at the force stage";
   ASSERT_FALSE(e.channels.empty());
+  // A clear effect at least halves the squared error of its channel.
   EXPECT_LT(e.channels[0].rmse_after, 0.7 * e.channels[0].rmse_before);
 }
 

@@ -121,6 +121,7 @@ TEST(Compare, TheRightModelHasNoError) {
   ASSERT_EQ(r.energy.size(), 1u);
   EXPECT_LT(std::abs(r.energy[0].relative_error), 1e-3);
   ASSERT_TRUE(r.energy[0].from_commands.has_value());
+  // The filter's 0.1 % of the speed, in the flow and in the load.
   EXPECT_NEAR(*r.energy[0].from_commands / r.energy[0].measured, 1.0, 2e-3);
   EXPECT_EQ(r.samples, 3000);
 }
@@ -144,6 +145,7 @@ TEST(Compare, ScoresFollowTheirDefinitions) {
       linear_process(6.0 * units::kBar, 1.0 / model.machine.cylinders[0].area_piston());
   const CompareResult r = compare(model, {arm_log()});
   const StageScore& s = *r.find("pressure", "arm", "extend");
+  // The offset is the only error, beside the 0.05 bar of TheRightModelHasNoError, which add by their squares.
   EXPECT_NEAR(s.rmse, 2.0 * units::kBar, 0.01 * units::kBar);
   EXPECT_NEAR(s.bias, 2.0 * units::kBar, 0.01 * units::kBar) << "predicted - measured";
   double sum = 0.0, squares = 0.0;
@@ -158,6 +160,7 @@ TEST(Compare, ScoresFollowTheirDefinitions) {
       }
     }
   }
+  // The same sums in another order: rounding.
   EXPECT_NEAR(s.fit_percent,
               100.0 * (1.0 - s.rmse * std::sqrt(static_cast<double>(s.n)) / std::sqrt(squares)),
               1e-6);
@@ -234,6 +237,7 @@ TEST(Compare, ExtrapolationOfAPressureModelIsNoted) {
   model.cylinders[0].extend = GaussianProcess(p);
   const CompareResult r = compare(model, {log});
   const StageScore& score = *r.find("pressure", "arm", "extend");
+  // Half of the range of loads lies beyond the data, so that more than a tenth of the samples must.
   EXPECT_GT(score.extrapolated_percent, 10.0);
   EXPECT_GT(score.extrapolated_error_percent, score.extrapolated_percent);
   EXPECT_THAT(r.notes, Contains(HasSubstr("lie outside what it was learned from")));
@@ -250,6 +254,7 @@ TEST(Compare, MeasuredFlowIsComparedWithTheSpeed) {
   const CompareResult r = compare(arm_model(), {log});
   const StageScore* s = r.find("flow_sensor", "arm");
   ASSERT_NE(s, nullptr);
+  // The sensor reads a tenth more, which is more than half a litre per minute.
   EXPECT_LT(s->bias, -0.5 * units::kLitrePerMinute);
 }
 
@@ -260,6 +265,7 @@ TEST(Compare, MasksLimitWhatCounts) {
   first.head(1500).setConstant(true);
   const CompareResult r = compare_signals(arm_model(), {signals}, {first});
   EXPECT_EQ(r.samples, 1500);
+  // One sample, of which the trapezoidal rule counts half at either end.
   EXPECT_NEAR(r.energy[0].duration, 30.0, 0.02);
   EXPECT_TRUE(r.logs[0].series[0].measured.tail(1500).array().isNaN().all());
 }
@@ -358,6 +364,7 @@ TEST(CompareReport, JsonHasTheDocumentedKeys) {
     EXPECT_GT(s["n"], 0);
   }
   EXPECT_EQ(j["stages"]["pressure"]["arm"]["extend"]["unit"], "bar");
+  // The noise of pA; only pB has an offset. Hundreds of samples give it to a few per cent.
   EXPECT_NEAR(j["stages"]["pressure"]["arm"]["extend"]["rmse"], 0.8, 0.1);
   EXPECT_EQ(j["stages"]["flow"]["arm"]["unit"], "l/min");
   for (const char* key : {"measured_J", "predicted_J", "relative_error"}) {

@@ -77,6 +77,7 @@ TEST(ResidualTests, ABiasIsFoundAndNamed) {
   ASSERT_FALSE(found.tests.empty());
   const ResidualTest& first = found.tests.front();
   EXPECT_EQ(first.depends_on, "");
+  // A bias of 1.0 is twelve deviations (below), far beyond any level.
   EXPECT_LE(first.p_value, 0.01);
   // 3000 samples of correlation 0.9 are 158 independent ones: deviation 0.08
   EXPECT_NEAR(first.size, 1.0, 0.25);
@@ -90,6 +91,7 @@ TEST(ResidualTests, ADependenceIsFoundOnItsSignalAlone) {
   const ResidualTest& first = found.tests.front();
   EXPECT_EQ(first.depends_on, "speed");
   EXPECT_LE(first.p_value, 0.01);
+  // Some 158 independent samples give a share of 0.4 with a deviation of 0.06.
   EXPECT_NEAR(first.share_explained, 0.64 / 1.64, 0.15);
   for (const ResidualTest& t : found.tests) {
     if (t.p_value <= 0.05) {
@@ -142,6 +144,7 @@ TEST(ResidualTests, EffectiveSamplesAreThoseOfAnAutoregression) {
   std::normal_distribution<double> normal;
   VectorXd white(3000);
   for (double& v : white) v = normal(random);
+  // The sum ends at the first correlation below 0.05, which white noise of 3000 samples (deviation 0.018) has at once.
   EXPECT_NEAR(effective_samples(white, part.block), 3000.0, 1.0);
 }
 

@@ -36,8 +36,10 @@ TEST(Fit, RecoversTheLawOfTheLog) {
   }
   ASSERT_TRUE(r.test.has_value());
   EXPECT_FALSE(r.held_out.has_value());
+  // The noise, known to a few per cent from hundreds of samples, and the model's tenth of it.
   EXPECT_NEAR(r.test->find("pressure", "arm", "extend")->rmse, 0.3 * units::kBar,
               0.05 * units::kBar);
+  // Binomial: 0.8 % for 700 samples; three of them.
   EXPECT_NEAR(r.test->find("pressure", "arm", "extend")->within_95_percent, 95.0, 2.5);
 }
 
@@ -53,6 +55,7 @@ TEST(Fit, TheModelCarriesDataAndQuality) {
     if (q.stage != "pressure" || q.at != "arm extend" || q.data != "test") continue;
     found = true;
     EXPECT_EQ(q.unit, "bar");
+    // As in RecoversTheLawOfTheLog.
     EXPECT_NEAR(q.rmse, 0.3, 0.05);
   }
   EXPECT_TRUE(found);
@@ -148,6 +151,7 @@ TEST(Fit, AConstantSupplyIsOneNumber) {
   Log log = arm_log(0.3);
   channel(log, "p_main").values.setConstant(140.0 * units::kBar);
   const FitResult r = fit(machine, {log});
+  // The pressure has no noise: rounding.
   EXPECT_NEAR(r.model.pumps[0].standby, 140.0 * units::kBar, 1.0);
   EXPECT_EQ(r.model.cylinders[0].margin, 0.0);
   EXPECT_NEAR(r.train.energy[0].relative_error, 0.0, 1e-9);
@@ -184,6 +188,7 @@ TEST(Fit, MotionsAgainstTheCommandAreNotUsed) {
     }
   }
   const FitResult r = fit(arm_machine(), {bad}, {good});
+  // As in RecoversTheLawOfTheLog: the bad samples must leave no trace.
   EXPECT_NEAR(r.test->find("pressure", "arm", "extend")->rmse, 0.3 * units::kBar,
               0.05 * units::kBar);
 }
@@ -244,6 +249,7 @@ TEST(Fit, CorrelatedSamplesAreThinned) {
   }
   const FitResult r = fit(arm_machine(), {log});
   ASSERT_EQ(r.processes.size(), 2u);
+  // (1 + 0.9) / (1 - 0.9) is 19; short motions cut the sum off early.
   EXPECT_GT(r.processes[0].autocorrelation, 5.0);
   EXPECT_GE(r.processes[0].step, 3) << "at most so that 400 samples remain";
   EXPECT_EQ(r.processes[0].report.given, r.model.cylinders[0].extend.parameters().data_count);
@@ -275,6 +281,7 @@ TEST(Fit, LoaderCraneWithNothingMissing) {
   EXPECT_LT(r.test->find("pump", "main")->rmse, 1.0 * units::kBar) << "requirement: 2 bar";
   ASSERT_EQ(r.test->energy.size(), 1u);
   EXPECT_LT(std::abs(r.test->energy[0].relative_error), 5e-3) << "requirement: 2 %";
+  // Below the noise of one sample, 0.8 bar.
   EXPECT_NEAR(r.model.pumps[0].standby, 22.0 * units::kBar, 0.5 * units::kBar);
   for (const CylinderModel& c : r.model.cylinders) {
     EXPECT_GT(c.margin, 5.0 * units::kBar);

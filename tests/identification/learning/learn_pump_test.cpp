@@ -91,6 +91,7 @@ TEST(LearnPump, NearTiesDoNotBiasTheMargins) {
   plain.tie_gap_stds = 0.0;
   const double with_ties = learn_pump(samples, plain).margins[0].margin;
   const double without = learn_pump(samples).margins[0].margin;
+  // A bias well above the standard error of 0.03 bar, of which leaving out ties must take off half at least.
   EXPECT_GT(with_ties, 15.3e5);
   EXPECT_LT(std::abs(without - 15e5), 0.5 * std::abs(with_ties - 15e5));
 }
@@ -153,6 +154,7 @@ TEST(LearnPump, WithoutSamplesAtStandbyTheDataSheetIsUsed) {
   const LearnedPump pump = learn_pump(samples, options);
   EXPECT_FALSE(pump.standby_identified);
   EXPECT_EQ(pump.standby, 22e5);
+  // 800 samples with 0.8 bar: standard error 0.03 bar; four of them.
   EXPECT_NEAR(pump.margins[0].margin, 14e5, 0.12e5);
   options.data_sheet_standby = 200e5;  // wrong, since far lower pressures were measured
   EXPECT_LT(learn_pump(samples, options).standby, 67e5);
@@ -167,6 +169,7 @@ TEST(LearnPump, SaturatedAndInvalidSamplesAreLeftOut) {
   const LearnedPump pump = learn_pump(samples, options);
   EXPECT_EQ(pump.saturated, 100);
   EXPECT_EQ(pump.invalid, 1);
+  // 0.8 bar in some 450 active samples: standard error 0.04 bar; five of them.
   EXPECT_NEAR(pump.margins[0].margin, 18e5, 0.2e5);
   samples.active.setConstant(true);
   samples.working_pressure.setConstant(NAN);
@@ -181,6 +184,7 @@ TEST(LearnPump, ConstantPressureIsARobustConstant) {
     pressure[t] = (t % 20 == 0 ? 40e5 : 140e5) + 0.8e5 * normal(random);
   pressure[7] = NAN;
   const LearnedPump pump = learn_constant_pump(pressure);
+  // 475 samples with 0.8 bar: standard error 0.04 bar; five of them.
   EXPECT_NEAR(pump.standby, 140e5, 0.2e5);
   EXPECT_EQ(pump.outliers, 25);
   EXPECT_EQ(pump.invalid, 1);

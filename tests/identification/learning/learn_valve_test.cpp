@@ -65,6 +65,7 @@ TEST(LearnValve, ReportsADeadBandWithoutModellingIt) {
   }
   const LearnedValve valve = learn_valve(shifted.command, shifted.flow);
   EXPECT_TRUE(valve.affine);
+  // A twentieth of the dead band; the gain to 0.6 % as in IsRobustToOutliers.
   EXPECT_NEAR(valve.dead_band, 0.08, 0.004);
   EXPECT_NEAR(valve.affine_gain / kValveGain, 1.0, 0.006);
   EXPECT_LT(valve.gain, kValveGain);

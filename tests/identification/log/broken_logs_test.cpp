@@ -280,9 +280,11 @@ TEST_F(LogFiles, ALogThatIsFasterThanNeededIsThinnedByMeans) {
   }
   const Log log = load(text);
   EXPECT_EQ(log.samples(), 2000);
+  // Rounding of times with four decimals.
   EXPECT_NEAR(log.step, 1e-3, 1e-9);
   EXPECT_THAT(log.warnings, Contains(HasSubstr("thinned from 20000 to 2000 samples")));
   const Channel& p = *log.find(Role::kPressureA, 0);
+  // Rounding; the ripple itself is 3e5 Pa.
   EXPECT_LT((p.values.array() - 80e5).abs().maxCoeff(), 1.0);
   // value and time are means over the same samples, so that a ramp stays one
   const Channel& q = *log.find(Role::kJointPosition, 0);

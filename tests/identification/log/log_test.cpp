@@ -203,6 +203,7 @@ TEST_F(LogFiles, SlowChannelsAreHeld) {
   const Log log = load(text);
   EXPECT_TRUE(log.find("oil")->complete());
   EXPECT_DOUBLE_EQ(log.find("oil")->values[0], 30.0);
+  // Rounding of an interpolation, here and of a sampling interval below.
   EXPECT_NEAR(log.find("oil")->values[35], 30.5, 1e-9);
   EXPECT_DOUBLE_EQ(log.find("oil")->values[199], 33.0);
   EXPECT_DOUBLE_EQ(log.find("payload")->values[199], 500.0);

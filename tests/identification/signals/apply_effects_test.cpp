@@ -70,6 +70,7 @@ TEST(WithOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
   const MachineSeries banded = with_openings({band}, series);
   EXPECT_EQ(series.cylinders[0].opening.size(), 0) << "the series given stays as it is";
   const Eigen::VectorXd& opening = banded.cylinders[0].opening;
+  // Rounding of differences of numbers below one.
   EXPECT_NEAR(opening[0], -0.8, 1e-12);
   EXPECT_NEAR(opening[1], -0.1, 1e-12);
   EXPECT_EQ(opening[2], 0.0);
@@ -121,6 +122,7 @@ TEST(ApplyEffects, ResidualIsZeroWhenTheModelHasThem) {
     EXPECT_LT(with.find("pressure", "arm", regime)->rmse, 1.0) << regime;
   }
   EXPECT_LT(rmse(with, "pump", "main"), 1.0);
+  // Without the effects the errors are those of typical effects, a quarter of 8 kN and 1 bar at least.
   EXPECT_GT(rmse(without, "force", "arm"), 2e3);
   EXPECT_GT(without.find("pressure", "arm", "extend")->rmse, 1e5);
   EXPECT_GT(rmse(without, "pump", "main"), 1e5);
@@ -143,6 +145,7 @@ TEST(ApplyEffects, FitLearnsTheRestOfTheModelWithThem) {
                 extend_pressure(truth.machine, force), 0.2 * units::kBar);
   }
   ASSERT_TRUE(r.test.has_value());
+  // Noise of 0.3 bar and the tolerances of margin and pressure model above.
   EXPECT_NEAR(rmse(*r.test, "pump", "main"), 0.3 * units::kBar, 0.1 * units::kBar);
   const FitResult blind = fit(truth.machine, {log_of(truth, 0.3, 1)}, {log_of(truth, 0.3, 2)});
   EXPECT_GT(rmse(*blind.test, "force", "arm"), 5.0 * rmse(*r.test, "force", "arm"));
@@ -157,6 +160,7 @@ TEST(ApplyEffects, MarginsOfALaggingPumpAreLearned) {
   MachineSeries series = make_series(truth, s);
   Eigen::VectorXd& pump = channel(log, "p_main").values;
   pump = first_order_lag(series, pump, model.effects[0].values[1]);
+  // With the lag in the model less than a hundredth of the error without it is left.
   EXPECT_GT(rmse(compare(truth, {log}), "pump", "main"), 1e5);
   EXPECT_LT(rmse(compare(model, {log}), "pump", "main"), 1e3);
   FitOptions options;

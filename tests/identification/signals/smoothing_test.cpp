@@ -74,6 +74,7 @@ TEST(SavitzkyGolay, CoefficientsAreThoseOfTheOriginalTables) {
   pulse[20] = 1.0;
   const Eigen::VectorXd smooth = filter(time, 4.0).apply(pulse, 0);
   const double five[] = {-3, 12, 17, 12, -3};
+  // Rounding of coefficients below one.
   for (int k = -2; k <= 2; ++k) EXPECT_NEAR(smooth[20 - k], five[k + 2] / 35.0, 1e-15);
   EXPECT_NEAR(smooth[17], 0.0, 1e-15);
   const Eigen::VectorXd slope = filter(time, 6.0).apply(pulse, 1);
@@ -91,6 +92,7 @@ TEST(SavitzkyGolay, EvenAndUnevenPathsAgree) {
   const auto away = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     return std::max((a - b).head(90).cwiseAbs().maxCoeff(), (a - b).tail(90).cwiseAbs().maxCoeff());
   };
+  // Rounding, larger by 1/0.02 s = 50 for each derivative.
   EXPECT_LT(away(even.value, uneven.value), 1e-12);
   EXPECT_LT(away(even.first, uneven.first), 1e-10);
   EXPECT_LT(away(even.second, uneven.second), 1e-8);
@@ -118,6 +120,7 @@ TEST(SavitzkyGolay, WindowsDoNotReachAcrossAGap) {
   v << 2.0 * time.head(100), 1000.0 - 3.0 * time.tail(100).array();
   const SavitzkyGolay sg(time, {{0, 100}, {100, 200}}, 0.25);
   const Eigen::VectorXd slope = sg.apply(v, 1);
+  // Rounding of values up to 1000, divided by steps of 0.02 s.
   EXPECT_LT((slope.head(100).array() - 2.0).abs().maxCoeff(), 1e-9);
   EXPECT_LT((slope.tail(100).array() + 3.0).abs().maxCoeff(), 1e-9);
 }
@@ -163,6 +166,7 @@ TEST(ChooseWindow, GrowsWithTheNoise) {
   EXPECT_LE(quiet, usual);
   EXPECT_LE(usual, loud);
   EXPECT_LT(quiet, loud);
+  // The grid of windows at 50 Hz is 0.2 to 0.4 s (smoothing.h), to half a step of 0.02 s; so it is below.
   EXPECT_GE(quiet, 0.2);
   EXPECT_LE(loud, 0.42);
 }
@@ -263,6 +267,7 @@ TEST(QuietenAcceleration, KeepsStartsAndStopsAndReducesTheNoiseBetween) {
   const Eigen::VectorXd before = filter.apply(clean, 2);
   Eigen::VectorXd after = before;
   quieten_acceleration(time, runs, clean, filter, after);
+  // A sine of 0.3 Hz is reproduced by any of the windows to better than a thousandth.
   EXPECT_LT((after - before).cwiseAbs().maxCoeff(), 1e-3 * before.cwiseAbs().maxCoeff());
 }
 

@@ -121,6 +121,7 @@ TEST(GpLikelihood, BoundIsBelowAndTightensToTheExactValue) {
   for (Index count : {3, 8, 20, 50, 80}) {
     SparseGp sparse(points, choose_inducing(points.x1, points.x2, kHyper, count, 0.0).rows);
     const double bound = sparse.bound(kHyper, nullptr);
+    // Rounding of a likelihood of some hundred nats, and the jitter on the matrix of the centres.
     EXPECT_LE(bound, exact + 1e-4);
     EXPECT_GE(bound, before - 1e-4);  // the choices are nested, so the bound cannot fall
     before = bound;

@@ -125,6 +125,7 @@ TEST(LearnPressure, OutliersAreLeftOut) {
     ++planted;
   }
   const LearnedGp learned = learn_gp(d.flow, d.force, d.pressure);
+  // The smallest outlier, 15 bar, is 19 deviations; of 1500 normal values at most one or two count as well.
   EXPECT_NEAR(learned.report.outliers, planted, 2);
   EXPECT_LT(error_of(learned.parameters), 0.16e5);
   EXPECT_NEAR(learned.report.noise_std, 0.8e5, 0.06e5);
@@ -141,6 +142,7 @@ TEST(LearnPressure, VarianceIsSmallInsideAndGrowsOutside) {
   const Data d = make_data(1200, 0.8e5);
   const GpParameters p = learn_gp(d.flow, d.force, d.pressure).parameters;
   const GaussianProcess process(p);
+  // 0.8 bar over the root of a dozen samples within a length-scale is 0.23 bar.
   EXPECT_LT(process.variance(8e-4, 1e5), std::pow(0.3e5, 2));
   // Ten length-scales away only the mean is known: the variance is at least the signal's and grows with the force by the
   // uncertainty of the slope.
@@ -179,6 +181,7 @@ TEST(LearnPressure, NaNsAreCountedAndLeftOut) {
   const LearnedGp learned = learn_gp(d.flow, d.force, d.pressure);
   EXPECT_EQ(learned.report.invalid, 3);
   EXPECT_EQ(learned.parameters.data_count, 297);
+  // A fifth of the samples of OutliersAreLeftOut: sqrt(5) times its 0.16 bar.
   EXPECT_LT(error_of(learned.parameters), 0.4e5);
 }
 
@@ -205,6 +208,7 @@ TEST(LearnPressure, ConstantInputsGiveAValidProcess) {
   ASSERT_FALSE(constant_force.report.warnings.empty());
   EXPECT_THAT(constant_force.report.warnings.front(), HasSubstr("force does not vary enough"));
   const GaussianProcess process(constant_force.parameters);
+  // As in NaNsAreCountedAndLeftOut, for the same number of samples.
   EXPECT_NEAR(process.mean(1e-3, 1e5), law(1e-3, 1e5), 0.4e5);
   EXPECT_TRUE(std::isfinite(process.variance(1e-3, 4e5)));
 

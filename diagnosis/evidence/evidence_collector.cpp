@@ -1,0 +1,355 @@
+// Builds the channels of an Evidence from the signals of all logs; declared in evidence.h.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/evidence/branches.h"
+#include "diagnosis/evidence/channel_builder.h"
+#include "diagnosis/evidence/evidence.h"
+#include "identification/signals/load_sensing_leader.h"
+#include "identification/signals/low_pass.h"
+#include "identification/signals/series.h"
+#include "models/effects/hydraulics.h"
+#include "models/math/nan.h"
+#include "models/math/robust.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Standard deviation of a raw channel's white noise from third differences (robust, so that motion does not count).
+double raw_noise(const VectorXd& x, int fewest_differences) {
+  std::vector<double> d = third_differences(x, 0, x.size());
+  if (d.size() < static_cast<std::size_t>(fewest_differences)) return kNaN;
+  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) /
+         kThirdDifferenceNoise;
+}
+
+/// Noise floor of a channel over several logs: the mean of those in which it is measured.
+class MeanNoise {
+ public:
+  explicit MeanNoise(const EvidenceOptions& options) : fewest_(options.fewest_differences) {}
+
+  /// @param gain of the channel's filter on white noise
+  void add(const VectorXd& raw, double gain) {
+    const double noise = raw_noise(raw, fewest_);
+    if (!std::isfinite(noise)) return;
+    sum_ += noise * gain;
+    ++logs_;
+  }
+  /// NaN where no log measures it.
+  double value() const { return logs_ > 0 ? sum_ / logs_ : kNaN; }
+
+ private:
+  int fewest_;  // differences
+  double sum_ = 0.0;
+  int logs_ = 0;
+};
+
+/// The supply or the return chamber of a cylinder that moves in one direction.
+struct ChamberRole {
+  int side;        // +1 extending, -1 retracting
+  bool returning;  // the return chamber
+
+  EvidenceKind kind() const {
+    if (returning) return side > 0 ? EvidenceKind::kReturnExtend : EvidenceKind::kReturnRetract;
+    return side > 0 ? EvidenceKind::kSupplyExtend : EvidenceKind::kSupplyRetract;
+  }
+  /// [Pa] as logged
+  const VectorXd& pressure(const CylinderSignals& c) const {
+    return (side > 0) != returning ? c.pressure_a : c.pressure_b;
+  }
+  /// Columns 1, Q, Q^2 of a return chamber, and F, Q F in a supply chamber. [samples x columns]
+  MatrixXd baseline(const CylinderSeries& s) const {
+    const VectorXd& q = returning ? s.return_flow : s.flow;
+    MatrixXd base(q.size(), returning ? 3 : 5);
+    const double q0 = kBaselineFlow, f0 = kBaselineForce;
+    base.col(0).setOnes();
+    base.col(1) = q / q0;
+    base.col(2) = (q / q0).cwiseAbs2();
+    if (!returning) {
+      base.col(3) = steady_force(s) / f0;
+      base.col(4) = (steady_force(s) / f0).cwiseProduct(q / q0);
+    }
+    return base;
+  }
+};
+
+std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
+                                            const std::vector<MachineSignals>& references) {
+  std::vector<const MachineSignals*> all;
+  all.reserve(suspects.size() + references.size());
+  for (const MachineSignals& s : suspects) all.push_back(&s);
+  for (const MachineSignals& s : references) all.push_back(&s);
+  return all;
+}
+
+bool measures_both_chambers(const CylinderSignals& c) {
+  return c.pressure_a.size() > 0 && c.pressure_b.size() > 0;
+}
+
+/// One cylinder that moves to one side, as the branches' mixture takes it.
+BranchData branch_data(const MachineSignals& signals, const MachineSeries& series,
+                       std::size_t cylinder, int side) {
+  const CylinderSignals& c = signals.cylinders[cylinder];
+  const CylinderSeries& s = series.cylinders[cylinder];
+  BranchData d;
+  d.p_return = side > 0 ? s.pressure_b : s.pressure_a;
+  d.p_supply = side > 0 ? s.pressure_a : s.pressure_b;
+  d.q_return = s.return_flow;
+  d.q_supply = s.flow;
+  d.force = s.force;
+  d.q_return_total = VectorXd::Zero(s.return_flow.size());
+  for (const CylinderSeries& other : series.cylinders) d.q_return_total += other.return_flow;
+  d.oil = series.oil;
+  d.moving = c.driven && signals.usable && (c.direction.array() == side);
+  return d;
+}
+
+}  // namespace
+
+/// Adds the logs, then the channels; add_logs must come first.
+class EvidenceCollector {
+ public:
+  /// The arguments must outlive this.
+  EvidenceCollector(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                    const std::vector<MachineSignals>& references, const EvidenceOptions& options)
+      : model_(model), signals_(in_order(suspects, references)) {
+    evidence_.options = options;
+    evidence_.suspects = suspects.size();
+  }
+
+  /// @param in_references effects that act in the references; null: those of the model
+  void add_logs(const std::vector<AppliedEffect>* in_references);
+  void add_force_channel(int cylinder);
+  void add_flow_channel(int cylinder);
+  /// By direction: a return channel where the return line sets the pressures, else a supply channel.
+  void add_pressure_channels(int cylinder);
+  void add_pump_channel(int pump);
+  Evidence finished();
+
+ private:
+  const EvidenceOptions& options() const { return evidence_.options; }
+  bool is_suspect(std::size_t log) const { return log < evidence_.suspects; }
+  void add_kernels(const MachineSignals& signals);
+  /// Half the filter's width, so that a row contains samples of its own motion only. [samples]
+  Index margin_of(std::size_t log) const;
+  /// A builder of a channel of cylinder or pump `index`. @param unit of reports
+  ChannelBuilder builder(EvidenceKind kind, int index, const FieldUnit& unit) const;
+  /// @return for each log; empty where the log does not measure what the branches need
+  std::vector<BranchSplit> branches_of(std::size_t cylinder, int side) const;
+  /// @param splits of the chamber's side, for each log
+  void add_pressure_channel(int cylinder, const ChamberRole& chamber,
+                            const std::vector<BranchSplit>& splits);
+
+  const CraneModel& model_;
+  Evidence evidence_;
+  std::vector<const MachineSignals*> signals_;      // suspect logs first, then references
+  std::vector<double> gain_force_, gain_pressure_;  // by log: gains of the filters on white noise
+};
+
+void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references) {
+  Evidence& e = evidence_;
+  e.known_ = model_.effects;
+  e.known_in_references_ = in_references != nullptr ? *in_references : model_.effects;
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const MachineSignals& s = *signals_[log];
+    e.series.push_back(make_series(model_, s));
+    if (!is_suspect(log) && in_references != nullptr)
+      e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
+    add_kernels(s);
+    e.window = std::max(e.window, s.window);
+    e.stride = std::max(e.stride,
+                        static_cast<int>(std::lround(s.window / s.step / e.options.rows_a_window)));
+  }
+}
+
+void EvidenceCollector::add_kernels(const MachineSignals& signals) {
+  Evidence::Kernels k;
+  if (options().whole_motions) {
+    k.force = k.speed = k.pressure = VectorXd::Ones(1);
+  } else {
+    k.force = low_pass_of(signals.step, signals.window, signals.order, 2);
+    k.speed = low_pass_of(signals.step, signals.window, signals.order, 1);
+    k.pressure = low_pass_of(signals.step, signals.window, signals.order, 0);
+  }
+  gain_force_.push_back(k.force.norm());
+  gain_pressure_.push_back(k.pressure.norm());
+  evidence_.kernels_.push_back(std::move(k));
+}
+
+Index EvidenceCollector::margin_of(std::size_t log) const {
+  if (options().whole_motions) return 0;
+  return static_cast<Index>(std::lround(0.5 * signals_[log]->window / signals_[log]->step));
+}
+
+ChannelBuilder EvidenceCollector::builder(EvidenceKind kind, int index,
+                                          const FieldUnit& unit) const {
+  const Machine& machine = model_.machine;
+  const auto at = static_cast<std::size_t>(index);
+  ChannelBuilder b(evidence_);
+  b.channel.kind = kind;
+  b.channel.index = index;
+  b.channel.at = kind == EvidenceKind::kPump ? machine.pumps[at].name : machine.cylinders[at].name;
+  b.channel.unit = unit;
+  b.channel.text = evidence_text(kind, b.channel.at);
+  return b;
+}
+
+void EvidenceCollector::add_force_channel(int cylinder) {
+  Evidence& e = evidence_;
+  ChannelBuilder b = builder(EvidenceKind::kForce, cylinder, {"N", 1.0});
+  const std::string name = b.channel.at;
+  MeanNoise noise(e.options);
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
+    if (!c.has_force()) continue;
+    const VectorXd y = e.filter(log, EvidenceKind::kForce,
+                                c.force - e.known(log, EvidenceKind::kForce, cylinder)) -
+                       c.static_force;
+    b.channel.raw.resize(signals_.size());
+    b.channel.raw[log] = c.force - c.static_force;
+    for (const double f : c.static_force) {
+      if (std::isfinite(f))
+        b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
+    }
+    b.add(log, c.moving && signals_[log]->usable, y, MatrixXd(y.size(), 0), margin_of(log));
+    if (is_suspect(log)) noise.add(c.force, gain_force_[log]);
+  }
+  b.channel.noise_floor = noise.value();
+  if (!b.finish(e.channels)) {
+    e.notes.push_back(
+        fmt::format("{}: no measured force while it moves, force effects cannot be judged", name));
+  }
+}
+
+void EvidenceCollector::add_flow_channel(int cylinder) {
+  Evidence& e = evidence_;
+  ChannelBuilder b = builder(EvidenceKind::kFlow, cylinder, {"mm/s", 1e-3});
+  const std::string name = b.channel.at;
+  std::vector<double> still;
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
+    if (!c.has_command()) continue;
+    MatrixXd base(c.command.size(), 2);
+    base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
+    base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
+    const VectorXd y =
+        c.speed - e.filter(log, EvidenceKind::kFlow, e.known(log, EvidenceKind::kFlow, cylinder));
+    b.add(log, signals_[log]->usable && !signals_[log]->edge, y, base, 0);
+    for (Index k = 0; k < y.size(); ++k) {
+      if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
+    }
+  }
+  b.channel.noise_floor =
+      still.size() > static_cast<std::size_t>(options().fewest_samples_at_rest)
+          ? robust_std(Eigen::Map<VectorXd>(still.data(), static_cast<Index>(still.size())))
+          : kNaN;
+  if (!b.finish(e.channels)) {
+    e.notes.push_back(
+        fmt::format("{}: no command is logged, valve effects cannot be judged", name));
+  }
+}
+
+std::vector<BranchSplit> EvidenceCollector::branches_of(std::size_t cylinder, int side) const {
+  std::vector<BranchData> data;
+  std::vector<std::size_t> owner;
+  std::vector<BranchSplit> result(signals_.size());
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    if (!measures_both_chambers(signals_[log]->cylinders[cylinder]) ||
+        evidence_.series[log].cylinders[cylinder].force.size() == 0)
+      continue;
+    data.push_back(branch_data(*signals_[log], evidence_.series[log], cylinder, side));
+    owner.push_back(log);
+  }
+  if (data.empty()) return result;
+  const auto suspects =
+      std::count_if(owner.begin(), owner.end(), [&](std::size_t log) { return is_suspect(log); });
+  std::vector<BranchSplit> splits =
+      split_branches(data, static_cast<std::size_t>(suspects), options().branches);
+  for (std::size_t k = 0; k < owner.size(); ++k) result[owner[k]] = std::move(splits[k]);
+  return result;
+}
+
+void EvidenceCollector::add_pressure_channels(int cylinder) {
+  const auto at = static_cast<std::size_t>(cylinder);
+  for (const int side : {1, -1}) {
+    const std::vector<BranchSplit> splits = branches_of(at, side);
+    for (const bool returning : {true, false})
+      add_pressure_channel(cylinder, {side, returning}, splits);
+  }
+}
+
+void EvidenceCollector::add_pressure_channel(int cylinder, const ChamberRole& chamber,
+                                             const std::vector<BranchSplit>& splits) {
+  Evidence& e = evidence_;
+  const auto at = static_cast<std::size_t>(cylinder);
+  const EvidenceKind kind = chamber.kind();
+  ChannelBuilder b = builder(kind, cylinder, {"bar", 1e5});
+  MeanNoise noise(e.options);
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const CylinderSignals& c = signals_[log]->cylinders[at];
+    const BranchSplit& split = splits[log];
+    if (!measures_both_chambers(c) || split.return_line.size() == 0) continue;
+    const VectorXd& raw = chamber.pressure(c);
+    const VectorXd y = e.filter(log, kind, raw - e.known(log, kind, cylinder));
+    b.add(log, chamber.returning ? split.return_line : split.counterbalance, y,
+          chamber.baseline(e.series[log].cylinders[at]), margin_of(log));
+    if (is_suspect(log)) noise.add(raw, gain_pressure_[log]);
+  }
+  b.channel.noise_floor = noise.value();
+  if (b.finish(e.channels) && !chamber.returning)
+    set_force_slope(e.channels.back(), e.suspects, e.options);
+}
+
+void EvidenceCollector::add_pump_channel(int pump) {
+  Evidence& e = evidence_;
+  const auto at = static_cast<std::size_t>(pump);
+  ChannelBuilder b = builder(EvidenceKind::kPump, pump, {"bar", 1e5});
+  const std::string name = b.channel.at;
+  MeanNoise noise(e.options);
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const PumpSignals& s = signals_[log]->pumps[at];
+    const PumpSeries& series = e.series[log].pumps[at];
+    if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
+    const VectorXd y =
+        e.filter(log, EvidenceKind::kPump,
+                 s.pressure - series.demand - e.known(log, EvidenceKind::kPump, pump));
+    b.add(log, signals_[log]->usable && !signals_[log]->edge, y, e.margins(log, pump), 0);
+    b.channel.raw.resize(signals_.size());
+    b.channel.raw[log] = s.pressure - series.demand;
+    if (is_suspect(log)) noise.add(s.pressure, gain_pressure_[log]);
+  }
+  b.channel.noise_floor = noise.value();
+  if (!b.finish(e.channels)) {
+    e.notes.push_back(fmt::format(
+        "pump {}: its pressure or what it feeds is not measured, pump effects cannot be judged",
+        name));
+  }
+}
+
+Evidence EvidenceCollector::finished() {
+  for (EvidenceChannel& channel : evidence_.channels) evidence_.add_shared(channel);
+  return std::move(evidence_);
+}
+
+Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSignals>& suspects,
+                          const std::vector<MachineSignals>& references,
+                          const std::vector<AppliedEffect>* in_references,
+                          const EvidenceOptions& options) {
+  EvidenceCollector collector(model, suspects, references, options);
+  collector.add_logs(in_references);
+  for (int i = 0; i < model.machine.cylinder_count(); ++i) {
+    collector.add_force_channel(i);
+    collector.add_flow_channel(i);
+    collector.add_pressure_channels(i);
+  }
+  for (int p = 0; p < model.machine.pump_count(); ++p) collector.add_pump_channel(p);
+  return collector.finished();
+}
+
+}  // namespace sparflow
