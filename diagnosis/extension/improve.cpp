@@ -138,6 +138,16 @@ std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
   return list;
 }
 
+/// Whether the error of the quantity that an effect acts on grew significantly; of an effect at no single cylinder, that of
+/// any quantity of its stage.
+bool harms_its_own_place(const ExtendStep& step, const Machine& machine, const EffectAt& e) {
+  const std::vector<HarmedError> harmed = harmed_measured(step);
+  const bool one = e.at >= 0 && e.effect->info().place == EffectPlace::kCylinder;
+  return std::any_of(harmed.begin(), harmed.end(), [&](const HarmedError& h) {
+    return !one || h.at == machine.cylinders[static_cast<std::size_t>(e.at)].name;
+  });
+}
+
 /// What one round adds of the effects that a diagnosis names, at most `most`. Where one of them shapes a valve's opening,
 /// other effects on that cylinder's flow wait for the next diagnosis, because they act on the shaped opening.
 std::vector<EffectAt> of_one_round(const std::vector<const DiagnosedEffect*>& named,
@@ -234,6 +244,8 @@ class Improvement {
     const ExtendOptions& options = context_.options();
     const std::vector<EffectAt> all = places_of(joint.model.effects);
     const CompareResult measured = context_.measured_errors(joint.model, all, progress);
+    const std::optional<CompareResult> on_tests =
+        context_.tested_errors(joint.model, all, progress);
     std::optional<ExtendStep> weakest;
     double least = 0.0;
     for (const EffectAt& e : tested) {
@@ -250,9 +262,18 @@ class Improvement {
       } else {
         judge_step(context_, e, context_.measured_errors(joint.model, rest, progress), measured,
                    step);
+        step.judged_on = context_.measured_on();
       }
       step.determined = is_determined(step.effect);
-      const bool stays = step.determined && step.change.own * options.change.refit_moves < 1.0;
+      bool stays = step.determined && step.change.own * options.change.refit_moves < 1.0;
+      if (stays && on_tests &&
+          !learned) {  // test logs do not choose an effect, but may contradict it
+        ExtendStep test = step;
+        judge_step(context_, e, *context_.tested_errors(joint.model, rest, progress), *on_tests,
+                   test);
+        stays = !harms_its_own_place(test, joint.model.machine, e);
+        if (!stays) step = std::move(test);
+      }
       if (stays) continue;
       // an effect that the logs do not determine at all goes first
       const double worth =

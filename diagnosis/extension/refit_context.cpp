@@ -52,6 +52,7 @@ RefitContext::RefitContext(const CraneModel& model, const ExtendLogs& logs,
   references_ = signals_of(machine_, logs.references, how);
   if (!logs.references.empty()) in_references_ = effects_in_references(model, references_);
   test_signals_ = signals_of(machine_, logs.tests, how);
+  folds_ = held_out_folds(signals_, options.fit, options.folds);
   if (!logs.tests.empty()) {
     judged_on_ = "test logs";
     return;
@@ -60,7 +61,6 @@ RefitContext::RefitContext(const CraneModel& model, const ExtendLogs& logs,
   const bool any = std::any_of(held_.begin(), held_.end(), [](const Mask& m) { return m.any(); });
   judged_on_ = any ? "held-out motions" : "training logs";
   if (!any) held_.clear();
-  folds_ = held_out_folds(signals_, options.fit, options.folds);
 }
 
 Judged RefitContext::as_it_is(const CraneModel& model, std::vector<std::string>& notes,
@@ -173,23 +173,34 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
   return out;
 }
 
+CraneModel RefitContext::measured_model(const CraneModel& from,
+                                        const std::vector<EffectAt>& effects,
+                                        const std::vector<Mask>& left_out,
+                                        const SearchProgress& progress) const {
+  FitOptions how = options_.fit;
+  how.effects = estimate(from, effects, left_out, progress).effects;
+  if (references_.empty()) return fit_forces_and_flows(machine_, signals_, left_out, how);
+  CraneModel model = from;  // with references everything learned is theirs and stays
+  model.effects = how.effects;
+  return model;
+}
+
 CompareResult RefitContext::measured_errors(const CraneModel& from,
                                             const std::vector<EffectAt>& effects,
                                             const SearchProgress& progress) const {
-  // With references everything learned is theirs and stays.
-  const auto model_with = [&](const std::vector<Mask>& left_out) {
-    FitOptions how = options_.fit;
-    how.effects = estimate(from, effects, left_out, progress).effects;
-    if (references_.empty()) return fit_forces_and_flows(machine_, signals_, left_out, how);
-    CraneModel model = from;
-    model.effects = how.effects;
-    return model;
-  };
-  if (folds_.empty()) return judge(model_with({}));
+  if (folds_.empty()) return judge(measured_model(from, effects, {}, progress));
   std::vector<CompareResult> parts;
   for (const std::vector<Mask>& fold : folds_)
-    parts.push_back(compare_signals(model_with(fold), signals_, fold, compare_options()));
+    parts.push_back(compare_signals(measured_model(from, effects, fold, progress), signals_, fold,
+                                    compare_options()));
   return join_results(machine_, std::move(parts));
+}
+
+std::optional<CompareResult> RefitContext::tested_errors(const CraneModel& from,
+                                                         const std::vector<EffectAt>& effects,
+                                                         const SearchProgress& progress) const {
+  if (logs_.tests.empty()) return std::nullopt;
+  return judge(measured_model(from, effects, {}, progress));
 }
 
 std::vector<DataSource> RefitContext::data() const {

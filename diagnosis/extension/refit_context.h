@@ -1,6 +1,7 @@
 #pragma once
 /// The refit context: logs, options and held-out motions of one extension, on which models with other effects are
 /// learned and judged. Used by extend.cpp only.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,16 +44,28 @@ class RefitContext {
   Judged with(const Judged& from, const std::vector<EffectAt>& effects,
               const SearchProgress& progress, std::vector<std::string>* notes = nullptr) const;
 
-  /// Errors of forces and flows with these effects, on test logs, or by cross-validation over all motions: the effects are
-  /// estimated, and the valve gains learned, without the motions that they are judged on. Pressures take no part, so that
-  /// this takes a fraction of the time of `with`.
+  /// Errors of forces and flows with these effects by cross-validation over all motions of the logs to learn from: the
+  /// effects are estimated, and the valve gains learned, without the motions that they are judged on. Pressures take no part,
+  /// so that this takes a fraction of the time of `with`.
   CompareResult measured_errors(const CraneModel& from, const std::vector<EffectAt>& effects,
                                 const SearchProgress& progress) const;
+
+  /// The same on the test logs, which may contradict an effect; without test logs empty.
+  std::optional<CompareResult> tested_errors(const CraneModel& from,
+                                             const std::vector<EffectAt>& effects,
+                                             const SearchProgress& progress) const;
+
+  /// Data on which `measured_errors` judges, as `judged_on` names it.
+  std::string measured_on() const { return folds_.empty() ? judged_on_ : "held-out motions"; }
 
   /// Training and test logs, for the record.
   std::vector<DataSource> data() const;
 
  private:
+  /// The model of forces and flows with these effects, estimated and learned without some samples.
+  CraneModel measured_model(const CraneModel& from, const std::vector<EffectAt>& effects,
+                            const std::vector<Mask>& left_out,
+                            const SearchProgress& progress) const;
   /// @param base its effects that are not in `effects` are left out  @param leave_out [logs] masks; empty = none
   EffectEstimate estimate(CraneModel base, const std::vector<EffectAt>& effects,
                           const std::vector<Mask>& leave_out, const SearchProgress& progress) const;

@@ -26,7 +26,8 @@ void add(const VectorXd& what, VectorXd& to) {
   }
 }
 
-/// Recomputes poses, speeds and forces with the machine as the effects change it.
+/// Recomputes poses, speeds and forces with the machine as the effects change it. A measured stroke keeps its speed: another
+/// angle for the same stroke changes levers and forces, not what flows into the cylinder.
 void evaluate_effective(const Machine& machine, MachineSignals& signals) {
   StaticForce statics(machine);
   VectorXd q(machine.joint_count());
@@ -46,8 +47,10 @@ void evaluate_effective(const Machine& machine, MachineSignals& signals) {
       const double rate = signals.qd(k, cylinder.joint);
       c.length[k] = x.value;
       c.rate[k] = x.d1;
-      c.speed[k] = x.d1 * rate;
-      c.acceleration[k] = x.d1 * signals.qdd(k, cylinder.joint) + x.d2 * rate * rate;
+      if (!c.stroke_measured) {
+        c.speed[k] = x.d1 * rate;
+        c.acceleration[k] = x.d1 * signals.qdd(k, cylinder.joint) + x.d2 * rate * rate;
+      }
       c.model_force[k] = statics.force()[static_cast<Index>(i)];
       if (c.direction[k] != 0) {
         c.flow[k] = std::max(0.0, c.speed[k] * c.direction[k]) *

@@ -21,6 +21,7 @@ CylinderSeries cylinder_series(const Cylinder& cylinder, const CylinderSignals& 
   out.length = c.length;
   out.rate = c.rate;
   out.speed = c.speed;
+  out.stroke_measured = c.stroke_measured;
   out.acceleration = c.acceleration;
   out.static_force = c.static_force;
   out.force = c.force_smooth;

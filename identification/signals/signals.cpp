@@ -87,6 +87,8 @@ void measured(const Machine& machine, const Log& log, int index, MachineSignals&
   c.command = values_or_empty(log, Role::kCommand, index);
   c.measured_flow = values_or_empty(log, Role::kFlow, index);
   c.force = values_or_empty(log, Role::kForce, index);
+  c.stroke_measured = log.find(Role::kStroke, index) != nullptr &&
+                      log.find(Role::kJointPosition, cylinder.joint) == nullptr;
   if (cylinder.hydraulic()) {
     c.pressure_a = values_or_empty(log, Role::kPressureA, index);
     c.pressure_b = values_or_empty(log, Role::kPressureB, index);

@@ -32,6 +32,9 @@ struct CylinderSignals {
   Eigen::VectorXd force;          ///< [N] measured: pA A_A - pB A_B, or the log's own force
   Eigen::VectorXd force_smooth;   ///< [N] by the position's filter
   Eigen::VectorXd measured_flow;  ///< [m^3/s] magnitude, as logged
+  /// Whether the log has the stroke and not the joint's position: speeds and flows are then measured, whatever angle belongs
+  /// to the stroke.
+  bool stroke_measured = false;
 
   /// +1 extending, -1 retracting, 0 at rest. It follows the command where commands are logged, because the valve section
   /// connects the commanded side to the pump also while lag or load still move the rod the other way; else the speed.

@@ -85,8 +85,9 @@ TEST(ApplyEffects, ForcesAreTheExactChains) {
   int checked = 0;
   for (const EffectAt& place : candidates(bare.machine)) {
     const EffectInfo& info = place.effect->info();
-    // Presliding friction depends on the last reversal; the chain, which has no memory, gives its sliding value.
-    if (info.stage != EffectStage::kForce || info.id == "presliding") continue;
+    // Presliding friction depends on the last reversal, sway on the accelerations before; the chain has no memory.
+    const bool memory = info.id == "presliding" || info.id == "payload_sway";
+    if (info.stage != EffectStage::kForce || memory) continue;
     CraneModel model = bare;
     const std::string key = effect_key(info, bare.machine, place.at);
     model.effects = {typical(key, bare.machine)};
@@ -209,6 +210,26 @@ TEST(ApplyEffects, AnotherModelReplacesEarlierEffectsAndChangesNoValue) {
   EXPECT_EQ(s.cylinders[0].speed, plain.cylinders[0].speed);
   EXPECT_EQ(s.cylinders[0].flow, plain.cylinders[0].flow);
   EXPECT_EQ(s.cylinders[0].pressure_effect.size(), 0);
+}
+
+TEST(ApplyEffects, AnotherAngleLeavesTheSpeedOfAMeasuredStroke) {
+  CraneModel model = arm_model();
+  Log log = arm_log();
+  for (Channel& c : log.channels) {
+    if (c.role != Role::kJointPosition) continue;
+    c.role = Role::kStroke;
+    c.index = 0;
+    for (double& x : c.values) x = stroke_at(model.machine, 0, x);
+  }
+  const MachineSignals plain = make_signals(model.machine, log);
+  model.effects = {typical("angle_offset:arm", model.machine)};
+  const MachineSignals offset = with_effects(model, plain);
+  EXPECT_EQ(offset.cylinders[0].speed, plain.cylinders[0].speed);
+  EXPECT_EQ(offset.cylinders[0].flow, plain.cylinders[0].flow);
+  EXPECT_NE(offset.cylinders[0].model_force, plain.cylinders[0].model_force);
+  const MachineSeries series = make_series(arm_model(), plain);
+  Eigen::MatrixXd column;
+  EXPECT_FALSE(model.effects[0].effect->columns(series, {EvidenceKind::kFlow, 0}, 0, {}, column));
 }
 
 }  // namespace

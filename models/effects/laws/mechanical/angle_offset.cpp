@@ -63,7 +63,9 @@ class AngleOffset final : public Effect {
       return Effect::columns(log, measured, at, shape, columns);
     }
     const Machine& machine = *log.machine;
-    if (machine.cylinders[static_cast<std::size_t>(measured.index)].joint != at) return false;
+    const auto cylinder = static_cast<std::size_t>(measured.index);
+    if (machine.cylinders[cylinder].joint != at || log.cylinders[cylinder].stroke_measured)
+      return false;
     // The measured rod speed is dx/dq at the logged angle times dq/dt: the true speed less d2x/dq2 offset dq/dt.
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
