@@ -149,7 +149,7 @@ int run(int argc, char** argv) {
         print_reach(task(i), f);
         return pack_short_time(f);
       },
-      [&](int, int done) { fmt::print(stderr, "{}/{}\n", done, count); });
+      [&](int, int done, const ChildResult&) { fmt::print(stderr, "{}/{}\n", done, count); });
   Excesses all;
   nlohmann::json out = nlohmann::json::object();
   for (int i = 0; i < count; ++i) {

@@ -58,7 +58,7 @@ int run(int argc, char** argv) {
         print_reach(task, f);
         return pack_figures(f);
       },
-      [&](int i, int done) {
+      [&](int i, int done, const ChildResult&) {
         fmt::print(stderr, "{}/{} {}\n", done, count,
                    tasks[static_cast<std::size_t>(i)].problem.name);
       });

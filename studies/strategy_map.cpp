@@ -128,7 +128,7 @@ std::vector<MapCurve> solve_curves(const std::vector<MapTask>& tasks, const MapO
   const std::vector<ChildResult> results = run_in_children(
       static_cast<int>(tasks.size()), o.processes,
       [&](int index) { return packed_curve_of(tasks[static_cast<std::size_t>(index)], o); },
-      [&](int index, int done) {
+      [&](int index, int done, const ChildResult&) {
         const MapTask& task = tasks[static_cast<std::size_t>(index)];
         fmt::print(stderr, "{}/{} {} {} kg\n", done, tasks.size(), task.reach, task.payload);
       });

@@ -4,8 +4,12 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
+#include "apps/cli/console.h"
 #include "models/math/error.h"
+#include "models/math/sha256.h"
 
 namespace sparflow::cli {
 
@@ -16,6 +20,58 @@ void Outputs::add_to(CLI::App& verb, bool with_report) {
                     "write a page with figures to FILE.html; it needs no network")
         ->type_name("FILE.html");
   }
+}
+
+void Outputs::add_resume_to(CLI::App& verb) {
+  verb.add_flag("--resume", resume,
+                "take what an earlier run, ended before it was complete, has finished; it stands "
+                "in FILE.journal beside the JSON (or the page)");
+}
+
+std::string Outputs::journal() const {
+  const std::string& beside = json.empty() ? report : json;
+  std::error_code error;
+  const bool other =
+      std::filesystem::exists(beside, error) && !std::filesystem::is_regular_file(beside, error);
+  return beside.empty() || other ? "" : beside + ".journal";
+}
+
+std::unique_ptr<Journal> Outputs::open_journal(const std::string& verb,
+                                               const std::string& run) const {
+  const std::string path = journal();
+  if (path.empty()) {
+    if (!resume) return std::make_unique<Journal>();
+    throw UsageError(
+        fmt::format("{}: --resume needs --json FILE or --report FILE.html, beside which the "
+                    "journal of the earlier run lies",
+                    verb));
+  }
+  const bool there = std::filesystem::exists(path);
+  if (there && !resume) {
+    warn(
+        fmt::format("{} holds parts of an earlier run and is replaced as soon as a part of this "
+                    "run is finished; --resume would use them",
+                    path));
+  }
+  auto journal = std::make_unique<Journal>(path, run, resume);
+  for (const std::string& sentence : journal->warnings()) warn(sentence);
+  if (resume && !there) note(fmt::format("there is no {}; everything is computed", path));
+  return journal;
+}
+
+std::string run_fingerprint(const std::vector<std::string>& files, const std::string& options) {
+  std::string all;
+  std::vector<std::string> read = files;
+  read.emplace_back("/proc/self/exe");
+  for (const std::string& file : read) {
+    std::ifstream in(file, std::ios::binary);
+    if (!in) throw InputError({file, 0, 0}, "", "cannot read this file");
+    std::ostringstream bytes;
+    bytes << in.rdbuf();
+    // The name too, because results hold it; no name contains a zero byte.
+    all += file + '\0' + sha256_hex(bytes.str());
+  }
+  return sha256_hex(all + options);
 }
 
 void check_writable(const std::string& path) {

@@ -1,8 +1,11 @@
 #pragma once
 /// Files that a verb writes: the options that name them, and checks before any long work.
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 #include <vector>
+
+#include "models/math/journal.h"
 
 namespace sparflow::cli {
 
@@ -16,11 +19,22 @@ struct NamedFile {
 struct Outputs {
   std::string json;
   std::string report;
+  bool resume = false;  ///< --resume, of verbs that have it
   void add_to(CLI::App& verb, bool with_report = true);
   /// Checks, before any long work, that these files can be written. @throws InputError
   void check() const;
   std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
+  /// Adds --resume, for a verb that keeps a journal of its finished parts.
+  void add_resume_to(CLI::App& verb);
+  /// The journal's path: beside the first of these files; "" where that is none, or a device or FIFO.
+  std::string journal() const;
+  /// Opens the journal, and tells what it holds. @param run of run_fingerprint()
+  /// @throws UsageError for --resume without an output beside which a journal can lie  @throws InputError
+  std::unique_ptr<Journal> open_journal(const std::string& verb, const std::string& run) const;
 };
+
+/// Identifies a run: SHA-256 of this program, of the files' names and contents, and of the options in words.
+std::string run_fingerprint(const std::vector<std::string>& files, const std::string& options);
 
 /// Checks, before any long work, that the folder of `path` exists and can be written. @throws InputError
 void check_writable(const std::string& path);

@@ -144,23 +144,75 @@ StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArgum
   return without_rows(task, options, "infeasible. " + seeds.paths.message);
 }
 
-/// Compares the strategies of every problem, each in a process of its own.
+/// All that a comparison depends on. The number of processes is not part of it.
+std::string fingerprint(const std::vector<ProblemAndModel>& tasks, const StrategiesArguments& a) {
+  std::vector<std::string> files;
+  for (const ProblemAndModel& task : tasks) {
+    files.push_back(task.problem.file);
+    files.push_back(a.model.empty() ? task.problem.model_path : a.model);
+  }
+  return run_fingerprint(
+      files,
+      fmt::format("strategies --time {} --idle {} --paths {} --orders {} --seed {} "
+                  "--intervals {}",
+                  a.time, a.idle_kw, a.seeds.count, a.orders, a.seeds.random_seed, a.intervals));
+}
+
+/// The name of a problem's comparison in the journal, whose run fixes the order of the problems.
+std::string part_name(std::size_t index) { return fmt::format("problem {}", index + 1); }
+
+/// Keeps a finished comparison; a journal that cannot be written is no reason to end the run.
+void keep_finished(Journal& journal, const std::string& part, const ChildResult& result) {
+  if (!result.ok || unpacked_comparison(result.bytes).interrupted) return;
+  try {
+    journal.add(part, result.bytes);
+  } catch (const InputError& error) {
+    warn(error.what());
+  }
+}
+
+/// Compares the strategies of every problem that the journal lacks, each in a process of its own.
+/// @return the results in the order of the problems
+std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
+                                    const StrategiesArguments& a, const StrategyOptions& options,
+                                    Journal& journal) {
+  std::vector<ChildResult> results(tasks.size());
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const std::string* finished = journal.find(part_name(i));
+    if (finished != nullptr)
+      results[i] = {true, *finished, ""};
+    else
+      left.push_back(i);
+  }
+  const int count = static_cast<int>(tasks.size());
+  const int before = count - static_cast<int>(left.size());
+  if (before > 0) note(fmt::format("{} of {} problems were finished before", before, count));
+  const int processes = a.processes > 0 ? a.processes : usable_processors();
+  const auto work = [&](int index) {
+    return packed(compare_in(tasks[left[static_cast<std::size_t>(index)]], a, options));
+  };
+  Progress progress("strategies");
+  progress(static_cast<double>(before) / count,
+           fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
+  std::vector<ChildResult> computed = run_in_children(
+      static_cast<int>(left.size()), processes, work,
+      [&](int index, int finished, const ChildResult& result) {
+        const std::size_t i = left[static_cast<std::size_t>(index)];
+        keep_finished(journal, part_name(i), result);
+        progress(static_cast<double>(before + finished) / count, tasks[i].problem.name);
+      });
+  for (std::size_t k = 0; k < left.size(); ++k) results[left[k]] = std::move(computed[k]);
+  return results;
+}
+
+/// Compares the strategies of every problem.
 /// @param broken gets the number of processes that ended without a result
 std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& tasks,
                                             const StrategiesArguments& a,
-                                            const StrategyOptions& options, int& broken) {
-  const int count = static_cast<int>(tasks.size());
-  const int processes = a.processes > 0 ? a.processes : usable_processors();
-  const auto work = [&](int index) {
-    return packed(compare_in(tasks[static_cast<std::size_t>(index)], a, options));
-  };
-  Progress progress("strategies");
-  progress(0.0, fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
-  const std::vector<ChildResult> children =
-      run_in_children(count, processes, work, [&](int index, int finished) {
-        progress(static_cast<double>(finished) / count,
-                 tasks[static_cast<std::size_t>(index)].problem.name);
-      });
+                                            const StrategyOptions& options, Journal& journal,
+                                            int& broken) {
+  const std::vector<ChildResult> children = results_of(tasks, a, options, journal);
   std::vector<StrategyComparison> all;
   all.reserve(children.size());
   for (std::size_t i = 0; i < children.size(); ++i) {
@@ -189,7 +241,9 @@ int run(const StrategiesArguments& a) {
   const std::vector<ProblemPath> files = problem_files(a.problems);
   std::vector<NamedFile> inputs = {{"--model", a.model}};
   for (const ProblemPath& p : files) inputs.push_back({"--problem", p.file});
-  check_outputs_apart("strategies", a.outputs.files(), inputs);
+  std::vector<NamedFile> outputs = a.outputs.files();
+  outputs.push_back({"the journal", a.outputs.journal()});
+  check_outputs_apart("strategies", outputs, inputs);
   a.outputs.check();
   StrategyOptions options;
   read_times(a.time, options);
@@ -197,9 +251,11 @@ int run(const StrategiesArguments& a) {
   options.optimize.processes = 1;
   options.optimize.interrupted = interrupted;
   const std::vector<ProblemAndModel> tasks = load_tasks(a, files, options.own_time);
+  const std::unique_ptr<Journal> journal =
+      a.outputs.open_journal("strategies", fingerprint(tasks, a));
   finish_on_interrupt();
   int broken = 0;
-  const std::vector<StrategyComparison> all = compare_all(tasks, a, options, broken);
+  const std::vector<StrategyComparison> all = compare_all(tasks, a, options, *journal, broken);
   std::vector<Machine> machines;
   machines.reserve(tasks.size());
   for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
@@ -211,6 +267,7 @@ int run(const StrategiesArguments& a) {
                     one ? &tasks.front().problem : nullptr)
         .write(a.outputs.report);
   }
+  if (!interrupted() && broken == 0) journal->remove();
   tell(strategies_table(all));
   if (interrupted()) return kInterrupted;
   if (broken > 0) return kNotSolved;
@@ -252,6 +309,7 @@ void add_strategies_verb(CLI::App& app, int& code) {
                    "problems solved in parallel; absent: as many as there are processors")
       ->check(CLI::Range(1, 256));
   a->outputs.add_to(*verb);
+  a->outputs.add_resume_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }
 

@@ -1,6 +1,7 @@
 /// The one way to write a file.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -91,6 +92,75 @@ void flush_folder(const std::string& folder) {
   ::close(fd);
 }
 
+/// A new file in a folder, open for writing. Where the file system serves, it has no name before it is whole, so that the
+/// kernel removes it with a process that is killed.
+struct NewFile {
+  int fd = -1;
+  std::string name;  ///< "" while it has none
+};
+
+std::string path_of_open(int fd) { return fmt::format("/proc/self/fd/{}", fd); }
+
+NewFile new_file_in(const std::string& folder, bool with_name) {
+  NewFile file;
+  if (!with_name) {
+    file.fd = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+    return file;
+  }
+  file.name = folder + "/.sparflow-XXXXXX";
+  file.fd = ::mkostemp(file.name.data(), O_CLOEXEC);
+  return file;
+}
+
+/// Gives a file without a name one that no other file has, in the folder. @return 0, or the error
+int give_name(NewFile& file, const std::string& folder) {
+  const std::string open_file = path_of_open(file.fd);
+  /// Names that are tried.
+  /// @threshold [1] 2..1000; chosen: each of them is free but for one in 2^32 or where an earlier kill left it
+  constexpr int kNames = 20;
+  for (int i = 0; i < kNames; ++i) {
+    unsigned int number = 0;
+    if (::getrandom(&number, sizeof number, 0) != sizeof number) return errno;
+    const std::string name = fmt::format("{}/.sparflow-{:08x}", folder, number);
+    if (::linkat(AT_FDCWD, open_file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+      file.name = name;
+      return 0;
+    }
+    if (errno != EEXIST) return errno;
+  }
+  return EEXIST;
+}
+
+/// Puts a whole file in the place of `target`. A target that is not there takes the file in one step; one that is there can
+/// only be replaced by a file with a name, which it has for that instant. @return 0, or the error
+int put_in_place(NewFile& file, const std::string& target, const std::string& folder) {
+  if (file.name.empty()) {
+    const std::string open_file = path_of_open(file.fd);
+    if (::linkat(AT_FDCWD, open_file.c_str(), AT_FDCWD, target.c_str(), AT_SYMLINK_FOLLOW) == 0)
+      return 0;
+    const int failed = errno == EEXIST ? give_name(file, folder) : errno;
+    if (failed != 0) return failed;
+  }
+  return ::rename(file.name.c_str(), target.c_str()) == 0 ? 0 : errno;
+}
+
+/// Writes beside `target` and replaces it. @param before what is there, or null  @return 0, or the error
+int replace(const std::string& target, const std::string& content, const struct stat* before,
+            bool with_name) {
+  const std::string folder = folder_of(target);
+  NewFile file = new_file_in(folder, with_name);
+  if (file.fd < 0) return errno;
+  int failed = write_whole(file.fd, content);
+  if (failed == 0) failed = keep_mode(file.fd, before);
+  if (failed == 0 && ::fsync(file.fd) != 0 && errno != EINVAL) failed = errno;
+  // Before it is closed: a file without a name ends with its last descriptor.
+  if (failed == 0) failed = put_in_place(file, target, folder);
+  if (::close(file.fd) != 0 && failed == 0) failed = errno;
+  if (failed != 0 && !file.name.empty()) ::unlink(file.name.c_str());
+  if (failed == 0) flush_folder(folder);
+  return failed;
+}
+
 }  // namespace
 
 void write_file_atomically(const std::string& path, const std::string& content) {
@@ -104,19 +174,11 @@ void write_file_atomically(const std::string& path, const std::string& content) 
   // A file that may not be written is not replaced either, though its folder would allow it.
   if (exists && ::access(path.c_str(), W_OK) != 0) cannot_write(path, errno);
   const std::string target = behind_links(path);
-  std::string aside = folder_of(target) + "/.sparflow-XXXXXX";
-  const int fd = ::mkostemp(aside.data(), O_CLOEXEC);
-  if (fd < 0) cannot_write(path, errno);
-  int failed = write_whole(fd, content);
-  if (failed == 0) failed = keep_mode(fd, exists ? &before : nullptr);
-  if (failed == 0 && ::fsync(fd) != 0 && errno != EINVAL) failed = errno;
-  if (::close(fd) != 0 && failed == 0) failed = errno;
-  if (failed == 0 && ::rename(aside.c_str(), target.c_str()) != 0) failed = errno;
-  if (failed != 0) {
-    ::unlink(aside.c_str());
-    cannot_write(path, failed);
-  }
-  flush_folder(folder_of(target));
+  const struct stat* there = exists ? &before : nullptr;
+  // Network and layered file systems know no file without a name, or cannot name it later; nor can any without /proc.
+  if (replace(target, content, there, false) == 0) return;
+  const int failed = replace(target, content, there, true);
+  if (failed != 0) cannot_write(path, failed);
 }
 
 }  // namespace sparflow

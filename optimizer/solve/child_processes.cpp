@@ -93,12 +93,12 @@ std::string fate(pid_t pid) {
 
 std::vector<ChildResult> run_in_children(int count, int at_once,
                                          const std::function<std::string(int)>& work,
-                                         const std::function<void(int, int)>& on_done) {
+                                         const OnDone& on_done) {
   std::vector<ChildResult> results(static_cast<std::size_t>(count));
   if (at_once <= 1 || count == 1) {
     for (int i = 0; i < count; ++i) {
       results[static_cast<std::size_t>(i)] = decode(run_here(work, i), "");
-      if (on_done) on_done(i, i + 1);
+      if (on_done) on_done(i, i + 1, results[static_cast<std::size_t>(i)]);
     }
     return results;
   }
@@ -127,7 +127,7 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
       const int index = children[i].index;
       children.erase(children.begin() + static_cast<std::ptrdiff_t>(i));
       ++finished;
-      if (on_done) on_done(index, finished);
+      if (on_done) on_done(index, finished, results[static_cast<std::size_t>(index)]);
     }
   }
   return results;

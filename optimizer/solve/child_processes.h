@@ -14,12 +14,14 @@ struct ChildResult {
       error;  ///< why there is no result: an exception's text, or the signal that ended the child
 };
 
+using OnDone = std::function<void(int index, int finished, const ChildResult& result)>;
+
 /// Runs work(0) .. work(count-1), at most `at_once` at a time, each in a forked child that returns its result through a
 /// pipe. No child outlives this process. With at_once <= 1 or count == 1 everything runs in this process.
-/// @param on_done called in this process as results arrive, with (index, number finished so far)
+/// @param on_done called in this process as results arrive, with (index, number finished so far, result); must not throw
 std::vector<ChildResult> run_in_children(int count, int at_once,
                                          const std::function<std::string(int)>& work,
-                                         const std::function<void(int, int)>& on_done = {});
+                                         const OnDone& on_done = {});
 
 /// Runs `work` in a forked child until it is done or `stop` says so (asked ten times a second), which ends the child.
 ChildResult run_in_child(const std::function<std::string()>& work,

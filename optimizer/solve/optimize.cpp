@@ -160,7 +160,7 @@ class Search {
 
   void solve(int count, const std::function<StartResult(int)>& start,
              const std::function<std::string(int)>& name) {
-    const auto done = [&](int index, int finished) {
+    const auto done = [&](int index, int finished, const ChildResult&) {
       if (options_.progress)
         options_.progress(static_cast<int>(result_.starts.size()) + finished, expected_,
                           name(index));

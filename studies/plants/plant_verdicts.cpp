@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
@@ -253,7 +252,7 @@ int run(const Arguments& a) {
     fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
     json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
   }
-  if (!a.json.empty()) std::ofstream(a.json) << json.dump(1) << "\n";
+  if (!a.json.empty()) write_file_atomically(a.json, json.dump(1) + "\n");
   return 0;
 }
 

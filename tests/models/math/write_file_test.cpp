@@ -1,4 +1,5 @@
 /// Tests of the one way to write a file.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -130,6 +131,32 @@ TEST_F(WriteFile, WhatWasThereStaysWhereWritingFails) {
   EXPECT_EQ(WEXITSTATUS(status), 3);
   EXPECT_EQ(content(at("a")), "before");
   EXPECT_EQ(entries(), 1U);
+}
+
+TEST_F(WriteFile, AProcessThatIsKilledWhileItWritesLeavesNothingBehind) {
+  const int unnamed = ::open(folder_.c_str(), O_TMPFILE | O_WRONLY, 0600);
+  if (unnamed < 0) GTEST_SKIP() << "this file system knows no file without a name";
+  ::close(unnamed);
+  std::ofstream(at("a")) << "before";
+  const std::string big(1 << 20, 'x');
+  for (const char* name : {"a", "new"}) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      // The signal of a file that grows beyond the limit kills in the middle of the first call that writes it.
+      const struct rlimit none = {0, 0}, small = {1000, 1000};
+      ::setrlimit(RLIMIT_CORE, &none);
+      ::setrlimit(RLIMIT_FSIZE, &small);
+      ::signal(SIGXFSZ, SIG_DFL);
+      write_file_atomically(at(name), big);
+      ::_exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(WTERMSIG(status), SIGXFSZ);
+    EXPECT_EQ(content(at("a")), "before");
+    EXPECT_EQ(entries(), 1U) << name;
+  }
 }
 
 TEST_F(WriteFile, ATemporaryNameThatSomebodyPreparedIsNotFollowed) {

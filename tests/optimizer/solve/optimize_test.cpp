@@ -384,7 +384,8 @@ TEST(ChildProcesses, ResultsExceptionsAndCrashesComeBack) {
                        'x');  // larger than a pipe's buffer
   };
   int calls = 0;
-  const std::vector<ChildResult> r = run_in_children(4, 2, work, [&](int, int) { ++calls; });
+  const std::vector<ChildResult> r =
+      run_in_children(4, 2, work, [&](int, int, const ChildResult&) { ++calls; });
   EXPECT_TRUE(r[0].ok);
   EXPECT_EQ(r[0].bytes, "x");
   EXPECT_EQ(r[1].error, "no luck");
