@@ -16,7 +16,8 @@ struct CylinderSeries {
   Eigen::VectorXd rate;          ///< dx/dq [m/rad] or [-]
   Eigen::VectorXd speed;         ///< dx/dt [m/s], positive extending
   Eigen::VectorXd acceleration;  ///< [m/s^2]
-  bool stroke_measured = false;  ///< whether length and speed are measured, and the joint follows from them
+  bool stroke_measured =
+      false;  ///< whether length and speed are measured, and the joint follows from them
   /// [N] from the machine file by virtual work, positive when the load pushes the rod in
   Eigen::VectorXd static_force;
   Eigen::MatrixXd
