@@ -66,6 +66,11 @@ struct ExtendOptions {
   /// @threshold [steps] 0..; chosen: as many as it may keep, because each may need another
   /// diagnosis.
   std::size_t most_rejected = 8;
+  /// Change of an error's logarithm below which `improve` takes it that the motions do not show an
+  /// effect at all.
+  /// @threshold [1] 0..0.02; chosen: a twentieth of what learning anew may change
+  /// (ErrorChangeOptions::refit_moves)
+  double unmoved = 1e-3;
   /// Folds of the cross-validation by which `improve` judges forces and flows.
   /// @threshold [folds] 2..10; chosen: two cost least, and half of the motions still determine what
   /// a diagnosis of all has found
@@ -82,10 +87,10 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
 /// Adds all effects that a diagnosis names and diagnoses again, until none is named, data is bad, or `max_steps` are done;
 /// `stopped_because` says which. The effects of a diagnosis are estimated together. Then each of them is taken out of the
 /// set in turn: it stays if it reduces the error where it acts, on data that took no part, by more than refitting alone
-/// may, and if its interval excludes zero; that it is no chance finding, the diagnosis has tested. The one that fails
-/// most is removed, and the rest is tested again (backward elimination). At the end the effects of all rounds are tested
-/// once more beside each other. Pressures, margins and gains are learned anew for each step. Effects not kept are
-/// excluded until another round keeps one.
+/// may, or if motions do not show it at all (a leak acts at rest), and if its interval excludes zero; that it is no chance
+/// finding, the diagnosis has tested. The one that fails most is removed, and the rest is tested again (backward
+/// elimination). At the end the effects of all rounds are tested once more beside each other. Pressures, margins and gains
+/// are learned anew for each step. Effects not kept are excluded until another round keeps one.
 /// @param progress may throw Interruption: then the steps kept so far are the result
 ExtendResult improve(const CraneModel& model, const ExtendLogs& logs,
                      const ExtendOptions& options = {}, const SearchProgress& progress = {});

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -265,7 +266,10 @@ class Improvement {
         step.judged_on = context_.measured_on();
       }
       step.determined = is_determined(step.effect);
-      bool stays = step.determined && step.change.own * options.change.refit_moves < 1.0;
+      const bool falls = step.change.own * options.change.refit_moves < 1.0;
+      // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
+      const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
+      bool stays = step.determined && (falls || unseen);
       if (stays && on_tests &&
           !learned) {  // test logs do not choose an effect, but may contradict it
         ExtendStep test = step;
