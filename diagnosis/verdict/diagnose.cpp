@@ -198,6 +198,10 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once)
     d.unexplained = describe_isolated_event(d, options.isolated_event);
+  if (d.search.found.empty() && !d.unexplained) {
+    if (const std::optional<std::size_t> channel = channel_beyond_references(d))
+      d.unexplained = describe_beyond_references(d, *channel);
+  }
   return unmodelled;
 }
 

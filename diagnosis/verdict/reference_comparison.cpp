@@ -21,9 +21,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Mean and variance of the mean of the logarithms of the blocks' mean squares.
+/// Mean, variance of the mean and largest of the logarithms of the blocks' mean squares.
 struct BlockLevel {
-  double mean = 0.0, variance_of_mean = 0.0;
+  double mean = 0.0, variance_of_mean = 0.0, largest = 0.0;
   int blocks = 0;
 };
 
@@ -44,8 +44,34 @@ BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references)
   const auto n = static_cast<double>(levels.size());
   const Eigen::Map<const VectorXd> v(levels.data(), static_cast<Index>(levels.size()));
   level.mean = v.mean();
+  level.largest = v.maxCoeff();
   level.variance_of_mean = (v.array() - level.mean).square().sum() / (n - 1.0) / n;
   return level;
+}
+
+/// One-sided probability of Student's t as that of a normal deviate (Abramowitz and Stegun 1964, 26.7.8).
+double chance_of_t(double t, double freedom) {
+  const double z = t * (1.0 - 0.25 / freedom) / std::sqrt(1.0 + 0.5 * t * t / freedom);
+  return 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
+}
+
+/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike (Welch and
+/// Satterthwaite).
+double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
+  const double variance = suspect.variance_of_mean + reference.variance_of_mean;
+  const double freedom = variance * variance /
+                         (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
+                          std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
+  return chance_of_t((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
+}
+
+/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
+/// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
+/// of motion hardly moves the mean level.
+double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference) {
+  const double n = reference.blocks;
+  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
+  return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
 }
 
 /// Columns of a found effect in other logs than the suspect ones.
@@ -155,33 +181,44 @@ double reference_rms(const Diagnosis& d, std::size_t channel) {
   return n > 0.0 ? std::sqrt(squares / n) : kNaN;
 }
 
-bool exceeds_references(const Diagnosis& d, std::size_t channel) {
-  if (!d.evidence.has_reference()) return true;
+std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {
+  if (!d.evidence.has_reference()) return std::nullopt;
   const BlockLevel suspect = block_level(d, channel, false),
                    reference = block_level(d, channel, true);
-  if (std::min(suspect.blocks, reference.blocks) < 2) return true;
+  if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
+  const double level = chance_of_level(suspect, reference),
+               largest = chance_of_largest(suspect, reference);
   if (tracing())
     fmt::print(stderr,
-               "  {}: residual {:.3g}, in the references {:.3g} {}, {:.1f} standard errors, {} and "
-               "{} blocks\n",
+               "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
+               "block {:.2g}, {} and {} blocks\n",
                d.evidence.channels[channel].text,
                suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
                    d.evidence.channels[channel].unit.si,
                reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name,
-               (suspect.mean - reference.mean) /
-                   std::sqrt(suspect.variance_of_mean + reference.variance_of_mean),
-               suspect.blocks, reference.blocks);
-  // Welch and Satterthwaite's degrees of freedom; Student's t as a normal deviate (Abramowitz and Stegun 1964, 26.7.8)
-  const double variance = suspect.variance_of_mean + reference.variance_of_mean;
-  const double t = (suspect.mean - reference.mean) / std::sqrt(variance);
-  const double freedom = variance * variance /
-                         (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
-                          std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
-  const double z = t * (1.0 - 0.25 / freedom) / std::sqrt(1.0 + 0.5 * t * t / freedom);
-  const double chance = 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
-  return chance * static_cast<double>(d.evidence.channels.size()) <
-         d.thresholds.structure_false_alarm;
+               d.evidence.channels[channel].unit.name, level, largest, suspect.blocks,
+               reference.blocks);
+  constexpr double kTests = 2.0;  // Bonferroni's bound, over the channels as well
+  return std::min(
+      1.0, kTests * static_cast<double>(d.evidence.channels.size()) * std::min(level, largest));
+}
+
+bool exceeds_references(const Diagnosis& d, std::size_t channel) {
+  const std::optional<double> chance = chance_beyond_references(d, channel);
+  return !chance || *chance < d.thresholds.structure_false_alarm;
+}
+
+std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
+  std::optional<std::size_t> found;
+  double least = d.thresholds.structure_false_alarm;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    const std::optional<double> chance = chance_beyond_references(d, c);
+    if (chance && *chance < least) {
+      least = *chance;
+      found = c;
+    }
+  }
+  return found;
 }
 
 std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,

@@ -15,9 +15,15 @@ Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signal
 /// RMS of a channel's final residual in the reference logs [SI]; NaN where they do not have the channel.
 double reference_rms(const Diagnosis& d, std::size_t channel);
 
-/// Whether a channel's final residual is larger in the suspect logs than in the references: Welch's (1947) test on the
-/// logarithms of the blocks' mean squares. True where there is no reference to compare with.
+/// Probability, by Bonferroni's bound over the channels, that a channel's final residual is so much larger in the suspect logs
+/// than in the references by chance, on the logarithms of the blocks' mean squares: Welch's (1947) test of their means, and
+/// Student's prediction for the largest one, because a deviation in one stretch of motion hardly moves the mean. Nothing
+/// where there are no references, or too few motions of one kind.
+std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel);
+/// Whether that is significant; true where there is nothing to compare with.
 bool exceeds_references(const Diagnosis& d, std::size_t channel);
+/// The channel in which it is most significant; nothing where it is in none, or without references.
+std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
 
 /// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in
 /// the same channel by the same residual models, or leave about as much beyond the sensors' noise there, and the residual of the

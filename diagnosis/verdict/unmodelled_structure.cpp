@@ -155,6 +155,44 @@ Unexplained describe_unnamed(const Diagnosis& d) {
   return u;
 }
 
+Unexplained describe_beyond_references(const Diagnosis& d, std::size_t channel) {
+  const EvidenceChannel& c = d.evidence.channels[channel];
+  const VectorXd& residual = d.search.final.residual[channel];
+  Unexplained u;
+  u.channel = channel;
+  u.stage = evidence_stage(c.kind);
+  u.at = c.at;
+  u.depends_on = {"no single signal"};
+  u.rmse = suspect_rms(d.evidence, channel, residual);
+  u.noise_floor = c.noise_floor;
+  u.unit = c.unit;
+  u.share = 1.0;
+  std::size_t worst = c.blocks.size();
+  double largest = -1.0;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) continue;
+    const Index n = c.blocks[b].last - c.blocks[b].first;
+    const double rms = residual.segment(c.blocks[b].first, n).norm() / std::sqrt(n);
+    if (rms > largest) {
+      largest = rms;
+      worst = b;
+    }
+  }
+  const auto log = static_cast<std::size_t>(c.log[worst]);
+  const VectorXd& time = d.evidence.series[log].time;
+  const auto at = [&](Index row) { return time[c.sample[static_cast<std::size_t>(row)]]; };
+  u.sentence = fmt::format(
+      "{}: residual of {} {} (RMS), in the references {}; largest between {:.1f} and {:.1f} s{}, "
+      "{} "
+      "{}, and no effect explains the difference",
+      c.text, plain_number(u.rmse / c.unit.si, 2), c.unit.name,
+      plain_number(reference_rms(d, channel) / c.unit.si, 2), at(c.blocks[worst].first),
+      at(c.blocks[worst].last - 1),
+      d.evidence.suspects > 1 ? fmt::format(" of log {}", log + 1) : "",
+      plain_number(largest / c.unit.si, 2), c.unit.name);
+  return u;
+}
+
 Unexplained describe_isolated_event(const Diagnosis& d, const IsolatedEventOptions& options) {
   const EffectDesign& design = *d.search.once;
   FitControl control;

@@ -34,6 +34,9 @@ Unexplained describe_residual_structure(const Evidence& evidence, const Residual
 /// Describes evidence that fits an effect only with implausible parameters.
 Unexplained describe_unnamed(const Diagnosis& d);
 
+/// Describes a channel whose residual is larger than in the references although no effect and no signal explains it.
+Unexplained describe_beyond_references(const Diagnosis& d, std::size_t channel);
+
 /// Describes an isolated event that an effect would explain although no law can be tested on it.
 Unexplained describe_isolated_event(const Diagnosis& d, const IsolatedEventOptions& options);
 

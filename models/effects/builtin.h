@@ -26,6 +26,7 @@ std::unique_ptr<Effect> make_sensor_delay();
 std::unique_ptr<Effect> make_pump_lag();
 std::unique_ptr<Effect> make_valve_deadband();
 std::unique_ptr<Effect> make_valve_lag();
+std::unique_ptr<Effect> make_valve_pressure_drop();
 std::unique_ptr<Effect> make_flow_saturation();
 std::unique_ptr<Effect> make_leakage();
 std::unique_ptr<Effect> make_compressibility();

@@ -29,6 +29,7 @@ std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
     list.push_back(make_force_offset());
     list.push_back(make_valve_deadband());
     list.push_back(make_valve_lag());
+    list.push_back(make_valve_pressure_drop());
     list.push_back(make_flow_saturation());
     list.push_back(make_leakage());
     list.push_back(make_compressibility());

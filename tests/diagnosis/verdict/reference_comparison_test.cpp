@@ -112,6 +112,10 @@ TEST(ReferenceComparison, ChangesOfAForeignPlantAreNamedAlone) {
   EXPECT_THAT(named("j1.csv"), ElementsAre("pressure_offset:lift"));
   EXPECT_THAT(named("i1.csv"), ElementsAre("flow_saturation:main"));
   EXPECT_THAT(named("clean2.csv"), IsEmpty());
+  // The regulator hunts in one motion only: the mean level of the residual hardly moves, and no law fits.
+  const Diagnosis hunting = diagnose(model, {load_log(folder + "e1.csv", machine)}, {reference});
+  EXPECT_NE(hunting.verdict, Verdict::kNone) << hunting.table();
+  EXPECT_NE(hunting.verdict, Verdict::kBadData) << hunting.table();
 }
 
 }  // namespace

@@ -121,6 +121,33 @@ TEST_F(FlowEffects, LagActsBehindTheDeadBandOfTheModel) {
   EXPECT_LT(3.0 * exact, of_command);  // that lag contains what the dead band removes as well
 }
 
+// The pump's pressure is late, so that both valves lose pressure drop; the log's law is an orifice written out by regimes.
+TEST_F(FlowEffects, FlowFollowsThePressureDropBelowTheCompensatorsSetting) {
+  const double setting = 12e5;
+  CylinderSeries& c = log.cylinders[0];
+  Index starved = 0, closed = 0;
+  for (Index k = 0; k < log.samples(); ++k) {
+    double& supply = log.pumps[0].pressure[k];
+    supply -= 20e5 * std::pow(std::sin(0.8 * log.time[k]), 2);
+    const double drop = supply - (c.command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+    if (c.command[k] == 0.0 || drop >= setting) continue;
+    ++(drop > 0.0 ? starved : closed);
+    c.speed[k] *= drop > 0.0 ? std::sqrt(drop) / std::sqrt(setting) : 0.0;
+  }
+  ASSERT_GT(starved, 100);
+  ASSERT_GT(closed, 100);
+  const MatrixXd right = gains_and(columns("valve_pressure_drop", 0, 0, {setting}), 0);
+  EXPECT_NEAR(scaled_least_squares(right, c.speed)[2], 1.0, 1e-9);  // the same law, no noise
+  for (const double wrong : {0.7 * setting, 1.5 * setting}) {
+    const MatrixXd other = gains_and(columns("valve_pressure_drop", 0, 0, {wrong}), 0);
+    EXPECT_LT(0.01, residual(other, c.speed)) << wrong;
+  }
+  log.pumps[0].pressure.resize(0);
+  MatrixXd none;
+  EXPECT_FALSE(effect_named("valve_pressure_drop")
+                   .columns(log, {EvidenceKind::kFlow, 0}, 0, std::vector{setting}, none));
+}
+
 TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
   const double limit = 1.3e-3;
   std::vector<VectorXd> straight;

@@ -1,0 +1,93 @@
+#include <algorithm>
+#include <cmath>
+
+#include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/valve_flow.h"
+
+namespace sparflow {
+namespace {
+
+/// An edge of constant opening carries the root of its pressure difference. A compensator keeps that difference at its
+/// setting while the pump's pressure suffices; without one, the setting lies above all differences of the log.
+class ValvePressureDrop final : public Effect {
+ public:
+  const EffectInfo& info() const override {
+    static const EffectInfo info = {
+        .id = "valve_pressure_drop",
+        .title = "flow limited by the valve's pressure drop",
+        .stage = EffectStage::kFlow,
+        .place = EffectPlace::kCylinder,
+        .parameters = {{"share",
+                        "-",
+                        1.0,
+                        0.5,
+                        2.0,
+                        1.0,
+                        "share of the flow that follows the pressure drop, about 1",
+                        true,
+                        {}},
+                       {"setting",
+                        "bar",
+                        units::kBar,
+                        0.5 * units::kBar,
+                        500 * units::kBar,
+                        10 * units::kBar,
+                        "pressure drop from which the flow no longer rises: the compensator's "
+                        "setting; above all pressure drops of the log the valve has none",
+                        false,
+                        {2 * units::kBar, 5 * units::kBar, 10 * units::kBar, 20 * units::kBar,
+                         40 * units::kBar, 80 * units::kBar, 160 * units::kBar,
+                         320 * units::kBar}}},
+        .equation =
+            "Q = Q_valve(u) min(1, max(0, p_pump - p) / setting)^0.5, p = pressure of the "
+            "supply chamber",
+        .signals = {"command", "position", "pump pressure", "chamber pressures"},
+        .confused_with = {"valve_lag", "flow_saturation", "pump_lag"},
+        .separated_by =
+            "the same command alone and beside a cylinder of higher load; a step of "
+            "the command from standby",
+        .citation =
+            "H. E. Merritt (1967), Hydraulic Control Systems, eq. 3-34 (orifice equation); "
+            "H. Murrenhoff (2011), Grundlagen der Fluidtechnik, Teil 1: Hydraulik (pressure "
+            "compensators)",
+        // A compensator's spring and flow forces let the flow bend before its setting.
+        .form_error = 0.1,
+        .in_motion = "nothing: a motion prescribes the flow; only the command for it is larger"};
+    return info;
+  }
+  std::vector<int> places(const Machine& machine) const override {
+    return hydraulic_cylinders(machine);
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+
+  bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
+               std::span<const double> shape, Eigen::MatrixXd& columns) const override {
+    if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    const int pump = log.machine->pump_of_cylinder(at);
+    if (pump < 0) return false;
+    const Eigen::VectorXd& supply = log.pumps[static_cast<std::size_t>(pump)].pressure;
+    const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
+    if (command.size() == 0 || supply.size() == 0 || c.pressure_a.size() == 0 ||
+        c.pressure_b.size() == 0)
+      return false;
+    Eigen::VectorXd lacking = Eigen::VectorXd::Zero(log.samples());
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+      if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / shape[0], 0.0, 1.0));
+    }
+    const Eigen::VectorXd passed = command.cwiseProduct((1.0 - lacking.array()).matrix());
+    const SectionFit fit = fit_gains(log, at, passed);
+    columns.resize(log.samples(), 1);
+    for (Eigen::Index k = 0; k < log.samples(); ++k)
+      columns(k, 0) = -fit.gain(command[k]) * command[k] * lacking[k];
+    return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_valve_pressure_drop() { return std::make_unique<ValvePressureDrop>(); }
+
+}  // namespace sparflow
