@@ -104,6 +104,8 @@ double RawEvidence::measured(std::size_t log, EvidenceKind kind, int index, Inde
     case EvidenceKind::kReturnRetract:
     case EvidenceKind::kSupplyExtend:
       return s.cylinders[i].pressure_a[row];
+    case EvidenceKind::kReturnLine:
+      break;
     case EvidenceKind::kPump:
       return s.pumps[i].pressure[row] - evidence_.series[log].pumps[i].demand[row];
   }
@@ -132,6 +134,8 @@ VectorXd RawEvidence::baseline_row(std::size_t log, EvidenceKind kind, int index
       line << 1.0, q, q * q, f, q * f;
       return line;
     }
+    case EvidenceKind::kReturnLine:
+      break;
     case EvidenceKind::kPump: {
       VectorXd line = VectorXd::Zero(machine_.cylinder_count() + 1);
       line[s.pumps[i].leader[row] + 1] = 1.0;

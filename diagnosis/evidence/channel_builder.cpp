@@ -120,6 +120,7 @@ void ChannelBuilder::block(std::size_t log, Index first, Index last, const Vecto
     y_.push_back(values[k]);
     rows_.push_back(base.row(k));
     channel.sample.push_back(k);
+    if (log < evidence_.since_change.size()) since_.push_back(evidence_.since_change[log][k]);
   }
   b.last = static_cast<Index>(y_.size());
   close(log, b);
@@ -142,6 +143,7 @@ bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   for (Index i = 0; i < n; ++i)
     channel.baseline.row(i) = rows_[static_cast<std::size_t>(i)].transpose();
   channel.baseline = acting_columns(channel.baseline);
+  channel.since_change = Eigen::Map<VectorXd>(since_.data(), std::ssize(since_));
   out.push_back(std::move(channel));
   return true;
 }

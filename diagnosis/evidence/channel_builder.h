@@ -30,6 +30,7 @@ class ChannelBuilder {
 
   const Evidence& evidence_;
   std::vector<double> y_;
+  std::vector<double> since_;          // [s] by row, since a command changed
   std::vector<Eigen::VectorXd> rows_;  // baseline
 };
 

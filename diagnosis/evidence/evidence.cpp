@@ -40,6 +40,8 @@ std::string evidence_text(EvidenceKind kind, const std::string& at) {
       return "supply pressure of " + at + " retracting";
     case EvidenceKind::kPump:
       return "pressure of pump " + at;
+    case EvidenceKind::kReturnLine:
+      return "pressure of the return line";
   }
   return at;
 }

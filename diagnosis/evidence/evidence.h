@@ -22,7 +22,7 @@ namespace sparflow {
 
 struct EvidenceChannel {
   EvidenceKind kind = EvidenceKind::kForce;
-  int index = 0;      ///< cylinder, or pump for kPump
+  int index = 0;      ///< cylinder, pump for kPump, 0 for kReturnLine
   std::string at;     ///< name of that cylinder or pump
   std::string text;   ///< "force of boom"
   FieldUnit unit;     ///< unit of reports
@@ -32,6 +32,7 @@ struct EvidenceChannel {
   std::vector<NoiseBlock> blocks;    ///< stretches of motion
   std::vector<int> log;              ///< [blocks] index into Evidence::series
   std::vector<Eigen::Index> sample;  ///< [rows] sample index in that log
+  Eigen::VectorXd since_change;      ///< [rows, s] since a command changed; infinite: none did
   /// Force and pump channels, by log: y before the filter [samples, SI], in which oscillations are searched; empty where
   /// the log does not measure it.
   std::vector<Eigen::VectorXd> raw;
@@ -49,6 +50,7 @@ struct EvidenceChannel {
       0.0;  ///< [SI] standard deviation of the sensors' noise in y; NaN = not known
 
   Eigen::Index rows() const { return y.size(); }
+  NoiseRows noise_rows() const { return {blocks, since_change}; }
 };
 
 /// Whether an effect rotates the whole machine, so that its force is nonlinear in its only parameter. A joint's offset
@@ -62,6 +64,8 @@ struct Evidence {
   std::vector<MachineSeries> series;  ///< suspect logs first, then references
   std::size_t suspects = 0;           ///< number of suspect logs
   std::vector<EvidenceChannel> channels;
+  std::vector<Eigen::VectorXd>
+      since_change;  ///< [logs][samples, s] since a command of the machine changed; no logs: not used
   std::vector<std::string> notes;  ///< which effects cannot be judged, and why; whole sentences
   int stride = 1;                  ///< samples between rows
   double window = 0.0;             ///< [s] width of the filter

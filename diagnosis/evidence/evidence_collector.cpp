@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
@@ -79,6 +80,26 @@ struct ChamberRole {
   }
 };
 
+/// Time since a command changed by more than `least`, in its run; infinite before the first change. [samples, s]
+VectorXd since_change(const MachineSeries& series, double least) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  VectorXd since = VectorXd::Constant(series.samples(), kNever);
+  for (const CylinderSeries& c : series.cylinders) {
+    if (c.command.size() == 0) continue;
+    for (const auto& [first, last] : series.runs) {
+      double level = c.command[first], changed = -kNever;
+      for (Index k = first; k < last; ++k) {
+        if (std::abs(c.command[k] - level) > least) {
+          level = c.command[k];
+          changed = series.time[k];
+        }
+        since[k] = std::min(since[k], series.time[k] - changed);
+      }
+    }
+  }
+  return since;
+}
+
 std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
                                             const std::vector<MachineSignals>& references) {
   std::vector<const MachineSignals*> all;
@@ -130,6 +151,8 @@ class EvidenceCollector {
   /// By direction: a return channel where the return line sets the pressures, else a supply channel.
   void add_pressure_channels(int cylinder);
   void add_pump_channel(int pump);
+  /// The common return line, where a log measures its pressure.
+  void add_return_line_channel();
   Evidence finished();
 
  private:
@@ -161,6 +184,8 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
     e.series.push_back(make_series(model_, s));
     if (!is_suspect(log) && in_references != nullptr)
       e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
+    if (e.options.mechanisms.enabled(Mechanism::kSettling))
+      e.since_change.push_back(since_change(e.series[log], e.options.least_change));
     add_kernels(s);
     e.window = std::max(e.window, s.window);
     e.stride = std::max(e.stride,
@@ -194,7 +219,9 @@ ChannelBuilder EvidenceCollector::builder(EvidenceKind kind, int index,
   ChannelBuilder b(evidence_);
   b.channel.kind = kind;
   b.channel.index = index;
-  b.channel.at = kind == EvidenceKind::kPump ? machine.pumps[at].name : machine.cylinders[at].name;
+  if (kind != EvidenceKind::kReturnLine)
+    b.channel.at =
+        kind == EvidenceKind::kPump ? machine.pumps[at].name : machine.cylinders[at].name;
   b.channel.unit = unit;
   b.channel.text = evidence_text(kind, b.channel.at);
   return b;
@@ -332,6 +359,27 @@ void EvidenceCollector::add_pump_channel(int pump) {
   }
 }
 
+void EvidenceCollector::add_return_line_channel() {
+  Evidence& e = evidence_;
+  constexpr EvidenceKind kKind = EvidenceKind::kReturnLine;
+  ChannelBuilder b = builder(kKind, 0, {"bar", 1e5});
+  MeanNoise noise(e.options);
+  for (std::size_t log = 0; log < signals_.size(); ++log) {
+    const VectorXd& raw = signals_[log]->return_pressure;
+    if (raw.size() == 0) continue;
+    const VectorXd total = total_return_flow(e.series[log]) / kBaselineFlow;
+    MatrixXd base(total.size(), 3);
+    base.col(0).setOnes();
+    base.col(1) = e.filter(log, kKind, total);
+    base.col(2) = e.filter(log, kKind, total.cwiseAbs2());
+    b.add(log, signals_[log]->usable && !signals_[log]->edge,
+          e.filter(log, kKind, raw - e.known(log, kKind, 0)), base, 0);
+    if (is_suspect(log)) noise.add(raw, gain_pressure_[log]);
+  }
+  b.channel.noise_floor = noise.value();
+  b.finish(e.channels);
+}
+
 Evidence EvidenceCollector::finished() {
   for (EvidenceChannel& channel : evidence_.channels) evidence_.add_shared(channel);
   return std::move(evidence_);
@@ -349,6 +397,7 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
     collector.add_pressure_channels(i);
   }
   for (int p = 0; p < model.machine.pump_count(); ++p) collector.add_pump_channel(p);
+  if (!hydraulic_cylinders(model.machine).empty()) collector.add_return_line_channel();
   return collector.finished();
 }
 

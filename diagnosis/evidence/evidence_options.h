@@ -1,6 +1,7 @@
 #pragma once
 /// Thresholds of the evidence: which samples form a channel, which branch of a valve law holds in them, what its noise
 /// model may contain. An Evidence keeps the options that it was collected with.
+#include <array>
 #include <vector>
 
 #include "diagnosis/evidence/mechanisms.h"
@@ -77,6 +78,19 @@ struct NoiseOptions {
   /// @threshold [rows] 1..; chosen: stands for the autoregression, which is not known yet in that
   /// step
   double rows_alike = 4.0;
+  /// Time constants of settling that are tried (NoiseModel::settling).
+  /// @threshold [s] 0..; chosen: from a fast spool to a column of oil behind a slow pump; between neighbours the likelihood changes
+  /// little
+  std::array<double, 4> settling = {0.15, 0.4, 1.0, 2.5};
+  /// Rows within one time constant after a change, and beyond three, below which both have the same deviation.
+  /// @threshold [rows] 2..; chosen: of fewer rows one outlier would decide; whether they differ decides the likelihood's gain
+  double fewest_rows_of_kind = 5.0;
+  /// Largest ratio of the deviations right after a change and in steady motion.
+  /// @threshold [1] 1..; chosen: beyond it transient rows have no weight left
+  double largest_transient_ratio = 30.0;
+  /// Gain in likelihood of a deviation that settles, below which it is constant.
+  /// @threshold [nat] 0..; chosen: as SearchOptions::least_gain, since rows are not quite independent
+  double least_settling_gain = 10.0;
 };
 
 /// See CavitationFloor in channel_builder.cpp.
@@ -105,6 +119,9 @@ struct EvidenceOptions {
   /// each channel, as columns of its baseline: an error of their values is no difference between the logs.
   std::vector<AppliedEffect> shared;
 
+  /// Change of a command, as share of full command, from which machine and oil have to settle again.
+  /// @threshold [1] 0..1; chosen: levers rest within a twentieth
+  double least_change = 0.05;
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows
   /// would cost time and add no information

@@ -35,6 +35,7 @@ enum class Mechanism : unsigned {
   kMinor,            ///< minor effects are not named
   kOnce,             ///< isolated event: a large gain without significance
   kEvent,            ///< event in the residual of a force or speed
+  kSettling,         ///< noise that is larger while the machine settles after a change of a command
   kCount
 };
 

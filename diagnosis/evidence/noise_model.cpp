@@ -1,7 +1,10 @@
 #include "diagnosis/evidence/noise_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 namespace sparflow {
 namespace {
@@ -18,16 +21,88 @@ Reflection reflections(const NoiseModel& m) {
   return {m.phi1 / (1.0 - m.phi2), m.phi2};
 }
 
-}  // namespace
+/// Squares by the time since a command changed, in classes that each are half as wide again as the one before; the last one has no
+/// end. A class has the variance that its median square implies for normal values, so that one motion out of many decides nothing.
+struct SettlingClasses {
+  static constexpr int kCount = 14;
+  static constexpr double kFirst = 0.05, kRatio = 1.5;  // [s], [1]
+  static constexpr double kMedianSquare = 0.4549;       // of a normal value of unit variance
+  std::array<double, kCount> squares{}, rows{};
 
-double NoiseModel::deviation() const {
-  const auto [k1, k2] = reflections(*this);
-  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
+  SettlingClasses(const Eigen::Ref<const Eigen::VectorXd>& residual, const NoiseRows& of) {
+    const double per_class = 1.0 / std::log(kRatio);
+    std::array<std::vector<double>, kCount> all;
+    for (const auto& [first, last] : of.blocks) {
+      for (Eigen::Index t = first; t < last; ++t) {
+        const double since = (*of.since_change)[t];
+        const auto at = since < kFirst
+                            ? 0.0
+                            : std::min(1.0 + std::log(since / kFirst) * per_class, kCount - 1.0);
+        all[static_cast<std::size_t>(at)].push_back(residual[t] * residual[t]);
+      }
+    }
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (all[k].empty()) continue;
+      const auto middle = all[k].begin() + std::ssize(all[k]) / 2;
+      std::nth_element(all[k].begin(), middle, all[k].end());
+      rows[k] = static_cast<double>(all[k].size());
+      squares[k] = rows[k] * *middle / kMedianSquare;
+    }
+  }
+  /// [s] middle of a class
+  static double time(int k) {
+    if (k == 0) return 0.5 * kFirst;
+    if (k == kCount - 1) return std::numeric_limits<double>::infinity();
+    return kFirst * std::pow(kRatio, k - 0.5);
+  }
+  double rows_between(double from, double to) const {
+    double n = 0.0;
+    for (int k = 0; k < kCount; ++k)
+      if (time(k) >= from && time(k) <= to) n += rows[static_cast<std::size_t>(k)];
+    return n;
+  }
+  /// Of independent rows with the deviation s(t), up to a constant. [nats]
+  double log_likelihood(double ratio, double settling) const {
+    double sum = 0.0, n = 0.0, logs = 0.0;
+    for (int k = 0; k < kCount; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double s = 1.0 + (ratio - 1.0) * std::exp(-time(k) / settling);
+      sum += squares[i] / (s * s);
+      logs += rows[i] * std::log(s);
+      n += rows[i];
+    }
+    return -logs - 0.5 * n * std::log(std::max(sum / n, 1e-300));
+  }
+};
+
+/// Sets `transient` and `settling` to the most likely ones.
+void estimate_settling(const Eigen::Ref<const Eigen::VectorXd>& residual, const NoiseRows& rows,
+                       const NoiseOptions& options, NoiseModel& m) {
+  if (rows.since_change == nullptr) return;
+  constexpr double kRatioStep = 1.4;   // between the ratios that are tried
+  constexpr double kSteadyFrom = 3.0;  // time constants, after which e^-3 of the excess is left
+  const SettlingClasses classes(residual, rows);
+  double best = classes.log_likelihood(1.0, 1.0) + options.least_settling_gain;
+  for (const double settling : options.settling) {
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    if (std::min(classes.rows_between(0.0, settling),
+                 classes.rows_between(kSteadyFrom * settling, kNever)) <
+        options.fewest_rows_of_kind)
+      continue;
+    for (double ratio = kRatioStep; ratio <= options.largest_transient_ratio; ratio *= kRatioStep) {
+      const double likelihood = classes.log_likelihood(ratio, settling);
+      if (likelihood <= best) continue;
+      best = likelihood;
+      m.transient = ratio;
+      m.settling = settling;
+    }
+  }
 }
 
-NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                const std::vector<NoiseBlock>& blocks, bool offsets,
-                                const NoiseOptions& options) {
+/// See NoiseModel::estimate; all rows have the same deviation.
+NoiseModel estimate_evenly(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                           const std::vector<NoiseBlock>& blocks, bool offsets,
+                           const NoiseOptions& options) {
   const double largest = options.largest_reflection;
   NoiseModel m;
   double tau2 = 0.0;
@@ -91,27 +166,58 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
   return m;
 }
 
+}  // namespace
+
+double NoiseModel::deviation() const {
+  const auto [k1, k2] = reflections(*this);
+  return std::sqrt(variance / ((1.0 - k1 * k1) * (1.0 - k2 * k2)) + offset_variance);
+}
+
+Eigen::VectorXd NoiseModel::scale_of(const NoiseRows& rows) const {
+  if (transient == 1.0 || rows.since_change == nullptr) return {};
+  return 1.0 + (transient - 1.0) * (-rows.since_change->array() / settling).exp();
+}
+
+NoiseModel NoiseModel::settling_of(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                   const NoiseRows& rows, const NoiseOptions& options) {
+  NoiseModel m;
+  estimate_settling(values, rows, options, m);
+  return m;
+}
+
+NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                const NoiseRows& rows, bool offsets, const NoiseOptions& options) {
+  const NoiseModel settling = settling_of(residual, rows, options);
+  const Eigen::VectorXd scale = settling.scale_of(rows);
+  if (scale.size() == 0) return estimate_evenly(residual, rows.blocks, offsets, options);
+  NoiseModel m = estimate_evenly(residual.cwiseQuotient(scale), rows.blocks, offsets, options);
+  m.transient = settling.transient;
+  m.settling = settling.settling;
+  return m;
+}
+
 double NoiseModel::log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                  const std::vector<NoiseBlock>& blocks) const {
+                                  const NoiseRows& rows) const {
   Eigen::MatrixXd r = residual;
-  const double log_determinant = whiten(blocks, r);
+  const double log_determinant = whiten(rows, r);
   const auto n = static_cast<double>(r.size());
   return log_determinant - 0.5 * n * std::log(std::max(r.squaredNorm() / n, 1e-300));
 }
 
 NoiseModel NoiseModel::scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                                 const std::vector<NoiseBlock>& blocks) const {
+                                 const NoiseRows& rows) const {
   NoiseModel m = *this;
   Eigen::MatrixXd r = residual;
-  m.whiten(blocks, r);
+  m.whiten(rows, r);
   const double scale = std::max(r.squaredNorm() / static_cast<double>(r.size()), 1e-300) / variance;
   m.variance *= scale;
   m.offset_variance *= scale;
   return m;
 }
 
-double NoiseModel::whiten(const std::vector<NoiseBlock>& blocks,
-                          Eigen::Ref<Eigen::MatrixXd> columns) const {
+double NoiseModel::whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> columns) const {
+  const Eigen::VectorXd scale = scale_of(rows);
+  if (scale.size() > 0) columns.array().colwise() /= scale.array();
   const Reflection reflection = reflections(*this);
   const double k1 = reflection.k1, k2 = reflection.k2;
   // standard deviations of the first two samples in units of the innovation's
@@ -119,8 +225,9 @@ double NoiseModel::whiten(const std::vector<NoiseBlock>& blocks,
   const double s0 = s1 / std::sqrt(1.0 - k1 * k1);
   const double ratio = offset_variance / variance;
   double log_determinant = 0.0;
+  if (scale.size() > 0) log_determinant -= scale.array().log().sum();
   Eigen::VectorXd one;
-  for (const auto& [first, last] : blocks) {
+  for (const auto& [first, last] : rows.blocks) {
     const Eigen::Index n = last - first;
     if (n <= 0) continue;
     log_determinant -= std::log(s0) + (n > 1 ? std::log(s1) : 0.0);

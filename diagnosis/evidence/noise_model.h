@@ -15,32 +15,54 @@ struct NoiseBlock {
   Eigen::Index first = 0, last = 0;
 };
 
+/// The rows of a channel: its blocks, and the time since a command of the machine changed.
+struct NoiseRows {
+  const std::vector<NoiseBlock>& blocks;
+  const Eigen::VectorXd* since_change = nullptr;  ///< [rows, s]; null: not known
+
+  NoiseRows(const std::vector<NoiseBlock>& all) : blocks(all) {}
+  NoiseRows(const std::vector<NoiseBlock>& all, const Eigen::VectorXd& since)
+      : blocks(all), since_change(since.size() > 0 ? &since : nullptr) {}
+};
+
+/// The autoregression and the offsets are those of y / s(t), s(t) = 1 + (transient - 1) exp(-t / settling), with t the time since a command changed: pumps, spools and columns of oil settle, and what a model lacks of that must not count as noise of
+/// steady motion.
 struct NoiseModel {
   double phi1 = 0.0, phi2 = 0.0;  ///< y_t = phi1 y_{t-1} + phi2 y_{t-2} + e_t; stationary
   double variance = 1.0;          ///< [unit^2 of the series] variance of e_t
   double offset_variance = 0.0;   ///< [unit^2 of the series] variance of the block offsets
+  double transient =
+      1.0;  ///< [-] deviation right after a change of a command over that in steady motion, >= 1
+  double settling = 1.0;  ///< [s] time constant with which it settles
 
   /// Moment estimates from residuals: autocovariances are pooled over blocks about the blocks' shrunken means; the
   /// offset variance is the variance of block means beyond what the autoregression explains.
   /// @param offsets whether blocks may have offsets
   static NoiseModel estimate(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                             const std::vector<NoiseBlock>& blocks, bool offsets = true,
+                             const NoiseRows& rows, bool offsets = true,
                              const NoiseOptions& options = {});
+
+  /// White noise of unit variance whose deviation settles after commands as that of the values does.
+  static NoiseModel settling_of(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                const NoiseRows& rows, const NoiseOptions& options);
 
   /// Log-likelihood up to a constant, with both variances scaled by their most likely common factor. [nats]
   double log_likelihood(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                        const std::vector<NoiseBlock>& blocks) const;
+                        const NoiseRows& rows) const;
 
   /// This model with both variances scaled by their most likely common factor.
   NoiseModel scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residual,
-                       const std::vector<NoiseBlock>& blocks) const;
+                       const NoiseRows& rows) const;
 
   /// Makes rows independent with variance `variance`, by the exact inverse square root of the covariance of each block.
   /// @param columns [rows x any], in place
   /// @return log-determinant of the transformation, to be added to a log-likelihood
-  double whiten(const std::vector<NoiseBlock>& blocks, Eigen::Ref<Eigen::MatrixXd> columns) const;
+  double whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> columns) const;
 
-  /// Standard deviation of one value, of autoregression and offset together. [unit of the series]
+  /// s(t) of every row; empty where it is one. [rows]
+  Eigen::VectorXd scale_of(const NoiseRows& rows) const;
+
+  /// Standard deviation of one steady value, of autoregression and offset together. [unit of the series]
   double deviation() const;
 };
 

@@ -78,14 +78,14 @@ double noncentrality_for(double nats, double power, int freedom) {
   return hi;
 }
 
-VectorXd draw_noise(const NoiseModel& noise, const std::vector<NoiseBlock>& blocks, Index rows,
+VectorXd draw_noise(const NoiseModel& noise, const NoiseRows& of, Index rows,
                     std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   const double k2 = noise.phi2, k1 = noise.phi1 / (1.0 - noise.phi2);
   const double innovation = std::sqrt(noise.variance), offset = std::sqrt(noise.offset_variance);
   const double s1 = innovation / std::sqrt(1.0 - k2 * k2), s0 = s1 / std::sqrt(1.0 - k1 * k1);
   VectorXd y = VectorXd::Zero(rows);
-  for (const auto& [first, last] : blocks) {
+  for (const auto& [first, last] : of.blocks) {
     for (Index t = first; t < last; ++t) {
       if (t == first) {
         y[t] = s0 * normal(random);
@@ -97,7 +97,8 @@ VectorXd draw_noise(const NoiseModel& noise, const std::vector<NoiseBlock>& bloc
     }
     y.segment(first, last - first).array() += offset * normal(random);
   }
-  return y;
+  const VectorXd scale = noise.scale_of(of);
+  return scale.size() > 0 ? VectorXd(y.cwiseProduct(scale)) : y;
 }
 
 double Signature::squares() const {
@@ -142,7 +143,7 @@ PowerStudy::PowerStudy(const Evidence& evidence, const EffectFit& fit, unsigned 
     drawn_likelihood_.emplace_back();
     for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
       const EvidenceChannel& channel = evidence.channels[c];
-      drawn_.back().push_back(draw_noise(noise_[c], channel.blocks, channel.rows(), random));
+      drawn_.back().push_back(draw_noise(noise_[c], channel.noise_rows(), channel.rows(), random));
       drawn_likelihood_.back().push_back(log_likelihood(c, drawn_.back().back()));
     }
   }
@@ -170,10 +171,10 @@ ProjectedDesign PowerStudy::project(const EffectDesign& design) const {
 }
 
 double PowerStudy::log_likelihood(std::size_t channel, const VectorXd& residual) const {
-  const std::vector<NoiseBlock>& blocks = evidence_.channels[channel].blocks;
-  const NoiseModel noise = NoiseModel::estimate(residual, blocks, true, evidence_.options.noise);
+  const NoiseRows rows = evidence_.channels[channel].noise_rows();
+  const NoiseModel noise = NoiseModel::estimate(residual, rows, true, evidence_.options.noise);
   MatrixXd white = residual;
-  const double determinant = noise.whiten(blocks, white);
+  const double determinant = noise.whiten(rows, white);
   const auto n = static_cast<double>(residual.size());
   const double variance = std::max(white.squaredNorm() / n, 1e-300);
   return determinant - 0.5 * n * (std::log(2.0 * std::numbers::pi * variance) + 1.0);

@@ -17,8 +17,8 @@ double chance_above(double x, int freedom, double lambda);
 double noncentrality_for(double nats, double power, int freedom);
 
 /// Random draw from a noise model: an autoregression with random offsets of the blocks. [rows]
-Eigen::VectorXd draw_noise(const NoiseModel& noise, const std::vector<NoiseBlock>& blocks,
-                           Eigen::Index rows, std::mt19937_64& random);
+Eigen::VectorXd draw_noise(const NoiseModel& noise, const NoiseRows& of, Eigen::Index rows,
+                           std::mt19937_64& random);
 
 /// Columns of a design orthogonal to the baseline, by channel; no columns where the effect does not act.
 struct ProjectedDesign {

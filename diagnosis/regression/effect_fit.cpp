@@ -78,7 +78,7 @@ MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
   const Index n = channel.rows(), b = channel.baseline.cols(), m = columns.cols();
   MatrixXd all(n, b + m + 1);
   all << channel.baseline, columns, channel.y;
-  const double l = noise.whiten(channel.blocks, all);
+  const double l = noise.whiten(channel.noise_rows(), all);
   if (log_determinant != nullptr) *log_determinant = l;
   if (b == 0) {
     if (baseline_coefficients != nullptr) baseline_coefficients->resize(0, m + 1);
@@ -93,6 +93,16 @@ namespace {
 NoiseModel white_noise_of(const VectorXd& values) {
   NoiseModel noise;
   noise.variance = std::max(values.squaredNorm() / static_cast<double>(values.size()), 1e-300);
+  return noise;
+}
+
+/// The same with a deviation that settles after commands.
+NoiseModel settling_noise_of(const EvidenceChannel& channel, const NoiseOptions& options) {
+  NoiseModel noise = NoiseModel::settling_of(channel.y, channel.noise_rows(), options);
+  const VectorXd scale = noise.scale_of(channel.noise_rows());
+  noise.variance =
+      white_noise_of(scale.size() > 0 ? VectorXd(channel.y.cwiseQuotient(scale)) : channel.y)
+          .variance;
   return noise;
 }
 
@@ -209,12 +219,12 @@ void ProfileLikelihood::update_noise(std::size_t c, const VectorXd& residual, bo
     return;
   }
   // the more likely of the former model and the moment estimate, so that no pass makes the fit worse
-  const std::vector<NoiseBlock>& blocks = evidence_.channels[c].blocks;
+  const NoiseRows rows = evidence_.channels[c].noise_rows();
   const NoiseModel& before = fit_.noise[c];
-  const NoiseModel next = NoiseModel::estimate(residual, blocks, true, evidence_.options.noise);
-  const bool better = !keeps_former || next.log_likelihood(residual, blocks) >
-                                           before.log_likelihood(residual, blocks);
-  fit_.noise[c] = better ? next : before.scaled_to(residual, blocks);
+  const NoiseModel next = NoiseModel::estimate(residual, rows, true, evidence_.options.noise);
+  const bool better =
+      !keeps_former || next.log_likelihood(residual, rows) > before.log_likelihood(residual, rows);
+  fit_.noise[c] = better ? next : before.scaled_to(residual, rows);
 }
 
 double ProfileLikelihood::log_likelihood_in(std::size_t c) const {
@@ -269,7 +279,10 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
     fit_.log_likelihood = start->log_likelihood;
   } else {
     for (std::size_t c = 0; c < channels(); ++c) {
-      if (active(c)) fit_.noise[c] = white_noise_of(evidence_.channels[c].y);
+      if (!active(c)) continue;
+      fit_.noise[c] = control_.ordinary
+                          ? white_noise_of(evidence_.channels[c].y)
+                          : settling_noise_of(evidence_.channels[c], evidence_.options.noise);
     }
   }
   for (int pass = 0; pass < control_.noise_passes + 1; ++pass) {
@@ -285,6 +298,8 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
       if (control_.keep_residuals) fit_.residual[c] = std::move(residual);
     }
   }
+  for (const NoiseModel& noise : fit_.noise)
+    evidence_.options.mechanisms.act(Mechanism::kSettling, noise.transient != 1.0);
   if (control_.covariance && count_ > 0) fit_.covariance = covariance();
   return std::move(fit_);
 }

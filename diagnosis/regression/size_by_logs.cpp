@@ -130,7 +130,7 @@ SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
     return log_likelihood(suspects, v) + log_likelihood(references, v);
   };
   const Variation v = likelihood(scaled) > likelihood(added) ? scaled : added;
-  return {size_in_logs(suspects, v), size_in_logs(references, v), std::sqrt(v.added)};
+  return {size_in_logs(suspects, v), size_in_logs(references, v), m.freedom, std::sqrt(v.added)};
 }
 
 }  // namespace sparflow

@@ -239,7 +239,7 @@ VectorXd to_explain(const Evidence& evidence, const EvidenceChannel& channel, co
                     const std::vector<Index>& rows, const ResidualModelOptions& options) {
   VectorXd y = whole(rows).array() - whole(rows).mean();
   if (channel.kind != EvidenceKind::kForce && channel.kind != EvidenceKind::kFlow &&
-      channel.kind != EvidenceKind::kPump) {
+      channel.kind != EvidenceKind::kPump && channel.kind != EvidenceKind::kReturnLine) {
     // a pressure model learns any smooth law of the cylinder's own flow and force, so that is explained
     const MatrixXd own = own_process_basis(evidence, channel, rows, options);
     MatrixXd gram = transposed_product(own, own);
@@ -338,7 +338,12 @@ std::vector<ResidualStructure> find_residual_structure(const Evidence& evidence,
   const std::size_t channels = evidence.channels.size();
   std::vector<std::optional<ResidualStructure>> each(channels);
   parallel(channels, [&](std::size_t c) {
-    each[c] = residual_structure_of(evidence, c, fit.residual[c], options);
+    // while the machine settles a residual is larger without structure
+    const VectorXd scale = fit.noise[c].scale_of(evidence.channels[c].noise_rows());
+    const bool settles = scale.size() > 0 && fit.residual[c].size() > 0;
+    each[c] = residual_structure_of(
+        evidence, c, settles ? VectorXd(fit.residual[c].cwiseQuotient(scale)) : fit.residual[c],
+        options);
   });
   std::vector<ResidualStructure> found;
   for (std::optional<ResidualStructure>& left : each) {

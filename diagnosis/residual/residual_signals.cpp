@@ -49,9 +49,10 @@ class SignalCollector {
 
  private:
   bool is_pump() const { return channel_.kind == EvidenceKind::kPump; }
+  bool is_return_line() const { return channel_.kind == EvidenceKind::kReturnLine; }
   bool is_flow() const { return channel_.kind == EvidenceKind::kFlow; }
   bool is_pressure() const {
-    return channel_.kind != EvidenceKind::kForce && !is_flow() && !is_pump();
+    return channel_.kind != EvidenceKind::kForce && !is_flow() && !is_pump() && !is_return_line();
   }
   bool is_own(std::size_t cylinder) const { return static_cast<int>(cylinder) == channel_.index; }
   /// A signal from a sensor of the channel itself is left out, because it would explain that sensor's noise.
@@ -96,6 +97,7 @@ SignalCollector::SignalCollector(const Evidence& evidence, const EvidenceChannel
 
 bool SignalCollector::shares_sensor(std::size_t cylinder, bool pressure) const {
   if (is_pump()) return pressure;
+  if (is_return_line()) return false;
   if (!is_own(cylinder)) return false;
   if (is_pressure()) return true;  // inputs of the pressure model
   return pressure != is_flow();

@@ -17,7 +17,7 @@ InjectionCheck inject_and_search(const Evidence& evidence, const EffectFit& fit,
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     if (!design.touches(c)) continue;
     EvidenceChannel channel = evidence.channels[c];
-    channel.y = draw_noise(fit.noise[c], channel.blocks, channel.rows(), random) +
+    channel.y = draw_noise(fit.noise[c], channel.noise_rows(), channel.rows(), random) +
                 design.columns[c] * injection.theta;
     injected.channels.push_back(std::move(channel));
   }

@@ -196,8 +196,13 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
     else
       d.shared_structure.push_back(std::move(unnamed));
   }
-  if (d.search.found.empty() && !d.unexplained && d.search.once)
-    d.unexplained = describe_isolated_event(d, options.isolated_event);
+  if (d.search.found.empty() && !d.unexplained && d.search.once) {
+    Unexplained event = describe_isolated_event(d, options.isolated_event);
+    if (exceeds_references(d, event.channel))
+      d.unexplained = std::move(event);
+    else
+      d.shared_structure.push_back(std::move(event));
+  }
   if (d.search.found.empty() && !d.unexplained) {
     if (const std::optional<std::size_t> channel = channel_beyond_references(d))
       d.unexplained = describe_beyond_references(d, *channel);

@@ -104,6 +104,10 @@ struct VerdictOptions {
   /// larger is no change.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double structure_false_alarm = 0.01;
+  /// RMS of a channel's residual over that in the references, above which it is a difference although no effect and no signal
+  /// explains it.
+  /// @threshold [1] 1..; chosen: other motions alone change it by half; of twice the error three quarters of the square are new
+  double least_excess_ratio = 2.0;
   /// RMS of a structure in the references, or of what they leave in that channel beyond the sensors' noise, over that of
   /// a structure in the suspect logs, from which the latter may be shared.
   /// @threshold [1] 0..; chosen: half of the squared error; a structure near the residual models' own limits is found in

@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Mean, variance of the mean and largest of the logarithms of the blocks' mean squares.
+/// Mean, variance of the mean and largest of the logarithms of the blocks' mean squares, in which rows count by their deviation.
 struct BlockLevel {
   double mean = 0.0, variance_of_mean = 0.0, largest = 0.0;
   int blocks = 0;
@@ -29,7 +29,9 @@ struct BlockLevel {
 
 BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
   const EvidenceChannel& c = d.evidence.channels[channel];
-  const VectorXd& residual = d.search.final.residual[channel];
+  VectorXd residual = d.search.final.residual[channel];
+  const VectorXd scale = d.search.final.noise[channel].scale_of(c.noise_rows());
+  if (scale.size() > 0) residual.array() /= scale.array();
   std::vector<double> levels;
   for (std::size_t b = 0; b < c.blocks.size(); ++b) {
     if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
@@ -67,8 +69,11 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
 
 /// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
 /// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
-/// of motion hardly moves the mean level.
-double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference) {
+/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
+/// no difference.
+/// @param excess ratio of the RMS
+double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
+  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
   const double n = reference.blocks;
   const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
   return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
@@ -187,7 +192,7 @@ std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t c
                    reference = block_level(d, channel, true);
   if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
   const double level = chance_of_level(suspect, reference),
-               largest = chance_of_largest(suspect, reference);
+               largest = chance_of_largest(suspect, reference, d.thresholds.least_excess_ratio);
   if (tracing())
     fmt::print(stderr,
                "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
@@ -212,6 +217,8 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
   std::optional<std::size_t> found;
   double least = d.thresholds.structure_false_alarm;
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    const double here = suspect_rms(d.evidence, c, d.search.final.residual[c]);
+    if (!(here > d.thresholds.least_excess_ratio * reference_rms(d, c))) continue;
     const std::optional<double> chance = chance_beyond_references(d, c);
     if (chance && *chance < least) {
       least = *chance;
@@ -290,7 +297,8 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
     return parameters_differ(apart, suspect.linear, significant) ? InReferences::kNot
                                                                  : InReferences::kAlike;
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
-  if (here.blocks > 0 && !significant(here.size / here.standard_error))
+  // of a single stretch of motion it is not known how far the size varies between motions
+  if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
     return InReferences::kVaries;
   if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
     return InReferences::kNot;

@@ -22,7 +22,8 @@ double reference_rms(const Diagnosis& d, std::size_t channel);
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel);
 /// Whether that is significant; true where there is nothing to compare with.
 bool exceeds_references(const Diagnosis& d, std::size_t channel);
-/// The channel in which it is most significant; nothing where it is in none, or without references.
+/// The channel in which it is most significant, among those whose residual is a multiple of that in the references; nothing
+/// where it is in none, or without references.
 std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
 
 /// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in

@@ -18,7 +18,8 @@ namespace {
 /// cylinder, `to` is the pump whose demand they determine, or both are speeds of cylinders on one pump.
 bool shows_too(const Machine& machine, const EvidenceChannel& from, const EvidenceChannel& to) {
   const auto of_chambers = [](const EvidenceChannel& c) {
-    return c.kind != EvidenceKind::kFlow && c.kind != EvidenceKind::kPump;
+    return c.kind != EvidenceKind::kFlow && c.kind != EvidenceKind::kPump &&
+           c.kind != EvidenceKind::kReturnLine;
   };
   if (from.kind == EvidenceKind::kFlow && to.kind == EvidenceKind::kFlow) {
     const int pump = machine.pump_of_cylinder(from.index);

@@ -126,6 +126,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
   out.qdd = signals.qdd;
   out.payload = signals.payload;
   out.oil = signals.oil;
+  out.return_pressure = signals.return_pressure;
   for (std::size_t i = 0; i < machine.cylinders.size(); ++i) {
     out.cylinders.push_back(cylinder_series(machine.cylinders[i], signals.cylinders[i]));
     CylinderSeries& c = out.cylinders.back();

@@ -55,6 +55,8 @@ const char* evidence_words(EvidenceKind kind) {
       return "supply pressure retracting";
     case EvidenceKind::kPump:
       return "pump pressure";
+    case EvidenceKind::kReturnLine:
+      return "pressure of the return line";
   }
   return "";
 }

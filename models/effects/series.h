@@ -60,6 +60,7 @@ struct MachineSeries {
   Eigen::MatrixXd q, qd, qdd;                               ///< [samples x joints]
   Eigen::VectorXd payload;                                  ///< [kg]
   Eigen::VectorXd oil;                                      ///< [degC]
+  Eigen::VectorXd return_pressure;  ///< [Pa] of the common return line; empty: not measured
   std::vector<CylinderSeries> cylinders;
   std::vector<PumpSeries> pumps;
 
@@ -78,7 +79,8 @@ enum class EvidenceKind {
   /// counterbalance valve sets it, the force then appears in the return chamber
   kSupplyExtend,
   kSupplyRetract,  ///< the same while retracting
-  kPump            ///< pump: pressure - demand of the measured working pressures [Pa]
+  kPump,           ///< pump: pressure - demand of the measured working pressures [Pa]
+  kReturnLine      ///< machine: pressure of the common return line, given all return flows [Pa]
 };
 
 }  // namespace sparflow

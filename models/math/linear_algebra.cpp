@@ -63,7 +63,47 @@ VectorXd least_squares_of_least_norm(const MatrixIn& a, const VectorIn& b) {
   return qr.colsPermutation() * least_norm_columns(equations, right.topRows(r));
 }
 
+namespace {
+
+/// B S = Q U with scaled columns, orthonormal Q and upper triangular U, by two Cholesky factorisations (Yamamoto, Nakatsukasa,
+/// Yanagisawa, Fukaya 2015, Electron. Trans. Numer. Anal. 44, 306). It consists of matrix products and takes a fraction of the
+/// time of a QR factorisation with pivots.
+struct CholeskyQr {
+  MatrixXd q, u;
+  VectorXd scale;
+
+  /// @return false where the columns are nearly dependent, for which it is not accurate
+  bool compute(const MatrixIn& b) {
+    // The error of one step grows with the square of the condition number; from 1e6 on the second step may not repair it.
+    constexpr double kLeastPivot = 1e-6;  // no threshold: rounding of the first step
+    if (b.cols() == 0 || b.rows() < b.cols()) return false;
+    scale = b.colwise().norm().transpose();
+    if (!(scale.minCoeff() > 0.0)) return false;
+    scale = scale.cwiseInverse();
+    q = b * scale.asDiagonal();
+    for (int step = 0; step < 2; ++step) {
+      const Eigen::LLT<MatrixXd> factor(MatrixXd(q.transpose() * q));
+      if (factor.info() != Eigen::Success) return false;
+      const MatrixXd upper = factor.matrixU();
+      if (!(upper.diagonal().minCoeff() > kLeastPivot)) return false;
+      upper.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(q);
+      u = step == 0 ? upper : MatrixXd(upper * u);
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
 MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b, MatrixXd* coefficients) {
+  CholeskyQr fast;
+  if (fast.compute(b)) {
+    const MatrixXd on_basis = fast.q.transpose() * a;
+    if (coefficients != nullptr)
+      *coefficients =
+          fast.scale.asDiagonal() * fast.u.triangularView<Eigen::Upper>().solve(on_basis);
+    return a - fast.q * on_basis;
+  }
   MatrixXd x = Qr(b).solve(a);
   MatrixXd left = a - b * x;
   if (coefficients != nullptr) *coefficients = std::move(x);

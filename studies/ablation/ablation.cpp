@@ -56,7 +56,8 @@ const Named kMechanisms[] = {{"leaders", Mechanism::kLeaders},
                              {"swap", Mechanism::kSwap},
                              {"minor", Mechanism::kMinor},
                              {"once", Mechanism::kOnce},
-                             {"event", Mechanism::kEvent}};
+                             {"event", Mechanism::kEvent},
+                             {"settling", Mechanism::kSettling}};
 
 struct Options {
   int runs = 100;

@@ -1,6 +1,7 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [-v] [--json FILE] [--logs FOLDER]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without MECHANISM] [-v]
+//                  [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -34,6 +35,7 @@ struct Arguments {
   double seconds = 200.0;
   std::string only, json, logs;
   bool no_reference = false, verbose = false;
+  Mechanisms mechanisms;
 };
 
 /// A change of the plant, with what may be named for it.
@@ -204,8 +206,10 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       c.change = clean ? "none" : hidden.change->name;
       c.at = clean ? "" : hidden.at;
       const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
+      DiagnoseOptions options;
+      options.evidence.mechanisms = a.mechanisms;
       const Diagnosis d =
-          diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference);
+          diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
       judge(d, machine, clean ? Hidden{} : hidden, c);
       c.seconds = d.seconds;
       if (a.verbose) c.answer += "\n" + d.table();
@@ -270,7 +274,13 @@ int main(int argc, char** argv) {
   app.add_option("--logs", a.logs, "folder for the logs and the learned models")
       ->check(CLI::ExistingDirectory);
   app.add_flag("--no-reference", a.no_reference, "diagnose without the reference log");
+  std::vector<std::string> without;
+  app.add_option("--without", without, "mechanisms of the diagnosis that are switched off")
+      ->check(CLI::IsMember({"settling"}));
   app.add_flag("-v", a.verbose, "whole diagnoses");
   CLI11_PARSE(app, argc, argv);
+  using sparflow::Mechanism;
+  for (const std::string& name : without)
+    if (name == "settling") a.mechanisms.switch_off(Mechanism::kSettling);
   return sparflow::bench::run(a);
 }

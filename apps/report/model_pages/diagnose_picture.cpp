@@ -45,6 +45,8 @@ const VectorXd& measured_of(const MachineSeries& log, const EvidenceChannel& cha
     case EvidenceKind::kReturnRetract:
     case EvidenceKind::kSupplyExtend:
       return log.cylinders[i].pressure_a;
+    case EvidenceKind::kReturnLine:
+      return log.return_pressure;
     case EvidenceKind::kPump:
       break;
   }
@@ -115,7 +117,8 @@ std::vector<ExplainingSignal> explaining_signals(const Evidence& evidence,
     out.push_back({id, words, unit, values / scale});
   };
   const auto i = static_cast<std::size_t>(channel.index);
-  const bool is_pump = channel.kind == EvidenceKind::kPump;
+  const bool is_pump =
+      channel.kind == EvidenceKind::kPump || channel.kind == EvidenceKind::kReturnLine;
   for (int j = 0; j < machine.joint_count(); ++j) {
     const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
     const bool turns = joint.type == JointType::kRevolute;

@@ -128,6 +128,68 @@ TEST(NoiseModel, ConstantInsideBlocksIsNoEvidenceOnceBlocksHaveOffsets) {
   EXPECT_GT(without.squaredNorm(), 90.0);
 }
 
+/// Blocks that begin with a change of a command, rows 0.1 s apart. [rows, s]
+VectorXd since_start(const std::vector<NoiseBlock>& blocks) {
+  VectorXd since(testing_support::rows_of(blocks));
+  for (const NoiseBlock& b : blocks)
+    for (Index t = b.first; t < b.last; ++t) since[t] = 0.1 * static_cast<double>(t - b.first);
+  return since;
+}
+
+TEST(NoiseModel, SettlesAfterCommandsAndIsThenWhatItIsWithoutThem) {
+  std::mt19937_64 random(5);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 60));
+  const VectorXd since = since_start(blocks);
+  for (const NoiseModel& law : {laws()[0], laws()[1]}) {
+    NoiseModel truth = law;
+    truth.transient = 8.0;
+    truth.settling = 0.4;
+    const NoiseRows rows(blocks, since);
+    const VectorXd even = draw(law, blocks, random), y = even.cwiseProduct(truth.scale_of(rows));
+    const NoiseModel m = NoiseModel::estimate(y, rows, false),
+                     same = NoiseModel::estimate(even, blocks, false);
+    // ratios are tried in steps of 1.4, times in steps of 2.5
+    EXPECT_NEAR(std::log(m.transient / truth.transient), 0.0, std::log(1.4));
+    EXPECT_EQ(m.settling, truth.settling);
+    // a ratio that is wrong by a step changes a tenth of the rows
+    EXPECT_NEAR(m.phi1, same.phi1, 0.05);
+    EXPECT_NEAR(m.deviation(), same.deviation(), 0.1 * same.deviation());
+    // without the times, starts count as noise of steady motion
+    EXPECT_GT(NoiseModel::estimate(y, blocks, false).deviation(), 1.5 * same.deviation());
+  }
+}
+
+TEST(NoiseModel, NoiseThatIsEvenDoesNotSettle) {
+  std::mt19937_64 random(6);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 60));
+  for (const NoiseModel& law : laws())
+    EXPECT_EQ(NoiseModel::estimate(draw(law, blocks, random), {blocks, since_start(blocks)}, false)
+                  .transient,
+              1.0);
+}
+
+TEST(NoiseModel, WhiteningOfUnevenRowsIsTheInverseRootToo) {
+  const std::vector<NoiseBlock> blocks = blocks_of({3, 17, 40});
+  const Index n = testing_support::rows_of(blocks);
+  const VectorXd since = since_start(blocks);
+  const NoiseRows rows(blocks, since);
+  for (NoiseModel m : laws()) {
+    m.transient = 5.0;
+    MatrixXd w = MatrixXd::Identity(n, n);
+    const double log_determinant = m.whiten(rows, w);
+    VectorXd scale(n);
+    for (Index t = 0; t < n; ++t)
+      scale[t] = 1.0 + 4.0 * std::exp(-since[t] / m.settling);
+    const MatrixXd covariance =
+        scale.asDiagonal() * dense_covariance(m, blocks) * scale.asDiagonal();
+    const MatrixXd unit = w * covariance * w.transpose() / m.variance;
+    // rounding of sums of 40 products of size 10 times the scale, 5
+    EXPECT_LT((unit - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-9);
+    const double dense = -0.5 * Cholesky(covariance / m.variance).log_det();
+    EXPECT_NEAR(log_determinant, dense, 1e-9 * static_cast<double>(n));
+  }
+}
+
 TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
   std::mt19937_64 random(4);
   const std::vector<NoiseBlock> three = blocks_of({50, 50, 50});
@@ -135,7 +197,7 @@ TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
   const std::vector<NoiseBlock> five = blocks_of({50, 50, 50, 50, 50});
   EXPECT_EQ(NoiseModel::estimate(draw(laws()[2], five, random), five, false).offset_variance, 0.0);
   EXPECT_GT(NoiseModel::estimate(VectorXd::Zero(250), five).variance, 0.0);
-  EXPECT_GT(NoiseModel::estimate(VectorXd::Zero(0), {}).variance, 0.0);
+  EXPECT_GT(NoiseModel::estimate(VectorXd::Zero(0), std::vector<NoiseBlock>{}).variance, 0.0);
   const NoiseModel constant = NoiseModel::estimate(VectorXd::Constant(250, 3.0), five);
   EXPECT_TRUE(std::isfinite(constant.deviation()));
 }

@@ -65,6 +65,25 @@ TEST(LinearAlgebra, ComplementAndSpanMakeUpTheSpace) {
   EXPECT_LT((rest.transpose() * a).cwiseAbs().maxCoeff(), kNearOne);
 }
 
+TEST(LinearAlgebra, ProjectionIsTheLeastSquaresOneForDependentColumnsToo) {
+  const MatrixXd a = normal_matrix(40, 3, 9);
+  MatrixXd b = normal_matrix(40, 5, 10);
+  b.col(1) *= 1e9;  // columns of pressures and of ones
+  for (const double apart : {1.0, 1e-4, 1e-9, 0.0}) {
+    b.col(4) = b.col(0) + apart * normal_matrix(40, 1, 11);
+    MatrixXd x;
+    const MatrixXd left = without_projection(a, b, &x);
+    // normal to all columns, in units of their lengths; nearly dependent ones are determined to rounding / apart
+    const VectorXd scale = b.colwise().norm();
+    EXPECT_LT((scale.cwiseInverse().asDiagonal() * b.transpose() * left).cwiseAbs().maxCoeff(),
+              1e-6)
+        << apart;
+    EXPECT_LT((a - b * x - left).cwiseAbs().maxCoeff(), 1e-6) << apart;
+    const MatrixXd span = span_of(b);
+    EXPECT_LT((a - span * (span.transpose() * a) - left).cwiseAbs().maxCoeff(), 1e-6) << apart;
+  }
+}
+
 TEST(LinearAlgebra, CholeskySolvesAndRefuses) {
   const MatrixXd half = normal_matrix(5, 8, 7), b = normal_matrix(5, 2, 8);
   const MatrixXd a = gram_of_rows(half);

@@ -38,7 +38,7 @@ class ReturnBackPressure final : public Effect {
   }
   std::vector<int> places(const Machine& machine) const override { return whole_circuit(machine); }
   std::vector<EvidenceKind> shows_in() const override {
-    return {EvidenceKind::kReturnExtend, EvidenceKind::kReturnRetract};
+    return {EvidenceKind::kReturnExtend, EvidenceKind::kReturnRetract, EvidenceKind::kReturnLine};
   }
 
   template <class T>
@@ -54,8 +54,10 @@ class ReturnBackPressure final : public Effect {
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int,
                std::span<const double>, Eigen::MatrixXd& columns) const override {
-    if (return_side(measured.kind) == 0) return false;
-    if (!log.machine->cylinders[static_cast<std::size_t>(measured.index)].hydraulic()) return false;
+    const bool line = measured.kind == EvidenceKind::kReturnLine;
+    if (!line && return_side(measured.kind) == 0) return false;
+    if (!line && !log.machine->cylinders[static_cast<std::size_t>(measured.index)].hydraulic())
+      return false;
     columns = total_return_flow(log).array().square().matrix();
     return true;
   }
