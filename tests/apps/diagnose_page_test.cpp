@@ -46,7 +46,7 @@ Diagnosis missing_friction(const CraneModel& model) {
   e.id = "coulomb_friction";
   e.at = "arm";
   e.stage = "force";
-  e.probability = 0.99;
+  e.probability = e.set_probability = 0.99;
   e.parameters = {{"force", "N", "dry friction", 5010.0, 4890.0, 5130.0}};
   e.applied = {e.effect.effect, e.effect.at, {5010.0}, {4890.0}, {5130.0}};
   e.channels = {{force_channel(d.evidence), 5100.0, 420.0, 400.0}};

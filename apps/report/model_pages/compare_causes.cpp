@@ -30,7 +30,6 @@ void add_bad_data(Page& page, const CompareResult& result) {
 void add_stages(Page& page, const CompareResult& result) {
   const std::vector<StageSplit>& stages = result.fault.stages;
   if (stages.empty()) return;
-  page.paragraph(result.fault.sentence);
   BarChart chart;
   chart.title = "Own and inherited error of each stage";
   chart.note =
@@ -64,7 +63,8 @@ void add_stages(Page& page, const CompareResult& result) {
   for (const StageSplit& s : stages)
     table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
   table.note =
-      "RMS. Where own and inherited errors are correlated, their squares do not add up; where they "
+      "RMS, without samples outside the training data. Where own and inherited errors are "
+      "correlated, their squares do not add up; where they "
       "cancel, the law was learned with the wrong force and compensates it (the remaining error is "
       "drawn).";
   table.highlighted_row = result.fault.fault;
@@ -171,6 +171,7 @@ void add_segments(Page& page, const CompareResult& result) {
 void add_causes(Page& page, const CompareResult& result, const std::string& heading_prefix) {
   if (result.fault.stages.empty() && result.tests.tests.empty() && result.bad_data.empty()) return;
   page.section(heading_prefix + "Where the error arises");
+  if (!result.fault.sentence.empty()) page.paragraph(result.fault.sentence);
   add_bad_data(page, result);
   add_stages(page, result);
   add_tests(page, result);
