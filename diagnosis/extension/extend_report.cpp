@@ -212,7 +212,7 @@ std::string ExtendResult::brief() const {
   if (steps.empty()) return "Nothing was added: " + stopped_because;
   std::string names;
   for (const ExtendStep& s : steps)
-    names += (names.empty() ? "" : ", then ") + (s.added.empty() ? "minus " + s.removed : s.added);
+    names += (names.empty() ? "" : ", then ") + (s.added.empty() ? "minus " + s.removed : s.title);
   return fmt::format("{}{}: error on the {} {}", interrupted ? "Interrupted: " : "", names,
                      steps.front().judged_on, change().sentence());
 }

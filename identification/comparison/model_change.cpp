@@ -55,13 +55,25 @@ std::vector<const QuantityChange*> ModelChange::of(ChangeKind kind) const {
 
 Grade ModelChange::grade() const {
   const bool worse = !of(ChangeKind::kWorse).empty(), better = !of(ChangeKind::kBetter).empty();
-  if (overall > 1.0 && (worse || !better)) return worse ? Grade::kPoor : Grade::kFair;
-  if (worse) return better ? Grade::kFair : Grade::kPoor;
-  return better && energy_compared ? Grade::kGood : Grade::kFair;
+  if (worse && (overall > 1.0 || !better)) return Grade::kPoor;
+  if (worse || !better || !energy_compared) return Grade::kFair;
+  for (const std::vector<std::string>& family :
+       {std::vector<std::string>{"force"}, {"pressure", "pump"}, {"energy"}}) {
+    bool gained = false, all_good = true;
+    for (const QuantityChange& q : quantities) {
+      if (std::find(family.begin(), family.end(), q.after.stage) == family.end()) continue;
+      gained = gained || q.kind == ChangeKind::kBetter;
+      all_good = all_good && q.after.grade == Grade::kGood;
+    }
+    if (!gained && !all_good) return Grade::kFair;
+  }
+  return Grade::kGood;
 }
 
 std::string ModelChange::sentence() const {
-  std::string text = fmt::format("{:+.1f} % overall", 100.0 * (overall - 1.0));
+  const double percent = std::round(1e3 * (overall - 1.0)) / 10.0;
+  std::string text =
+      percent == 0.0 ? "unchanged overall" : fmt::format("{:+.1f} % overall", percent);
   const std::vector<const QuantityChange*> worse = of(ChangeKind::kWorse);
   text += worse.empty() ? "; nothing became worse" : "; worse: " + named(worse, most_named);
   if (!energy_compared) text += "; the energy was not compared";

@@ -41,8 +41,8 @@ struct ModelChange {
   std::size_t most_named = 3;  ///< that of the options
 
   std::vector<const QuantityChange*> of(ChangeKind kind) const;
-  /// Good only when something is better and nothing worse: forces, pressures, flows and energies. Poor when the errors are
-  /// larger overall, or when nothing is better and something worse.
+  /// Good only when forces, pressures and energies are all better, or good already, and nothing is worse. Poor when the
+  /// errors are larger overall, or when nothing is better and something worse.
   Grade grade() const;
   /// "-42.0 % overall; worse: energy of pump main -9.00 -> -27.00 %, ...": the change, and every time what became worse.
   std::string sentence() const;

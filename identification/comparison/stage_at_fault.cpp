@@ -7,6 +7,7 @@
 
 #include "identification/comparison/compare.h"
 #include "identification/comparison/error_ranking.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/signals/apply_effects.h"
 #include "models/chain/pump_law.h"
 #include "models/math/nan.h"
@@ -77,8 +78,8 @@ class Inheritance {
 };
 
 std::string amount(double value, const std::string& unit) {
-  if (unit == "N" && std::abs(value) >= 1e3) return fmt::format("{:.3g} kN", value / 1e3);
-  return fmt::format("{:.3g} {}", value, unit);
+  if (unit == "N" && std::abs(value) >= 1e3) return plain_number(value / 1e3, 3) + " kN";
+  return plain_number(value, 3) + " " + unit;
 }
 
 /// Splits the error of one quantity. @param score of the quantity
@@ -89,7 +90,7 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.stage = stage;
   out.at = at;
   out.regime = regime;
-  double error = 0.0, own = 0.0, inherited = 0.0, sum = 0.0, squares = 0.0, n = 0.0;
+  double error = 0.0, own = 0.0, inherited = 0.0, n = 0.0;
   FieldUnit unit;
   for (const LogComparison& log : result.logs) {
     const Inheritance before(model, log);
@@ -106,8 +107,6 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
         error += e * e;
         own += (e - from_before) * (e - from_before);
         inherited += from_before * from_before;
-        sum += s.measured[k];
-        squares += s.measured[k] * s.measured[k];
         n += 1.0;
       }
     }
@@ -118,7 +117,6 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.error = std::sqrt(error / n) / unit.si;
   out.own = std::sqrt(own / n) / unit.si;
   out.inherited = std::sqrt(inherited / n) / unit.si;
-  out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
   const double noise = sensor_noise(model.machine, result, score);
   if (std::isfinite(noise)) out.noise = noise / unit.si;
   // A law that was learned with wrong inputs compensates their error; its error with right inputs is then not its own.

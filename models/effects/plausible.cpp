@@ -71,13 +71,10 @@ double plausible_limit(const Machine& machine, const EffectInfo& effect, int at,
   if (parameter.unit == "kg" && effect.place == EffectPlace::kJoint) return whole_mass(machine);
   if (parameter.unit == "kg m" && effect.place == EffectPlace::kJoint)
     return whole_mass(machine) * reach_from(machine, at);
-  const auto of_pump = [&](double Pump::*member) {
+  if (parameter.unit == "bar")
     return largest(pump, machine.pump_count(), [&](int i) {
-      return known(machine.pumps[static_cast<std::size_t>(i)].*member);
+      return known(machine.pumps[static_cast<std::size_t>(i)].max_pressure);
     });
-  };
-  if (parameter.unit == "bar") return of_pump(&Pump::max_pressure);
-  if (parameter.unit == "l/min") return of_pump(&Pump::max_flow);
   return kUnlimited;
 }
 

@@ -2,7 +2,7 @@
 /// How large an effect may plausibly be on a machine, by the machine's own masses and areas. The catalogue's bounds hold for
 /// any machine; these come from the machine file: a force of no more than the cylinder can push at the pump's largest
 /// pressure, a mass of no more than the machine's own, a mass moment of no more than that mass at the tip, a pressure of
-/// no more than the pump's largest, a flow of no more than its largest.
+/// no more than the pump's largest.
 #include <string>
 
 #include "models/effects/effect.h"

@@ -155,7 +155,6 @@ TEST(OneRanking, AWrongForceIsNamedByAllAndThePressuresThatInheritItComeBehind) 
   expect_one_ranking(model, result);
   EXPECT_EQ(result.ranking.errors[0].stage, "force");
   EXPECT_THAT(compare_headline(result), HasSubstr("misses the force of arm"));
-  EXPECT_EQ(result.worst.front().stage, "force");
 }
 
 TEST(OneRanking, AWrongPressureModelAndAWrongMarginAreNamedByAll) {
@@ -202,16 +201,15 @@ TEST(OneRanking, StagesThatAMachineFileCannotPredictAreNowhere) {
   keep_stages(model.machine, {"force", "flow_sensor"}, result);
   expect_one_ranking(model, result);
   EXPECT_EQ(result.ranking.errors.size(), 1u);
-  EXPECT_THAT(compare_table(result), Not(HasSubstr("flow of arm")));
+  EXPECT_THAT(compare_table(result), Not(HasSubstr("\nflow ")));
 }
 
 // ------------------------------------------------------------------ before and after
 
-/// One step that takes the friction in and, as learning anew may do, makes a pressure worse by `bar`.
-ExtendResult friction_added(double bar) {
-  const Log log = arm_log_with_friction(20e3);
+/// One step from a model to another, judged on one log.
+ExtendResult one_step(const CraneModel& before, const CraneModel& after, const Log& log) {
   ExtendResult r;
-  r.model = with_pressure_off(bar);
+  r.model = after;
   const EffectAt friction = parse_effect("coulomb_friction:arm", r.model.machine);
   ExtendStep step;
   step.added = "coulomb_friction:arm";
@@ -219,13 +217,25 @@ ExtendResult friction_added(double bar) {
   step.stage = "force";
   step.effect = {friction.effect, friction.at, {20e3}, {19e3}, {21e3}};
   step.judged_on = "test logs";
-  step.before = compare(arm_model(), {log});
-  r.model.effects = {step.effect};
-  step.after = compare(r.model, {log});
+  step.before = compare(before, {log});
+  step.after = compare(after, {log});
   step.change = error_change(r.model.machine, step.before, step.after, "force", "arm");
   r.steps = {step};
   r.stopped_because = r.reason = "all effects asked for were added";
   return r;
+}
+
+/// A pressure model that was 60 bar off and is right then.
+ExtendResult better_everywhere() {
+  return one_step(with_pressure_off(60.0), arm_model(), arm_log(kNoise));
+}
+
+/// Friction that the model lacked is taken in; learning anew makes a pressure, and with it the energy, wrong by 60 bar.
+ExtendResult better_and_worse() {
+  CraneModel after = with_pressure_off(60.0);
+  const EffectAt friction = parse_effect("coulomb_friction:arm", after.machine);
+  after.effects = {{friction.effect, friction.at, {20e3}, {}, {}}};
+  return one_step(arm_model(), after, arm_log_with_friction(20e3));
 }
 
 void expect_one_change(const ExtendResult& r) {
@@ -244,23 +254,23 @@ void expect_one_change(const ExtendResult& r) {
 }
 
 TEST(OneRanking, APageIsGreenOnlyWhenNothingBecameWorse) {
-  const ExtendResult good = friction_added(0.0);
+  const ExtendResult good = better_everywhere();
   expect_one_change(good);
   EXPECT_EQ(good.grade(), Grade::kGood) << good.brief();
-  const ExtendResult mixed = friction_added(60.0);
+  const ExtendResult mixed = better_and_worse();
   expect_one_change(mixed);
   EXPECT_NE(mixed.grade(), Grade::kGood);
   EXPECT_THAT(mixed.brief(), HasSubstr("worse: "));
   EXPECT_THAT(mixed.brief(), HasSubstr("working pressure of arm extending"));
   EXPECT_THAT(mixed.brief(), HasSubstr("energy of pump main"));
-  ExtendResult on_training = friction_added(0.0);
+  ExtendResult on_training = better_everywhere();
   on_training.steps[0].judged_on = "training logs";
   EXPECT_NE(on_training.grade(), Grade::kGood);
 }
 
 TEST(OneRanking, TheHeadlineOfADiagnosisSaysWhatGotWorseOnTheTestLogs) {
   const CraneModel model = arm_model();
-  const ExtendResult mixed = friction_added(60.0);
+  const ExtendResult mixed = better_and_worse();
   Diagnosis d;
   d.evidence = collect_evidence(model, {make_signals(model.machine, arm_log_with_friction(20e3))});
   d.verdict = Verdict::kMissing;
@@ -291,7 +301,7 @@ TEST(OneRanking, TheHeadlineOfADiagnosisSaysWhatGotWorseOnTheTestLogs) {
 }
 
 TEST(OneRanking, AnInterruptedResultSaysSoInItsHeadline) {
-  ExtendResult r = friction_added(0.0);
+  ExtendResult r = better_everywhere();
   r.interrupted = true;
   expect_one_change(r);
   EXPECT_THAT(r.brief(), HasSubstr("Interrupted: "));
@@ -299,7 +309,7 @@ TEST(OneRanking, AnInterruptedResultSaysSoInItsHeadline) {
 
 // "mass 58.61 kg (-53103630 .. 53103747)" was shown.
 TEST(OneRanking, ANumberWithoutInformationIsShownToNobody) {
-  ExtendResult r = friction_added(0.0);
+  ExtendResult r = better_everywhere();
   r.steps[0].effect.lower95 = {-53103630.0};
   r.steps[0].effect.upper95 = {53103747.0};
   r.model.effects = {r.steps[0].effect};

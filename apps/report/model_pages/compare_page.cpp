@@ -82,7 +82,7 @@ void add_scores(Page& page, const CompareResult& result) {
                    {"sensor noise", "", 3},
                    {"unit"},
                    {"explained", "%", 3},
-                   {""},
+                   {"grade"},
                    {"inherited from"},
                    {"inside 95 % interval", "%", 3},
                    {"samples"}};
@@ -219,7 +219,7 @@ void add_comparison(Page& page, const CraneModel& model, const CompareResult& re
   for (const std::string& note : result.notes)
     page.paragraph(note.ends_with('.') ? note : note + ".");
   if (result.scores.empty()) return;
-  add_causes(page, result, heading_prefix);
+  add_causes(page, model.machine, result, heading_prefix);
   add_worst_regions(page, result, heading_prefix);
   add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");

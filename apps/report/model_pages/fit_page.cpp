@@ -198,7 +198,7 @@ void set_verdict(Page& page, const FitResult& r) {
   std::string text = r.brief(false) + ".";
   const ErrorRanking& ranking = judged_on(r).ranking;
   if (ranking.grade() != Grade::kGood) {
-    tone = std::max(tone, Tone::kWarning);
+    tone = std::max(tone, tone_of(ranking.grade()));
     headline += ". " + ranking.headline;
   }
   if (learned < all) {
