@@ -90,7 +90,6 @@ RankedError ranked(const Machine& machine, const CompareResult& result, const St
   r.error = score.rmse;
   r.noise = sensor_noise(machine, result, score);
   r.scale = scale_of(result, score, options.level_share);
-  r.si = score.unit.si;
   const double noise = std::isfinite(r.noise) ? r.noise : 0.0;
   const double beyond = std::sqrt(std::max(0.0, score.rmse * score.rmse - noise * noise));
   r.unexplained = beyond > 0.0 && r.scale > 0.0 ? beyond / r.scale : 0.0;

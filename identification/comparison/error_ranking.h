@@ -45,7 +45,6 @@ struct RankedError {
   double error = 0.0;             ///< RMS error; of an energy predicted - measured [J]
   double noise = 0.0;             ///< standard deviation of the sensor's noise; NaN = not known
   double scale = 0.0;             ///< what the error is compared with
-  double si = 1.0;                ///< SI value of one unit of display
   double unexplained = 0.0;       ///< unexplained share, 0 = none
   Grade grade = Grade::kGood;
   /// Index of the quantity from which most of the error is inherited; -1 = it arises here.

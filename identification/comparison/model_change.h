@@ -16,8 +16,9 @@ struct ModelChangeOptions {
   /// @threshold [1] 1..1.2; chosen: as ErrorChangeOptions::refit_moves, by which learning anew moves errors
   double moves = 1.02;
   /// Growth of the unexplained share (error_ranking.h) from which a larger error is worse, and likewise for better.
-  /// @threshold [1] 0..0.1; chosen: half a percent of a quantity's scale is irrelevant, as are changes within the noise
-  double share_moves = 0.005;
+  /// @threshold [1] 0..0.1; chosen: for an energy this is ErrorChangeOptions::energy_moves, two in a thousand of it; the
+  /// change of a pressure that is as good as its sensor before and after stays below
+  double share_moves = 0.02;
   /// Number of quantities that a sentence names; the others are counted.
   /// @threshold [quantities] 1..20; chosen: a headline that can be read at once
   std::size_t most_named = 3;

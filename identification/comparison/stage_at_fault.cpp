@@ -90,7 +90,7 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.stage = stage;
   out.at = at;
   out.regime = regime;
-  double error = 0.0, own = 0.0, inherited = 0.0, n = 0.0;
+  double error = 0.0, own = 0.0, inherited = 0.0, sum = 0.0, squares = 0.0, n = 0.0;
   FieldUnit unit;
   for (const LogComparison& log : result.logs) {
     const Inheritance before(model, log);
@@ -107,6 +107,8 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
         error += e * e;
         own += (e - from_before) * (e - from_before);
         inherited += from_before * from_before;
+        sum += s.measured[k];
+        squares += s.measured[k] * s.measured[k];
         n += 1.0;
       }
     }
@@ -117,6 +119,7 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.error = std::sqrt(error / n) / unit.si;
   out.own = std::sqrt(own / n) / unit.si;
   out.inherited = std::sqrt(inherited / n) / unit.si;
+  out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
   const double noise = sensor_noise(model.machine, result, score);
   if (std::isfinite(noise)) out.noise = noise / unit.si;
   // A law that was learned with wrong inputs compensates their error; its error with right inputs is then not its own.

@@ -25,6 +25,7 @@ struct StageSplit {
   double own = 0.0;        ///< RMS with measured inputs
   double inherited = 0.0;  ///< RMS of the change that the error of the stage before causes
   double noise = 0.0;      ///< [unit] noise of its sensor (sensor_noise); 0 for flows
+  double spread = 0.0;     ///< standard deviation of the measured values
   long n = 0;
   /// Whether the stage was learned together with the errors of the stage before and compensates them.
   bool compensates = false;

@@ -47,7 +47,9 @@ void add_stages(Page& page, const CompareResult& result) {
     const StageSplit& s = stages[static_cast<std::size_t>(i)];
     chart.categories.push_back(s.words);
     const RankedError* ranked = result.ranking.find(s.stage, s.at, s.regime);
-    const double scale = ranked != nullptr ? ranked->scale / ranked->si : 0.0;
+    const StageScore* score = result.find(s.stage, s.at, s.regime);
+    const double scale =
+        ranked != nullptr && score != nullptr ? ranked->scale / score->unit.si : 0.0;
     const auto share = [scale](double rms) {
       return scale > 0.0 ? 100.0 * rms * rms / (scale * scale) : kNaN;
     };
