@@ -85,7 +85,7 @@ std::string beyond_plausible(const Machine& machine, const AppliedEffect& effect
     const double limit = plausible_limit(machine, info, effect.at, q);
     if (q.choice || !(std::abs(effect.values[p]) > limit)) continue;
     return fmt::format(
-        "{}: {} of {:.5g} {} is more than masses and areas of the machine make plausible ({:.4g} "
+        "{}: {} of {:.5g} {} is more than masses and areas of the machine make plausible ({:.5g} "
         "{})",
         effect.key(machine), q.name, effect.values[p] / q.si, q.unit, limit / q.si, q.unit);
   }
