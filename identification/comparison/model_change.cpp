@@ -75,7 +75,9 @@ std::string ModelChange::sentence() const {
   std::string text =
       percent == 0.0 ? "unchanged overall" : fmt::format("{:+.1f} % overall", percent);
   const std::vector<const QuantityChange*> worse = of(ChangeKind::kWorse);
-  text += worse.empty() ? "; nothing became worse" : "; worse: " + named(worse, most_named);
+  text += worse.empty() ? fmt::format("; nothing worse by {:.0f} % of its scale",
+                                      100.0 * ModelChangeOptions().share_moves)
+                        : "; worse: " + named(worse, most_named);
   if (!energy_compared) text += "; the energy was not compared";
   return text;
 }

@@ -248,14 +248,15 @@ TEST(DiagnosePageInBrowser, NothingMissing) {
   expect_good_in_browser(page, "diagnose page none");
 }
 
-TEST(ImprovePage, DrawsErrorsRelativeToBeforeOverWholeSteps) {
+TEST(ImprovePage, DrawsErrorsBeforeAndAfterAndOverWholeSteps) {
   const CraneModel model = fit(testing_support::arm_machine(), {log_with_friction(1)}).model;
   const std::string html =
       improve_page(extend(model, {parse_effect("coulomb_friction:arm", model.machine)},
                           {{log_with_friction(1)}, {}, {log_with_friction(2)}}))
           .html();
   EXPECT_THAT(html, HasSubstr("\"x_counts\":true"));
-  EXPECT_THAT(html, HasSubstr("% of before"));
+  EXPECT_THAT(html, HasSubstr("Unexplained share of each quantity before and after"));
+  EXPECT_THAT(html, HasSubstr("{\"color\":-1,\"name\":\"before\"")) << "before is grey";
 }
 
 TEST(ImprovePageInBrowser, StepsOfExtend) {

@@ -250,7 +250,7 @@ void expect_one_change(const ExtendResult& r) {
   EXPECT_EQ(json["grade"], grade_word(r.grade()));
   std::size_t worse = 0;
   for (const nlohmann::json& q : json["changes"]) worse += q["change"] == "worse" ? 1 : 0;
-  EXPECT_EQ(worse == 0, r.brief().find("nothing became worse") != std::string::npos);
+  EXPECT_EQ(worse == 0, r.brief().find("nothing worse by 2 %") != std::string::npos);
 }
 
 TEST(OneRanking, APageIsGreenOnlyWhenNothingBecameWorse) {
