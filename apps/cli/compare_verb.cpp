@@ -20,18 +20,7 @@ struct CompareArguments {
   Outputs outputs;
 };
 
-/// Removes what a machine file alone cannot predict: it gives forces and flows by geometry, pressures are learned.
-void keep_geometric_stages(CompareResult& result) {
-  const auto learned = [](const auto& item) {
-    return item.stage != "force" && item.stage != "flow_sensor";
-  };
-  std::erase_if(result.scores, learned);
-  std::erase_if(result.worst, learned);
-  for (LogComparison& log : result.logs) std::erase_if(log.series, learned);
-  result.energy.clear();
-}
-
-/// Replaces energies whose relative error is undefined, because the pump delivered nothing, by a note.
+/// Notes energies whose relative error is undefined, because the pump delivered nothing.
 void note_undefined_energies(CompareResult& result) {
   for (const EnergyScore& e : result.energy) {
     if (std::isfinite(e.relative_error)) continue;
@@ -40,8 +29,6 @@ void note_undefined_energies(CompareResult& result) {
         "because no cylinder is driven in them",
         e.pump, e.duration));
   }
-  std::erase_if(result.energy,
-                [](const EnergyScore& e) { return !std::isfinite(e.relative_error); });
 }
 
 int run(const CompareArguments& a) {
@@ -60,10 +47,11 @@ int run(const CompareArguments& a) {
                                ? CraneModel::untrained(load_machine_with_warnings(a.machine))
                                : load_model_with_warnings(a.model);
   CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
-  if (a.model.empty()) keep_geometric_stages(result);
+  // A machine file alone gives forces and flows by geometry; pressures are learned.
+  if (a.model.empty()) keep_stages(model.machine, {"force", "flow_sensor"}, result);
+  note_undefined_energies(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
-  note_undefined_energies(result);
   tell(fmt::format("{}\n", compare_table(result)));
   return kDone;
 }

@@ -25,7 +25,7 @@ std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
                                            const Diagnosis& diagnosis) {
   std::vector<EffectAt> found;
   for (const DiagnosedEffect& e : diagnosis.effects) {
-    if (diagnosis.probable(e)) found.push_back(e.effect);
+    if (diagnosis.named(e)) found.push_back(e.effect);
   }
   if (files.logs.tests.empty() || found.empty()) return std::nullopt;
   Progress progress("test logs");
@@ -48,7 +48,10 @@ int run(const DiagnoseArguments& a) {
   const Outputs& outputs = a.inputs.outputs();
   if (!outputs.json.empty()) {
     nlohmann::ordered_json json = nlohmann::ordered_json::parse(result.json());
-    if (tested) json["test"] = nlohmann::ordered_json::parse(tested->json());
+    if (tested) {
+      json["headline"] = headline_on_tests(result, &*tested);
+      json["test"] = nlohmann::ordered_json::parse(tested->json());
+    }
     write_file_atomically(
         outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
@@ -57,7 +60,7 @@ int run(const DiagnoseArguments& a) {
     files.write_provenance(page);
     page.write(outputs.report);
   }
-  tell(result.table());
+  tell(result.table(headline_on_tests(result, tested ? &*tested : nullptr)));
   if (tested)
     tell(fmt::format("\nOn the test logs, with these effects in the model:\n{}", tested->table()));
   return kDone;

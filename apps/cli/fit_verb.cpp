@@ -25,6 +25,18 @@ struct FitArguments {
   Outputs outputs;
 };
 
+/// The headline of the comparison that judges the model, as its page has it; "" when all is good.
+std::string judgement(const FitResult& result) {
+  const bool held_out = !result.test && result.held_out;
+  const CompareResult& by = result.test ? *result.test : held_out ? *result.held_out : result.train;
+  if (by.ranking.grade() == Grade::kGood) return "";
+  return fmt::format("on the {}: {}\n",
+                     result.test ? "test logs"
+                     : held_out  ? "held-out motions"
+                                 : "training logs",
+                     by.ranking.headline);
+}
+
 std::string fit_json(const FitResult& result) {
   nlohmann::json json;
   json["seconds"] = result.seconds;
@@ -160,7 +172,7 @@ int run(const FitArguments& a) {
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
-  tell(fmt::format("{}\nmodel written to {}\n", result.full(), a.output));
+  tell(fmt::format("{}{}\nmodel written to {}\n", result.full(), judgement(result), a.output));
   return kDone;
 }
 

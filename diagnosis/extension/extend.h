@@ -8,6 +8,7 @@
 
 #include "diagnosis/verdict/diagnose.h"
 #include "identification/comparison/error_change.h"
+#include "identification/comparison/model_change.h"
 #include "identification/learning/fit.h"
 
 namespace sparflow {
@@ -38,7 +39,11 @@ struct ExtendResult {
   bool interrupted = false;               ///< `improve` ended early; the steps done are kept
   double seconds = 0.0;
 
-  std::string brief() const;  ///< one sentence
+  /// What all steps together did to each quantity; empty quantities where there is no step.
+  ModelChange change() const;
+  /// Good only when nothing became worse on logs that took no part in the estimate; of no step, good when none was rejected.
+  Grade grade() const;
+  std::string brief() const;  ///< one sentence, the headline of all outputs
   std::string table() const;  ///< one screen: error falling step by step
   std::string json() const;   ///< keys of the contract and more
 };
@@ -98,6 +103,10 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs,
 /// Removes an effect and learns the rest again. @throws InputError when the model does not have it
 ExtendResult take_back(const CraneModel& model, const EffectAt& effect, const ExtendLogs& logs,
                        const ExtendOptions& options = {}, const SearchProgress& progress = {});
+
+/// The headline of a diagnosis with what its effects did to the errors on test logs, for all outputs.
+/// @param tested the effects found, added to the model and judged on test logs; may be null
+std::string headline_on_tests(const Diagnosis& diagnosis, const ExtendResult* tested);
 
 /// "Coulomb friction, boom"
 std::string effect_title(const EffectInfo& info, const Machine& machine, int at);

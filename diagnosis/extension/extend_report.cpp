@@ -32,6 +32,10 @@ std::string parameters_text(const AppliedEffect& e) {
     const EffectParameter& q = parameters[p];
     const std::string unit = q.unit.empty() || q.unit == "-" ? "" : " " + q.unit;
     const bool choice = q.choice || p >= e.lower95.size();
+    if (!choice && !is_determined(e.values[p], e.lower95[p], e.upper95[p], q.typical)) {
+      text += fmt::format("{}{} is not determined by these logs", text.empty() ? "" : ", ", q.name);
+      continue;
+    }
     text += fmt::format(
         "{}{} {}{}", text.empty() ? "" : ", ", q.name,
         choice ? fmt::format("{:g}", e.values[p] / q.si) : plain_number(e.values[p] / q.si, 4),
@@ -150,12 +154,30 @@ Json parameters_json(const AppliedEffect& e) {
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = e.effect->info().parameters[p];
     Json ci = nullptr;
-    if (p < e.lower95.size())
+    bool determined = true;
+    if (p < e.lower95.size()) {
+      determined = is_determined(e.values[p], e.lower95[p], e.upper95[p], q.typical);
       ci = {value_or_null(e.lower95[p] / q.si), value_or_null(e.upper95[p] / q.si)};
-    parameters.push_back(
-        {{"name", q.name}, {"value", e.values[p] / q.si}, {"unit", q.unit}, {"ci95", ci}});
+    }
+    parameters.push_back({{"name", q.name},
+                          {"value", e.values[p] / q.si},
+                          {"unit", q.unit},
+                          {"determined", determined},
+                          {"ci95", ci}});
   }
   return parameters;
+}
+
+Json changes_json(const ModelChange& change) {
+  Json out = Json::array();
+  for (const QuantityChange& q : change.quantities) {
+    out.push_back({{"stage", q.before.stage},
+                   {"at", q.before.at},
+                   {"regime", q.before.regime},
+                   {"change", change_word(q.kind)},
+                   {"text", q.text}});
+  }
+  return out;
 }
 
 Json step_json(const ExtendStep& step) {
@@ -175,14 +197,30 @@ Json step_json(const ExtendStep& step) {
 
 }  // namespace
 
+ModelChange ExtendResult::change() const {
+  if (steps.empty()) return {};
+  return model_change(model.machine, steps.front().before, steps.back().after);
+}
+
+Grade ExtendResult::grade() const {
+  if (steps.empty()) return rejected.empty() ? Grade::kGood : Grade::kFair;
+  const Grade grade = change().grade();
+  return steps.front().judged_on == "training logs" ? std::max(grade, Grade::kFair) : grade;
+}
+
 std::string ExtendResult::brief() const {
   if (steps.empty()) return "Nothing was added: " + stopped_because;
   std::string names;
   for (const ExtendStep& s : steps)
-    names += (names.empty() ? "" : ", then ") + (s.added.empty() ? "minus " + s.removed : s.added);
-  const ErrorChange all = error_change(model.machine, steps.front().before, steps.back().after, "");
-  return fmt::format("{}: error on the {} {} overall", names, steps.front().judged_on,
-                     signed_percent(all.overall));
+    names += (names.empty() ? "" : ", then ") + (s.added.empty() ? "minus " + s.removed : s.title);
+  return fmt::format("{}{}: error on the {} {}", interrupted ? "Interrupted: " : "", names,
+                     steps.front().judged_on, change().sentence());
+}
+
+std::string headline_on_tests(const Diagnosis& diagnosis, const ExtendResult* tested) {
+  if (tested == nullptr || tested->steps.empty()) return diagnosis.headline();
+  return fmt::format("{} On the {}, with that in the model: error {}.", diagnosis.headline(),
+                     tested->steps.front().judged_on, tested->change().sentence());
 }
 
 std::string ExtendResult::table() const {
@@ -222,6 +260,9 @@ std::string ExtendResult::json() const {
                {"not_kept", tried},
                {"effects", effects},
                {"in_the_model", now},
+               {"headline", brief()},
+               {"grade", grade_word(grade())},
+               {"changes", changes_json(change())},
                {"notes", notes},
                {"interrupted", interrupted},
                {"seconds", seconds}};

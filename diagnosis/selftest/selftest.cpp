@@ -149,12 +149,13 @@ SelftestEvidence evidence_of(const CraneModel& model, const std::vector<Log>& lo
 
 /// A sentence for each channel whose residual is so large that something is probably missing already.
 void note_large_residuals(const SelftestEvidence& logs, const SelftestOptions& options,
-                          std::vector<std::string>& notes) {
+                          Selftest& out) {
   for (std::size_t c = 0; c < logs.evidence.channels.size(); ++c) {
     const EvidenceChannel& channel = logs.evidence.channels[c];
     const double ratio = logs.fit.noise[c].deviation() / channel.noise_floor;
     if (!(ratio > options.suspicious_noise)) continue;
-    notes.push_back(fmt::format(
+    out.residual_over_noise = std::max(out.residual_over_noise, ratio);
+    out.notes.push_back(fmt::format(
         "{}: the residual is {:.0f} times the noise floor and counts as noise here; `diagnose` may "
         "find its cause, and more effects can then be named",
         channel.text, ratio));
@@ -205,7 +206,7 @@ Selftest selftest(const CraneModel& model, const std::vector<Log>& logs,
   out.false_alarm = options.search.false_alarm;
   const SelftestEvidence seen = evidence_of(model, logs, references, options, out);
   out.notes = seen.evidence.notes;
-  note_large_residuals(seen, options, out.notes);
+  note_large_residuals(seen, options, out);
   report(0.1, "signatures of the effects");
   const std::vector<EffectAt> wanted = effects_to_inject(model, options);
   std::vector<SearchCandidate> all = search_candidates(seen.evidence, wanted);

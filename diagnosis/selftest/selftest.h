@@ -76,6 +76,9 @@ struct Selftest {
   double least_gain = 10.0;              ///< [nats] SearchOptions::least_gain
   double samples = 0.0, duration = 0.0;  ///< of the logs, [s]
   std::size_t logs = 0, references = 0;
+  /// Largest residual of a channel over its noise floor, where it is so large that effects are probably missing already
+  /// (SelftestOptions::suspicious_noise); 0 = none is.
+  double residual_over_noise = 0.0;
   std::vector<std::string> notes;
   double seconds = 0.0;
 

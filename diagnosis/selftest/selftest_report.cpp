@@ -60,8 +60,14 @@ std::string Selftest::headline() const {
   const int seen = count(Visibility::kSeen);
   return fmt::format(
       "Of {} candidate effects {} would be named at their typical size, {} of them without a "
-      "rival; {} only if larger, {} not at all.",
-      effects.size(), seen, alone, count(Visibility::kOnlyLarge), count(Visibility::kNever));
+      "rival; {} only if larger, {} not at all.{}",
+      effects.size(), seen, alone, count(Visibility::kOnlyLarge), count(Visibility::kNever),
+      residual_over_noise > 0.0
+          ? fmt::format(
+                " That is beside what the model leaves unexplained now, up to {:.0f} times the "
+                "sensors' noise: run `diagnose` first.",
+                residual_over_noise)
+          : "");
 }
 
 std::string Selftest::table() const {
@@ -111,6 +117,7 @@ std::string Selftest::json() const {
                       {"references", references},
                       {"gate", {{"false_alarm", false_alarm}, {"threshold", threshold}}},
                       {"seen", count(Visibility::kSeen)},
+                      {"residual_over_noise", residual_over_noise},
                       {"only_large", count(Visibility::kOnlyLarge)},
                       {"never", count(Visibility::kNever)}};
   j["effects"] = nlohmann::json::array();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "models/effects/plausible.h"
+
 namespace sparflow {
 namespace {
 
@@ -20,7 +22,8 @@ double whole_action(const EffectDesign& d) {
 
 }  // namespace
 
-EffectSize size_effect(const SearchCandidate& candidate, double largest_times) {
+EffectSize size_effect(const Machine& machine, const SearchCandidate& candidate,
+                       double largest_times) {
   const EffectInfo& info = candidate.effect.effect->info();
   std::vector<const EffectParameter*> shapes;
   std::vector<double> theta;
@@ -35,6 +38,9 @@ EffectSize size_effect(const SearchCandidate& candidate, double largest_times) {
     theta.push_back(p.optional ? 0.0 : p.typical);
     if (p.optional) continue;
     share = share || p.lower > 0.0;
+    if (p.typical != 0.0)
+      out.largest = std::min(out.largest, plausible_limit(machine, info, candidate.effect.at, p) /
+                                              std::abs(p.typical));
     if (p.typical > 0.0) out.largest = std::min(out.largest, p.upper / p.typical);
     if (p.typical < 0.0) out.largest = std::min(out.largest, p.lower / p.typical);
   }

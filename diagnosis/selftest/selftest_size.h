@@ -21,7 +21,9 @@ struct EffectSize {
   std::vector<SizeLevel> levels;  ///< weakest first; empty: the effect is proportional to theta
 };
 
+/// @param machine its masses and areas bound the size (models/effects/plausible.h), as they do in a diagnosis
 /// @param largest_times [-] largest multiple of the typical size where the effect has no bound
-EffectSize size_effect(const SearchCandidate& candidate, double largest_times);
+EffectSize size_effect(const Machine& machine, const SearchCandidate& candidate,
+                       double largest_times);
 
 }  // namespace sparflow

@@ -78,7 +78,7 @@ SelftestStudy::SelftestStudy(const Machine& machine, const SelftestEvidence& log
       projected_(candidates_.size()),
       result_(candidates_.size()) {
   parallel(candidates_.size(), [&](std::size_t i) {
-    sizes_[i] = size_effect(candidates_[i], options.largest_times);
+    sizes_[i] = size_effect(machine_, candidates_[i], options.largest_times);
     for (const EffectDesign& d : candidates_[i].designs) projected_[i].push_back(power_.project(d));
   });
 }
@@ -220,8 +220,22 @@ void SelftestStudy::see(std::size_t i) {
   if (std::isfinite(out.times80)) out.smallest = shown(info, values);
   if (out.visibility == Visibility::kOnlyLarge)
     out.reason = fmt::format("{:.2f} times the noise where it acts", out.size);
-  if (out.visibility == Visibility::kNever)
-    out.reason = "below the noise at any plausible size: stronger or more motions are needed";
+  if (out.visibility == Visibility::kNever) out.reason = never_reason(i);
+}
+
+std::string SelftestStudy::never_reason(std::size_t i) const {
+  const EffectDesign& design = candidates_[i].designs[sizes_[i].typical];
+  double ratio = 0.0;  // of the residual to the sensors' noise, where the effect acts
+  for (std::size_t c = 0; c < evidence_.channels.size(); ++c) {
+    const double one = fit_.noise[c].deviation() / evidence_.channels[c].noise_floor;
+    if (design.touches(c) && one > ratio) ratio = one;
+  }
+  // A residual that large is no noise: `diagnose` may find its cause in it, and this very effect may be the cause.
+  if (ratio > options_.suspicious_noise)
+    return "hidden by what the model leaves unexplained where it acts: run `diagnose` first, "
+           "extend the model, and "
+           "repeat the self-test";
+  return "below the noise at any plausible size: stronger or more motions are needed";
 }
 
 /// Finds the rivals at the typical size or at the smallest that would be named, whichever is larger.

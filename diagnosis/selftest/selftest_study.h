@@ -41,6 +41,8 @@ class SelftestStudy {
   std::pair<double, std::vector<double>> times_for(std::size_t i, const Signature& typical,
                                                    double gain) const;
   double absorbed_alone(const SearchCandidate& c, const EffectSize& s) const;
+  /// Why an effect that acts in the logs is named at no plausible size.
+  std::string never_reason(std::size_t i) const;
   void see(std::size_t i);
   void confuse(std::size_t i);
 

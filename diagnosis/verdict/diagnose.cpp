@@ -14,6 +14,7 @@
 #include "diagnosis/verdict/reference_comparison.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
 #include "identification/data_checks/set_aside.h"
+#include "models/effects/plausible.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 
@@ -146,13 +147,18 @@ std::vector<EffectAt> rivals_of(const FoundEffect& found, const SearchOptions& o
   return rivals;
 }
 
+/// The candidates of a search: those asked for, else the catalogue. With references, another value of an effect that the
+/// model has is a change, too.
+std::vector<EffectAt> searched_for(const CraneModel& model, const DiagnoseOptions& options,
+                                   bool has_reference) {
+  if (!options.candidates.empty()) return options.candidates;
+  return has_reference ? candidates(model.machine) : effects_not_in(model);
+}
+
 /// Searches for the effects that explain the evidence.
 void search(const CraneModel& model, const DiagnoseOptions& options, const SearchProgress& progress,
             Diagnosis& d) {
-  // with references, another value of an effect that the model has is a change, too
-  const std::vector<EffectAt> catalogue =
-      d.evidence.has_reference() ? candidates(model.machine) : effects_not_in(model);
-  d.search = search_effects(d.evidence, options.candidates.empty() ? catalogue : options.candidates,
+  d.search = search_effects(d.evidence, searched_for(model, options, d.evidence.has_reference()),
                             options.search, progress);
   if (d.search.updated_evidence) d.evidence = *d.search.updated_evidence;
   d.notes.insert(d.notes.end(), d.search.notes.begin(), d.search.notes.end());
@@ -248,10 +254,8 @@ void design_experiments(const CraneModel& model, const DiagnoseOptions& options,
   }
 }
 
-}  // namespace
-
-Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signals,
-                         const DiagnoseOptions& options, const SearchProgress& progress) {
+Diagnosis diagnose_once(const CraneModel& model, const DiagnosisSignals& signals,
+                        const DiagnoseOptions& options, const SearchProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   Diagnosis d;
   d.thresholds = options.verdict;
@@ -276,6 +280,36 @@ Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signal
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (progress) progress(1.0, "done");
   return d;
+}
+
+}  // namespace
+
+Diagnosis diagnose_sound(const CraneModel& model, const DiagnosisSignals& signals,
+                         const DiagnoseOptions& options, const SearchProgress& progress) {
+  // An estimate beyond what masses and areas of the machine make plausible imitates another cause. It is no candidate then,
+  // and the search is repeated without it.
+  DiagnoseOptions allowed = options;
+  std::vector<std::string> refused;
+  for (;;) {
+    Diagnosis d = diagnose_once(model, signals, allowed, progress);
+    allowed.candidates = searched_for(model, allowed, d.evidence.has_reference());
+    const std::size_t before = allowed.candidates.size();
+    for (const DiagnosedEffect& e : d.effects) {
+      const std::string why = beyond_plausible(model.machine, e.applied);
+      if (why.empty()) continue;
+      refused.push_back(why + "; it is not named");
+      std::erase_if(allowed.candidates, [&](const EffectAt& c) {
+        return c.effect == e.effect.effect && c.at == e.effect.at;
+      });
+    }
+    if (!allowed.candidates.empty() && allowed.candidates.size() < before) continue;
+    if (allowed.candidates.size() < before) {  // nothing is left to search for
+      d.verdict = Verdict::kUnknown;
+      if (!d.unexplained) d.unexplained = describe_minor_effect(d.evidence, d.effects.front());
+    }
+    d.notes.insert(d.notes.end(), refused.begin(), refused.end());
+    return d;
+  }
 }
 
 const char* verdict_name(Verdict verdict) {

@@ -21,6 +21,8 @@ const char* verdict_name(Verdict verdict);  ///< "missing" "none" "unknown" "bad
 struct ParameterEstimate {
   std::string name, unit, meaning;
   double value = 0.0, lower95 = 0.0, upper95 = 0.0;  ///< in `unit`
+  bool determined =
+      true;  ///< whether the logs determine it (is_determined); if not, no output shows its value
 };
 
 /// Error of one evidence channel without and with one effect; all other found effects are included in both.
@@ -157,11 +159,15 @@ struct Diagnosis {
   bool probable(const DiagnosedEffect& e) const {
     return e.set_probability >= thresholds.least_probability;
   }
-  std::string headline() const;  ///< one sentence
+  /// Whether headline and `effects` in JSON name an effect: it is probable, and the verdict is that something is missing.
+  bool named(const DiagnosedEffect& e) const;
+  const char* standing(const DiagnosedEffect& e) const;  ///< "named", or why it is not
+  std::string headline() const;                          ///< one sentence
   /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
   std::string p_value_text() const;
-  std::string table() const;  ///< one screen for a terminal
-  std::string json() const;   ///< keys of the contract and more
+  /// One screen for a terminal. @param first_line in place of the headline; empty = the headline
+  std::string table(const std::string& first_line = "") const;
+  std::string json() const;  ///< keys of the contract and more
 
   // Defaulted in diagnose.cpp, so that they are compiled only once.
   Diagnosis();

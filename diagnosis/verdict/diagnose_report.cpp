@@ -12,6 +12,7 @@ namespace {
 
 std::string with_interval(const ParameterEstimate& p) {
   const std::string unit = p.unit.empty() || p.unit == "-" ? "" : " " + p.unit;
+  if (!p.determined) return p.name + " is not determined by these logs";
   if (p.lower95 == p.upper95) return fmt::format("{} = {:g}{}", p.name, p.value, unit);
   return fmt::format("{} = {}{} ({} .. {})", p.name, plain_number(p.value, 4), unit,
                      plain_number(p.lower95, 4), plain_number(p.upper95, 4));
@@ -30,6 +31,7 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
       {"stage", e.stage},
       {"change", e.change},
       {"probability", e.probability},
+      {"probability_percent", e.shown_probability()},
       {"set_probability", e.set_probability},
       {"p_value", e.p_value},
       {"log_likelihood_gain", e.gain},
@@ -41,6 +43,7 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
     j["parameters"].push_back({{"name", p.name},
                                {"value", json_number(p.value)},
                                {"unit", p.unit},
+                               {"determined", p.determined},
                                {"ci95", {json_number(p.lower95), json_number(p.upper95)}}});
   }
   j["channels"] = nlohmann::json::array();
@@ -93,6 +96,7 @@ std::string Diagnosis::headline() const {
   }
   std::vector<std::string> parts;
   for (const DiagnosedEffect& e : effects) {
+    if (!named(e)) continue;
     std::string part = title_of(e);
     if (!e.rivals.empty()) {
       std::vector<std::string> rivals;
@@ -101,11 +105,27 @@ std::string Diagnosis::headline() const {
     }
     parts.push_back(part);
   }
+  if (parts.empty()) {  // none of a set is probable enough by itself
+    for (const DiagnosedEffect& e : effects) parts.push_back(title_of(e));
+    return fmt::format("Missing, but none of these is probable by itself: {}.",
+                       fmt::join(parts, "; "));
+  }
   return fmt::format("Missing: {}.", fmt::join(parts, "; "));
 }
 
-std::string Diagnosis::table() const {
-  std::string out = headline() + "\n\n";
+bool Diagnosis::named(const DiagnosedEffect& e) const {
+  return verdict == Verdict::kMissing && probable(e);
+}
+
+const char* Diagnosis::standing(const DiagnosedEffect& e) const {
+  return named(e) ? "named"
+         : verdict == Verdict::kMissing
+             ? "one of a set that is less probable than chance and rivals"
+             : "not proven, because too much stays unexplained";
+}
+
+std::string Diagnosis::table(const std::string& first_line) const {
+  std::string out = (first_line.empty() ? headline() : first_line) + "\n\n";
   if (verdict == Verdict::kBadData) {
     for (std::size_t i = 1; i < set_aside.size(); ++i)  // the headline has the first
       out += fmt::format("  {}\n", bad_channel_sentence(set_aside[i]));
@@ -117,6 +137,7 @@ std::string Diagnosis::table() const {
     out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}{}\n", e.key(),
                        e.shown_probability(), e.stage,
                        e.change ? "   a change of what the references have" : "");
+    if (!named(e)) out += fmt::format("      {}\n", standing(e));
     for (const ParameterEstimate& p : e.parameters)
       out += fmt::format("      {}\n", with_interval(p));
     for (std::size_t i = 0; i < std::min<std::size_t>(4, e.evidence.size()); ++i) {
@@ -169,7 +190,11 @@ std::string Diagnosis::json() const {
       {"verdict", verdict_name(verdict)}, {"p_value", p_value}, {"headline", headline()}};
   j["effects"] = nlohmann::json::array();
   for (const DiagnosedEffect& e : effects) {
-    if (verdict == Verdict::kMissing && probable(e)) j["effects"].push_back(json_of(e, evidence));
+    if (named(e)) j["effects"].push_back(json_of(e, evidence));
+  }
+  j["not_proven"] = nlohmann::json::array();  // found, and withheld by the verdict
+  for (const DiagnosedEffect& e : effects) {
+    if (verdict != Verdict::kMissing) j["not_proven"].push_back(json_of(e, evidence));
   }
   j["lacking"] = nlohmann::json::array();
   for (const DiagnosedEffect& e : lacking) j["lacking"].push_back(json_of(e, evidence));

@@ -186,13 +186,16 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
   for (const LogComparison& log : result.logs) {
     for (const ComparedSeries& s : log.series) {
       if (!seen.insert({s.stage, s.at}).second) continue;
-      // Pools are ordered by the share of the variation that the model does not explain.
-      const StageScore whole = score(result.logs, s.stage, s.at, "");
+      // Pools are searched by the share of the error in the quantity's scale, by which the ranking judges, noise included.
+      double severity = 0.0;
+      for (const RankedError& r : result.ranking.errors) {
+        const StageScore* of = result.find(r.stage, r.at, r.regime);
+        if (r.stage == s.stage && r.at == s.at && of != nullptr && r.scale > 0.0)
+          severity = std::max(severity, std::min(1.0, of->rmse / r.scale));
+      }
       for (std::size_t r = 0; r < s.regimes.size(); ++r) {
         ErrorGroup group = gather(machine, result.logs, s, r);
-        if (std::isfinite(whole.fit_percent)) {
-          group.severity = std::min(1.0, 1.0 - whole.fit_percent / 100.0);
-        }
+        group.severity = severity;
         if (group.squared_error.size() > 0) groups.push_back(std::move(group));
       }
     }
@@ -283,21 +286,51 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
     e.relative_error = e.measured > 0.0 ? (e.predicted - e.measured) / e.measured : kNaN;
     result.energy.push_back(e);
   }
+  const bool find_causes = options.find_regions && options.find_causes;
+  if (find_causes) result.fault.stages = split_stages(model, result, options.fault);
+  result.ranking = rank_errors(model.machine, result, options.ranking);
   if (options.find_regions) {
     result.worst = worst_regions(error_groups(model.machine, result), options.regions);
   }
-  if (options.find_regions && options.find_causes) {
+  if (find_causes) {
     const std::vector<CompareBlock> blocks = compare_blocks(result, options.tests.blocks.longest_s);
     const std::vector<ComparedPart> parts = compare_parts(model.machine, result, blocks);
     result.tests = test_residuals(parts, static_cast<int>(blocks.size()), options.tests);
-    result.fault = find_stage_at_fault(model, result, options.fault);
     result.regimes = errors_by_regime(result, parts, blocks, options.segments);
     result.segments = worst_segments(model.machine, result, parts, blocks, options.segments);
     const std::vector<WorstRegion> biased = biased_everywhere(parts, result.tests, options.notes);
     result.worst.insert(result.worst.begin(), biased.begin(), biased.end());
+    rank(model.machine, result, options);
   }
   result.notes.assign(notes.begin(), notes.end());
   return result;
+}
+
+void rank(const Machine& machine, CompareResult& result, const CompareOptions& options) {
+  result.ranking = rank_errors(machine, result, options.ranking);
+  name_stage_at_fault(result.ranking, result.fault, options.fault);
+  const auto by_rank = [&](const auto& a, const auto& b) {
+    return result.ranking.place(a.stage, a.at, a.regime) <
+           result.ranking.place(b.stage, b.at, b.regime);
+  };
+  std::stable_sort(result.worst.begin(), result.worst.end(), by_rank);
+  std::stable_sort(result.segments.begin(), result.segments.end(), by_rank);
+}
+
+void keep_stages(const Machine& machine, const std::vector<std::string>& stages,
+                 CompareResult& result) {
+  const auto other = [&](const auto& item) {
+    return std::find(stages.begin(), stages.end(), item.stage) == stages.end();
+  };
+  std::erase_if(result.scores, other);
+  std::erase_if(result.worst, other);
+  std::erase_if(result.tests.tests, other);
+  std::erase_if(result.fault.stages, other);
+  std::erase_if(result.regimes, other);
+  std::erase_if(result.segments, other);
+  for (LogComparison& log : result.logs) std::erase_if(log.series, other);
+  if (std::find(stages.begin(), stages.end(), "energy") == stages.end()) result.energy.clear();
+  rank(machine, result);
 }
 
 CompareResult join_results(const Machine& machine, std::vector<CompareResult> parts) {
@@ -307,6 +340,7 @@ CompareResult join_results(const Machine& machine, std::vector<CompareResult> pa
     for (LogComparison& log : part.logs) out.logs.push_back(std::move(log));
   }
   out.scores = scores(machine, out.logs);
+  out.ranking = rank_errors(machine, out);
   return out;
 }
 

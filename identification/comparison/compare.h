@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "identification/comparison/compare_regions.h"
+#include "identification/comparison/error_ranking.h"
 #include "identification/comparison/residual_tests.h"
 #include "identification/comparison/stage_at_fault.h"
 #include "identification/comparison/worst_segments.h"
@@ -106,6 +107,7 @@ struct CompareOptions {
   /// Residual tests, stage at fault, errors by regime, worst segments; requires `find_regions`.
   bool find_causes = true;
   ResidualTestOptions tests;  ///< its blocks are those of all statements on motions
+  RankingOptions ranking;
   StageAtFaultOptions fault;
   WorstSegmentOptions segments;
   CompareNoteOptions notes;
@@ -121,11 +123,12 @@ struct CompareResult {
   long samples = 0;
   std::vector<StageScore> scores;  ///< in the order of the stages, then of the machine
   std::vector<EnergyScore> energy;
-  std::vector<WorstRegion> worst;
+  ErrorRanking ranking;                   ///< by which all outputs name and order the errors
+  std::vector<WorstRegion> worst;         ///< in the order of the ranking
   ResidualTests tests;                    ///< systematic errors, with controlled false alarms
-  StageAtFault fault;                     ///< stage in which the error arises
+  StageAtFault fault;                     ///< split errors, and the stage at fault by the ranking
   std::vector<RegimeError> regimes;       ///< errors by regime, with 95 % intervals
-  std::vector<WorstSegment> segments;     ///< motions with the largest errors
+  std::vector<WorstSegment> segments;     ///< motions with the largest errors, in that order
   std::vector<BadChannelOfLog> bad_data;  ///< filled by `compare` only, which has the logs
   std::vector<std::string> notes;         ///< what was not compared, and why; whole sentences
   std::vector<LogComparison> logs;
@@ -149,6 +152,13 @@ CompareResult compare(const CraneModel& model, const std::vector<Log>& logs,
 CompareResult compare(const CraneModel& model, std::vector<Log>&& logs,
                       const CompareOptions& options = {});
 
+/// Ranks the errors anew and orders regions and motions by the ranking, as after a change of `scores`.
+void rank(const Machine& machine, CompareResult& result, const CompareOptions& options = {});
+
+/// Removes all stages but these, as where a machine file alone is compared, and ranks what is left.
+void keep_stages(const Machine& machine, const std::vector<std::string>& stages,
+                 CompareResult& result);
+
 /// Compares with signals that exist already.
 /// @param only [logs] mask of the samples that count; empty = all
 CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignals> signals,
@@ -168,6 +178,9 @@ std::vector<StageQuality> stage_quality(const CompareResult& result, const std::
 
 /// Machine-readable result; keys as in docs/fit_and_compare.md.
 std::string compare_json(const CompareResult& result);
+
+/// One sentence without full stop: that of the ranking, after bad data where there are any.
+std::string compare_headline(const CompareResult& result);
 
 /// One screen for a terminal.
 std::string compare_table(const CompareResult& result);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -16,13 +17,17 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using Json = nlohmann::ordered_json;
 
-Json score_json(const StageScore& s) {
+Json score_json(const StageScore& s, const ErrorRanking& ranking) {
   Json out = {{"rmse", s.rmse / s.unit.si},
               {"unit", s.unit.name},
               {"fit_percent", s.fit_percent},
               {"bias", s.bias / s.unit.si},
               {"within_95_percent", s.within_95_percent},
               {"n", s.n}};
+  if (const RankedError* r = ranking.find(s.stage, s.at, s.regime)) {
+    out["grade"] = grade_word(r->grade);
+    out["explained_percent"] = r->explained_percent();
+  }
   if (s.stage == "pressure") {
     out["extrapolated_percent"] = s.extrapolated_percent;
     out["extrapolated_error_percent"] = s.extrapolated_error_percent;
@@ -50,6 +55,29 @@ RegimeSignal candidate_signal(const CandidateSignal& c) {
     return {c.name + "_lpm", c.name, "l/min", units::kLitrePerMinute, c.values};
   if (c.unit == "rad") return {c.name + "_deg", c.name, "deg", units::kDegree, c.values};
   return {c.name, c.name, c.unit, 1.0, c.values};
+}
+
+const char* bad_words(BadDataKind kind) {
+  switch (kind) {
+    case BadDataKind::kStuck:
+      return "is stuck";
+    case BadDataKind::kJumping:
+      return "jumps";
+    case BadDataKind::kNoisy:
+      return "is noisy";
+    case BadDataKind::kDropOut:
+      return "drops out";
+    case BadDataKind::kSaturated:
+      return "is cut off";
+    case BadDataKind::kWild:
+      return "has single samples far off";
+  }
+  return "";
+}
+
+std::string lower_case_first(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[0])));
+  return text;
 }
 
 /// Wraps text into indented lines of at most about 110 characters.
@@ -121,7 +149,6 @@ void causes_json(const CompareResult& result, Json& root) {
                                {"inherited", s.inherited},
                                {"noise", s.noise},
                                {"unit", s.unit},
-                               {"severity", s.severity},
                                {"n", s.n}});
   }
   root["regimes"] = Json::array();
@@ -166,6 +193,24 @@ void causes_json(const CompareResult& result, Json& root) {
                                 {"evidence", b.bad.evidence},
                                 {"remedy", b.bad.remedy}});
   }
+}
+
+Json ranking_json(const ErrorRanking& ranking) {
+  Json out = Json::array();
+  for (const RankedError& r : ranking.errors) {
+    Json one = {{"stage", r.stage},
+                {"at", r.at},
+                {"regime", r.regime},
+                {"words", r.words},
+                {"error", r.amount},
+                {"grade", grade_word(r.grade)},
+                {"explained_percent", r.explained_percent()},
+                {"inherited_from", nullptr}};
+    if (r.source >= 0)
+      one["inherited_from"] = ranking.errors[static_cast<std::size_t>(r.source)].words;
+    out.push_back(std::move(one));
+  }
+  return out;
 }
 
 std::string duration_text(double seconds) {
@@ -241,9 +286,9 @@ std::string compare_json(const CompareResult& result) {
     stages[stage] = Json::object();
   for (const StageScore& s : result.scores) {
     if (s.regime.empty()) {
-      stages[s.stage][s.at] = score_json(s);
+      stages[s.stage][s.at] = score_json(s, result.ranking);
     } else {
-      stages[s.stage][s.at][s.regime] = score_json(s);
+      stages[s.stage][s.at][s.regime] = score_json(s, result.ranking);
     }
   }
   for (const EnergyScore& e : result.energy) {
@@ -252,6 +297,8 @@ std::string compare_json(const CompareResult& result) {
           {"predicted_J", e.predicted},
           {"relative_error", e.relative_error},
           {"duration_s", e.duration}};
+    if (const RankedError* r = result.ranking.find("energy", e.pump))
+      at["grade"] = grade_word(r->grade);
     if (e.from_commands) at["predicted_from_commands_J"] = *e.from_commands;
   }
   Json worst = Json::array();
@@ -275,6 +322,9 @@ std::string compare_json(const CompareResult& result) {
                     {"filter_window_s", log.signals.window}});
   }
   Json root = {{"samples", result.samples},
+               {"headline", compare_headline(result)},
+               {"grade", grade_word(result.ranking.grade())},
+               {"ranking", ranking_json(result.ranking)},
                {"stages", stages},
                {"worst", worst},
                {"notes", result.notes},
@@ -283,34 +333,51 @@ std::string compare_json(const CompareResult& result) {
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::string compare_headline(const CompareResult& result) {
+  std::string text = result.ranking.headline;
+  if (!result.bad_data.empty()) {
+    const BadChannel& bad = result.bad_data.front().bad;
+    text = fmt::format("Bad data: {} {}; {}", bad.channel, bad_words(bad.kind),
+                       lower_case_first(text));
+  }
+  return text;
+}
+
 std::string compare_table(const CompareResult& result) {
   std::string text = fmt::format("{} samples in {} log{}\n", result.samples, result.logs.size(),
                                  result.logs.size() == 1 ? "" : "s");
+  text += compare_headline(result) + ".\n";
   std::size_t width = 12;
   for (const StageScore& s : result.scores)
     width = std::max(width, s.at.size() + s.regime.size() + 1);
-  if (result.scores.empty()) {
-    text += "nothing could be compared\n";
-  } else {
-    text += fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", "stage", "at", width,
-                        "RMSE", "bias", "unit", "fit %", "n");
+  if (!result.scores.empty()) {
+    text += fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>11}  {:<5}{:>8}\n", "stage", "at",
+                        width, "RMSE", "bias", "unit", "explained %", "grade", "n");
   }
   for (const StageScore& s : result.scores) {
+    const RankedError* r = result.ranking.find(s.stage, s.at, s.regime);
     text +=
-        fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>8}{:>9}\n", s.stage,
+        fmt::format("{:<12}{:<{}}  {:>9}  {:>9}  {:<6}{:>11}  {:<5}{:>8}\n", s.stage,
                     s.regime.empty() ? s.at : s.at + " " + s.regime, width,
                     short_number(s.rmse / s.unit.si), short_number(s.bias / s.unit.si), s.unit.name,
-                    std::isfinite(s.fit_percent) ? fmt::format("{:.1f}", s.fit_percent) : "-", s.n);
+                    r != nullptr ? fmt::format("{:.0f}", r->explained_percent()) : "-",
+                    r != nullptr ? grade_word(r->grade) : "-", s.n);
   }
   for (const EnergyScore& e : result.energy) {
+    if (!std::isfinite(e.relative_error)) continue;  // a note tells it
     text += fmt::format("{:<12}{:<{}}  measured {} kJ, predicted {} kJ ({:+.2f} %)", "energy",
                         e.pump, width, short_number(e.measured / 1e3),
                         short_number(e.predicted / 1e3), 100.0 * e.relative_error);
     if (e.from_commands)
       text += fmt::format(", from commands {} kJ", short_number(*e.from_commands / 1e3));
-    text += fmt::format(" in {}\n", duration_text(e.duration));
+    const RankedError* r = result.ranking.find("energy", e.pump);
+    text += fmt::format(" in {}{}\n", duration_text(e.duration),
+                        r != nullptr ? std::string(", ") + grade_word(r->grade) : "");
   }
-  text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
+  text +=
+      "explained % = 100 (1 - error beyond the sensor's noise / standard deviation of the "
+      "measured, "
+      "at least a\nthird of its RMS); bias = predicted - measured\n";
   if (!result.bad_data.empty())
     text += "\nbad data: repair or leave out before learning from these logs\n";
   for (const BadChannelOfLog& b : result.bad_data)

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "identification/comparison/compare_parts.h"
+#include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
 namespace {
@@ -154,16 +155,16 @@ bool acts_on(const CompareResult& before, const CompareResult& after,
 
 /// @param before, after RMS errors over the samples that count, SI
 HarmedError harm(const StageScore& b, double before, double after) {
-  const bool kilo = b.unit.name == "N" && after >= 1e4;
+  const bool kilo = b.unit.name == "N" && after >= 1e3;
   const double si = kilo ? 1e3 : b.unit.si;
   return {b.stage,
           b.at,
           b.regime,
           before,
           after,
-          fmt::format("the error of {} {}{} grew from {:.3g} to {:.3g} {}", b.stage, b.at,
-                      b.regime.empty() ? "" : " " + b.regime, before / si, after / si,
-                      kilo ? "kN" : b.unit.name)};
+          fmt::format("the error of {} {}{} grew from {} to {} {}", b.stage, b.at,
+                      b.regime.empty() ? "" : " " + b.regime, plain_number(before / si, 3),
+                      plain_number(after / si, 3), kilo ? "kN" : b.unit.name)};
 }
 
 std::vector<HarmedError> harmed_energies(const Machine& machine, const CompareResult& before,

@@ -23,6 +23,19 @@ inline std::string plain_number(double value, int digits) {
   return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 9));
 }
 
+/// Half width of a parameter's 95 % interval, over the larger of its value and its typical size, from which the logs do not
+/// determine it and no output shows it to a person.
+/// @threshold [1] 1..100; chosen: of three times the size at which an effect is clearly seen, nothing is known
+inline constexpr double kUndeterminedWidth = 3.0;
+
+/// Whether an interval says something about a parameter. An interval that is not known (NaN) is no reason to hide a value.
+/// @param typical size at which the effect is clearly visible, in the unit of the others; 0 = not known
+inline bool is_determined(double value, double lower95, double upper95, double typical) {
+  if (std::isnan(lower95) || std::isnan(upper95)) return true;
+  const double half = 0.5 * (upper95 - lower95);
+  return half <= kUndeterminedWidth * std::max(std::abs(value), std::abs(typical));
+}
+
 /// @return null for NaN and infinity, which JSON cannot represent
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "identification/comparison/report_numbers.h"
 #include "models/math/nan.h"
 
 namespace sparflow {
@@ -47,7 +48,7 @@ MatrixXd features(const VectorXd& signal) {
   return out.leftCols(columns);
 }
 
-std::string three_digits(double value) { return fmt::format("{:.3g}", value); }
+std::string three_digits(double value) { return plain_number(value, 3); }
 
 /// @return R^2: share of the squared error (mean removed) in the span of orthogonal features
 double explained(const MatrixXd& f, const VectorXd& error) {

@@ -6,10 +6,11 @@
 #include <cmath>
 
 #include "identification/comparison/compare.h"
+#include "identification/comparison/error_ranking.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/signals/apply_effects.h"
 #include "models/chain/pump_law.h"
 #include "models/math/nan.h"
-#include "models/math/robust.h"
 
 namespace sparflow {
 namespace {
@@ -76,33 +77,9 @@ class Inheritance {
   const MachineSignals& signals_;
 };
 
-/// Measured minus smoothed signal, as an estimate of the sensor noise; NaN for flows, whose speed is smoothed already.
-double roughness(const Machine& machine, const MachineSignals& signals, const ComparedSeries& s,
-                 Index k) {
-  if (s.stage == "pump") {
-    const auto p = static_cast<std::size_t>(machine.pump_index(s.at));
-    return signals.pumps[p].pressure[k] - signals.pumps[p].pressure_smooth[k];
-  }
-  const CylinderSignals& c =
-      signals.cylinders[static_cast<std::size_t>(machine.cylinder_index(s.at))];
-  if (s.stage == "force") return c.force[k] - c.force_smooth[k];
-  if (s.stage == "pressure") return c.working_pressure[k] - c.working_pressure_smooth[k];
-  return kNaN;
-}
-
-std::string words_of(const StageSplit& s) {
-  const std::string side = s.regime.empty()       ? ""
-                           : s.regime == "extend" ? " extending"
-                                                  : " retracting";
-  if (s.stage == "pump") return "pressure of pump " + s.at;
-  if (s.stage == "pressure") return "working pressure of " + s.at + side;
-  if (s.stage == "flow") return "flow of " + s.at + " from its command";
-  return s.stage + " of " + s.at;
-}
-
 std::string amount(double value, const std::string& unit) {
-  if (unit == "N" && std::abs(value) >= 1e3) return fmt::format("{:.3g} kN", value / 1e3);
-  return fmt::format("{:.3g} {}", value, unit);
+  if (unit == "N" && std::abs(value) >= 1e3) return plain_number(value / 1e3, 3) + " kN";
+  return plain_number(value, 3) + " " + unit;
 }
 
 /// Splits the error of one quantity. @param score of the quantity
@@ -114,7 +91,6 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.at = at;
   out.regime = regime;
   double error = 0.0, own = 0.0, inherited = 0.0, sum = 0.0, squares = 0.0, n = 0.0;
-  std::vector<double> rough;
   FieldUnit unit;
   for (const LogComparison& log : result.logs) {
     const Inheritance before(model, log);
@@ -134,8 +110,6 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
         sum += s.measured[k];
         squares += s.measured[k] * s.measured[k];
         n += 1.0;
-        const double r = roughness(model.machine, log.signals, s, k);
-        if (std::isfinite(r)) rough.push_back(r);
       }
     }
   }
@@ -146,27 +120,29 @@ StageSplit split(const CraneModel& model, const CompareResult& result, const Sta
   out.own = std::sqrt(own / n) / unit.si;
   out.inherited = std::sqrt(inherited / n) / unit.si;
   out.spread = std::sqrt(std::max(0.0, squares / n - sum * sum / n / n)) / unit.si;
-  if (!rough.empty()) {
-    const Eigen::Map<const VectorXd> r(rough.data(), static_cast<Index>(rough.size()));
-    out.noise = options.noise_allowance * robust_std(r) / unit.si;
-  }
+  const double noise = sensor_noise(model.machine, result, score);
+  if (std::isfinite(noise)) out.noise = noise / unit.si;
   // A law that was learned with wrong inputs compensates their error; its error with right inputs is then not its own.
-  const double at_fault = std::min(out.own, out.error);
-  const double beyond = std::sqrt(std::max(0.0, at_fault * at_fault - out.noise * out.noise));
-  out.severity = out.spread > 0.0 ? beyond / out.spread : 0.0;
   out.compensates = out.own > options.compensation_ratio * out.error &&
                     out.inherited > options.compensation_ratio * out.error;
-  out.words = words_of(out);
+  out.words = quantity_name(stage, at, regime);
   return out;
 }
 
-std::string describe(const StageAtFault& found, const StageAtFaultOptions& options) {
-  if (found.stages.empty()) return "";
-  if (found.fault < 0)
+/// @param at the quantity at fault by the ranking; nullptr = none
+std::string describe(const StageAtFault& found, const ErrorRanking& ranking, const RankedError* at,
+                     const StageAtFaultOptions& options) {
+  if (ranking.empty()) return "";
+  if (at == nullptr)
     return "No stage stands out: with measured inputs the error of every stage is near its noise.";
+  const char* const what =
+      ranking.grade() == Grade::kGood ? "The largest error that is left" : "The error";
+  if (found.fault <
+      0)  // it could not be split, as where all of its samples lie outside the training data
+    return fmt::format("{} arises in the {}: {}.", what, at->words, at->amount);
   const StageSplit& f = found.stages[static_cast<std::size_t>(found.fault)];
   std::string text =
-      fmt::format("The error arises in the {}: {} RMS of its own", f.words, amount(f.own, f.unit));
+      fmt::format("{} arises in the {}: {} RMS of its own", what, f.words, amount(f.own, f.unit));
   if (f.inherited > options.mentioned_share * f.own)
     text += fmt::format(" and {} inherited", amount(f.inherited, f.unit));
   // The following stage that inherits the largest error is named with it.
@@ -201,22 +177,26 @@ std::string describe(const StageAtFault& found, const StageAtFaultOptions& optio
 
 }  // namespace
 
-StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& result,
-                                 const StageAtFaultOptions& options) {
-  StageAtFault out;
+std::vector<StageSplit> split_stages(const CraneModel& model, const CompareResult& result,
+                                     const StageAtFaultOptions& options) {
+  std::vector<StageSplit> out;
   for (const StageScore& score : result.scores) {
-    if (score.stage == "flow_sensor") continue;
     StageSplit s = split(model, result, score, options);
-    if (s.n > 1) out.stages.push_back(std::move(s));
+    if (s.n > 1) out.push_back(std::move(s));
   }
-  double worst = options.least_severity;
-  for (std::size_t i = 0; i < out.stages.size(); ++i) {
-    if (out.stages[i].severity <= worst) continue;
-    worst = out.stages[i].severity;
-    out.fault = static_cast<int>(i);
-  }
-  out.sentence = describe(out, options);
   return out;
+}
+
+void name_stage_at_fault(const ErrorRanking& ranking, StageAtFault& fault,
+                         const StageAtFaultOptions& options) {
+  fault.fault = -1;
+  const RankedError* at = ranking.at_fault();
+  for (std::size_t i = 0; at != nullptr && i < fault.stages.size(); ++i) {
+    const StageSplit& s = fault.stages[i];
+    if (s.stage == at->stage && s.at == at->at && s.regime == at->regime)
+      fault.fault = static_cast<int>(i);
+  }
+  fault.sentence = describe(fault, ranking, at, options);
 }
 
 }  // namespace sparflow

@@ -1,5 +1,5 @@
 #pragma once
-/// Finds the stage in which an error arises. Every stage is evaluated twice: with the prediction of the stage before as
+/// Splits errors, so that the ranking (error_ranking.h) can tell the stage in which an error arises. Every stage is evaluated twice: with the prediction of the stage before as
 /// input, and with the measurement there. The second gives its own error; the difference of the two is inherited.
 ///   force     from the pose: all of the error is its own
 ///   flow      from the command: all of the error is its own
@@ -13,6 +13,7 @@
 namespace sparflow {
 
 struct CompareResult;
+struct ErrorRanking;
 
 /// The error of one quantity split into own and inherited error, in `unit`.
 struct StageSplit {
@@ -23,11 +24,9 @@ struct StageSplit {
   double error = 0.0;      ///< RMS of predicted - measured
   double own = 0.0;        ///< RMS with measured inputs
   double inherited = 0.0;  ///< RMS of the change that the error of the stage before causes
-  double noise = 0.0;      ///< [unit] noise of its sensor, from measured - smoothed; 0 for flows
+  double noise = 0.0;      ///< [unit] noise of its sensor (sensor_noise); 0 for flows
   double spread = 0.0;     ///< standard deviation of the measured values
   long n = 0;
-  /// The smaller of own error and error along the chain, less the noise, over the measured spread; 0 is best.
-  double severity = 0.0;
   /// Whether the stage was learned together with the errors of the stage before and compensates them.
   bool compensates = false;
 };
@@ -41,9 +40,6 @@ struct StageAtFault {
 };
 
 struct StageAtFaultOptions {
-  /// Least own error beyond noise, as a share of the measured spread, for a stage to be at fault.
-  /// @threshold [1] 0..0.5; chosen: smaller errors hardly affect the energy
-  double least_severity = 0.05;
   /// Least own and least inherited error, over the error along the chain, for a stage to compensate
   /// the errors before it.
   /// @threshold [1] 1..10; chosen: two errors that partly cancel have to be clearly larger than
@@ -53,13 +49,14 @@ struct StageAtFaultOptions {
   /// the following stage), to be mentioned.
   /// @threshold [1] 0..1; chosen: a smaller part is of no use to the reader
   double mentioned_share = 0.25;
-  /// Factor on measured minus smoothed signal as an estimate of the sensor noise.
-  /// @threshold [1] 1..1.5; chosen: the smoothed signal keeps a part of the noise, so the
-  /// difference is too small by about this factor
-  double noise_allowance = 1.1;
 };
 
-StageAtFault find_stage_at_fault(const CraneModel& model, const CompareResult& result,
-                                 const StageAtFaultOptions& options = {});
+/// Splits the errors of all quantities, in the order of the chain; names no stage.
+std::vector<StageSplit> split_stages(const CraneModel& model, const CompareResult& result,
+                                     const StageAtFaultOptions& options = {});
+
+/// Names the stage at fault: the one that the ranking says (ErrorRanking::at_fault).
+void name_stage_at_fault(const ErrorRanking& ranking, StageAtFault& fault,
+                         const StageAtFaultOptions& options = {});
 
 }  // namespace sparflow

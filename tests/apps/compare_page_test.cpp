@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "apps/report/model_pages/compare_charts.h"
-#include "apps/report/model_pages/score_judgement.h"
 #include "models/math/error.h"
 #include "models/math/units.h"
 #include "tests/apps/browser_check.h"
@@ -50,17 +49,13 @@ void expect_compare_page_good(const Page& page, const std::string& name) {
 TEST(ComparePage, CorrectModelIsGoodInEveryStage) {
   const CraneModel model = arm_model();
   const CompareResult result = compare(model, {arm_log(kNoise)});
-  const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
-  ASSERT_FALSE(judged.empty());
-  int pumps = 0;
-  for (const JudgedScore& j : judged) {
-    EXPECT_EQ(j.tone, Tone::kGood) << j.score.stage << " " << j.score.regime;
-    if (j.score.stage != "pump") continue;
-    ++pumps;
-    // The filter keeps a part of the noise, so the estimate is low, by at most 15 %.
-    EXPECT_NEAR(j.noise / units::kBar, kNoise, 0.15 * kNoise);
-  }
-  EXPECT_EQ(pumps, 1) << "the arm has one pump, and the log its pressure";
+  ASSERT_FALSE(result.ranking.empty());
+  for (const RankedError& r : result.ranking.errors)
+    EXPECT_EQ(r.grade, Grade::kGood) << r.words << " " << r.unexplained;
+  const RankedError* pump = result.ranking.find("pump", "main");
+  ASSERT_NE(pump, nullptr);
+  // The filter keeps a part of the noise, for which the estimate has an allowance of a tenth: 15 % cover both.
+  EXPECT_NEAR(pump->noise / units::kBar, kNoise, 0.15 * kNoise);
   EXPECT_THAT(compare_page(model, result).html(),
               HasSubstr("The model follows the measurements in every stage"));
 }
@@ -68,10 +63,9 @@ TEST(ComparePage, CorrectModelIsGoodInEveryStage) {
 TEST(ComparePage, FrictionIsNamedInTheVerdict) {
   const CraneModel model = arm_model();
   const CompareResult result = compare(model, {log_with_force(40e3)});
-  const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
-  ASSERT_NE(worst_score(judged), nullptr);
-  EXPECT_EQ(worst_score(judged)->score.stage, "force");
-  EXPECT_EQ(worst_score(judged)->tone, Tone::kBad);
+  ASSERT_FALSE(result.ranking.empty());
+  EXPECT_EQ(result.ranking.errors[0].stage, "force");
+  EXPECT_EQ(result.ranking.errors[0].grade, Grade::kPoor);
   const std::string html = compare_page(model, result).html();
   EXPECT_THAT(html,
               HasSubstr("The model misses the force of arm: 4"));  // friction of 40 kN, plus noise

@@ -43,5 +43,23 @@ TEST(MotionText, ConstantPressureIsSaid) {
   EXPECT_THAT(constant_pressure_note(model), testing::HasSubstr("depends on the strokes alone"));
 }
 
+TEST(MotionText, HeadlineTellsTheGapAndWhatTheModelHasNotLearned) {
+  OptimizeResult r;
+  EXPECT_EQ(motion_headline(r), "no motion was found");
+  r.motion.t = Eigen::Vector2d(0.0, 16.0);
+  r.duration = 16.0;
+  r.energy.total = 82e3;
+  r.energy.moving_share_outside_data = 0.4;
+  EXPECT_EQ(motion_headline(r), "82.0 kJ in 16.00 s") << "no bound, and most was learned";
+  r.lower_bound = 80e3;
+  EXPECT_NEAR(bound_gap(r), 0.025, 1e-12);  // rounding
+  EXPECT_THAT(motion_headline(r),
+              testing::HasSubstr("; 2.5 % above the estimated bound of 80.0 kJ"));
+  r.energy.moving_share_outside_data = 0.67;
+  EXPECT_THAT(motion_headline(r),
+              testing::EndsWith("; most of the motion (67 % of the moving time) lies outside what "
+                                "the model has learned"));
+}
+
 }  // namespace
 }  // namespace sparflow

@@ -99,6 +99,7 @@
     if (series.style === "measured") return { stroke: faded(color, 0.38), width: 3.5 };
     if (series.style === "predicted") return { stroke: color, width: 1.5 };
     if (series.style === "limit") return { stroke: color, width: 1.2, dash: [6, 4] };
+    if (series.style === "before") return { stroke: color, width: 1.5 };
     return { stroke: color, width: 1.8 };
   }
 
@@ -182,13 +183,13 @@
     const series = [{ label: spec.x_axis.label, class: "quiet" }];
     const alpha = points.length > 1500 ? 0.35 : 0.65;
     spec.groups.forEach((g, k) => {
-      const color = theme.color(k);
+      const color = theme.color(g.color);
       series.push({ label: g.name, stroke: color, paths: () => null,
         points: { show: true, size: points.length > 1500 ? 3.5 : 5, width: 0, fill: faded(color, alpha) } });
     });
     for (const t of trends) {
       const lone = groupCount === 1;
-      series.push({ label: "median", ...(lone ? {} : { class: "quiet" }), stroke: lone ? theme.ink() : theme.color(t.group),
+      series.push({ label: "median", ...(lone ? {} : { class: "quiet" }), stroke: lone ? theme.ink() : theme.color(spec.groups[t.group].color),
         width: 2.4, pxAlign: 0, points: { show: false } });
     }
     const reading = element("div", { class: "reading" });
@@ -196,7 +197,7 @@
       width: host.clientWidth, height: spec.height || 280, padding: [8, kRight, 0, 0],
       scales: { x: { time: false, range: range(0.03) }, y: { range: range(0.06) } },
       axes: axes(spec), series,
-      legend: { live: false, markers: { fill: (u, i) => (i > groupCount ? theme.ink() : theme.color(i - 1)), width: 0 } },
+      legend: { live: false, markers: { fill: (u, i) => (i < 1 || i > groupCount ? theme.ink() : theme.color(spec.groups[i - 1].color)), width: 0 } },
       cursor: { drag: { x: true, y: true, uni: 40 }, points: { show: false } },
       hooks: {
         drawClear: [(u) => drawReferenceLines(u, spec)],
@@ -214,7 +215,7 @@
     chart.over.append(reading);
     return {
       picture: () => chart.ctx.canvas,
-      key: () => spec.groups.map((g, k) => ({ name: g.name, color: theme.color(k) })),
+      key: () => spec.groups.map((g) => ({ name: g.name, color: theme.color(g.color) })),
       rows: () => [["group", titled(spec.x_axis), titled(spec.y_axis)]].concat(
         ...spec.groups.map((g) => g.x.map((x, i) => [g.name, x, g.y[i]]))),
       remove: () => chart.destroy(),

@@ -76,7 +76,7 @@
   page.plane.count = 0;
 
   page.kinds.bars = function (host, spec) {
-    const width = host.clientWidth, many = spec.series.length, colors = spec.series.map((_, k) => theme.color(k));
+    const width = host.clientWidth, many = spec.series.length, colors = spec.series.map((s) => theme.color(s.color));
     const left = Math.min(width * 0.5, 16 + Math.max(30, ...spec.categories.map(textWidth))), right = 70;
     const barHeight = spec.stacked ? 22 : 15, rowHeight = (spec.stacked ? barHeight : barHeight * Math.max(1, many)) + 12;
     const rows = spec.categories.length;

@@ -86,8 +86,16 @@ json parts_json(const std::vector<DrawingPart>& parts) {
   return out;
 }
 
+/// Number of a colour for the scripts, in which -1 is grey.
+int color_number(int color, int& next) {
+  if (color == kBeforeColor) return -1;
+  return color >= 0 ? color : next++;
+}
+
 const char* style_name(LineStyle style) {
   switch (style) {
+    case LineStyle::kBefore:
+      return "before";
     case LineStyle::kPlain:
       return "plain";
     case LineStyle::kMeasured:
@@ -142,7 +150,7 @@ json chart_json(const LineChart& chart, Index most_points) {
   int next_color = 0;
   for (const LineSeries& s : chart.series) {
     json one = {{"name", s.name}, {"style", style_name(s.style)}};
-    if (s.style == LineStyle::kLimit && s.color < 0) {
+    if ((s.style == LineStyle::kLimit && s.color < 0) || s.style == LineStyle::kBefore) {
       one["color"] = -1;
     } else {
       one["color"] = s.color >= 0 ? s.color : next_color++;
@@ -174,6 +182,7 @@ json chart_json(const ScatterChart& chart, Index most_points) {
   out["diagonal"] = chart.diagonal;
   out["groups"] = json::array();
   Index total = 0, shown = 0;
+  int next_color = 0;
   const Index share = most_points / std::max<Index>(1, static_cast<Index>(chart.groups.size()));
   for (const ScatterGroup& group : chart.groups) {
     SPARFLOW_CHECK(
@@ -183,6 +192,7 @@ json chart_json(const ScatterChart& chart, Index most_points) {
     total += group.x.size();
     shown += static_cast<Index>(points.size());
     out["groups"].push_back({{"name", group.name},
+                             {"color", color_number(group.color, next_color)},
                              {"x", picked(group.x, points, kValueDigits)},
                              {"y", picked(group.y, points, kValueDigits)}});
   }
@@ -206,11 +216,14 @@ json chart_json(const BarChart& chart, Index /*most_points*/) {
   out["categories"] = chart.categories;
   out["stacked"] = chart.stacked;
   out["series"] = json::array();
+  int next_color = 0;
   for (const BarSeries& s : chart.series) {
     SPARFLOW_CHECK(
         s.values.size() == static_cast<Index>(chart.categories.size()),
         fmt::format("chart \"{}\": series \"{}\" needs one value a category", chart.title, s.name));
-    out["series"].push_back({{"name", s.name}, {"values", numbers(s.values, kValueDigits)}});
+    out["series"].push_back({{"name", s.name},
+                             {"color", color_number(s.color, next_color)},
+                             {"values", numbers(s.values, kValueDigits)}});
   }
   return out;
 }

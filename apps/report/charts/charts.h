@@ -29,8 +29,12 @@ struct Figure {
   std::string group;  ///< charts over time and crane drawings of one group share cursor and zoom
 };
 
-/// Measured is drawn as a wide pale line, predicted as a thin full one over it, limits dashed.
-enum class LineStyle { kPlain, kMeasured, kPredicted, kLimit };
+/// Measured is drawn as a wide pale line, predicted as a thin full one over it, limits dashed. The model before a change is
+/// grey on every page (kBefore), after it kPredicted.
+enum class LineStyle { kPlain, kMeasured, kPredicted, kLimit, kBefore };
+
+/// Number of the colour of everything before a change: the grey of notes.
+inline constexpr int kBeforeColor = -2;
 
 struct LineSeries {
   std::string name;
@@ -65,6 +69,7 @@ struct LineChart : Figure {
 struct ScatterGroup {
   std::string name;
   Eigen::VectorXd x, y;  ///< of one length, in any order
+  int color = -1;        ///< palette number, kBeforeColor, or -1 = the next
 };
 
 struct ScatterChart : Figure {
@@ -77,6 +82,7 @@ struct ScatterChart : Figure {
 struct BarSeries {
   std::string name;
   Eigen::VectorXd values;  ///< [categories]
+  int color = -1;          ///< palette number, kBeforeColor, or -1 = the next
 };
 
 /// Horizontal bars, one row for each category.

@@ -30,15 +30,15 @@ void add_bad_data(Page& page, const CompareResult& result) {
 void add_stages(Page& page, const CompareResult& result) {
   const std::vector<StageSplit>& stages = result.fault.stages;
   if (stages.empty()) return;
-  page.paragraph(result.fault.sentence);
   BarChart chart;
   chart.title = "Own and inherited error of each stage";
   chart.note =
-      "Mean squared error as a share of the measured quantity's variance; at 100 % a constant "
-      "would "
-      "predict as well. Own: the error beyond the sensor's noise when the input from the stage "
-      "before is the measured one. Inherited: the change when that input is the predicted one. A "
-      "quantity that varies little has a large share of noise, which is no fault of the model.";
+      "Mean squared error as a share of the square of the quantity's scale, by which the ranking "
+      "judges; "
+      "at 100 % nothing is explained. Own: the error beyond the sensor's noise when the input from "
+      "the "
+      "stage before is the measured one. Inherited: the change when that input is the predicted "
+      "one.";
   chart.value_axis = {"squared error", "%"};
   const auto n = static_cast<Index>(stages.size());
   BarSeries own{"own", VectorXd(n)}, inherited{"inherited", VectorXd(n)};
@@ -46,8 +46,12 @@ void add_stages(Page& page, const CompareResult& result) {
   for (Index i = 0; i < n; ++i) {
     const StageSplit& s = stages[static_cast<std::size_t>(i)];
     chart.categories.push_back(s.words);
-    const auto share = [&s](double rms) {
-      return s.spread > 0.0 ? 100.0 * rms * rms / (s.spread * s.spread) : kNaN;
+    const RankedError* ranked = result.ranking.find(s.stage, s.at, s.regime);
+    const StageScore* score = result.find(s.stage, s.at, s.regime);
+    const double scale =
+        ranked != nullptr && score != nullptr ? ranked->scale / score->unit.si : 0.0;
+    const auto share = [scale](double rms) {
+      return scale > 0.0 ? 100.0 * rms * rms / (scale * scale) : kNaN;
     };
     // Where a law compensates the error that it inherits, the remaining error of both is drawn.
     const double own_error = s.compensates ? s.error : s.own;
@@ -64,7 +68,8 @@ void add_stages(Page& page, const CompareResult& result) {
   for (const StageSplit& s : stages)
     table.rows.push_back({capitalised(s.words), s.error, s.own, s.inherited, s.noise, s.unit});
   table.note =
-      "RMS. Where own and inherited errors are correlated, their squares do not add up; where they "
+      "RMS, without samples outside the training data. Where own and inherited errors are "
+      "correlated, their squares do not add up; where they "
       "cancel, the law was learned with the wrong force and compensates it (the remaining error is "
       "drawn).";
   table.highlighted_row = result.fault.fault;
@@ -118,7 +123,7 @@ void add_tests(Page& page, const CompareResult& result) {
 }
 
 /// Appends the errors by regime of the stage at fault, or of the first stage; the JSON result has all stages.
-void add_regimes(Page& page, const CompareResult& result) {
+void add_regimes(Page& page, const Machine& machine, const CompareResult& result) {
   if (result.regimes.empty()) return;
   std::string stage = result.regimes.front().stage, at = result.regimes.front().at;
   if (result.fault.fault >= 0) {
@@ -148,7 +153,8 @@ void add_regimes(Page& page, const CompareResult& result) {
     values.push_back(e.rmse);
   }
   if (values.empty()) return;
-  chart.series = {{"RMSE", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size()))}};
+  chart.series = {{"RMSE", Eigen::Map<VectorXd>(values.data(), static_cast<Index>(values.size())),
+                   place_color(machine, stage, at)}};
   table.note =
       "Intervals are from a bootstrap of whole blocks of motion. The JSON result (--json) has all "
       "quantities.";
@@ -168,13 +174,15 @@ void add_segments(Page& page, const CompareResult& result) {
 
 }  // namespace
 
-void add_causes(Page& page, const CompareResult& result, const std::string& heading_prefix) {
+void add_causes(Page& page, const Machine& machine, const CompareResult& result,
+                const std::string& heading_prefix) {
   if (result.fault.stages.empty() && result.tests.tests.empty() && result.bad_data.empty()) return;
   page.section(heading_prefix + "Where the error arises");
+  if (!result.fault.sentence.empty()) page.paragraph(result.fault.sentence);
   add_bad_data(page, result);
   add_stages(page, result);
   add_tests(page, result);
-  add_regimes(page, result);
+  add_regimes(page, machine, result);
   add_segments(page, result);
 }
 

@@ -9,6 +9,7 @@ namespace sparflow {
 
 /// Appends, each as a figure or a table: own and inherited error of each stage, systematic errors, errors by regime,
 /// worst motions, bad channels. Appends nothing when the comparison was made without a search for causes.
-void add_causes(Page& page, const CompareResult& result, const std::string& heading_prefix);
+void add_causes(Page& page, const Machine& machine, const CompareResult& result,
+                const std::string& heading_prefix);
 
 }  // namespace sparflow

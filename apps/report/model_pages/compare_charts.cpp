@@ -15,7 +15,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 constexpr std::size_t kMostCurveCharts = 40;  // keeps the page readable and small
 const char* const kCurvesExplained =
-    "Only samples that count in the scores are drawn. Bands: \u00B12 standard deviations of one "
+    "Each cylinder and pump has one colour on all pages. Only samples that count in the scores are "
+    "drawn. Bands: \u00B12 standard deviations of one "
     "measurement. Shaded: the regions named above. Drag to zoom; all charts of a log zoom "
     "together.";
 
@@ -66,7 +67,7 @@ std::vector<Span> spans_of(const Mask& inside, const VectorXd& time) {
 /// @param of the log and its series, as in ComparedQuantity::logs
 LineChart curve_chart(const Machine& machine, const CompareResult& result,
                       const ComparedQuantity& quantity,
-                      const std::pair<const LogComparison*, const ComparedSeries*>& of, int color) {
+                      const std::pair<const LogComparison*, const ComparedSeries*>& of) {
   const LogComparison& log = *of.first;
   const ComparedSeries& series = *of.second;
   LineChart chart;
@@ -86,7 +87,7 @@ LineChart curve_chart(const Machine& machine, const CompareResult& result,
   predicted.name = "predicted";
   predicted.y = series.predicted * scale;
   predicted.style = LineStyle::kPredicted;
-  measured.color = predicted.color = color;
+  measured.color = predicted.color = place_color(machine, series.stage, series.at);
   if (series.deviation.size() > 0) {
     predicted.band_lower = (series.predicted - 2.0 * series.deviation) * scale;
     predicted.band_upper = (series.predicted + 2.0 * series.deviation) * scale;
@@ -103,16 +104,22 @@ LineChart curve_chart(const Machine& machine, const CompareResult& result,
 
 }  // namespace
 
+int place_color(const Machine& machine, const std::string& stage, const std::string& at) {
+  return stage == "pump" || stage == "energy" ? machine.cylinder_count() + machine.pump_index(at)
+                                              : machine.cylinder_index(at);
+}
+
+Tone tone_of(Grade grade) {
+  return grade == Grade::kGood ? Tone::kGood : grade == Grade::kPoor ? Tone::kBad : Tone::kWarning;
+}
+
 std::string capitalised(std::string text) {
   if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
   return text;
 }
 
 std::string quantity_words(const std::string& stage, const std::string& at) {
-  if (stage == "pump") return "pressure of pump " + at;
-  if (stage == "pressure") return "working pressure of " + at;
-  if (stage == "flow_sensor") return "flow of " + at + " at its sensor";
-  return stage + " of " + at;
+  return quantity_name(stage, at, "");
 }
 
 std::vector<ComparedQuantity> compared_quantities(const CompareResult& result) {
@@ -162,7 +169,7 @@ void add_compared_curves(Page& page, const Machine& machine, const CompareResult
           heading = true;
         }
         ++drawn;
-        page.plot(curve_chart(machine, result, quantities[i], of, static_cast<int>(i)));
+        page.plot(curve_chart(machine, result, quantities[i], of));
       }
     }
   }

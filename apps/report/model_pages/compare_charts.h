@@ -22,6 +22,15 @@ struct ComparedQuantity {
 /// @param result must outlive the list, which points into it
 std::vector<ComparedQuantity> compared_quantities(const CompareResult& result);
 
+/// The sign of every error and residual on all pages, in the terminal and in JSON: positive where the model says too much.
+inline constexpr const char* kErrorAxis = "predicted \u2212 measured";
+
+/// Number of the colour of a cylinder or pump on every page: cylinders in the machine's order, then pumps.
+int place_color(const Machine& machine, const std::string& stage, const std::string& at);
+
+/// Colour of a grade: green, amber, red.
+Tone tone_of(Grade grade);
+
 /// Returns the text with a capital first letter, for titles.
 std::string capitalised(std::string text);
 

@@ -4,21 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "apps/report/model_pages/compare_causes.h"
 #include "apps/report/model_pages/compare_charts.h"
-#include "apps/report/model_pages/score_judgement.h"
+#include "identification/comparison/report_numbers.h"
 #include "models/files/model_file.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 namespace {
-
-/// RMSE in the unit that keeps it short: {"20.3", "kN"}.
-std::pair<std::string, std::string> error_text(const StageScore& s) {
-  if (s.unit.name == "N" && s.rmse >= 1e3) return {display_number(s.rmse / 1e3, 3), "kN"};
-  return {display_number(s.rmse / s.unit.si, 3), s.unit.name};
-}
 
 std::string place_words(const StageScore& s) {
   if (s.stage == "pump") return "pump " + s.at;
@@ -37,58 +31,80 @@ std::string stage_words(const std::string& stage) {
 /// Rounds to a multiple of `step`, so that rounding errors are shown as 0.
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
-std::string signed_percent(double share) {
-  if (!std::isfinite(share)) return "\u2013";
-  const double percent = rounded(100.0 * share, 0.01);
-  return percent == 0.0 ? "0.00" : fmt::format("{:+.2f}", percent);
-}
-
-void add_tiles(Page& page, const CompareResult& result, const std::vector<JudgedScore>& judged) {
+/// One tile for each stage, with its worst quantity, and one for each pump's energy, in the order of the ranking.
+void add_tiles(Page& page, const CompareResult& result) {
   std::vector<Tile> tiles;
-  for (const JudgedScore& j : worst_of_stages(judged)) {
-    const StageScore& s = j.score;
-    const auto [value, unit] = error_text(s);
+  for (const RankedError* r : result.ranking.worst_of_stages()) {
+    if (r->stage == "energy") continue;
+    const StageScore* s = result.find(r->stage, r->at, r->regime);
     const auto of_stage = std::count_if(result.scores.begin(), result.scores.end(),
-                                        [&](const StageScore& o) { return o.stage == s.stage; });
-    std::string note = of_stage > 1 ? "worst: " + place_words(s) : place_words(s);
-    if (s.fit_percent >= 0.05) note += fmt::format(", fit {:.0f} %", s.fit_percent);
-    tiles.push_back({value, unit, stage_words(s.stage) + ", RMS error", note, j.tone});
+                                        [&](const StageScore& o) { return o.stage == r->stage; });
+    const std::size_t space = r->amount.find(' ');
+    const std::string unit = r->amount.substr(space + 1, r->amount.rfind(' ') - space - 1);
+    tiles.push_back({r->amount.substr(0, space), unit, stage_words(r->stage) + ", RMS error",
+                     fmt::format("{}{}, {:.0f} % explained", of_stage > 1 ? "worst: " : "",
+                                 place_words(*s), r->explained_percent()),
+                     tone_of(r->grade)});
+  }
+  for (const RankedError& r : result.ranking.errors) {
+    if (r.stage != "energy") continue;
+    for (const EnergyScore& e : result.energy) {
+      if (e.pump != r.at) continue;
+      tiles.push_back(
+          {r.amount.substr(0, r.amount.find(' ')), "%", r.words,
+           fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
+                       display_number(e.measured / 1e3, 4)),
+           tone_of(r.grade)});
+    }
   }
   for (const EnergyScore& e : result.energy) {
+    if (std::isfinite(e.relative_error)) continue;
     tiles.push_back(
-        {signed_percent(e.relative_error), "%", "energy of pump " + e.pump,
-         std::isfinite(e.relative_error)
-             ? fmt::format("{} kJ predicted, {} kJ measured", display_number(e.predicted / 1e3, 4),
-                           display_number(e.measured / 1e3, 4))
-             : fmt::format("the pump delivered nothing in {:.1f} s: no cylinder is driven",
-                           e.duration),
-         judge_energy(e)});
+        {"\u2013", "%", "energy of pump " + e.pump,
+         fmt::format("the pump delivered nothing in {:.1f} s: no cylinder is driven", e.duration)});
   }
   if (!tiles.empty()) page.tiles(std::move(tiles));
 }
 
-void add_scores(Page& page, const std::vector<JudgedScore>& judged) {
+const char* const kJudgementRule =
+    "Explained: 100 % when the error is the sensor's noise, 0 % when it is as large as the "
+    "standard deviation of the measured values (at least a third of their RMS is taken for it; of "
+    "an "
+    "energy a tenth). Good: 85 % and more. Poor: less than 50 %. The order is that of the ranking: "
+    "worst grade first, an inherited error behind its source.";
+
+void add_scores(Page& page, const CompareResult& result) {
   Table table;
-  table.title = "Predicted against measured";
-  table.columns = {{"stage"},       {"at"},   {"RMSE", "", 4}, {"sensor noise", "", 3},
-                   {"bias", "", 2}, {"unit"}, {"fit", "%", 3}, {"inside 95 % interval", "%", 3},
-                   {"samples"},     {""}};
+  table.title = "Predicted against measured, worst first";
+  table.columns = {{"quantity"},
+                   {"error"},
+                   {"bias"},
+                   {"sensor noise", "", 3},
+                   {"unit"},
+                   {"explained", "%", 3},
+                   {"grade"},
+                   {"inherited from"},
+                   {"inside 95 % interval", "%", 3},
+                   {"samples"}};
   bool intervals = false;
-  for (const JudgedScore& j : judged) {
-    const StageScore& s = j.score;
-    const double rmse = s.rmse / s.unit.si;
-    const double step = rmse > 0.0 ? std::pow(10.0, std::floor(std::log10(rmse)) - 2.0) : 1.0;
-    intervals = intervals || std::isfinite(s.within_95_percent);
-    table.rows.push_back({stage_words(s.stage), place_words(s), rmse, j.noise / s.unit.si,
-                          rounded(s.bias / s.unit.si, step), s.unit.name,
-                          rounded(s.fit_percent, 0.1), s.within_95_percent,
-                          static_cast<double>(s.n), std::string(tone_word(j.tone))});
+  for (const RankedError& r : result.ranking.errors) {
+    const StageScore* s = result.find(r.stage, r.at, r.regime);
+    const std::string from =
+        r.source < 0 ? "" : result.ranking.errors[static_cast<std::size_t>(r.source)].words;
+    if (s == nullptr) {  // an energy
+      table.rows.push_back({capitalised(r.words), r.amount, "", kNaN, "", r.explained_percent(),
+                            std::string(grade_word(r.grade)), from, kNaN, kNaN});
+      continue;
+    }
+    intervals = intervals || std::isfinite(s->within_95_percent);
+    table.rows.push_back(
+        {capitalised(r.words), r.amount, short_number(s->bias / s->unit.si) + " " + s->unit.name,
+         r.noise / s->unit.si, s->unit.name, r.explained_percent(),
+         std::string(grade_word(r.grade)), from, s->within_95_percent, static_cast<double>(s->n)});
   }
   table.note =
       "Only samples in which the cylinder moves (for a pump: any of its cylinders). Bias: mean of "
-      "predicted \u2212 measured. "
-      "Fit: 100 % when there is no error, 0 % when a constant would predict as well; noise alone "
-      "keeps it below 100 %. ";
+      "predicted \u2212 measured. ";
   if (intervals) table.note += "Inside: share of samples within the model's own 95 % interval. ";
   table.note += kJudgementRule;
   if (!table.rows.empty()) page.table(std::move(table));
@@ -101,10 +117,9 @@ void add_energy(Page& page, const CompareResult& result) {
   table.columns = {{"pump"},          {"measured", "kJ", 5},           {"predicted", "kJ", 5},
                    {"error", "%", 3}, {"from commands only", "kJ", 5}, {"time", "s", 4}};
   for (const EnergyScore& e : result.energy) {
-    table.rows.push_back(
-        {e.pump, e.measured / 1e3, e.predicted / 1e3, rounded(100.0 * e.relative_error, 0.01),
-         e.from_commands ? *e.from_commands / 1e3 : std::numeric_limits<double>::quiet_NaN(),
-         e.duration});
+    table.rows.push_back({e.pump, e.measured / 1e3, e.predicted / 1e3,
+                          rounded(100.0 * e.relative_error, 0.01),
+                          e.from_commands ? *e.from_commands / 1e3 : kNaN, e.duration});
   }
   table.note =
       "Integral of pressure times flow. Measured and predicted use the flow of the measured "
@@ -137,17 +152,15 @@ void add_worst_regions(Page& page, const CompareResult& result, const std::strin
   page.table(std::move(table));
 }
 
-/// "force 2.3 kN, working pressure 0.9 bar, energy of main +0.40 %"
-std::string worst_errors(const CompareResult& result, const std::vector<JudgedScore>& judged) {
+/// "force 2.3 kN RMS, working pressure 0.9 bar RMS, energy of pump main +0.40 %"
+std::string worst_errors(const CompareResult& result) {
   std::string text;
-  for (const JudgedScore& j : worst_of_stages(judged)) {
-    const auto [value, unit] = error_text(j.score);
-    text += fmt::format("{}{} {} {}", text.empty() ? "" : ", ", stage_words(j.score.stage), value,
-                        unit);
+  for (const RankedError* r : result.ranking.worst_of_stages()) {
+    if (r->stage == "energy") continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", stage_words(r->stage), r->amount);
   }
-  for (const EnergyScore& e : result.energy) {
-    text += fmt::format("{}energy of {} {} %", text.empty() ? "" : ", ", e.pump,
-                        signed_percent(e.relative_error));
+  for (const RankedError& r : result.ranking.errors) {
+    if (r.stage == "energy") text += fmt::format(", {} {}", r.words, r.amount);
   }
   return text;
 }
@@ -171,61 +184,28 @@ std::string where_it_fails(const CompareResult& result, const StageScore& worst)
   return text;
 }
 
-const char* bad_words(BadDataKind kind) {
-  switch (kind) {
-    case BadDataKind::kStuck:
-      return "is stuck";
-    case BadDataKind::kJumping:
-      return "jumps";
-    case BadDataKind::kNoisy:
-      return "is noisy";
-    case BadDataKind::kDropOut:
-      return "drops out";
-    case BadDataKind::kSaturated:
-      return "is cut off";
-    case BadDataKind::kWild:
-      return "has single samples far off";
-  }
-  return "";
-}
-
-void set_verdict(Page& page, const CompareResult& result, const std::vector<JudgedScore>& judged) {
-  const JudgedScore* worst = worst_score(judged);
-  if (worst == nullptr) {
-    page.verdict(Tone::kWarning, "Nothing could be compared",
+void set_verdict(Page& page, const CompareResult& result) {
+  const ErrorRanking& ranking = result.ranking;
+  if (ranking.empty()) {
+    page.verdict(Tone::kWarning, compare_headline(result),
                  "The notes below name the columns that the log lacks.");
     return;
   }
-  Tone tone = worst->tone;
-  for (const EnergyScore& e : result.energy) tone = std::max(tone, judge_energy(e));
-  const StageScore& s = worst->score;
-  const auto [value, unit] = error_text(s);
-  std::string headline = "The model follows the measurements in every stage";
   std::string text;
-  if (worst->tone != Tone::kGood) {
-    const std::string what = quantity_words(s.stage, s.stage == "pump" ? s.at : place_words(s));
-    headline = fmt::format("The model {} the {}: {} {} RMS",
-                           worst->tone == Tone::kBad ? "misses" : "follows only roughly", what,
-                           value, unit);
-    if (std::isfinite(s.fit_percent))
-      headline += fmt::format(", {:.0f} % explained", std::max(0.0, s.fit_percent));
-    text = where_it_fails(result, s);
+  if (!result.bad_data.empty()) text = bad_channel_sentence(result.bad_data.front().bad) + " ";
+  if (!result.fault.sentence.empty()) text += result.fault.sentence + " ";
+  const RankedError& cause = *ranking.cause();
+  if (const StageScore* s = result.find(cause.stage, cause.at, cause.regime);
+      s != nullptr && ranking.grade() != Grade::kGood) {
+    text += where_it_fails(result, *s);
   } else {
-    if (tone != Tone::kGood) headline = "The model follows the measurements, except for the energy";
-    text = result.worst.empty()
-               ? "No region of postures, speeds or loads stands out. "
-               : "The error is largest here: " + result.worst.front().sentence + ". ";
+    text += result.worst.empty()
+                ? "No region of postures, speeds or loads stands out. "
+                : "The error is largest here: " + result.worst.front().sentence + ". ";
   }
-  if (!result.bad_data.empty()) {
-    tone = Tone::kBad;
-    headline = "Bad data: " + result.bad_data.front().bad.channel + " " +
-               bad_words(result.bad_data.front().bad.kind);
-    text = bad_channel_sentence(result.bad_data.front().bad) + " " + text;
-  }
-  if (!result.fault.sentence.empty()) text = result.fault.sentence + " " + text;
-  page.verdict(tone, headline,
-               text + fmt::format("RMS error at the worst place of each stage: {}.",
-                                  worst_errors(result, judged)));
+  page.verdict(result.bad_data.empty() ? tone_of(ranking.grade()) : Tone::kBad,
+               compare_headline(result),
+               text + fmt::format("Worst of each stage: {}.", worst_errors(result)));
 }
 
 }  // namespace
@@ -233,14 +213,13 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
 void add_comparison(Page& page, const CraneModel& model, const CompareResult& result,
                     const std::string& heading_prefix) {
   page.section(heading_prefix + "Scores");
-  const std::vector<JudgedScore> judged = judge_scores(model.machine, result);
-  add_tiles(page, result, judged);
-  add_scores(page, judged);
+  add_tiles(page, result);
+  add_scores(page, result);
   add_energy(page, result);
   for (const std::string& note : result.notes)
     page.paragraph(note.ends_with('.') ? note : note + ".");
   if (result.scores.empty()) return;
-  add_causes(page, result, heading_prefix);
+  add_causes(page, model.machine, result, heading_prefix);
   add_worst_regions(page, result, heading_prefix);
   add_working_area(page, model.machine, result, heading_prefix);
   page.section(heading_prefix + "Error against signals");
@@ -250,8 +229,8 @@ void add_comparison(Page& page, const CraneModel& model, const CompareResult& re
       "each direction. A median that differs from zero is a systematic error, so the model lacks a "
       "physical effect. Two medians with a constant difference indicate friction. A cloud about "
       "zero is noise.");
-  const JudgedScore* worst = worst_score(judged);
-  add_residuals(page, model.machine, result, worst->score.stage, worst->score.at);
+  const RankedError& cause = *result.ranking.cause();
+  add_residuals(page, model.machine, result, cause.stage, cause.at);
   add_compared_curves(page, model.machine, result, heading_prefix);
 }
 
@@ -259,7 +238,7 @@ Page compare_page(const CraneModel& model, const CompareResult& result) {
   Page page("Model against measurements: " + model.machine.name);
   page.subtitle(fmt::format("{} samples in {} log{}", result.samples, result.logs.size(),
                             result.logs.size() == 1 ? "" : "s"));
-  set_verdict(page, result, judge_scores(model.machine, result));
+  set_verdict(page, result);
   add_comparison(page, model, result);
   page.provenance("program", std::string("sparflow ") + program_version());
   page.provenance("machine", model.machine.name);

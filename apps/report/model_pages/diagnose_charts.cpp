@@ -73,6 +73,12 @@ const ExplainingSignal* choose(const std::vector<ExplainingSignal>& signals,
   return own != nullptr && most_own >= 0.5 * most ? own : best;
 }
 
+int color_of(const Diagnosis& d, const EvidenceChannel& channel) {
+  return channel.kind == EvidenceKind::kPump
+             ? d.evidence.series.front().machine->cylinder_count() + channel.index
+             : channel.index;
+}
+
 FieldUnit shown_unit(const EvidenceChannel& channel, double largest) {
   if (channel.unit.name == "N" && largest >= 1e4) return {"kN", 1e3};
   return channel.unit;
@@ -141,11 +147,13 @@ LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string&
   const FieldUnit unit = shown_unit(channel, largest_of(column(measured)));
   chart.x = column(time);
   chart.y_axis = axis_of(channel, unit.name);
-  chart.series.push_back({"measured", column(measured) / unit.si, LineStyle::kMeasured, 0, {}, {}});
+  const int color = color_of(d, channel);
   chart.series.push_back(
-      {"model without " + effect, column(without) / unit.si, LineStyle::kPlain, 1, {}, {}});
+      {"measured", column(measured) / unit.si, LineStyle::kMeasured, color, {}, {}});
   chart.series.push_back(
-      {"model with " + effect, column(with) / unit.si, LineStyle::kPredicted, 2, {}, {}});
+      {"model without " + effect, column(without) / unit.si, LineStyle::kBefore, -1, {}, {}});
+  chart.series.push_back(
+      {"model with " + effect, column(with) / unit.si, LineStyle::kPredicted, color, {}, {}});
   chart.note =
       fmt::format("The {:.0f} s in which the effect shows most. Nothing is compared in the gaps.",
                   kStretchSeconds);
@@ -159,23 +167,25 @@ ScatterChart residuals(const Diagnosis& d, const ChannelPicture& p, const Explai
   ScatterChart chart;
   chart.title = fmt::format("Residual of the {} against {}", channel.text, signal.words);
   chart.x_axis = {signal.words, signal.unit};
-  chart.y_axis = {"measured \u2212 model", unit.name};
+  chart.y_axis = {kErrorAxis, unit.name};
   chart.trend = true;
   std::vector<double> x, without, with;
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
     if (!suspect_row(d.evidence, channel, b)) continue;
     for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
       x.push_back(signal.values[r]);
-      without.push_back(p.without[r] / unit.si);
-      with.push_back(p.with[r] / unit.si);
+      without.push_back(-p.without[r] / unit.si);
+      with.push_back(-p.with[r] / unit.si);
     }
   }
   const auto n = static_cast<Index>(x.size());
   const auto column = [n](const std::vector<double>& v) {
     return VectorXd(Eigen::Map<const VectorXd>(v.data(), n));
   };
-  if (both) chart.groups.push_back({"without the effect", column(x), column(without)});
-  chart.groups.push_back({both ? "with it" : "residual", column(x), column(with)});
+  if (both)
+    chart.groups.push_back({"without the effect", column(x), column(without), kBeforeColor});
+  chart.groups.push_back(
+      {both ? "with it" : "residual", column(x), column(with), color_of(d, channel)});
   chart.note = fmt::format(
       "Lines: medians in bins. {} explains {:.0f} % of the residual's variance{}.",
       capitalised(signal.words), 100.0 * share_explained(column(x), column(both ? without : with)),
@@ -204,11 +214,11 @@ LineChart residual_over_time(const Diagnosis& d, const ChannelPicture& p) {
     const auto row = static_cast<std::size_t>(channel.blocks[longest].first + i);
     chart.x[i] = log.time[channel.sample[row]];
   }
-  chart.y_axis = {"measured \u2212 model", unit.name};
+  chart.y_axis = {kErrorAxis, unit.name};
   chart.series.push_back({"residual",
-                          p.with.segment(channel.blocks[longest].first, rows) / unit.si,
+                          -p.with.segment(channel.blocks[longest].first, rows) / unit.si,
                           LineStyle::kPredicted,
-                          0,
+                          color_of(d, channel),
                           {},
                           {}});
   chart.note = "The longest motion without a gap.";

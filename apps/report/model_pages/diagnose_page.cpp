@@ -62,9 +62,11 @@ std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
   return text;
 }
 
-void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
+void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
+                 const ExtendResult* tested) {
   std::string text;
   for (const DiagnosedEffect& e : d.effects) {
+    if (!d.named(e)) continue;
     text += fmt::format("{}: {}", capitalised(title_of(machine, e)), parameters_text(e.parameters));
     if (!e.channels.empty())
       text += fmt::format("; error of the {}", gain_text(d, e.channels.front()));
@@ -78,16 +80,19 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d) {
         "Do not add anything to the model before the cause is known; the signals on which the "
         "residual depends are shown below.";
   if (d.verdict == Verdict::kNone) {
-    text += fmt::format("The residuals contain no more than noise would (p = {:.2g}). ", d.p_value);
+    text +=
+        fmt::format("The residuals contain no more than noise would (p = {}). ", d.p_value_text());
   } else if (d.verdict == Verdict::kMissing) {
     text += fmt::format("Chance of such evidence if no effect were missing: {}.", d.p_value_text());
   }
-  page.verdict(tone_of(d.verdict), sentence(d.headline()), text);
+  Tone tone = tone_of(d.verdict);
+  if (tested != nullptr && !tested->steps.empty()) tone = std::max(tone, tone_of(tested->grade()));
+  page.verdict(tone, sentence(headline_on_tests(d, tested)), text);
 }
 
 void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
   if (d.effects.empty()) return;
-  page.section("What is missing");
+  page.section(d.verdict == Verdict::kMissing ? "What is missing" : "Found, but not proven");
   Table table;
   table.title = "Effects, most probable first";
   table.columns = {{"effect"},
@@ -96,12 +101,13 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                    {"probability", "%", 3},
                    {"gain", "nats", 3},
                    {"motions left out", "standard errors", 2},
-                   {"absorbed", "%", 2}};
+                   {"absorbed", "%", 2},
+                   {"standing"}};
   for (const DiagnosedEffect& e : d.effects) {
     table.rows.push_back({title_of(machine, e), e.stage, parameters_text(e.parameters),
                           e.shown_probability(), e.gain,
                           e.held_out_error > 0.0 ? e.held_out_gain / e.held_out_error : kNaN,
-                          std::round(100.0 * e.absorbed)});
+                          std::round(100.0 * e.absorbed), std::string(d.standing(e))});
   }
   table.note =
       "Probability: that it is this effect, and neither chance nor a rival. Gain: increase of the "
@@ -211,13 +217,9 @@ void add_lacking(Page& page, const Machine& machine, const Diagnosis& d) {
       "References and suspect logs show this alike, so that it is no change between them.");
   if (!d.lacking.empty()) {
     Table table;
-    table.columns = {{"effect"}, {"parameter"}, {"value", "", 4}, {"unit"}, {"95 %"}};
-    for (const DiagnosedEffect& e : d.lacking) {
-      for (const ParameterEstimate& p : e.parameters)
-        table.rows.push_back(
-            {title_of(machine, e), p.name, p.value, p.unit,
-             display_number(p.lower95, 3) + " .. " + display_number(p.upper95, 3)});
-    }
+    table.columns = {{"effect"}, {"parameters, 95 % interval"}};
+    for (const DiagnosedEffect& e : d.lacking)
+      table.rows.push_back({title_of(machine, e), parameters_text(e.parameters)});
     page.table(std::move(table));
   }
   for (const Unexplained& u : d.shared_structure) page.paragraph(sentence(u.sentence));
@@ -235,7 +237,7 @@ Page diagnose_page(const CraneModel& model, const Diagnosis& d, const ExtendResu
       d.evidence.has_reference()
           ? fmt::format(", {} of reference", d.evidence.series.size() - d.evidence.suspects)
           : ", no reference"));
-  set_verdict(page, machine, d);
+  set_verdict(page, machine, d, tested);
   add_bad_data(page, d);
   add_effects(page, machine, d);
   add_sets(page, d);

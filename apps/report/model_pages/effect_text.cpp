@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/report/page/page.h"
+#include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
 namespace {
@@ -27,6 +28,7 @@ std::pair<double, std::string> readable_error(double si, const FieldUnit& unit) 
 }
 
 std::string parameter_text(const ParameterEstimate& p) {
+  if (!p.determined) return p.name + " is not determined by these logs";
   double scale = 1.0;
   std::string unit = p.unit;
   if (unit == "N" && std::max(std::abs(p.value), std::abs(p.upper95)) >= 1e3) {
@@ -61,9 +63,12 @@ std::vector<ParameterEstimate> estimates_of(const AppliedEffect& effect) {
   for (std::size_t i = 0; i < effect.values.size(); ++i) {
     const EffectParameter& p = parameters[i];
     const bool known = i < effect.lower95.size() && i < effect.upper95.size();
-    out.push_back({p.name, p.unit, p.meaning, effect.values[i] / p.si,
-                   known ? effect.lower95[i] / p.si : std::nan(""),
-                   known ? effect.upper95[i] / p.si : std::nan("")});
+    out.push_back(
+        {p.name, p.unit, p.meaning, effect.values[i] / p.si,
+         known ? effect.lower95[i] / p.si : std::nan(""),
+         known ? effect.upper95[i] / p.si : std::nan(""),
+         !known || p.choice ||
+             is_determined(effect.values[i], effect.lower95[i], effect.upper95[i], p.typical)});
   }
   return out;
 }

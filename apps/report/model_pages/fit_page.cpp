@@ -5,7 +5,6 @@
 
 #include "apps/report/model_pages/compare_charts.h"
 #include "apps/report/model_pages/compare_page.h"
-#include "apps/report/model_pages/score_judgement.h"
 #include "models/files/model_file.h"
 #include "models/math/nan.h"
 #include "models/math/units.h"
@@ -197,12 +196,10 @@ void set_verdict(Page& page, const FitResult& r) {
   }
   if (all == 0) headline = "The machine has no hydraulics: only forces are compared";
   std::string text = r.brief(false) + ".";
-  const std::vector<JudgedScore> judged = judge_scores(r.model.machine, judged_on(r));
-  const JudgedScore* worst = worst_score(judged);
-  if (worst != nullptr && worst->tone == Tone::kBad) {
-    tone = std::max(tone, Tone::kWarning);
-    text += fmt::format(" The {}, however, is predicted poorly: see the scores.",
-                        quantity_words(worst->score.stage, worst->score.at));
+  const ErrorRanking& ranking = judged_on(r).ranking;
+  if (ranking.grade() != Grade::kGood) {
+    tone = std::max(tone, tone_of(ranking.grade()));
+    headline += ". " + ranking.headline;
   }
   if (learned < all) {
     std::string names;

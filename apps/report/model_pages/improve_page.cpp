@@ -7,7 +7,6 @@
 
 #include "apps/report/model_pages/compare_charts.h"
 #include "apps/report/model_pages/effect_text.h"
-#include "apps/report/model_pages/score_judgement.h"
 #include "models/files/model_file.h"
 #include "models/math/nan.h"
 
@@ -36,17 +35,11 @@ struct ErrorTrace {
   }
 };
 
-std::string words_of(const StageScore& s) {
-  std::string words = quantity_words(s.stage, s.at);
-  if (!s.regime.empty()) words += s.regime == "extend" ? " extending" : " retracting";
-  return words;
-}
+std::string words_of(const StageScore& s) { return quantity_name(s.stage, s.at, s.regime); }
 
 std::vector<ErrorTrace> traces_of(const ExtendResult& result) {
   std::vector<ErrorTrace> out;
   const auto steps = static_cast<Index>(result.steps.size());
-  const std::vector<JudgedScore> judged =
-      judge_scores(result.model.machine, result.steps.back().after);
   for (const StageScore& s : result.steps.front().before.scores) {
     ErrorTrace t;
     t.score = s;
@@ -58,11 +51,7 @@ std::vector<ErrorTrace> traces_of(const ExtendResult& result) {
           result.steps[static_cast<std::size_t>(i)].after.find(s.stage, s.at, s.regime);
       if (a != nullptr) t.rmse[i + 1] = a->rmse;
     }
-    t.noise = kNaN;
-    for (const JudgedScore& j : judged) {
-      if (j.score.stage == s.stage && j.score.at == s.at && j.score.regime == s.regime)
-        t.noise = j.noise;
-    }
+    t.noise = sensor_noise(result.model.machine, result.steps.back().after, s);
     out.push_back(std::move(t));
   }
   return out;
@@ -86,22 +75,36 @@ LineChart over_steps(const ExtendResult& result) {
   return chart;
 }
 
-/// Appends all errors that changed, relative to their value before the first step.
-void add_overview(Page& page, const ExtendResult& result, const std::vector<ErrorTrace>& traces) {
-  LineChart chart = over_steps(result);
-  chart.title = "Error after each step";
-  chart.markers = step_markers(result);
+/// Appends all errors before the first step and after the last, and what became of each.
+void add_overview(Page& page, const ExtendResult& result) {
+  const ModelChange change = result.change();
+  BarChart chart;
+  chart.title = "Unexplained share of each quantity before and after";
   chart.note = fmt::format(
-      "RMS error on the {}, relative to its value before the first step. Quantities whose error "
-      "did "
-      "not change are left out.",
+      "Error beyond the sensor's noise over the quantity's scale, on the {}; up to 15 % is good, "
+      "more "
+      "than 50 % poor. Largest growth first.",
       result.steps.front().judged_on);
-  chart.y_axis = {"RMS error", "% of before"};
-  for (const ErrorTrace& t : traces) {
-    if (!(t.rmse[0] > 0.0) || !(t.largest_change() > kLeastChange)) continue;
-    chart.series.push_back({t.words, 100.0 / t.rmse[0] * t.rmse, LineStyle::kPlain, -1, {}, {}});
+  chart.value_axis = {"unexplained", "%"};
+  chart.stacked = false;
+  const auto n = static_cast<Index>(change.quantities.size());
+  BarSeries before{"before", VectorXd(n), kBeforeColor}, after{"after", VectorXd(n)};
+  Table table;
+  table.title = "Errors before and after";
+  table.columns = {{"quantity and error"}, {""}, {"grade before"}, {"grade after"}};
+  for (Index i = 0; i < n; ++i) {
+    const QuantityChange& q = change.quantities[static_cast<std::size_t>(i)];
+    chart.categories.push_back(q.before.words);
+    before.values[i] = 100.0 * q.before.unexplained;
+    after.values[i] = 100.0 * q.after.unexplained;
+    table.rows.push_back({capitalised(q.text), std::string(change_word(q.kind)),
+                          std::string(grade_word(q.before.grade)),
+                          std::string(grade_word(q.after.grade))});
   }
-  if (!chart.series.empty()) page.plot(std::move(chart));
+  chart.series = {std::move(before), std::move(after)};
+  if (n == 0) return;
+  page.plot(std::move(chart));
+  page.table(std::move(table));
 }
 
 void add_error_charts(Page& page, const ExtendResult& result, std::vector<ErrorTrace> traces) {
@@ -121,7 +124,13 @@ void add_error_charts(Page& page, const ExtendResult& result, std::vector<ErrorT
                              display_number(t.rmse[t.rmse.size() - 1] * scale, 3), unit);
     chart.width = FigureWidth::kHalf;
     chart.y_axis = {"RMS error", unit};
-    chart.series.push_back({"RMS error", t.rmse * scale, LineStyle::kPredicted, 0, {}, {}});
+    chart.markers = step_markers(result);
+    chart.series.push_back({"RMS error",
+                            t.rmse * scale,
+                            LineStyle::kPredicted,
+                            place_color(result.model.machine, t.score.stage, t.score.at),
+                            {},
+                            {}});
     if (std::isfinite(t.noise)) {
       chart.series.push_back({"sensor noise",
                               VectorXd::Constant(chart.x.size(), t.noise * scale),
@@ -191,7 +200,7 @@ MostChanged most_changed(const ExtendStep& step) {
   return best;
 }
 
-void add_curves(Page& page, const ExtendStep& step) {
+void add_curves(Page& page, const Machine& machine, const ExtendStep& step) {
   const MostChanged m = most_changed(step);
   if (m.log == nullptr) return;
   const VectorXd& time = m.log->signals.time;
@@ -220,12 +229,13 @@ void add_curves(Page& page, const ExtendStep& step) {
                                                        : "pressure",
                   unit};
   chart.x = cut(time);
+  const int color = place_color(machine, m.after->stage, m.after->at);
   chart.series.push_back(
-      {"measured", cut(m.after->measured) * scale, LineStyle::kMeasured, 0, {}, {}});
+      {"measured", cut(m.after->measured) * scale, LineStyle::kMeasured, color, {}, {}});
   chart.series.push_back(
-      {"before", cut(m.before->predicted) * scale, LineStyle::kPlain, 1, {}, {}});
+      {"before", cut(m.before->predicted) * scale, LineStyle::kBefore, -1, {}, {}});
   chart.series.push_back(
-      {"after", cut(m.after->predicted) * scale, LineStyle::kPredicted, 2, {}, {}});
+      {"after", cut(m.after->predicted) * scale, LineStyle::kPredicted, color, {}, {}});
   page.plot(std::move(chart));
 }
 
@@ -246,25 +256,16 @@ std::string stopped_briefly(const ExtendResult& r) {
 
 void set_verdict(Page& page, const ExtendResult& r) {
   if (r.steps.empty()) {
-    page.verdict(r.rejected.empty() ? Tone::kGood : Tone::kWarning, "Nothing was added",
-                 capitalised(r.stopped_because) + ".");
+    page.verdict(tone_of(r.grade()), "Nothing was added", capitalised(r.stopped_because) + ".");
     return;
   }
-  const ErrorChange all =
-      error_change(r.model.machine, r.steps.front().before, r.steps.back().after, "");
-  std::string names, text;
-  for (const ExtendStep& s : r.steps) {
-    names += (names.empty() ? "" : ", then ") + s.title;
+  std::string text;
+  for (const ExtendStep& s : r.steps)
     text += fmt::format("{}: {}. ", capitalised(s.title),
                         parameters_text(estimates_of(in_the_model(r.model, s.effect))));
-  }
-  const std::string change = change_text(all.overall);
-  page.verdict(
-      all.overall > 1.0 ? Tone::kBad : Tone::kGood, capitalised(names),
-      fmt::format("The error on the {} is {} overall{}. {}{}{}.", r.steps.front().judged_on, change,
-                  r.steps.size() > 1 ? " after all steps" : "", text,
-                  r.last ? "Stopped because " : "",
-                  r.last ? stopped_briefly(r) : capitalised(stopped_briefly(r))));
+  page.verdict(tone_of(r.grade()), capitalised(r.brief()),
+               fmt::format("{}{}{}.", text, r.last ? "Stopped because " : "",
+                           r.last ? stopped_briefly(r) : capitalised(stopped_briefly(r))));
 }
 
 void add_last(Page& page, const Diagnosis& d) {
@@ -283,6 +284,8 @@ void add_last(Page& page, const Diagnosis& d) {
 void add_steps(Page& page, const ExtendResult& result, const std::string& heading_prefix) {
   if (!result.steps.empty()) {
     const std::vector<ErrorTrace> traces = traces_of(result);
+    page.section(heading_prefix + "Better and worse");
+    add_overview(page, result);
     page.section(heading_prefix + "Error after each step");
     Table table = steps_table("Steps", result.steps);
     table.note = fmt::format(
@@ -301,16 +304,15 @@ void add_steps(Page& page, const ExtendResult& result, const std::string& headin
           "All are estimated together, so that each step changes the values of the earlier ones.";
       page.table(std::move(now));
     }
-    add_overview(page, result, traces);
     add_error_charts(page, result, traces);
     page.section(heading_prefix + "Measured, before and after");
-    for (const ExtendStep& s : result.steps) add_curves(page, s);
+    for (const ExtendStep& s : result.steps) add_curves(page, result.model.machine, s);
   }
   if (!result.rejected.empty()) {
     page.section(heading_prefix + "Tried and not kept");
     Table table = steps_table("Changes that made the error worse", result.rejected);
     page.table(std::move(table));
-    for (const ExtendStep& s : result.rejected) add_curves(page, s);
+    for (const ExtendStep& s : result.rejected) add_curves(page, result.model.machine, s);
   }
   for (const std::string& note : result.notes)
     page.paragraph(capitalised(note.ends_with('.') ? note : note + "."));

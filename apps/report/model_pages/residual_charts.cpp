@@ -64,14 +64,25 @@ std::string regime_words(const std::string& stage, const std::string& regime) {
   return regime == "standby" || regime == "constant" ? regime : "leader " + regime;
 }
 
-ScatterChart scatter(const ComparedQuantity& quantity, const ResidualTable& table,
-                     const RegimeSignal& signal, double share) {
+/// A pump's regimes have the colours of their leaders. Of a cylinder, extending has its colour and retracting a dark one.
+int regime_color(const Machine& machine, const ComparedQuantity& quantity,
+                 const std::string& regime) {
+  constexpr int kDark = 7;
+  if (quantity.stage != "pump")
+    return regime == "retract" ? kDark : place_color(machine, quantity.stage, quantity.at);
+  if (regime == "constant") return place_color(machine, "pump", quantity.at);
+  const int leader = machine.cylinder_index(regime);
+  return leader >= 0 ? leader : kDark;
+}
+
+ScatterChart scatter(const Machine& machine, const ComparedQuantity& quantity,
+                     const ResidualTable& table, const RegimeSignal& signal, double share) {
   ScatterChart chart;
   chart.title = capitalised(fmt::format("{} against {}", quantity.words, signal.words));
   chart.note = fmt::format("Explains {:.0f} % of the error's variance.", 100.0 * share);
   chart.width = FigureWidth::kHalf;
   chart.x_axis = {signal.words, signal.unit};
-  chart.y_axis = {"predicted \u2212 measured", quantity.unit.name};
+  chart.y_axis = {kErrorAxis, quantity.unit.name};
   chart.trend = true;
   for (std::size_t r = 0; r < table.names.size(); ++r) {
     std::vector<double> x, y;
@@ -83,7 +94,8 @@ ScatterChart scatter(const ComparedQuantity& quantity, const ResidualTable& tabl
     if (x.empty()) continue;
     const auto n = static_cast<Index>(x.size());
     chart.groups.push_back({regime_words(quantity.stage, table.names[r]),
-                            Eigen::Map<VectorXd>(x.data(), n), Eigen::Map<VectorXd>(y.data(), n)});
+                            Eigen::Map<VectorXd>(x.data(), n), Eigen::Map<VectorXd>(y.data(), n),
+                            regime_color(machine, quantity, table.names[r])});
   }
   return chart;
 }
@@ -165,7 +177,7 @@ void add_residuals(Page& page, const Machine& machine, const CompareResult& resu
     const ResidualTable table = residual_table(machine, quantity);
     for (const auto& [share, signal] :
          chosen(quantity, table, is_first(quantity) ? kChartsOfTheFirst : kCharts)) {
-      page.plot(scatter(quantity, table, *signal, share));
+      page.plot(scatter(machine, quantity, table, *signal, share));
     }
   }
 }

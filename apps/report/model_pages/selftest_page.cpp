@@ -151,9 +151,9 @@ Page selftest_page(const CraneModel& model, const Selftest& t) {
   if (!t.sets.empty())
     text += fmt::format("{} set{} of effects cannot be distinguished on these motions.",
                         t.sets.size(), t.sets.size() == 1 ? "" : "s");
-  page.verdict(!all_right                        ? Tone::kWarning
-               : t.count(Visibility::kNever) > 0 ? Tone::kNeutral
-                                                 : Tone::kGood,
+  page.verdict(!all_right || t.residual_over_noise > 0.0 ? Tone::kWarning
+               : t.count(Visibility::kNever) > 0         ? Tone::kNeutral
+                                                         : Tone::kGood,
                t.headline(), text);
   page.section("What would be seen");
   add_power_chart(page, t);

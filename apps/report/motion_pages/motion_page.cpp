@@ -281,14 +281,32 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
           : std::string();
   double lost = 0.0;
   for (const double t : result.energy.throttling) lost += t;
-  page.tiles(
-      {{fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law", beside,
-        Tone::kGood},
-       {seconds_text(result.duration), "s", "duration"},
-       {fmt::format("{:.1f}", lost / 1e3), "kJ", "throttling loss",
-        fmt::format("{:.0f} % of the energy", 100.0 * lost / std::max(1.0, result.energy.total))},
-       {fmt::format("{:+.1f}", result.energy.potential_difference / 1e3), "kJ",
-        "potential energy gained", "end minus start"}});
+  const Tone tone = mostly_outside_data(result) ? Tone::kWarning : Tone::kGood;
+  std::vector<Tile> tiles = {
+      {fmt::format("{:.1f}", result.energy.total / 1e3), "kJ", "pump energy, exact law", beside,
+       tone},
+      {seconds_text(result.duration), "s", "duration"},
+      {fmt::format("{:.1f}", lost / 1e3), "kJ", "throttling loss",
+       fmt::format("{:.0f} % of the energy", 100.0 * lost / std::max(1.0, result.energy.total))},
+      {fmt::format("{:+.1f}", result.energy.potential_difference / 1e3), "kJ",
+       "potential energy gained", "end minus start"}};
+  if (result.lower_bound > 0.0) {
+    tiles.push_back(
+        {fmt::format("{:.1f}", result.lower_bound / 1e3), "kJ", "estimated lower bound",
+         fmt::format("gap {:.1f} %; {}", 100.0 * bound_gap(result),
+                     result.lower_bound_time > 0.0
+                         ? fmt::format("motions of {:.2f} s or less", result.lower_bound_time)
+                         : "motions of any duration")});
+  } else if (!result.bound_note.empty()) {
+    tiles.push_back({"none", "", "estimated lower bound", result.bound_note});
+  }
+  if (mostly_outside_data(result)) {
+    tiles.push_back({fmt::format("{:.0f}", 100.0 * result.energy.moving_share_outside_data), "%",
+                     "outside the data",
+                     "of the moving time: flows or forces from which the model has not learned",
+                     Tone::kWarning});
+  }
+  page.tiles(std::move(tiles));
   if (result.energy.impossible()) {
     page.paragraph(
         "Warning: the pump delivers less energy than machine and payload gain. The working "
@@ -313,11 +331,8 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
                  const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
   Page page("Energy-optimal motion: " + problem.name);
   if (result.status == OptimizeStatus::kOptimal) {
-    const std::string against = against_seeds(result);
     page.verdict(
-        Tone::kGood,
-        fmt::format("{:.1f} kJ in {:.2f} s{}{}", result.energy.total / 1e3, result.duration,
-                    against.empty() ? "" : ": ", against),
+        mostly_outside_data(result) ? Tone::kWarning : Tone::kGood, motion_headline(result),
         "All limits are kept at 16 samples per mesh interval. Energies are those of the exact, "
         "unsmoothed law. " +
             constant_pressure_note(model));

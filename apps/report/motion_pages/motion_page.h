@@ -27,6 +27,13 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
 /// straight line (85.9 kJ) in the same time"; also names the cheapest seed path where it is neither of these. Returns
 /// "" when no seed keeps the limits in that time.
 std::string against_seeds(const OptimizeResult& result);
+/// Energy over the estimated lower bound, less one: the gap of page, terminal and JSON. NaN without a bound.
+double bound_gap(const OptimizeResult& result);
+/// Whether most of the moving time lies outside the flows and forces of the pressure models' data.
+bool mostly_outside_data(const OptimizeResult& result);
+/// The headline of page and JSON without full stop: energy, what it is compared with, gap to the bound, and that most of the
+/// motion lies outside what the model has learned, where it does.
+std::string motion_headline(const OptimizeResult& result);
 /// Explains, when every pump has constant pressure, that the energy depends on the strokes alone; "" otherwise.
 std::string constant_pressure_note(const CraneModel& model);
 

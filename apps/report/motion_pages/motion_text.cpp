@@ -78,8 +78,8 @@ std::string energies_text(const OptimizeResult& r) {
     const std::string which =
         r.lower_bound_time > 0.0 ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
                                  : "of motions of any duration";
-    text += fmt::format("  estimated bound      {:9.2f} kJ   {}: {:.1f} % below this one\n",
-                        r.lower_bound / 1e3, which, 100.0 * (1.0 - r.lower_bound / r.energy.total));
+    text += fmt::format("  estimated bound      {:9.2f} kJ   {}: gap {:.1f} %\n",
+                        r.lower_bound / 1e3, which, 100.0 * bound_gap(r));
   } else if (!r.bound_note.empty()) {
     text += "  estimated bound           none   " + r.bound_note + "\n";
   }
@@ -112,10 +112,13 @@ std::string limits_text(const std::vector<LimitCheck>& checks) {
   return {};
 }
 
+/// Share of the moving time outside the data from which it is told, and from which the headline tells it.
+constexpr double kToldOutside = 0.02, kMostlyOutside = 0.5;
+
 /// What a reader must know before the energies are believed.
 std::string reservations_text(const CraneModel& model, const MotionEnergy& energy) {
   std::string text;
-  if (energy.moving_share_outside_data > 0.02) {
+  if (energy.moving_share_outside_data > kToldOutside) {
     text += fmt::format(
         "  note                 {:.0f} % of the moving time lies outside the data; least certain "
         "pressure +-{:.1f} bar (one standard deviation)\n",
@@ -133,6 +136,12 @@ std::string reservations_text(const CraneModel& model, const MotionEnergy& energ
         "such loads\n";
   }
   return text;
+}
+
+std::string outside_text(const OptimizeResult& r) {
+  return fmt::format(
+      "most of the motion ({:.0f} % of the moving time) lies outside what the model has learned",
+      100.0 * r.energy.moving_share_outside_data);
 }
 
 std::string starts_text(const OptimizeResult& r) {
@@ -169,6 +178,25 @@ std::string against_seeds(const OptimizeResult& r) {
   return parts.empty() ? "" : fmt::format("{} in the same time", fmt::join(parts, " and "));
 }
 
+double bound_gap(const OptimizeResult& r) {
+  return r.lower_bound > 0.0 ? r.energy.total / r.lower_bound - 1.0 : std::nan("");
+}
+
+bool mostly_outside_data(const OptimizeResult& r) {
+  return r.energy.moving_share_outside_data > kMostlyOutside;
+}
+
+std::string motion_headline(const OptimizeResult& r) {
+  if (r.motion.size() < 2) return "no motion was found";
+  std::string text = fmt::format("{:.1f} kJ in {:.2f} s", r.energy.total / 1e3, r.duration);
+  if (const std::string against = against_seeds(r); !against.empty()) text += ": " + against;
+  if (r.lower_bound > 0.0)
+    text += fmt::format("; {:.1f} % above the estimated bound of {:.1f} kJ", 100.0 * bound_gap(r),
+                        r.lower_bound / 1e3);
+  if (mostly_outside_data(r)) text += "; " + outside_text(r);
+  return text;
+}
+
 std::string constant_pressure_note(const CraneModel& model) {
   const std::vector<Pump>& pumps = model.machine.pumps;
   const bool constant =
@@ -187,6 +215,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       {"status", r.status == OptimizeStatus::kInterrupted ? "failed" : to_string(r.status)},
       {"interrupted", r.interrupted || r.status == OptimizeStatus::kInterrupted},
       {"message", r.message},
+      {"headline", motion_headline(r)},
       {"duration_s", r.duration},
       {"solve_s", r.solve_s}};
   if (r.shortest_duration > 0.0) out["shortest_duration_s"] = r.shortest_duration;
@@ -215,7 +244,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       out["lower_bound_J"] = r.lower_bound;
       out["lower_bound_time_s"] =
           r.lower_bound_time > 0.0 ? nlohmann::json(r.lower_bound_time) : nlohmann::json();
-      out["gap"] = r.energy.total / r.lower_bound - 1.0;
+      out["gap"] = bound_gap(r);
     }
     if (r.grid_path_energy > 0.0) out["grid_path_energy_exact_J"] = r.grid_path_energy;
     if (r.unlimited_energy > 0.0) out["unlimited_time_J"] = r.unlimited_energy;
@@ -243,8 +272,9 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
                            const OptimizeResult& r) {
   if (r.motion.size() < 2) return no_motion_text(r);
-  return fmt::format("{}: {}\n", to_string(r.status), problem.name) + energies_text(r) +
-         cylinders_text(model.machine, r.energy) + limits_text(r.checks) +
+  return fmt::format("{}: {}{}\n", to_string(r.status), problem.name,
+                     mostly_outside_data(r) ? "; " + outside_text(r) : "") +
+         energies_text(r) + cylinders_text(model.machine, r.energy) + limits_text(r.checks) +
          reservations_text(model, r.energy) + starts_text(r);
 }
 

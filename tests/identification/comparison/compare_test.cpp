@@ -388,7 +388,7 @@ TEST(CompareReport, TableFitsAScreen) {
   }
   EXPECT_THAT(table, HasSubstr("bar"));
   EXPECT_THAT(table, HasSubstr("arm extend"));
-  EXPECT_THAT(table, HasSubstr("fit % = 100"));
+  EXPECT_THAT(table, HasSubstr("explained % = 100"));
 }
 
 }  // namespace
