@@ -59,7 +59,9 @@ int run(const CompareArguments& a) {
   const CraneModel model = a.model.empty()
                                ? CraneModel::untrained(load_machine_with_warnings(a.machine))
                                : load_model_with_warnings(a.model);
-  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
+  CompareOptions options;
+  options.signals.slim = a.outputs.report.empty() && model.effects.empty();
+  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping), options);
   if (a.model.empty()) keep_geometric_stages(result);
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);

@@ -175,6 +175,7 @@ std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
   work.name = part_name;
   work.work = [&](int i) { return packed(compare_in(task(i), a, options)); };
   work.complete = [](const std::string& bytes) { return !unpacked_comparison(bytes).interrupted; };
+  work.stop = interrupted;
   const int before = finished_before(work, journal);
   if (before > 0) note(fmt::format("{} of {} problems were finished before", before, work.count));
   Progress progress("strategies");
@@ -203,6 +204,7 @@ std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& 
     all.back().file = tasks[i].problem.file;
     all.back().message = children[i].error;
     all.back().interrupted = interrupted();
+    if (interrupted()) continue;
     ++broken;
     note(fmt::format("{}: {}", tasks[i].problem.file, children[i].error));
   }

@@ -25,13 +25,17 @@ std::vector<ChildResult> run_kept(const KeptWork& parts, Journal& journal, const
     if (on_done) on_done(i, ++before, result);
   }
   const auto index_of = [&](int k) { return left[static_cast<std::size_t>(k)]; };
-  std::vector<ChildResult> computed = run_in_children(
-      static_cast<int>(left.size()), parts.at_once, [&](int k) { return parts.work(index_of(k)); },
-      [&](int k, int finished, const ChildResult& result) {
-        const bool whole = result.ok && (!parts.complete || parts.complete(result.bytes));
-        if (whole) journal.keep(parts.name(index_of(k)), result.bytes);
-        if (on_done) on_done(index_of(k), before + finished, result);
-      });
+  KeptWork missing = parts;
+  missing.count = static_cast<int>(left.size());
+  missing.work = [&](int k) { return parts.work(index_of(k)); };
+  const OnDone keep = [&](int k, int finished, const ChildResult& result) {
+    const bool whole = result.ok && (!parts.complete || parts.complete(result.bytes));
+    if (whole) journal.keep(parts.name(index_of(k)), result.bytes);
+    if (on_done) on_done(index_of(k), before + finished, result);
+  };
+  std::vector<ChildResult> computed =
+      parts.stop ? run_until_stopped(missing, keep)
+                 : run_in_children(missing.count, missing.at_once, missing.work, keep);
   for (std::size_t k = 0; k < left.size(); ++k)
     results[static_cast<std::size_t>(left[k])] = std::move(computed[k]);
   return results;

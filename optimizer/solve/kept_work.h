@@ -18,10 +18,18 @@ struct KeptWork {
   std::function<std::string(int index)> work;
   /// Whether a result is complete and may be kept; empty: each is.
   std::function<bool(const std::string& bytes)> complete = {};
+  /// Whether to end early; empty: never. Children notice it themselves and give what they have; those that have not done so
+  /// within `patience_s` are ended.
+  std::function<bool()> stop = {};
+  /// @threshold [s] 0..60; chosen: a user who presses Ctrl-C sees an answer at once, and most solves end within a tenth of it
+  double patience_s = 0.5;
 };
 
 /// Number of parts that the journal has.
 int finished_before(const KeptWork& parts, const Journal& journal);
+
+/// As run_in_children, but each part in a child, and ended early as the options say. A part that gave nothing has an error.
+std::vector<ChildResult> run_until_stopped(const KeptWork& parts, const OnDone& on_done);
 
 /// Takes the parts that the journal has, computes the others in child processes, and keeps them.
 /// @param on_done as in run_in_children; the parts of the journal come first, in their order
