@@ -91,9 +91,8 @@ std::vector<RegimeSignal> gathered_signals(const Machine& machine, const Compare
   return out;
 }
 
-ComparedPart gather(const Machine& machine, const CompareResult& result,
-                    const std::vector<Eigen::VectorXi>& blocks, const ComparedSeries& like,
-                    const std::string& regime) {
+ComparedPart gather(const CompareResult& result, const std::vector<Eigen::VectorXi>& blocks,
+                    const ComparedSeries& like, const std::string& regime) {
   ComparedPart part;
   part.stage = like.stage;
   part.at = like.at;
@@ -173,7 +172,7 @@ std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareRes
       const bool whole = s.stage == "force" || s.stage == "pump";
       const std::vector<std::string> regimes = whole ? std::vector<std::string>{""} : s.regimes;
       for (const std::string& regime : regimes) {
-        ComparedPart part = gather(machine, result, of_sample, s, regime);
+        ComparedPart part = gather(result, of_sample, s, regime);
         if (part.error.size() == 0) continue;
         out.push_back(std::move(part));
       }

@@ -18,10 +18,10 @@ struct KeptWork {
   std::function<std::string(int index)> work;
   /// Whether a result is complete and may be kept; empty: each is.
   std::function<bool(const std::string& bytes)> complete = {};
-  /// Whether to end early; empty: never. Children notice it themselves and give what they have; those that have not done so
-  /// within `patience_s` are ended.
+  /// Whether to end early; empty: never. Children notice it themselves and give what they have.
   std::function<bool()> stop = {};
-  /// @threshold [s] 0..60; chosen: a user who presses Ctrl-C sees an answer at once, and most solves end within a tenth of it
+  /// Time in which children must have answered after that; those that have not are ended.
+  /// @threshold [s] 0..60; chosen: a user who presses Ctrl-C sees an answer at once; most solves end in a tenth of it
   double patience_s = 0.5;
 };
 
