@@ -290,13 +290,9 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
     e.relative_error = e.measured > 0.0 ? (e.predicted - e.measured) / e.measured : kNaN;
     result.energy.push_back(e);
   }
-  if (options.signals.slim) {  // only the scores read them
-    for (LogComparison& log : result.logs) {
-      for (ComparedSeries& s : log.series) {
-        s.deviation.resize(0);
-        s.extrapolated.resize(0);
-      }
-    }
+  if (options.signals.slim) {  // only the scores read it
+    for (LogComparison& log : result.logs)
+      for (ComparedSeries& s : log.series) s.deviation.resize(0);
   }
   if (options.find_regions) {
     result.worst = worst_regions(error_groups(model.machine, result), options.regions);
