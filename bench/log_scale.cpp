@@ -1,8 +1,8 @@
 /// How time and memory of the verbs grow with the length of a log.
-///   log_scale [ROWS...]      without arguments: 12000 50000 100000 200000 400000
+///   log_scale [ROWS...]      without arguments: 12000 50000 100000 200000 400000 2000000
 /// The bundled log is repeated, with a pause of a second between its repetitions. Each verb runs in a process of its own
-/// (build/sparflow). Prints wall time, largest resident memory and, from row to row, the exponent with which time grows;
-/// diagnose is left out above 400000 rows.
+/// (build/sparflow). Prints wall time, processor time, largest resident memory and, from row to row, the exponent with
+/// which processor time grows (wall time grows with whatever else the machine does); diagnose is left out above 400000 rows.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -32,6 +32,7 @@ constexpr long kMostForDiagnose = 400'000;
 
 struct Used {
   double seconds = 0.0;    ///< wall time
+  double processor = 0.0;  ///< [s] of all threads
   double megabytes = 0.0;  ///< largest resident memory
 };
 
@@ -57,8 +58,11 @@ Used run(const std::vector<std::string>& arguments) {
     throw std::runtime_error(
         fmt::format("{} {} ended with status {}", arguments[0], arguments[1], status));
   }
+  const auto of = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
-          static_cast<double>(usage.ru_maxrss) / 1024.0};
+          of(usage.ru_utime) + of(usage.ru_stime), static_cast<double>(usage.ru_maxrss) / 1024.0};
 }
 
 /// The bundled log, repeated up to `rows` rows.
@@ -90,8 +94,10 @@ void table(const std::vector<long>& sizes) {
       std::filesystem::temp_directory_path() / fmt::format("sparflow_scale_{}", ::getpid());
   std::filesystem::create_directories(folder);
   const auto in = [&](const char* name) { return (folder / name).string(); };
-  fmt::print("{:>9}  {:<9} {:>8} {:>9} {:>9}\n", "rows", "verb", "s", "MB", "exponent");
-  std::map<std::string, std::pair<double, double>> before;  // rows and seconds of the size before
+  fmt::print("{:>9}  {:<9} {:>8} {:>8} {:>9} {:>9}\n", "rows", "verb", "wall s", "cpu s", "MB",
+             "exponent");
+  std::map<std::string, std::pair<double, double>>
+      before;  // rows and processor time [s] of the size before
   for (const long rows : sizes) {
     write_log(in("log.csv"), rows);
     std::vector<std::pair<std::string, std::vector<std::string>>> verbs = {
@@ -107,12 +113,12 @@ void table(const std::vector<long>& sizes) {
       const std::string exponent =
           last == before.end()
               ? std::string()
-              : fmt::format("{:.2f}", std::log(used.seconds / last->second.second) /
+              : fmt::format("{:.2f}", std::log(used.processor / last->second.second) /
                                           std::log(n / last->second.first));
-      fmt::print("{:>9}  {:<9} {:>8.1f} {:>9.0f} {:>9}\n", rows, verb, used.seconds, used.megabytes,
-                 exponent);
+      fmt::print("{:>9}  {:<9} {:>8.1f} {:>8.1f} {:>9.0f} {:>9}\n", rows, verb, used.seconds,
+                 used.processor, used.megabytes, exponent);
       std::fflush(stdout);
-      before[verb] = {n, used.seconds};
+      before[verb] = {n, used.processor};
     }
   }
   std::filesystem::remove_all(folder);
@@ -124,7 +130,7 @@ int main(int argc, char** argv) {
   try {
     std::vector<long> sizes;
     for (int i = 1; i < argc; ++i) sizes.push_back(std::strtol(argv[i], nullptr, 10));
-    if (sizes.empty()) sizes = {12'000, 50'000, 100'000, 200'000, 400'000};
+    if (sizes.empty()) sizes = {12'000, 50'000, 100'000, 200'000, 400'000, 2'000'000};
     table(sizes);
   } catch (const std::exception& e) {
     fmt::print(stderr, "log_scale: {}\n", e.what());

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "models/math/journal.h"
+
 namespace sparflow::bench {
 
 class ProgramOptions {
@@ -30,6 +32,13 @@ class ProgramOptions {
                       const std::string& help);
   /// Adds a flag; the name "!--no-bound" makes it set false.
   ProgramOptions& flag(const std::string& name, bool& value, const std::string& help);
+
+  /// Adds --journal FILE, in which each finished part of a long study stands as soon as it is complete, and --resume.
+  ProgramOptions& add_journal();
+  /// Opens it after `parse`; without --journal it keeps nothing. It belongs to this program, to the files and to the options.
+  /// @param not_of_result options that change no result ("--processes")  @throws UsageError for --resume without --journal
+  std::unique_ptr<Journal> journal(const std::vector<std::string>& files,
+                                   const std::vector<std::string>& not_of_result) const;
 
   /// @return the exit code when the program must end: 0 after --help, 2 after a wrong command line (with a message on
   /// stderr); nothing otherwise

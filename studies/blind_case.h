@@ -64,6 +64,10 @@ struct BlindRun {
   bool good() const;
 };
 
+/// A run as bytes for a journal, without what was asked; the same program must read them.
+std::string pack_run(const BlindRun& run);
+BlindRun unpack_run(const BlindCase& asked, const std::string& bytes);
+
 /// A case that is drawn and fitted once and can be diagnosed in several ways.
 class PreparedCase {
  public:

@@ -57,9 +57,15 @@ std::vector<BlindCase> cases_of(const Options& options) {
 /// Set by Ctrl-C: the current runs are finished, then the table of all finished runs is printed.
 volatile std::sig_atomic_t stopped = 0;
 
-/// Runs all cases on `jobs` threads and prints their lines in the order of the cases.
+/// Name of a case in the journal.
+std::string part_name(const BlindCase& c) {
+  return fmt::format("{} {} {} {}", c.judge, c.row, c.seed, c.reference ? "reference" : "alone");
+}
+
+/// Runs all cases that the journal lacks on `jobs` threads and prints their lines in the order of the cases.
 /// @return the finished runs
-std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options& options) {
+std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options& options,
+                              Journal& journal) {
   std::vector<BlindRun> runs(cases.size());
   std::vector<bool> done(cases.size(), false);
   std::mutex mutex;
@@ -81,7 +87,10 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
           }
           i = next++;
         }
-        BlindRun run = run_blind(cases[i]);
+        BlindRun run = unpack_run(
+            cases[i], journal.kept(part_name(cases[i]), [&] {
+              return Journal::Part{pack_run(run_blind(cases[i])), true};
+            }));
         const std::lock_guard lock(mutex);
         runs[i] = std::move(run);
         done[i] = true;
@@ -127,6 +136,7 @@ int run(int argc, char** argv) {
       .one_of({"rod", "payload", "commands", "oil", "pump"});
   app.add("--jobs", options.jobs, "runs in parallel").range(1, 64);
   app.add("--json", options.json, "file for all runs and the table (JSON)");
+  app.add_journal();
   app.add("--write", options.how.folder, "folder for the logs and machine of every case");
   bool no_extend = false;
   app.flag("--no-extend", no_extend, "diagnose only: faster, without the measures on the test log");
@@ -137,7 +147,10 @@ int run(int argc, char** argv) {
 
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
-  const std::vector<BlindRun> all = run_all(cases_of(options), options);
+  const std::unique_ptr<Journal> journal =
+      app.journal(
+      {}, {"--runs", "--none", "--jobs", "--json", "-v", "--verbose", "--no-time"});
+  const std::vector<BlindRun> all = run_all(cases_of(options), options, *journal);
   nlohmann::json json;
   json["runs"] = nlohmann::json::array();
   json["table"] = nlohmann::json::array();
@@ -166,6 +179,7 @@ int run(int argc, char** argv) {
     for (auto& line : table_json(table, judge)) json["table"].push_back(std::move(line));
   }
   if (!options.json.empty()) write_file_atomically(options.json, json.dump(1) + "\n");
+  if (stopped == 0) journal->remove();
   return 0;
 }
 

@@ -10,7 +10,7 @@
 #include "bench/program_options.h"
 #include "models/math/error.h"
 #include "optimizer/baselines/strategies_statistics.h"
-#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/kept_work.h"
 #include "studies/near_shortest_time_case.h"
 
 namespace sparflow::bench {
@@ -133,6 +133,7 @@ int run(int argc, char** argv) {
   app.flag("!--no-bound", settings.bounds, "leave out the estimated lower bounds");
   app.add("--json", json, "file for all results (JSON)");
   app.add("--processes", processes, "reaches in parallel").positive();
+  app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
   ModelCache models;
   std::vector<ReachTask> tasks =
@@ -142,14 +143,18 @@ int run(int argc, char** argv) {
   });
   const int count = static_cast<int>(tasks.size());
   const auto task = [&](int i) -> const ReachTask& { return tasks[static_cast<std::size_t>(i)]; };
-  const std::vector<ChildResult> results = run_in_children(
-      count, processes,
-      [&](int i) {
-        const ShortTimeFigures f = short_time_of(task(i), settings);
-        print_reach(task(i), f);
-        return pack_short_time(f);
-      },
-      [&](int, int done, const ChildResult&) { fmt::print(stderr, "{}/{}\n", done, count); });
+  const std::unique_ptr<Journal> journal =
+      app.journal(files_of(tasks, models), {"--processes", "--json"});
+  KeptWork work;
+  work.count = count;
+  work.at_once = processes;
+  work.name = [&](int i) { return fmt::format("reach {}", task(i).problem.name); };
+  work.work = [&](int i) { return pack_short_time(short_time_of(task(i), settings)); };
+  const std::vector<ChildResult> results =
+      run_kept(work, *journal, [&](int i, int done, const ChildResult& r) {
+        if (r.ok) print_reach(task(i), unpack_short_time(r.bytes));
+        fmt::print(stderr, "{}/{}\n", done, count);
+      });
   Excesses all;
   nlohmann::json out = nlohmann::json::object();
   for (int i = 0; i < count; ++i) {
@@ -165,6 +170,7 @@ int run(int argc, char** argv) {
   }
   print_summary(all, settings.factor);
   if (!json.empty()) write_file_atomically(json, out.dump(1) + "\n");
+  journal->remove();
   return 0;
 }
 

@@ -7,7 +7,7 @@
 
 #include "bench/program_options.h"
 #include "models/math/error.h"
-#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/kept_work.h"
 #include "studies/best_known.h"
 #include "studies/problem_set_report.h"
 
@@ -39,6 +39,7 @@ int run(int argc, char** argv) {
   app.add("--faster-than", settings.faster_than,
           "only reaches with less time than this many times the shortest; 0: all");
   app.add("--processes", processes, "reaches in parallel");
+  app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
   if (!optima.empty()) {
     std::ifstream in(optima);
@@ -49,18 +50,20 @@ int run(int argc, char** argv) {
   ModelCache models;
   const std::vector<ReachTask> tasks =
       random_count > 0 ? random_tasks(random_count, seed, models) : bundled_tasks(only, models);
-  const int count = static_cast<int>(tasks.size());
-  const std::vector<ChildResult> results = run_in_children(
-      count, processes,
-      [&](int i) {
-        const ReachTask& task = tasks[static_cast<std::size_t>(i)];
-        const ReachFigures f = solve_reach(task, settings);
-        print_reach(task, f);
-        return pack_figures(f);
-      },
-      [&](int i, int done, const ChildResult&) {
-        fmt::print(stderr, "{}/{} {}\n", done, count,
-                   tasks[static_cast<std::size_t>(i)].problem.name);
+  const auto task = [&](int i) -> const ReachTask& { return tasks[static_cast<std::size_t>(i)]; };
+  std::vector<std::string> files = files_of(tasks, models);
+  if (!optima.empty()) files.push_back(optima);
+  const std::unique_ptr<Journal> journal =
+      app.journal(files, {"--processes", "--write", "--write-optima"});
+  KeptWork work;
+  work.count = static_cast<int>(tasks.size());
+  work.at_once = processes;
+  work.name = [&](int i) { return fmt::format("reach {}", task(i).problem.name); };
+  work.work = [&](int i) { return pack_figures(solve_reach(task(i), settings)); };
+  const std::vector<ChildResult> results =
+      run_kept(work, *journal, [&](int i, int done, const ChildResult& r) {
+        if (r.ok) print_reach(task(i), unpack_figures(r.bytes));
+        fmt::print(stderr, "{}/{} {}\n", done, work.count, task(i).problem.name);
       });
   std::vector<ReachFigures> figures;
   figures.reserve(results.size());
@@ -77,6 +80,7 @@ int run(int argc, char** argv) {
   print_gap_by_time(tasks, figures);
   if (!keep.empty()) write_optima(keep, tasks, figures);
   if (!write.empty()) write_best_known(write, tasks, figures);
+  journal->remove();
   return 0;
 }
 

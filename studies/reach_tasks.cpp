@@ -100,6 +100,7 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelCache& models
     if (model_file.empty()) continue;
     task.model = &models.at(model_file);
     task.mark = models.mark_of(model_file);
+    task.source = file;
     // Infeasible reaches say so in the first line of their file.
     std::ifstream in(file);
     std::string first;
@@ -124,8 +125,18 @@ std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelCache& m
         file, [&](const std::string& named) { return &models.at(named).machine; });
     tasks.push_back(random_task(problem, models.at(problem.model_path), own));
     tasks.back().mark = models.mark_of(problem.model_path);
+    tasks.back().source = file;
   }
   return tasks;
+}
+
+std::vector<std::string> files_of(const std::vector<ReachTask>& tasks, const ModelCache& models) {
+  std::vector<std::string> files = models.files();
+  for (const ReachTask& task : tasks) {
+    if (std::find(files.begin(), files.end(), task.source) == files.end())
+      files.push_back(task.source);
+  }
+  return files;
 }
 
 }  // namespace sparflow::bench

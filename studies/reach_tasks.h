@@ -20,6 +20,7 @@ struct ReachTask {
   MotionProblem problem;
   const CraneModel* model = nullptr;
   ModelMark mark;
+  std::string source;  ///< file of the reach, or of that from which it was drawn
   bool meant_feasible = true;
   std::string why_not;  ///< reason why a reach was made infeasible on purpose
   /// Whether there are obstacles or a tip line, which lower bounds leave out.
@@ -31,6 +32,12 @@ class ModelCache {
  public:
   const CraneModel& at(const std::string& file) { return *entry(file).model; }
   ModelMark mark_of(const std::string& file) { return entry(file).mark; }
+  /// The files read so far.
+  std::vector<std::string> files() const {
+    std::vector<std::string> out;
+    for (const Entry& e : entries_) out.push_back(e.file);
+    return out;
+  }
 
  private:
   struct Entry {
@@ -49,5 +56,8 @@ std::vector<ReachTask> bundled_tasks(const std::string& only, ModelCache& models
 /// to 300 kg, the goal at the tip of the end posture, duration 1.02 to 4 times that of the straight joint line. Every
 /// tenth is made infeasible on purpose. Two of three are on the loader crane, which is hardest because it is redundant.
 std::vector<ReachTask> random_tasks(int count, std::uint64_t seed, ModelCache& models);
+
+/// All files on which the tasks' results depend.
+std::vector<std::string> files_of(const std::vector<ReachTask>& tasks, const ModelCache& models);
 
 }  // namespace sparflow::bench

@@ -13,7 +13,7 @@
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "optimizer/baselines/pareto.h"
-#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/kept_work.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
 #include "studies/strategy_map_picture.h"
@@ -96,12 +96,34 @@ std::vector<MapTask> map_tasks(const MapOptions& o) {
   return tasks;
 }
 
+std::string file_of(const MapTask& task) {
+  return bundled_file("reaches/" + task.reach + ".yaml");
+}
+
+/// Older problems name no model.
+std::string model_of(const std::string& named) {
+  return named.empty() ? bundled_file("models/loader_crane.json") : named;
+}
+
+/// The files on which the curves depend.
+std::vector<std::string> files_of(const std::vector<MapTask>& tasks) {
+  std::vector<std::string> files;
+  for (const MapTask& task : tasks) {
+    files.push_back(file_of(task));
+    CraneModel model;
+    load_problem_with(files.back(), [&](const std::string& named) {
+      files.push_back(model_of(named));
+      model = load_model(files.back());
+      return &model.machine;
+    });
+  }
+  return files;
+}
+
 std::string packed_curve_of(const MapTask& task, const MapOptions& o) {
-  const std::string file = bundled_file("reaches/" + task.reach + ".yaml");
   CraneModel model;
-  MotionProblem problem = load_problem_with(file, [&](const std::string& named) {
-    // Older problems name no model.
-    model = load_model(named.empty() ? bundled_file("models/loader_crane.json") : named);
+  MotionProblem problem = load_problem_with(file_of(task), [&](const std::string& named) {
+    model = load_model(model_of(named));
     return &model.machine;
   });
   problem.payload = task.payload;
@@ -124,13 +146,17 @@ std::string packed_curve_of(const MapTask& task, const MapOptions& o) {
       energy_against_time(model, problem, bench::planned_seeds(problem, 4, o.intervals), options));
 }
 
-std::vector<MapCurve> solve_curves(const std::vector<MapTask>& tasks, const MapOptions& o) {
-  const std::vector<ChildResult> results = run_in_children(
-      static_cast<int>(tasks.size()), o.processes,
-      [&](int index) { return packed_curve_of(tasks[static_cast<std::size_t>(index)], o); },
-      [&](int index, int done, const ChildResult&) {
-        const MapTask& task = tasks[static_cast<std::size_t>(index)];
-        fmt::print(stderr, "{}/{} {} {} kg\n", done, tasks.size(), task.reach, task.payload);
+std::vector<MapCurve> solve_curves(const std::vector<MapTask>& tasks, const MapOptions& o,
+                                   Journal& journal) {
+  const auto task = [&](int i) -> const MapTask& { return tasks[static_cast<std::size_t>(i)]; };
+  KeptWork work;
+  work.count = static_cast<int>(tasks.size());
+  work.at_once = o.processes;
+  work.name = [&](int i) { return fmt::format("{} {} kg", task(i).reach, task(i).payload); };
+  work.work = [&](int i) { return packed_curve_of(task(i), o); };
+  const std::vector<ChildResult> results =
+      run_kept(work, journal, [&](int i, int done, const ChildResult&) {
+        fmt::print(stderr, "{}/{} {}\n", done, work.count, work.name(i));
       });
   std::vector<MapCurve> curves;
   for (std::size_t i = 0; i < results.size(); ++i) {
@@ -162,8 +188,12 @@ int run(int argc, char** argv) {
   app.add("--rounds", o.rounds, "rounds of the search over mode sequences");
   app.flag("--two-loads", o.ends_only, "only the lightest and the heaviest payload");
   app.add("--processes", o.processes, "curves in parallel");
+  app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
-  const std::vector<MapCurve> curves = solve_curves(map_tasks(o), o);
+  const std::vector<MapTask> tasks = map_tasks(o);
+  const std::unique_ptr<Journal> journal =
+      app.journal(files_of(tasks), {"--processes", "--out", "-o"});
+  const std::vector<MapCurve> curves = solve_curves(tasks, o, *journal);
   std::filesystem::create_directories(o.folder);
   write_file_atomically(o.folder + "/strategy_map.csv", map_csv(curves));
   const std::vector<double> idle = {0.0, 1e3, 2e3, 5e3, 10e3, 15e3};
@@ -172,6 +202,7 @@ int run(int argc, char** argv) {
   const std::string summary = map_summary(curves, idle);
   write_file_atomically(o.folder + "/summary.txt", summary);
   fmt::print("{}", summary);
+  journal->remove();
   return 0;
 }
 

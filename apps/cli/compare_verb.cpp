@@ -46,7 +46,9 @@ int run(const CompareArguments& a) {
   const CraneModel model = a.model.empty()
                                ? CraneModel::untrained(load_machine_with_warnings(a.machine))
                                : load_model_with_warnings(a.model);
-  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
+  CompareOptions options;
+  options.signals.slim = a.outputs.report.empty() && model.effects.empty();
+  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping), options);
   // A machine file alone gives forces and flows by geometry; pressures are learned.
   if (a.model.empty()) keep_stages(model.machine, {"force", "flow_sensor"}, result);
   note_undefined_energies(result);

@@ -150,6 +150,7 @@ int run(const FitArguments& a) {
   FitOptions options;
   options.threads = a.threads;
   options.keep_held_out_series = !a.outputs.report.empty();
+  options.signals.slim = a.outputs.report.empty();
   FitResult result = [&] {
     Progress progress("fit");
     return fit(machine, std::move(logs), std::move(tests), options,

@@ -3,6 +3,7 @@
 #include <exception>
 #include <new>
 #include <sstream>
+#include <system_error>
 
 #include "apps/cli/console.h"
 #include "apps/cli/verbs.h"
@@ -64,6 +65,14 @@ int run(CLI::App& app, int argc, char** argv, const int& code) {
   }
 }
 
+int out_of_memory() {
+  note(
+      fmt::format("sparflow: out of memory: {} needs more than this process may have{}; give "
+                  "fewer or shorter logs, or use a machine with more memory (docs/limits.md)",
+                  current_work(), memory_in_words()));
+  return kBadInput;
+}
+
 /// Prints the sentence of an exception. @return the exit code
 int report(const std::exception_ptr& thrown) {
   try {
@@ -78,11 +87,12 @@ int report(const std::exception_ptr& thrown) {
     note(fmt::format("sparflow: {}", e.what()));
     return kBadInput;
   } catch (const std::bad_alloc&) {
-    note(
-        fmt::format("sparflow: out of memory: {} needs more than this process may have{}; give "
-                    "fewer or shorter logs, or use a machine with more memory (docs/limits.md)",
-                    current_work(), memory_in_words()));
-    return kBadInput;
+    return out_of_memory();
+  } catch (const std::system_error& e) {
+    // A thread whose stack finds no place.
+    if (e.code() == std::errc::resource_unavailable_try_again) return out_of_memory();
+    note(fmt::format("sparflow: {}", e.what()));
+    return kInternal;
   } catch (const std::exception& e) {
     note(
         fmt::format("sparflow: {}\nThis is a defect of the program; please report it with the "

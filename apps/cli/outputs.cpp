@@ -4,12 +4,9 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "apps/cli/console.h"
 #include "models/math/error.h"
-#include "models/math/sha256.h"
 
 namespace sparflow::cli {
 
@@ -54,24 +51,10 @@ std::unique_ptr<Journal> Outputs::open_journal(const std::string& verb,
                     path));
   }
   auto journal = std::make_unique<Journal>(path, run, resume);
+  journal->on_trouble(warn);
   for (const std::string& sentence : journal->warnings()) warn(sentence);
   if (resume && !there) note(fmt::format("there is no {}; everything is computed", path));
   return journal;
-}
-
-std::string run_fingerprint(const std::vector<std::string>& files, const std::string& options) {
-  std::string all;
-  std::vector<std::string> read = files;
-  read.emplace_back("/proc/self/exe");
-  for (const std::string& file : read) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw InputError({file, 0, 0}, "", "cannot read this file");
-    std::ostringstream bytes;
-    bytes << in.rdbuf();
-    // The name too, because results hold it; no name contains a zero byte.
-    all += file + '\0' + sha256_hex(bytes.str());
-  }
-  return sha256_hex(all + options);
 }
 
 void check_writable(const std::string& path) {

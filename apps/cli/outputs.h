@@ -33,9 +33,6 @@ struct Outputs {
   std::unique_ptr<Journal> open_journal(const std::string& verb, const std::string& run) const;
 };
 
-/// Identifies a run: SHA-256 of this program, of the files' names and contents, and of the options in words.
-std::string run_fingerprint(const std::vector<std::string>& files, const std::string& options);
-
 /// Checks, before any long work, that the folder of `path` exists and can be written. @throws InputError
 void check_writable(const std::string& path);
 

@@ -21,9 +21,19 @@ struct ParetoArguments {
   Outputs outputs;
 };
 
+/// All that the curve depends on. The number of processes is not part of it.
+std::string fingerprint(const ParetoArguments& a, const MotionProblem& problem) {
+  return run_fingerprint(
+      {problem.file, a.model.empty() ? problem.model_path : a.model},
+      fmt::format("pareto --points {} --longest {} --idle {} --paths {} --seed {} --intervals {}",
+                  a.points, a.longest, fmt::join(a.idle_kw, ","), a.seeds.count,
+                  a.seeds.random_seed, a.intervals));
+}
+
 int run(const ParetoArguments& a) {
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
+  outputs.push_back({"the journal", a.outputs.journal()});
   check_outputs_apart("pareto", outputs, {{"--problem", a.problem}, {"--model", a.model}});
   check_writable(a.output);
   a.outputs.check();
@@ -48,6 +58,11 @@ int run(const ParetoArguments& a) {
   options.strategies.baselines.intervals = optimize.intervals;
   options.strategies.baselines.polished_orders = 2;
   options.strategies.baselines.optimize = optimize;
+  const std::unique_ptr<Journal> journal =
+      a.outputs.open_journal("pareto", fingerprint(a, problem));
+  if (journal->finished() > 0)
+    note(fmt::format("{} solves were finished before", journal->finished()));
+  options.strategies.journal = journal.get();
   ParetoCurve curve;
   {
     Progress progress("pareto");
@@ -71,8 +86,10 @@ int run(const ParetoArguments& a) {
     write_file_atomically(a.output, pareto_csv(curve));
   if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, pareto_json(problem, curve));
   if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
+  const bool whole = !curve.interrupted && !interrupted();
+  if (whole) journal->remove();
   tell(pareto_table(problem, curve));
-  if (curve.interrupted || interrupted()) return kInterrupted;
+  if (!whole) return kInterrupted;
   return curve.points.empty() ? kNotSolved : kDone;
 }
 
@@ -110,6 +127,7 @@ void add_pareto_verb(CLI::App& app, int& code) {
   verb->add_option("--processes", a->processes, "starts solved in parallel; absent: 2")
       ->check(CLI::Range(1, 256));
   a->outputs.add_to(*verb);
+  a->outputs.add_resume_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }
 

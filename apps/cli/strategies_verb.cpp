@@ -9,7 +9,7 @@
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/strategies_page.h"
 #include "models/math/error.h"
-#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/kept_work.h"
 
 namespace sparflow::cli {
 namespace {
@@ -159,51 +159,30 @@ std::string fingerprint(const std::vector<ProblemAndModel>& tasks, const Strateg
 }
 
 /// The name of a problem's comparison in the journal, whose run fixes the order of the problems.
-std::string part_name(std::size_t index) { return fmt::format("problem {}", index + 1); }
-
-/// Keeps a finished comparison; a journal that cannot be written is no reason to end the run.
-void keep_finished(Journal& journal, const std::string& part, const ChildResult& result) {
-  if (!result.ok || unpacked_comparison(result.bytes).interrupted) return;
-  try {
-    journal.add(part, result.bytes);
-  } catch (const InputError& error) {
-    warn(error.what());
-  }
-}
+std::string part_name(int index) { return fmt::format("problem {}", index + 1); }
 
 /// Compares the strategies of every problem that the journal lacks, each in a process of its own.
 /// @return the results in the order of the problems
 std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
                                     const StrategiesArguments& a, const StrategyOptions& options,
                                     Journal& journal) {
-  std::vector<ChildResult> results(tasks.size());
-  std::vector<std::size_t> left;
-  for (std::size_t i = 0; i < tasks.size(); ++i) {
-    const std::string* finished = journal.find(part_name(i));
-    if (finished != nullptr)
-      results[i] = {true, *finished, ""};
-    else
-      left.push_back(i);
-  }
-  const int count = static_cast<int>(tasks.size());
-  const int before = count - static_cast<int>(left.size());
-  if (before > 0) note(fmt::format("{} of {} problems were finished before", before, count));
-  const int processes = a.processes > 0 ? a.processes : usable_processors();
-  const auto work = [&](int index) {
-    return packed(compare_in(tasks[left[static_cast<std::size_t>(index)]], a, options));
+  const auto task = [&](int i) -> const ProblemAndModel& {
+    return tasks[static_cast<std::size_t>(i)];
   };
+  KeptWork work;
+  work.count = static_cast<int>(tasks.size());
+  work.at_once = a.processes > 0 ? a.processes : usable_processors();
+  work.name = part_name;
+  work.work = [&](int i) { return packed(compare_in(task(i), a, options)); };
+  work.complete = [](const std::string& bytes) { return !unpacked_comparison(bytes).interrupted; };
+  work.stop = interrupted;
+  const int before = finished_before(work, journal);
+  if (before > 0) note(fmt::format("{} of {} problems were finished before", before, work.count));
   Progress progress("strategies");
-  progress(static_cast<double>(before) / count,
-           fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
-  std::vector<ChildResult> computed = run_in_children(
-      static_cast<int>(left.size()), processes, work,
-      [&](int index, int finished, const ChildResult& result) {
-        const std::size_t i = left[static_cast<std::size_t>(index)];
-        keep_finished(journal, part_name(i), result);
-        progress(static_cast<double>(before + finished) / count, tasks[i].problem.name);
-      });
-  for (std::size_t k = 0; k < left.size(); ++k) results[left[k]] = std::move(computed[k]);
-  return results;
+  progress(0.0, fmt::format("{} problem{}", work.count, work.count > 1 ? "s" : ""));
+  return run_kept(work, journal, [&](int i, int finished, const ChildResult&) {
+    progress(static_cast<double>(finished) / work.count, task(i).problem.name);
+  });
 }
 
 /// Compares the strategies of every problem.
@@ -225,6 +204,7 @@ std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& 
     all.back().file = tasks[i].problem.file;
     all.back().message = children[i].error;
     all.back().interrupted = interrupted();
+    if (interrupted()) continue;
     ++broken;
     note(fmt::format("{}: {}", tasks[i].problem.file, children[i].error));
   }

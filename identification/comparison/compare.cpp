@@ -130,7 +130,7 @@ void set_pool(ErrorGroup& group) {
 
 /// Collects the compared samples of one regime over all logs, with every signal that all of them have.
 ErrorGroup gather(const Machine& machine, const std::vector<LogComparison>& logs,
-                  const ComparedSeries& like, std::size_t regime) {
+                  const ComparedSeries& like, std::size_t regime, bool with_signals) {
   ErrorGroup group;
   group.stage = like.stage;
   group.at = like.at;
@@ -139,49 +139,54 @@ ErrorGroup gather(const Machine& machine, const std::vector<LogComparison>& logs
   group.unit = like.unit.name;
   group.scale = like.unit.si;
   set_pool(group);
-  std::vector<double> errors;
-  std::vector<std::vector<double>> columns;
-  bool first = true;
-  for (const LogComparison& log : logs) {
-    for (const ComparedSeries& s : log.series) {
-      if (s.stage != like.stage || s.at != like.at) continue;
-      const std::vector<RegimeSignal> signals = regime_signals(machine, log.signals, s);
-      if (first) {
-        for (const RegimeSignal& signal : signals) {
-          group.signals.push_back({signal.key, signal.words, signal.unit, signal.scale, {}});
-        }
-        columns.resize(group.signals.size());
-        first = false;
-      }
-      const std::size_t before = errors.size();
-      for (Index k = 0; k < s.measured.size(); ++k) {
-        if (!std::isfinite(s.measured[k]) || s.regime[k] != static_cast<int>(regime)) continue;
-        const double e = s.predicted[k] - s.measured[k];
-        errors.push_back(e * e);
-      }
-      for (std::size_t c = 0; c < columns.size(); ++c) {
-        columns[c].resize(errors.size(), kNaN);
-        for (const RegimeSignal& signal : signals) {
-          if (signal.key != group.signals[c].key) continue;
-          std::size_t row = before;
-          for (Index k = 0; k < s.measured.size(); ++k) {
-            if (!std::isfinite(s.measured[k]) || s.regime[k] != static_cast<int>(regime)) continue;
-            columns[c][row++] = signal.values[k];
-          }
-        }
-      }
+  const auto each_row = [&](const ComparedSeries& s, const auto& use) {
+    for (Index k = 0; k < s.measured.size(); ++k)
+      if (std::isfinite(s.measured[k]) && s.regime[k] == static_cast<int>(regime)) use(k);
+  };
+  const auto each_series = [&](const auto& use) {
+    for (const LogComparison& log : logs) {
+      for (const ComparedSeries& s : log.series)
+        if (s.stage == like.stage && s.at == like.at) use(log.signals, s);
     }
-  }
-  group.squared_error = Eigen::Map<VectorXd>(errors.data(), static_cast<Index>(errors.size()));
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    group.signals[c].values =
-        Eigen::Map<VectorXd>(columns[c].data(), static_cast<Index>(columns[c].size()));
-  }
+  };
+  Index count = 0, row = 0;
+  each_series([&](const MachineSignals&, const ComparedSeries& s) {
+    each_row(s, [&](Index) { ++count; });
+  });
+  group.squared_error.resize(count);
+  bool first = true;
+  each_series([&](const MachineSignals& signals, const ComparedSeries& s) {
+    const Index before = row;
+    each_row(s, [&](Index k) {
+      const double e = s.predicted[k] - s.measured[k];
+      group.squared_error[row++] = e * e;
+    });
+    if (!with_signals) return;
+    for_each_regime_signal(machine, signals, s, [&](RegimeSignal&& signal) {
+      auto known = std::find_if(group.signals.begin(), group.signals.end(),
+                                [&](const RegimeSignal& g) { return g.key == signal.key; });
+      if (known == group.signals.end()) {
+        if (!first) return;
+        group.signals.push_back(
+            {signal.key, signal.words, signal.unit, signal.scale, VectorXd::Constant(count, kNaN)});
+        known = group.signals.end() - 1;
+      }
+      Index at = before;
+      each_row(s, [&](Index k) { known->values[at++] = signal.values[k]; });
+    });
+    first = false;
+  });
   return group;
 }
 
-std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult& result) {
-  std::vector<ErrorGroup> groups;
+/// @param result must outlive the groups
+ErrorGroups error_groups(const Machine& machine, const CompareResult& result) {
+  struct Asked {
+    const ComparedSeries* series;
+    std::size_t regime;
+    double severity;  ///< NaN: not known
+  };
+  std::vector<Asked> asked;
   std::set<std::pair<std::string, std::string>> seen;
   for (const LogComparison& log : result.logs) {
     for (const ComparedSeries& s : log.series) {
@@ -193,14 +198,16 @@ std::vector<ErrorGroup> error_groups(const Machine& machine, const CompareResult
         if (r.stage == s.stage && r.at == s.at && of != nullptr && r.scale > 0.0)
           severity = std::max(severity, std::min(1.0, of->rmse / r.scale));
       }
-      for (std::size_t r = 0; r < s.regimes.size(); ++r) {
-        ErrorGroup group = gather(machine, result.logs, s, r);
-        group.severity = severity;
-        if (group.squared_error.size() > 0) groups.push_back(std::move(group));
-      }
+      for (std::size_t r = 0; r < s.regimes.size(); ++r) asked.push_back({&s, r, severity});
     }
   }
-  return groups;
+  const std::size_t count = asked.size();
+  return {count, [&machine, &result, asked = std::move(asked)](std::size_t i, bool with_signals) {
+            const Asked& a = asked[i];
+            ErrorGroup group = gather(machine, result.logs, *a.series, a.regime, with_signals);
+            if (std::isfinite(a.severity)) group.severity = a.severity;
+            return group;
+          }};
 }
 
 /// @return quantities with a bias of one sign nearly everywhere, as regions without bounds
@@ -289,6 +296,10 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   const bool find_causes = options.find_regions && options.find_causes;
   if (find_causes) result.fault.stages = split_stages(model, result, options.fault);
   result.ranking = rank_errors(model.machine, result, options.ranking);
+  if (options.signals.slim) {  // only the scores read it
+    for (LogComparison& log : result.logs)
+      for (ComparedSeries& s : log.series) s.deviation.resize(0);
+  }
   if (options.find_regions) {
     result.worst = worst_regions(error_groups(model.machine, result), options.regions);
   }

@@ -8,6 +8,7 @@
 ///   pump      max of demands and standby, from the same  against  the pump's pressure
 ///   energy    the integral of pump pressure * flow, Q from speed in both
 /// Stages without measurement are not compared, and a note says so. docs/fit_and_compare.md has the equations.
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -172,6 +173,11 @@ CompareResult join_results(const Machine& machine, std::vector<CompareResult> pa
 ///   payload, temperature and the log's columns without a known meaning, as far as the log has them
 std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
                                          const ComparedSeries& series);
+
+/// Calls `visit` with each of them in turn, so that only one is in memory at a time.
+void for_each_regime_signal(const Machine& machine, const MachineSignals& signals,
+                            const ComparedSeries& series,
+                            const std::function<void(RegimeSignal&&)>& visit);
 
 /// @param data "train", "test" or "held out"  @return the scores in the form of the model file
 std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data);

@@ -37,20 +37,62 @@ Eigen::VectorXi block_of_sample(const std::vector<CompareBlock>& blocks, std::si
   return out;
 }
 
-std::vector<RegimeSignal> signals_of(const Machine& machine, const MachineSignals& log,
-                                     const ComparedSeries& series) {
-  std::vector<RegimeSignal> out = regime_signals(machine, log, series);
+/// Calls `visit` with the signals of a quantity, one at a time.
+void each_signal(const Machine& machine, const MachineSignals& log, const ComparedSeries& series,
+                 const std::function<void(RegimeSignal&&)>& visit) {
+  for_each_regime_signal(machine, log, series, visit);
   if (series.stage == "force") {  // Coulomb friction depends on the direction only
     const VectorXd direction =
         series.regime.cast<double>().unaryExpr([](double r) { return r == 0.0 ? 1.0 : -1.0; });
-    out.push_back({"direction", "direction of motion", "", 1.0, direction});
+    visit({"direction", "direction of motion", "", 1.0, direction});
   }
+}
+
+/// Which quantity a part is of.
+struct PartKey {
+  std::string stage, at, regime;
+};
+
+/// Calls `use` for the series of a quantity in each log. @param use (log, series)
+template <class Use>
+void each_series(const CompareResult& result, const PartKey& key, const Use& use) {
+  for (std::size_t l = 0; l < result.logs.size(); ++l) {
+    for (const ComparedSeries& s : result.logs[l].series) {
+      if (s.stage == key.stage && s.at == key.at) use(l, s);
+    }
+  }
+}
+
+/// The signals at a part's samples. @param used [parts of logs] number of the part's samples in each log's series
+std::vector<RegimeSignal> gathered_signals(const Machine& machine, const CompareResult& result,
+                                           const PartKey& key,
+                                           const std::vector<std::vector<Index>>& rows) {
+  Index count = 0;
+  for (const std::vector<Index>& r : rows) count += static_cast<Index>(r.size());
+  std::vector<RegimeSignal> out;
+  std::size_t series = 0;
+  Index before = 0;
+  each_series(result, key, [&](std::size_t l, const ComparedSeries& s) {
+    const std::vector<Index>& here = rows[series];
+    const bool first = series++ == 0;
+    each_signal(machine, result.logs[l].signals, s, [&](RegimeSignal&& g) {
+      auto known = std::find_if(out.begin(), out.end(),
+                                [&](const RegimeSignal& o) { return o.key == g.key; });
+      if (known == out.end()) {
+        if (!first) return;
+        out.push_back({g.key, g.words, g.unit, g.scale, VectorXd::Constant(count, kNaN)});
+        known = out.end() - 1;
+      }
+      for (std::size_t i = 0; i < here.size(); ++i)
+        known->values[before + static_cast<Index>(i)] = g.values[here[i]];
+    });
+    before += static_cast<Index>(here.size());
+  });
   return out;
 }
 
-ComparedPart gather(const Machine& machine, const CompareResult& result,
-                    const std::vector<Eigen::VectorXi>& blocks, const ComparedSeries& like,
-                    const std::string& regime) {
+ComparedPart gather(const CompareResult& result, const std::vector<Eigen::VectorXi>& blocks,
+                    const ComparedSeries& like, const std::string& regime) {
   ComparedPart part;
   part.stage = like.stage;
   part.at = like.at;
@@ -58,44 +100,42 @@ ComparedPart gather(const Machine& machine, const CompareResult& result,
   part.words = part_words(like, regime);
   part.unit = like.unit.name;
   part.scale = like.unit.si;
-  std::vector<double> error, measured;
-  std::vector<std::vector<double>> columns;
-  bool first = true;
-  for (std::size_t l = 0; l < result.logs.size(); ++l) {
-    for (const ComparedSeries& s : result.logs[l].series) {
-      if (s.stage != like.stage || s.at != like.at) continue;
-      const std::vector<RegimeSignal> signals = signals_of(machine, result.logs[l].signals, s);
-      if (first) {
-        for (const RegimeSignal& g : signals)
-          part.signals.push_back({g.key, g.words, g.unit, g.scale, {}});
-        columns.resize(part.signals.size());
-        first = false;
-      }
-      std::vector<const RegimeSignal*> source(columns.size(), nullptr);
-      for (std::size_t c = 0; c < columns.size(); ++c) {
-        for (const RegimeSignal& g : signals) {
-          if (g.key == part.signals[c].key) source[c] = &g;
-        }
-      }
+  const PartKey key{like.stage, like.at, regime};
+  const auto each_row = [&](const auto& use) {
+    each_series(result, key, [&](std::size_t l, const ComparedSeries& s) {
       for (Index k = 0; k < s.measured.size(); ++k) {
         if (!std::isfinite(s.measured[k]) || blocks[l][k] < 0) continue;
         if (!regime.empty() && s.regimes[static_cast<std::size_t>(s.regime[k])] != regime) continue;
-        error.push_back(s.predicted[k] - s.measured[k]);
-        measured.push_back(s.measured[k]);
-        part.block.push_back(blocks[l][k]);
-        part.sample.push_back(k);
-        for (std::size_t c = 0; c < columns.size(); ++c)
-          columns[c].push_back(source[c] == nullptr ? kNaN : source[c]->values[k]);
+        use(l, s, k);
       }
-    }
-  }
-  part.error = Eigen::Map<VectorXd>(error.data(), static_cast<Index>(error.size()));
-  part.measured = Eigen::Map<VectorXd>(measured.data(), static_cast<Index>(measured.size()));
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    part.signals[c].values =
-        Eigen::Map<VectorXd>(columns[c].data(), static_cast<Index>(columns[c].size()));
-  }
+    });
+  };
+  Index count = 0;
+  each_row([&](std::size_t, const ComparedSeries&, Index) { ++count; });
+  part.error.resize(count);
+  part.block.reserve(static_cast<std::size_t>(count));
+  part.sample.reserve(static_cast<std::size_t>(count));
+  Index row = 0;
+  each_row([&](std::size_t l, const ComparedSeries& s, Index k) {
+    part.error[row++] = s.predicted[k] - s.measured[k];
+    part.block.push_back(blocks[l][k]);
+    part.sample.push_back(k);
+  });
   return part;
+}
+
+/// Rows of a part in each log's series, from the samples that it has in order of the logs.
+std::vector<std::vector<Index>> rows_by_series(const CompareResult& result, const PartKey& key,
+                                               const ComparedPart& part,
+                                               const std::vector<CompareBlock>& blocks) {
+  std::vector<std::vector<Index>> rows;
+  std::size_t i = 0;
+  each_series(result, key, [&](std::size_t l, const ComparedSeries&) {
+    rows.emplace_back();
+    for (; i < part.block.size() && blocks[static_cast<std::size_t>(part.block[i])].log == l; ++i)
+      rows.back().push_back(part.sample[i]);
+  });
+  return rows;
 }
 
 }  // namespace
@@ -132,10 +172,17 @@ std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareRes
       const bool whole = s.stage == "force" || s.stage == "pump";
       const std::vector<std::string> regimes = whole ? std::vector<std::string>{""} : s.regimes;
       for (const std::string& regime : regimes) {
-        ComparedPart part = gather(machine, result, of_sample, s, regime);
-        if (part.error.size() > 0) out.push_back(std::move(part));
+        ComparedPart part = gather(result, of_sample, s, regime);
+        if (part.error.size() == 0) continue;
+        out.push_back(std::move(part));
       }
     }
+  }
+  for (ComparedPart& made : out) {
+    made.gather_signals = [&machine, &result, &blocks](const ComparedPart& part) {
+      const PartKey key{part.stage, part.at, part.regime};
+      return gathered_signals(machine, result, key, rows_by_series(result, key, part, blocks));
+    };
   }
   return out;
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// The errors of a comparison arranged for statistics: the errors of one quantity over all logs with the block of motion
 /// to which each belongs. Neighbouring errors are correlated, so confidence statements count blocks, not samples.
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -41,13 +42,19 @@ struct ComparedPart {
   std::string unit;       ///< of the field
   double scale = 1.0;     ///< SI value of one `unit`
   Eigen::VectorXd error;  ///< predicted - measured, SI
-  Eigen::VectorXd measured;          ///< SI
   std::vector<int> block;            ///< index into the blocks
   std::vector<Eigen::Index> sample;  ///< index into its log
-  std::vector<RegimeSignal>
-      signals;  ///< those that all logs have; for a force also its direction (+1, -1)
+  /// Those that all logs have; for a force also its direction (+1, -1). Empty where `gather_signals` gives them.
+  std::vector<RegimeSignal> signals;
+  /// Gives the signals when they are needed, since those of all parts together take several times the memory of the logs.
+  std::function<std::vector<RegimeSignal>(const ComparedPart& part)> gather_signals;
+
+  std::vector<RegimeSignal> all_signals() const {
+    return gather_signals ? gather_signals(*this) : signals;
+  }
 };
 
+/// @param machine,result,blocks must outlive the parts
 std::vector<ComparedPart> compare_parts(const Machine& machine, const CompareResult& result,
                                         const std::vector<CompareBlock>& blocks);
 

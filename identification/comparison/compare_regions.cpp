@@ -213,8 +213,14 @@ WorstRegion region_of(const ErrorGroup& group, const Candidate& c, const Pool& p
 
 std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,
                                        const RegionOptions& options) {
+  return worst_regions({groups.size(), [&groups](std::size_t i, bool) { return groups[i]; }},
+                       options);
+}
+
+std::vector<WorstRegion> worst_regions(const ErrorGroups& groups, const RegionOptions& options) {
   std::map<std::string, Pool> pools;
-  for (const ErrorGroup& group : groups) {
+  for (std::size_t i = 0; i < groups.count; ++i) {
+    const ErrorGroup group = groups.gather(i, false);
     Pool& pool = pools[group.pool];
     pool.error += group.squared_error.sum();
     pool.samples += static_cast<double>(group.squared_error.size());
@@ -224,7 +230,9 @@ std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,
     WorstRegion region;
   };
   std::vector<Ranked> ranked;
-  for (const ErrorGroup& group : groups) {
+  for (std::size_t i = 0; i < groups.count; ++i) {
+    const ErrorGroup group = groups.gather(i, true);
+    if (group.squared_error.size() == 0) continue;
     if (group.severity < options.least_severity) continue;
     std::vector<BinnedSignal> signals;
     for (const RegimeSignal& signal : group.signals) {

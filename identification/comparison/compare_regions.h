@@ -8,6 +8,7 @@
 /// spread evenly, and prefers neither tiny regions nor large ones. All intervals between the
 /// quantiles of each signal, and all rectangles of two signals, are tried.
 #include <Eigen/Dense>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -82,6 +83,16 @@ struct RegionOptions {
   /// @threshold [regions] 1..100; chosen: as many as a screen shows and a reader compares
   int most = 6;
 };
+
+/// Groups that are gathered when they are needed: all of them together take several times the memory of the logs.
+struct ErrorGroups {
+  std::size_t count = 0;
+  /// @param with_signals false: a group without its signals is asked for
+  std::function<ErrorGroup(std::size_t index, bool with_signals)> gather;
+};
+
+/// The regions of groups that are gathered one at a time.
+std::vector<WorstRegion> worst_regions(const ErrorGroups& groups, const RegionOptions& options);
 
 /// @return at most one region for each group, the worst first; none where the error is spread evenly
 std::vector<WorstRegion> worst_regions(const std::vector<ErrorGroup>& groups,

@@ -35,16 +35,17 @@ Json score_json(const StageScore& s, const ErrorRanking& ranking) {
   return out;
 }
 
-void add_cylinder(const Machine& machine, const MachineSignals& signals, int index,
-                  std::vector<RegimeSignal>& out) {
+using VisitSignal = std::function<void(RegimeSignal&&)>;
+
+void visit_cylinder(const Machine& machine, const MachineSignals& signals, int index,
+                    const VisitSignal& visit) {
   const std::string& name = machine.cylinders[static_cast<std::size_t>(index)].name;
   const CylinderSignals& c = signals.cylinders[static_cast<std::size_t>(index)];
-  out.push_back({"speed_" + name + "_mm_s", name + " speed", "mm/s", 1e-3, c.speed.cwiseAbs()});
-  out.push_back(
-      {"acceleration_" + name + "_m_s2", name + " acceleration", "m/s2", 1.0, c.acceleration});
-  out.push_back({"load_" + name + "_kN", name + " load", "kN", 1e3, c.static_force});
+  visit({"speed_" + name + "_mm_s", name + " speed", "mm/s", 1e-3, c.speed.cwiseAbs()});
+  visit({"acceleration_" + name + "_m_s2", name + " acceleration", "m/s2", 1.0, c.acceleration});
+  visit({"load_" + name + "_kN", name + " load", "kN", 1e3, c.static_force});
   if (c.has_command()) {
-    out.push_back({"u_" + name, name + " command", "", 1.0, c.command.cwiseAbs()});
+    visit({"u_" + name, name + " command", "", 1.0, c.command.cwiseAbs()});
   }
 }
 
@@ -248,36 +249,40 @@ std::string systematic_errors_text(const CompareResult& result) {
 std::vector<RegimeSignal> regime_signals(const Machine& machine, const MachineSignals& signals,
                                          const ComparedSeries& series) {
   std::vector<RegimeSignal> out;
+  for_each_regime_signal(machine, signals, series,
+                         [&out](RegimeSignal&& s) { out.push_back(std::move(s)); });
+  return out;
+}
+
+void for_each_regime_signal(const Machine& machine, const MachineSignals& signals,
+                            const ComparedSeries& series, const VisitSignal& visit) {
   const int cylinder = series.stage == "pump" ? -1 : machine.cylinder_index(series.at);
   const int pump =
       series.stage == "pump" ? machine.pump_index(series.at) : machine.pump_of_cylinder(cylinder);
   for (int j = 0; j < machine.joint_count(); ++j) {
     const Joint& joint = machine.joints[static_cast<std::size_t>(j)];
     if (joint.type == JointType::kRevolute) {
-      out.push_back({"q_" + joint.name + "_deg", joint.name + " angle", "deg", units::kDegree,
-                     signals.q.col(j)});
+      visit({"q_" + joint.name + "_deg", joint.name + " angle", "deg", units::kDegree,
+             signals.q.col(j)});
     } else {
-      out.push_back(
-          {"q_" + joint.name + "_m", joint.name + " position", "m", 1.0, signals.q.col(j)});
+      visit({"q_" + joint.name + "_m", joint.name + " position", "m", 1.0, signals.q.col(j)});
     }
   }
-  if (cylinder >= 0) add_cylinder(machine, signals, cylinder, out);
+  if (cylinder >= 0) visit_cylinder(machine, signals, cylinder, visit);
   if (pump >= 0) {
-    out.push_back({cylinder >= 0 ? "other_flow_lpm" : "flow_lpm",
-                   cylinder >= 0 ? "flow to the other cylinders" : "total flow", "l/min",
-                   units::kLitrePerMinute, other_flow(machine, signals, pump, cylinder)});
+    visit({cylinder >= 0 ? "other_flow_lpm" : "flow_lpm",
+           cylinder >= 0 ? "flow to the other cylinders" : "total flow", "l/min",
+           units::kLitrePerMinute, other_flow(machine, signals, pump, cylinder)});
   }
   if (series.stage == "pump") {
-    out.push_back({"predicted_bar", "predicted pressure", "bar", units::kBar, series.predicted});
+    visit({"predicted_bar", "predicted pressure", "bar", units::kBar, series.predicted});
   }
-  if (signals.payload_measured)
-    out.push_back({"payload_kg", "payload", "kg", 1.0, signals.payload});
-  if (signals.oil.size() > 0) out.push_back({"oil_C", "oil temperature", "degC", 1.0, signals.oil});
+  if (signals.payload_measured) visit({"payload_kg", "payload", "kg", 1.0, signals.payload});
+  if (signals.oil.size() > 0) visit({"oil_C", "oil temperature", "degC", 1.0, signals.oil});
   if (signals.return_pressure.size() > 0) {
-    out.push_back({"p_return_bar", "return pressure", "bar", units::kBar, signals.return_pressure});
+    visit({"p_return_bar", "return pressure", "bar", units::kBar, signals.return_pressure});
   }
-  for (const CandidateSignal& c : signals.candidates) out.push_back(candidate_signal(c));
-  return out;
+  for (const CandidateSignal& c : signals.candidates) visit(candidate_signal(c));
 }
 
 std::string compare_json(const CompareResult& result) {

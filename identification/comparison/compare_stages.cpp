@@ -65,8 +65,7 @@ void Comparison::force(std::size_t i, std::vector<ComparedSeries>& out,
   }
   ComparedSeries s = series_for("force", name, kNewton, signals_.samples());
   for (Index k = 0; k < signals_.samples(); ++k) {
-    if (counts(k) && c.moving[k])
-      put(s, k, c.force[k], c.predicted_force[k], c.speed[k] > 0.0 ? 0 : 1);
+    if (counts(k) && c.moving[k]) put(s, k, c.force[k], c.predicted()[k], c.speed[k] > 0.0 ? 0 : 1);
   }
   out.push_back(std::move(s));
 }

@@ -193,7 +193,7 @@ ResidualTests test_residuals(const std::vector<ComparedPart>& parts, int blocks,
     bias.columns = 1;
     columns.push_back(sums);
     hypotheses.push_back(bias);
-    for (const RegimeSignal& signal : part.signals) {
+    for (const RegimeSignal& signal : part.all_signals()) {
       const MatrixXd f = features(signal.values);
       if (f.cols() == 0) continue;
       Hypothesis h = blank;

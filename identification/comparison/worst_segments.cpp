@@ -43,16 +43,20 @@ std::string size_text(double value, const std::string& unit) {
                          : fmt::format("{:.3g} {}", value, unit);
 }
 
-/// The level of a factor at every sample; "" = unknown.
+/// The level of a factor at every sample.
 struct Factor {
   std::string name;
-  std::vector<std::string> level;
+  std::vector<int> level;  ///< index into `order`; -1 = unknown
   std::vector<std::string> order;
+
+  static std::vector<int> unknown(Index samples) {
+    return std::vector<int>(static_cast<std::size_t>(samples), -1);
+  }
 };
 
 Factor terciles(const std::string& name, const VectorXd& values,
                 const std::vector<std::string>& words) {
-  Factor f{name, std::vector<std::string>(static_cast<std::size_t>(values.size())), words};
+  Factor f{name, Factor::unknown(values.size()), words};
   VectorXd known(values.size());
   Index n = 0;
   for (const double v : values) {
@@ -66,7 +70,7 @@ Factor terciles(const std::string& name, const VectorXd& values,
   if (!(span > kConstant * known.cwiseAbs().maxCoeff()) || !(hi > lo)) return f;
   for (Index k = 0; k < values.size(); ++k) {
     if (!std::isfinite(values[k])) continue;
-    f.level[static_cast<std::size_t>(k)] = words[values[k] <= lo ? 0 : values[k] <= hi ? 1 : 2];
+    f.level[static_cast<std::size_t>(k)] = values[k] <= lo ? 0 : values[k] <= hi ? 1 : 2;
   }
   return f;
 }
@@ -79,18 +83,20 @@ Factor values_or_terciles(const std::string& name, const VectorXd& values,
     if (std::isfinite(v)) seen.insert(v);
     if (seen.size() > most_values) return terciles(name, values, {"low", "medium", "high"});
   }
-  Factor f{name, std::vector<std::string>(static_cast<std::size_t>(values.size())), {}};
+  Factor f{name, Factor::unknown(values.size()), {}};
   if (seen.size() < 2) return f;
   for (const double v : seen) f.order.push_back(fmt::format("{:g}", v));
   for (Index k = 0; k < values.size(); ++k) {
-    if (std::isfinite(values[k]))
-      f.level[static_cast<std::size_t>(k)] = fmt::format("{:g}", values[k]);
+    if (!std::isfinite(values[k])) continue;
+    // of values with the same six digits the first
+    const auto at = std::find(f.order.begin(), f.order.end(), fmt::format("{:g}", values[k]));
+    f.level[static_cast<std::size_t>(k)] = static_cast<int>(at - f.order.begin());
   }
   return f;
 }
 
-const RegimeSignal* signal_of(const ComparedPart& part, const std::string& prefix) {
-  for (const RegimeSignal& s : part.signals) {
+const RegimeSignal* signal_of(const std::vector<RegimeSignal>& signals, const std::string& prefix) {
+  for (const RegimeSignal& s : signals) {
     if (s.key.starts_with(prefix)) return &s;
   }
   return nullptr;
@@ -105,7 +111,7 @@ Factor functions_moving(const CompareResult& result, const ComparedPart& part,
         result.logs[blocks[static_cast<std::size_t>(part.block[i])].log].signals;
     int moving = 0;
     for (const CylinderSignals& c : s.cylinders) moving += c.direction[part.sample[i]] != 0 ? 1 : 0;
-    f.level.push_back(moving > 1 ? "several" : "one");
+    f.level.push_back(moving > 1 ? 1 : 0);
   }
   return f;
 }
@@ -119,7 +125,7 @@ Factor regime_factor(const CompareResult& result, const ComparedPart& part,
     for (const ComparedSeries& s : log.series) {
       if (s.stage != part.stage || s.at != part.at) continue;
       if (f.order.empty()) f.order = s.regimes;
-      f.level.push_back(s.regimes[static_cast<std::size_t>(s.regime[part.sample[i]])]);
+      f.level.push_back(s.regime[part.sample[i]]);
     }
   }
   return f;
@@ -130,26 +136,27 @@ std::vector<Factor> factors_of(const CompareResult& result, const ComparedPart& 
                                const WorstSegmentOptions& options) {
   std::vector<Factor> out;
   out.push_back(regime_factor(result, part, blocks));
-  const RegimeSignal* speed = signal_of(part, part.stage == "pump" ? "flow_lpm" : "speed_");
+  const std::vector<RegimeSignal> signals = part.all_signals();
+  const RegimeSignal* speed = signal_of(signals, part.stage == "pump" ? "flow_lpm" : "speed_");
   if (speed != nullptr) out.push_back(terciles("speed", speed->values, {"slow", "medium", "fast"}));
-  if (const RegimeSignal* load = signal_of(part, "load_"))
+  if (const RegimeSignal* load = signal_of(signals, "load_"))
     out.push_back(terciles("load", load->values, {"low", "medium", "high"}));
   for (const char* key : {"payload_kg", "oil_C"}) {
-    if (const RegimeSignal* s = signal_of(part, key))
+    if (const RegimeSignal* s = signal_of(signals, key))
       out.push_back(values_or_terciles(key, s->values, options.most_values));
   }
   out.push_back(functions_moving(result, part, blocks));
   return out;
 }
 
-RegimeError error_at(const ComparedPart& part, const Factor& factor, const std::string& level,
-                     Index blocks, const BlockOptions& options) {
+RegimeError error_at(const ComparedPart& part, const Factor& factor, int level, Index blocks,
+                     const BlockOptions& options) {
   RegimeError out;
   out.stage = part.stage;
   out.at = part.at;
   out.regime = part.regime;
   out.factor = factor.name;
-  out.level = level;
+  out.level = factor.order[static_cast<std::size_t>(level)];
   out.unit = part.unit;
   VectorXd count = VectorXd::Zero(blocks), sum = count, squares = count;
   for (std::size_t i = 0; i < part.block.size(); ++i) {
@@ -235,7 +242,7 @@ std::vector<RegimeError> errors_by_regime(const CompareResult& result,
   std::vector<RegimeError> out;
   for (const ComparedPart& part : parts) {
     for (const Factor& factor : factors_of(result, part, blocks, options)) {
-      for (const std::string& level : factor.order) {
+      for (int level = 0; level < static_cast<int>(factor.order.size()); ++level) {
         RegimeError e =
             error_at(part, factor, level, static_cast<Index>(blocks.size()), options.blocks);
         if (e.samples > 0) out.push_back(std::move(e));

@@ -26,14 +26,30 @@ std::vector<MachineSignals> all_with_effects(const CraneModel& model,
   return out;
 }
 
+/// Whether no effect has contributed anything to the signals.
+bool has_no_effects(const MachineSignals& s) {
+  const auto none = [](const CylinderSignals& c) {
+    return c.pressure_effect.size() + c.return_effect.size() + c.pressure_sensor_effect.size() +
+               c.demand_effect.size() + c.flow_effect.size() ==
+           0;
+  };
+  return !s.of_effective_machine && std::all_of(s.cylinders.begin(), s.cylinders.end(), none) &&
+         std::all_of(s.pumps.begin(), s.pumps.end(),
+                     [](const PumpSignals& p) { return p.pressure_effect.size() == 0; });
+}
+
 /// Learns a model from the samples that count, with the options' effects.
-FitPass learn(const Machine& machine, std::span<const MachineSignals> plain,
+FitPass learn(const Machine& machine, const std::vector<MachineSignals>& plain,
               std::vector<Mask> counts, const FitOptions& options, const Progress& progress) {
   FitPass pass;
   pass.model = CraneModel::untrained(machine);
   pass.model.effects = options.effects;
-  std::vector<MachineSignals> signals = all_with_effects(pass.model, plain);
-  const TrainingData data{&signals, std::move(counts)};
+  // A copy of a long log is the larger part of the memory, so one is made only where effects change it.
+  const bool as_they_are =
+      pass.model.effects.empty() && std::all_of(plain.begin(), plain.end(), has_no_effects);
+  std::vector<MachineSignals> signals;
+  if (!as_they_are) signals = all_with_effects(pass.model, plain);
+  const TrainingData data{as_they_are ? &plain : &signals, std::move(counts)};
   learn_processes(data, options, pass, progress);
   learn_valves(data, options.valve, pass);
   const std::vector<std::string> notes = pass.notes;

@@ -9,6 +9,7 @@
 #include "models/effects/effective_machine.h"
 #include "models/effects/instant.h"
 #include "models/hydraulics/return_rise.h"
+#include "models/math/error.h"
 #include "models/math/nan.h"
 
 namespace sparflow {
@@ -243,6 +244,8 @@ double working_pressure_effect(const CraneModel& model, const MachineSignals& si
 }
 
 MachineSignals with_effects(const CraneModel& model, MachineSignals signals) {
+  SPARFLOW_CHECK(!signals.slim || model.effects.empty(), "slim signals have no effects");
+  if (signals.slim) return signals;
   for (CylinderSignals& c : signals.cylinders) {
     c.model_force = c.predicted_force = c.static_force;
     for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,

@@ -216,6 +216,12 @@ Mask edges(const MachineSignals& s) {
   return edge;
 }
 
+/// Frees what is no longer read after speeds and forces are known (SignalOptions::slim).
+void free_poses(MachineSignals& s) {
+  for (Eigen::MatrixXd* m : {&s.q_measured, &s.qd, &s.qdd, &s.tip}) m->resize(0, 0);
+  for (CylinderSignals& c : s.cylinders) c.rate.resize(0);
+}
+
 /// Computes all signals that follow from the measured ones and the filter.
 void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOptions& options,
             MachineSignals& out) {
@@ -245,9 +251,19 @@ void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOpt
     c.force_smooth = smoothed_or_empty(filter, c.force);
   }
   evaluate_machine(machine, out);
-  for (CylinderSignals& c : out.cylinders) c.model_force = c.predicted_force = c.static_force;
+  out.slim = options.slim;
+  if (out.slim) free_poses(out);
   drop_dead_commands(machine, options.motion, out);
   find_motion(machine, options.motion, out);
+  for (CylinderSignals& c : out.cylinders) {
+    c.model_force = c.static_force;
+    if (out.slim) {
+      c.pressure_a_smooth.resize(0);
+      c.pressure_b_smooth.resize(0);
+    } else {
+      c.predicted_force = c.static_force;
+    }
+  }
   for (PumpSignals& pump : out.pumps)
     pump.pressure_smooth = smoothed_or_empty(filter, pump.pressure);
 }

@@ -17,6 +17,9 @@ using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 struct SignalOptions {
   SmoothingOptions smoothing;  ///< one filter for every signal of a log
   SegmentOptions motion;       ///< thresholds of "moving" and "commanded", and what one motion is
+  /// Only columns are kept that learning and comparing read where no effect acts: three quarters of the memory of a long
+  /// log. Not for pages, diagnoses and models with effects.
+  bool slim = false;
 };
 
 /// One cylinder; all vectors are [samples]. A vector is empty when the log does not measure it and NaN where not valid.
@@ -63,6 +66,10 @@ struct CylinderSignals {
   bool has_command() const { return command.size() > 0; }
   bool has_force() const { return force.size() > 0; }
   bool has_pressure() const { return working_pressure.size() > 0; }
+  /// The predicted force; slim signals have no sensor effects, and no column of their own for it.
+  const Eigen::VectorXd& predicted() const {
+    return predicted_force.size() > 0 ? predicted_force : model_force;
+  }
 };
 
 struct PumpSignals {
@@ -102,7 +109,8 @@ struct MachineSignals {
   Mask edge;                      ///< within half a filter window of either end of a run
   Mask usable;                    ///< pose, speed and payload are known
   bool of_effective_machine =
-      false;  ///< `with_effects` has computed speeds and flows with a changed machine
+      false;          ///< `with_effects` has computed speeds and flows with a changed machine
+  bool slim = false;  ///< as SignalOptions::slim
   std::vector<std::string> notes;  ///< whole sentences: what was missing, converted, left out
 
   Eigen::Index samples() const { return time.size(); }

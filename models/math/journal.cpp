@@ -217,10 +217,41 @@ void Journal::add(const std::string& part, const std::string& bytes) {
   whole_ += static_cast<long>(line.size());
 }
 
+void Journal::keep(const std::string& part, const std::string& bytes) {
+  const std::lock_guard lock(writing_);
+  try {
+    add(part, bytes);
+  } catch (const InputError& error) {
+    if (trouble_) trouble_(error.what());
+  }
+}
+
+std::string Journal::kept(const std::string& part, const std::function<Part()>& compute) {
+  if (const std::string* finished = find(part)) return *finished;
+  Part computed = compute();
+  if (computed.complete) keep(part, computed.bytes);
+  return std::move(computed.bytes);
+}
+
 void Journal::remove() {
   if (path_.empty()) return;
   // A file that this run neither read nor wrote is another's.
   if (fd_ >= 0 || resume_) ::unlink(path_.c_str());
+}
+
+std::string run_fingerprint(const std::vector<std::string>& files, const std::string& options) {
+  std::string all;
+  std::vector<std::string> read = files;
+  read.emplace_back("/proc/self/exe");
+  for (const std::string& file : read) {
+    std::ifstream in(file, std::ios::binary);
+    if (!in) throw InputError({file, 0, 0}, "", "cannot read this file");
+    std::ostringstream bytes;
+    bytes << in.rdbuf();
+    // The name too, because results hold it; no name contains a zero byte.
+    all += file + '\0' + sha256_hex(bytes.str());
+  }
+  return sha256_hex(all + options);
 }
 
 }  // namespace sparflow

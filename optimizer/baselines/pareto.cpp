@@ -151,10 +151,18 @@ void CurveSearch::drive_shorter_slower() {
     OptimizeOptions with_modes = options_.strategies.optimize;
     with_modes.smooth_starts = with_modes.sequential_starts = 0;
     with_modes.grid_starts = with_modes.sequence_rounds = 0;
-    const OptimizeResult r = optimize_at(model_, problem_, from, p.duration, with_modes);
-    if (r.best_start < 0 || r.energy.total >= p.optimal.energy.total) continue;
-    p.optimal.motion = r.motion;
-    p.optimal.energy = r.energy;
+    const StrategyOutcome slower =
+        kept_outcome(options_.strategies, fmt::format("driven slower {}", i), [&] {
+          const OptimizeResult r = optimize_at(model_, problem_, from, p.duration, with_modes);
+          StrategyOutcome o;
+          if (r.best_start < 0) return o;
+          o.motion = r.motion;
+          o.energy = r.energy;
+          return o;
+        });
+    if (!slower.found() || slower.energy.total >= p.optimal.energy.total) continue;
+    p.optimal.motion = slower.motion;
+    p.optimal.energy = slower.energy;
     p.optimal.detail = "shorter time";
   }
 }

@@ -127,17 +127,19 @@ StrategyOutcome OptimumSearch::solved(const std::string& kind, const MotionProbl
     o.why = "no motion to start from";
     return o;
   }
-  const OptimizeResult r = optimize_in(model_, problem, from, time, options);
-  if (r.best_start < 0) {
-    o.why = r.message;
-    if (!r.checks.empty()) o.worst = limit_text(worst_limit(r.checks));
+  return kept_outcome(options_, fmt::format("solve {}", ++solves_), [&] {
+    const OptimizeResult r = optimize_in(model_, problem, from, time, options);
+    if (r.best_start < 0) {
+      o.why = r.message;
+      if (!r.checks.empty()) o.worst = limit_text(worst_limit(r.checks));
+      return o;
+    }
+    o.motion = r.motion;
+    o.duration = r.duration;
+    o.energy = r.energy;
+    o.detail = r.starts[static_cast<std::size_t>(r.best_start)].seed;
     return o;
-  }
-  o.motion = r.motion;
-  o.duration = r.duration;
-  o.energy = r.energy;
-  o.detail = r.starts[static_cast<std::size_t>(r.best_start)].seed;
-  return o;
+  });
 }
 
 StrategyOutcome OptimumSearch::at(double duration, const std::vector<StrategyOutcome>& known,

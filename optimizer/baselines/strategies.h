@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "models/math/journal.h"
 #include "optimizer/baselines/baselines.h"
 #include "optimizer/solve/optimize.h"
 
@@ -67,6 +68,9 @@ struct StrategyOptions {
   int smooth_seeds = 2;
   BaselineOptions baselines;
   OptimizeOptions optimize;
+  /// Keeps each solve of a search, so that a search that was ended can be resumed; null: none is kept. It must outlive the
+  /// search, and belong to these options and to this problem and model.
+  Journal* journal = nullptr;
 };
 
 /// Search for the energy-optimal motion from every baseline that keeps the limits, the seeds and earlier optima.
@@ -101,6 +105,7 @@ class OptimumSearch {
   const BaselineSet& baselines_;
   StrategyOptions options_;
   std::vector<SeedMotion> earlier_;  // optima at other durations, the latest last
+  int solves_ = 0;                   // by which the journal's parts are named
 };
 
 /// Baselines at one duration as outcomes with their pressures.
@@ -119,7 +124,14 @@ StrategyComparison compare_strategies(const CraneModel& model, const MotionProbl
                                       const std::vector<SeedMotion>& seeds,
                                       const StrategyOptions& options);
 
-/// Binary packing for child processes; the same program must read it.
+/// The outcome of a part of a search: the one that the options' journal has, else the one computed now, which it keeps
+/// unless the search was interrupted.
+StrategyOutcome kept_outcome(const StrategyOptions& options, const std::string& part,
+                             const std::function<StrategyOutcome()>& compute);
+
+/// Binary packing for child processes and journals; the same program must read it.
+std::string packed(const StrategyOutcome& outcome);
+StrategyOutcome unpacked_outcome(const std::string& bytes);
 std::string packed(const StrategyComparison& comparison);
 StrategyComparison unpacked_comparison(const std::string& bytes);
 

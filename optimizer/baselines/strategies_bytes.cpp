@@ -45,7 +45,51 @@ Trajectory take_motion(Unpacker& u) {
   return m;
 }
 
+void put_outcome(Packer& p, const StrategyOutcome& o) {
+  p.text(o.kind).text(o.detail).text(o.why).text(o.worst).number(o.duration).number(o.shortest);
+  put_motion(p, o.motion);
+  put_energy(p, o.energy);
+  put_list(p, o.peak_pressure);
+  put_list(p, o.mean_pressure);
+}
+
+StrategyOutcome take_outcome(Unpacker& u) {
+  StrategyOutcome o;
+  o.kind = u.text();
+  o.detail = u.text();
+  o.why = u.text();
+  o.worst = u.text();
+  o.duration = u.number();
+  o.shortest = u.number();
+  o.motion = take_motion(u);
+  o.energy = take_energy(u);
+  o.peak_pressure = u.numbers();
+  o.mean_pressure = u.numbers();
+  return o;
+}
+
 }  // namespace
+
+std::string packed(const StrategyOutcome& outcome) {
+  Packer p;
+  put_outcome(p, outcome);
+  return p.bytes();
+}
+
+StrategyOutcome unpacked_outcome(const std::string& bytes) {
+  Unpacker u(bytes);
+  return take_outcome(u);
+}
+
+StrategyOutcome kept_outcome(const StrategyOptions& options, const std::string& part,
+                             const std::function<StrategyOutcome()>& compute) {
+  if (options.journal == nullptr) return compute();
+  return unpacked_outcome(options.journal->kept(part, [&] {
+    std::string bytes = packed(compute());
+    const std::function<bool()>& stop = options.optimize.interrupted;
+    return Journal::Part{std::move(bytes), !(stop && stop())};
+  }));
+}
 
 std::string packed(const StrategyComparison& c) {
   Packer p;
@@ -56,13 +100,7 @@ std::string packed(const StrategyComparison& c) {
   for (const StrategyRow& row : c.rows) {
     p.text(row.name).number(row.factor).number(row.duration);
     p.number(static_cast<double>(row.outcomes.size()));
-    for (const StrategyOutcome& o : row.outcomes) {
-      p.text(o.kind).text(o.detail).text(o.why).text(o.worst).number(o.duration).number(o.shortest);
-      put_motion(p, o.motion);
-      put_energy(p, o.energy);
-      put_list(p, o.peak_pressure);
-      put_list(p, o.mean_pressure);
-    }
+    for (const StrategyOutcome& o : row.outcomes) put_outcome(p, o);
   }
   p.number(static_cast<double>(c.orders.size()));
   for (const BaselineMotion& m : c.orders) {
@@ -90,18 +128,7 @@ StrategyComparison unpacked_comparison(const std::string& bytes) {
     row.factor = u.number();
     row.duration = u.number();
     row.outcomes.resize(static_cast<std::size_t>(u.number()));
-    for (StrategyOutcome& o : row.outcomes) {
-      o.kind = u.text();
-      o.detail = u.text();
-      o.why = u.text();
-      o.worst = u.text();
-      o.duration = u.number();
-      o.shortest = u.number();
-      o.motion = take_motion(u);
-      o.energy = take_energy(u);
-      o.peak_pressure = u.numbers();
-      o.mean_pressure = u.numbers();
-    }
+    for (StrategyOutcome& o : row.outcomes) o = take_outcome(u);
   }
   c.orders.resize(static_cast<std::size_t>(u.number()));
   for (BaselineMotion& m : c.orders) {

@@ -9,12 +9,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <exception>
 #include <new>
 
 #include "models/math/error.h"
+#include "optimizer/solve/kept_work.h"
 
 namespace sparflow {
 namespace {
@@ -128,6 +130,60 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
       children.erase(children.begin() + static_cast<std::ptrdiff_t>(i));
       ++finished;
       if (on_done) on_done(index, finished, results[static_cast<std::size_t>(index)]);
+    }
+  }
+  return results;
+}
+
+std::vector<ChildResult> run_until_stopped(const KeptWork& parts, const OnDone& on_done) {
+  using Clock = std::chrono::steady_clock;
+  std::vector<ChildResult> results(static_cast<std::size_t>(parts.count));
+  for (ChildResult& r : results) r.error = "interrupted before it began";
+  std::vector<Child> children;
+  int next = 0, finished = 0;
+  bool stopping = false;
+  Clock::time_point patient_until{};
+  for (;;) {
+    if (!stopping && parts.stop()) {
+      stopping = true;
+      patient_until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                         std::chrono::duration<double>(parts.patience_s));
+    }
+    const bool out_of_patience = stopping && Clock::now() >= patient_until;
+    if (out_of_patience) {
+      for (const Child& child : children) ::kill(child.pid, SIGKILL);
+    }
+    while (!stopping && next < parts.count &&
+           static_cast<int>(children.size()) < std::max(1, parts.at_once)) {
+      children.push_back(start_child(parts.work, next++, children));
+    }
+    if (children.empty()) break;
+    std::vector<pollfd> polls;
+    polls.reserve(children.size());
+    for (const Child& child : children) polls.push_back({child.pipe, POLLIN, 0});
+    /// Time between two questions whether to stop.
+    /// @threshold [ms] 1..100; chosen: a tenth of the patience at most, and costs nothing
+    constexpr int kAskEvery = 20;
+    if (::poll(polls.data(), polls.size(), kAskEvery) <= 0) continue;
+    for (std::size_t i = polls.size(); i-- > 0;) {
+      if (polls[i].revents == 0) continue;
+      char buffer[65536];
+      const ssize_t n = ::read(children[i].pipe, buffer, sizeof buffer);
+      if (n < 0 && errno == EINTR) continue;
+      if (n > 0) {
+        children[i].received.append(buffer, static_cast<std::size_t>(n));
+        continue;
+      }
+      ::close(children[i].pipe);
+      const std::string end = fate(children[i].pid);
+      const int index = children[i].index;
+      ChildResult& result = results[static_cast<std::size_t>(index)];
+      // What a child had sent when it was ended is torn.
+      result = decode(out_of_patience ? std::string() : children[i].received,
+                      stopping ? "interrupted" : end);
+      children.erase(children.begin() + static_cast<std::ptrdiff_t>(i));
+      ++finished;
+      if (on_done) on_done(index, finished, result);
     }
   }
   return results;

@@ -1,21 +1,23 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without MECHANISM] [-v]
-//                  [--json FILE] [--logs FOLDER]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling] [-v] [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "bench/program_options.h"
 #include "diagnosis/verdict/diagnose.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
 #include "models/math/parallel.h"
+#include "optimizer/solve/child_processes.h"
 #include "simulator/plant/parameters/parameter_table.h"
 #include "simulator/plant/run/plant_run.h"
 #include "simulator/programmes/programmes.h"
@@ -34,8 +36,7 @@ struct Arguments {
   std::uint64_t seed = 1;
   double seconds = 200.0;
   std::string only, json, logs;
-  bool no_reference = false, verbose = false;
-  Mechanisms mechanisms;
+  bool no_reference = false, without_settling = false, verbose = false;
 };
 
 /// A change of the plant, with what may be named for it.
@@ -207,7 +208,7 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       c.at = clean ? "" : hidden.at;
       const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
       DiagnoseOptions options;
-      options.evidence.mechanisms = a.mechanisms;
+      if (a.without_settling) options.evidence.mechanisms.switch_off(Mechanism::kSettling);
       const Diagnosis d =
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
       judge(d, machine, clean ? Hidden{} : hidden, c);
@@ -225,11 +226,40 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
   return cases;
 }
 
-int run(const Arguments& a) {
+/// The cases of a plant as bytes for the journal. The fields are bound by name, so that none is forgotten.
+std::string packed(const std::vector<Case>& cases) {
+  Packer p;
+  p.number(static_cast<double>(cases.size()));
+  for (const Case& c : cases) {
+    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds] = c;
+    p.number(static_cast<double>(seed)).text(machine).text(change).text(at).text(verdict);
+    p.text(answer).text(left_out).number(right ? 1.0 : 0.0).number(seconds);
+  }
+  return p.bytes();
+}
+
+std::vector<Case> unpacked_cases(const std::string& bytes) {
+  Unpacker u(bytes);
+  std::vector<Case> cases(static_cast<std::size_t>(u.number()));
+  for (Case& c : cases) {
+    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds] = c;
+    seed = static_cast<std::uint64_t>(u.number());
+    for (std::string* text : {&machine, &change, &at, &verdict, &answer, &left_out})
+      *text = u.text();
+    right = u.number() != 0.0;
+    seconds = u.number();
+  }
+  return cases;
+}
+
+int run(const Arguments& a, Journal& journal) {
   std::mutex mutex;
   std::vector<Case> all;
   parallel(static_cast<std::size_t>(a.plants), [&](std::size_t i) {
-    std::vector<Case> cases = plant_cases(a.seed + i, a);
+    std::vector<Case> cases =
+        unpacked_cases(journal.kept(fmt::format("plant {}", a.seed + i), [&] {
+          return Journal::Part{packed(plant_cases(a.seed + i, a)), true};
+        }));
     const std::lock_guard lock(mutex);
     for (Case& c : cases) {
       if (!c.left_out.empty()) {
@@ -257,30 +287,33 @@ int run(const Arguments& a) {
     json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
   }
   if (!a.json.empty()) write_file_atomically(a.json, json.dump(1) + "\n");
+  journal.remove();
   return 0;
+}
+
+int run_with(int argc, char** argv) {
+  Arguments a;
+  ProgramOptions app("verdicts on logs of dynamic plants");
+  app.add("--plants", a.plants, "number of plants");
+  app.add("--seed", a.seed, "of the first plant");
+  app.add("--seconds", a.seconds, "of each log");
+  app.add("--only", a.only, "one change alone");
+  app.add("--json", a.json, "file for the counts");
+  app.add("--logs", a.logs, "folder for the logs and the learned models");
+  app.flag("--no-reference", a.no_reference, "diagnose without the reference log");
+  app.flag("--without-settling", a.without_settling, "noise that does not settle after commands");
+  app.flag("-v", a.verbose, "whole diagnoses");
+  app.add_journal();
+  if (const auto code = app.parse(argc, argv)) return *code;
+  if (!a.logs.empty() && !std::filesystem::is_directory(a.logs))
+    throw UsageError("--logs needs a folder that exists");
+  const std::unique_ptr<Journal> journal = app.journal({}, {"--json", "--plants"});
+  return run(a, *journal);
 }
 
 }  // namespace
 }  // namespace sparflow::bench
 
 int main(int argc, char** argv) {
-  sparflow::bench::Arguments a;
-  CLI::App app("verdicts on logs of dynamic plants");
-  app.add_option("--plants", a.plants, "number of plants")->capture_default_str();
-  app.add_option("--seed", a.seed, "of the first plant")->capture_default_str();
-  app.add_option("--seconds", a.seconds, "of each log")->capture_default_str();
-  app.add_option("--only", a.only, "one change alone");
-  app.add_option("--json", a.json, "file for the counts");
-  app.add_option("--logs", a.logs, "folder for the logs and the learned models")
-      ->check(CLI::ExistingDirectory);
-  app.add_flag("--no-reference", a.no_reference, "diagnose without the reference log");
-  std::vector<std::string> without;
-  app.add_option("--without", without, "mechanisms of the diagnosis that are switched off")
-      ->check(CLI::IsMember({"settling"}));
-  app.add_flag("-v", a.verbose, "whole diagnoses");
-  CLI11_PARSE(app, argc, argv);
-  using sparflow::Mechanism;
-  for (const std::string& name : without)
-    if (name == "settling") a.mechanisms.switch_off(Mechanism::kSettling);
-  return sparflow::bench::run(a);
+  return sparflow::bench::run_program("plant_verdicts", sparflow::bench::run_with, argc, argv);
 }

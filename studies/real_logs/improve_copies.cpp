@@ -3,7 +3,6 @@
 //   improve_copies -m MACHINE.yaml -l LOG.csv... [-t LEFT_OUT.csv...]
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -11,10 +10,12 @@
 #include <map>
 #include <sstream>
 
+#include "bench/program_options.h"
 #include "diagnosis/extension/extend.h"
 #include "identification/learning/fit.h"
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
+#include "optimizer/solve/child_processes.h"
 
 namespace sparflow::bench {
 namespace {
@@ -141,56 +142,81 @@ std::vector<Log> logs_of(const Tables& tables, const Machine& machine) {
   return out;
 }
 
-int run(const std::string& machine_file, const std::vector<std::string>& files,
-        const std::vector<std::string>& left_out) {
-  const Machine machine = load_machine(machine_file);
+/// Effects that a copy gives, and the errors on the logs left out, as lines.
+struct CopyResult {
+  std::string set, text;
+};
+
+CopyResult result_of(const Tables& tables, const Machine& machine, const std::string& name,
+                     const std::vector<Log>& tests) {
+  const ExtendLogs logs{logs_of(tables, machine), {}, {}};
+  const ExtendResult r = improve(fit(machine, logs.suspects).model, logs);
+  std::vector<std::string> keys;
+  for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
+  std::sort(keys.begin(), keys.end());
+  CopyResult out;
+  out.set = fmt::format("{}", fmt::join(keys, " "));
+  out.text = fmt::format("{:28}{:6.0f} s  {}\n", name, r.seconds, out.set);
+  if (tests.empty()) return out;
+  const CompareResult errors = compare(r.model, tests);
+  for (const StageScore& s : errors.scores)
+    out.text += fmt::format("{:30}{:9} {:18}{:9.4g} {}\n", "", s.stage, s.at + " " + s.regime,
+                            s.rmse / s.unit.si, s.unit.name);
+  for (const EnergyScore& e : errors.energy)
+    out.text +=
+        fmt::format("{:30}energy    {:18}{:+9.2f} %\n", "", e.pump, 100.0 * e.relative_error);
+  return out;
+}
+
+struct Arguments {
+  std::string machine;
+  std::vector<std::string> logs, left_out;
+};
+
+int run(const Arguments& a, Journal& journal) {
+  const Machine machine = load_machine(a.machine);
   Tables as_is, apart;
-  for (const std::string& f : files) as_is.push_back(read_table(f));
-  for (const std::string& f : left_out) apart.push_back(read_table(f));
+  for (const std::string& f : a.logs) as_is.push_back(read_table(f));
+  for (const std::string& f : a.left_out) apart.push_back(read_table(f));
   const std::vector<Log> tests = logs_of(apart, machine);
   std::map<std::string, int> sets;
-  for (const auto& [name, tables] : copies(as_is)) {
-    const ExtendLogs logs{logs_of(tables, machine), {}, {}};
-    const ExtendResult r = improve(fit(machine, logs.suspects).model, logs);
-    std::vector<std::string> keys;
-    for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
-    std::sort(keys.begin(), keys.end());
-    const std::string set = fmt::format("{}", fmt::join(keys, " "));
-    ++sets[set];
-    fmt::print("{:28}{:6.0f} s  {}\n", name, r.seconds, set);
-    if (!tests.empty()) {
-      const CompareResult errors = compare(r.model, tests);
-      for (const StageScore& s : errors.scores)
-        fmt::print("{:30}{:9} {:18}{:9.4g} {}\n", "", s.stage, s.at + " " + s.regime,
-                   s.rmse / s.unit.si, s.unit.name);
-      for (const EnergyScore& e : errors.energy)
-        fmt::print("{:30}energy    {:18}{:+9.2f} %\n", "", e.pump, 100.0 * e.relative_error);
-    }
+  for (const auto& copy : copies(as_is)) {
+    const std::string& name = copy.first;
+    const Tables& tables = copy.second;
+    const std::string bytes = journal.kept(name, [&] {
+      const CopyResult r = result_of(tables, machine, name, tests);
+      return Journal::Part{Packer().text(r.set).text(r.text).bytes(), true};
+    });
+    Unpacker u(bytes);
+    ++sets[u.text()];
+    fmt::print("{}", u.text());
     std::fflush(stdout);
   }
   const auto most = std::max_element(
-      sets.begin(), sets.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+      sets.begin(), sets.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
   fmt::print("same set in {} of 10 copies: {}\n", most->second, most->first);
+  journal.remove();
   return 0;
+}
+
+int run_with(int argc, char** argv) {
+  Arguments a;
+  ProgramOptions app("effects that improve finds on copies of the same logs");
+  app.add("-m,--machine", a.machine, "machine file").required();
+  app.add("-l,--log", a.logs, "logs to learn from (CSV)").required();
+  app.add("-t,--test", a.left_out, "logs that take no part");
+  app.add_journal();
+  if (const auto code = app.parse(argc, argv)) return *code;
+  std::vector<std::string> files = a.logs;
+  files.insert(files.end(), a.left_out.begin(), a.left_out.end());
+  files.push_back(a.machine);
+  const std::unique_ptr<Journal> journal = app.journal(files, {});
+  return run(a, *journal);
 }
 
 }  // namespace
 }  // namespace sparflow::bench
 
 int main(int argc, char** argv) {
-  std::string machine;
-  std::vector<std::string> logs, left_out;
-  CLI::App app("effects that improve finds on copies of the same logs");
-  app.add_option("-m,--machine", machine, "machine file")->required()->check(CLI::ExistingFile);
-  app.add_option("-l,--log", logs, "logs to learn from (CSV)")
-      ->required()
-      ->check(CLI::ExistingFile);
-  app.add_option("-t,--test", left_out, "logs that take no part")->check(CLI::ExistingFile);
-  CLI11_PARSE(app, argc, argv);
-  try {
-    return sparflow::bench::run(machine, logs, left_out);
-  } catch (const sparflow::InputError& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return 3;
-  }
+  return sparflow::bench::run_program("improve_copies", sparflow::bench::run_with, argc, argv);
 }

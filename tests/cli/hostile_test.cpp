@@ -160,10 +160,23 @@ TEST_F(HostileCli, MemoryThatEndsIsNoDefectOfTheProgram) {
     }
   }
   write("short.csv", big);
-  const Outcome o = shell(within_memory(420'000, fit("-o m.json")));
+  const Outcome o = shell(within_memory(180'000, fit("-o m.json")));
   EXPECT_EQ(o.code, 3) << o.err;
   EXPECT_THAT(o.err, HasSubstr("out of memory: "));
   EXPECT_THAT(o.err, Not(HasSubstr("defect of the program")));
+}
+
+TEST_F(HostileCli, MemoryThatEndsWhileThreadsBeginIsNoDefectOfTheProgram) {
+  if (kSanitized) GTEST_SKIP() << "AddressSanitizer needs more address space than the limit leaves";
+  write_short_log(3000);
+  int ended = 0;
+  for (int limit = 70'000; limit <= 140'000; limit += 10'000) {
+    const Outcome o = shell(within_memory(limit, fit("-o m.json")));
+    EXPECT_NE(o.code, 1) << limit << " kB: " << o.err;
+    EXPECT_THAT(o.err, Not(HasSubstr("defect of the program")));
+    ended += o.code == 3 ? 1 : 0;
+  }
+  EXPECT_GE(ended, 1);
 }
 
 TEST_F(HostileCli, MessagesAreClippedAndShowNoEscape) {

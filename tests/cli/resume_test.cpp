@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <chrono>
+#include <random>
 #include <thread>
 
 #include "tests/cli/cli_fixture.h"
@@ -82,6 +83,41 @@ TEST_F(Resume, StrategiesRefusesAJournalOfOtherInputsOrOptions) {
   EXPECT_EQ(input.code, 3);
   EXPECT_THAT(input.err, HasSubstr("other inputs or options"));
   EXPECT_EQ(lines("killed.json.journal"), 2U);
+}
+
+TEST_F(Resume, ParetoKilledAtRandomEqualsAnUndisturbedRun) {
+  const std::string pareto =
+      "pareto -p " + kData + "/reaches/hmf_lift.yaml --points 3 --paths 2 --intervals 30";
+  const auto command = [&](const std::string& stem) {
+    return pareto + " --json " + at(stem + ".json") + " --report " + at(stem + ".html") + " -o " +
+           at(stem + ".csv");
+  };
+  const Outcome undisturbed = run(command("whole"));
+  ASSERT_EQ(undisturbed.code, 0) << undisturbed.err;
+  std::mt19937 random(std::random_device{}());
+  int kills = 0;
+  for (std::size_t parts = 2; parts <= 4; ++parts) {  // each run is killed after one solve more
+    const std::string line = "exec " + kProgram + " " + command("killed") +
+                             (parts > 2 ? " --resume" : "") + " >/dev/null 2>&1";
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
+      ::_exit(127);
+    }
+    while (lines("killed.json.journal") < parts && ::waitpid(child, nullptr, WNOHANG) == 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    kills += fs::exists(at("killed.json")) ? 0 : 1;
+  }
+  EXPECT_GE(kills, 1) << "no run was killed in the middle";
+  const Outcome resumed = run(command("killed") + " --resume");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  for (const char* end : {".json", ".html", ".csv"})
+    EXPECT_EQ(slurp(at(std::string("killed") + end)), slurp(at(std::string("whole") + end)));
+  EXPECT_EQ(resumed.out, undisturbed.out);
+  EXPECT_FALSE(fs::exists(at("killed.json.journal")));
 }
 
 TEST_F(Resume, NeedsAnOutputBesideWhichTheJournalLies) {

@@ -99,6 +99,22 @@ TEST(Fit, WithoutHeldOutSeriesAllScoresAreTheSame) {
   EXPECT_FALSE(whole.held_out->logs.at(0).series.empty());
 }
 
+TEST(Fit, SlimSignalsGiveTheSameModelAndTheSameComparison) {
+  FitOptions slim;
+  slim.signals.slim = true;
+  const FitResult with = fit(arm_machine(), {arm_log()}),
+                  without = fit(arm_machine(), {arm_log()}, {}, slim);
+  EXPECT_EQ(model_to_json(without.model), model_to_json(with.model));
+  EXPECT_EQ(compare_json(without.train), compare_json(with.train));
+  EXPECT_EQ(compare_json(*without.held_out), compare_json(*with.held_out));
+  EXPECT_EQ(compare_table(without.train), compare_table(with.train));
+  EXPECT_EQ(without.train.logs.front().signals.tip.size(), 0);
+  CompareOptions options;
+  options.signals.slim = true;
+  EXPECT_EQ(compare_json(compare(with.model, {arm_log()}, options)),
+            compare_json(compare(with.model, {arm_log()})));
+}
+
 TEST(Fit, BlocksCoverEveryMotionOnce) {
   const MachineSignals s = make_signals(arm_machine(), arm_log());
   Mask covered = Mask::Constant(s.samples(), false);

@@ -160,6 +160,36 @@ TEST_F(JournalFile, AFullDiskLeavesWholeLines) {
   EXPECT_EQ(text(), before);
 }
 
+TEST_F(JournalFile, KeptComputesWhatIsMissingAndKeepsWhatIsComplete) {
+  {
+    Journal journal(path_, "run", false);
+    EXPECT_EQ(journal.kept("one", [] { return Journal::Part{"1", true}; }), "1");
+    EXPECT_EQ(journal.kept("two", [] { return Journal::Part{"half", false}; }), "half");
+  }
+  Journal journal(path_, "run", true);
+  EXPECT_EQ(journal.kept("one", [] { return Journal::Part{"other", true}; }), "1");
+  EXPECT_EQ(journal.kept("two", [] { return Journal::Part{kBinary, true}; }), kBinary);
+}
+
+TEST_F(JournalFile, TroubleWithWritingIsToldAndEndsNoWork) {
+  Journal journal("/nonexistent/journal", "run", false);
+  std::string told;
+  journal.on_trouble([&](const std::string& sentence) { told = sentence; });
+  EXPECT_EQ(journal.kept("one", [] { return Journal::Part{"1", true}; }), "1");
+  EXPECT_THAT(told, HasSubstr("the journal cannot be written"));
+}
+
+TEST_F(JournalFile, AFingerprintChangesWithNamesContentsAndOptions) {
+  write("a");
+  const std::string first = run_fingerprint({path_}, "x");
+  EXPECT_EQ(run_fingerprint({path_}, "x"), first);
+  EXPECT_NE(run_fingerprint({path_}, "y"), first);
+  EXPECT_NE(run_fingerprint({}, "x"), first);
+  write("b");
+  EXPECT_NE(run_fingerprint({path_}, "x"), first);
+  EXPECT_THROW(run_fingerprint({"/nonexistent"}, "x"), InputError);
+}
+
 TEST_F(JournalFile, ACompleteRunDeletesIt) {
   two_parts();
   Journal journal(path_, "run", true);

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "models/files/machine_file.h"
+#include "models/files/model_file.h"
 #include "models/math/units.h"
 #include "optimizer/solve/optimize.h"
 #include "problems/bundled.h"
@@ -174,6 +176,37 @@ TEST(ExactEnergy, PotentialEnergyIsThatOfTheLift) {
     };
     EXPECT_NEAR(loaded - empty, 1000.0 * 9.81 * (height(s.motion.size() - 1) - height(0)), 1e-3);
   }
+}
+
+TEST(ExactEnergy, IsNeverBelowWhatMachineAndLoadGain) {
+  const Lift c;
+  const CraneModel learned = load_model(bundled_file("models/loader_crane.json"));
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  int lifts = 0;
+  for (int i = 0; i < 60; ++i) {
+    const auto posture = [&] {
+      VectorXd q = c.problem.start;
+      for (Eigen::Index j = 0; j < q.size(); ++j) {
+        const Range& r = c.problem.limits.position[static_cast<std::size_t>(j)];
+        q[j] = r.lo + unit(random) * (r.hi - r.lo);
+      }
+      return q;
+    };
+    Eigen::MatrixXd line(2, 3);
+    line << posture().transpose(), posture().transpose();
+    const TimedMotion timed = time_parametrise(c.problem, line, 0.0);
+    if (timed.motion.size() < 2) continue;
+    const double payload = 1000.0 * unit(random);
+    const Trajectory motion =
+        with_duration(timed.motion, (1.0 + 3.0 * unit(random)) * timed.shortest);
+    for (const CraneModel* model : {&c.model, &learned}) {
+      const MotionEnergy e = exact_energy(*model, motion, payload);
+      if (e.potential_difference > 0.0) ++lifts;
+      EXPECT_GE(e.total, e.potential_difference) << "motion " << i << ", " << payload << " kg";
+    }
+  }
+  EXPECT_GE(lifts, 20);
 }
 
 TEST(Optimize, BaselinesAreTheCheapestOfTheirKind) {
