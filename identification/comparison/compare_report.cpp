@@ -85,6 +85,17 @@ Json range_json(const Range& r) {
   return {r.lo, r.hi};
 }
 
+Json slips_json(const CompareResult& result) {
+  Json list = Json::array();
+  for (const SlipOfLog& s : result.slips) {
+    list.push_back({{"file", s.file},
+                    {"kind", s.slip.kind},
+                    {"channels", s.slip.channels},
+                    {"sentence", s.slip.sentence}});
+  }
+  return list;
+}
+
 /// Adds residual tests, stage at fault, errors by regime, worst motions and bad channels.
 void causes_json(const CompareResult& result, Json& root) {
   Json& tests = root["residual_tests"];
@@ -279,6 +290,7 @@ std::string compare_json(const CompareResult& result) {
                {"worst", worst},
                {"notes", result.notes},
                {"logs", logs}};
+  root["slips"] = slips_json(result);
   causes_json(result, root);
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -311,6 +323,8 @@ std::string compare_table(const CompareResult& result) {
     text += fmt::format(" in {}\n", duration_text(e.duration));
   }
   text += "fit % = 100 (1 - |error| / |measured - its mean|); bias = predicted - measured\n";
+  if (!result.slips.empty()) text += "\nsensors that seem to be connected or named wrongly\n";
+  for (const SlipOfLog& s : result.slips) text += wrapped(s.file + ": " + s.slip.sentence);
   if (!result.bad_data.empty())
     text += "\nbad data: repair or leave out before learning from these logs\n";
   for (const BadChannelOfLog& b : result.bad_data)

@@ -23,6 +23,13 @@ inline std::string plain_number(double value, int digits) {
   return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 9));
 }
 
+/// Fixed notation with `decimals`, without a sign before a zero: 0.0, never -0.0.
+inline std::string fixed_number(double value, int decimals) {
+  const std::string text = fmt::format("{:.{}f}", value, decimals);
+  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
+  return zero && text.front() == '-' ? text.substr(1) : text;
+}
+
 /// @return null for NaN and infinity, which JSON cannot represent
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);

@@ -222,6 +222,15 @@ void set_verdict(Page& page, const CompareResult& result, const std::vector<Judg
                bad_words(result.bad_data.front().bad.kind);
     text = bad_channel_sentence(result.bad_data.front().bad) + " " + text;
   }
+  if (!result.slips.empty()) {
+    tone = Tone::kBad;
+    headline =
+        fmt::format("Check the sensors: {}", fmt::join(result.slips.front().slip.channels, ", "));
+    std::string sentences;
+    for (const SlipOfLog& slip : result.slips)
+      sentences += slip.file + ": " + slip.slip.sentence + ". ";
+    text = sentences + text;
+  }
   if (!result.fault.sentence.empty()) text = result.fault.sentence + " " + text;
   page.verdict(tone, headline,
                text + fmt::format("RMS error at the worst place of each stage: {}.",
