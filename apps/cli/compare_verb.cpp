@@ -61,7 +61,7 @@ int run(const CompareArguments& a) {
                                : load_model_with_warnings(a.model);
   CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping));
   if (a.model.empty()) keep_geometric_stages(result);
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
+  if (!a.outputs.json.empty()) a.outputs.write_json(compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   note_undefined_energies(result);
   tell(fmt::format("{}\n", compare_table(result)));

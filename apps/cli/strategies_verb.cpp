@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <sys/mman.h>
 
+#include <atomic>
 #include <filesystem>
 #include <optional>
 
@@ -127,6 +129,25 @@ StrategyComparison without_rows(const ProblemAndModel& task, const StrategyOptio
   return c;
 }
 
+/// Counts the solves of all processes; each adds to it.
+class SolveCount {
+ public:
+  SolveCount() {
+    void* shared = ::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
+                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of solves");
+    count_ = new (shared) std::atomic<int>(0);
+  }
+  ~SolveCount() { ::munmap(count_, sizeof(std::atomic<int>)); }
+  SolveCount(const SolveCount&) = delete;
+  SolveCount& operator=(const SolveCount&) = delete;
+  void add() { count_->fetch_add(1); }
+  int value() const { return count_->load(); }
+
+ private:
+  std::atomic<int>* count_;
+};
+
 StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
                               StrategyOptions options) {
   options.idle_power = idle_power(a, task);
@@ -189,17 +210,29 @@ std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
   const int before = count - static_cast<int>(left.size());
   if (before > 0) note(fmt::format("{} of {} problems were finished before", before, count));
   const int processes = a.processes > 0 ? a.processes : usable_processors();
-  const auto work = [&](int index) {
-    return packed(compare_in(tasks[left[static_cast<std::size_t>(index)]], a, options));
+  SolveCount solves;
+  StrategyOptions counted = options;
+  counted.optimize.progress = [&](int, int, const std::string&) {
+    solves.add();
+    return !interrupted();
   };
+  const auto work = [&](int index) {
+    return packed(compare_in(tasks[left[static_cast<std::size_t>(index)]], a, counted));
+  };
+  std::atomic<int> done = before;  // outlives the progress that shows it
   Progress progress("strategies");
   progress(static_cast<double>(before) / count,
            fmt::format("{} problem{}", count, count > 1 ? "s" : ""));
+  progress.watch([&] {
+    return fmt::format("{} of {} problem{} finished, {} starts solved", done.load(), count,
+                       count > 1 ? "s" : "", solves.value());
+  });
   std::vector<ChildResult> computed = run_in_children(
       static_cast<int>(left.size()), processes, work,
       [&](int index, int finished, const ChildResult& result) {
         const std::size_t i = left[static_cast<std::size_t>(index)];
         keep_finished(journal, part_name(i), result);
+        done = before + finished;
         progress(static_cast<double>(before + finished) / count, tasks[i].problem.name);
       });
   for (std::size_t k = 0; k < left.size(); ++k) results[left[k]] = std::move(computed[k]);
@@ -259,8 +292,7 @@ int run(const StrategiesArguments& a) {
   std::vector<Machine> machines;
   machines.reserve(tasks.size());
   for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
-  if (!a.outputs.json.empty())
-    write_file_atomically(a.outputs.json, strategies_json(all, machines));
+  if (!a.outputs.json.empty()) a.outputs.write_json(strategies_json(all, machines));
   if (!a.outputs.report.empty()) {
     const bool one = all.size() == 1;
     strategies_page(all, one ? &tasks.front().model : nullptr,
@@ -292,7 +324,7 @@ void add_strategies_verb(CLI::App& app, int& code) {
       ->capture_default_str();
   verb->add_option("--idle", a->idle_kw, "idle power; absent: that of the problem")
       ->type_name("KW")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_from(0.0, 1000.0));
   verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
