@@ -227,8 +227,10 @@ class SlipSearch {
       }
     }
     if (!any) return;
+    double cylinders = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       if (!(square[i] > 0.0)) continue;
+      cylinders += 1.0;
       for (std::size_t u = 0; u < error.size(); ++u) error[u] += sums[i][u] / square[i];
     }
     const auto best = std::min_element(error.begin(), error.end()) - error.begin();
@@ -240,8 +242,7 @@ class SlipSearch {
          {"payload"},
          fmt::format("payload looks as if it is in {}, not in kg: the squared error of all forces "
                      "falls to {:.0f} % when it is read that way. Name the column payload_{}",
-                     unit.name, 100.0 * error[static_cast<std::size_t>(best)] / error[0],
-                     unit.suffix)});
+                     unit.name, 100.0 * least / error[0], unit.suffix)});
   }
 
   const Machine& machine_;

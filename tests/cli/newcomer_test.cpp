@@ -2,6 +2,7 @@
 // verb could read (docs/commands.md has the verbs).
 #include <functional>
 #include <map>
+#include <regex>
 
 #include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
@@ -9,8 +10,8 @@
 namespace sparflow::test {
 namespace {
 
-const std::string kModel = kData + "/models/loader_crane.json";
-const std::string kLift = kData + "/reaches/loader_crane_lift.yaml";
+const std::string kBundledModel = kData + "/models/loader_crane.json";
+const std::string kLiftProblem = kData + "/reaches/loader_crane_lift.yaml";
 
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields;
@@ -82,8 +83,8 @@ const Lift& lift() {
         (fs::temp_directory_path() / ("sparflow_newcomer_" + std::to_string(::getpid()))).string();
     fs::create_directories(folder);
     Lift l{folder + "/m.csv", folder + "/m100.csv", {}};
-    const std::string command = kProgram + " optimize -p " + kLift + " --model " + kModel +
-                                " --paths 2 --intervals 40 --seed 1 ";
+    const std::string command = kProgram + " optimize -p " + kLiftProblem + " --model " +
+                                kBundledModel + " --paths 2 --intervals 40 --seed 1 ";
     EXPECT_EQ(
         std::system(
             (command + "-o " + l.solved + " --json " + folder + "/m.json >/dev/null 2>&1").c_str()),
@@ -98,8 +99,8 @@ const Lift& lift() {
 
 TEST_F(Cli, EvaluatePricesTheProgramsOwnMotionAsOptimizeDid) {
   const double energy = lift().result.at("energy_exact_J").get<double>();
-  const Outcome o = run("evaluate " + lift().solved + " -p " + kLift + " --model " + kModel +
-                        " --json " + at("e.json") + " --report " + at("e.html"));
+  const Outcome o = run("evaluate " + lift().solved + " -p " + kLiftProblem + " --model " +
+                        kBundledModel + " --json " + at("e.json") + " --report " + at("e.html"));
   ASSERT_EQ(o.code, 0) << o.err << o.out;
   const json e = test_support::parsed_json(slurp(at("e.json")));
   // The file has twelve digits of every number.
@@ -117,7 +118,7 @@ TEST_F(Cli, AMotionAtAFixedRateCostsTheSameAndHasStrokesAndCommands) {
     EXPECT_THAT(header, ::testing::Contains(column));
   // 16 s at 100 Hz and the header
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1602);
-  const Outcome o = run("evaluate " + lift().at_100_hz + " --payload 500 --model " + kModel +
+  const Outcome o = run("evaluate " + lift().at_100_hz + " --payload 500 --model " + kBundledModel +
                         " --json " + at("e.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   const double energy = lift().result.at("energy_exact_J").get<double>();
@@ -134,8 +135,8 @@ TEST_F(Cli, PositionsAloneArePricedToo) {
     text += f[0] + "," + f[1] + "," + f[2] + "," + f[3] + "\n";
   }
   write("positions.csv", text);
-  const Outcome o = run("evaluate " + at("positions.csv") + " --payload 500 --model " + kModel +
-                        " --json " + at("e.json"));
+  const Outcome o = run("evaluate " + at("positions.csv") + " --payload 500 --model " +
+                        kBundledModel + " --json " + at("e.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   const json e = test_support::parsed_json(slurp(at("e.json")));
   EXPECT_TRUE(e.at("from_positions").get<bool>());
@@ -149,14 +150,15 @@ TEST_F(Cli, EvaluateEndsWithFiveWhereTheProblemIsBroken) {
   other.replace(other.find("3.5]"), 4, "3.1]");
   write("other.yaml", other);
   const Outcome o =
-      run("evaluate " + lift().solved + " -p " + at("other.yaml") + " --model " + kModel);
+      run("evaluate " + lift().solved + " -p " + at("other.yaml") + " --model " + kBundledModel);
   EXPECT_EQ(o.code, 5) << o.err << o.out;
   EXPECT_THAT(o.out, HasSubstr("distance of the tip from its goal"));
 }
 
 TEST_F(Cli, AComputedMotionHasNoBadSensors) {
   for (const std::string& file : {lift().solved, lift().at_100_hz}) {
-    const Outcome o = run("compare --model " + kModel + " -l " + file + " --json " + at("c.json"));
+    const Outcome o =
+        run("compare --model " + kBundledModel + " -l " + file + " --json " + at("c.json"));
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_TRUE(test_support::parsed_json(slurp(at("c.json"))).at("bad_data").empty()) << o.out;
   }
@@ -188,8 +190,8 @@ TEST_F(Cli, SensorSlipsAreNamed) {
       {"nothing", same_name, same_cell, "", "", ""}};
   for (const Case& c : cases) {
     write("log.csv", changed_log(c.name, c.cell));
-    const Outcome o =
-        run("compare --model " + kModel + " -l " + at("log.csv") + " --json " + at("c.json"));
+    const Outcome o = run("compare --model " + kBundledModel + " -l " + at("log.csv") + " --json " +
+                          at("c.json"));
     ASSERT_EQ(o.code, 0) << c.what << o.err;
     const json slips = test_support::parsed_json(slurp(at("c.json"))).at("slips");
     // One chamber alone in psi is no slip of this kind: nothing may be named rather than something wrong.
@@ -203,7 +205,10 @@ TEST_F(Cli, SensorSlipsAreNamed) {
 
 TEST_F(Cli, AnglesInDegreesAreNamed) {
   write("deg.csv", changed_log(same_name, times("q_boom_rad", 57.29577951308232)));
-  const Outcome o = run("compare --model " + kModel + " -l " + at("deg.csv"));
+  const Outcome o =
+      run("compare --model " + kBundledModel + " -l " + at("deg.csv") + " --json " + at("c.json"));
+  EXPECT_TRUE(test_support::parsed_json(slurp(at("c.json"))).at("slips").empty())
+      << "forces at a wrong posture judge no other sensor";
   EXPECT_THAT(o.err, HasSubstr("are they in degrees? Then name the column q_boom_deg"));
 }
 
@@ -234,7 +239,7 @@ TEST_F(Cli, MachineTabulatesDrawsAndDoubtsAWrongBranch) {
 }
 
 TEST_F(Cli, PlanDrawsItsPaths) {
-  const Outcome o = run("plan -p " + kLift + " --paths 2 --report " + at("p.html"));
+  const Outcome o = run("plan -p " + kLiftProblem + " --paths 2 --report " + at("p.html"));
   ASSERT_EQ(o.code, 0) << o.err;
   const std::string page = slurp(at("p.html"));
   EXPECT_THAT(page, HasSubstr("the quickest in"));
@@ -248,12 +253,12 @@ TEST_F(Cli, WordsOfTheCommandLineHelp) {
   const Outcome typo = run("compare --modle x.json -l " + kTest);
   EXPECT_EQ(typo.code, 2);
   EXPECT_THAT(typo.err, HasSubstr("Did you mean --model?"));
-  const Outcome number = run("plan -p " + kLift + " --seconds abc");
+  const Outcome number = run("plan -p " + kLiftProblem + " --seconds abc");
   EXPECT_EQ(number.code, 2);
   EXPECT_THAT(number.err, HasSubstr("got \"abc\", expected a number from 0.001 to 1e+06"));
   EXPECT_LT(number.err.size(), 300u);
-  const Outcome no_folder =
-      run("optimize -p " + kLift + " --model " + kModel + " -o " + at("no/such/m.csv"));
+  const Outcome no_folder = run("optimize -p " + kLiftProblem + " --model " + kBundledModel +
+                                " -o " + at("no/such/m.csv"));
   EXPECT_EQ(no_folder.code, 3);
   EXPECT_THAT(no_folder.err, Not(HasSubstr("optimize ...")));
 }
@@ -275,11 +280,38 @@ TEST_F(Cli, PreambleLinesAreExplained) {
 TEST_F(Cli, IdleEnergyStandsBesideTheMotionsOwn) {
   write("idle.yaml", reach("loader_crane_lift") + "\nidle_power_W: 4000\n");
   const Outcome o = run("evaluate " + lift().solved + " -p " + at("idle.yaml") + " --model " +
-                        kModel + " --json " + at("e.json"));
+                        kBundledModel + " --json " + at("e.json"));
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_THAT(o.out, HasSubstr("idle energy"));
   EXPECT_NEAR(test_support::parsed_json(slurp(at("e.json"))).at("idle_energy_J").get<double>(),
               64e3, 1.0);
+}
+
+TEST_F(Cli, ProgressNeverGoesBack) {
+  // `script` gives the program a terminal, on which every change of the share is drawn.
+  const std::string command = "script -qec '" + kProgram + " optimize -p " + kLiftProblem +
+                              " --model " + kBundledModel + " --paths 2 --intervals 40' " +
+                              at("typescript") + " >/dev/null 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const std::string text = slurp(at("typescript"));
+  const std::regex share("optimize +([0-9]+) %");
+  int last = 0, seen = 0;
+  for (std::sregex_iterator it(text.begin(), text.end(), share), end; it != end; ++it, ++seen) {
+    const int now = std::stoi((*it)[1]);
+    EXPECT_GE(now, last) << "after " << seen << " lines";
+    last = now;
+  }
+  EXPECT_GT(seen, 10);
+}
+
+TEST_F(Cli, SigtermActsAsCtrlC) {
+  // A mesh that takes far longer than the three seconds.
+  const std::string command = "timeout --preserve-status -s TERM 3 " + kProgram + " optimize -p " +
+                              kLiftProblem + " --model " + kBundledModel +
+                              " --intervals 3000 >/dev/null 2>&1";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace sparflow {
 namespace {
 
-const std::string kReaches = SPARFLOW_SOURCE_DIR "/problems/reaches";
+const std::string kReachFolder = SPARFLOW_SOURCE_DIR "/problems/reaches";
 
 /// Two intervals of unequal length with known positions.
 Trajectory hop() {
@@ -51,7 +51,7 @@ TEST(LeastFlow, IsTheProblemsShareOfEachValvesFullFlow) {
       "machine: ../machines/loader_crane.yaml\n"
       "start: {q: {boom: 0.2, jib: -1.6, extension: 0.8}}\n"
       "goal: {tip: [7.5, 0, 3.5]}\nduration_s: 16\nlimits: {valve_least_fraction: 0.01}\n",
-      "p.yaml", kReaches);
+      "p.yaml", kReachFolder);
   const LeastFlows least = least_flows(p.machine, p.limits);
   ASSERT_EQ(least.size(), 3u);
   const Valve* boom = p.machine.valve_of_cylinder(0);
@@ -75,7 +75,7 @@ TEST(OrientedGoal, TheTipIsAtItsPointAndPointsAsAsked) {
   // Reached by some posture: that of this configuration.
   const Eigen::Vector4d wanted(0.8, 0.3, -1.4, -0.6);
   const MotionProblem some = parse_problem(
-      excavator("{q: {swing: 0.8, boom: 0.3, stick: -1.4, bucket: -0.6}}"), "p.yaml", kReaches);
+      excavator("{q: {swing: 0.8, boom: 0.3, stick: -1.4, bucket: -0.6}}"), "p.yaml", kReachFolder);
   const Eigen::Vector3d tip = tip_position<double>(some.machine, Eigen::VectorXd(wanted));
   // All three lift by their angles: the bucket points along their sum.
   const double angle = 0.3 - 1.4 - 0.6;
@@ -83,7 +83,7 @@ TEST(OrientedGoal, TheTipIsAtItsPointAndPointsAsAsked) {
   const MotionProblem p = parse_problem(
       excavator("{tip: [" + std::to_string(tip.x()) + ", " + std::to_string(tip.y()) + ", " +
                 std::to_string(tip.z()) + "], angle_rad: " + std::to_string(angle) + "}"),
-      "p.yaml", kReaches);
+      "p.yaml", kReachFolder);
   const auto* goal = std::get_if<JointGoal>(&p.goal);
   ASSERT_NE(goal, nullptr);
   // The goal is written with six decimals.
@@ -96,7 +96,7 @@ TEST(OrientedGoal, TheTipIsAtItsPointAndPointsAsAsked) {
 TEST(OrientedGoal, AnAngleThatNothingReachesIsNamedWithItsRemedy) {
   const auto message = [](const std::string& goal) {
     try {
-      parse_problem(excavator(goal), "p.yaml", kReaches);
+      parse_problem(excavator(goal), "p.yaml", kReachFolder);
     } catch (const std::exception& e) {
       return std::string(e.what());
     }

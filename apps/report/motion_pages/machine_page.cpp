@@ -131,7 +131,7 @@ Page machine_page(const MachineReview& review) {
     page.verdict(
         Tone::kWarning,
         fmt::format("{} warning{}", review.warnings.size(), review.warnings.size() > 1 ? "s" : ""),
-        fmt::format("{}", fmt::join(review.warnings, " ")));
+        fmt::format("{}", fmt::join(review.warnings, ". ")));
   }
   CraneDrawing drawing;
   drawing.title = "The machine";
@@ -154,7 +154,7 @@ Page machine_page(const MachineReview& review) {
     above.z_axis = {top.vertical_name, "m"};
     above.stills = 1;
     above.frames = drawing_frames(machine, motion, 120, top);
-    above.payload = review.payload > 0.0;
+    above.payload = false;  // it hangs below the tip
     page.plot(std::move(above));
   }
   for (int i = 0; i < machine.cylinder_count(); ++i) add_cylinder(page, review, i);

@@ -260,7 +260,7 @@ CraneDrawing view_from_above(const Machine& machine, const MotionProblem& proble
     drawing.paths.push_back({other.name, tip_path(machine, other.motion, plane)});
   if (const auto* goal = std::get_if<TipGoal>(&problem.goal))
     drawing.goal = plane.project(goal->tip);
-  drawing.payload = problem.payload > 0.0;
+  drawing.payload = false;  // it hangs below the tip
   return drawing;
 }
 

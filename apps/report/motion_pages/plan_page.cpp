@@ -27,7 +27,7 @@ Page plan_page(const MotionProblem& problem, const PlannedPaths& paths) {
   page.verdict(Tone::kGood,
                fmt::format("{} path{}, the quickest in {:.2f} s", paths.motions.size(),
                            paths.motions.size() > 1 ? "s" : "", quickest->shortest),
-               paths.message + " Energy is not considered: `optimize` does.");
+               paths.message + ". The energy is not considered here, but by optimize.");
   std::vector<ComparedMotion> beside;
   for (const PlannedMotion& m : paths.motions) {
     if (&m != &*quickest) beside.push_back({m.name, m.motion});
