@@ -234,7 +234,9 @@ class SlipSearch {
       for (std::size_t u = 0; u < error.size(); ++u) error[u] += sums[i][u] / square[i];
     }
     const auto best = std::min_element(error.begin(), error.end()) - error.begin();
-    if (best == 0 || error[static_cast<std::size_t>(best)] > options_.error_share * error[0])
+    const double least = error[static_cast<std::size_t>(best)];
+    if (best == 0 || least > options_.error_share * error[0] ||
+        least > options_.explained_share * cylinders)
       return;
     const OtherUnit& unit = kMassUnits[best - 1];
     slips_.push_back(

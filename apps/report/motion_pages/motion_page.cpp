@@ -150,7 +150,8 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
       "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, "
       "times "
       "flow; another cylinder, the margin or standby sets the pump pressure.";
-  std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
+  std::vector<std::pair<std::string, MotionEnergy>> motions = {
+      {result.starts.empty() ? "this motion" : "optimised", result.energy}};
   if (baseline)
     motions.emplace_back(baseline->name, exact_energy(model, problem, baseline->motion));
   for (const auto& [name, energy] : motions) {
