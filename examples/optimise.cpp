@@ -1,11 +1,14 @@
-/// The motion of least pump energy between a start and a goal, with its limits, as a file.
+/// The library's way from a model to a motion: load a model, evaluate it on states, turn seed paths into starts, optimise, and
+/// write the motion as a file (docs/library.md explains each step).
 ///   optimise [PROBLEM.yaml MODEL.json [MOTION.csv]]
 #include <fmt/format.h>
 
 #include <exception>
 
+#include "models/chain/crane_model.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
+#include "models/math/units.h"
 #include "optimizer/solve/optimize.h"
 #include "planners/seed_paths.h"
 #include "problems/bundled.h"
@@ -31,6 +34,23 @@ std::vector<SeedMotion> seeds_of(const MotionProblem& problem) {
   return seeds;
 }
 
+/// Evaluates the exact law on states: forces, flows and pressures of every cylinder and the pumps' power.
+void print_states(const CraneModel& model, const Trajectory& motion, double payload) {
+  Chain chain(model);  // one for each thread; refers to the model
+  for (const double share : {0.25, 0.5, 0.75}) {
+    const auto k = static_cast<Eigen::Index>(share * static_cast<double>(motion.size() - 1));
+    const Eigen::VectorXd q = motion.q.row(k), qd = motion.qd.row(k), qdd = motion.qdd.row(k);
+    const MachineState& state = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
+    fmt::print("  at {:5.2f} s: {:6.2f} kW", motion.t[k], state.power / 1e3);
+    for (std::size_t i = 0; i < state.cylinders.size(); ++i) {
+      const CylinderState& c = state.cylinders[i];
+      fmt::print("; {}: {:.1f} kN, {:.1f} l/min, {:.0f} bar", model.machine.cylinders[i].name,
+                 c.total_force / 1e3, c.flow / units::kLitrePerMinute, c.pressure / units::kBar);
+    }
+    fmt::print("\n");
+  }
+}
+
 int run(int argc, char** argv) {
   if (argc != 1 && argc != 3 && argc != 4)
     throw UsageError("usage: optimise [PROBLEM.yaml MODEL.json [MOTION.csv]]");
@@ -46,6 +66,7 @@ int run(int argc, char** argv) {
                c.unit, c.time, c.excess > OptimizeOptions{}.limit_tolerance ? "  broken" : "");
   }
   if (result.status != OptimizeStatus::kOptimal) return 4;
+  print_states(model, result.motion, problem.payload);
   const std::string path = argc == 4 ? argv[3] : "motion.csv";
   write_file_atomically(path, motion_csv(model, result.motion, problem.payload));
   if (result.nearest_line_energy > 0.0)

@@ -83,6 +83,25 @@ double LimitRatios::acceleration(const VectorXd& qdd, std::string* name) const {
   return worst;
 }
 
+LeastFlows least_flows(const Machine& machine, const MotionLimits& limits) {
+  LeastFlows least(machine.cylinders.size());
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    const Valve* valve = machine.valve_of_cylinder(i);
+    const int pump = machine.pump_of_cylinder(i);
+    const double whole = pump >= 0 ? limits.pump_max_flow[at(pump)] : 0.0;
+    const auto full = [&](double flow) { return flow > 0.0 ? flow : whole; };
+    const double extend = full(valve != nullptr ? valve->max_flow_extend : 0.0);
+    const double retract = full(valve != nullptr ? valve->max_flow_retract : 0.0);
+    least[at(i)] = {limits.valve_least_fraction * extend, limits.valve_least_fraction * retract};
+  }
+  return least;
+}
+
+bool firmly_moving(const LeastFlows& least, std::size_t cylinder, double flow, double speed) {
+  if (least.empty()) return true;
+  return flow >= (speed > 0.0 ? least[cylinder].extend : least[cylinder].retract);
+}
+
 double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,
                    std::string* limit) {
   LimitRatios limits(problem);

@@ -28,6 +28,21 @@ class LimitRatios {
   Eigen::VectorXd pump_flow_;
 };
 
+/// Least flows of the valves, by cylinder. [m^3/s]
+struct LeastFlow {
+  double extend = 0.0;
+  double retract = 0.0;
+};
+using LeastFlows = std::vector<LeastFlow>;
+
+/// The least flow of every cylinder's valve: the problem's share of the valve's full flow; where the machine file gives no
+/// valve, of its pump's largest flow; 0 where neither is known.
+LeastFlows least_flows(const Machine& machine, const MotionLimits& limits);
+
+/// True when a cylinder moves and its valve can give that flow.
+/// @param least of all cylinders, or empty: then every flow can be given  @param speed of the rod [m/s]
+bool firmly_moving(const LeastFlows& least, std::size_t cylinder, double flow, double speed);
+
 /// Largest ratio over a motion at `factor` instants in each interval, positions included (as distance from the middle of
 /// the range over half the range, only if it exceeds 1). @param limit set to the name of that limit; may be null
 double limit_ratio(const MotionProblem& problem, const Trajectory& motion, int factor,

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "models/machine/linkage.h"
 #include "models/math/error.h"
 #include "models/math/units.h"
 
@@ -30,9 +31,27 @@ std::vector<std::string> split(const std::string& line) {
   return fields;
 }
 
-}  // namespace
+/// Flow at full command, as learned or, failing that, of the machine file; 0 = not known. [m^3/s]
+double full_command_flow(const CraneModel& model, std::size_t cylinder, bool extend) {
+  const CylinderModel& learned = model.cylinders[cylinder];
+  const double gain = extend ? learned.valve_gain_extend : learned.valve_gain_retract;
+  const Valve* valve = model.machine.valve_of_cylinder(static_cast<int>(cylinder));
+  if (gain > 0.0 || valve == nullptr) return gain;
+  return extend ? valve->max_flow_extend : valve->max_flow_retract;
+}
 
-std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload) {
+/// Cylinders whose command can be told in both directions.
+std::vector<std::size_t> commanded_cylinders(const CraneModel& model) {
+  std::vector<std::size_t> cylinders;
+  for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
+    if (!model.machine.cylinders[i].hydraulic()) continue;
+    if (full_command_flow(model, i, true) > 0.0 && full_command_flow(model, i, false) > 0.0)
+      cylinders.push_back(i);
+  }
+  return cylinders;
+}
+
+std::string motion_header(const CraneModel& model) {
   const Machine& machine = model.machine;
   std::string text = "t_s";
   for (const char* kind : {"q", "qd", "qdd"}) {
@@ -42,30 +61,84 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
   for (const Cylinder& c : machine.cylinders) text += fmt::format(",Q_{}_lpm", c.name);
   for (const Cylinder& c : machine.cylinders) text += fmt::format(",P_{}_bar", c.name);
   for (const Pump& p : machine.pumps) text += fmt::format(",p_{}_bar", p.name);
-  text += ",power_W\n";
+  text += ",power_W";
+  for (const Cylinder& c : machine.cylinders) text += fmt::format(",x_{}_m", c.name);
+  for (const std::size_t i : commanded_cylinders(model))
+    text += fmt::format(",u_{}", machine.cylinders[i].name);
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
+                       const LeastFlows& least) {
+  std::string text = motion_header(model);
+  const auto out = std::back_inserter(text);
+  const std::vector<std::size_t> with_command = commanded_cylinders(model);
   Chain chain(model);
   Eigen::VectorXd q(motion.q.cols()), qd(motion.q.cols()), qdd(motion.q.cols());
   for (Eigen::Index k = 0; k < motion.size(); ++k) {
     q = motion.q.row(k);
     qd = motion.qd.row(k);
     qdd = motion.qdd.row(k);
-    fmt::format_to(std::back_inserter(text), "{:.6f}", motion.t[k]);
+    fmt::format_to(out, "{:.6f}", motion.t[k]);
     for (const Eigen::MatrixXd* m : {&motion.q, &motion.qd, &motion.qdd}) {
-      for (Eigen::Index j = 0; j < m->cols(); ++j)
-        fmt::format_to(std::back_inserter(text), ",{:.12g}", (*m)(k, j));
+      for (Eigen::Index j = 0; j < m->cols(); ++j) fmt::format_to(out, ",{:.12g}", (*m)(k, j));
     }
     const MachineState& state = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
-    for (const CylinderState& c : state.cylinders) {
-      fmt::format_to(std::back_inserter(text), ",{:.6g}", c.flow / units::kLitrePerMinute);
+    const auto moves = [&](std::size_t i) {
+      return firmly_moving(least, i, state.cylinders[i].flow, state.cylinders[i].speed);
+    };
+    for (const CylinderState& c : state.cylinders)
+      fmt::format_to(out, ",{:.6g}", c.flow / units::kLitrePerMinute);
+    for (std::size_t i = 0; i < state.cylinders.size(); ++i)
+      fmt::format_to(out, ",{:.6g}", moves(i) ? state.cylinders[i].pressure / units::kBar : 0.0);
+    for (const PumpState& p : state.pumps) fmt::format_to(out, ",{:.6g}", p.pressure / units::kBar);
+    fmt::format_to(out, ",{:.6g}", state.power);
+    for (std::size_t i = 0; i < state.cylinders.size(); ++i) {
+      fmt::format_to(
+          out, ",{:.9g}",
+          stroke_at(model.machine, static_cast<int>(i), q[model.machine.cylinders[i].joint]));
     }
-    for (const CylinderState& c : state.cylinders) {
-      fmt::format_to(std::back_inserter(text), ",{:.6g}", c.pressure / units::kBar);
+    for (const std::size_t i : with_command) {
+      const CylinderState& c = state.cylinders[i];
+      const bool extend = c.speed > 0.0;
+      const double u = moves(i) ? c.flow / full_command_flow(model, i, extend) : 0.0;
+      fmt::format_to(out, ",{:.6g}", extend || u == 0.0 ? u : -u);
     }
-    for (const PumpState& p : state.pumps)
-      fmt::format_to(std::back_inserter(text), ",{:.6g}", p.pressure / units::kBar);
-    fmt::format_to(std::back_inserter(text), ",{:.6g}\n", state.power);
+    text += '\n';
   }
   return text;
+}
+
+Trajectory at_rate(const Trajectory& motion, double rate) {
+  SPARFLOW_CHECK(rate > 0.0 && motion.size() > 1, "a rate and a motion");
+  /// Part of a step below which the last instant and the end of the motion are one.
+  /// @threshold [1] 1e-9..0.1; numerical: rounding of a duration times a rate
+  constexpr double kSameInstant = 1e-6;
+  const double whole = motion.duration() * rate;
+  const auto steps = static_cast<Eigen::Index>(std::ceil(whole - kSameInstant));
+  const Eigen::Index n = motion.q.cols();
+  Trajectory out;
+  out.t.resize(steps + 1);
+  for (Eigen::MatrixXd* m : {&out.q, &out.qd, &out.qdd}) m->resize(steps + 1, n);
+  Eigen::Index interval = 0;
+  for (Eigen::Index k = 0; k <= steps; ++k) {
+    const double t = motion.t[0] + std::min(static_cast<double>(k) / rate, motion.duration());
+    while (interval + 2 < motion.size() && motion.t[interval + 1] <= t) ++interval;
+    const double dt = t - motion.t[interval];
+    out.t[k] = t;
+    out.q.row(k) = motion.q.row(interval) + dt * motion.qd.row(interval) +
+                   0.5 * dt * dt * motion.qdd.row(interval);
+    out.qd.row(k) = motion.qd.row(interval) + dt * motion.qdd.row(interval);
+  }
+  // The end is exactly that of the motion, whose rounding the sum above would carry on.
+  out.q.row(steps) = motion.q.row(motion.size() - 1);
+  out.qd.row(steps) = motion.qd.row(motion.size() - 1);
+  for (Eigen::Index k = 0; k < steps; ++k)
+    out.qdd.row(k) = (out.qd.row(k + 1) - out.qd.row(k)) / (out.t[k + 1] - out.t[k]);
+  out.qdd.row(steps) = out.qdd.row(steps - 1);
+  return out;
 }
 
 Trajectory load_motion(const std::string& path, const Machine& machine) {

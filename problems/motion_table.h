@@ -4,11 +4,20 @@
 
 #include "models/chain/crane_model.h"
 #include "models/machine/trajectory.h"
+#include "problems/motion_limits.h"
 
 namespace sparflow {
 
-/// Columns: t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm and P_*_bar by cylinder, p_*_bar by pump, power_W.
-std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload);
+/// Columns: t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm, P_*_bar, x_*_m (stroke) and, where the valve's full flow is known,
+/// u_* (command, -1..1) by cylinder, p_*_bar by pump, power_W.
+/// @param least flows of the valves below which a cylinder stands: its working pressure and its command are then 0
+std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
+                       const LeastFlows& least = {});
+
+/// The same motion at a fixed rate: positions and speeds are those of the motion at each instant, accelerations are the
+/// mean over each step, so that the rows are a motion again. The last step ends with the motion and may be shorter.
+/// @param rate [Hz], > 0
+Trajectory at_rate(const Trajectory& motion, double rate);
 
 /// Reads a motion (t, q, qd, qdd; other columns are ignored).
 /// @throws InputError with line and column name

@@ -63,6 +63,9 @@ struct MotionLimits {
   double valve_fraction = 1.0;            ///< share of each valve's full flow that may be used [-]
   /// Trust region: largest standard deviation of a predicted working pressure [Pa]; 0 = none.
   double pressure_std = 0.0;
+  /// Share of each valve's full flow below which the valve cannot be opened steadily, so that its cylinder counts as standing.
+  /// @threshold [1] 0..0.05; chosen: spools of mobile valves resolve about half a percent of their full flow
+  double valve_least_fraction = 0.005;
 };
 
 /// The tip shall follow the straight line from its start to its goal.
@@ -88,8 +91,10 @@ struct MotionProblem {
   std::string model_path;  ///< resolved; empty when the file names none
   Machine machine;
   std::vector<std::string> machine_warnings;  ///< warnings of load_machine()
-  double payload = 0.0;                       ///< [kg], hangs at the tip
-  Eigen::VectorXd start;                      ///< [rad] or [m], in the machine's joint order
+  /// Whole sentences for the user, e.g. that other postures reach an oriented goal too.
+  std::vector<std::string> notes;
+  double payload = 0.0;   ///< [kg], hangs at the tip
+  Eigen::VectorXd start;  ///< [rad] or [m], in the machine's joint order
   Goal goal;
   /// Points that the tip passes in this order without having to stop [m]; the instants are free.
   std::vector<Eigen::Vector3d> waypoints;

@@ -14,6 +14,7 @@
 #include "models/yaml/yaml_reader.h"
 #include "problems/bundled.h"
 #include "problems/obstacle_file.h"
+#include "problems/oriented_goal.h"
 
 namespace sparflow {
 namespace {
@@ -27,6 +28,7 @@ constexpr Quantity kTolerance{"tolerance", "m", Sign::kPositive, 1.0, 100.0};
 constexpr Quantity kTime{"duration", "s", Sign::kPositive};
 constexpr Quantity kPower{"power", "W", Sign::kNonNegative};
 constexpr Quantity kFraction{"share of the full flow", "", Sign::kPositive};
+constexpr Quantity kLeastFraction{"share of the full flow", "", Sign::kNonNegative};
 constexpr Quantity kWeight{"weight", "", Sign::kNonNegative};
 
 /// Goals are given to a millimetre; a tenth of that counts as rounding.
@@ -163,17 +165,43 @@ class ProblemReader {
   }
 
   void read_goal(const YamlValue& value) {
-    const YamlMap map =
-        value.map("a goal {tip: [x, y, z]} or {q: {JOINT: position}}", {"tip", "q"});
+    const YamlMap map = value.map("a goal {tip: [x, y, z], angle_rad} or {q: {JOINT: position}}",
+                                  {"tip", "angle_rad", "q"});
     if (map.has("tip") == map.has("q")) {
       map.fail(map.has("tip") ? "gives both tip and q; keep one"
                               : "missing; expected tip: [x, y, z] or q: {JOINT: position}");
     }
     if (const auto q = map.find("q")) {
+      if (const auto angle = map.find("angle_rad"))
+        angle->fail("a goal posture q sets the tip's angle already; drop the one or the other");
       problem_.goal = JointGoal{read_posture(*q)};
       return;
     }
-    problem_.goal = TipGoal{read_tip(*map.find("tip"))};
+    const YamlValue tip = *map.find("tip");
+    problem_.goal = TipGoal{read_tip(tip)};
+    if (const auto angle = map.find("angle_rad"))
+      read_oriented_goal(*angle, {read_tip(tip), angle->number(kAngle)});
+  }
+
+  /// Replaces the tip goal by the nearest configuration that also has the tip's angle.
+  void read_oriented_goal(const YamlValue& value, const OrientedTip& goal) {
+    if (std::abs(goal.angle) > 7.0)
+      value.fail(fmt::format("got {:g}; angles are in rad, are these degrees?", goal.angle));
+    const std::vector<Eigen::VectorXd> postures = oriented_postures(problem_, goal);
+    if (postures.empty()) {
+      value.fail(fmt::format(
+          "no posture within the limits puts the tip at [{:g}, {:g}, {:g}] pointing at {:.1f} deg "
+          "(0: horizontal and away from the base, -90: down); at the start it points at {:.1f} deg",
+          goal.tip.x(), goal.tip.y(), goal.tip.z(), goal.angle / units::kDegree,
+          tip_angle(problem_.machine, problem_.start, goal.tip) / units::kDegree));
+    }
+    problem_.goal = JointGoal{postures.front()};
+    if (postures.size() > 1) {
+      problem_.notes.push_back(fmt::format(
+          "{}: more than one posture reaches the goal at that angle; the one nearest to the start "
+          "is taken (goal: {{q: ...}} would choose another)",
+          problem_.name));
+    }
   }
 
   /// Reads a tip position, which must lie in the machine's plane if it is planar.
@@ -229,8 +257,9 @@ class ProblemReader {
   }
 
   void read_limits(const YamlValue& value) {
-    const YamlMap map = value.map("limits {joints, pumps, valve_fraction, pressure_std_bar}",
-                                  {"joints", "pumps", "valve_fraction", "pressure_std_bar"});
+    const YamlMap map = value.map(
+        "limits {joints, pumps, valve_fraction, valve_least_fraction, pressure_std_bar}",
+        {"joints", "pumps", "valve_fraction", "valve_least_fraction", "pressure_std_bar"});
     problem_.limits.pressure_std = map.number_or("pressure_std_bar", kPressure, 0.0);
     if (const auto joints = map.find("joints")) {
       const YamlMap named = joints->map("limits by joint name", joint_names());
@@ -244,6 +273,14 @@ class ProblemReader {
       if (problem_.limits.valve_fraction > 1.0) {
         fraction->fail(fmt::format("got {:g}, expected at most 1, the valve's full flow",
                                    problem_.limits.valve_fraction));
+      }
+    }
+    if (const auto least = map.find("valve_least_fraction")) {
+      problem_.limits.valve_least_fraction = least->number(kLeastFraction);
+      if (problem_.limits.valve_least_fraction >= problem_.limits.valve_fraction) {
+        least->fail(fmt::format(
+            "got {:g}, expected less than valve_fraction, {:g}: else no flow is left to the valve",
+            problem_.limits.valve_least_fraction, problem_.limits.valve_fraction));
       }
     }
   }

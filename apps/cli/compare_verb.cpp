@@ -52,7 +52,7 @@ int run(const CompareArguments& a) {
   // A machine file alone gives forces and flows by geometry; pressures are learned.
   if (a.model.empty()) keep_stages(model.machine, {"force", "flow_sensor"}, result);
   note_undefined_energies(result);
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, compare_json(result));
+  if (!a.outputs.json.empty()) a.outputs.write_json(compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   tell(fmt::format("{}\n", compare_table(result)));
   return kDone;

@@ -23,6 +23,7 @@ namespace sparflow::cli {
 namespace {
 
 constexpr std::chrono::seconds kPrintPeriod{10};
+constexpr std::chrono::seconds kRedrawPeriod{1};
 /// Longest line of progress.
 /// @threshold [byte] 40..200; chosen: fits most terminals
 constexpr std::size_t kLine = 107;
@@ -37,6 +38,7 @@ std::atomic<int>* interrupt_count = nullptr;
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 volatile std::sig_atomic_t finish_first = 0;
 pid_t main_process = 0;
+bool stdout_is_taken = false;
 
 void on_interrupt(int) {
   if (::getpid() != main_process) return;
@@ -84,9 +86,18 @@ void complain(const std::string& text) {
   }
 }
 
+void texts_to_stderr() { stdout_is_taken = true; }
+
 void tell(const std::string& text) {
-  const std::string safe = harmless(text);
-  const bool taken = std::fwrite(safe.data(), 1, safe.size(), stdout) == safe.size();
+  if (stdout_is_taken) {
+    complain(text);
+  } else {
+    put_out(harmless(text));
+  }
+}
+
+void put_out(const std::string& text) {
+  const bool taken = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (taken && std::fflush(stdout) == 0) return;
   const int reason = errno;
   throw InputError({"standard output", 0, 0}, "",
@@ -118,38 +129,67 @@ void note(const std::string& sentence) {
 
 Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(2) == 1) {
   begin_work(what_);
-  if (terminal_) return;
-  complain(what_ + " ...\n");
+  if (!terminal_) complain(what_ + " ...\n");
   printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
+}
+
+void Progress::watch(std::function<std::string()> doing) {
+  const std::lock_guard lock(mutex_);
+  watched_ = std::move(doing);
+}
+
+std::string Progress::left(double seconds) const {
+  /// Time and share of the work from which on the rest is forecast.
+  /// @threshold [s] 1..60; chosen: earlier forecasts jump
+  constexpr double kForecastFrom = 5.0;
+  /// @threshold [1] 0.01..0.5; chosen: less says nothing about the rest
+  constexpr double kForecastShare = 0.05;
+  if (seconds < kForecastFrom || share_ < kForecastShare || share_ >= 1.0) return "";
+  return fmt::format(", about {:.0f} s left", seconds * (1.0 - share_) / share_);
 }
 
 void Progress::print_periodically(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (!ended_.wait_for(lock, stop, kPrintPeriod, [&] { return stop.stop_requested(); })) {
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    complain(fmt::format("{}: {:.0f} s, {:.0f} %{}{}\n", what_, seconds, 100.0 * share_,
-                         doing_.empty() ? "" : ", ", doing_));
+  const std::chrono::seconds period = terminal_ ? kRedrawPeriod : kPrintPeriod;
+  while (!ended_.wait_for(lock, stop, period, [&] { return stop.stop_requested(); })) {
+    if (terminal_) {
+      draw();
+      continue;
+    }
+    const double seconds = elapsed();
+    const std::string doing = watched_ ? watched_() : doing_;
+    complain(fmt::format("{}: {:.0f} s, {:.0f} %{}{}{}\n", what_, seconds, 100.0 * share_,
+                         left(seconds), doing.empty() ? "" : ", ", doing));
   }
+}
+
+double Progress::elapsed() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
 Progress::~Progress() {
+  printer_.request_stop();
+  printer_.join();
   if (terminal_ && width_ > 0) rewrite_line(fmt::format("\r{:{}}\r", "", width_));
 }
 
-void Progress::operator()(double share, const std::string& what) {
-  if (!terminal_) {
-    const std::lock_guard lock(mutex_);
-    share_ = share;
-    doing_ = what;
-    return;
-  }
-  if (share < 1.0 && std::abs(share - last_) < 0.005) return;
-  last_ = share;
+void Progress::draw() {
+  const double seconds = elapsed();
   const std::string line =
-      printable(fmt::format("{} {:3.0f} %  {}", what_, 100.0 * share, what), kLine);
+      printable(fmt::format("{} {:3.0f} %  {:.0f} s{}  {}", what_, 100.0 * share_, seconds,
+                            left(seconds), watched_ ? watched_() : doing_),
+                kLine);
   rewrite_line(fmt::format("\r{:{}}", line, std::max(width_, line.size())));
   width_ = line.size();
+}
+
+void Progress::operator()(double share, const std::string& what) {
+  const std::lock_guard lock(mutex_);
+  share_ = std::max(share_, share);  // work that is found on the way is no step back
+  doing_ = what;
+  if (!terminal_ || (share < 1.0 && std::abs(share_ - last_) < 0.005)) return;
+  last_ = share_;
+  draw();
 }
 
 }  // namespace sparflow::cli

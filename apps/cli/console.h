@@ -2,6 +2,7 @@
 /// What a verb tells while it works, on stderr: warnings, progress; and interruption by Ctrl-C.
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <stop_token>
 #include <string>
@@ -9,8 +10,9 @@
 
 namespace sparflow::cli {
 
-/// Progress on stderr. On a terminal it rewrites one line; elsewhere (a file, a job's log) it prints a plain line at
-/// the beginning and one every ten seconds, also while nothing new is reported, to show that the work goes on.
+/// Progress on stderr. On a terminal it rewrites one line, at least every second; elsewhere (a file, a job's log) it prints a
+/// plain line at the beginning and one every ten seconds, also while nothing new is reported, to show that the work goes on.
+/// The share never goes back; from some seconds on the time left is forecast from it.
 class Progress {
  public:
   explicit Progress(std::string what);
@@ -18,18 +20,25 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   void operator()(double share, const std::string& what);
+  /// Words for what is at work, asked whenever a line is printed, for work that is done elsewhere.
+  /// @param doing must not use this object
+  void watch(std::function<std::string()> doing);
 
  private:
   void print_periodically(const std::stop_token& stop);
+  void draw();
+  double elapsed() const;                  ///< [s]
+  std::string left(double seconds) const;  ///< ", about 12 s left", or ""
 
   std::string what_;
   bool terminal_ = false;
   std::size_t width_ = 0;
   double last_ = -1.0;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::mutex mutex_;  ///< guards share_ and doing_
+  std::mutex mutex_;  ///< guards all but what_, terminal_ and begin_
   double share_ = 0.0;
   std::string doing_;
+  std::function<std::string()> watched_;
   std::condition_variable_any ended_;
   std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
 };
@@ -49,6 +58,10 @@ void secure_standard_streams();
 void complain(const std::string& text);
 /// Writes a result to stdout, harmless for a terminal. @throws InputError when stdout takes it no more
 void tell(const std::string& text);
+/// Lets tell() write to stderr from now on, because standard output belongs to a file's content.
+void texts_to_stderr();
+/// Writes a file's content to stdout as it is. @throws InputError when stdout takes it no more
+void put_out(const std::string& text);
 
 /// Says what the program is at, for the case that memory ends. Progress says it too.
 void begin_work(const std::string& what);

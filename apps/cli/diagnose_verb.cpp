@@ -52,8 +52,7 @@ int run(const DiagnoseArguments& a) {
       json["headline"] = headline_on_tests(result, &*tested);
       json["test"] = nlohmann::ordered_json::parse(tested->json());
     }
-    write_file_atomically(
-        outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    outputs.write_json(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
   if (!outputs.report.empty()) {
     Page page = diagnose_page(files.model, result, tested ? &*tested : nullptr);

@@ -9,6 +9,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
+#include "identification/data_checks/sensor_slips.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {
@@ -30,6 +31,14 @@ void refuse_shared_logs(const std::string& verb, const ExtendLogs& logs) {
   refuse(logs.suspects, logs.references, "--log", "--reference");
   refuse(logs.suspects, logs.tests, "--log", "--test");
   refuse(logs.references, logs.tests, "--reference", "--test");
+}
+
+/// Warns of sensors that seem to be connected or named wrongly: a diagnosis would take them for missing physics.
+void warn_of_slips(const Machine& machine, const std::vector<Log>& logs) {
+  for (const Log& log : logs) {
+    for (const SensorSlip& slip : find_sensor_slips(machine, make_signals(machine, log)))
+      warn(log.file + ": " + slip.sentence);
+  }
 }
 
 }  // namespace
@@ -118,6 +127,7 @@ DiagnosisFiles DiagnosisInputs::read() const {
   files.logs.suspects = load_logs(logs_, machine, mapping_);
   files.logs.references = load_logs(references_, machine, mapping_);
   files.logs.tests = load_logs(tests_, machine, mapping_);
+  warn_of_slips(machine, files.logs.suspects);
   refuse_shared_logs(verb_, files.logs);
   return files;
 }

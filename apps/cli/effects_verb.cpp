@@ -23,7 +23,7 @@ int run(const EffectsArguments& a) {
   a.outputs.check();
   a.own.load(nullptr);
   const std::string text = a.effect.empty() ? effect_table() : effect_entry(a.effect);
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, effects_json(a.effect));
+  if (!a.outputs.json.empty()) a.outputs.write_json(effects_json(a.effect));
   tell(text);
   return kDone;
 }

@@ -45,7 +45,7 @@ int run(const ExtendArguments& a) {
 void write_extended(const DiagnosisInputs& inputs, const ExtendResult& result) {
   save_model(result.model, inputs.output());
   const Outputs& outputs = inputs.outputs();
-  if (!outputs.json.empty()) write_file_atomically(outputs.json, result.json());
+  if (!outputs.json.empty()) outputs.write_json(result.json());
   if (!outputs.report.empty()) improve_page(result).write(outputs.report);
   tell(fmt::format("{}model written to {}\n", result.table(), inputs.output()));
 }

@@ -156,6 +156,7 @@ int run(const FitArguments& a) {
     return fit(machine, std::move(logs), std::move(tests), options,
                [&](double share, const std::string& what) { progress(share, what); });
   }();
+  for (const SlipOfLog& s : result.train.slips) warn(s.file + ": " + s.slip.sentence);
   const std::string lacking = why_nothing_learned(result);
   if (!lacking.empty()) {
     for (const std::string& n : result.notes) note("  " + n);
@@ -169,9 +170,16 @@ int run(const FitArguments& a) {
         "{} has no hydraulic cylinder: there is nothing to learn, only forces are compared",
         machine.name));
   }
+  const bool no_pressures =
+      !result.processes.empty() && result.model.missing().size() == result.processes.size();
+  if (no_pressures) {
+    warn(
+        "no pressure model was learned; the model predicts flows from commands and what the pump "
+        "does, but no working pressures and no energy of a motion");
+  }
   a.own.load_into(result.model);
   save_model(result.model, a.output);
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, fit_json(result));
+  if (!a.outputs.json.empty()) a.outputs.write_json(fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
   tell(fmt::format("{}{}\nmodel written to {}\n", result.full(), judgement(result), a.output));
   return kDone;

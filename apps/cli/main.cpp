@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <exception>
 #include <new>
 #include <sstream>
@@ -33,6 +34,7 @@ void refuse_empty_values(CLI::App& app) {
 }
 
 void suggest_verb(const CLI::App& app, const std::string& given) {
+  if (given == "help") return;
   std::vector<std::string> verbs;
   bool known = false;
   for (const CLI::App* verb : app.get_subcommands({})) {
@@ -41,6 +43,38 @@ void suggest_verb(const CLI::App& app, const std::string& given) {
   }
   const std::string near = nearest_word(printable(given), verbs);
   if (!known && !near.empty()) complain(fmt::format("Did you mean \"sparflow {}\"?\n", near));
+}
+
+/// Suggests, for each option that the verb does not know, the one whose name is nearest.
+void suggest_options(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2) return;
+  const std::vector<const CLI::App*> verbs =
+      app.get_subcommands([&](const CLI::App* v) { return v->get_name() == argv[1]; });
+  if (verbs.empty()) return;
+  std::vector<std::string> known;
+  for (const CLI::Option* option : verbs.front()->get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (int i = 2; i < argc; ++i) {
+    std::string given = argv[i];
+    given = given.substr(0, given.find('='));
+    if (given.rfind("--", 0) != 0 || given == "--") continue;
+    if (std::find(known.begin(), known.end(), given) != known.end()) continue;
+    const std::string near = nearest_word(printable(given), known);
+    if (!near.empty()) complain(fmt::format("Did you mean {}?\n", near));
+  }
+}
+
+/// `sparflow help VERB` is `sparflow VERB --help`, `sparflow help` is `sparflow --help`.
+std::vector<std::string> spelt_out(int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words.front() == "help") {
+    words.erase(words.begin());
+    words.resize(std::min<std::size_t>(words.size(), 1));
+    words.emplace_back("--help");
+  }
+  std::reverse(words.begin(), words.end());  // as the command line's library takes them
+  return words;
 }
 
 /// Prints the help or the error of the command line's library.
@@ -53,7 +87,7 @@ void print_parsed(const CLI::App& app, const CLI::ParseError& e) {
 
 int run(CLI::App& app, int argc, char** argv, const int& code) {
   try {
-    app.parse(argc, argv);
+    app.parse(spelt_out(argc, argv));
     return code;
   } catch (const CLI::Success& e) {  // --help, --version
     print_parsed(app, e);
@@ -61,6 +95,7 @@ int run(CLI::App& app, int argc, char** argv, const int& code) {
   } catch (const CLI::ParseError& e) {
     print_parsed(app, e);
     if (argc > 1 && argv[1][0] != '-') suggest_verb(app, argv[1]);
+    suggest_options(app, argc, argv);
     return kUsage;
   }
 }
@@ -124,6 +159,7 @@ int main(int argc, char** argv) {
       "            5 a verification failed, 130 interrupted.");
   int code = cli::kDone;
   cli::add_demo_verb(app, code);
+  cli::add_machine_verb(app, code);
   cli::add_simulate_verb(app, code);
   cli::add_fit_verb(app, code);
   cli::add_compare_verb(app, code);
@@ -134,6 +170,7 @@ int main(int argc, char** argv) {
   cli::add_effects_verb(app, code);
   cli::add_plan_verb(app, code);
   cli::add_optimize_verb(app, code);
+  cli::add_evaluate_verb(app, code);
   cli::add_strategies_verb(app, code);
   cli::add_pareto_verb(app, code);
   cli::refuse_empty_values(app);

@@ -21,6 +21,7 @@ std::optional<ProblemAndModel> load_problem_with_model(const std::string& proble
     both.model = load_model_with_warnings(named);
     return &both.model.machine;
   });
+  for (const std::string& n : both.problem.notes) note(n);
   if (!given && both.problem.model_path.empty()) return std::nullopt;
   if (given && !both.problem.machine_path.empty()) {
     try {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "apps/cli/console.h"
@@ -24,6 +25,7 @@ struct OptimizeArguments {
   int processes = 0;
   bool smooth_only = false;
   bool bound = false;
+  double rate = 0.0;
   std::string from;
   Outputs outputs;
 };
@@ -141,12 +143,18 @@ int run(const OptimizeArguments& a) {
     result = seeds.motions.empty() ? no_seed(problem, seeds)
                                    : optimize(model, problem, seeds.motions, options);
   }
-  if (a.bound && result.motion.size() > 1) add_bound(model, problem, result);
-  if (result.motion.size() > 1 && !a.output.empty()) {
-    write_file_atomically(a.output, motion_csv(model, result.motion, problem.payload));
+  if (a.bound && result.motion.size() > 1) {
+    const auto begin = std::chrono::steady_clock::now();
+    add_bound(model, problem, result);
+    result.solve_s +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
-  if (!a.outputs.json.empty())
-    write_file_atomically(a.outputs.json, optimize_json(model, problem, result));
+  if (result.motion.size() > 1 && !a.output.empty()) {
+    const Trajectory rows = a.rate > 0.0 ? at_rate(result.motion, a.rate) : result.motion;
+    write_file_atomically(a.output, motion_csv(model, rows, problem.payload,
+                                               least_flows(model.machine, problem.limits)));
+  }
+  if (!a.outputs.json.empty()) a.outputs.write_json(optimize_json(model, problem, result));
   if (!a.outputs.report.empty()) {
     motion_page(model, problem, result, compared_motion(seeds, result)).write(a.outputs.report);
   }
@@ -168,11 +176,14 @@ void add_optimize_verb(CLI::App& app, int& code) {
   verb->add_option("--model", a->model, "fitted model; absent: the one that the problem names")
       ->type_name("MODEL.json");
   verb->add_option("--output,-o", a->output, "motion to write (CSV)")->type_name("MOTION.csv");
+  verb->add_option("--rate", a->rate, "rows per second of --output; absent: the mesh of the solve")
+      ->type_name("HZ")
+      ->check(number_from(0.1, 1e5));
   verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   verb->add_option("--seconds", a->seeds.seconds, "time for the path search [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(number_from(1e-3, 1e6))
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed of the path search")
       ->capture_default_str();

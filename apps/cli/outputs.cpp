@@ -3,15 +3,24 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "apps/cli/console.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {
+namespace {
+
+constexpr const char* kStandardOutput = "-";
+
+}  // namespace
 
 void Outputs::add_to(CLI::App& verb, bool with_report) {
-  verb.add_option("--json", json, "write the result to FILE as JSON")->type_name("FILE");
+  verb.add_option(
+          "--json", json,
+          "write the result to FILE as JSON; - is standard output, and texts then go to stderr")
+      ->type_name("FILE");
   if (with_report) {
     verb.add_option("--report", report,
                     "write a page with figures to FILE.html; it needs no network")
@@ -26,7 +35,7 @@ void Outputs::add_resume_to(CLI::App& verb) {
 }
 
 std::string Outputs::journal() const {
-  const std::string& beside = json.empty() ? report : json;
+  const std::string& beside = json.empty() || json == kStandardOutput ? report : json;
   std::error_code error;
   const bool other =
       std::filesystem::exists(beside, error) && !std::filesystem::is_regular_file(beside, error);
@@ -116,8 +125,30 @@ void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& 
   }
 }
 
+void Outputs::write_json(const std::string& text) const {
+  if (json == kStandardOutput) {
+    put_out(text);
+  } else {
+    write_file_atomically(json, text);
+  }
+}
+
+CLI::Validator number_from(double lo, double hi) {
+  return {[=](const std::string& text) {
+            char* end = nullptr;
+            const double value = std::strtod(text.c_str(), &end);
+            if (!text.empty() && *end == '\0' && value >= lo && value <= hi) return std::string();
+            return fmt::format("got \"{}\", expected a number from {:g} to {:g}", text, lo, hi);
+          },
+          fmt::format("{:g}..{:g}", lo, hi), "number"};
+}
+
 void Outputs::check() const {
-  check_writable(json);
+  if (json == kStandardOutput) {
+    texts_to_stderr();
+  } else {
+    check_writable(json);
+  }
   check_writable(report);
 }
 

@@ -21,8 +21,11 @@ struct Outputs {
   std::string report;
   bool resume = false;  ///< --resume, of verbs that have it
   void add_to(CLI::App& verb, bool with_report = true);
-  /// Checks, before any long work, that these files can be written. @throws InputError
+  /// Checks, before any long work, that these files can be written; with `--json -` texts go to stderr from now on.
+  /// @throws InputError
   void check() const;
+  /// Writes the result to the file of --json, or to standard output where that is "-". @throws InputError
+  void write_json(const std::string& text) const;
   std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
   /// Adds --resume, for a verb that keeps a journal of its finished parts.
   void add_resume_to(CLI::App& verb);
@@ -43,6 +46,9 @@ void check_outputs_apart(const std::string& verb, const std::vector<NamedFile>& 
 
 /// True when both names refer to the same file, whether it exists already or not.
 bool same_file(const std::string& a, const std::string& b);
+
+/// Checks that a value is a number in this range, with a message that a reader can take in.
+CLI::Validator number_from(double lo, double hi);
 
 /// Every path of a repeatable option.
 std::vector<NamedFile> named(const std::string& option, const std::vector<std::string>& paths);

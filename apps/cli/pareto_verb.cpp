@@ -84,7 +84,7 @@ int run(const ParetoArguments& a) {
   }
   if (!a.output.empty() && !curve.points.empty())
     write_file_atomically(a.output, pareto_csv(curve));
-  if (!a.outputs.json.empty()) write_file_atomically(a.outputs.json, pareto_json(problem, curve));
+  if (!a.outputs.json.empty()) a.outputs.write_json(pareto_json(problem, curve));
   if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
   const bool whole = !curve.interrupted && !interrupted();
   if (whole) journal->remove();
@@ -110,11 +110,11 @@ void add_pareto_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(3, 200))
       ->capture_default_str();
   verb->add_option("--longest", a->longest, "longest duration, as a multiple of the shortest")
-      ->check(CLI::Range(1.2, 100.0))
+      ->check(number_from(1.2, 100.0))
       ->capture_default_str();
   verb->add_option("--idle", a->idle_kw, "idle powers for which the best duration is reported")
       ->type_name("KW")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(number_from(0.0, 1000.0))
       ->capture_default_str();
   verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))

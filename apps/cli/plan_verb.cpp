@@ -6,6 +6,7 @@
 #include "apps/cli/motion_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
+#include "apps/report/motion_pages/plan_page.h"
 #include "models/math/error.h"
 #include "problems/problem_file.h"
 
@@ -34,6 +35,14 @@ std::string path_csv(const Machine& machine, const std::vector<SeedPath>& paths)
   return text;
 }
 
+/// The paths as the page draws them.
+PlannedPaths drawn(const Seeds& seeds) {
+  PlannedPaths paths{seeds.paths.message, {}, seeds.refused};
+  for (const SeedMotion& m : seeds.motions)
+    paths.motions.push_back({m.name, m.motion, m.shortest_duration});
+  return paths;
+}
+
 int run(const PlanArguments& a) {
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
@@ -42,6 +51,7 @@ int run(const PlanArguments& a) {
   a.outputs.check();
   const MotionProblem problem = load_problem(a.problem);
   for (const std::string& w : problem.machine_warnings) warn(w);
+  for (const std::string& n : problem.notes) note(n);
   const Seeds seeds = [&] {
     Progress progress("plan");
     SeedOptions options = a.seeds;
@@ -85,9 +95,9 @@ int run(const PlanArguments& a) {
   for (const std::string& r : seeds.refused) warn(r);
   if (!a.output.empty())
     write_file_atomically(a.output, path_csv(problem.machine, seeds.paths.paths));
+  if (!a.outputs.report.empty()) plan_page(problem, drawn(seeds)).write(a.outputs.report);
   if (!a.outputs.json.empty())
-    write_file_atomically(
-        a.outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    a.outputs.write_json(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   return seeds.paths.status == SeedStatus::kFound ? kDone : kNotSolved;
 }
 
@@ -106,10 +116,10 @@ void add_plan_verb(CLI::App& app, int& code) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   verb->add_option("--seconds", a->seeds.seconds, "time for the search [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(number_from(1e-3, 1e6))
       ->capture_default_str();
   verb->add_option("--seed", a->seeds.random_seed, "random seed")->capture_default_str();
-  a->outputs.add_to(*verb, false);
+  a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }
 

@@ -27,7 +27,7 @@ int run(const SelftestArguments& a) {
                     [&](double share, const std::string& what) { progress(share, what); });
   }();
   const Outputs& outputs = a.inputs.outputs();
-  if (!outputs.json.empty()) write_file_atomically(outputs.json, result.json());
+  if (!outputs.json.empty()) outputs.write_json(result.json());
   if (!outputs.report.empty()) {
     Page page = selftest_page(files.model, result);
     files.write_provenance(page);
@@ -50,7 +50,7 @@ void add_selftest_verb(CLI::App& app, int& code) {
   a->inputs.add_candidates(*verb, "effects to inject");
   verb->add_option("--check", a->check,
                    "number of effects for which the whole search is run on injected data")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from(0.0, 1e9))
       ->capture_default_str();
   a->inputs.add_rest(*verb);
   verb->footer(

@@ -431,8 +431,7 @@ int run(const SimulateArguments& a) {
   nlohmann::json json = simulation_json(a, machine, s);
   const std::string errors = write_comparison(a, machine, s, rows, json);
   if (!a.outputs.json.empty())
-    write_file_atomically(
-        a.outputs.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    a.outputs.write_json(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   tell(fmt::format("{}{}", errors, summary(machine, s, a.output)));
   if (s.cut) return kInterrupted;
   return s.run->status() == plant::RunStatus::kRunning ? kDone : kNotSolved;
@@ -451,7 +450,7 @@ void add_simulate_verb(CLI::App& app, int& code) {
       ->required()
       ->type_name("LOG.csv");
   verb->add_option("--seconds", a->seconds, "duration")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(number_from(0.1, 1e6))
       ->capture_default_str();
   verb->add_option("--seed", a->seed, "random seed of work and sensors")->capture_default_str();
   verb->add_option("--rate", a->rate, "samples a second")
@@ -477,7 +476,7 @@ void add_simulate_verb(CLI::App& app, int& code) {
       ->type_name("WORDS");
   verb->add_option("--payload", a->payload, "payload; absent: that of the file, or drawn")
       ->type_name("KG")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_from(0.0, 1e6));
   verb->add_flag_callback(
       "--list-effects",
       [] {

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <sys/mman.h>
 
+#include <atomic>
 #include <filesystem>
 #include <optional>
 
@@ -127,6 +129,25 @@ StrategyComparison without_rows(const ProblemAndModel& task, const StrategyOptio
   return c;
 }
 
+/// Counts the solves of all processes; each adds to it.
+class SolveCount {
+ public:
+  SolveCount() {
+    void* shared = ::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
+                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of solves");
+    count_ = new (shared) std::atomic<int>(0);
+  }
+  ~SolveCount() { ::munmap(count_, sizeof(std::atomic<int>)); }
+  SolveCount(const SolveCount&) = delete;
+  SolveCount& operator=(const SolveCount&) = delete;
+  void add() { count_->fetch_add(1); }
+  int value() const { return count_->load(); }
+
+ private:
+  std::atomic<int>* count_;
+};
+
 StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
                               StrategyOptions options) {
   options.idle_power = idle_power(a, task);
@@ -166,6 +187,12 @@ std::string part_name(int index) { return fmt::format("problem {}", index + 1); 
 std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
                                     const StrategiesArguments& a, const StrategyOptions& options,
                                     Journal& journal) {
+  SolveCount solves;
+  StrategyOptions counted = options;
+  counted.optimize.progress = [&](int, int, const std::string&) {
+    solves.add();
+    return !interrupted();
+  };
   const auto task = [&](int i) -> const ProblemAndModel& {
     return tasks[static_cast<std::size_t>(i)];
   };
@@ -173,14 +200,20 @@ std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
   work.count = static_cast<int>(tasks.size());
   work.at_once = a.processes > 0 ? a.processes : usable_processors();
   work.name = part_name;
-  work.work = [&](int i) { return packed(compare_in(task(i), a, options)); };
+  work.work = [&](int i) { return packed(compare_in(task(i), a, counted)); };
   work.complete = [](const std::string& bytes) { return !unpacked_comparison(bytes).interrupted; };
   work.stop = interrupted;
   const int before = finished_before(work, journal);
   if (before > 0) note(fmt::format("{} of {} problems were finished before", before, work.count));
+  std::atomic<int> done = before;  // outlives the progress that shows it
   Progress progress("strategies");
   progress(0.0, fmt::format("{} problem{}", work.count, work.count > 1 ? "s" : ""));
+  progress.watch([&] {
+    return fmt::format("{} of {} problem{} finished, {} starts solved", done.load(), work.count,
+                       work.count > 1 ? "s" : "", solves.value());
+  });
   return run_kept(work, journal, [&](int i, int finished, const ChildResult&) {
+    done = finished;
     progress(static_cast<double>(finished) / work.count, task(i).problem.name);
   });
 }
@@ -239,8 +272,7 @@ int run(const StrategiesArguments& a) {
   std::vector<Machine> machines;
   machines.reserve(tasks.size());
   for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
-  if (!a.outputs.json.empty())
-    write_file_atomically(a.outputs.json, strategies_json(all, machines));
+  if (!a.outputs.json.empty()) a.outputs.write_json(strategies_json(all, machines));
   if (!a.outputs.report.empty()) {
     const bool one = all.size() == 1;
     strategies_page(all, one ? &tasks.front().model : nullptr,
@@ -272,7 +304,7 @@ void add_strategies_verb(CLI::App& app, int& code) {
       ->capture_default_str();
   verb->add_option("--idle", a->idle_kw, "idle power; absent: that of the problem")
       ->type_name("KW")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_from(0.0, 1000.0));
   verb->add_option("--paths", a->seeds.count, "largest number of seed paths")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();

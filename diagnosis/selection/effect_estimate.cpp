@@ -10,6 +10,7 @@
 #include "diagnosis/selection/effect_intervals.h"
 #include "diagnosis/selection/leader_updates.h"
 #include "diagnosis/selection/search_candidates.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/signals/series.h"
 #include "models/math/error.h"
 #include "models/math/golden_section.h"
@@ -314,9 +315,10 @@ class Estimator {
         if (v > parameter.lower + kOnBound * span && v < parameter.upper - kOnBound * span)
           continue;
         out.notes.push_back(fmt::format(
-            "{} of {} lies on the bound of its plausible range, {:.4g} {}: another effect may act, "
+            "{} of {} lies on the bound of its plausible range, {} {}: another effect may act, "
             "or it does not act at all",
-            parameter.name, e.key(base_.machine), v / parameter.si, parameter.unit));
+            parameter.name, e.key(base_.machine), plain_number(v / parameter.si, 4),
+            parameter.unit));
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "identification/comparison/compare_stages.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/signals/apply_effects.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
@@ -89,10 +90,11 @@ void extrapolation_notes(const CraneModel& model, const std::vector<StageScore>&
     notes.insert(fmt::format(
         "pressure of {} {}: {:.0f} % of the samples lie outside what it was learned from "
         "({:.1f}..{:.1f} l/min, "
-        "{:.1f}..{:.1f} kN) and hold {:.0f} % of its squared error; fit with such motions",
+        "{}..{} kN) and hold {:.0f} % of its squared error; fit with such motions",
         s.at, extend ? "extending" : "retracting", s.extrapolated_percent,
-        p.flow_min / units::kLitrePerMinute, p.flow_max / units::kLitrePerMinute, p.force_min / 1e3,
-        p.force_max / 1e3, s.extrapolated_error_percent));
+        p.flow_min / units::kLitrePerMinute, p.flow_max / units::kLitrePerMinute,
+        fixed_number(p.force_min / 1e3, 1), fixed_number(p.force_max / 1e3, 1),
+        s.extrapolated_error_percent));
   }
 }
 
@@ -257,10 +259,12 @@ const StageScore* CompareResult::find(const std::string& stage, const std::strin
 std::vector<StageQuality> stage_quality(const CompareResult& result, const std::string& data) {
   std::vector<StageQuality> out;
   for (const StageScore& s : result.scores) {
+    if (!std::isfinite(s.rmse)) continue;  // not a single sample could be compared
     out.push_back({s.stage, s.regime.empty() ? s.at : s.at + " " + s.regime, data,
                    s.rmse / s.unit.si, s.unit.name, s.fit_percent, s.n});
   }
   for (const EnergyScore& e : result.energy) {
+    if (!std::isfinite(e.relative_error)) continue;  // the pump delivered nothing
     out.push_back({"energy", e.pump, data, 100.0 * std::abs(e.relative_error), "%", kNaN, 1});
   }
   return out;
@@ -278,6 +282,10 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
   }
   for (std::size_t l = 0; l < signals.size(); ++l) {
     LogComparison log;
+    if (options.find_regions) {
+      for (SensorSlip& slip : find_sensor_slips(model.machine, signals[l]))
+        result.slips.push_back({signals[l].file, std::move(slip)});
+    }
     log.signals = with_effects(model, std::move(signals[l]));
     Comparison comparison(model, log.signals, only.empty() ? nullptr : &only[l]);
     log.series = comparison.series(notes);
@@ -361,6 +369,10 @@ namespace {
 void add_log(const CraneModel& model, const Log& log, const CompareOptions& options,
              std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>>& out) {
   out.first.push_back(make_signals(model.machine, log, options.signals));
+  if (is_computed_motion(model.machine, log)) {
+    out.first.back().notes.push_back(
+        "the columns are those of a computed motion, so its channels are not judged as sensors");
+  }
   for (BadChannel& b : find_bad_channels(model.machine, log, out.first.back(), options.bad_data))
     out.second.push_back({log.file, std::move(b)});
 }

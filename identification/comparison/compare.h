@@ -19,6 +19,7 @@
 #include "identification/comparison/stage_at_fault.h"
 #include "identification/comparison/worst_segments.h"
 #include "identification/data_checks/bad_data.h"
+#include "identification/data_checks/sensor_slips.h"
 #include "identification/signals/signals.h"
 #include "models/chain/crane_model.h"
 
@@ -120,6 +121,12 @@ struct BadChannelOfLog {
   BadChannel bad;
 };
 
+/// A sensor connected or named wrongly, and the log it is in.
+struct SlipOfLog {
+  std::string file;
+  SensorSlip slip;
+};
+
 struct CompareResult {
   long samples = 0;
   std::vector<StageScore> scores;  ///< in the order of the stages, then of the machine
@@ -131,7 +138,8 @@ struct CompareResult {
   std::vector<RegimeError> regimes;       ///< errors by regime, with 95 % intervals
   std::vector<WorstSegment> segments;     ///< motions with the largest errors, in that order
   std::vector<BadChannelOfLog> bad_data;  ///< filled by `compare` only, which has the logs
-  std::vector<std::string> notes;         ///< what was not compared, and why; whole sentences
+  std::vector<SlipOfLog> slips;    ///< sensors connected or named wrongly, where regions are sought
+  std::vector<std::string> notes;  ///< what was not compared, and why; whole sentences
   std::vector<LogComparison> logs;
 
   const StageScore* find(const std::string& stage, const std::string& at,

@@ -114,6 +114,17 @@ Json range_json(const Range& r) {
   return {r.lo, r.hi};
 }
 
+Json slips_json(const CompareResult& result) {
+  Json list = Json::array();
+  for (const SlipOfLog& s : result.slips) {
+    list.push_back({{"file", s.file},
+                    {"kind", s.slip.kind},
+                    {"channels", s.slip.channels},
+                    {"sentence", s.slip.sentence}});
+  }
+  return list;
+}
+
 /// Adds residual tests, stage at fault, errors by regime, worst motions and bad channels.
 void causes_json(const CompareResult& result, Json& root) {
   Json& tests = root["residual_tests"];
@@ -334,6 +345,7 @@ std::string compare_json(const CompareResult& result) {
                {"worst", worst},
                {"notes", result.notes},
                {"logs", logs}};
+  root["slips"] = slips_json(result);
   causes_json(result, root);
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -345,6 +357,9 @@ std::string compare_headline(const CompareResult& result) {
     text = fmt::format("Bad data: {} {}; {}", bad.channel, bad_words(bad.kind),
                        lower_case_first(text));
   }
+  if (!result.slips.empty())
+    text = fmt::format("Check the sensors: {}; {}", fmt::join(result.slips.front().slip.channels, ", "),
+                       lower_case_first(text));
   return text;
 }
 
@@ -383,6 +398,8 @@ std::string compare_table(const CompareResult& result) {
       "explained % = 100 (1 - error beyond the sensor's noise / standard deviation of the "
       "measured, "
       "at least a\nthird of its RMS); bias = predicted - measured\n";
+  if (!result.slips.empty()) text += "\nsensors that seem to be connected or named wrongly\n";
+  for (const SlipOfLog& s : result.slips) text += wrapped(s.file + ": " + s.slip.sentence);
   if (!result.bad_data.empty())
     text += "\nbad data: repair or leave out before learning from these logs\n";
   for (const BadChannelOfLog& b : result.bad_data)

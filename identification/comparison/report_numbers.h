@@ -36,6 +36,13 @@ inline bool is_determined(double value, double lower95, double upper95, double t
   return half <= kUndeterminedWidth * std::max(std::abs(value), std::abs(typical));
 }
 
+/// Fixed notation with `decimals`, without a sign before a zero: 0.0, never -0.0.
+inline std::string fixed_number(double value, int decimals) {
+  const std::string text = fmt::format("{:.{}f}", value, decimals);
+  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
+  return zero && text.front() == '-' ? text.substr(1) : text;
+}
+
 /// @return null for NaN and infinity, which JSON cannot represent
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);

@@ -171,6 +171,19 @@ const char* bad_data_word(BadDataKind kind) {
   return "";
 }
 
+bool is_computed_motion(const Machine& machine, const Log& log) {
+  const auto has = [&](const std::string& column) {
+    return std::any_of(log.channels.begin(), log.channels.end(),
+                       [&](const Channel& c) { return c.column == column; });
+  };
+  return !machine.joints.empty() && has("power_W") &&
+         std::all_of(machine.joints.begin(), machine.joints.end(), [&](const Joint& j) {
+           const char* unit = j.type == JointType::kRevolute ? "rad" : "m";
+           return has(fmt::format("qd_{}_{}_s", j.name, unit)) &&
+                  has(fmt::format("qdd_{}_{}_s2", j.name, unit));
+         });
+}
+
 std::string bad_channel_sentence(const BadChannel& bad) {
   const char* words[] = {"is stuck",  "jumps",      "is noisy",
                          "drops out", "is cut off", "has wild samples"};
@@ -194,8 +207,10 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
   const Check checks[] = {check_missing,   check_stuck, check_stuck_command, check_noise,
                           check_saturated, check_wild,  check_jumps};
+  const bool computed = is_computed_motion(machine, log);
   for (std::size_t i = 0; i < context.channels.size(); ++i) {
     for (const Check check : checks) {
+      if (computed && check != &check_missing) continue;
       std::optional<Finding> found = check(context, i);
       if (!found) continue;
       out.push_back(report(context, i, std::move(*found)));

@@ -289,6 +289,10 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
                                           const MachineSignals& signals,
                                           const BadDataOptions& options = {});
 
+/// Whether a log's columns are those of a motion that the program computed (speed and acceleration of every joint, power):
+/// its values have no noise, and a pump that stands by is no stuck sensor. Only missing values are then faults.
+bool is_computed_motion(const Machine& machine, const Log& log);
+
 /// @return e.g. "pA_boom is noisy between 12.0 and 38.5 s (22 % of the log): its noise there is 5.1 bar ..."
 std::string bad_channel_sentence(const BadChannel& bad);
 

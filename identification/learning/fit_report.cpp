@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/comparison/report_numbers.h"
 #include "identification/learning/fit.h"
 #include "models/math/units.h"
 
@@ -37,7 +38,8 @@ std::string figures(const CompareResult& result) {
   }
   if (text.empty()) {
     const double force = stage_rmse(result, "force");
-    return std::isfinite(force) ? fmt::format("force {:.4g} N", force) : "nothing compared";
+    return std::isfinite(force) ? fmt::format("force {} N", plain_number(force, 4))
+                                : "nothing compared";
   }
   return text.substr(0, text.size() - 2);
 }
@@ -58,12 +60,12 @@ std::string process_lines(const FitResult& r) {
       continue;
     }
     const GpParameters& p = g.parameters();
-    text += fmt::format("{:<20}{:>8}{:>6}{:>16}{:>11.2f}{:>11.2f}{:>16}{:>20}\n", name, f.offered,
-                        f.step, pressure_law_name(p.law), f.report.rmse / units::kBar,
-                        f.report.noise_std / units::kBar,
-                        fmt::format("{:.1f}..{:.1f}", p.flow_min / units::kLitrePerMinute,
-                                    p.flow_max / units::kLitrePerMinute),
-                        fmt::format("{:.1f}..{:.1f}", p.force_min / 1e3, p.force_max / 1e3));
+    text += fmt::format(
+        "{:<20}{:>8}{:>6}{:>16}{:>11.2f}{:>11.2f}{:>16}{:>20}\n", name, f.offered, f.step,
+        pressure_law_name(p.law), f.report.rmse / units::kBar, f.report.noise_std / units::kBar,
+        fmt::format("{:.1f}..{:.1f}", p.flow_min / units::kLitrePerMinute,
+                    p.flow_max / units::kLitrePerMinute),
+        fixed_number(p.force_min / 1e3, 1) + ".." + fixed_number(p.force_max / 1e3, 1));
   }
   return text;
 }

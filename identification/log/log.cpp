@@ -107,9 +107,11 @@ InterpretedColumn time_column(const RawTable& table,
   if (found == columns.end()) {
     throw InputError(
         {table.file, table.header_line, 0}, "t_s",
-        fmt::format("no column of this name; found {}; rename the column of time, or give a "
-                    "mapping file with columns: {{t_s: \"...\"}}",
-                    column_list(table)));
+        fmt::format(
+            "no column of this name; found {}; rename the column of time, or give a "
+            "mapping file with columns: {{t_s: \"...\"}}, and skip_rows: N if lines of text stand "
+            "before the header",
+            column_list(table)));
   }
   if (found->raw->text) {
     throw InputError({table.file, found->raw->example_line, 0}, found->raw->name,

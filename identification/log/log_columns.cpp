@@ -52,7 +52,8 @@ const ColumnQuantity kFlow = {
     "m^3/s",
     "lpm",
     {{"lpm", units::kLitrePerMinute}, {"m3_s", 1.0}, {"l_s", 1e-3}, {"m3_h", 1.0 / 3600.0}}};
-const ColumnQuantity kMass = {"a mass", "kg", "kg", {{"kg", 1.0}, {"t", 1e3}, {"g", 1e-3}}};
+const ColumnQuantity kMass = {
+    "a mass", "kg", "kg", {{"kg", 1.0}, {"t", 1e3}, {"g", 1e-3}, {"lb", 0.45359237}}};
 const ColumnQuantity kTemperature = {
     "a temperature",
     "degC",

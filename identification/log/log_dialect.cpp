@@ -313,7 +313,10 @@ class DelimitedReader {
               "; decimal commas between values separated by commas? Export with \";\" or decimal "
               "points";
         } else {
-          what += "; every row needs one value (or nothing between separators) for each column";
+          what +=
+              "; every row needs one value (or nothing between separators) for each column. If "
+              "lines "
+              "of text stand before the header, a mapping file says how many: skip_rows: N";
         }
         fail(wrong_line_, what);
       }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <limits>
+#include <stdexcept>
 #include <vector>
 
 #include "models/files/machine_file.h"
@@ -324,7 +325,15 @@ CraneModel model_from_json(const std::string& text, const std::string& file) {
 }
 
 void save_model(const CraneModel& model, const std::string& path) {
-  write_file_atomically(path, model_to_json(model));
+  const std::string text = model_to_json(model);
+  try {
+    model_from_json(text, path);
+  } catch (const InputError& error) {
+    // Found before the file stands, and not by the next verb.
+    throw std::logic_error(
+        fmt::format("this model could not be read again, so it is not written: {}", error.what()));
+  }
+  write_file_atomically(path, text);
 }
 
 CraneModel load_model(const std::string& path) { return model_from_json(read_file(path), path); }

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "models/machine/linkage.h"
+#include "models/machine/linkage_review.h"
 #include "models/math/units.h"
 
 namespace sparflow {
@@ -160,6 +161,8 @@ class Checker {
       check_less_than_a_turn(i);
       check_four_bar_plane(i);
       check_dead_centre(i);
+      for (const std::string& doubt : linkage_doubts(machine_, static_cast<int>(i)))
+        warn(places_.cylinders, i, key, doubt);
     }
     check_stroke(i);
   }

@@ -248,7 +248,7 @@ BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, b
   for (const DrivenPath& path : paths(kind)) {
     all.push_back(timed(kind, path, duration));
     if (all.back().found())
-      all.back().energy = exact_energy(model_, all.back().motion, problem_.payload, 2);
+      all.back().energy = exact_energy(model_, problem_, all.back().motion, 2);
   }
   // The best redundancy depends on the duration, so it is solved again for a result, but not during a search.
   if (kind == kBestTipLine && polish && !all.empty()) {
@@ -269,7 +269,7 @@ BaselineMotion BaselineSet::cheapest(const std::string& kind, double duration, b
                              c.limit, c.unit);
       continue;
     }
-    m.energy = exact_energy(model_, m.motion, problem_.payload, options_.optimize.refine);
+    m.energy = exact_energy(model_, problem_, m.motion, options_.optimize.refine);
     return std::move(m);
   }
   return none;

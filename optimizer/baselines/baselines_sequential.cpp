@@ -330,7 +330,7 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
   for (const DrivenPath& path : sequences_) {
     BaselineMotion m = timed(kSequential, path, duration);
     if (m.found()) {
-      m.energy = exact_energy(model_, m.motion, problem_.payload, 4);
+      m.energy = exact_energy(model_, problem_, m.motion, 4);
     }
     const auto [at, first] = best.try_emplace(path.detail, m, &path);
     if (first) continue;
@@ -370,7 +370,7 @@ std::vector<BaselineMotion> BaselineSet::sequences_at(double duration, int polis
       continue;
     }
     kept_one = true;
-    m.energy = exact_energy(model_, m.motion, problem_.payload, options_.optimize.refine);
+    m.energy = exact_energy(model_, problem_, m.motion, options_.optimize.refine);
     if (left-- > 0) m = polished(m, *path);
   }
   std::stable_sort(all.begin(), all.end(), cheaper);
@@ -412,7 +412,7 @@ BaselineMotion BaselineSet::polished(const BaselineMotion& from, const DrivenPat
     return from;
   BaselineMotion better = from;
   better.motion = solved.motion;
-  better.energy = exact_energy(model_, solved.motion, problem_.payload, options_.optimize.refine);
+  better.energy = exact_energy(model_, problem_, solved.motion, options_.optimize.refine);
   return better;
 }
 

@@ -366,7 +366,7 @@ PathRedundancy refined_line(const CraneModel& model, LineProgram& program, const
       continue;
     }
     best.motion = motion;
-    best.energy = exact_energy(model, motion, problem.payload, options.refine);
+    best.energy = exact_energy(model, problem, motion, options.refine);
     best.summed_J = coarse.sum;
     best.excess = excess;
     best.grids = grid + 1;
@@ -442,7 +442,7 @@ PathRedundancy best_redundancy_line(const CraneModel& model, const MotionProblem
     if (excess > options.limit_tolerance) return result;
     result = {};
     result.motion = line;
-    result.energy = exact_energy(model, line, problem.payload, options.refine);
+    result.energy = exact_energy(model, problem, line, options.refine);
     result.excess = excess;
   }
   return result;

@@ -21,12 +21,13 @@ bool outside_data(const GpParameters& p, double flow, double force) {
 }  // namespace
 
 MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
-                          int refine) {
+                          int refine, const LeastFlows& least) {
   const std::size_t cylinders = model.cylinders.size();
   MotionEnergy energy;
   energy.pump.assign(model.pumps.size(), 0.0);
   energy.throttling.assign(cylinders, 0.0);
   energy.useful.assign(cylinders, 0.0);
+  energy.creep.assign(cylinders, 0.0);
   energy.share_moving.assign(cylinders + 1, 0.0);
   if (motion.size() < 2) return energy;
   Chain chain(model);
@@ -45,9 +46,13 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
         for (std::size_t i = 0; i < cylinders; ++i) {
           const CylinderState& c = state.cylinders[i];
           if (!c.moving) continue;
-          ++moving;
           energy.throttling[i] += step * state.throttling(model.machine, static_cast<int>(i));
           energy.useful[i] += step * c.pressure * c.flow;
+          if (model.machine.cylinders[i].hydraulic() && !firmly_moving(least, i, c.flow, c.speed)) {
+            energy.creep[i] += step * std::abs(c.speed);
+            continue;
+          }
+          ++moving;
           energy.largest_pressure_std = std::max(energy.largest_pressure_std, c.pressure_std);
           const GaussianProcess& process =
               c.speed > 0.0 ? model.cylinders[i].extend : model.cylinders[i].retract;
@@ -64,6 +69,12 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
       potential_energy(chain.machine(), motion.q.row(last).transpose(), payload) -
       potential_energy(chain.machine(), motion.q.row(0).transpose(), payload);
   return energy;
+}
+
+MotionEnergy exact_energy(const CraneModel& model, const MotionProblem& problem,
+                          const Trajectory& motion, int refine) {
+  return exact_energy(model, motion, problem.payload, refine,
+                      least_flows(model.machine, problem.limits));
 }
 
 double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,

@@ -6,6 +6,7 @@
 
 #include "models/chain/crane_model.h"
 #include "models/machine/trajectory.h"
+#include "problems/motion_limits.h"
 #include "problems/problem.h"
 
 namespace sparflow {
@@ -20,6 +21,7 @@ struct MotionEnergy {
   double moving_share_outside_data =
       0.0;  ///< share of moving cylinder-time outside the data of its pressure model
   std::vector<double> share_moving;  ///< share of time with 0, 1, 2, ... cylinders moving
+  std::vector<double> creep;  ///< [m] by cylinder, way of its rod at flows below its valve's least
 
   /// True when the pumps deliver less than machine and load gain: the pressures are extrapolated far beyond their data.
   bool impossible() const { return total < potential_difference; }
@@ -28,8 +30,14 @@ struct MotionEnergy {
 /// Integrates the exact law over a motion by the midpoint rule on every interval cut into `refine` parts. Velocities are
 /// linear within an interval, so a cylinder starts or stops at knots only (a change of sign aside), and no midpoint falls
 /// on such an instant. The jumps of the exact maximum and activation therefore cost no accuracy.
+/// @param least flows below which a cylinder counts as standing in share_moving, in the share outside the data and in the
+///        largest standard deviation; empty: none stands before it rests. The energies count every flow and every demand:
+///        the motion needs them to arrive, and a least flow can thus never make a motion cheaper.
 MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
-                          int refine = 16);
+                          int refine = 16, const LeastFlows& least = {});
+/// The same with the problem's payload and its valves' least flows.
+MotionEnergy exact_energy(const CraneModel& model, const MotionProblem& problem,
+                          const Trajectory& motion, int refine = 16);
 
 /// MotionEnergy::total alone, in less than half the time: standard deviations and shares are not computed. [J]
 double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,

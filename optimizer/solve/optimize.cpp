@@ -358,7 +358,7 @@ class Search {
       result_.motion = best.motion;
       result_.duration = best.motion.duration();
       result_.energy_smooth = best.energy_smooth;
-      result_.energy = exact_energy(model_, best.motion, problem_.payload, options_.refine);
+      result_.energy = exact_energy(model_, problem_, best.motion, options_.refine);
       result_.checks = check_limits(model_, problem_, best.motion, options_.refine);
       result_.message = fmt::format("{}: {:.1f} kJ in {:.2f} s", problem_.name,
                                     result_.energy.total / 1e3, result_.duration);

@@ -56,5 +56,19 @@ TEST(CutObstacles, DrawsHalfSpacesOnTheirSolidSide) {
   EXPECT_NEAR(area(shapes[0].points), 200.0 * 100.0, 1e-6);
 }
 
+TEST(OutlineObstacles, SeenFromAboveNothingIsLeftOutAndBesideIsNamed) {
+  const Box crate{{4, 5, 1}, {2, 1, 3}, Eigen::Matrix3d::Identity()};
+  const std::vector<Obstacle> all = {{"crate", crate}, {"ball", Sphere{{1, -3, 2}, 0.5}}};
+  EXPECT_EQ(obstacles_beside(all, DrawingPlane{}), (std::vector<std::string>{"crate", "ball"}));
+  DrawingPlane top;
+  top.up = Vector3d::UnitY();
+  const auto shapes = outline_obstacles(all, top);
+  ASSERT_EQ(shapes.size(), 2u);
+  EXPECT_EQ(shapes[0].points.size(), 4u) << "eight corners, four on the outline";
+  EXPECT_NEAR(area(shapes[0].points), 2.0, 1e-12);
+  EXPECT_EQ(shapes[1].points[0], Vector2d(1, -3));
+  EXPECT_EQ(shapes[1].radius, 0.5);
+}
+
 }  // namespace
 }  // namespace sparflow

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <regex>
 #include <thread>
 
 #include "tests/cli/cli_fixture.h"
@@ -234,6 +235,15 @@ class Running {
   int code_ = -1;
 };
 
+/// Waits until a file contains a match. @return whether it did in time
+bool comes(const std::string& path, const std::regex& pattern, double seconds) {
+  for (int k = 0; k < 10.0 * seconds; ++k) {
+    if (std::regex_search(slurp(path), pattern)) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return false;
+}
+
 /// Waits until a file contains this text. @return whether it did in time
 bool comes(const std::string& path, const std::string& text, double seconds) {
   for (int k = 0; k < 10.0 * seconds; ++k) {
@@ -248,7 +258,9 @@ TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
   Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_beam.yaml", "--model",
                    model(), "--intervals", "2000", "--json", at("o.json")},
                   at("out"), at("err"));
-  ASSERT_TRUE(comes(at("err"), "optimize: 10 s, ", 120.0)) << slurp(at("err"));
+  // Paths are searched up to 20 %; there a first Ctrl-C ends at once, because nothing was found yet that could be kept.
+  const std::regex solving("optimize: [0-9]+ s, ([2-9][0-9]|100) %");
+  ASSERT_TRUE(comes(at("err"), solving, 180.0)) << slurp(at("err"));
   EXPECT_THAT(slurp(at("err")), StartsWith("optimize ...\n"));
   // A signal from another program reaches only the parent, and the children must end with it.
   ::kill(program.pid(), SIGINT);

@@ -231,8 +231,20 @@ std::vector<MachinePart> machine_parts(const Machine& machine, const VectorXd& q
   return std::move(parts);
 }
 
-DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double time) {
-  const DrawingPlane plane = drawing_plane(machine, q);
+DrawingPlane top_plane(const Machine& machine) {
+  DrawingPlane plane;
+  const Vector3d above = up_direction(machine);
+  plane.horizontal = horizontal_part(Vector3d::UnitX(), above);
+  if (plane.horizontal.norm() < 0.1) plane.horizontal = horizontal_part(Vector3d::UnitY(), above);
+  plane.horizontal.normalize();
+  plane.up = above.cross(plane.horizontal);
+  plane.horizontal_name = base_axis_name(plane.horizontal, "ahead");
+  plane.vertical_name = base_axis_name(plane.up, "to the left");
+  return plane;
+}
+
+DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double time,
+                           const DrawingPlane& plane) {
   DrawingFrame frame;
   frame.time = time;
   frame.tip = plane.project(tip_position<double>(machine, q));
@@ -244,13 +256,20 @@ DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double tim
   return frame;
 }
 
+DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double time) {
+  return drawing_frame(machine, q, time, drawing_plane(machine, q));
+}
+
 std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajectory& motion,
-                                         int count) {
+                                         int count, const std::optional<DrawingPlane>& fixed) {
   std::vector<DrawingFrame> frames;
   if (motion.size() == 0 || count < 1) return frames;
+  const auto add = [&](const VectorXd& q, double time) {
+    frames.push_back(drawing_frame(machine, q, time, fixed ? *fixed : drawing_plane(machine, q)));
+  };
   if (motion.size() == 1 || count == 1) {
     const Eigen::Index last = motion.size() - 1;
-    frames.push_back(drawing_frame(machine, motion.q.row(last), motion.t[last]));
+    add(motion.q.row(last), motion.t[last]);
     return frames;
   }
   Eigen::Index k = 0;
@@ -260,7 +279,7 @@ std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajector
     const double step = motion.t[k + 1] - motion.t[k];
     const double share = step > 0.0 ? std::clamp((time - motion.t[k]) / step, 0.0, 1.0) : 1.0;
     const VectorXd q = (1.0 - share) * motion.q.row(k) + share * motion.q.row(k + 1);
-    frames.push_back(drawing_frame(machine, q, time));
+    add(q, time);
   }
   return frames;
 }

@@ -2,6 +2,7 @@
 /// The machine as lines for drawings: links, telescope stages, cylinders, rockers and couplers at one configuration,
 /// in the base frame and projected onto the vertical plane of the arm.
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ struct DrawingFrame {
   Eigen::Vector2d tip = Eigen::Vector2d::Zero();  ///< [m]
 };
 
-/// A vertical plane of the base frame.
+/// A plane of the base frame: vertical, or horizontal for the view from above.
 struct DrawingPlane {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< [m]
   Eigen::Vector3d horizontal = Eigen::Vector3d::UnitX();  ///< unit vector
@@ -57,12 +58,19 @@ DrawingPlane drawing_plane(const Machine& machine, const Eigen::VectorXd& q);
 /// Barrels are drawn a little shorter than the cylinder's shortest length.
 std::vector<MachinePart> machine_parts(const Machine& machine, const Eigen::VectorXd& q);
 
+/// The horizontal plane seen from above, in the base frame's coordinates where gravity is along -z.
+DrawingPlane top_plane(const Machine& machine);
+
 /// Projects machine_parts() onto drawing_plane() at the same configuration.
 DrawingFrame drawing_frame(const Machine& machine, const Eigen::VectorXd& q, double time = 0.0);
+/// Projects machine_parts() onto a given plane.
+DrawingFrame drawing_frame(const Machine& machine, const Eigen::VectorXd& q, double time,
+                           const DrawingPlane& plane);
 
 /// Returns `count` frames evenly spaced in time over a motion, with joint coordinates interpolated linearly between its
 /// instants; one frame when the motion has a single instant, none when it has none.
+/// @param fixed plane of all frames; absent: that of the arm at each instant
 std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajectory& motion,
-                                         int count);
+                                         int count, const std::optional<DrawingPlane>& fixed = {});
 
 }  // namespace sparflow

@@ -12,4 +12,13 @@ namespace sparflow {
 std::vector<DrawingObstacle> cut_obstacles(const std::vector<Obstacle>& obstacles,
                                            const DrawingPlane& plane);
 
+/// Names of the obstacles that cut_obstacles() leaves out.
+std::vector<std::string> obstacles_beside(const std::vector<Obstacle>& obstacles,
+                                          const DrawingPlane& plane);
+
+/// Returns the outline of each obstacle as seen along the plane's normal, wherever it stands; half-spaces are cut, and left
+/// out where their border is parallel to the plane (the ground from above).
+std::vector<DrawingObstacle> outline_obstacles(const std::vector<Obstacle>& obstacles,
+                                               const DrawingPlane& plane);
+
 }  // namespace sparflow

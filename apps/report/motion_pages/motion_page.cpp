@@ -33,7 +33,8 @@ struct Curves {
   VectorXd power;                  // [kW]
 };
 
-Curves curves_of(const CraneModel& model, const Trajectory& motion, double payload) {
+Curves curves_of(const CraneModel& model, const Trajectory& motion, double payload,
+                 const LeastFlows& least) {
   const Trajectory fine = motion.refined(4);
   const Eigen::Index rows = fine.size();
   const auto cylinders = static_cast<Eigen::Index>(model.cylinders.size());
@@ -55,7 +56,10 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
     for (Eigen::Index i = 0; i < cylinders; ++i) {
       const CylinderState& cylinder = s.cylinders[static_cast<std::size_t>(i)];
       c.flow(k, i) = cylinder.flow / units::kLitrePerMinute;
-      c.pressure(k, i) = cylinder.moving ? cylinder.pressure / units::kBar : std::nan("");
+      c.pressure(k, i) = cylinder.moving && firmly_moving(least, static_cast<std::size_t>(i),
+                                                          cylinder.flow, cylinder.speed)
+                             ? cylinder.pressure / units::kBar
+                             : std::nan("");
     }
     for (Eigen::Index p = 0; p < pumps; ++p) {
       c.pump_pressure(k, p) = s.pumps[static_cast<std::size_t>(p)].pressure / units::kBar;
@@ -66,9 +70,11 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
   return c;
 }
 
-std::vector<Eigen::Vector2d> tip_path(const Machine& machine, const Trajectory& motion) {
+std::vector<Eigen::Vector2d> tip_path(const Machine& machine, const Trajectory& motion,
+                                      const std::optional<DrawingPlane>& fixed = {}) {
   std::vector<Eigen::Vector2d> points;
-  for (const DrawingFrame& frame : drawing_frames(machine, motion, 80)) points.push_back(frame.tip);
+  for (const DrawingFrame& frame : drawing_frames(machine, motion, 80, fixed))
+    points.push_back(frame.tip);
   return points;
 }
 
@@ -81,34 +87,11 @@ std::optional<double> ground_of(const MotionProblem& problem) {
   return std::nullopt;
 }
 
-void add_crane(Page& page, const Machine& machine, const MotionProblem& problem,
-               const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
-  CraneDrawing drawing;
-  drawing.title = "The motion";
-  drawing.note =
-      "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the "
-      "tip" +
-      (baseline ? "; dashed: its path along " + baseline->name : std::string()) + ".";
-  drawing.group = "motion";
-  const DrawingPlane plane = drawing_plane(machine, problem.start);
-  drawing.x_axis = {plane.horizontal_name, "m"};
-  drawing.z_axis = {plane.vertical_name, "m"};
-  drawing.frames = drawing_frames(machine, result.motion, 90);
-  drawing.obstacles = cut_obstacles(problem.obstacles, plane);
-  if (baseline) drawing.paths.push_back({baseline->name, tip_path(machine, baseline->motion)});
-  if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
-    drawing.goal = drawing_plane(machine, result.motion.q.row(result.motion.size() - 1).transpose())
-                       .project(goal->tip);
-  }
-  drawing.ground = ground_of(problem);
-  drawing.payload = problem.payload > 0.0;
-  page.plot(std::move(drawing));
-}
-
 void add_curves(Page& page, const CraneModel& model, const MotionProblem& problem,
                 const OptimizeResult& result) {
   const Machine& machine = model.machine;
-  const Curves c = curves_of(model, result.motion, problem.payload);
+  const Curves c =
+      curves_of(model, result.motion, problem.payload, least_flows(machine, problem.limits));
   const auto chart = [&](const std::string& title, const std::string& label,
                          const std::string& unit) {
     LineChart out;
@@ -167,9 +150,10 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
       "Useful: working pressure times flow. Throttled: pump pressure above the working pressure, "
       "times "
       "flow; another cylinder, the margin or standby sets the pump pressure.";
-  std::vector<std::pair<std::string, MotionEnergy>> motions = {{"optimised", result.energy}};
+  std::vector<std::pair<std::string, MotionEnergy>> motions = {
+      {result.starts.empty() ? "this motion" : "optimised", result.energy}};
   if (baseline)
-    motions.emplace_back(baseline->name, exact_energy(model, baseline->motion, problem.payload));
+    motions.emplace_back(baseline->name, exact_energy(model, problem, baseline->motion));
   for (const auto& [name, energy] : motions) {
     for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
       if (!model.machine.cylinders[i].hydraulic()) continue;
@@ -224,6 +208,7 @@ void add_tables(Page& page, const OptimizeResult& result) {
     limits.rows.push_back({c.what, value, c.limit, c.unit, c.time, margin_cell(c)});
   }
   if (!result.checks.empty()) page.table(std::move(limits));
+  if (result.starts.empty()) return;
   Table starts;
   starts.title = "Starts";
   starts.columns = {{"from"},
@@ -260,7 +245,66 @@ void add_tables(Page& page, const OptimizeResult& result) {
 
 std::string seconds_text(double s) { return fmt::format("{:.2f}", s); }
 
+/// The same motion from above, where obstacles are outlines: for machines that do not stay in one vertical plane.
+CraneDrawing view_from_above(const Machine& machine, const MotionProblem& problem,
+                             const Trajectory& motion, const std::vector<ComparedMotion>& beside) {
+  const DrawingPlane plane = top_plane(machine);
+  CraneDrawing drawing;
+  drawing.title = "The motion from above";
+  drawing.note = "Obstacles are drawn as outlines, whatever their height.";
+  drawing.group = "motion";
+  drawing.x_axis = {plane.horizontal_name, "m"};
+  drawing.z_axis = {plane.vertical_name, "m"};
+  drawing.frames = drawing_frames(machine, motion, 90, plane);
+  drawing.obstacles = outline_obstacles(problem.obstacles, plane);
+  for (const ComparedMotion& other : beside)
+    drawing.paths.push_back({other.name, tip_path(machine, other.motion, plane)});
+  if (const auto* goal = std::get_if<TipGoal>(&problem.goal))
+    drawing.goal = plane.project(goal->tip);
+  drawing.payload = false;  // it hangs below the tip
+  return drawing;
+}
+
 }  // namespace
+
+void add_views(Page& page, const Machine& machine, const MotionProblem& problem,
+               const Trajectory& motion, const std::vector<ComparedMotion>& beside) {
+  CraneDrawing drawing;
+  drawing.title = "The motion";
+  std::vector<std::string> dashed;
+  for (const ComparedMotion& other : beside) dashed.push_back(other.name);
+  drawing.note = fmt::format(
+      "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the "
+      "tip{}.",
+      dashed.empty() ? "" : fmt::format("; dashed: its path along {}", fmt::join(dashed, ", ")));
+  drawing.group = "motion";
+  const DrawingPlane plane = drawing_plane(machine, problem.start);
+  const bool above = plane.turns || fixed_tip_directions(machine).empty();
+  const std::vector<std::string> missed = obstacles_beside(problem.obstacles, plane);
+  if (plane.turns && !problem.obstacles.empty()) {
+    drawing.note +=
+        " The view turns with the crane; obstacles are cut where the crane stands at the start.";
+  }
+  if (!missed.empty()) {
+    drawing.note += fmt::format(" Not in this view, because its plane does not meet {}: {}{}.",
+                                missed.size() > 1 ? "them" : "it", fmt::join(missed, ", "),
+                                above ? "; see the view from above" : "");
+  }
+  drawing.x_axis = {plane.horizontal_name, "m"};
+  drawing.z_axis = {plane.vertical_name, "m"};
+  drawing.frames = drawing_frames(machine, motion, 90);
+  drawing.obstacles = cut_obstacles(problem.obstacles, plane);
+  for (const ComparedMotion& other : beside)
+    drawing.paths.push_back({other.name, tip_path(machine, other.motion)});
+  if (const auto* goal = std::get_if<TipGoal>(&problem.goal)) {
+    drawing.goal =
+        drawing_plane(machine, motion.q.row(motion.size() - 1).transpose()).project(goal->tip);
+  }
+  drawing.ground = ground_of(problem);
+  drawing.payload = problem.payload > 0.0;
+  page.plot(std::move(drawing));
+  if (above) page.plot(view_from_above(machine, problem, motion, beside));
+}
 
 void add_motion(Page& page, const CraneModel& model, const MotionProblem& problem,
                 const OptimizeResult& result, const std::optional<ComparedMotion>& baseline) {
@@ -321,7 +365,9 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
                     100.0 * result.energy.moving_share_outside_data,
                     result.energy.largest_pressure_std / units::kBar));
   }
-  add_crane(page, model.machine, problem, result, baseline);
+  std::vector<ComparedMotion> others;
+  if (baseline) others.push_back(*baseline);
+  add_views(page, model.machine, problem, result.motion, others);
   add_curves(page, model, problem, result);
   add_losses(page, model, problem, result, baseline);
   add_tables(page, result);

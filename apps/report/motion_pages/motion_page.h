@@ -2,6 +2,7 @@
 /// The page and the texts of optimize.
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/report/page/page.h"
 #include "optimizer/solve/optimize.h"
@@ -13,6 +14,11 @@ struct ComparedMotion {
   std::string name;
   Trajectory motion;
 };
+
+/// Appends drawings of a motion with the problem's obstacles, and the paths of the tip along other motions: from the side,
+/// and from above where the machine does not stay in one vertical plane. Obstacles that a view cannot show are named.
+void add_views(Page& page, const Machine& machine, const MotionProblem& problem,
+               const Trajectory& motion, const std::vector<ComparedMotion>& beside);
 
 /// Appends the motion: crane at several instants, joint speeds, flows, pressures, power, throttling loss of each
 /// cylinder, limits at their worst, all starts.

@@ -51,7 +51,9 @@ std::vector<BrokenLog> broken_logs() {
       {"rows too short", kHeader + "0.00,0.5\n0.02,0.5\n" + rows(2, 6),
        "log.csv:2: 2 values where the header names 4 columns; every row needs one value (or "
        "nothing "
-       "between separators) for each column"},
+       "between separators) for each column. If lines of text stand before the header, a mapping "
+       "file "
+       "says how many: skip_rows: N"},
       {"thousands separators, European",
        "t_s;q_boom_rad;q_extension_m;force_boom_N\n0,00;0,5;1,5;1.234,5\n",
        "log.csv:2: force_boom_N: got \"1.234,5\", expected a number without thousands separators; "
@@ -83,7 +85,9 @@ std::vector<BrokenLog> broken_logs() {
       {"no time", "Time [ms],q_boom_rad,q_extension_m\n0,0.5,1\n20,0.5,1\n",
        "log.csv:1: t_s: no column of this name; found Time [ms], q_boom_rad, q_extension_m; rename "
        "the "
-       "column of time, or give a mapping file with columns: {t_s: \"...\"}"},
+       "column of time, or give a mapping file with columns: {t_s: \"...\"}, and skip_rows: N if "
+       "lines of "
+       "text stand before the header"},
       {"clock time", "t_s,q_boom_rad,q_extension_m\n12:00:01,0.5,1\n12:00:02,0.5,1\n",
        "log.csv:2: t_s: got \"12:00:01\", expected a number of seconds from any start; export "
        "relative "

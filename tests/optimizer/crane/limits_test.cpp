@@ -141,6 +141,22 @@ TEST(ExactEnergy, SharesOfPumpsUsefulWorkAndDataAddUp) {
   EXPECT_NEAR(exact_energy(s.model, m, 0.0).moving_share_outside_data, 0.5, 1e-12);
 }
 
+TEST(ExactEnergy, ACreepingCylinderStandsButIsPaidFor) {
+  // 1 mm in two seconds is 0.5 mm/s on average: 0.24 l/min of the valve's 300, and its least flow is 1.5 l/min.
+  Slide s;
+  const Trajectory m = s.hop(0.5, 1e-3);
+  const MotionEnergy creeping = exact_energy(s.model, s.problem, m);
+  EXPECT_EQ(creeping.share_moving[0], 1.0);
+  EXPECT_EQ(creeping.share_moving[1], 0.0);
+  EXPECT_NEAR(creeping.creep[0], 1e-3, 1e-9);
+  EXPECT_EQ(creeping.total, exact_energy(s.model, m, 0.0).total)
+      << "a least flow never makes a motion cheaper";
+  s.problem.limits.valve_least_fraction = 0.0;
+  const MotionEnergy moving = exact_energy(s.model, s.problem, m);
+  EXPECT_EQ(moving.share_moving[1], 1.0);
+  EXPECT_EQ(moving.creep[0], 0.0);
+}
+
 /// The bundled lift with a synthetic model and straight lines to two goal configurations.
 struct Lift {
   MotionProblem problem = load_problem(bundled_file("reaches/loader_crane_lift.yaml"));
