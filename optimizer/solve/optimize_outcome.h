@@ -9,8 +9,8 @@ namespace sparflow {
 
 /// Relative difference up to which two costs count as equal: a motion of a solve that converged, or on a finer mesh, is then
 /// preferred.
-/// @threshold [1] 0..1e-3; chosen: a fifth of OptimizeOptions::mesh_error
-inline constexpr double kSameCost = 2e-5;
+/// @threshold [1] 0..1e-3; chosen: OptimizeOptions::mesh_error
+inline constexpr double kSameCost = 1e-4;
 
 /// Whether two motions are equal: all joints within a thousandth of their range at all of a's knots.
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b);

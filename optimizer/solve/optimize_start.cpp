@@ -130,7 +130,10 @@ class Start {
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
-    if (!problem_.obstacles.empty()) knot.near_postures = from.q;
+    if (!problem_.obstacles.empty()) {
+      knot.near_postures = from.q;
+      if (is_clear(from)) knot.clear_motion = from.q;
+    }
     spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
     if (options_.knot_wrapper) spec.knot = options_.knot_wrapper(knot, spec.knot);
     set_bounds(spec);
@@ -290,6 +293,14 @@ class Start {
 
   double problem_energy_weight() const {
     return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
+  }
+
+  /// Whether a motion keeps the clearance by the exact distance, between its knots too.
+  bool is_clear(const Trajectory& motion) {
+    const std::vector<LimitCheck>& checks = verdict(motion).checks;
+    return std::none_of(checks.begin(), checks.end(), [&](const LimitCheck& c) {
+      return c.what.starts_with("clearance") && c.excess > options_.limit_tolerance;
+    });
   }
 
   /// Remembers start and end posture of a motion if they are clear by the exact distance.

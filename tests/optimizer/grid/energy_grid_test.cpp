@@ -203,7 +203,7 @@ TEST(EnergyGrid, PathsThroughANarrowWindowAreClear) {
 TEST(SimplifyPath, KeepsAndCountsALineOfThePathThatIsRefused) {
   GridCase c("loader_crane_lift");
   MatrixXd path(4, 3);
-  path << 0.10, -1.6, 0.8, 0.20, -1.6, 0.8, 0.30, -1.6, 0.8, 0.30, -1.5, 0.8;
+  path << 0.10, -1.6, 0.8, 0.20, -1.6, 0.8, 0.30, -1.6, 0.8, 0.40, -1.6, 0.8;
   std::vector<Range> forces(static_cast<std::size_t>(c.model.machine.cylinder_count()),
                             Range{-3e5, 3e5});
   MovePricer pricer(c.model, c.problem, c.problem.machine, forces);
