@@ -381,12 +381,8 @@ class Search {
               return optimize_with_phases(model_, problem_, {name(i), s.plan, s.motion, false},
                                           time, fine);
             }
-            const ModeCandidate c = on_mesh(name(i), s.motion, fine);
-            StartResult r = optimize_with_modes(model_, problem_, c, time, fine);
-            if (r.converged) return r;
-            // With the switching times held nothing may be near; with free ones the phases can give way.
-            return optimize_with_phases(
-                model_, problem_, {c.name, plan_of(c.modes, c.guess.t), c.guess, true}, time, fine);
+            return optimize_with_modes(model_, problem_, on_mesh(name(i), s.motion, fine), time,
+                                       fine);
           },
           name);
       // The coarse motion stays in the list for comparison, but is not a candidate of its own.
