@@ -143,7 +143,7 @@ std::vector<adouble> torques(const Machine& machine, const Taped& q, double payl
 
 adouble learned_mean(const GaussianProcess& process, const adouble& flow, const adouble& force) {
   const GpParameters& p = process.parameters();
-  adouble sum = p.mean_constant + p.mean_slope * force;
+  adouble sum = p.mean_constant + p.mean_slope * force + p.mean_flow_slope * flow;
   const adouble x = flow / p.length_flow, y = force / p.length_force;
   const double variance = p.signal_std * p.signal_std;
   for (Eigen::Index j = 0; j < p.weight.size(); ++j) {

@@ -81,7 +81,6 @@ ConfigurationSpace::ConfigurationSpace(const MotionProblem& problem, ClearanceMo
   for (unsigned i = 0; i < joints; ++i) {
     bounds.setLow(i, limits_[i].lo / scale_[i]);
     bounds.setHigh(i, limits_[i].hi / scale_[i]);
-    has_volume_ = has_volume_ && limits_[i].hi > limits_[i].lo;
   }
   space->setBounds(bounds);
   information_ = std::make_shared<ob::SpaceInformation>(space);

@@ -20,8 +20,6 @@ class ConfigurationSpace {
   ConfigurationSpace(const MotionProblem& problem, ClearanceModel& clearance);
 
   const ompl::base::SpaceInformationPtr& information() const { return information_; }
-  /// Whether the product of the ranges is positive, as informed planners need it.
-  bool has_volume() const { return has_volume_; }
   void write(const Eigen::VectorXd& q, ompl::base::State* state) const;
   void read(const ompl::base::State* state, double* q) const;
   /// Waypoints x joints, [rad] or [m], within the limits.
@@ -31,7 +29,6 @@ class ConfigurationSpace {
   Eigen::VectorXd scale_;
   std::vector<Range> limits_;
   ompl::base::SpaceInformationPtr information_;
-  bool has_volume_ = true;
 };
 
 }  // namespace sparflow

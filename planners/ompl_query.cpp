@@ -5,7 +5,6 @@
 #include <ompl/base/goals/GoalStates.h>
 #include <ompl/base/objectives/PathLengthOptimizationObjective.h>
 #include <ompl/geometric/PathSimplifier.h>
-#include <ompl/geometric/planners/informedtrees/BITstar.h>
 #include <ompl/geometric/planners/rrt/RRTConnect.h>
 #include <ompl/util/Console.h>
 #include <ompl/util/RandomNumbers.h>
@@ -63,10 +62,6 @@ void shorten(og::PathSimplifier& simplifier, og::PathGeometric& path, const Quer
 
 }  // namespace
 
-const char* name(PathPlanner planner) {
-  return planner == PathPlanner::kRrtConnect ? "RRT-Connect" : "BIT*";
-}
-
 std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space,
                                           const Eigen::VectorXd& start, const PathQuery& query,
                                           const QueryLimits& limits) {
@@ -91,12 +86,7 @@ std::optional<Eigen::MatrixXd> query_path(const ConfigurationSpace& space,
   definition->setOptimizationObjective(
       std::make_shared<ob::PathLengthOptimizationObjective>(information));
 
-  ob::PlannerPtr solver;
-  if (query.planner == PathPlanner::kBitStar) {
-    solver = std::make_shared<og::BITstar>(information);
-  } else {
-    solver = std::make_shared<og::RRTConnect>(information);
-  }
+  const auto solver = std::make_shared<og::RRTConnect>(information);
   solver->setProblemDefinition(definition);
   solver->setup();
   int iteration = 0;

@@ -10,11 +10,8 @@
 
 namespace sparflow {
 
-enum class PathPlanner {
-  kRrtConnect,  ///< Kuffner and LaValle 2000: any path, fast; then shortened
-  kBitStar,     ///< Gammell, Srinivasa and Barfoot 2015: the shortest path it finds
-};
-const char* name(PathPlanner planner);
+/// The planner: Kuffner and LaValle 2000. It finds any path, which is then shortened.
+inline constexpr const char* kTreePlanner = "RRT-Connect";
 
 struct QueryLimits {
   /// Largest number of iterations of the planner's loop; this limit keeps results reproducible.
@@ -25,7 +22,6 @@ struct QueryLimits {
 };
 
 struct PathQuery {
-  PathPlanner planner;
   std::vector<Eigen::VectorXd> ends;
   std::uint32_t seed = 1;  ///< of the random numbers
 };

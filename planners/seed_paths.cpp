@@ -28,9 +28,6 @@ constexpr double kLimitSlack = 1e-9;
 /// @threshold [1] 0..0.5; chosen: planning to both would give the same path twice
 constexpr double kSameEnd = 0.02;
 constexpr const char* kStraight = "straight line";
-/// Divisor of the iterations that BIT* gets.
-/// @threshold [1] 1..1000; chosen: it gains little after that, and is slow
-constexpr int kBitStarShare = 10;
 /// Pairs of postures tested between two paths.
 /// @threshold [1] 4..1000; chosen: links move less than an obstacle's size between two
 constexpr int kDeformationSteps = 32;
@@ -252,27 +249,24 @@ class Search {
     for (const VectorXd& q : postures_) {
       if (std::find(ends_.begin(), ends_.end(), q) == ends_.end()) others.push_back(q);
     }
-    if (!others.empty()) queries.push_back({PathPlanner::kRrtConnect, others});
-    if (!blocked_.empty() && space.has_volume()) queries.push_back({PathPlanner::kBitStar, ends_});
+    if (!others.empty()) queries.push_back({others});
+    if (!blocked_.empty()) queries.push_back({ends_});
     // Each blocked end gets several queries, because other random trees can find other homotopy classes.
     /// Queries to each blocked end.
     /// @threshold [1] 1..100; chosen: other random trees can find other homotopy classes
     constexpr int kTries = 3;
     for (int t = 0; t < kTries; ++t) {
-      for (const VectorXd& end : blocked_) queries.push_back({PathPlanner::kRrtConnect, {end}});
+      for (const VectorXd& end : blocked_) queries.push_back({{end}});
     }
     const QueryLimits limits{options_.iterations, deadline_, &result_.out_of_time};
     for (std::size_t i = 0; i < queries.size() && !late(); ++i) {
       tell(static_cast<double>(i + 1) / static_cast<double>(queries.size() + 1),
-           fmt::format("{} {} of {}", name(queries[i].planner), i + 1, queries.size()));
-      QueryLimits own = limits;
-      if (queries[i].planner == PathPlanner::kBitStar)
-        own.iterations = options_.iterations / kBitStarShare;
+           fmt::format("{} {} of {}", kTreePlanner, i + 1, queries.size()));
       // The factor 2654435761 keeps the queries of neighbouring user seeds apart.
       queries[i].seed =
           static_cast<std::uint32_t>((options_.random_seed * 2654435761u + i) % 0x7fffffffu);
-      auto path = query_path(space, problem_.start, queries[i], own);
-      if (path) add(std::move(*path), name(queries[i].planner));
+      auto path = query_path(space, problem_.start, queries[i], limits);
+      if (path) add(std::move(*path), kTreePlanner);
     }
   }
 
@@ -327,6 +321,11 @@ class Search {
 };
 
 }  // namespace
+
+bool may_have_a_path(const MotionProblem& problem, SeedStatus status) {
+  return status == SeedStatus::kFound || status == SeedStatus::kNoPath ||
+         (status == SeedStatus::kGoalInCollision && std::holds_alternative<TipGoal>(problem.goal));
+}
 
 SeedResult find_seed_paths(const MotionProblem& problem, const SeedOptions& options) {
   if (!problem.waypoints.empty()) return find_paths_through_waypoints(problem, options);

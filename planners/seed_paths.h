@@ -39,9 +39,13 @@ enum class SeedStatus {
   kNoPath,           ///< none found within iterations and time; a path may still exist
 };
 
+/// Whether a motion can exist although the search ended with this status: a path may be missed, and so may be a clear goal
+/// configuration where the goal is a tip; the other failures are properties of the problem.
+bool may_have_a_path(const MotionProblem& problem, SeedStatus status);
+
 struct SeedPath {
   Eigen::MatrixXd path;  ///< waypoints x joints, first = start, [rad] or [m]; straight between them
-  std::string planner;   ///< "straight line", "RRT-Connect", "BIT*", "tip line"
+  std::string planner;   ///< "straight line", "RRT-Connect", "tip line"
   double length = 0.0;   ///< path_length() [s]
 };
 

@@ -195,6 +195,58 @@ Trajectory spline_motion(const MatrixXd& c, double h) {
   return motion;
 }
 
+namespace {
+
+/// The profile along a straight line at equally distant instants, one second apart. Positions follow from the speeds by
+/// the trapezoidal rule, so that accelerations are constant between the instants and no rounding of the profile is needed.
+Trajectory straight_motion(const Grid& grid, const Run& run, int intervals) {
+  const VectorXd way = grid.q.back() - grid.q.front();
+  VectorXd speed = VectorXd::Zero(intervals + 1);  // shares of the way in a second, up to a factor
+  std::size_t piece = 0;
+  for (int k = 1; k < intervals; ++k) {
+    const double when = run.t.back() * k / intervals;
+    while (piece + 2 < run.t.size() && run.t[piece + 1] < when) ++piece;
+    const double share = (when - run.t[piece]) / (run.t[piece + 1] - run.t[piece]);
+    speed[k] = (1.0 - share) * run.speed[piece] + share * run.speed[piece + 1];
+  }
+  speed /= speed.sum();
+  Trajectory motion;
+  motion.t.setLinSpaced(intervals + 1, 0.0, intervals);
+  motion.q.resize(intervals + 1, way.size());
+  motion.q.row(0) = grid.q.front();
+  motion.qd = speed * way.transpose();
+  motion.qdd.setZero(intervals + 1, way.size());
+  for (int k = 0; k < intervals; ++k) {
+    motion.qdd.row(k) = motion.qd.row(k + 1) - motion.qd.row(k);
+    motion.q.row(k + 1) = motion.q.row(k) + 0.5 * (motion.qd.row(k) + motion.qd.row(k + 1));
+  }
+  motion.qdd.row(intervals) = motion.qdd.row(intervals - 1);
+  motion.q.row(intervals) = grid.q.back();  // removes rounding errors
+  return motion;
+}
+
+/// The path's motion with intervals of one second.
+Trajectory unit_motion(const MotionProblem& problem, const std::vector<VectorXd>& waypoints,
+                       bool round, ClearanceModel& clearance, int intervals) {
+  MatrixXd control(intervals, waypoints.front().size());
+  if (waypoints.size() == 1) {
+    control.rowwise() = waypoints.front().transpose();
+    return spline_motion(control, 1.0);
+  }
+  const Grid grid = sample(problem, waypoints, round, clearance);
+  const Run run = fastest(problem, grid);
+  if (waypoints.size() == 2) return straight_motion(grid, run, intervals);
+  std::size_t piece = 0;
+  for (int k = 0; k < intervals; ++k) {
+    control.row(k) = point_at(grid, run, run.t.back() * k / (intervals - 1), piece);
+  }
+  control.row(0) = waypoints.front();
+  control.row(intervals - 1) = waypoints.back();
+  return spline_motion(control, 1.0);
+}
+
+}  // namespace
+
 TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path, double duration,
                              const TimingOptions& options) {
   SPARFLOW_CHECK(options.intervals >= 8, "a timed motion has at least 8 intervals");
@@ -210,21 +262,8 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
   ClearanceModel clearance(problem);
   TimedMotion result;
   for (const bool round : {true, false}) {
-    MatrixXd control(intervals, path.cols());
-    if (waypoints.size() == 1) {
-      control.rowwise() = waypoints.front().transpose();
-    } else {
-      const Grid grid = sample(problem, waypoints, round, clearance);
-      const Run run = fastest(problem, grid);
-      std::size_t piece = 0;
-      for (int k = 0; k < intervals; ++k) {
-        control.row(k) = point_at(grid, run, run.t.back() * k / (intervals - 1), piece);
-      }
-      control.row(0) = path.row(0);
-      control.row(intervals - 1) = path.bottomRows(1);
-    }
     // Ratios at intervals of 1 s give the factor by which time must be stretched.
-    const Trajectory unit = spline_motion(control, 1.0);
+    const Trajectory unit = unit_motion(problem, waypoints, round, clearance, intervals);
     LimitRatios limits(problem);
     double interval = kLeastInterval;
     std::string name;
@@ -244,8 +283,12 @@ TimedMotion time_parametrise(const MotionProblem& problem, const MatrixXd& path,
     result.shortest = interval * intervals;
     const bool too_short = duration > 0.0 && duration < result.shortest;
     const double taken = duration > 0.0 && !too_short ? duration : result.shortest;
-    result.motion = spline_motion(control, taken / intervals);
+    const double h = taken / intervals;
+    result.motion = unit;
+    result.motion.t *= h;
     result.motion.t[intervals] = taken;
+    result.motion.qd /= h;
+    result.motion.qdd /= h * h;
     result.stops = !round && waypoints.size() > 2;
     const Nearest nearest = clearance.nearest_on(result.motion, kFine);
     result.clearance = nearest.distance;

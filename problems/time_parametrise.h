@@ -24,8 +24,8 @@ struct TimedMotion {
   std::string message;  ///< one sentence
   Trajectory motion;    ///< rest to rest, constant acceleration in each interval
   double shortest =
-      0.0;            ///< shortest duration of this path with this profile [s]: an upper bound of
-                      ///< the path's minimum time, usually a few per cent above it
+      0.0;  ///< shortest duration of this path with this profile [s]: an upper bound of
+            ///< the path's minimum time, usually one per cent above it, less on a straight line
   std::string limit;  ///< the limit that determines it, e.g. "flow of pump main"
   bool stops =
       false;  ///< true when corners could not be rounded: the motion stops at each waypoint
@@ -40,6 +40,7 @@ struct TimedMotion {
 ///  3. Points at equal times on it are the control points of a uniform quadratic B-spline: exactly
 ///     the piecewise constant acceleration of Trajectory, without ringing, inside the control
 ///     polygon's hull (so within position limits), its first two and last two control points equal (rest).
+///     A straight line needs no rounding: its speeds at equal times are the profile's, and its positions follow from them.
 ///  4. All limits are evaluated on that motion (speed at knots and acceleration per interval, which is
 ///     exact; flows at 16 instants an interval, with a margin for what lies between) and the time is
 ///     stretched so that the most violated one just holds. Stretching

@@ -36,6 +36,7 @@ int exit_code(OptimizeStatus status) {
       return kDone;
     case OptimizeStatus::kInterrupted:
       return kInterrupted;
+    case OptimizeStatus::kFeasible:
     case OptimizeStatus::kInfeasible:
     case OptimizeStatus::kFailed:
       return kNotSolved;
@@ -43,8 +44,14 @@ int exit_code(OptimizeStatus status) {
   return kInternal;
 }
 
-OptimizeResult no_seed(const MotionProblem& problem, const Seeds& seeds) {
+/// Without a seed path: from paths of the joint grid, unless the planner has shown that there is no motion.
+OptimizeResult without_seeds(const CraneModel& model, const MotionProblem& problem,
+                             const Seeds& seeds, const OptimizeOptions& options) {
   OptimizeResult result;
+  if (may_have_a_path(problem, seeds.paths.status)) {
+    result = optimize(model, problem, {}, options);
+    if (result.motion.size() > 1 || !result.starts.empty()) return result;
+  }
   result.status = OptimizeStatus::kInfeasible;
   result.message = fmt::format("{}: infeasible. {}", problem.name, seeds.paths.message);
   for (const std::string& r : seeds.refused) result.message += " " + r + ".";
@@ -61,6 +68,10 @@ void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
   result.bound_note = bound.message;
   if (!bound.valid) return;
   result.lower_bound = bound.lower_bound_J;
+  if (problem.idle_power > 0.0 && !problem.duration.fixed()) {
+    const TimedBound cost = cost_bound(model, problem, problem.idle_power);
+    if (cost.valid) result.lower_bound_cost = cost.value;
+  }
   // Within half a percent of the bound of any motion, the limited time can raise the energy by no more than that.
   const double time = problem.duration.max;
   if (!std::isfinite(time) || result.energy.total < 1.005 * bound.lower_bound_J) return;
@@ -84,7 +95,7 @@ void add_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
         set_bound(model, problem, r);
         Packer p;
         p.number(r.grid_path_energy).number(r.unlimited_energy).number(r.lower_bound);
-        p.number(r.lower_bound_time).text(r.bound_note);
+        p.number(r.lower_bound_time).number(r.lower_bound_cost).text(r.bound_note);
         return p.bytes();
       },
       interrupted);
@@ -98,6 +109,7 @@ void add_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
   result.unlimited_energy = u.number();
   result.lower_bound = u.number();
   result.lower_bound_time = u.number();
+  result.lower_bound_cost = u.number();
   result.bound_note = u.text();
 }
 
@@ -128,11 +140,13 @@ int run(const OptimizeArguments& a) {
     };
     if (a.from.empty()) {
       seeds = make_seeds(problem, seed_options, options.intervals);
-    } else {  // warm start: from the given motion only
+    } else {  // warm start
       seeds.motions.push_back({"previous motion", load_motion(a.from, model.machine), 0.0, false});
       seeds.motions.back().shortest_duration = seeds.motions.back().motion.duration();
-      options.sequential_starts = options.grid_starts = options.smooth_starts = 0;
-      options.sequence_rounds = 1;
+      // Beside it one path of the grid, because another goal or payload may ask for another sequence of moves.
+      options.sequential_starts = options.smooth_starts = 0;
+      options.grid_starts = 1;
+      options.sequence_rounds = 2;
     }
     progress(0.2, fmt::format("solving from {} paths", seeds.motions.size()));
     finish_on_interrupt();
@@ -140,7 +154,7 @@ int run(const OptimizeArguments& a) {
       progress(0.2 + 0.8 * done / std::max(1, all), what);
       return !interrupted();
     };
-    result = seeds.motions.empty() ? no_seed(problem, seeds)
+    result = seeds.motions.empty() ? without_seeds(model, problem, seeds, options)
                                    : optimize(model, problem, seeds.motions, options);
   }
   if (a.bound && result.motion.size() > 1) {
@@ -198,9 +212,10 @@ void add_optimize_verb(CLI::App& app, int& code) {
                  "also report the energy found by dynamic programming on a joint grid, the energy "
                  "at unlimited "
                  "time and an estimated lower bound (docs/energy_bound.md)");
-  verb->add_option("--from", a->from,
-                   "start from this motion only (CSV of an earlier run, for another goal or "
-                   "payload)")
+  verb->add_option(
+          "--from", a->from,
+          "start from this motion (CSV of an earlier run, for another goal or payload) and "
+          "one path of the joint grid")
       ->type_name("MOTION.csv")
       ->check(CLI::ExistingFile);
   a->outputs.add_to(*verb);

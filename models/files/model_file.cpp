@@ -9,6 +9,7 @@
 #include "models/files/machine_file.h"
 #include "models/files/model_file_cursor.h"
 #include "models/files/model_file_effects.h"
+#include "models/hydraulics/uninformed_length.h"
 
 namespace sparflow {
 namespace {
@@ -178,6 +179,7 @@ GaussianProcess read_process(const Cursor& c) {
   }
   if (c.has("corner")) p.corner = read_corner(c.at("corner", ""));
   if (c.has("beyond")) p.beyond = read_beyond(c.at("beyond", ""));
+  replace_uninformed_lengths(p);
   try {
     return GaussianProcess(std::move(p));
   } catch (const InputError& error) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -74,6 +75,8 @@ class CurveSearch {
   /// Points are dense near the shortest duration, where the curve is steep; each optimum starts the next.
   /// @param low shortest duration [s]
   void add_points(double low);
+  /// Adds durations at which energy + idle power x time is least, by parabolas through the points around it.
+  void add_idle_points();
   /// Where a shorter duration has the cheaper motion, that motion is driven slower.
   void drive_shorter_slower();
 
@@ -142,6 +145,50 @@ void CurveSearch::add_points(double low) {
             [](const ParetoPoint& a, const ParetoPoint& b) { return a.duration < b.duration; });
 }
 
+/// Abscissa at which the parabola through three points is least, between the outer ones; x[1] where it has no least value.
+double least_of_parabola(const std::array<double, 3>& x, const std::array<double, 3>& y) {
+  const double left = (y[1] - y[0]) / (x[1] - x[0]), right = (y[2] - y[1]) / (x[2] - x[1]);
+  const double bend = (right - left) / (x[2] - x[0]);
+  if (!(bend > 0.0)) return x[1];
+  return std::clamp(0.5 * (x[0] + x[1]) - 0.5 * left / bend, x[0], x[2]);
+}
+
+void CurveSearch::add_idle_points() {
+  /// Parabolas for each idle power.
+  /// @threshold [1] 0..10; chosen: the second one corrects what the curve's steps hide from the first
+  constexpr int kParabolas = 2;
+  /// Distance of two durations, in the logarithm, below which a further point tells nothing.
+  /// @threshold [1] 1e-4..0.1; chosen: near the optimum the cost changes with the square of it
+  constexpr double kNear = 0.01;
+  for (const double power : options_.idle_powers) {
+    for (int round = 0; round < kParabolas && go_on_ && !stopped(); ++round) {
+      const std::vector<ParetoPoint>& all = curve_.points;
+      const auto cost = [&](std::size_t i) {
+        return all[i].optimal.energy.total + power * all[i].duration;
+      };
+      std::size_t best = 0;
+      for (std::size_t i = 1; i < all.size(); ++i) {
+        if (cost(i) < cost(best)) best = i;
+      }
+      if (best == 0 || best + 1 >= all.size()) break;
+      std::array<double, 3> x{}, y{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        x[k] = std::log(all[best + k - 1].duration);
+        y[k] = cost(best + k - 1);
+      }
+      const double at = least_of_parabola(x, y);
+      const bool known = std::any_of(x.begin(), x.end(),
+                                     [&](double other) { return std::abs(at - other) < kNear; });
+      if (known) break;
+      ParetoPoint p = point_at(std::exp(at), false);
+      if (!p.optimal.found()) break;
+      curve_.points.push_back(std::move(p));
+      std::sort(curve_.points.begin(), curve_.points.end(),
+                [](const auto& a, const auto& b) { return a.duration < b.duration; });
+    }
+  }
+}
+
 void CurveSearch::drive_shorter_slower() {
   for (std::size_t i = 1; i < curve_.points.size() && go_on_; ++i) {
     ParetoPoint& p = curve_.points[i];
@@ -186,6 +233,7 @@ ParetoCurve CurveSearch::filled() {
     return std::move(curve_);
   }
   curve_.shortest = curve_.points.front().duration;
+  add_idle_points();
   drive_shorter_slower();
   curve_.idle = idle_choices(curve_.points, options_.idle_powers);
   curve_.interrupted = stopped() || !go_on_;

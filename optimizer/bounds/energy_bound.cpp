@@ -104,7 +104,15 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
     bound.checked_scale = 1.0 / ratio;
     potential.scale(bound.checked_scale);
   }
-  const LeastOnGoal least = least_on_goal(problem, *loaded, potential, options.goal_accuracy);
+  const LeastOnGoal least = least_on_goal(problem, *loaded, potential,
+                                          {options.goal_accuracy, 2e-3, options.most_goal_cuts});
+  bound.capped = least.capped;
+  if (least.capped) {
+    bound.message = fmt::format(
+        "the search on the goal set ended at {} boxes: the bound is what was shown until then and "
+        "may be low",
+        options.most_goal_cuts);
+  }
   bound.valid = least.reachable;
   if (!least.reachable) bound.message = "no posture within the limits puts the tip at its goal";
   bound.lower_bound_J = least.lower;

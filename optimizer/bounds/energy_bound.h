@@ -28,6 +28,9 @@ struct EnergyBoundOptions {
   /// Relative accuracy of the least potential over the goal set.
   /// @threshold [1] 1e-6..1e-2; chosen: far below what the grid costs the bound
   double goal_accuracy = 2e-4;
+  /// Boxes of postures cut at most on the goal set (GoalAccuracy::most_cuts).
+  /// @threshold [boxes] 1..1e9; chosen: as GoalAccuracy::most_cuts
+  long most_goal_cuts = 1000000;
 };
 
 struct EnergyBound {
@@ -38,6 +41,9 @@ struct EnergyBound {
   std::vector<int> lines;  ///< number of grid lines by joint
   double checked_scale =
       1.0;  ///< factor <= 1 on the potential, by which its inequality holds at all sampled postures
+  /// Whether the search on the goal set ended at EnergyBoundOptions::most_goal_cuts; then `message` says so, and the bound,
+  /// which is valid, may be far below the least energy.
+  bool capped = false;
   double seconds = 0.0;  ///< wall time
 };
 

@@ -106,7 +106,7 @@ class GoalSearch {
   /// Opens the cells that can hold the goal; they are found by halving ranges of grid lines.
   void open_cells();
   /// Cuts the box of the least potential until it is as accurate as wanted.
-  void narrow(double accuracy, double tip_accuracy);
+  void narrow(const GoalAccuracy& accuracy);
   const LeastOnGoal& result() const { return result_; }
 
  private:
@@ -225,18 +225,19 @@ void GoalSearch::cut(const PostureBox& box, int joint) {
   }
 }
 
-void GoalSearch::narrow(double accuracy, double tip_accuracy) {
-  /// Boxes after which the search ends.
-  /// @threshold [boxes] 1000..1e8; chosen: ends a search that no longer narrows; the least value of the open boxes is
-  /// a bound at any time
-  constexpr long kMostBoxes = 400000;
+void GoalSearch::narrow(const GoalAccuracy& accuracy) {
+  long cuts = 0;
   while (!open_.empty()) {
     PostureBox box = open_.top();
-    result_.lower = box.least;
+    // The least box of all comes first, and cutting raises it: what was shown once stays.
+    result_.lower = std::max(result_.lower, box.least);
     result_.q = 0.5 * (box.lo + box.hi);
     survey(box);
-    const auto [joint, beyond] = coarsest_side(box, accuracy, tip_accuracy);
-    if (beyond <= 1.0 || ++result_.boxes > kMostBoxes) return;
+    const auto [joint, beyond] = coarsest_side(box, accuracy.value, accuracy.tip);
+    if (beyond <= 1.0) return;
+    result_.capped = ++cuts > accuracy.most_cuts;
+    if (result_.capped) return;
+    ++result_.boxes;
     open_.pop();
     cut(box, joint);
   }
@@ -246,12 +247,17 @@ void GoalSearch::narrow(double accuracy, double tip_accuracy) {
 }  // namespace
 
 LeastOnGoal least_on_goal(const MotionProblem& problem, const Machine& machine,
-                          const EnergyPotential& potential, double accuracy, double tip_accuracy) {
-  if (const auto* goal = std::get_if<JointGoal>(&problem.goal))
-    return {true, potential.value(goal->q), goal->q};
+                          const EnergyPotential& potential, const GoalAccuracy& accuracy) {
+  if (const auto* goal = std::get_if<JointGoal>(&problem.goal)) {
+    LeastOnGoal known;
+    known.reachable = true;
+    known.lower = potential.value(goal->q);
+    known.q = goal->q;
+    return known;
+  }
   GoalSearch search(problem, machine, potential);
   search.open_cells();
-  search.narrow(accuracy, tip_accuracy);
+  search.narrow(accuracy);
   return search.result();
 }
 

@@ -351,6 +351,33 @@ bool EnergyPotential::sweep(unsigned order) {
   }
 }
 
+std::vector<long> EnergyPotential::path_to(long node) const {
+  std::vector<long> path = {node};
+  while (phi_[ix(node)] > 0.0) {
+    long before = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (int j = 0; j < lattice_.joints(); ++j) {
+      const long stride = lattice_.stride[ix(j)];
+      const int line = lattice_.line(node, j);
+      const auto consider = [&](long from, double step) {
+        if (phi_[ix(from)] + step >= least) return;
+        least = phi_[ix(from)] + step;
+        before = from;
+      };
+      if (line > 0)
+        consider(node - stride, static_cast<double>(cost_[ix(j)][0][ix(node - stride)]));
+      if (line + 1 < lattice_.lines[ix(j)].size())
+        consider(node + stride, static_cast<double>(cost_[ix(j)][1][ix(node)]));
+    }
+    // Edges without cost could lead round in a circle; each step therefore lowers the potential.
+    if (before < 0 || !(phi_[ix(before)] < phi_[ix(node)])) break;
+    node = before;
+    path.push_back(node);
+  }
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
 int EnergyPotential::cell_of(int joint, double q) const {
   const VectorXd& lines = lattice_.lines[ix(joint)];
   const auto* end = lines.data() + lines.size();

@@ -71,6 +71,8 @@ class EnergyPotential {
   double value(const Eigen::VectorXd& q) const;
   /// Gradient of value() inside a cell [J/rad] or [J/m].
   Eigen::VectorXd gradient(const Eigen::VectorXd& q) const;
+  /// Nodes of the shortest path from the start to a node, both included.
+  std::vector<long> path_to(long node) const;
   /// Weights of the nodes in value(q), by node; all are zero except at the corners of q's cell.
   std::vector<double> corner_weights(const Eigen::VectorXd& q) const;
   /// Puts other values at the nodes, so that value() and gradient() interpolate those.

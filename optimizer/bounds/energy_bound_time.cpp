@@ -24,14 +24,23 @@ struct TimedGrid {
   LatticeForces forces;
 };
 
+/// What is bounded from below: energy in a duration (energy_weight 1), the duration (energy_weight 0), or energy and a given
+/// price of time (price_W > 0, no duration).
+struct Wanted {
+  double energy_weight = 1.0;
+  double duration = 0.0;  // [s]
+  double price_W = 0.0;   // 0: the best one is searched for
+};
+
 class TimedSearch {
  public:
   TimedSearch(const CraneModel& model, const MotionProblem& problem,
-              const TimedBoundOptions& options, double energy_weight, double duration)
+              const TimedBoundOptions& options, const Wanted& wanted)
       : problem_(problem),
         options_(options),
-        energy_weight_(energy_weight),
-        duration_(duration),
+        energy_weight_(wanted.energy_weight),
+        duration_(wanted.duration),
+        price_given_(wanted.price_W > 0.0),
         loaded_(effective_machine(model.machine, model.effects)),
         n_(problem.start.size()) {
     const Lattice coarse = bound_lattice(problem, uniform(n_ <= 3 ? 12 : 8));
@@ -99,10 +108,10 @@ class TimedSearch {
     /// Share of the constant price's bound below which time costs too little for a search.
     /// @threshold [1] 0..0.1; chosen: the bound of unlimited time is as good
     constexpr double kShortTime = 0.01;
-    if (energy_weight_ > 0.0 && price * duration_ < kShortTime * constant) return {{base_, x}};
+    if (price_searched() && price * duration_ < kShortTime * constant) return {{base_, x}};
     TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
     double guide_price = price;
-    if (energy_weight_ > 0.0) {  // the price at which the guide's own bound is the largest
+    if (price_searched()) {  // the price at which the guide's own bound is the largest
       double best = guide.solve(price) - price * duration_;
       for (const double factor : {1.6, 1.0 / 1.6}) {
         const double before = best;
@@ -122,15 +131,13 @@ class TimedSearch {
     const TimeShares found = guide.shares(shares_);
     const Eigen::MatrixX2d constant_base = base_;
     /// First step of the search in the logarithms of the shares.
-    /// @threshold [1] 0.1..2; chosen: a factor of two in a share; the simplex then adapts its steps itself. It
+    /// @threshold [1] 0.1..2; chosen: a factor of two in a share; the climb then adapts its steps itself. It
     /// decides how soon the search ends, not whether the bound holds
     constexpr double kStep = 0.7;
-    /// Times the search begins anew with its first step.
-    /// @threshold [1] 1..10; chosen: a simplex can degenerate before it is at a maximum
-    constexpr int kTimes = 3;
     const auto searched = [&](const Eigen::MatrixX2d& base, const VectorXd& from) -> Found {
       base_ = base;
-      return {base, best_shares(g, from, kTimes * options_.evaluations, kStep)};
+      const VectorXd top = climbed(g, from, options_.evaluations, kStep);
+      return {base, best_shares(g, top, options_.evaluations / 2, 0.5 * kStep)};
     };
     std::vector<Found> all;
     bool better = false;
@@ -145,6 +152,9 @@ class TimedSearch {
     if (!better) all.push_back(searched(constant_base, y));
     return all;
   }
+
+  /// Whether the price of time is one of the variables.
+  bool price_searched() const { return energy_weight_ > 0.0 && !price_given_; }
 
   int guide_cells() const { return n_ == 1 ? 60 : n_ == 2 ? 40 : n_ == 3 ? 10 : 5; }
 
@@ -168,8 +178,7 @@ class TimedSearch {
     free.reserve(static_cast<std::size_t>(x.size()));
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       const Eigen::Index row = (i - n_ - 1) % (2 * n_);  // of a tilt: 2 j + direction
-      if (i == n_ ? energy_weight_ > 0.0 : i < n_ || base_(row / 2, row % 2) > 0.0)
-        free.push_back(i);
+      if (i == n_ ? price_searched() : i < n_ || base_(row / 2, row % 2) > 0.0) free.push_back(i);
     }
     return free;
   }
@@ -183,8 +192,86 @@ class TimedSearch {
     /// Resolution of the goal set while shares are searched.
     /// @threshold [m] 1e-3..0.2; chosen: a tenth of a cell; the final bound is computed with the finer one
     constexpr double kRoughTip = 0.02;
-    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kRough, kRoughTip);
+    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, {kRough, kRoughTip});
+    path_.clear();
+    if (least.reachable && path_wanted_) path_ = potential.path_to(g.lattice.nearest_node(least.q));
+    ramp_ = weights_->ramp_gain();
     return value_of(least.lower, shares_.price);
+  }
+
+  /// Cost of moving along the nodes of path_ with the shares of x. [J]
+  double cost_of_path(const TimedGrid& g, const VectorXd& x) {
+    set(x);
+    Eigen::MatrixX2d price;
+    double cost = 0.0;
+    for (std::size_t k = 0; k + 1 < path_.size(); ++k) {
+      const VectorXd a = g.lattice.posture(path_[k]), b = g.lattice.posture(path_[k + 1]);
+      Eigen::Index joint = 0;
+      const double way = (b - a).cwiseAbs().maxCoeff(&joint);
+      weights_->at(0.5 * (a + b), price);
+      cost += price(joint, b[joint] > a[joint] ? 0 : 1) * way;
+    }
+    return cost;
+  }
+
+  /// Gradient of the objective at x, for which it was evaluated last: the least potential is the length of a shortest path,
+  /// so it changes as the costs along that path do; the ramps' gain is held.
+  VectorXd gradient(const TimedGrid& g, const VectorXd& x, const std::vector<Eigen::Index>& free) {
+    /// Step of the differences, in logarithms.
+    /// @threshold [1] 1e-6..1e-2; numerical: costs are smooth in it, and accurate to kPriceTolerance
+    constexpr double kStep = 5e-3;
+    VectorXd slope(static_cast<Eigen::Index>(free.size()));
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      VectorXd y = x;
+      y[free[k]] += kStep;
+      const double ahead = cost_of_path(g, y);
+      y[free[k]] -= 2.0 * kStep;
+      const auto i = static_cast<Eigen::Index>(k);
+      slope[i] = (ahead - cost_of_path(g, y)) / (2.0 * kStep);
+      if (free[k] == n_) {
+        const double price = std::exp(x[n_]), time = ramp_ > 0.0 ? price / ramp_ : 0.0;
+        const bool short_ramps = duration_ - time > 0.5 * duration_;
+        slope[i] -= price * (short_ramps ? duration_ - 2.0 * time : 0.5 * duration_);
+      }
+    }
+    set(x);
+    return slope;
+  }
+
+  /// Ascent along the gradient, with part of the last direction kept where steps succeed, and shorter steps where not.
+  VectorXd climbed(const TimedGrid& g, VectorXd x, int evaluations, double step) {
+    const std::vector<Eigen::Index> free = free_entries(x);
+    path_wanted_ = true;
+    double best = objective(g, x);
+    VectorXd last = VectorXd::Zero(static_cast<Eigen::Index>(free.size()));
+    VectorXd slope = gradient(g, x, free);
+    int used = 2;
+    /// Step at which the climb ends.
+    /// @threshold [1] 1e-3..0.1; chosen: two per cent of a share changes the bound by less than the grid does
+    constexpr double kLeastStep = 0.02;
+    while (used < evaluations && step > kLeastStep && slope.norm() > 0.0) {
+      /// Share of the last direction in the next one.
+      /// @threshold [1] 0..0.95; chosen: along a ridge the components across it cancel
+      constexpr double kKept = 0.5;
+      const VectorXd direction = (slope.normalized() + kKept * last).normalized();
+      VectorXd y = x;
+      y(free) += step * direction;
+      const double value = objective(g, y);
+      ++used;
+      if (value > best) {
+        best = value;
+        x = y;
+        last = direction;
+        slope = gradient(g, x, free);
+        ++used;
+        step *= 1.5;
+        continue;
+      }
+      last.setZero();
+      step *= 0.5;
+    }
+    path_wanted_ = false;
+    return x;
   }
 
   /// The bound from the least potential over the goal when the maximised Hamiltonian nowhere exceeds `price`. Near the
@@ -194,6 +281,8 @@ class TimedSearch {
     /// Factor on the ramp's gain for postures between the nodes.
     /// @threshold [1] 1..1.2; chosen: two per cent for what lies between
     constexpr double kBetweenNodes = 1.02;
+    if (price_given_)
+      return least;  // the Hamiltonian is below the price given: see bound_with_time()
     price *= 1.0 + kPriceTolerance;
     const double ramp = kBetweenNodes * weights_->ramp_gain();
     const double time =
@@ -256,7 +345,8 @@ class TimedSearch {
     /// Relative accuracy of the least potential at the goal for the bound that is reported.
     /// @threshold [1] 1e-6..1e-2; chosen: as EnergyBoundOptions::goal_accuracy
     constexpr double kAccuracy = 2e-4;
-    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, kAccuracy);
+    const LeastOnGoal least = least_on_goal(problem_, *loaded_, potential, {kAccuracy});
+    bound.capped = least.capped;
     bound.valid = least.reachable;
     if (!least.reachable) bound.message = "no posture within the limits puts the tip at its goal";
     // The inequality is sampled away from the nodes. Where it fails, either the price is raised to the largest value met
@@ -265,7 +355,9 @@ class TimedSearch {
     bound.checked_scale = price / gain;
     const double charged = value_of(least.lower, gain);
     const double scaled = value_of(least.lower * bound.checked_scale, price);
-    bound.value = energy_weight_ > 0.0 ? std::max({0.0, charged, scaled}) : charged;
+    bound.value = price_given_           ? std::max(0.0, scaled)
+                  : energy_weight_ > 0.0 ? std::max({0.0, charged, scaled})
+                                         : charged;
     bound.price_W = energy_weight_ > 0.0 ? price : 0.0;
     bound.shares = shares_.share.rowwise().maxCoeff();
     return bound;
@@ -295,21 +387,24 @@ class TimedSearch {
   const MotionProblem& problem_;
   const TimedBoundOptions& options_;
   double energy_weight_, duration_;
+  bool price_given_;
   std::shared_ptr<const Machine> loaded_;
   Eigen::Index n_;
   std::unique_ptr<TimedWeights> weights_;
   TimeShares shares_;
   Eigen::MatrixX2d active_, base_;
+  bool path_wanted_ = false;  // whether objective() keeps the shortest path
+  std::vector<long> path_;    // nodes of that path, when it was evaluated last
+  double ramp_ = 0.0;         // ramps' gain then
 };
 
 TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem,
-                           const TimedBoundOptions& options, double energy_weight,
-                           double duration) {
+                           const TimedBoundOptions& options, const Wanted& wanted) {
   const auto begin = std::chrono::steady_clock::now();
   TimedBound bound;
   bound.message = no_bound_reason(model, problem, options.most_joints);
   if (!bound.message.empty()) return bound;
-  TimedSearch search(model, problem, options, energy_weight, duration);
+  TimedSearch search(model, problem, options, wanted);
   if (!search.possible()) {
     bound.message = "no bound: a joint's cylinders are fed by different pumps";
     return bound;
@@ -318,14 +413,18 @@ TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem
   MotionProblem open = problem;
   open.tip_line.reset();
   EnergyGrid grid(model, open, {8000, options.most_joints});
-  const GridPath path =
-      energy_weight > 0.0 ? grid.path_for_duration(duration) : grid.cheapest_path(1e6);
+  const GridPath path = wanted.price_W > 0.0         ? grid.cheapest_path(wanted.price_W)
+                        : wanted.energy_weight > 0.0 ? grid.path_for_duration(wanted.duration)
+                                                     : grid.cheapest_path(1e6);
   VectorXd moves = VectorXd::Zero(problem.start.size());
   double price = 1e3;
   if (path.found) {
     moves = (path.corners.bottomRows(1) - path.corners.topRows(1)).transpose();
-    price = std::max({price, path.price_W, 0.1 * path.energy_J / duration});
+    if (wanted.duration > 0.0)
+      price = std::max({price, path.price_W, 0.1 * path.energy_J / wanted.duration});
   }
+  // The Hamiltonian may exceed the price by its tolerance, so a price given is lowered by as much.
+  if (wanted.price_W > 0.0) price = wanted.price_W / (1.0 + kPriceTolerance);
   bound = search.run(moves, price);
   bound.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return bound;
@@ -336,7 +435,7 @@ TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem
 TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
                            const TimedBoundOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
-  TimedBound bound = bound_with_time(model, problem, options, 1.0, duration);
+  TimedBound bound = bound_with_time(model, problem, options, {1.0, duration, 0.0});
   if (!bound.valid) return bound;
   EnergyBoundOptions unlimited;
   unlimited.nodes = options.nodes;
@@ -353,9 +452,14 @@ TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem
   return bound;
 }
 
+TimedBound cost_bound(const CraneModel& model, const MotionProblem& problem, double price_W,
+                      const TimedBoundOptions& options) {
+  return bound_with_time(model, problem, options, {1.0, 0.0, price_W});
+}
+
 TimedBound least_duration(const CraneModel& model, const MotionProblem& problem,
                           const TimedBoundOptions& options) {
-  return bound_with_time(model, problem, options, 0.0, 1.0);
+  return bound_with_time(model, problem, options, {0.0, 1.0, 0.0});
 }
 
 }  // namespace sparflow

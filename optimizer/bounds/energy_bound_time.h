@@ -42,12 +42,18 @@ struct TimedBound {
   Eigen::VectorXd shares;      ///< by joint, the largest 1
   std::vector<int> lines;      ///< number of lines of the final grid by joint
   double checked_scale = 1.0;  ///< price / largest Hamiltonian sampled, <= 1
+  bool capped = false;         ///< whether the search on the goal set ended at its most boxes
   double seconds = 0.0;        ///< wall time
 };
 
 /// Estimated lower bound of the energy [J] of motions that take at most `duration` [s], idle power not included.
 TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
                            const TimedBoundOptions& options = {});
+
+/// Estimated lower bound of energy + price x duration [J] of motions of any duration, as idle power asks for it.
+/// @param price_W of time, positive
+TimedBound cost_bound(const CraneModel& model, const MotionProblem& problem, double price_W,
+                      const TimedBoundOptions& options = {});
 
 /// Estimated lower bound of the duration of a motion [s].
 TimedBound least_duration(const CraneModel& model, const MotionProblem& problem,

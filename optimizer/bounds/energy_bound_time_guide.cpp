@@ -184,7 +184,7 @@ double TimeGuide::solve(double price) {
   /// Resolution of the goal set.
   /// @threshold [m] 1e-4..0.1; chosen: the guide only proposes shares
   constexpr double kRoughTip = 0.01;
-  const LeastOnGoal least = least_on_goal(problem_, loaded_, potential_, kRough, kRoughTip);
+  const LeastOnGoal least = least_on_goal(problem_, loaded_, potential_, {kRough, kRoughTip});
   end_ = least.q;
   return least.reachable ? least.lower : kFar;
 }

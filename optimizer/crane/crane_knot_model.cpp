@@ -140,12 +140,14 @@ void CraneKnotModel::choose_clearance_rows() {
     return low;
   };
   const Eigen::VectorXd lower = least(options_.clear_postures, 0.0);
+  const Eigen::VectorXd known = least(options_.clear_motion, 0.0);
   const Eigen::VectorXd reach = least(options_.near_postures, kInfinity);
   std::vector<double> bounds;
   for (int r = 0; r < all; ++r) {
     if (options_.near_postures.rows() > 0 && reach[r] > kNearRow) continue;
     near_rows_.push_back(r);
-    bounds.push_back(lower[r] < 0.0 ? lower[r] : options_.extra_clearance);
+    const double wanted = known[r] + options_.extra_clearance;
+    bounds.push_back(lower[r] < 0.0 ? std::min(lower[r], wanted) : wanted);
   }
   clearance_rows_ = static_cast<int>(near_rows_.size());
   clearance_lower_ = Eigen::Map<const Eigen::VectorXd>(bounds.data(), clearance_rows_);

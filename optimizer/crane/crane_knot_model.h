@@ -41,6 +41,9 @@ struct CraneKnotOptions {
   /// Postures that are clear by the exact distance, one in each row. The smooth clearance rows are conservative by some
   /// centimetres; their lower bounds are lowered to their values there, or a goal near an obstacle could not be reached.
   Eigen::MatrixXd clear_postures;
+  /// Postures of a motion that is clear by the exact distance, one in each row. Rows are lowered to their values there too, so
+  /// that this motion keeps them; `extra_clearance` is added, as the exact check may refuse what the lower rows allow.
+  Eigen::MatrixXd clear_motion;
   /// Postures the solve starts from, one in each row: only clearance rows within kNearRow of zero in one of them are
   /// imposed (all of them if this is empty). The caller must check the exact distance afterwards.
   Eigen::MatrixXd near_postures;

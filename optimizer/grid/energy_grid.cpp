@@ -299,7 +299,28 @@ class EnergyGrid::Search {
     double cost = 0.0;
   };
 
-  RawPath dijkstra(double price) {
+  /// Whether the line of a move is clear. @param move node * steps + step
+  bool move_clear(std::uint64_t move, long from, long to) {
+    if (checked_.empty())
+      checked_.assign(static_cast<std::size_t>(lattice_.nodes) * steps_.size(), 0);
+    char& state = checked_[move];
+    if (state == 0) {
+      const VectorXd a = lattice_.posture(from), b = lattice_.posture(to);
+      state = clearance_->motion_clear(a.data(), b.data()) ? 1 : 2;
+    }
+    return state == 1;
+  }
+
+  /// Whether the line of a last move is clear; one that is not is blocked.
+  bool end_clear(std::size_t e) {
+    const VectorXd from = lattice_.posture(ends_[e].end.node);
+    const bool clear = clearance_->motion_clear(from.data(), ends_[e].end.q.data());
+    if (!clear) blocked_ends_.insert(e);
+    return clear;
+  }
+
+  /// @param check_moves whether every move is checked for clearance before it is used
+  RawPath dijkstra(double price, bool check_moves) {
     const std::size_t count = steps_.size();
     std::vector<double> cost(static_cast<std::size_t>(lattice_.nodes), kNoPath);
     std::vector<std::uint64_t> came(static_cast<std::size_t>(lattice_.nodes), 0);
@@ -322,10 +343,10 @@ class EnergyGrid::Search {
           if (blocked_ends_.contains(e)) continue;
           const double total =
               so_far + std::min(ends_[e].together.at_price(price), ends_[e].each.at_price(price));
-          if (total < best) {
-            best = total;
-            best_end = e;
-          }
+          if (!(total < best)) continue;
+          if (clearance_ && check_moves && !end_clear(e)) continue;
+          best = total;
+          best_end = e;
         }
       }
       lines_of(node, line);
@@ -336,6 +357,7 @@ class EnergyGrid::Search {
         const double through = so_far + moves_[from * count + s].at_price(price);
         if (!(through < cost[to])) continue;
         if (clearance_ && (blocked_.contains(from * count + s) || !node_clear(next))) continue;
+        if (clearance_ && check_moves && !move_clear(from * count + s, node, next)) continue;
         cost[to] = through;
         came[to] = from * count + s;
         open.emplace(through, next);
@@ -388,13 +410,13 @@ class EnergyGrid::Search {
   GridPath search(double price) {
     GridPath path;
     path.price_W = price;
-    RawPath raw = dijkstra(price);
-    /// Searches after which no further blocked edges are taken out.
-    /// @threshold [1] 10..1e5; chosen: each blocks at least one edge that collides; ends a search among ever new
-    /// collisions
-    constexpr int kMostBlocked = 400;
-    for (int tries = 0; raw.found && block(raw) && tries < kMostBlocked; ++tries) {
-      raw = dijkstra(price);
+    /// Searches in which only the moves of the path found are checked; afterwards every move is before it is used.
+    /// @threshold [1] 0..1e4; chosen: few collisions are found faster by checking paths alone, many by checking moves,
+    /// each of which is checked once
+    constexpr int kChecksOfPaths = 20;
+    RawPath raw;
+    for (int tries = 0; tries == 0 || (raw.found && block(raw)); ++tries) {
+      raw = dijkstra(price, tries >= kChecksOfPaths);
     }
     if (!raw.found) {
       path.message = "no path of the grid reaches the goal clear of the obstacles";
@@ -426,7 +448,9 @@ class EnergyGrid::Search {
         return clearance_->motion_clear(a.data(), b.data());
       };
     }
-    const Legs chosen = simplify_path(*pricer_, straight_runs(raw.points), legs);
+    Legs chosen = simplify_path(*pricer_, straight_runs(raw.points), legs);
+    // A long straight run is tested at other postures than its moves were.
+    if (chosen.refused > 0 && clearance_) chosen = simplify_path(*pricer_, raw.points, legs);
     path.found = true;
     path.corners = chosen.corners;
     path.slow_energy_J = chosen.slow_energy;
@@ -476,7 +500,8 @@ class EnergyGrid::Search {
   LatticeForces forces_;
   std::unique_ptr<MovePricer> pricer_;
   std::unique_ptr<ClearanceModel> clearance_;
-  std::vector<char> clear_;  // by node: 0 not checked, 1 clear, 2 in collision
+  std::vector<char> clear_;    // by node: 0 not checked, 1 clear, 2 in collision
+  std::vector<char> checked_;  // by move, the same
   std::vector<Step> steps_;
   std::vector<MoveCost> moves_;  // [nodes x steps]
   std::vector<PricedEnd> ends_;

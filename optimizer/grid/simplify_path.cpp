@@ -21,6 +21,15 @@ struct Jump {
   double cost = kNever;
 };
 
+/// Best way from the path's first corner to another one: with the fewest lines of the path that the exact checks refuse,
+/// and among these the cheapest.
+struct Way {
+  int refused = std::numeric_limits<int>::max();
+  double cost = kNever;
+  Eigen::Index before = 0;        // corner from which its last lines come
+  std::vector<VectorXd> corners;  // of its last lines, without the first
+};
+
 class LegChooser {
  public:
   LegChooser(MovePricer& pricer, const LegSearch& search) : pricer_(pricer), search_(search) {}
@@ -108,36 +117,39 @@ void join_legs(std::vector<VectorXd>& corners) {
 Legs simplify_path(MovePricer& pricer, const MatrixXd& path, const LegSearch& search) {
   LegChooser chooser(pricer, search);
   const Eigen::Index count = path.rows();
-  std::vector<double> cost(static_cast<std::size_t>(count), kNever);
-  std::vector<Eigen::Index> before(static_cast<std::size_t>(count), 0);
-  std::vector<Jump> jump(static_cast<std::size_t>(count));
-  cost[0] = 0.0;
+  std::vector<Way> way(static_cast<std::size_t>(count));
+  way[0].refused = 0;
+  way[0].cost = 0.0;
   for (Eigen::Index to = 1; to < count; ++to) {
-    const auto t = static_cast<std::size_t>(to);
-    // Adjacent corners come first: their connection is known to be clear, and its cost bounds the others.
+    Way& best = way[static_cast<std::size_t>(to)];
+    // Adjacent corners come first: the path itself connects them, and their cost bounds the others.
     for (Eigen::Index from = to - 1; from >= std::max<Eigen::Index>(0, to - kLongestJump); --from) {
-      const double bound = cost[t] - cost[static_cast<std::size_t>(from)];
+      const Way& until = way[static_cast<std::size_t>(from)];
+      if (until.refused > best.refused) continue;
+      const double bound = until.refused < best.refused ? kNever : best.cost - until.cost;
       if (!(bound > 0.0)) continue;
       Jump j = chooser.jump(path.row(from).transpose(), path.row(to).transpose(), bound);
-      if (!(j.cost < bound) && !(std::isinf(bound) && from + 1 == to)) continue;
-      if (j.corners.empty()) j.corners = {path.row(to).transpose()};
-      cost[t] = cost[static_cast<std::size_t>(from)] + j.cost;
-      before[t] = from;
-      jump[t] = std::move(j);
+      if (j.cost < bound) {
+        best = {until.refused, until.cost + j.cost, from, std::move(j.corners)};
+      } else if (from + 1 == to) {
+        // The path's own line stays, at no cost, where no line between its ends can be driven.
+        best = {until.refused + 1, until.cost, from, {path.row(to).transpose()}};
+      }
     }
   }
   std::vector<Eigen::Index> chosen;
-  for (Eigen::Index k = count - 1; k > 0; k = before[static_cast<std::size_t>(k)]) {
+  for (Eigen::Index k = count - 1; k > 0; k = way[static_cast<std::size_t>(k)].before) {
     chosen.push_back(k);
   }
   std::vector<VectorXd> corners = {path.row(0).transpose()};
   for (std::size_t i = chosen.size(); i-- > 0;) {
-    for (const VectorXd& q : jump[static_cast<std::size_t>(chosen[i])].corners) {
+    for (const VectorXd& q : way[static_cast<std::size_t>(chosen[i])].corners) {
       corners.push_back(q);
     }
   }
   join_legs(corners);
   Legs legs;
+  legs.refused = way.back().refused;
   legs.corners.resize(static_cast<Eigen::Index>(corners.size()), path.cols());
   for (std::size_t k = 0; k < corners.size(); ++k) {
     legs.corners.row(static_cast<Eigen::Index>(k)) = corners[k].transpose();

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "models/math/error.h"
 #include "optimizer/grid/energy_grid.h"
 #include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/grid_seeds.h"
 #include "optimizer/solve/optimize_outcome.h"
 #include "optimizer/solve/start_bytes.h"
+#include "problems/clearance.h"
 
 namespace sparflow {
 namespace {
@@ -36,9 +39,9 @@ constexpr double kShortOfTime = 2.0;
 /// @threshold [1] 1..5; chosen: about a quarter and two thirds more time, up to the duration of sequential motions
 constexpr double kSlower[] = {1.25, 1.6};
 
-/// Distance that starts keep from obstacles beyond the clearance.
-/// @threshold [m] 0..0.5; chosen: inflation of the smooth clearance rows, and sag between two knots
-constexpr double kRoomForTheRows = 0.04;
+/// Relative tolerance of solves that only compare starts and sequences.
+/// @threshold [1] 1e-8..1e-2; chosen: below kWorthAnotherRound and the mesh error of the search; the best are solved again
+constexpr double kSearchTolerance = 1e-4;
 
 /// All solves for one problem in one window of durations.
 class Search {
@@ -55,12 +58,15 @@ class Search {
     if (options.modes && options.free_phases && options.search_intervals > 0)
       coarse_.intervals = std::min(options.intervals, options.search_intervals);
     coarse_.phase_iterations = options.phase_iterations / 2;
+    if (options.modes && options.free_phases)
+      coarse_.tolerance = std::max(options.tolerance, kSearchTolerance);
     // Near obstacles a solve takes ten times longer, and seeds differ more than neighbouring sequences do.
     searched_ = problem.obstacles.empty() ? options.searched_starts : 1;
   }
 
   OptimizeResult run() {
     const auto begin = std::chrono::steady_clock::now();
+    searching_ = options_.modes && options_.free_phases;
     std::vector<ModeCandidate> one_by_one = sequences(time_.guess);
     if (short_of_time()) {
       for (const double slower : kSlower) {
@@ -71,6 +77,7 @@ class Search {
         }
       }
     }
+    drop_repeated(one_by_one);
     const std::size_t given = seeds_.size();
     expected_ = static_cast<int>(given + one_by_one.size());
     solve(
@@ -123,6 +130,33 @@ class Search {
     return found;
   }
 
+  /// Of candidates with the same phases to (nearly) the same goal configuration the first is kept: the phases' durations are
+  /// variables, so that the others would lead to the same motion.
+  void drop_repeated(std::vector<ModeCandidate>& candidates) const {
+    /// Difference of a joint's end position, as share of its range, up to which goal configurations count as the same.
+    /// @threshold [1] 0..0.5; chosen: a solve moves the end along the goal set by more than that
+    constexpr double kSameEnd = 0.05;
+    if (!options_.free_phases || !problem_.obstacles.empty()) return;
+    std::vector<PhasePlan> plans;
+    std::vector<ModeCandidate> kept;
+    for (ModeCandidate& c : candidates) {
+      PhasePlan plan = plan_of(c.modes, c.guess.t);
+      bool known = false;
+      for (std::size_t k = 0; k < kept.size() && !known; ++k) {
+        known = same_plan(plan, plans[k]);
+        for (Eigen::Index j = 0; known && j < c.guess.q.cols(); ++j) {
+          const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
+          known = std::abs(c.guess.q.bottomRows(1)(0, j) - kept[k].guess.q.bottomRows(1)(0, j)) <=
+                  kSameEnd * (r.hi - r.lo);
+        }
+      }
+      if (known) continue;
+      plans.push_back(std::move(plan));
+      kept.push_back(std::move(c));
+    }
+    candidates = std::move(kept);
+  }
+
   /// @param wanted duration of the paths [s]; if it is longer than the window allows, the caller shortens the motion
   std::vector<ModeCandidate> grid_candidates(double wanted) const {
     std::vector<ModeCandidate> found;
@@ -152,7 +186,7 @@ class Search {
     if (!problem_.obstacles.empty()) {
       // The smooth clearance rows keep a larger distance than the exact check, so paths with that distance are sought.
       MotionProblem wider = problem_;
-      wider.clearance += kRoomForTheRows;
+      wider.clearance = capsule_radius(problem_) + kRoomForTheRows;
       search(wider, options_.grid_starts);
     }
     return found;
@@ -172,6 +206,8 @@ class Search {
       StartResult r;
       if (child.ok) {
         r = unpack_start(child.bytes);
+        // A solve of the search is not one to the tolerance of results.
+        r.converged = r.converged && !searching_;
       } else {
         r.seed = name(i);
         r.message = child.error;
@@ -291,6 +327,17 @@ class Search {
     return std::max(0.0, std::max(excess - softness, -excess)) / s.energy_exact;
   }
 
+  /// A motion without phases and the modes that it has, on a mesh of equal intervals.
+  ModeCandidate on_mesh(const std::string& name, const Trajectory& motion,
+                        const OptimizeOptions& options) const {
+    ModeCandidate c;
+    c.name = name;
+    c.guess = resampled(motion, Eigen::VectorXd::LinSpaced(options.intervals + 1, motion.t[0],
+                                                           motion.t[motion.size() - 1]));
+    c.modes = modes_of(model_, problem_, c.guess, options.mode_options);
+    return c;
+  }
+
   /// Solves the best motions again on the result's mesh, refined until the trapezoidal error is below `mesh_error`.
   void refine() {
     std::vector<int> best = ranking(result_, options_.limit_tolerance);
@@ -301,7 +348,8 @@ class Search {
       /// Cost over the best up to which a motion is solved on the finer mesh.
       /// @threshold [1] 1..1.2; chosen: errors of the coarse mesh may exchange motions this close
       constexpr double kWorthRefining = 1.005;
-      if (s.plan.count() > 0 && s.same_as < 0 && s.cost < kWorthRefining * least)
+      if ((s.plan.count() > 0 || problem_.waypoints.empty()) && s.same_as < 0 &&
+          s.cost < kWorthRefining * least)
         chosen.push_back(i);
       if (static_cast<int>(chosen.size()) == searched_) break;
     }
@@ -313,6 +361,7 @@ class Search {
          !chosen.empty() && round < kMostMeshes && !interrupted(); intervals *= 2, ++round) {
       OptimizeOptions fine = options_;
       fine.intervals = intervals;
+      searching_ = false;
       expected_ = static_cast<int>(result_.starts.size() + chosen.size());
       const std::vector<StartResult> from = result_.starts;
       const std::size_t first = result_.starts.size();
@@ -328,8 +377,12 @@ class Search {
           [&](int i) {
             const StartResult& s = source(i);
             const TimeWindow time{s.duration, time_.lower, time_.upper};
-            return optimize_with_phases(model_, problem_, {name(i), s.plan, s.motion, false}, time,
-                                        fine);
+            if (s.plan.count() > 0) {
+              return optimize_with_phases(model_, problem_, {name(i), s.plan, s.motion, false},
+                                          time, fine);
+            }
+            return optimize_with_modes(model_, problem_, on_mesh(name(i), s.motion, fine), time,
+                                       fine);
           },
           name);
       // The coarse motion stays in the list for comparison, but is not a candidate of its own.
@@ -339,22 +392,27 @@ class Search {
             result_.starts[i].cost < result_.starts[winner].cost)
           winner = i;
       }
-      if (!result_.starts[winner].usable(options_.limit_tolerance)) return;
-      result_.mesh_error = mesh_error(result_.starts[winner]);
-      if (result_.mesh_error <= options_.mesh_error) return;
+      const StartResult& best_fine = result_.starts[winner];
+      if (!best_fine.usable(options_.limit_tolerance)) return;
+      if (best_fine.converged && mesh_error(best_fine) <= options_.mesh_error) return;
       chosen = {static_cast<int>(winner)};
     }
   }
 
   void conclude() {
     const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
-    const bool stopped =
-        std::any_of(result_.starts.begin(), result_.starts.end(),
-                    [](const StartResult& r) { return r.status == NlpStatus::kInterrupted; });
+    const bool stopped = interrupted() || std::any_of(result_.starts.begin(), result_.starts.end(),
+                                                      [](const StartResult& r) {
+                                                        return r.status == NlpStatus::kInterrupted;
+                                                      });
     if (!ranked.empty()) {
-      result_.best_start = ranked.front();
+      result_.best_start = best_of(result_, ranked);
       const StartResult& best = result_.starts[static_cast<std::size_t>(result_.best_start)];
-      result_.status = stopped ? OptimizeStatus::kInterrupted : OptimizeStatus::kOptimal;
+      result_.status = stopped          ? OptimizeStatus::kInterrupted
+                       : best.converged ? OptimizeStatus::kOptimal
+                                        : OptimizeStatus::kFeasible;
+      result_.mesh_error =
+          best.converged ? mesh_error(best) : std::numeric_limits<double>::quiet_NaN();
       result_.motion = best.motion;
       result_.duration = best.motion.duration();
       result_.energy_smooth = best.energy_smooth;
@@ -362,6 +420,8 @@ class Search {
       result_.checks = check_limits(model_, problem_, best.motion, options_.refine);
       result_.message = fmt::format("{}: {:.1f} kJ in {:.2f} s", problem_.name,
                                     result_.energy.total / 1e3, result_.duration);
+      if (!best.converged)
+        result_.message += "; it keeps all limits, but no solve converged to a cheaper motion";
       set_baselines(model_, problem_, seeds_, options_.refine, result_);
       return;
     }
@@ -385,6 +445,7 @@ class Search {
   OptimizeOptions coarse_;
   OptimizeResult result_;
   int expected_ = 0, searched_ = 1;
+  bool searching_ = true;  // whether solves only compare starts
 };
 
 }  // namespace
@@ -427,13 +488,20 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
 
 OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
                         const std::vector<SeedMotion>& seeds, const OptimizeOptions& options) {
-  SPARFLOW_CHECK(!seeds.empty(), "optimisation starts from at least one seed");
   const std::vector<std::string> missing = model.missing();
   if (!missing.empty()) {
     throw InputError({problem.file, 0, 0}, "model",
                      fmt::format("the model has no working pressure for {}; fit it on a log in "
                                  "which that movement occurs",
                                  fmt::join(missing, ", ")));
+  }
+  if (seeds.empty()) {
+    const GridSeeds found = grid_seeds(model, problem, options.grid_nodes);
+    if (!found.motions.empty()) return optimize(model, problem, found.motions, options);
+    OptimizeResult none;
+    none.status = OptimizeStatus::kInfeasible;
+    none.message = fmt::format("{}: infeasible. {}", problem.name, found.message);
+    return none;
   }
   if (problem.duration.fixed())
     return optimize_at(model, problem, seeds, problem.duration.min, options);
@@ -442,19 +510,43 @@ OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
   const auto begin = std::chrono::steady_clock::now();
   const double shortest = shortest_seed(seeds);
   const double lo = std::max(problem.duration.min, 0.05 * shortest);
-  const double hi = std::min(problem.duration.max, std::max(6.0 * shortest, 2.0 * lo));
+  // An endless window is cut off where the search begins, and widened while the result lies at its end.
+  const bool endless = std::isinf(problem.duration.max);
+  double hi = endless ? std::max(6.0 * shortest, 2.0 * lo) : std::max(problem.duration.max, lo);
   OptimizeResult best;
   int durations = 0;
-  for (const double times_shortest : {1.3, 3.0}) {
-    if (durations > 0 && options.interrupted && options.interrupted()) break;
-    const TimeWindow window{std::clamp(times_shortest * shortest, lo, hi), lo, hi};
+  const auto cost = [](const OptimizeResult& o) {
+    return o.best_start < 0 ? std::numeric_limits<double>::infinity()
+                            : o.starts[static_cast<std::size_t>(o.best_start)].cost;
+  };
+  const auto search = [&](double guess) {
+    const TimeWindow window{std::clamp(guess, lo, hi), lo, hi};
     OptimizeResult r = optimize_in(model, problem, seeds, window, options);
     ++durations;
-    const auto cost = [](const OptimizeResult& o) {
-      return o.best_start < 0 ? std::numeric_limits<double>::infinity()
-                              : o.starts[static_cast<std::size_t>(o.best_start)].cost;
-    };
     if (durations == 1 || cost(r) < cost(best)) best = std::move(r);
+  };
+  const auto stopped = [&] { return options.interrupted && options.interrupted(); };
+  search(1.3 * shortest);
+  if (!stopped()) search(3.0 * shortest);
+  // Where time costs nothing the longest motion is the cheapest, which may be far from either.
+  const bool time_is_free = problem.idle_power <= 0.0 && problem.objective.time <= 0.0;
+  /// Longest duration over the shortest from which the search begins there as well.
+  /// @threshold [1] 2..20; chosen: beyond the two others, which are 1.3 and 3 times the shortest
+  constexpr double kFarFromBoth = 4.0;
+  if (!stopped() && time_is_free && !endless && hi > kFarFromBoth * shortest) search(hi);
+  /// Share of a window's end from which a result lies at it.
+  /// @threshold [1] 0.9..1; chosen: an optimum inside the window is flat, so its duration is not exact
+  constexpr double kAtTheEnd = 0.98;
+  /// Factor by which an endless window is widened then.
+  /// @threshold [1] 1.5..10; chosen: few searches lead to any duration
+  constexpr double kWider = 4.0;
+  /// Largest number of widenings.
+  /// @threshold [1] 0..20; chosen: a thousand times the first window; ends a search in which time costs next to nothing
+  constexpr int kMostWidenings = 5;
+  for (int i = 0; endless && i < kMostWidenings && !stopped(); ++i) {
+    if (best.best_start < 0 || best.duration < kAtTheEnd * hi) break;
+    hi *= kWider;
+    search(2.0 * best.duration);
   }
   best.evaluated_durations = durations;
   best.solve_s = seconds_since(begin);

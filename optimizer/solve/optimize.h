@@ -145,6 +145,8 @@ struct StartResult {
   int iterations = 0;
   double solve_s = 0.0, callbacks_s = 0.0, linear_solver_s = 0.0;
   bool modes_held = false;  ///< whether the motion is of a solve with fixed modes
+  /// Whether the motion is of a solve that converged to OptimizeOptions::tolerance: neither a guess nor one cut short.
+  bool converged = false;
   double seed_energy =
       0.0;  ///< [J] energy of the initial guess (the seed in this duration); 0 if it violates limits
   bool seed_feasible = false;
@@ -155,7 +157,13 @@ struct StartResult {
   }
 };
 
-enum class OptimizeStatus { kOptimal, kInfeasible, kFailed, kInterrupted };
+enum class OptimizeStatus {
+  kOptimal,   ///< the motion is a local optimum: its solve converged
+  kFeasible,  ///< the motion keeps all limits, but it is a guess or of a solve that did not converge
+  kInfeasible,  ///< no motion within all limits was found
+  kFailed,
+  kInterrupted
+};
 const char* to_string(OptimizeStatus status);
 
 struct OptimizeResult {
@@ -171,12 +179,15 @@ struct OptimizeResult {
   double lower_bound =
       0.0;  ///< [J] estimated lower bound (energy_bound.h); 0 = not asked for or none
   double lower_bound_time = 0.0;  ///< [s] it is for motions that take at most this; 0 = for all
-  std::string bound_note;         ///< why there is no bound
+  /// [J] estimated lower bound of energy + idle power x time, where the duration is free and time has a price; 0 = none
+  double lower_bound_cost = 0.0;
+  std::string bound_note;  ///< why there is no bound, or what it lacks
   double grid_path_energy =
       0.0;  ///< [J] path of the joint grid, driven in the same duration; 0 = none
   double unlimited_energy =
-      0.0;                  ///< [J] cheapest path of the joint grid at unlimited time; 0 = none
-  double mesh_error = 0.0;  ///< relative, on the result's last mesh (OptimizeOptions::mesh_error)
+      0.0;  ///< [J] cheapest path of the joint grid at unlimited time; 0 = none
+  /// Relative, on the result's mesh (OptimizeOptions::mesh_error); not a number where no solve converged.
+  double mesh_error = 0.0;
   double best_seed_energy = 0.0;  ///< [J] cheapest feasible seed at this duration; 0 = none
   std::string best_seed_name;
   double straight_line_energy = 0.0;  ///< [J] cheapest feasible straight joint line; 0 = none
@@ -232,6 +243,7 @@ OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& pro
                                const OptimizeOptions& options);
 
 /// The problem as posed: a fixed duration, or the duration that minimises energy + idle power * time.
+/// Without seeds it starts from paths of the joint grid (grid_seeds.h).
 /// @throws InputError when the model lacks a pressure model that the machine needs
 OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
                         const std::vector<SeedMotion>& seeds, const OptimizeOptions& options = {});

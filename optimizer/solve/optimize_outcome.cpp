@@ -46,6 +46,20 @@ std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance) {
   return kept;
 }
 
+int best_of(const OptimizeResult& result, const std::vector<int>& ranked) {
+  const auto start = [&](int i) -> const StartResult& {
+    return result.starts[static_cast<std::size_t>(i)];
+  };
+  int best = ranked.front();
+  const double most = start(best).cost + kSameCost * std::abs(start(best).cost);
+  for (const int i : ranked) {
+    if (start(i).cost > most) break;
+    const auto rank = [&](int k) { return std::pair{start(k).converged, start(k).motion.size()}; };
+    if (rank(i) > rank(best)) best = i;
+  }
+  return best;
+}
+
 void set_baselines(const CraneModel& model, const MotionProblem& problem,
                    const std::vector<SeedMotion>& seeds, int refine, OptimizeResult& result) {
   result.best_seed_energy = result.straight_line_energy = result.nearest_line_energy = 0.0;
@@ -84,6 +98,8 @@ const char* to_string(OptimizeStatus status) {
   switch (status) {
     case OptimizeStatus::kOptimal:
       return "optimal";
+    case OptimizeStatus::kFeasible:
+      return "feasible";
     case OptimizeStatus::kInfeasible:
       return "infeasible";
     case OptimizeStatus::kFailed:

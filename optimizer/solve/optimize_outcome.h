@@ -7,6 +7,11 @@
 
 namespace sparflow {
 
+/// Relative difference up to which two costs count as equal: a motion of a solve that converged, or on a finer mesh, is then
+/// preferred.
+/// @threshold [1] 0..1e-3; chosen: OptimizeOptions::mesh_error
+inline constexpr double kSameCost = 1e-4;
+
 /// Whether two motions are equal: all joints within a thousandth of their range at all of a's knots.
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b);
 
@@ -15,6 +20,10 @@ double shortest_seed(const std::vector<SeedMotion>& seeds);
 
 /// Indices of the starts that keep all limits, each motion once, by increasing cost.
 std::vector<int> ranking(const OptimizeResult& result, double limit_tolerance);
+
+/// The start whose motion is the result: the cheapest within all limits, or one of (nearly) the same cost that converged,
+/// on the finest mesh. @param ranked not empty
+int best_of(const OptimizeResult& result, const std::vector<int>& ranked);
 
 /// Sets the energies of the seeds in the result's duration, where they keep the limits.
 void set_baselines(const CraneModel& model, const MotionProblem& problem,

@@ -23,7 +23,7 @@ class Start {
   StartResult run(const ModeCandidate& candidate) {
     result_.seed = candidate.name;
     keep_clear_ends(candidate.guess);
-    offer(candidate.guess, false);
+    offer(candidate.guess, false, false);
     hold(candidate.modes, candidate.guess, true);
     return finished();
   }
@@ -32,7 +32,7 @@ class Start {
                   bool overlaps) {
     result_.seed = name;
     keep_clear_ends(guess);
-    offer(guess, false);
+    offer(guess, false, false);
     hold_plan(plan, guess, overlaps);
     return finished();
   }
@@ -46,7 +46,8 @@ class Start {
     result_.seed_feasible = worst_excess(verdict(timed).checks) <= kSeedExcess;
     if (result_.seed_feasible) result_.seed_energy = verdict(timed).energy;
     keep_clear_ends(timed);
-    if (options_.modes) offer(timed, false);  // so no start ends with more energy than its seed
+    if (options_.modes)
+      offer(timed, false, false);  // so no start ends with more energy than its seed
     // The seed's own modes are solved first, so the smooth law can only improve on that result.
     if (options_.modes) hold_modes(resampled(timed, mesh_.times));
     Trajectory motion = timed;
@@ -129,7 +130,10 @@ class Start {
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
-    if (!problem_.obstacles.empty()) knot.near_postures = from.q;
+    if (!problem_.obstacles.empty()) {
+      knot.near_postures = from.q;
+      if (is_clear(from)) knot.clear_motion = from.q;
+    }
     spec.knot = std::make_shared<CraneKnotModel>(model_, problem_, knot);
     if (options_.knot_wrapper) spec.knot = options_.knot_wrapper(knot, spec.knot);
     set_bounds(spec);
@@ -157,14 +161,21 @@ class Start {
       return !(options_.interrupted && options_.interrupted());
     };
     NlpResult solved = solve_with_ipopt(*transcription_, nlp);
+    converged_ = solved.solved() && tolerance <= options_.tolerance;
     result_.iterations += solved.iterations;
     result_.solve_s += solved.solve_s;
     result_.callbacks_s += solved.callbacks_s;
     result_.linear_solver_s += solved.linear_solver_s;
+    note_stage(solved, smoothing);
+    return solved;
+  }
+
+  void note_stage(const NlpResult& solved, const Smoothing& smoothing) {
     StageRecord record;
-    record.what = modes.rows() > 0 ? "modes"
-                                   : fmt::format("smooth, {:g} mm/s, {:g} bar",
-                                                 1e3 * smoothing.speed, smoothing.pressure / 1e5);
+    record.what = mesh_.modes.rows() > 0
+                      ? "modes"
+                      : fmt::format("smooth, {:g} mm/s, {:g} bar", 1e3 * smoothing.speed,
+                                    smoothing.pressure / 1e5);
     if (tightenings_used_ > 0)
       record.what += fmt::format(", limits tightened ({})", tightenings_used_);
     record.status = solved.status;
@@ -176,7 +187,6 @@ class Start {
       record.excess = worst_excess(verdict(motion).checks);
     }
     result_.stages.push_back(std::move(record));
-    return solved;
   }
 
   void set_bounds(TranscriptionSpec& spec) const {
@@ -225,8 +235,9 @@ class Start {
     return verdict_;
   }
 
-  /// Keeps a motion if it is better than the best so far: by violation first, then by exact cost. @return its limits
-  std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held) {
+  /// Keeps a motion if it is better than the best so far: by violation first, then by exact cost; of equal costs the
+  /// one of a solve that converged. @return its limits
+  std::vector<LimitCheck> offer(const Trajectory& motion, bool modes_held, bool converged) {
     const std::vector<LimitCheck> checks = verdict(motion).checks;
     const double excess = worst_excess(checks);
     const double energy = verdict(motion).energy;
@@ -234,10 +245,14 @@ class Start {
     const bool kept = excess <= options_.limit_tolerance;
     const bool first = result_.motion.size() < 2;
     const bool had_kept = !first && result_.excess <= options_.limit_tolerance;
-    if (!first && !(kept && (!had_kept || cost < result_.cost)) &&
+    const double rank = cost + (converged ? 0.0 : kSameCost * std::abs(cost));
+    const double known =
+        result_.cost + (result_.converged ? 0.0 : kSameCost * std::abs(result_.cost));
+    if (!first && !(kept && (!had_kept || rank < known)) &&
         !(!kept && !had_kept && excess < result_.excess)) {
       return checks;
     }
+    result_.converged = converged;
     result_.motion = motion;
     result_.excess = excess;
     result_.energy_exact = energy;
@@ -261,7 +276,7 @@ class Start {
   /// limits tightened.
   void keep_limits(Trajectory motion, const Smoothing& smoothing, bool solve_again = true) {
     for (int attempt = 0;; ++attempt) {
-      const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0);
+      const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0, converged_);
       if (!solve_again || attempt == options_.tightenings) return;
       if (split_where_it_touches(problem_, motion, options_.refine, 4 * options_.intervals,
                                  mesh_)) {
@@ -278,6 +293,14 @@ class Start {
 
   double problem_energy_weight() const {
     return problem_.objective.energy > 0.0 ? problem_.objective.energy : 1.0;
+  }
+
+  /// Whether a motion keeps the clearance by the exact distance, between its knots too.
+  bool is_clear(const Trajectory& motion) {
+    const std::vector<LimitCheck>& checks = verdict(motion).checks;
+    return std::none_of(checks.begin(), checks.end(), [&](const LimitCheck& c) {
+      return c.what.starts_with("clearance") && c.excess > options_.limit_tolerance;
+    });
   }
 
   /// Remembers start and end posture of a motion if they are clear by the exact distance.
@@ -405,6 +428,7 @@ class Start {
   PhasePlan plan_;  // phases of the mesh
   Tightening tightening_;
   int tightenings_used_ = 0;
+  bool converged_ = false;  // whether the last solve did, to the tolerance of results
   Eigen::MatrixXd clear_postures_;
   std::unique_ptr<Transcription> transcription_;
   StartResult result_;

@@ -19,6 +19,7 @@ std::string pack_start(const StartResult& r) {
   for (const int phase : r.plan.waypoint_after) p.number(phase);
   p.number(r.energy_exact).number(r.energy_smooth).number(r.excess).number(r.iterations);
   p.number(r.solve_s).number(r.callbacks_s).number(r.linear_solver_s).number(r.modes_held);
+  p.number(r.converged);
   p.number(r.seed_energy).number(r.seed_feasible).number(static_cast<double>(r.stages.size()));
   for (const StageRecord& s : r.stages) {
     p.text(s.what).number(static_cast<double>(s.status)).number(s.iterations);
@@ -54,6 +55,7 @@ StartResult unpack_start(const std::string& bytes) {
   r.callbacks_s = u.number();
   r.linear_solver_s = u.number();
   r.modes_held = u.number() != 0.0;
+  r.converged = u.number() != 0.0;
   r.seed_energy = u.number();
   r.seed_feasible = u.number() != 0.0;
   r.stages.resize(static_cast<std::size_t>(u.number()));

@@ -12,10 +12,11 @@
 namespace sparflow::bench {
 namespace {
 
-/// The synthetic process with a corner inside the learned loads, which are so few that many samples lie beyond them.
+/// The synthetic process with a slope of its mean over the flow and a corner inside the learned loads, which are so few that many samples lie beyond them.
 GaussianProcess with_corner_and_border(const GaussianProcess& process, int side, double area) {
   GpParameters p = process.parameters();
   p.corner = {2e5, 1e8, 0.3 * side / area};
+  p.mean_flow_slope = 4e8;  // 4 bar at a litre a second
   p.force_min *= 0.2;
   p.force_max *= 0.2;
   p.beyond = {side, 1.0 / area, 5e5, 0.8 / area, 0.6 / area, 1e5};

@@ -139,7 +139,8 @@ TEST(SeedPaths, FindsBothPathsAroundAPillarForASlewingCrane) {
     expect_good_path(problem, seed);
     planners.insert(seed.planner);
   }
-  EXPECT_TRUE(planners.count("RRT-Connect") || planners.count("BIT*"));
+  EXPECT_TRUE(planners.count("RRT-Connect"));
+  EXPECT_FALSE(planners.count("BIT*")) << "OMPL 1.5.2 crashes where it publishes a solution";
 }
 
 TEST(SeedPaths, SameSeedSamePathsOtherSeedOtherPaths) {

@@ -382,6 +382,13 @@ Page motion_page(const CraneModel& model, const MotionProblem& problem,
         "All limits are kept at 16 samples per mesh interval. Energies are those of the exact, "
         "unsmoothed law. " +
             constant_pressure_note(model));
+  } else if (result.status == OptimizeStatus::kFeasible) {
+    page.verdict(
+        Tone::kWarning,
+        fmt::format("{:.1f} kJ in {:.2f} s, not converged", result.energy.total / 1e3,
+                    result.duration),
+        "All limits are kept at 16 samples per mesh interval, but the motion is a guess or of a "
+        "solve that was cut short: a cheaper one may be near.");
   } else {
     // The message begins like the headline ("lift: infeasible. Worst: ..."); that part is left out.
     const std::string prefix = problem.name + ": infeasible. ";

@@ -90,8 +90,13 @@ std::string no_motion_text(const OptimizeResult& r) {
   return text;
 }
 
+/// Energy and idle power x time. [J]
+double cost_of(const MotionProblem& problem, const OptimizeResult& r) {
+  return r.energy.total + problem.idle_power * r.duration;
+}
+
 /// The optimum's energy beside those it is compared with, and beside its bounds.
-std::string energies_text(const OptimizeResult& r) {
+std::string energies_text(const MotionProblem& problem, const OptimizeResult& r) {
   std::string text = fmt::format("  energy (exact law)   {:9.2f} kJ   in {:.2f} s, from {}\n",
                                  r.energy.total / 1e3, r.duration,
                                  r.starts[static_cast<std::size_t>(r.best_start)].seed);
@@ -113,12 +118,21 @@ std::string energies_text(const OptimizeResult& r) {
         "  at unlimited time    {:9.2f} kJ   cheapest path of a joint grid, driven slowly\n",
         r.unlimited_energy / 1e3);
   }
+  if (r.lower_bound_cost > 0.0) {
+    text += fmt::format(
+        "  with idle power      {:9.2f} kJ   energy and {:g} kW x time; their estimated bound "
+        "{:.2f} "
+        "kJ is {:.1f} % below\n",
+        cost_of(problem, r) / 1e3, problem.idle_power / 1e3, r.lower_bound_cost / 1e3,
+        100.0 * (1.0 - r.lower_bound_cost / cost_of(problem, r)));
+  }
   if (r.lower_bound > 0.0) {
     const std::string which =
         r.lower_bound_time > 0.0 ? fmt::format("of motions of {:.2f} s or less", r.lower_bound_time)
                                  : "of motions of any duration";
     text += fmt::format("  estimated bound      {:9.2f} kJ   {}: gap {:.1f} %\n",
                         r.lower_bound / 1e3, which, 100.0 * bound_gap(r));
+    if (!r.bound_note.empty()) text += "  note                 " + r.bound_note + "\n";
   } else if (!r.bound_note.empty()) {
     text += "  estimated bound           none   " + r.bound_note + "\n";
   }
@@ -285,6 +299,12 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
           r.lower_bound_time > 0.0 ? nlohmann::json(r.lower_bound_time) : nlohmann::json();
       out["gap"] = bound_gap(r);
     }
+    if (r.lower_bound_cost > 0.0) {
+      // With idle power it is energy and time together that are least.
+      out["cost_J"] = cost_of(problem, r);
+      out["lower_bound_cost_J"] = r.lower_bound_cost;
+      out["gap"] = cost_of(problem, r) / r.lower_bound_cost - 1.0;
+    }
     if (r.grid_path_energy > 0.0) out["grid_path_energy_exact_J"] = r.grid_path_energy;
     if (r.unlimited_energy > 0.0) out["unlimited_time_J"] = r.unlimited_energy;
     out["best_seed_energy_exact_J"] =
@@ -302,10 +322,12 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
 std::string optimize_table(const CraneModel& model, const MotionProblem& problem,
                            const OptimizeResult& r) {
   if (r.motion.size() < 2) return no_motion_text(r);
+  const std::string reached =
+      r.status == OptimizeStatus::kFeasible ? "  not converged        " + r.message + "\n" : "";
   return fmt::format("{}: {}{}\n", to_string(r.status), problem.name,
                      mostly_outside_data(r) ? "; " + outside_text(r) : "") +
-         energies_text(r) +
-         idle_text(problem, r.duration) + cylinders_text(model.machine, r.energy) +
+         reached + energies_text(problem, r) + idle_text(problem, r.duration) +
+         cylinders_text(model.machine, r.energy) +
          limits_text(r.checks) + reservations_text(model, r.energy) + starts_text(r);
 }
 

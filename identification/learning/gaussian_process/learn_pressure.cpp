@@ -12,6 +12,7 @@
 #include "identification/learning/gaussian_process/gp_screening.h"
 #include "identification/learning/gaussian_process/minimise_bounded.h"
 #include "identification/learning/gaussian_process/sparse_gp.h"
+#include "models/hydraulics/uninformed_length.h"
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/parallel.h"
@@ -376,6 +377,7 @@ LearnedGp learn_gp(const GpDataset& samples, const LearnGpOptions& options) {
   out.flow_max = used.flow.maxCoeff();
   out.force_min = used.force.minCoeff();
   out.force_max = used.force.maxCoeff();
+  replace_uninformed_lengths(out);
   out.data_count = report.used;
   report.centres = static_cast<int>(out.weight.size());
   report.noise_std = out.noise_std;

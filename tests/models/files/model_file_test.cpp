@@ -64,6 +64,20 @@ TEST(ModelFile, ReadsBackEveryNumberExactly) {
   EXPECT_TRUE(std::isnan(read.quality[1].fit_percent)) << "a constant signal has no fit";
 }
 
+TEST(ModelFile, ALengthThatNoDataInformIsReplacedWhenRead) {
+  CraneModel model = small_model();
+  GpParameters p = model.cylinders[0].extend.parameters();
+  p.force.setConstant(1e4);
+  p.force_min = p.force_max = 1e4;
+  p.length_force = 3e-9;
+  p.beyond = {};
+  model.cylinders[0].extend = GaussianProcess(p);
+  const CraneModel read = model_from_json(model_to_json(model), "m.json");
+  EXPECT_GT(read.cylinders[0].extend.parameters().length_force, 1e4);
+  EXPECT_EQ(read.cylinders[0].extend.mean(p.flow[0], 1e4),
+            model.cylinders[0].extend.mean(p.flow[0], 1e4));
+}
+
 TEST(ModelFile, GivesTheSamePressuresAfterALoad) {
   const CraneModel model = small_model();
   const CraneModel read = model_from_json(model_to_json(model), "m.json");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "models/hydraulics/gp_kernel.h"
+#include "models/hydraulics/uninformed_length.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -216,6 +217,54 @@ TEST(GaussianProcess, InvalidParametersAreNamed) {
   p = example(4);
   p.variance_core.conservativeResize(4, 4);
   EXPECT_EQ(key_of(p), "variance_core");
+}
+
+/// A process over the flow at one force, as it is learned for a slewing drive: its length over the force is rounding.
+GpParameters at_one_force(double force) {
+  GpParameters p;
+  p.length_flow = 1e-3;
+  p.length_force = 3e-9;
+  p.signal_std = 3e5;
+  p.noise_std = 1e4;
+  p.mean_constant = 5e6;
+  p.flow = Eigen::Array3d(1e-4, 3e-4, 5e-4);
+  p.force = Eigen::Array3d::Constant(force);
+  p.weight = Eigen::Array3d(2e-5, -1e-5, 3e-5);
+  p.flow_min = 1e-4;
+  p.flow_max = 5e-4;
+  p.force_min = p.force_max = force;
+  return p;
+}
+
+TEST(UninformedLength, IsLongAndThePressuresAtTheDataStay) {
+  for (const double force : {0.0, 2e4}) {
+    const GpParameters before = at_one_force(force);
+    GpParameters after = before;
+    EXPECT_TRUE(replace_uninformed_lengths(after));
+    EXPECT_EQ(after.length_flow, before.length_flow) << "the flows vary";
+    const GaussianProcess a(before), b(after);
+    for (const double flow : {1e-4, 2.2e-4, 5e-4}) {
+      EXPECT_EQ(a.mean(flow, force), b.mean(flow, force));
+      // Nothing shows another pressure beside the only force learned: a kilonewton is a hundredth of the length, which
+      // takes half of its square off the process's share.
+      const double share = b.mean(flow, force) - before.mean_constant;
+      EXPECT_NEAR(b.mean(flow, force + 1e3), b.mean(flow, force), 5.1e-5 * share);
+      EXPECT_NEAR(b.mean_derivatives(flow, force).d_force_force, -share / 1e10,
+                  1e-9 * share / 1e10);
+    }
+  }
+}
+
+TEST(UninformedLength, LengthsThatDataInformStay) {
+  GpParameters p = at_one_force(0.0);
+  p.force = Eigen::Array3d(0.0, 100.0, 200.0);
+  p.force_max = 200.0;
+  p.length_force = 50.0;
+  EXPECT_FALSE(replace_uninformed_lengths(p));
+  EXPECT_EQ(p.length_force, 50.0);
+  // A plane has one centre; its range tells that the data vary.
+  p.force = p.flow = p.weight = Eigen::ArrayXd::Zero(1);
+  EXPECT_FALSE(replace_uninformed_lengths(p));
 }
 
 }  // namespace

@@ -234,7 +234,7 @@ TEST(EnergyBound, LeastOnTheGoalIsBelowEveryPostureThere) {
   const BoundCase c("loader_crane_lift");
   MoveWeights weights = c.weights();
   const EnergyPotential potential = c.potential(weights, 20);
-  const LeastOnGoal least = least_on_goal(c.problem, c.model.machine, potential, 1e-4);
+  const LeastOnGoal least = least_on_goal(c.problem, c.model.machine, potential, {1e-4});
   ASSERT_TRUE(least.reachable);
   std::mt19937_64 random(21);
   double sampled = 1e30;
@@ -249,6 +249,32 @@ TEST(EnergyBound, LeastOnTheGoalIsBelowEveryPostureThere) {
   EXPECT_LE(least.lower, sampled * (1.0 + 1e-6));
   EXPECT_GE(least.lower,
             sampled * (1.0 - 5e-3));  // samples are some millimetres apart on the goal's curve
+}
+
+TEST(EnergyBound, ACappedSearchOnTheGoalSaysSoAndKeepsWhatWasShown) {
+  const BoundCase c("loader_crane_lift");
+  MoveWeights weights = c.weights();
+  const EnergyPotential potential = c.potential(weights, 20);
+  const LeastOnGoal whole = least_on_goal(c.problem, c.model.machine, potential, {1e-4});
+  ASSERT_FALSE(whole.capped);
+  double before = 0.0;
+  for (const long cuts : {1L, 20L, 100L}) {
+    const LeastOnGoal least =
+        least_on_goal(c.problem, c.model.machine, potential, {1e-4, 2e-3, cuts});
+    EXPECT_TRUE(least.capped) << cuts;
+    EXPECT_TRUE(least.reachable);
+    EXPECT_GE(least.lower, before) << "what fewer cuts show stays shown";
+    EXPECT_LE(least.lower, whole.lower);
+    before = least.lower;
+  }
+  EXPECT_GT(before, 0.5 * whole.lower);
+  EnergyBoundOptions few;
+  few.nodes = 20000;
+  few.most_goal_cuts = 3;
+  const EnergyBound bound = energy_bound(c.model, c.problem, few);
+  EXPECT_TRUE(bound.valid && bound.capped);
+  EXPECT_GT(bound.lower_bound_J, 0.0);
+  EXPECT_THAT(bound.message, ::testing::HasSubstr("ended at 3 boxes"));
 }
 
 TEST(EnergyBound, SaysWhenThereIsNone) {

@@ -298,6 +298,32 @@ TEST(TimedBound, IsBelowEveryMotionFoundAndNotBelowTheUnlimitedBound) {
   }
 }
 
+TEST(TimedBound, TheBoundOfEnergyAndIdleTimeIsBelowEveryMotionAndAboveThatOfEnergyAlone) {
+  const TimedCase c("loader_crane_lift");
+  EnergyGrid grid(c.model, c.problem, {12000, 4});
+  const EnergyBound alone = energy_bound(c.model, c.problem, {15000, 4, 2e-4});
+  for (const double idle : {500.0, 5e3}) {
+    const TimedBound bound = cost_bound(c.model, c.problem, idle, quick_bound());
+    ASSERT_TRUE(bound.valid) << bound.message;
+    double least = std::numeric_limits<double>::infinity();
+    for (const double price : {0.3 * idle, idle, 3.0 * idle, 1e5}) {
+      const GridPath path = grid.cheapest_path(price);
+      ASSERT_TRUE(path.found);
+      for (const double slower : {1.0, 1.3, 1.8}) {
+        const double duration = slower * path.duration_s;
+        const double energy =
+            exact_energy(c.model, timed_grid_path(c.model, c.problem, path, duration),
+                         c.problem.payload)
+                .total;
+        least = std::min(least, energy + idle * duration);
+      }
+    }
+    EXPECT_LE(bound.value, least) << idle;
+    EXPECT_GT(bound.value, alone.lower_bound_J) << "time costs something";
+    EXPECT_GT(bound.value, 0.8 * least) << "ramps and the grid's steps are not in the bound";
+  }
+}
+
 TEST(TimedBound, IsNeverBelowTheBoundOfUnlimitedTime) {
   // The price of time is charged for every second. A search of forty steps lowers it as the duration grows (below a
   // milliwatt for an hour); a search of one step leaves it so high that an hour is charged with more than V.

@@ -6,10 +6,12 @@
 
 #include <cmath>
 
+#include "models/files/model_file.h"
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
 #include "optimizer/crane/exact_energy.h"
 #include "optimizer/grid/driven_grid_path.h"
+#include "optimizer/grid/simplify_path.h"
 #include "optimizer/phases/sequential_modes.h"
 #include "problems/bundled.h"
 #include "problems/problem_file.h"
@@ -159,6 +161,70 @@ TEST(EnergyGrid, GoesRoundAnObstacle) {
   c.problem.obstacles.clear();
   EnergyGrid open(c.model, c.problem, {12000, 4});
   EXPECT_LE(open.cheapest_path(0.0).slow_energy_J, path.slow_energy_J * 1.001);
+}
+
+/// A wall across the slewing crane's reach with a square window of 0.7 m, through which the jib must pass.
+MotionProblem through_a_window() {
+  MotionProblem p = load_problem(bundled_file("reaches/swing_crane_far.yaml"));
+  p.start = Eigen::Vector4d(-0.0046, 0.7045, -1.7787, 0.3155);
+  p.goal = TipGoal{{6.2847, -1.1619, 4.14}};
+  p.payload = 100.0;
+  p.clearance = 0.1;
+  const auto part = [&](const std::string& name, double y, double z, double width, double height) {
+    Box box;
+    box.center = {4.4341, y, z};
+    box.size = {0.2, width, height};
+    p.obstacles.push_back({name, box});
+  };
+  part("left", -3.1698, 3.8688, 4.0, 16.0);
+  part("right", 1.5302, 3.8688, 4.0, 16.0);
+  part("below", -0.8198, 1.5188, 0.72, 4.0);
+  part("above", -0.8198, 6.2188, 0.72, 4.0);
+  return p;
+}
+
+TEST(EnergyGrid, PathsThroughANarrowWindowAreClear) {
+  // The exact check refuses lines between neighbouring corners here; this once ended in a row before the first corner.
+  const MotionProblem problem = through_a_window();
+  const CraneModel model = load_model(bundled_file("models/swing_crane.json"));
+  EnergyGrid grid(model, problem, {15000, 4});
+  const std::vector<GridPath> paths = grid.paths_for_duration(24.0, 3);
+  ASSERT_FALSE(paths.empty());
+  ClearanceModel clearance(problem);
+  for (const GridPath& path : paths) {
+    ASSERT_TRUE(path.found) << path.message;
+    EXPECT_GE(path.corners.rows(), 2);
+    EXPECT_TRUE(path.corners.allFinite());
+    EXPECT_NEAR((path.corners.row(0).transpose() - problem.start).norm(), 0.0, 1e-12);
+    EXPECT_TRUE(clearance.path_clear(path.corners));
+  }
+}
+
+TEST(SimplifyPath, KeepsAndCountsALineOfThePathThatIsRefused) {
+  GridCase c("loader_crane_lift");
+  MatrixXd path(4, 3);
+  path << 0.10, -1.6, 0.8, 0.20, -1.6, 0.8, 0.30, -1.6, 0.8, 0.40, -1.6, 0.8;
+  std::vector<Range> forces(static_cast<std::size_t>(c.model.machine.cylinder_count()),
+                            Range{-3e5, 3e5});
+  MovePricer pricer(c.model, c.problem, c.problem.machine, forces);
+  LegSearch search;
+  search.leg_penalty = 10.0;
+  search.part = VectorXd::Constant(3, 0.05);
+  for (const Eigen::Index refused : {0, 1, 2}) {
+    // Every line that passes the middle of one line of the path is refused, so that no other can replace it.
+    const VectorXd middle = 0.5 * (path.row(refused) + path.row(refused + 1)).transpose();
+    search.clear = [&](const VectorXd& a, const VectorXd& b) {
+      const double way = (b - a).squaredNorm();
+      if (way == 0.0) return true;
+      const double share = std::clamp((middle - a).dot(b - a) / way, 0.0, 1.0);
+      return (a + share * (b - a) - middle).norm() > 0.049;
+    };
+    const Legs legs = simplify_path(pricer, path, search);
+    EXPECT_EQ(legs.refused, 1) << refused;
+    EXPECT_TRUE(legs.corners.allFinite());
+    EXPECT_EQ(legs.corners.row(0), path.row(0));
+    EXPECT_EQ(legs.corners.bottomRows(1), path.bottomRows(1));
+  }
 }
 
 TEST(EnergyGrid, SaysWhyThereIsNoPath) {
