@@ -2,6 +2,7 @@
 /// Compares the errors of a model before and after a change, on test data: whether they fell where the change acts, and
 /// whether any other error, or that of the energy, grew significantly given the variation between motions.
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "identification/comparison/compare.h"
@@ -60,6 +61,8 @@ struct ErrorChange {
   double overall = 1.0;
   /// The same for the quantities on which the change acts, pooled by stage; equals `overall` if there are none.
   double own = 1.0;
+  /// The same for each stage in which the change acts.
+  std::vector<std::pair<std::string, double>> own_by_stage;
   std::vector<HarmedError> harmed;
   /// Standard error of log(overall), from the variation between blocks of motion.
   double overall_deviation = 0.0;
