@@ -36,6 +36,28 @@ std::pair<std::ptrdiff_t, int> rank(const EffectAt& e) {
   return {at - all.begin(), e.at};
 }
 
+/// An effect in the place in question, with all effects of the model and their cross-validated errors.
+struct Choice {
+  EffectAt effect;
+  double
+      error;  ///< RMS error of the effect's stage over that with the effect that the diagnosis named
+  std::vector<EffectAt> effects;
+  CompareResult errors;
+};
+
+/// Whether the errors of `one` are hardly larger than those of the best, and no quantity's by more than chance between motions.
+bool equals(const RefitContext& context, const Choice& best, const Choice& one,
+            const std::string& stage) {
+  if (one.error > context.options().equal_rivals * best.error) return false;
+  if (one.effect == best.effect) return true;
+  ErrorChangeOptions options = context.options().change;
+  options.large_change = 1.0;  // any growth beyond chance
+  const ErrorChange change =
+      error_change(context.machine(), best.errors, one.errors, {{stage}, ""}, options);
+  return std::none_of(change.harmed.begin(), change.harmed.end(),
+                      [&](const HarmedError& h) { return h.stage == stage; });
+}
+
 /// Whether no parameter lies on a bound other than a zero, which means that the part is absent.
 bool is_plausible(const AppliedEffect& e) {
   for (std::size_t k = 0; k < e.values.size(); ++k) {
@@ -76,30 +98,27 @@ EffectAt best_of_rivals(const RefitContext& context, const RivalTrial& trial,
   if (stage != "force" && stage != "flow") return trial.effect;
   const std::string other = stage == "force" ? "flow" : "force";
   const CompareResult own = context.measured_errors(trial.from, trial.effects, progress);
-  struct Choice {
-    EffectAt effect;
-    double error;
-    std::vector<EffectAt> effects;
-  };
-  std::vector<Choice> choices = {{trial.effect, 1.0, trial.effects}};
+  std::vector<Choice> choices = {{trial.effect, 1.0, trial.effects, own}};
   for (const EffectAt& r : trial.rivals) {
     if (has(trial.effects, r)) continue;
     std::vector<EffectAt> with = trial.effects;
     std::replace(with.begin(), with.end(), trial.effect, r);
     try {
-      const CompareResult errors = context.measured_errors(trial.from, with, progress);
+      CompareResult errors = context.measured_errors(trial.from, with, progress);
       if (error_ratio(own, errors, other) > context.options().change.refit_moves) continue;
-      choices.push_back({r, error_ratio(own, errors, stage), std::move(with)});
+      const double error = error_ratio(own, errors, stage);
+      choices.push_back({r, error, std::move(with), std::move(errors)});
     } catch (const InputError&) {  // half of the logs do not show this rival
     }
   }
-  double least = 1.0;
-  for (const Choice& c : choices) least = std::min(least, c.error);
+  const Choice best =
+      *std::min_element(choices.begin(), choices.end(),
+                        [](const Choice& a, const Choice& b) { return a.error < b.error; });
   std::stable_sort(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
     return rank(a.effect) < rank(b.effect);
   });
   for (const Choice& c : choices) {
-    if (c.error > context.options().equal_rivals * least) continue;
+    if (!equals(context, best, c, stage)) continue;
     if (c.effect == trial.effect) return c.effect;
     const CraneModel model = context.estimated(trial.from, c.effects, progress);
     const auto it = std::find_if(

@@ -18,7 +18,7 @@ struct RivalTrial {
 };
 
 /// Puts each rival in the place of the effect and cross-validates. Of those whose error is within
-/// ExtendOptions::equal_rivals of the least, the one that comes first in the catalogue is taken, which lists what is usual
+/// ExtendOptions::equal_rivals of the least and not larger by more than chance between motions, the one that comes first in the catalogue is taken, which lists what is usual
 /// before what is rare: the likelihood orders such rivals by the noise of the log, and a copy of the same log with other
 /// digits would give another one. A rival is taken only where its parameters are determined and plausible, and where
 /// the errors of the other stage do not grow.

@@ -61,11 +61,11 @@ struct ErrorChange {
   double overall = 1.0;
   /// The same for the quantities on which the change acts, pooled by stage; equals `overall` if there are none.
   double own = 1.0;
-  /// The same for each stage in which the change acts.
-  std::vector<std::pair<std::string, double>> own_by_stage;
   std::vector<HarmedError> harmed;
   /// Standard error of log(overall), from the variation between blocks of motion.
   double overall_deviation = 0.0;
+  /// `own` for each stage in which the change acts.
+  std::vector<std::pair<std::string, double>> own_by_stage = {};
 
   /// @return true when the error where the change acts grew, another error is harmed, or the overall error grew by more
   ///   than refitting alone may change it

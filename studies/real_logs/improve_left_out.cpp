@@ -11,9 +11,8 @@
 #include <map>
 
 #include "diagnosis/extension/extend.h"
-#include "identification/comparison/error_change.h"
+#include "identification/comparison/compare.h"
 #include "identification/learning/fit.h"
-#include "identification/signals/apply_effects.h"
 #include "models/effects/registry.h"
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
@@ -48,6 +47,15 @@ struct Rows {
   }
 };
 
+/// A log's signals with a model's effects.
+MachineSignals seen_with(const CraneModel& model, MachineSignals signals) {
+  CompareOptions options;
+  options.find_regions = false;
+  std::vector<MachineSignals> one;
+  one.push_back(std::move(signals));
+  return std::move(compare_signals(model, std::move(one), {}, options).logs.front().signals);
+}
+
 /// Mass and moment on the last link and Coulomb friction of each cylinder, by least squares over all moving samples.
 std::vector<AppliedEffect> mass_and_coulomb(const Machine& machine,
                                             const std::vector<MachineSignals>& signals) {
@@ -73,7 +81,7 @@ std::vector<AppliedEffect> mass_and_coulomb(const Machine& machine,
       AppliedEffect unit = effects[u.effect];
       unit.values[u.parameter] = 1.0;
       one.effects = {unit};
-      with.push_back(with_effects(one, s));
+      with.push_back(seen_with(one, s));
     }
     for (std::size_t i = 0; i < s.cylinders.size(); ++i) {
       const CylinderSignals& c = s.cylinders[i];
@@ -106,7 +114,7 @@ CraneModel by_least_squares(const CraneModel& fitted, const std::vector<MachineS
       plane.flow_min = plane.force_min = 1e300;
       plane.flow_max = plane.force_max = -1e300;
       for (const MachineSignals& plain : signals) {
-        const MachineSignals s = with_effects(model, plain);
+        const MachineSignals s = seen_with(model, plain);
         const CylinderSignals& c = s.cylinders[i];
         for (Index k = 0; k < s.samples() && c.has_pressure() && c.has_command(); ++k) {
           if (!c.driven[k] || c.direction[k] != side || !s.usable[k] || s.edge[k]) continue;
@@ -219,13 +227,18 @@ void print_effects(const CraneModel& model) {
   }
 }
 
-/// Relative error of each force over all usable samples and over those of which `compare` gives errors.
+/// Relative error of each force over all usable samples and over those of which `compare` gives errors. Accelerations come from the
+/// sharpest window that the positions allow, as in the estimate: the force is compared as measured, and a wide window would smooth
+/// what the force shows.
 void run_together(const Machine& machine, const std::vector<Log>& logs) {
   const ExtendResult r = improve(fit(machine, logs).model, {logs, {}, {}});
   fmt::print("{:.0f} s, {}\n", r.seconds, r.stopped_because);
   print_effects(r.model);
   for (const Log& log : logs) {
-    const MachineSignals s = with_effects(r.model, make_signals(machine, log));
+    MachineSignals raw = make_signals(machine, log);
+    raw = smoothed_anew(machine, raw,
+                        sharpest_window(raw.time, raw.runs, raw.q_measured, raw.window));
+    const MachineSignals s = seen_with(r.model, std::move(raw));
     for (std::size_t i = 0; i < s.cylinders.size(); ++i) {
       const CylinderSignals& c = s.cylinders[i];
       double error = 0.0, all = 0.0, moving_error = 0.0, moving = 0.0;
