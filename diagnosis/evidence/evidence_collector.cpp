@@ -184,7 +184,7 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
     e.series.push_back(make_series(model_, s));
     if (!is_suspect(log) && in_references != nullptr)
       e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
-    if (e.options.mechanisms.enabled(Mechanism::kSettling))
+    if (e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling))
       e.since_change.push_back(since_change(e.series[log], e.options.least_change));
     add_kernels(s);
     e.window = std::max(e.window, s.window);

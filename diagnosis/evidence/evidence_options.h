@@ -112,6 +112,9 @@ struct EvidenceOptions {
   BranchOptions branches;
   NoiseOptions noise;
   CavitationOptions cavitation;
+  /// Whether the noise may settle after commands (NoiseModel::settling): in a comparison with references, which lack the same of
+  /// starts and stops. In a log alone a start may be where the effect shows, as friction does.
+  bool settles = false;
   /// Uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
   /// (sharpest_window) that it distorts nothing.
   bool whole_motions = false;

@@ -323,9 +323,10 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
       progress(from + share * (to - from), what);
     };
   };
-  const Diagnosis before = diagnose_sound(model, {signals.references}, options, part(0.0, 0.4));
-  CraneModel with = model;
   DiagnoseOptions now = options;
+  now.evidence.settles = true;
+  const Diagnosis before = diagnose_sound(model, {signals.references}, now, part(0.0, 0.4));
+  CraneModel with = model;
   now.evidence.shared = effects_in_references(model, signals.references);
   const auto add = [&](const AppliedEffect& e) {
     with.effects.push_back(e);
