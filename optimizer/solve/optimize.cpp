@@ -357,11 +357,16 @@ class Search {
     /// @threshold [meshes] 1..10; derived: each halves the intervals: at most eight times the first, as
     /// OptimizeOptions::intervals says
     constexpr int kMostMeshes = 4;
+    bool reached = true;  // whether the best motion of the last mesh is of a solve that converged
     for (int intervals = options_.intervals, round = 0;
          !chosen.empty() && round < kMostMeshes && !interrupted(); intervals *= 2, ++round) {
       OptimizeOptions fine = options_;
       fine.intervals = intervals;
       searching_ = false;
+      /// Factor on the smoothing of the maximum where no solve converged to less than a guess costs.
+      /// @threshold [1] 0.01..1; chosen: the smoothed optimum may cost more than the guess by this smoothing alone
+      constexpr double kSharper = 0.2;
+      if (round > 0 && !reached) fine.pressure_in_modes *= kSharper;
       expected_ = static_cast<int>(result_.starts.size() + chosen.size());
       const std::vector<StartResult> from = result_.starts;
       const std::size_t first = result_.starts.size();
@@ -381,8 +386,12 @@ class Search {
               return optimize_with_phases(model_, problem_, {name(i), s.plan, s.motion, false},
                                           time, fine);
             }
-            return optimize_with_modes(model_, problem_, on_mesh(name(i), s.motion, fine), time,
-                                       fine);
+            const ModeCandidate c = on_mesh(name(i), s.motion, fine);
+            StartResult r = optimize_with_modes(model_, problem_, c, time, fine);
+            if (r.converged) return r;
+            // With the switching times held nothing may be near; with free ones the phases can give way.
+            return optimize_with_phases(
+                model_, problem_, {c.name, plan_of(c.modes, c.guess.t), c.guess, true}, time, fine);
           },
           name);
       // The coarse motion stays in the list for comparison, but is not a candidate of its own.
@@ -395,6 +404,9 @@ class Search {
       const StartResult& best_fine = result_.starts[winner];
       if (!best_fine.usable(options_.limit_tolerance)) return;
       if (best_fine.converged && mesh_error(best_fine) <= options_.mesh_error) return;
+      reached = best_fine.converged;
+      // A finer mesh mends the mesh error; what did not converge twice does not converge on more intervals.
+      if (!best_fine.converged && round > 0) return;
       chosen = {static_cast<int>(winner)};
     }
   }
