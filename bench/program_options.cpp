@@ -78,7 +78,8 @@ ProgramOptions& ProgramOptions::flag(const std::string& name, bool& value,
 }
 
 ProgramOptions& ProgramOptions::add_journal() {
-  add("--journal", app_->journal, "file of the finished parts, written as soon as each is complete");
+  add("--journal", app_->journal,
+      "file of the finished parts, written as soon as each is complete");
   return flag("--resume", app_->resume, "take the parts that the journal has, compute the others");
 }
 
@@ -91,14 +92,14 @@ std::unique_ptr<Journal> ProgramOptions::journal(
   std::string options;
   for (const CLI::Option* option : app_->app.get_options()) {
     const std::string name = option->get_name();
-    const bool other = name == "--journal" || name == "--resume" ||
-                       std::find(not_of_result.begin(), not_of_result.end(), name) !=
-                           not_of_result.end();
+    const bool other =
+        name == "--journal" || name == "--resume" ||
+        std::find(not_of_result.begin(), not_of_result.end(), name) != not_of_result.end();
     if (!other && option->count() > 0)
       options += fmt::format("{} {}\n", name, fmt::join(option->results(), " "));
   }
-  auto journal = std::make_unique<Journal>(app_->journal, run_fingerprint(files, options),
-                                           app_->resume);
+  auto journal =
+      std::make_unique<Journal>(app_->journal, run_fingerprint(files, options), app_->resume);
   const auto tell = [](const std::string& sentence) { fmt::print(stderr, "{}\n", sentence); };
   journal->on_trouble(tell);
   for (const std::string& sentence : journal->warnings()) tell(sentence);

@@ -87,10 +87,9 @@ std::vector<BlindRun> run_all(const std::vector<BlindCase>& cases, const Options
           }
           i = next++;
         }
-        BlindRun run = unpack_run(
-            cases[i], journal.kept(part_name(cases[i]), [&] {
-              return Journal::Part{pack_run(run_blind(cases[i])), true};
-            }));
+        BlindRun run = unpack_run(cases[i], journal.kept(part_name(cases[i]), [&] {
+          return Journal::Part{pack_run(run_blind(cases[i])), true};
+        }));
         const std::lock_guard lock(mutex);
         runs[i] = std::move(run);
         done[i] = true;
@@ -148,8 +147,7 @@ int run(int argc, char** argv) {
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
   const std::unique_ptr<Journal> journal =
-      app.journal(
-      {}, {"--runs", "--none", "--jobs", "--json", "-v", "--verbose", "--no-time"});
+      app.journal({}, {"--runs", "--none", "--jobs", "--json", "-v", "--verbose", "--no-time"});
   const std::vector<BlindRun> all = run_all(cases_of(options), options, *journal);
   nlohmann::json json;
   json["runs"] = nlohmann::json::array();

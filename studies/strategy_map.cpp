@@ -96,9 +96,7 @@ std::vector<MapTask> map_tasks(const MapOptions& o) {
   return tasks;
 }
 
-std::string file_of(const MapTask& task) {
-  return bundled_file("reaches/" + task.reach + ".yaml");
-}
+std::string file_of(const MapTask& task) { return bundled_file("reaches/" + task.reach + ".yaml"); }
 
 /// Older problems name no model.
 std::string model_of(const std::string& named) {

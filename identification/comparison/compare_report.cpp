@@ -358,8 +358,8 @@ std::string compare_headline(const CompareResult& result) {
                        lower_case_first(text));
   }
   if (!result.slips.empty())
-    text = fmt::format("Check the sensors: {}; {}", fmt::join(result.slips.front().slip.channels, ", "),
-                       lower_case_first(text));
+    text = fmt::format("Check the sensors: {}; {}",
+                       fmt::join(result.slips.front().slip.channels, ", "), lower_case_first(text));
   return text;
 }
 

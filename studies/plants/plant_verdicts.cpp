@@ -256,10 +256,9 @@ int run(const Arguments& a, Journal& journal) {
   std::mutex mutex;
   std::vector<Case> all;
   parallel(static_cast<std::size_t>(a.plants), [&](std::size_t i) {
-    std::vector<Case> cases =
-        unpacked_cases(journal.kept(fmt::format("plant {}", a.seed + i), [&] {
-          return Journal::Part{packed(plant_cases(a.seed + i, a)), true};
-        }));
+    std::vector<Case> cases = unpacked_cases(journal.kept(fmt::format("plant {}", a.seed + i), [&] {
+      return Journal::Part{packed(plant_cases(a.seed + i, a)), true};
+    }));
     const std::lock_guard lock(mutex);
     for (Case& c : cases) {
       if (!c.left_out.empty()) {

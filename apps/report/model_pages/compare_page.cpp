@@ -203,7 +203,8 @@ void set_verdict(Page& page, const CompareResult& result) {
                 ? "No region of postures, speeds or loads stands out. "
                 : "The error is largest here: " + result.worst.front().sentence + ". ";
   }
-  for (const SlipOfLog& slip : result.slips) text = slip.file + ": " + slip.slip.sentence + ". " + text;
+  for (const SlipOfLog& slip : result.slips)
+    text = slip.file + ": " + slip.slip.sentence + ". " + text;
   const bool sound = result.bad_data.empty() && result.slips.empty();
   page.verdict(sound ? tone_of(ranking.grade()) : Tone::kBad, compare_headline(result),
                text + fmt::format("Worst of each stage: {}.", worst_errors(result)));

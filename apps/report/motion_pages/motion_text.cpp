@@ -327,8 +327,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   return fmt::format("{}: {}{}\n", to_string(r.status), problem.name,
                      mostly_outside_data(r) ? "; " + outside_text(r) : "") +
          reached + energies_text(problem, r) + idle_text(problem, r.duration) +
-         cylinders_text(model.machine, r.energy) +
-         limits_text(r.checks) + reservations_text(model, r.energy) + starts_text(r);
+         cylinders_text(model.machine, r.energy) + limits_text(r.checks) +
+         reservations_text(model, r.energy) + starts_text(r);
 }
 
 bool limits_kept(const MotionEvaluation& e) {

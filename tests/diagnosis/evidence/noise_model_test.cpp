@@ -178,8 +178,7 @@ TEST(NoiseModel, WhiteningOfUnevenRowsIsTheInverseRootToo) {
     MatrixXd w = MatrixXd::Identity(n, n);
     const double log_determinant = m.whiten(rows, w);
     VectorXd scale(n);
-    for (Index t = 0; t < n; ++t)
-      scale[t] = 1.0 + 4.0 * std::exp(-since[t] / m.settling);
+    for (Index t = 0; t < n; ++t) scale[t] = 1.0 + 4.0 * std::exp(-since[t] / m.settling);
     const MatrixXd covariance =
         scale.asDiagonal() * dense_covariance(m, blocks) * scale.asDiagonal();
     const MatrixXd unit = w * covariance * w.transpose() / m.variance;
