@@ -65,7 +65,7 @@ std::string motion_header(const CraneModel& model) {
   for (const Cylinder& c : machine.cylinders) text += fmt::format(",x_{}_m", c.name);
   for (const std::size_t i : commanded_cylinders(model))
     text += fmt::format(",u_{}", machine.cylinders[i].name);
-  return text + "\n";
+  return text + ",payload_kg\n";
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
       const double u = moves(i) ? c.flow / full_command_flow(model, i, extend) : 0.0;
       fmt::format_to(out, ",{:.6g}", extend || u == 0.0 ? u : -u);
     }
-    text += '\n';
+    fmt::format_to(out, ",{:.6g}\n", payload);
   }
   return text;
 }

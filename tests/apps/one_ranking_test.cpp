@@ -25,7 +25,7 @@ using testing_support::arm_model;
 using testing_support::channel;
 using units::kBar;
 
-constexpr double kNoise = 0.5;  // [bar]
+constexpr double kSensorNoise = 0.5;  // [bar]
 
 /// The arm on a constant supply of 140 bar by the model, and of 140 + `off` bar by the log, where it varies by 0.3 bar.
 CraneModel with_constant_supply(CraneModel model) {
@@ -144,7 +144,7 @@ void expect_one_ranking(const CraneModel& model, const CompareResult& result) {
 
 TEST(OneRanking, ARightModelIsGoodEverywhere) {
   const CraneModel model = arm_model();
-  const CompareResult result = compare(model, {arm_log(kNoise)});
+  const CompareResult result = compare(model, {arm_log(kSensorNoise)});
   expect_one_ranking(model, result);
   EXPECT_EQ(result.ranking.grade(), Grade::kGood);
 }
@@ -159,12 +159,12 @@ TEST(OneRanking, AWrongForceIsNamedByAllAndThePressuresThatInheritItComeBehind) 
 
 TEST(OneRanking, AWrongPressureModelAndAWrongMarginAreNamedByAll) {
   const CraneModel pressure = with_pressure_off(30.0);
-  const CompareResult off = compare(pressure, {arm_log(kNoise)});
+  const CompareResult off = compare(pressure, {arm_log(kSensorNoise)});
   expect_one_ranking(pressure, off);
   EXPECT_EQ(off.ranking.cause()->words, "working pressure of arm extending");
   CraneModel margin = arm_model();
   margin.cylinders[0].margin += 25.0 * kBar;
-  const CompareResult late = compare(margin, {arm_log(kNoise)});
+  const CompareResult late = compare(margin, {arm_log(kSensorNoise)});
   expect_one_ranking(margin, late);
   EXPECT_EQ(late.ranking.cause()->words, "pressure of pump main");
 }
@@ -180,7 +180,7 @@ TEST(OneRanking, AForceThatIsWrongAndASupplyThatIsOffHaveOneOrder) {
 // A supply that hardly varies and is 3 bar of 140 off has a fit below -200 %; no output shows it beside a green tile.
 TEST(OneRanking, NoGreenTileShowsANegativeFit) {
   const CraneModel model = with_constant_supply(arm_model());
-  const CompareResult result = compare(model, {supplied(arm_log(kNoise), 3.0)});
+  const CompareResult result = compare(model, {supplied(arm_log(kSensorNoise), 3.0)});
   const StageScore* pump = result.find("pump", "main");
   ASSERT_NE(pump, nullptr);
   EXPECT_LT(pump->fit_percent, -200.0);
@@ -227,7 +227,7 @@ ExtendResult one_step(const CraneModel& before, const CraneModel& after, const L
 
 /// A pressure model that was 60 bar off and is right then.
 ExtendResult better_everywhere() {
-  return one_step(with_pressure_off(60.0), arm_model(), arm_log(kNoise));
+  return one_step(with_pressure_off(60.0), arm_model(), arm_log(kSensorNoise));
 }
 
 /// Friction that the model lacked is taken in; learning anew makes a pressure, and with it the energy, wrong by 60 bar.
