@@ -199,8 +199,9 @@ namespace {
 
 /// The profile along a straight line at equally distant instants, one second apart. Positions follow from the speeds by
 /// the trapezoidal rule, so that accelerations are constant between the instants and no rounding of the profile is needed.
-Trajectory straight_motion(const Grid& grid, const Run& run, int intervals) {
-  const VectorXd way = grid.q.back() - grid.q.front();
+/// @param ends first and last posture
+Trajectory straight_motion(const std::vector<VectorXd>& ends, const Run& run, int intervals) {
+  const VectorXd way = ends.back() - ends.front();
   VectorXd speed = VectorXd::Zero(intervals + 1);  // shares of the way in a second, up to a factor
   std::size_t piece = 0;
   for (int k = 1; k < intervals; ++k) {
@@ -213,7 +214,7 @@ Trajectory straight_motion(const Grid& grid, const Run& run, int intervals) {
   Trajectory motion;
   motion.t.setLinSpaced(intervals + 1, 0.0, intervals);
   motion.q.resize(intervals + 1, way.size());
-  motion.q.row(0) = grid.q.front();
+  motion.q.row(0) = ends.front();
   motion.qd = speed * way.transpose();
   motion.qdd.setZero(intervals + 1, way.size());
   for (int k = 0; k < intervals; ++k) {
@@ -221,7 +222,7 @@ Trajectory straight_motion(const Grid& grid, const Run& run, int intervals) {
     motion.q.row(k + 1) = motion.q.row(k) + 0.5 * (motion.qd.row(k) + motion.qd.row(k + 1));
   }
   motion.qdd.row(intervals) = motion.qdd.row(intervals - 1);
-  motion.q.row(intervals) = grid.q.back();  // removes rounding errors
+  motion.q.row(intervals) = ends.back();  // removes rounding errors
   return motion;
 }
 
@@ -235,7 +236,7 @@ Trajectory unit_motion(const MotionProblem& problem, const std::vector<VectorXd>
   }
   const Grid grid = sample(problem, waypoints, round, clearance);
   const Run run = fastest(problem, grid);
-  if (waypoints.size() == 2) return straight_motion(grid, run, intervals);
+  if (waypoints.size() == 2) return straight_motion(waypoints, run, intervals);
   std::size_t piece = 0;
   for (int k = 0; k < intervals; ++k) {
     control.row(k) = point_at(grid, run, run.t.back() * k / (intervals - 1), piece);
