@@ -64,10 +64,9 @@ struct ExtendOptions {
   DiagnoseOptions diagnose;   ///< used by `improve` only
   ErrorChangeOptions change;  ///< whether a step is kept
   /// Largest number of steps that `improve` keeps.
-  /// @threshold [steps] 0..; chosen: twice as many effects as a diagnosis may find
-  /// (SearchOptions::max_effects), because valve effects wait for the dead band's round; a limit that
-  /// is reached cuts effects in the order of the data's last digits
-  int max_steps = 16;
+  /// @threshold [steps] 0..; chosen: as many effects as a diagnosis may find
+  /// (SearchOptions::max_effects).
+  int max_steps = 8;
   /// Steps that `improve` may reject before it stops.
   /// @threshold [steps] 0..; chosen: as many as it may keep, because each may need another
   /// diagnosis.
@@ -81,10 +80,6 @@ struct ExtendOptions {
   /// @threshold [folds] 2..10; chosen: two cost least, and half of the motions still determine what
   /// a diagnosis of all has found
   int folds = 2;
-  /// Ratio of errors up to which `improve` takes two rivals as equal.
-  /// @threshold [1] 1..1.2; chosen: above what learning anew may change
-  /// (ErrorChangeOptions::refit_moves), because each of two rivals is learned anew
-  double equal_rivals = 1.05;
   std::string date;  ///< "2025-03-14" for the record; empty = not recorded
 };
 

@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 
-#include "diagnosis/extension/exchange_rivals.h"
 #include "diagnosis/extension/extension_step.h"
 #include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
@@ -13,6 +12,19 @@
 
 namespace sparflow {
 namespace {
+
+/// Whether the logs determine that an effect is there at all: the 95 % interval of one of the parameters to which it is
+/// proportional excludes zero. True for an effect without such a parameter or without intervals.
+bool is_determined(const AppliedEffect& e) {
+  if (e.lower95.size() != e.values.size()) return true;
+  bool proportional = false;
+  for (std::size_t k = 0; k < e.values.size(); ++k) {
+    if (!e.effect->info().parameters[k].linear) continue;
+    if (e.lower95[k] > 0.0 || e.upper95[k] < 0.0) return true;
+    proportional = true;
+  }
+  return !proportional;
+}
 
 /// Factor by which an effect reduces the error of the channel that it improves most, beside all others.
 double times_smaller(const DiagnosedEffect& e) {
@@ -154,18 +166,6 @@ std::vector<EffectAt> of_one_round(const std::vector<const DiagnosedEffect*>& na
   return out;
 }
 
-/// Whether an effect acts on what is learned anew for each model, so that only learning again shows its error.
-bool acts_on_learned(const EffectAt& e) {
-  const EffectStage stage = e.effect->info().stage;
-  return stage == EffectStage::kPressure || stage == EffectStage::kPump;
-}
-
-/// Whether the error grew in no stage in which the change acts, by more than refitting alone may change it.
-bool no_stage_grows(const ErrorChange& change, const ErrorChangeOptions& options) {
-  return std::all_of(change.own_by_stage.begin(), change.own_by_stage.end(),
-                     [&](const auto& s) { return s.second <= options.refit_moves; });
-}
-
 /// Repeated rounds of diagnosis, joint estimate and backward elimination.
 class Improvement {
  public:
@@ -179,9 +179,7 @@ class Improvement {
            const SearchProgress& progress) {
     Trial trial{places_of(current_.model.effects), {}, diagnosis};
     trial.effects.insert(trial.effects.end(), wanted.begin(), wanted.end());
-    std::vector<EffectAt> kept = eliminate(trial, wanted, progress);
-    for (const EffectAt& e : kept) rivals_.push_back({e, close_rivals(*diagnosis, e)});
-    if (exchange(trial, kept, progress)) kept = eliminate(trial, kept, progress);
+    const std::vector<EffectAt> kept = eliminate(trial, wanted, progress);
     for (const EffectAt& e : kept) {
       TriedStep tried = try_adding(context_, current_, e, progress);
       tried.step.diagnosis = diagnosis;
@@ -202,15 +200,10 @@ class Improvement {
   void test_again(const SearchProgress& progress) {
     if (rounds_ < 2) return;
     Trial trial{places_of(current_.model.effects), {}, nullptr};
-    std::vector<EffectAt> still = eliminate(trial, added_, progress);
-    if (exchange(trial, still, progress)) still = eliminate(trial, still, progress);
+    const std::vector<EffectAt> still = eliminate(trial, added_, progress);
     for (const EffectAt& e : added_) {
       if (!contains(still, e))
         keep(try_removing(context_, current_, e, progress), context_, current_, result_);
-    }
-    for (const EffectAt& e : still) {
-      if (!contains(added_, e))
-        keep(try_adding(context_, current_, e, progress), context_, current_, result_);
     }
     added_ = still;
   }
@@ -228,42 +221,12 @@ class Improvement {
     std::shared_ptr<const Diagnosis> diagnosis;
   };
 
-  /// An effect, and those that the diagnosis hardly distinguished from it.
-  struct Rivals {
-    EffectAt effect;
-    std::vector<EffectAt> others;
-  };
-
-  /// Exchanges each of `kept` for the rival that the data bear out better, or as well and more usual.
-  /// @return whether one was exchanged
-  bool exchange(Trial& trial, std::vector<EffectAt>& kept, const SearchProgress& progress) {
-    bool changed = false;
-    for (EffectAt& e : kept) {
-      const auto known = std::find_if(rivals_.begin(), rivals_.end(),
-                                      [&](const Rivals& r) { return r.effect == e; });
-      if (known == rivals_.end() || known->others.empty()) continue;
-      const CraneModel joint = context_.estimated(current_.model, trial.effects, progress);
-      const EffectAt better =
-          best_of_rivals(context_, {joint, trial.effects, e, known->others}, progress);
-      if (better == e) continue;
-      std::replace(trial.effects.begin(), trial.effects.end(), e, better);
-      std::replace(known->others.begin(), known->others.end(), better, e);
-      known->effect = better;
-      e = better;
-      changed = true;
-    }
-    return changed;
-  }
-
   /// Backward elimination: removes from the set the one of `tested` that the data bear out least, until they bear out all.
   /// @return those of `tested` that stay
   std::vector<EffectAt> eliminate(Trial& trial, std::vector<EffectAt> tested,
                                   const SearchProgress& progress) const {
     while (!tested.empty()) {
-      const bool learned = std::any_of(tested.begin(), tested.end(), acts_on_learned);
-      const Judged joint =
-          learned ? context_.with(current_, trial.effects, progress)
-                  : Judged{context_.estimated(current_.model, trial.effects, progress), {}, {}};
+      const Judged joint = context_.with(current_, trial.effects, progress);
       std::optional<ExtendStep> weakest = weakest_of(joint, tested, progress);
       if (!weakest) break;
       weakest->diagnosis = trial.diagnosis;
@@ -288,7 +251,8 @@ class Improvement {
     double least = 0.0;
     for (const EffectAt& e : tested) {
       const std::vector<EffectAt> rest = without(all, e);
-      const bool learned = acts_on_learned(e);
+      const EffectStage stage = e.effect->info().stage;
+      const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
       ExtendStep step;
       step.added = effect_key(e.effect->info(), joint.model.machine, e.at);
       step.title = effect_title(e.effect->info(), joint.model.machine, e.at);
@@ -302,8 +266,7 @@ class Improvement {
         step.judged_on = context_.measured_on();
       }
       step.determined = is_determined(step.effect);
-      const bool falls = step.change.own * options.change.refit_moves < 1.0 &&
-                         no_stage_grows(step.change, options.change);
+      const bool falls = step.change.own * options.change.refit_moves < 1.0;
       // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
       const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
       bool stays = step.determined && (falls || unseen);
@@ -330,7 +293,6 @@ class Improvement {
   ExtendResult& result_;
   Judged& current_;
   std::vector<EffectAt> added_;  ///< by this call, and still there
-  std::vector<Rivals> rivals_;   ///< of every effect kept in a round
   std::vector<EffectAt> aside_;  ///< not kept since the last round that kept one
   std::size_t rejected_ = 0;
   int rounds_ = 0;

@@ -185,13 +185,6 @@ CraneModel RefitContext::measured_model(const CraneModel& from,
   return model;
 }
 
-CraneModel RefitContext::estimated(const CraneModel& from, const std::vector<EffectAt>& effects,
-                                   const SearchProgress& progress) const {
-  CraneModel model = from;
-  model.effects = estimate(from, effects, {}, progress).effects;
-  return model;
-}
-
 CompareResult RefitContext::measured_errors(const CraneModel& from,
                                             const std::vector<EffectAt>& effects,
                                             const SearchProgress& progress) const {

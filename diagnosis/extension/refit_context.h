@@ -50,10 +50,6 @@ class RefitContext {
   CompareResult measured_errors(const CraneModel& from, const std::vector<EffectAt>& effects,
                                 const SearchProgress& progress) const;
 
-  /// The same model with these effects, estimated together from all logs to learn from; nothing is learned again.
-  CraneModel estimated(const CraneModel& from, const std::vector<EffectAt>& effects,
-                       const SearchProgress& progress) const;
-
   /// The same on the test logs, which may contradict an effect; without test logs empty.
   std::optional<CompareResult> tested_errors(const CraneModel& from,
                                              const std::vector<EffectAt>& effects,

@@ -56,22 +56,4 @@ double least_squares_advantage(const Evidence& evidence, const LeastSquaresResid
                                                                                               : 0.0;
 }
 
-bool least_squares_prefers_pair(const Evidence& evidence,
-                                const std::vector<const EffectDesign*>& base,
-                                const std::pair<const EffectDesign*, const EffectDesign*>& two,
-                                const EffectDesign& one, const RegressionOptions& options) {
-  const std::size_t channels = evidence.channels.size();
-  std::vector<bool> active(channels), acts(channels);
-  for (std::size_t c = 0; c < channels; ++c) {
-    acts[c] = two.first->touches(c) || two.second->touches(c);
-    active[c] = acts[c] || one.touches(c);
-  }
-  LeastSquaresResidual single = least_squares_residual(evidence, base, one, active);
-  std::vector<const EffectDesign*> with = base;
-  with.push_back(two.first);
-  LeastSquaresResidual pair = least_squares_residual(evidence, with, *two.second, active);
-  single.channels = pair.channels = acts;
-  return least_squares_advantage(evidence, pair, single, options) > 0.0;
-}
-
 }  // namespace sparflow

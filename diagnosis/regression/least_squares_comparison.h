@@ -6,7 +6,6 @@
 /// Used by the search only.
 /// Source: J. A. Hausman (1978), Specification tests in econometrics, Econometrica 46(6), on generalised against
 /// ordinary least squares; the paired comparison as Q. H. Vuong (1989), Econometrica 57(2), with motions as units.
-#include <utility>
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
@@ -31,13 +30,5 @@ LeastSquaresResidual least_squares_residual(const Evidence& evidence,
 double least_squares_advantage(const Evidence& evidence, const LeastSquaresResidual& other,
                                const LeastSquaresResidual& one,
                                const RegressionOptions& options = {});
-
-/// Whether ordinary least squares prefers two effects to one in their place significantly, in the channels where the two
-/// act. With one effect for two, what is left is slow, and a noise model close to a random walk takes it for noise.
-/// @param base the other effects
-bool least_squares_prefers_pair(const Evidence& evidence,
-                                const std::vector<const EffectDesign*>& base,
-                                const std::pair<const EffectDesign*, const EffectDesign*>& two,
-                                const EffectDesign& one, const RegressionOptions& options = {});
 
 }  // namespace sparflow

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "diagnosis/regression/acceptance_statistics.h"
-#include "diagnosis/regression/least_squares_comparison.h"
 #include "diagnosis/selection/acceptance_tests.h"
 
 namespace sparflow {
@@ -33,10 +32,6 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
                search.key(one.design.effect), search.key(found[i].design.effect),
                search.key(found[j].design.effect), gain, pair);
   if (gain < pair) return false;
-  if (least_squares_prefers_pair(search.evidence, designs_of(trial, trial.size() - 1),
-                                 {&found[i].design, &found[j].design}, one.design,
-                                 search.options.regression))
-    return false;
   search.judge(trial, trial.size() - 1, fit);
   trial.back().gain = gain;
   if (!why_not_named(trial.back(), search.options, search.mechanisms()).empty()) return false;

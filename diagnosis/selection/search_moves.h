@@ -9,8 +9,7 @@ namespace sparflow {
 void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current);
 
 /// Replaces two effects by one that explains as much. The first effect of such a pair was chosen while it explained
-/// two causes at once, and the second compensated its error for one of them. Where ordinary least squares prefers the pair, the
-/// pair stays. @return whether a pair was replaced
+/// two causes at once, and the second compensated its error for one of them. @return whether a pair was replaced
 bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current);
 
 /// Replaces an effect by another variant of it (the other sensor, the other law) that explains more now that others

@@ -294,7 +294,6 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
   for (const auto& [name, pool] : own) {
     log_own += pool.n * 0.5 * std::log(pool.after / pool.before);
     own_n += pool.n;
-    if (pool.n > 0.0) out.own_by_stage.emplace_back(name, std::sqrt(pool.after / pool.before));
   }
   out.own = own_n > 0.0 ? std::exp(log_own / own_n) : out.overall;
   return out;

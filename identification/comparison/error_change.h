@@ -2,7 +2,6 @@
 /// Compares the errors of a model before and after a change, on test data: whether they fell where the change acts, and
 /// whether any other error, or that of the energy, grew significantly given the variation between motions.
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "identification/comparison/compare.h"
@@ -64,8 +63,6 @@ struct ErrorChange {
   std::vector<HarmedError> harmed;
   /// Standard error of log(overall), from the variation between blocks of motion.
   double overall_deviation = 0.0;
-  /// `own` for each stage in which the change acts.
-  std::vector<std::pair<std::string, double>> own_by_stage = {};
 
   /// @return true when the error where the change acts grew, another error is harmed, or the overall error grew by more
   ///   than refitting alone may change it

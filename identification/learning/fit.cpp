@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 #include <span>
 
 #include "identification/learning/fit_pass.h"
@@ -204,47 +203,6 @@ std::vector<Mask> every_nth_block(const std::vector<MachineSignals>& signals,
   return held;
 }
 
-/// Masks of whole logs, with the motion of each cylinder shared evenly by the folds; empty where that leaves too little.
-std::vector<std::vector<Mask>> folds_of_logs(const std::vector<MachineSignals>& signals,
-                                             const FitOptions& options, int count) {
-  const std::size_t logs = signals.size(), folds = static_cast<std::size_t>(count);
-  if (count < 2 || logs < 2 * folds) return {};
-  const auto cylinders = static_cast<Index>(signals.front().cylinders.size());
-  Eigen::MatrixXd moved(cylinders, static_cast<Index>(logs));  // [s] by cylinder and log
-  for (std::size_t l = 0; l < logs; ++l) {
-    for (Index c = 0; c < cylinders; ++c)
-      moved(c, static_cast<Index>(l)) =
-          signals[l].step *
-          static_cast<double>(
-              (signals[l].cylinders[static_cast<std::size_t>(c)].moving && signals[l].usable)
-                  .count());
-  }
-  const VectorXd all = moved.rowwise().sum();
-  for (Index c = 0; c < cylinders; ++c)
-    if (all[c] > 0.0) moved.row(c) /= all[c];
-  // the longest logs first, each to the fold that its cylinders have moved least in
-  std::vector<std::size_t> order(logs);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return moved.col(static_cast<Index>(a)).sum() > moved.col(static_cast<Index>(b)).sum();
-  });
-  Eigen::MatrixXd held = Eigen::MatrixXd::Zero(cylinders, count);
-  std::vector<std::vector<Mask>> out(folds);
-  for (std::vector<Mask>& fold : out)
-    for (const MachineSignals& s : signals) fold.push_back(Mask::Constant(s.samples(), false));
-  for (const std::size_t l : order) {
-    const VectorXd share = moved.col(static_cast<Index>(l));
-    Index to = 0;
-    for (Index f = 1; f < count; ++f)
-      if (held.col(f).dot(share) < held.col(to).dot(share)) to = f;
-    held.col(to) += share;
-    out[static_cast<std::size_t>(to)][l].setConstant(true);
-  }
-  for (Index c = 0; c < cylinders; ++c)
-    if (all[c] > 0.0 && held.row(c).maxCoeff() > 1.0 - options.fold_leaves) return {};
-  return out;
-}
-
 }  // namespace
 
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
@@ -259,8 +217,6 @@ std::vector<std::vector<Mask>> held_out_folds(const std::vector<MachineSignals>&
   };
   std::vector<std::vector<Mask>> folds;
   if (!any(held_out_samples(signals, options))) return folds;
-  folds = folds_of_logs(signals, options, count);
-  if (!folds.empty()) return folds;
   for (int f = 0; f < count; ++f) {
     std::vector<Mask> held = every_nth_block(signals, options, count, f);
     if (any(held)) folds.push_back(std::move(held));

@@ -38,9 +38,6 @@ struct FitOptions {
   /// Least number of held-out blocks for an error on held-out motions.
   /// @threshold [blocks] 1..20; chosen: a single motion says little about others
   int hold_out_least = 2;
-  /// Least share of each cylinder's motion that a fold of whole logs must leave to learn from.
-  /// @threshold [1] 0.05..0.5; chosen: half of what two equal folds leave
-  double fold_leaves = 0.25;
   /// The samples of a pressure model are thinned to independent ones when the integrated
   /// autocorrelation of its residual reaches this many samples. 0 = never.
   /// @threshold [samples] 1..20; chosen: thinning takes every second sample at least
@@ -114,9 +111,6 @@ CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<Machin
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,
                                    const FitOptions& options);
 
-/// Folds of whole logs where there are at least twice as many logs as folds and each fold leaves enough of every cylinder's
-/// motion to learn from: motions of one log share its day, oil and pose, so that only a log left out whole shows what another
-/// log will. Else every n-th block of motion. The logs' order does not matter.
 /// @return [folds][logs] masks of the samples held out in each of `count` folds, which together are all motions; empty
 ///   where held_out_samples() has none
 std::vector<std::vector<Mask>> held_out_folds(const std::vector<MachineSignals>& signals,

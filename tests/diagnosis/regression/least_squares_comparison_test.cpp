@@ -83,22 +83,5 @@ TEST(LeastSquaresComparison, ComparesOnlyChannelsInWhichBothAct) {
   EXPECT_EQ(advantage(e, first, second), 0.0);
 }
 
-/// Viscous friction once replaced friction by load and flexibility: the likelihood rose while the residual quadrupled, because
-/// the noise model took the rest for a random walk.
-TEST(LeastSquaresPrefersPair, OnlyWhereTheOneEffectLeavesMuchMore) {
-  const Strokes s;
-  std::mt19937_64 random(7);
-  VectorXd position(1200);
-  for (Index k = 0; k < 1200; ++k) position[k] = std::cos(0.013 * static_cast<double>(k));
-  Evidence e;
-  e.channels.push_back(plain_channel(s.blocks, s.side + position + 0.1 * white(1200, random)));
-  const EffectDesign friction = plain_design({s.side}), flexibility = plain_design({position});
-  EXPECT_TRUE(
-      least_squares_prefers_pair(e, {}, {&friction, &flexibility}, plain_design({s.speed})));
-  // one effect that is both
-  EXPECT_FALSE(least_squares_prefers_pair(e, {}, {&friction, &flexibility},
-                                          plain_design({s.side + position})));
-}
-
 }  // namespace
 }  // namespace sparflow

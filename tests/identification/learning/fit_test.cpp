@@ -17,43 +17,6 @@ using namespace testing_support;
 using testing::Contains;
 using testing::HasSubstr;
 
-// ---------------------------------------------------------------- folds
-
-std::vector<MachineSignals> signals_of_logs(const std::vector<unsigned>& seeds) {
-  std::vector<MachineSignals> out;
-  for (const unsigned seed : seeds) out.push_back(make_signals(arm_machine(), arm_log(0.3, seed)));
-  return out;
-}
-
-TEST(HeldOutFolds, AreWholeLogsWhereThereAreTwiceAsManyAsFolds) {
-  const auto folds = held_out_folds(signals_of_logs({1, 2, 3, 4}), {}, 2);
-  ASSERT_EQ(folds.size(), 2u);
-  for (std::size_t log = 0; log < 4; ++log) {
-    EXPECT_NE(folds[0][log].all(), folds[1][log].all()) << "each log is held out once";
-    EXPECT_EQ(folds[0][log].any(), folds[0][log].all()) << "a log is held out whole";
-  }
-  // the four logs move equally long
-  EXPECT_EQ(folds[0][0].all() + folds[0][1].all() + folds[0][2].all() + folds[0][3].all(), 2);
-}
-
-TEST(HeldOutFolds, AreBlocksOfMotionWithFewerLogs) {
-  const auto folds = held_out_folds(signals_of_logs({1, 2, 3}), {}, 2);
-  ASSERT_EQ(folds.size(), 2u);
-  for (std::size_t log = 0; log < 3; ++log) {
-    EXPECT_TRUE(folds[0][log].any());
-    EXPECT_TRUE(folds[1][log].any());
-    EXPECT_FALSE((folds[0][log] && folds[1][log]).any());
-  }
-}
-
-TEST(HeldOutFolds, AreBlocksWhereALogHoldsNearlyAllMotionOfACylinder) {
-  std::vector<MachineSignals> signals = signals_of_logs({1, 2, 3, 4});
-  for (std::size_t log = 1; log < 4; ++log) signals[log].cylinders[0].moving.setConstant(false);
-  const auto folds = held_out_folds(signals, {}, 2);
-  ASSERT_EQ(folds.size(), 2u);
-  EXPECT_TRUE(folds[0][0].any() && folds[1][0].any()) << "the only log that moves is divided";
-}
-
 // ---------------------------------------------------------------- simulated lift
 
 TEST(Fit, RecoversTheLawOfTheLog) {

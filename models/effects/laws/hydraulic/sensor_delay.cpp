@@ -23,13 +23,11 @@ class SensorDelay final : public Effect {
         .title = "sensor delay",
         .stage = EffectStage::kSensor,
         .place = EffectPlace::kMachine,
-        // A late channel is late as a whole. A share far from one is the mean of a delay in one quantity and none in
-        // another, as a slow valve makes beside prompt forces; it must lie on a bound and is then not named.
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.7,
-                        1.4,
+                        0.5,
+                        2.0,
                         1.0,
                         "share of the shift that shows in the log, about 1",
                         true,
