@@ -91,8 +91,8 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
     };
     for (const CylinderState& c : state.cylinders)
       fmt::format_to(out, ",{:.6g}", c.flow / units::kLitrePerMinute);
-    for (std::size_t i = 0; i < state.cylinders.size(); ++i)
-      fmt::format_to(out, ",{:.6g}", moves(i) ? state.cylinders[i].pressure / units::kBar : 0.0);
+    for (const CylinderState& c : state.cylinders)
+      fmt::format_to(out, ",{:.6g}", c.pressure / units::kBar);
     for (const PumpState& p : state.pumps) fmt::format_to(out, ",{:.6g}", p.pressure / units::kBar);
     fmt::format_to(out, ",{:.6g}", state.power);
     for (std::size_t i = 0; i < state.cylinders.size(); ++i) {

@@ -10,7 +10,7 @@ namespace sparflow {
 
 /// Columns: t_s, q_*, qd_*, qdd_* by joint, Q_*_lpm, P_*_bar, x_*_m (stroke) and, where the valve's full flow is known,
 /// u_* (command, -1..1) by cylinder, p_*_bar by pump, power_W, payload_kg. It can be read as a log.
-/// @param least flows of the valves below which a cylinder stands: its working pressure and its command are then 0
+/// @param least flows of the valves below which a cylinder stands: its command is then 0
 std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
                        const LeastFlows& least = {});
 

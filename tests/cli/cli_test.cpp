@@ -189,7 +189,8 @@ TEST_F(Cli, OptimizeWritesMotionPageAndTheDocumentedKeys) {
       "t_s,q_boom_rad,q_jib_rad,q_extension_m,qd_boom_rad_s,qd_jib_rad_s,qd_extension_m_s,qdd_boom_"
       "rad_s2,"
       "qdd_jib_rad_s2,qdd_extension_m_s2,Q_boom_lpm,Q_jib_lpm,Q_extension_lpm,P_boom_bar,P_jib_bar,"
-      "P_extension_bar,p_main_bar,power_W");
+      "P_extension_bar,p_main_bar,power_W,"
+      "x_boom_m,x_jib_m,x_extension_m,u_boom,u_jib,u_extension,payload_kg");
   const std::string page = slurp(at("o.html"));
   EXPECT_THAT(page, HasSubstr("</html>"));
   EXPECT_THAT(page, HasSubstr("at the limit"));
