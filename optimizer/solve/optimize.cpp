@@ -420,9 +420,13 @@ class Search {
     if (!ranked.empty()) {
       result_.best_start = best_of(result_, ranked);
       const StartResult& best = result_.starts[static_cast<std::size_t>(result_.best_start)];
-      result_.status = stopped          ? OptimizeStatus::kInterrupted
-                       : best.converged ? OptimizeStatus::kOptimal
-                                        : OptimizeStatus::kFeasible;
+      const bool confirmed = std::any_of(ranked.begin(), ranked.end(), [&](int i) {
+        const StartResult& r = result_.starts[static_cast<std::size_t>(i)];
+        return r.converged && r.cost <= best.cost + options_.confirmed_within * std::abs(best.cost);
+      });
+      result_.status = stopped     ? OptimizeStatus::kInterrupted
+                       : confirmed ? OptimizeStatus::kOptimal
+                                   : OptimizeStatus::kFeasible;
       result_.mesh_error =
           best.converged ? mesh_error(best) : std::numeric_limits<double>::quiet_NaN();
       result_.motion = best.motion;
@@ -432,7 +436,7 @@ class Search {
       result_.checks = check_limits(model_, problem_, best.motion, options_.refine);
       result_.message = fmt::format("{}: {:.1f} kJ in {:.2f} s", problem_.name,
                                     result_.energy.total / 1e3, result_.duration);
-      if (!best.converged)
+      if (!confirmed)
         result_.message += "; it keeps all limits, but no solve converged to a cheaper motion";
       set_baselines(model_, problem_, seeds_, options_.refine, result_);
       return;

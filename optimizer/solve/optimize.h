@@ -43,6 +43,10 @@ struct OptimizeOptions {
   /// Of the mesh on which starts and sequences are compared.
   /// @threshold [intervals] 10..1000; chosen: half of the first mesh; starts need only be compared
   int search_intervals = 50;
+  /// A motion that is cheaper than a converged one by at most this share of its cost counts as optimal although its own solve did
+  /// not converge: the solver minimises a smoothed energy, whose least motion need not be the exact energy's.
+  /// @threshold [1] 0..0.1; chosen: five times what the smoothing is seen to cost on the bundled reaches, a tenth of a per cent
+  double confirmed_within = 5e-3;
   /// Largest relative difference of the solve's energy, without the smoothing of the maximum, from the exact energy.
   /// @threshold [1] 1e-8..0.1; chosen: far below what models know
   double mesh_error = 1e-4;
@@ -158,7 +162,7 @@ struct StartResult {
 };
 
 enum class OptimizeStatus {
-  kOptimal,   ///< the motion is a local optimum: its solve converged
+  kOptimal,   ///< its solve converged, or one whose cost is hardly larger (OptimizeOptions::confirmed_within)
   kFeasible,  ///< the motion keeps all limits, but it is a guess or of a solve that did not converge
   kInfeasible,  ///< no motion within all limits was found
   kFailed,
