@@ -162,7 +162,7 @@ struct StartResult {
 };
 
 enum class OptimizeStatus {
-  kOptimal,   ///< its solve converged, or one whose cost is hardly larger (OptimizeOptions::confirmed_within)
+  kOptimal,  ///< its solve converged, or one whose cost is hardly larger (OptimizeOptions::confirmed_within)
   kFeasible,  ///< the motion keeps all limits, but it is a guess or of a solve that did not converge
   kInfeasible,  ///< no motion within all limits was found
   kFailed,
