@@ -207,6 +207,7 @@ class Search {
       if (child.ok) {
         r = unpack_start(child.bytes);
         // A solve of the search is not one to the tolerance of results.
+        r.solved = r.converged;
         r.converged = r.converged && !searching_;
       } else {
         r.seed = name(i);
@@ -422,7 +423,7 @@ class Search {
       const StartResult& best = result_.starts[static_cast<std::size_t>(result_.best_start)];
       const bool confirmed = std::any_of(ranked.begin(), ranked.end(), [&](int i) {
         const StartResult& r = result_.starts[static_cast<std::size_t>(i)];
-        return r.converged && r.cost <= best.cost + options_.confirmed_within * std::abs(best.cost);
+        return r.solved && r.cost <= best.cost + options_.confirmed_within * std::abs(best.cost);
       });
       result_.status = stopped     ? OptimizeStatus::kInterrupted
                        : confirmed ? OptimizeStatus::kOptimal

@@ -151,6 +151,8 @@ struct StartResult {
   bool modes_held = false;  ///< whether the motion is of a solve with fixed modes
   /// Whether the motion is of a solve that converged to OptimizeOptions::tolerance: neither a guess nor one cut short.
   bool converged = false;
+  bool solved =
+      false;  ///< whether it is of a solve that converged at all, be it to the tolerance of the search
   double seed_energy =
       0.0;  ///< [J] energy of the initial guess (the seed in this duration); 0 if it violates limits
   bool seed_feasible = false;
