@@ -272,6 +272,7 @@ void add_views(Page& page, const Machine& machine, const MotionProblem& problem,
   CraneDrawing drawing;
   drawing.title = "The motion";
   std::vector<std::string> dashed;
+  dashed.reserve(beside.size());
   for (const ComparedMotion& other : beside) dashed.push_back(other.name);
   drawing.note = fmt::format(
       "Move the slider to drive the crane. Darker drawings are later instants. Solid: path of the "
