@@ -293,7 +293,7 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
   fmt::print("all logs left out\n");
   for (const auto& [name, row] : study.pooled) {
     const auto& [unit, sums] = row;
-    const auto root = [&](double squares) { return std::sqrt(squares / sums.n); };
+    const auto root = [n = sums.n](double squares) { return std::sqrt(squares / n); };
     study.print(name, unit, sums.n, {root(sums.before), root(sums.after), root(sums.squares)});
   }
   fmt::print("rows of single logs: {}, worse than before {}, worse than least squares {}\n",
