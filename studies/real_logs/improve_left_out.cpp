@@ -88,6 +88,7 @@ std::vector<AppliedEffect> mass_and_coulomb(const Machine& machine,
       for (Index k = 0; k < s.samples() && c.has_force(); ++k) {
         if (!c.moving[k] || !s.usable[k] || s.edge[k]) continue;
         std::vector<double> row;
+        row.reserve(with.size());
         for (const MachineSignals& w : with)
           row.push_back(w.cylinders[i].model_force[k] - c.static_force[k]);
         rows.add(row, c.force[k] - c.static_force[k]);
@@ -261,6 +262,7 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
         const std::vector<std::string>& only, bool together) {
   const Machine machine = load_machine(machine_file);
   std::vector<Log> logs;
+  logs.reserve(files.size());
   for (const std::string& f : files) logs.push_back(load_log(f, machine));
   if (together) {
     run_together(machine, logs);
