@@ -119,9 +119,11 @@ class Search {
       } else {
         select();
         result_.status = SeedStatus::kFound;
-        result_.message =
-            fmt::format("{} path(s) to {} goal configuration(s), shortest {:.2f} s of travel",
-                        result_.paths.size(), result_.end_postures, result_.paths.front().length);
+        result_.message = fmt::format(
+            "{} path{} to {} goal configuration{}; at the joints' largest speeds alone the "
+            "shortest takes {:.2f} s",
+            result_.paths.size(), result_.paths.size() == 1 ? "" : "s", result_.end_postures,
+            result_.end_postures == 1 ? "" : "s", result_.paths.front().length);
       }
     }
     result_.solve_s = std::chrono::duration<double>(Clock::now() - begin_).count();

@@ -89,6 +89,7 @@ VectorXd since_change(const MachineSeries& series, double least) {
     for (const auto& [first, last] : series.runs) {
       double level = c.command[first], changed = -kNever;
       for (Index k = first; k < last; ++k) {
+        if (std::isnan(level)) level = c.command[k];
         if (std::abs(c.command[k] - level) > least) {
           level = c.command[k];
           changed = series.time[k];

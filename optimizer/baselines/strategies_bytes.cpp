@@ -14,6 +14,7 @@ void put_energy(Packer& p, const MotionEnergy& e) {
   put_list(p, e.throttling);
   put_list(p, e.useful);
   put_list(p, e.share_moving);
+  put_list(p, e.creep);
 }
 
 MotionEnergy take_energy(Unpacker& u) {
@@ -26,6 +27,7 @@ MotionEnergy take_energy(Unpacker& u) {
   e.throttling = u.numbers();
   e.useful = u.numbers();
   e.share_moving = u.numbers();
+  e.creep = u.numbers();
   return e;
 }
 

@@ -91,6 +91,19 @@ std::string fate(pid_t pid) {
   return "the solve ended without a result";
 }
 
+/// Takes what a child has sent. @return whether it has sent all; its pipe is closed then
+bool has_ended(Child& child) {
+  char buffer[65536];
+  const ssize_t n = ::read(child.pipe, buffer, sizeof buffer);
+  if (n < 0 && errno == EINTR) return false;
+  if (n > 0) {
+    child.received.append(buffer, static_cast<std::size_t>(n));
+    return false;
+  }
+  ::close(child.pipe);
+  return true;
+}
+
 }  // namespace
 
 std::vector<ChildResult> run_in_children(int count, int at_once,
@@ -116,14 +129,7 @@ std::vector<ChildResult> run_in_children(int count, int at_once,
     if (::poll(polls.data(), polls.size(), -1) < 0) continue;
     for (std::size_t i = polls.size(); i-- > 0;) {
       if (polls[i].revents == 0) continue;
-      char buffer[65536];
-      const ssize_t n = ::read(children[i].pipe, buffer, sizeof buffer);
-      if (n < 0 && errno == EINTR) continue;
-      if (n > 0) {
-        children[i].received.append(buffer, static_cast<std::size_t>(n));
-        continue;
-      }
-      ::close(children[i].pipe);
+      if (!has_ended(children[i])) continue;
       const std::string end = fate(children[i].pid);
       results[static_cast<std::size_t>(children[i].index)] = decode(children[i].received, end);
       const int index = children[i].index;
@@ -167,14 +173,7 @@ std::vector<ChildResult> run_until_stopped(const KeptWork& parts, const OnDone& 
     if (::poll(polls.data(), polls.size(), kAskEvery) <= 0) continue;
     for (std::size_t i = polls.size(); i-- > 0;) {
       if (polls[i].revents == 0) continue;
-      char buffer[65536];
-      const ssize_t n = ::read(children[i].pipe, buffer, sizeof buffer);
-      if (n < 0 && errno == EINTR) continue;
-      if (n > 0) {
-        children[i].received.append(buffer, static_cast<std::size_t>(n));
-        continue;
-      }
-      ::close(children[i].pipe);
+      if (!has_ended(children[i])) continue;
       const std::string end = fate(children[i].pid);
       const int index = children[i].index;
       ChildResult& result = results[static_cast<std::size_t>(index)];

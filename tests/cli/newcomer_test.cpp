@@ -241,6 +241,14 @@ TEST_F(Cli, MachineTabulatesDrawsAndDoubtsAWrongBranch) {
   EXPECT_THAT(wrong.err, HasSubstr("try branch: -1"));
 }
 
+TEST_F(Cli, AForceThatRoundsToZeroHasNoSign) {
+  const Outcome o =
+      run("machine " + kData + "/machines/excavator.yaml --report " + at("excavator.html"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  // the swing carries no static force but rounding, of either sign
+  EXPECT_THAT(slurp(at("excavator.html")), Not(HasSubstr("\u22120<")));
+}
+
 TEST_F(Cli, PlanDrawsItsPaths) {
   const Outcome o = run("plan -p " + kLiftProblem + " --paths 2 --report " + at("p.html"));
   ASSERT_EQ(o.code, 0) << o.err;

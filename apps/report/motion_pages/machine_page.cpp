@@ -14,6 +14,9 @@ namespace {
 /// Samples of a curve over a joint's range.
 /// @threshold [1] 20..2000; chosen: a smooth curve on a screen
 constexpr int kCurveSamples = 121;
+/// Drawings of one joint's way over its range.
+/// @threshold [1] 4..500; chosen: 10 deg apart for a joint that turns around
+constexpr int kFramesOfLeg = 36;
 
 struct ReviewedJoint {
   const Cylinder& cylinder;
@@ -143,7 +146,8 @@ Page machine_page(const MachineReview& review) {
   drawing.x_axis = {plane.horizontal_name, "m"};
   drawing.z_axis = {plane.vertical_name, "m"};
   drawing.stills = 1;
-  drawing.frames = drawing_frames(machine, motion, 120);
+  const int frames = kFramesOfLeg * static_cast<int>(motion.size() - 1);
+  drawing.frames = drawing_frames(machine, motion, frames);
   drawing.payload = review.payload > 0.0;
   page.plot(std::move(drawing));
   if (plane.turns) {
@@ -153,7 +157,7 @@ Page machine_page(const MachineReview& review) {
     above.x_axis = {top.horizontal_name, "m"};
     above.z_axis = {top.vertical_name, "m"};
     above.stills = 1;
-    above.frames = drawing_frames(machine, motion, 120, top);
+    above.frames = drawing_frames(machine, motion, frames, top);
     above.payload = false;  // it hangs below the tip
     page.plot(std::move(above));
   }

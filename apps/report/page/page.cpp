@@ -37,8 +37,9 @@ std::string with_unit(const std::string& label, const std::string& unit) {
   return fmt::format("{} <span class=\"unit\">[{}]</span>", html_escape(label), html_escape(unit));
 }
 
-/// Separates thousands by narrow no-break spaces (not in 1234) and writes a true minus sign.
+/// Separates thousands by narrow no-break spaces (not in 1234) and writes a true minus sign, but none before a zero.
 std::string grouped(std::string text) {
+  if (text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
   const std::size_t point = std::min(text.find('.'), text.size());
   const std::size_t first = text[0] == '-' ? 1 : 0;
   if (point - first > 4) {

@@ -186,6 +186,8 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
   EXPECT_EQ(again.rows.size(), r.rows.size());
   EXPECT_EQ(again.rows[0].find(kOptimal)->energy.total, best->energy.total);
   EXPECT_EQ(again.rows[0].find(kOptimal)->motion.q, best->motion.q);
+  EXPECT_EQ(again.rows[0].find(kOptimal)->energy.creep, best->energy.creep);
+  EXPECT_EQ(again.rows[0].find(kOptimal)->energy.creep.size(), c.model.cylinders.size());
   EXPECT_EQ(again.orders.size(), r.orders.size());
 }
 
