@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "apps/report/model_pages/compare_page.h"
 #include "apps/report/model_pages/diagnose_page.h"
@@ -82,6 +83,13 @@ void expect_one_ranking(const CraneModel& model, const CompareResult& result) {
   const std::string text = compare_table(result), html = compare_page(model, result).html();
   const auto json = test_support::parsed_json(compare_json(result));
   ASSERT_FALSE(result.ranking.empty());
+  // worst grade first, own errors before inherited ones, the larger unexplained share before the smaller
+  const std::vector<RankedError>& errors = result.ranking.errors;
+  const auto key = [](const RankedError& e) {
+    return std::tuple(-static_cast<int>(e.grade), e.source >= 0, -e.unexplained);
+  };
+  for (std::size_t k = 0; k + 1 < errors.size(); ++k)
+    EXPECT_LE(key(errors[k]), key(errors[k + 1])) << k << " of " << errors.size();
   // the headline, in all three
   const std::string headline = json["headline"];
   EXPECT_THAT(text, HasSubstr("\n" + headline + ".\n"));
