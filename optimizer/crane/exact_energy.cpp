@@ -214,6 +214,13 @@ void check_ends(const MotionProblem& problem, const Machine& machine, const Traj
 
 }  // namespace
 
+LimitCheck check_duration(const MotionProblem& problem, double duration) {
+  const bool early = duration < problem.duration.min;
+  const double limit = early ? problem.duration.min : problem.duration.max;
+  const double beyond = early ? limit - duration : duration - limit;
+  return {"duration", duration, limit, "s", duration, std::isfinite(limit) ? beyond / limit : -1.0};
+}
+
 std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProblem& problem,
                                      const Trajectory& motion, int refine) {
   const Machine& machine = model.machine;

@@ -68,6 +68,9 @@ struct LimitCheck {
 std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProblem& problem,
                                      const Trajectory& motion, int refine = 16);
 
+/// Whether a duration [s] is one that the problem allows.
+LimitCheck check_duration(const MotionProblem& problem, double duration);
+
 /// Largest relative excess, 0 when every limit is kept.
 double worst_excess(const std::vector<LimitCheck>& checks);
 

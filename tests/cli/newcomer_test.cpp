@@ -127,6 +127,14 @@ TEST_F(Cli, AMotionAtAFixedRateCostsTheSameAndHasStrokesAndCommands) {
               energy, 2e-3 * energy);
 }
 
+TEST_F(Cli, AMotionThatTakesTooLongBreaksTheProblemsDuration) {
+  // the same start and goal in 9 s; the motion takes 16 s
+  const Outcome o = run("evaluate " + lift().solved + " -p " + kData +
+                        "/reaches/loader_crane_hurry.yaml --model " + kBundledModel);
+  EXPECT_EQ(o.code, 5) << o.err << o.out;
+  EXPECT_THAT(o.out, HasSubstr("duration: 16 of 9 s"));
+}
+
 TEST_F(Cli, PositionsAloneArePricedToo) {
   std::istringstream in(slurp(lift().at_100_hz));
   std::string text, line;

@@ -136,7 +136,13 @@ int run(const EvaluateArguments& a) {
   }
   evaluation.energy = exact_energy(model, problem, evaluation.motion);
   evaluation.checks = check_limits(model, problem, evaluation.motion);
-  if (a.problem.empty()) remove_own_ends(evaluation.checks);
+  if (a.problem.empty()) {
+    remove_own_ends(evaluation.checks);
+  } else {
+    evaluation.checks.push_back(check_duration(problem, evaluation.motion.duration()));
+    std::stable_sort(evaluation.checks.begin(), evaluation.checks.end(),
+                     [](const LimitCheck& l, const LimitCheck& r) { return l.excess > r.excess; });
+  }
   if (!a.output.empty()) {
     const Trajectory rows = a.rate > 0.0 ? at_rate(evaluation.motion, a.rate) : evaluation.motion;
     write_file_atomically(a.output, motion_csv(model, rows, problem.payload,
@@ -162,9 +168,10 @@ void add_evaluate_verb(CLI::App& app, int& code) {
       ->type_name("MOTION.csv");
   verb->add_option("--model", a->model, "fitted model; absent: the one that the problem names")
       ->type_name("MODEL.json");
-  verb->add_option("--problem,-p", a->problem,
-                   "motion problem (YAML) whose limits, obstacles, payload, start and goal judge "
-                   "the motion; exit code 5 when it breaks one")
+  verb->add_option(
+          "--problem,-p", a->problem,
+          "motion problem (YAML) whose limits, obstacles, payload, duration, start and goal judge "
+          "the motion; exit code 5 when it breaks one")
       ->type_name("FILE");
   verb->add_option("--payload", a->payload, "payload; absent: that of the problem or of the log")
       ->type_name("KG")
