@@ -143,7 +143,9 @@ bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   for (Index i = 0; i < n; ++i)
     channel.baseline.row(i) = rows_[static_cast<std::size_t>(i)].transpose();
   channel.baseline = acting_columns(channel.baseline);
-  channel.since_change = Eigen::Map<VectorXd>(since_.data(), std::ssize(since_));
+  if (!since_.empty())
+    channel.since_change =
+        SettlingTimes(Eigen::Map<VectorXd>(since_.data(), std::ssize(since_)), options.noise);
   out.push_back(std::move(channel));
   return true;
 }

@@ -32,7 +32,7 @@ struct EvidenceChannel {
   std::vector<NoiseBlock> blocks;    ///< stretches of motion
   std::vector<int> log;              ///< [blocks] index into Evidence::series
   std::vector<Eigen::Index> sample;  ///< [rows] sample index in that log
-  Eigen::VectorXd since_change;      ///< [rows, s] since a command changed; infinite: none did
+  SettlingTimes since_change;        ///< since a command of the machine changed, by row
   /// Force and pump channels, by log: y before the filter [samples, SI], in which oscillations are searched; empty where
   /// the log does not measure it.
   std::vector<Eigen::VectorXd> raw;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <vector>
 
 namespace sparflow {
@@ -21,25 +22,20 @@ Reflection reflections(const NoiseModel& m) {
   return {m.phi1 / (1.0 - m.phi2), m.phi2};
 }
 
-/// Squares by the time since a command changed, in classes that each are half as wide again as the one before; the last one has no
-/// end. A class has the variance that its median square implies for normal values, so that one motion out of many decides nothing.
+constexpr double kFirstClass = 0.05, kClassRatio = 1.5;  // [s], [1]
+
+/// Squares by the class of the time since a command changed. A class has the variance that its median square implies for normal
+/// values, so that one motion out of many decides nothing.
 struct SettlingClasses {
-  static constexpr int kCount = 14;
-  static constexpr double kFirst = 0.05, kRatio = 1.5;  // [s], [1]
-  static constexpr double kMedianSquare = 0.4549;       // of a normal value of unit variance
+  static constexpr int kCount = SettlingTimes::kClasses;
+  static constexpr double kMedianSquare = 0.4549;  // of a normal value of unit variance
   std::array<double, kCount> squares{}, rows{};
 
   SettlingClasses(const Eigen::Ref<const Eigen::VectorXd>& residual, const NoiseRows& of) {
-    const double per_class = 1.0 / std::log(kRatio);
     std::array<std::vector<double>, kCount> all;
     for (const auto& [first, last] : of.blocks) {
-      for (Eigen::Index t = first; t < last; ++t) {
-        const double since = (*of.since_change)[t];
-        const auto at = since < kFirst
-                            ? 0.0
-                            : std::min(1.0 + std::log(since / kFirst) * per_class, kCount - 1.0);
-        all[static_cast<std::size_t>(at)].push_back(residual[t] * residual[t]);
-      }
+      for (Eigen::Index t = first; t < last; ++t)
+        all[of.since_change->class_of(t)].push_back(residual[t] * residual[t]);
     }
     for (std::size_t k = 0; k < all.size(); ++k) {
       if (all[k].empty()) continue;
@@ -49,12 +45,7 @@ struct SettlingClasses {
       squares[k] = rows[k] * *middle / kMedianSquare;
     }
   }
-  /// [s] middle of a class
-  static double time(int k) {
-    if (k == 0) return 0.5 * kFirst;
-    if (k == kCount - 1) return std::numeric_limits<double>::infinity();
-    return kFirst * std::pow(kRatio, k - 0.5);
-  }
+  static double time(int k) { return SettlingTimes::time(k); }
   double rows_between(double from, double to) const {
     double n = 0.0;
     for (int k = 0; k < kCount; ++k)
@@ -62,40 +53,46 @@ struct SettlingClasses {
     return n;
   }
   /// Of independent rows with the deviation s(t), up to a constant. [nats]
-  double log_likelihood(double ratio, double settling) const {
+  double log_likelihood(const SettlingTimes::Law& law) const {
     double sum = 0.0, n = 0.0, logs = 0.0;
-    for (int k = 0; k < kCount; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      const double s = 1.0 + (ratio - 1.0) * std::exp(-time(k) / settling);
-      sum += squares[i] / (s * s);
-      logs += rows[i] * std::log(s);
-      n += rows[i];
+    for (std::size_t k = 0; k < kCount; ++k) {
+      sum += squares[k] * law.inverse_squares[k];
+      logs += rows[k] * law.logs[k];
+      n += rows[k];
     }
     return -logs - 0.5 * n * std::log(std::max(sum / n, 1e-300));
   }
 };
 
+SettlingTimes::Law law_of(double ratio, double settling) {
+  SettlingTimes::Law law{ratio, settling, {}, {}};
+  for (int k = 0; k < SettlingTimes::kClasses; ++k) {
+    const double s = 1.0 + (ratio - 1.0) * std::exp(-SettlingTimes::time(k) / settling);
+    law.inverse_squares[static_cast<std::size_t>(k)] = 1.0 / (s * s);
+    law.logs[static_cast<std::size_t>(k)] = std::log(s);
+  }
+  return law;
+}
+
 /// Sets `transient` and `settling` to the most likely ones.
 void estimate_settling(const Eigen::Ref<const Eigen::VectorXd>& residual, const NoiseRows& rows,
                        const NoiseOptions& options, NoiseModel& m) {
   if (rows.since_change == nullptr) return;
-  constexpr double kRatioStep = 1.4;   // between the ratios that are tried
   constexpr double kSteadyFrom = 3.0;  // time constants, after which e^-3 of the excess is left
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   const SettlingClasses classes(residual, rows);
-  double best = classes.log_likelihood(1.0, 1.0) + options.least_settling_gain;
-  for (const double settling : options.settling) {
-    constexpr double kNever = std::numeric_limits<double>::infinity();
-    if (std::min(classes.rows_between(0.0, settling),
-                 classes.rows_between(kSteadyFrom * settling, kNever)) <
-        options.fewest_rows_of_kind)
-      continue;
-    for (double ratio = kRatioStep; ratio <= options.largest_transient_ratio; ratio *= kRatioStep) {
-      const double likelihood = classes.log_likelihood(ratio, settling);
-      if (likelihood <= best) continue;
-      best = likelihood;
-      m.transient = ratio;
-      m.settling = settling;
-    }
+  const auto occurs = [&](double settling) {
+    return std::min(classes.rows_between(0.0, settling),
+                    classes.rows_between(kSteadyFrom * settling, kNever)) >=
+           options.fewest_rows_of_kind;
+  };
+  double best = classes.log_likelihood(law_of(1.0, 1.0)) + options.least_settling_gain;
+  for (const SettlingTimes::Law& law : rows.since_change->laws()) {
+    const double likelihood = classes.log_likelihood(law);
+    if (likelihood <= best || !occurs(law.settling)) continue;
+    best = likelihood;
+    m.transient = law.ratio;
+    m.settling = law.settling;
   }
 }
 
@@ -166,7 +163,46 @@ NoiseModel estimate_evenly(const Eigen::Ref<const Eigen::VectorXd>& residual,
   return m;
 }
 
+/// Sum of the logarithms of values between 1 and NoiseOptions::largest_transient_ratio, few of which are taken.
+double sum_of_logs(const Eigen::VectorXd& values) {
+  constexpr Eigen::Index kAtOnce = 64;  // 30^64 < 1e95
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < values.size(); k += kAtOnce)
+    sum += std::log(values.segment(k, std::min(kAtOnce, values.size() - k)).prod());
+  return sum;
+}
+
 }  // namespace
+
+SettlingTimes::SettlingTimes(const Eigen::VectorXd& since, const NoiseOptions& options)
+    : settling_(options.settling.begin(), options.settling.end()) {
+  const double per_class = 1.0 / std::log(kClassRatio);
+  class_of_.reserve(static_cast<std::size_t>(since.size()));
+  for (const double t : since) {
+    const double at = t < kFirstClass
+                          ? 0.0
+                          : std::min(1.0 + std::log(t / kFirstClass) * per_class, kClasses - 1.0);
+    class_of_.push_back(static_cast<unsigned char>(at));
+  }
+  for (const double settling : settling_)
+    decay_.emplace_back((-since.array() / settling).exp().matrix());
+  constexpr double kRatioStep = 1.4;  // between the ratios that are tried
+  for (const double settling : settling_)
+    for (double ratio = kRatioStep; ratio <= options.largest_transient_ratio; ratio *= kRatioStep)
+      laws_.push_back(law_of(ratio, settling));
+}
+
+double SettlingTimes::time(int k) {
+  if (k == 0) return 0.5 * kFirstClass;
+  if (k == kClasses - 1) return std::numeric_limits<double>::infinity();
+  return kFirstClass * std::pow(kClassRatio, k - 0.5);
+}
+
+const Eigen::VectorXd& SettlingTimes::decay(double settling) const {
+  const auto at = std::find(settling_.begin(), settling_.end(), settling);
+  if (at == settling_.end()) throw std::logic_error("a time constant that is none of the options");
+  return decay_[static_cast<std::size_t>(at - settling_.begin())];
+}
 
 double NoiseModel::deviation() const {
   const auto [k1, k2] = reflections(*this);
@@ -175,7 +211,7 @@ double NoiseModel::deviation() const {
 
 Eigen::VectorXd NoiseModel::scale_of(const NoiseRows& rows) const {
   if (transient == 1.0 || rows.since_change == nullptr) return {};
-  return 1.0 + (transient - 1.0) * (-rows.since_change->array() / settling).exp();
+  return 1.0 + (transient - 1.0) * rows.since_change->decay(settling).array();
 }
 
 NoiseModel NoiseModel::settling_of(const Eigen::Ref<const Eigen::VectorXd>& values,
@@ -217,7 +253,7 @@ NoiseModel NoiseModel::scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residu
 
 double NoiseModel::whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> columns) const {
   const Eigen::VectorXd scale = scale_of(rows);
-  if (scale.size() > 0) columns.array().colwise() /= scale.array();
+  if (scale.size() > 0) columns.array().colwise() *= scale.array().inverse().eval();
   const Reflection reflection = reflections(*this);
   const double k1 = reflection.k1, k2 = reflection.k2;
   // standard deviations of the first two samples in units of the innovation's
@@ -225,14 +261,17 @@ double NoiseModel::whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> col
   const double s0 = s1 / std::sqrt(1.0 - k1 * k1);
   const double ratio = offset_variance / variance;
   double log_determinant = 0.0;
-  if (scale.size() > 0) log_determinant -= scale.array().log().sum();
-  Eigen::VectorXd one;
+  if (scale.size() > 0) log_determinant -= sum_of_logs(scale);
+  Eigen::VectorXd one, before;
   for (const auto& [first, last] : rows.blocks) {
     const Eigen::Index n = last - first;
     if (n <= 0) continue;
     log_determinant -= std::log(s0) + (n > 1 ? std::log(s1) : 0.0);
     const auto whiten_one = [&](auto&& x) {
-      for (Eigen::Index t = n - 1; t >= 2; --t) x[t] -= phi1 * x[t - 1] + phi2 * x[t - 2];
+      if (n > 2) {
+        before = x;
+        x.tail(n - 2) -= phi1 * before.segment(1, n - 2) + phi2 * before.head(n - 2);
+      }
       if (n > 1) x[1] = (x[1] - k1 * x[0]) / s1;
       x[0] /= s0;
     };

@@ -4,6 +4,7 @@
 /// effects where none are missing (98 % false alarms with such a criterion on logs with nothing missing).
 /// Source: Box, Jenkins, Reinsel (2008), ch. 3 (Levinson recursion); Laird & Ware (1982), random intercepts.
 #include <Eigen/Dense>
+#include <array>
 #include <vector>
 
 #include "diagnosis/evidence/evidence_options.h"
@@ -15,14 +16,45 @@ struct NoiseBlock {
   Eigen::Index first = 0, last = 0;
 };
 
+/// The time since a command of the machine changed, by row, and what every fit needs of it.
+class SettlingTimes {
+ public:
+  /// Times in one class: each is half as wide again as the one before, and the last one has no end.
+  static constexpr int kClasses = 14;
+
+  SettlingTimes() = default;
+  /// @param since [rows, s] infinite where no command changed before; no rows: not known
+  explicit SettlingTimes(const Eigen::VectorXd& since, const NoiseOptions& options = {});
+
+  bool known() const { return !class_of_.empty(); }
+  /// Class of a row's time, from 0 to kClasses - 1.
+  std::size_t class_of(Eigen::Index row) const { return class_of_[static_cast<std::size_t>(row)]; }
+  /// [s] middle of a class; infinite for the last one
+  static double time(int k);
+  /// A law s(t) that is tried, at the middle of every class.
+  struct Law {
+    double ratio = 1.0, settling = 1.0;  ///< NoiseModel::transient, NoiseModel::settling
+    std::array<double, kClasses> inverse_squares{}, logs{};
+  };
+  const std::vector<Law>& laws() const { return laws_; }
+  /// exp(-t / settling) of every row. @param settling one of NoiseOptions::settling [s]
+  const Eigen::VectorXd& decay(double settling) const;
+
+ private:
+  std::vector<unsigned char> class_of_;  // [rows]
+  std::vector<double> settling_;         // [s]
+  std::vector<Eigen::VectorXd> decay_;   // [settling][rows]
+  std::vector<Law> laws_;
+};
+
 /// The rows of a channel: its blocks, and the time since a command of the machine changed.
 struct NoiseRows {
   const std::vector<NoiseBlock>& blocks;
-  const Eigen::VectorXd* since_change = nullptr;  ///< [rows, s]; null: not known
+  const SettlingTimes* since_change = nullptr;  ///< null: not known
 
   NoiseRows(const std::vector<NoiseBlock>& all) : blocks(all) {}
-  NoiseRows(const std::vector<NoiseBlock>& all, const Eigen::VectorXd& since)
-      : blocks(all), since_change(since.size() > 0 ? &since : nullptr) {}
+  NoiseRows(const std::vector<NoiseBlock>& all, const SettlingTimes& since)
+      : blocks(all), since_change(since.known() ? &since : nullptr) {}
 };
 
 /// The autoregression and the offsets are those of y / s(t), s(t) = 1 + (transient - 1) exp(-t / settling), with t the time since a command changed: pumps, spools and columns of oil settle, and what a model lacks of that must not count as noise of

@@ -205,6 +205,7 @@ std::vector<bool> shape_choices(const Effect& effect) {
 EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,
                                const VectorXd& theta) {
   EffectDesign result = design;
+  result.number = 0;
   const std::vector<bool> choices = shape_choices(*design.effect.effect);
   for (std::size_t s = 0; s < design.shape.size(); ++s) {
     const double h = kSlopeStep * std::max(std::abs(design.shape[s]), 1e-9);

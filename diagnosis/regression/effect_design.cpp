@@ -1,5 +1,6 @@
 // Designs of effects: their columns in all channels; declared in effect_fit.h.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "diagnosis/regression/effect_fit.h"
@@ -58,6 +59,11 @@ void drop_negligible(const Evidence& evidence, EffectDesign& design) {
   }
 }
 
+std::uint64_t next_number() {
+  static std::atomic<std::uint64_t> last = 0;
+  return ++last;
+}
+
 /// @param k index among the linear parameters
 bool is_optional(const EffectDesign& design, Index k) {
   for (const EffectParameter& p : design.effect.effect->info().parameters) {
@@ -87,6 +93,7 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c, about));
   drop_negligible(evidence, d);
+  d.number = next_number();
   if (!optional) return without_optional(std::move(d));
   for (Index k = 0; k < d.linear; ++k) {
     if (!is_optional(d, k)) continue;
@@ -117,6 +124,7 @@ EffectDesign without_optional(EffectDesign design) {
     }
   }
   design.optional = false;
+  design.number = next_number();
   return design;
 }
 

@@ -72,19 +72,40 @@ double EffectFit::total() const {
   return std::accumulate(log_likelihood.begin(), log_likelihood.end(), 0.0);
 }
 
+namespace {
+
+/// The baseline and y side by side, whitened.
+MatrixXd whitened_baseline(const EvidenceChannel& channel, const NoiseModel& noise,
+                           double* log_determinant) {
+  MatrixXd all(channel.rows(), channel.baseline.cols() + 1);
+  all << channel.baseline, channel.y;
+  *log_determinant = noise.whiten(channel.noise_rows(), all);
+  return all;
+}
+
+}  // namespace
+
+WhitenedBaseline::WhitenedBaseline(const EvidenceChannel& channel, const NoiseModel& noise)
+    : channel_(channel), noise_(noise), baseline_([&] {
+        const MatrixXd all = whitened_baseline(channel, noise, &log_determinant_);
+        y_ = all.rightCols(1);
+        return Projection(all.leftCols(channel.baseline.cols()));
+      }()) {}
+
+MatrixXd WhitenedBaseline::rows(const MatrixXd& columns, MatrixXd* baseline_coefficients) const {
+  MatrixXd all(channel_.rows(), columns.cols() + 1);
+  all.leftCols(columns.cols()) = columns;
+  if (columns.cols() > 0) noise_.whiten(channel_.noise_rows(), all.leftCols(columns.cols()));
+  all.rightCols(1) = y_;
+  return baseline_.without(all, baseline_coefficients);
+}
+
 MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
                        const MatrixXd& columns, double* log_determinant,
                        MatrixXd* baseline_coefficients) {
-  const Index n = channel.rows(), b = channel.baseline.cols(), m = columns.cols();
-  MatrixXd all(n, b + m + 1);
-  all << channel.baseline, columns, channel.y;
-  const double l = noise.whiten(channel.noise_rows(), all);
-  if (log_determinant != nullptr) *log_determinant = l;
-  if (b == 0) {
-    if (baseline_coefficients != nullptr) baseline_coefficients->resize(0, m + 1);
-    return all;
-  }
-  return without_projection(all.rightCols(m + 1), all.leftCols(b), baseline_coefficients);
+  const WhitenedBaseline baseline(channel, noise);
+  if (log_determinant != nullptr) *log_determinant = baseline.log_determinant();
+  return baseline.rows(columns, baseline_coefficients);
 }
 
 namespace {
@@ -123,7 +144,8 @@ class ProfileLikelihood {
   }
   void collect_columns(const std::vector<const EffectDesign*>& designs, std::size_t c);
   /// Whitens all channels by the fit's noise models and sums up the normal equations.
-  void set_normal_equations();
+  /// @param baselines whitened by them; null: they are not at hand
+  void set_normal_equations(const WhitenedChannels* baselines);
   VectorXd theta_in(std::size_t c) const;  ///< parameters of a channel's columns
   /// Innovations: what the fit leaves of the whitened rows.
   VectorXd innovations_in(std::size_t c) const;
@@ -170,14 +192,19 @@ void ProfileLikelihood::collect_columns(const std::vector<const EffectDesign*>& 
   }
 }
 
-void ProfileLikelihood::set_normal_equations() {
+void ProfileLikelihood::set_normal_equations(const WhitenedChannels* baselines) {
   normal_ = MatrixXd::Zero(count_, count_);
   right_side_ = VectorXd::Zero(count_);
   for (std::size_t c = 0; c < channels(); ++c) {
     if (!active(c)) continue;
     Whitened& w = white_[c];
-    w.rows = whitened_rows(evidence_.channels[c], fit_.noise[c], columns_[c], &w.log_determinant,
-                           &w.baseline);
+    if (baselines != nullptr) {
+      w.log_determinant = baselines->baseline[c].log_determinant();
+      w.rows = baselines->baseline[c].rows(columns_[c], &w.baseline);
+    } else {
+      w.rows = whitened_rows(evidence_.channels[c], fit_.noise[c], columns_[c], &w.log_determinant,
+                             &w.baseline);
+    }
     const Index m = columns_[c].cols();
     const MatrixXd cross = transposed_product(w.rows.leftCols(m), w.rows) / fit_.noise[c].variance;
     for (Index i = 0; i < m; ++i) {
@@ -277,6 +304,8 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
   if (start != nullptr) {
     fit_.noise = start->noise;
     fit_.log_likelihood = start->log_likelihood;
+  } else if (control_.first != nullptr) {
+    fit_.noise = control_.first->noise;
   } else {
     for (std::size_t c = 0; c < channels(); ++c) {
       if (!active(c)) continue;
@@ -286,7 +315,7 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
     }
   }
   for (int pass = 0; pass < control_.noise_passes + 1; ++pass) {
-    set_normal_equations();
+    set_normal_equations(pass == 0 ? control_.first : nullptr);
     if (count_ > 0) fit_.theta = solve_box(normal_, right_side_, bounds, &fit_.at_bound);
     const bool last = pass == control_.noise_passes;
     for (std::size_t c = 0; c < channels(); ++c) {
@@ -305,6 +334,21 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
 }
 
 }  // namespace
+
+WhitenedChannels WhitenedChannels::by(const Evidence& evidence, std::vector<NoiseModel> noise) {
+  WhitenedChannels w{std::move(noise), {}};
+  w.baseline.reserve(evidence.channels.size());
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c)
+    w.baseline.emplace_back(evidence.channels[c], w.noise[c]);
+  return w;
+}
+
+WhitenedChannels WhitenedChannels::cold(const Evidence& evidence) {
+  std::vector<NoiseModel> noise;
+  for (const EvidenceChannel& c : evidence.channels)
+    noise.push_back(settling_noise_of(c, evidence.options.noise));
+  return by(evidence, std::move(noise));
+}
 
 EffectFit fit_effects(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                       const EffectFit* start, const FitControl& control) {

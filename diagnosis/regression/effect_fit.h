@@ -1,10 +1,12 @@
 #pragma once
 /// Generalised least squares of effects on evidence: linear parameters of the effects, baselines and noise models of
 /// all channels are estimated together by profile likelihood. Null distribution, ranking, intervals and power use it.
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "diagnosis/evidence/evidence.h"
+#include "models/math/linear_algebra.h"
 
 namespace sparflow {
 
@@ -16,6 +18,8 @@ struct EffectDesign {
   std::vector<double> lower, upper;      ///< [SI] bounds of the linear parameters
   int linear = 0;                        ///< number of linear parameters
   bool optional = false;                 ///< whether an optional parameter has a column
+  /// Number of the columns: designs of one number have the same columns; 0: not known.
+  std::uint64_t number = 0;
 
   bool acts() const;
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
@@ -47,6 +51,34 @@ struct EffectFit {
   double total() const;  ///< [nats] log-likelihood of all channels
 };
 
+/// A channel's baseline and y, whitened by a noise model: what fits of many designs with that noise model have in common.
+class WhitenedBaseline {
+ public:
+  /// @param channel must outlive this
+  WhitenedBaseline(const EvidenceChannel& channel, const NoiseModel& noise);
+  /// See whitened_rows.
+  Eigen::MatrixXd rows(const Eigen::MatrixXd& columns,
+                       Eigen::MatrixXd* baseline_coefficients = nullptr) const;
+  double log_determinant() const { return log_determinant_; }
+
+ private:
+  const EvidenceChannel& channel_;
+  NoiseModel noise_;
+  Eigen::VectorXd y_;
+  double log_determinant_ = 0.0;
+  Projection baseline_;
+};
+
+/// Noise models of all channels with the baselines whitened by them.
+struct WhitenedChannels {
+  std::vector<NoiseModel> noise;
+  std::vector<WhitenedBaseline> baseline;
+
+  /// By the noise models with which a fit without a start begins, that is white noise.
+  static WhitenedChannels cold(const Evidence& evidence);
+  static WhitenedChannels by(const Evidence& evidence, std::vector<NoiseModel> noise);
+};
+
 struct FitControl {
   int noise_passes = 3;  ///< estimates of the noise models, each from the residuals of the last fit
   bool keep_residuals = false;
@@ -56,6 +88,9 @@ struct FitControl {
   bool ordinary = false;
   /// By channel; a channel that is not active keeps log-likelihood and noise of `start`. Empty = all are active.
   std::vector<bool> active;
+  /// The noise models with which the fit begins, those of `start` if there is one, with whitened baselines; null: they are
+  /// computed.
+  const WhitenedChannels* first = nullptr;
 };
 
 /// @param start fit whose noise models are the initial guess; may be null

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/math/linear_algebra.h"
+#include "models/math/parallel.h"
 
 namespace sparflow {
 namespace {
@@ -40,58 +41,65 @@ MatrixXd flipped_scores(const MatrixXd& x, const VectorXd& residual, const Vecto
   return product(by_block, signs) / std::sqrt(std::max(variance, 1e-300));
 }
 
+/// Random innovations and signs, see NullSimulator.
+struct RandomRows {
+  const std::vector<MatrixXd>& noise;
+  const std::vector<MatrixXd>& signs;
+  int count = 0;
+};
+
 /// The simulated residuals of all channels, whitened and orthogonal to the accepted effects.
 class NullSimulation {
  public:
-  /// @param null must outlive this  @param count simulations of either kind
-  NullSimulation(const NullModel& null, int count, std::mt19937_64& random);
+  /// Both must outlive this.
+  NullSimulation(const NullModel& null, const RandomRows& random);
 
-  /// Gains of a design on normal innovations, then on flipped residuals. [2 x simulations, nats]
-  VectorXd gains(const EffectDesign& design) const;
+  /// Gains of each design on normal innovations, then on flipped residuals. [2 x simulations, nats]
+  std::vector<VectorXd> gains(const std::vector<EffectDesign>& designs) const;
 
  private:
   std::size_t channels() const { return null_.evidence.channels.size(); }
   /// Fills in the span of the accepted effects and the residual beside it.
   void project_accepted(std::size_t c);
-  /// Whitened columns of a design, orthogonal to the accepted effects, for innovations of unit variance.
-  MatrixXd own_columns(const EffectDesign& design, std::size_t c) const;
+  /// What the gains of a design are made of, summed over channels.
+  struct Sums {
+    MatrixXd normal;            // [linear x linear] normal equations
+    MatrixXd z;                 // [linear x 2 simulations] right sides
+    VectorXd g;                 // [linear] right side of the residual itself
+    std::vector<MatrixXd> own;  // [channels] own_columns
+  };
+  /// Whitened columns, orthogonal to the accepted effects, for innovations of unit variance.
+  MatrixXd own_columns(const MatrixXd& columns, std::size_t c) const;
+  /// Adds a channel to the sums of all designs; their columns are whitened and multiplied side by side.
+  void add_channel(const std::vector<EffectDesign>& designs, std::size_t c,
+                   std::vector<Sums>& sums) const;
+  VectorXd gains_of(const EffectDesign& design, Sums& sums) const;
   /// [rows] residual of the accepted effects for innovations of unit variance
   VectorXd unit_residual(std::size_t c) const {
     return residual_[c] / std::sqrt(null_.fit.noise[c].variance);
   }
 
   const NullModel& null_;
-  int count_;
-  std::vector<MatrixXd> noise_;     // [channels]: [rows x simulations] normal innovations
-  std::vector<MatrixXd> signs_;     // [channels]: [blocks x simulations] -1 or 1
+  const RandomRows& random_;
+  WhitenedChannels white_;
   std::vector<MatrixXd> accepted_;  // [channels] orthonormal basis of the accepted effects' columns
   std::vector<VectorXd> residual_;  // [channels]
 };
 
-NullSimulation::NullSimulation(const NullModel& null, int count, std::mt19937_64& random)
+NullSimulation::NullSimulation(const NullModel& null, const RandomRows& random)
     : null_(null),
-      count_(count),
-      noise_(null.evidence.channels.size()),
-      signs_(null.evidence.channels.size()),
+      random_(random),
+      white_(WhitenedChannels::by(null.evidence, null.fit.noise)),
       accepted_(null.evidence.channels.size()),
       residual_(null.evidence.channels.size()) {
-  std::normal_distribution<double> normal;
-  for (std::size_t c = 0; c < channels(); ++c) {
-    project_accepted(c);
-    const EvidenceChannel& channel = null.evidence.channels[c];
-    noise_[c].resize(channel.rows(), count);
-    for (Index i = 0; i < noise_[c].size(); ++i) noise_[c].data()[i] = normal(random);
-    signs_[c].resize(static_cast<Index>(channel.blocks.size()), count);
-    for (Index i = 0; i < signs_[c].size(); ++i)
-      signs_[c].data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
-  }
+  for (std::size_t c = 0; c < channels(); ++c) project_accepted(c);
 }
 
 void NullSimulation::project_accepted(std::size_t c) {
   const EvidenceChannel& channel = null_.evidence.channels[c];
   const MatrixXd columns = columns_of(null_.accepted, c, channel.rows());
   const Index width = columns.cols();
-  const MatrixXd rows = whitened_rows(channel, null_.fit.noise[c], columns);
+  const MatrixXd rows = white_.baseline[c].rows(columns);
   accepted_[c] = rows.leftCols(width);
   VectorXd r = rows.col(width);
   if (width > 0) {  // orthonormal, so that a projection is one product
@@ -101,9 +109,8 @@ void NullSimulation::project_accepted(std::size_t c) {
   residual_[c] = std::move(r);
 }
 
-MatrixXd NullSimulation::own_columns(const EffectDesign& design, std::size_t c) const {
-  MatrixXd x = whitened_rows(null_.evidence.channels[c], null_.fit.noise[c], design.columns[c])
-                   .leftCols(design.linear);
+MatrixXd NullSimulation::own_columns(const MatrixXd& columns, std::size_t c) const {
+  MatrixXd x = white_.baseline[c].rows(columns).leftCols(columns.cols());
   if (accepted_[c].cols() > 0) {
     const VectorXd whole = x.colwise().squaredNorm();
     x -= product(accepted_[c], transposed_product(accepted_[c], x));
@@ -116,30 +123,51 @@ MatrixXd NullSimulation::own_columns(const EffectDesign& design, std::size_t c) 
   return x;
 }
 
-VectorXd NullSimulation::gains(const EffectDesign& design) const {
-  const Index m = design.linear;
-  MatrixXd n = MatrixXd::Zero(m, m), z = MatrixXd::Zero(m, 2 * count_);
-  VectorXd g = VectorXd::Zero(m);
-  std::vector<MatrixXd> columns(channels());
-  for (std::size_t c = 0; c < channels(); ++c) {
-    if (!design.touches(c)) continue;
-    MatrixXd x = own_columns(design, c);
-    n += transposed_product(x, x);
-    z.leftCols(count_) += transposed_product(x, noise_[c]);
-    g += x.transpose() * residual_[c] / std::sqrt(null_.fit.noise[c].variance);
-    columns[c] = std::move(x);
+void NullSimulation::add_channel(const std::vector<EffectDesign>& designs, std::size_t c,
+                                 std::vector<Sums>& sums) const {
+  std::vector<const EffectDesign*> all;
+  for (const EffectDesign& d : designs) all.push_back(&d);
+  const MatrixXd columns = columns_of(all, c, null_.evidence.channels[c].rows());
+  if (columns.cols() == 0) return;
+  const MatrixXd x = own_columns(columns, c);
+  const MatrixXd z = transposed_product(x, random_.noise[c]);
+  const VectorXd g = x.transpose() * residual_[c] / std::sqrt(null_.fit.noise[c].variance);
+  Index at = 0;
+  for (std::size_t d = 0; d < designs.size(); ++d) {
+    const Index m = designs[d].columns[c].cols();
+    if (m == 0) continue;
+    sums[d].own[c] = x.middleCols(at, m);
+    sums[d].normal += transposed_product(sums[d].own[c], sums[d].own[c]);
+    sums[d].z.leftCols(random_.count) += z.middleRows(at, m);
+    sums[d].g += g.segment(at, m);
+    at += m;
   }
+}
+
+VectorXd NullSimulation::gains_of(const EffectDesign& design, Sums& sums) const {
+  MatrixXd n = std::move(sums.normal);
   const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   n = scale.asDiagonal() * n * scale.asDiagonal();
   n.diagonal().array() += 1e-9;
-  const VectorXd own = scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
+  const VectorXd own = scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(sums.g)));
   for (std::size_t c = 0; c < channels(); ++c) {
-    if (columns[c].cols() == 0) continue;
-    z.rightCols(count_) += flipped_scores(columns[c], unit_residual(c), own,
-                                          null_.evidence.channels[c].blocks, signs_[c]);
+    if (!design.touches(c)) continue;
+    sums.z.rightCols(random_.count) += flipped_scores(
+        sums.own[c], unit_residual(c), own, null_.evidence.channels[c].blocks, random_.signs[c]);
   }
-  z = scale.asDiagonal() * z;
+  const MatrixXd z = scale.asDiagonal() * sums.z;
   return 0.5 * z.cwiseProduct(solve_symmetric_columns(n, z)).colwise().sum().transpose();
+}
+
+std::vector<VectorXd> NullSimulation::gains(const std::vector<EffectDesign>& designs) const {
+  std::vector<Sums> sums;
+  for (const EffectDesign& d : designs)
+    sums.push_back({MatrixXd::Zero(d.linear, d.linear), MatrixXd::Zero(d.linear, 2 * random_.count),
+                    VectorXd::Zero(d.linear), std::vector<MatrixXd>(channels())});
+  for (std::size_t c = 0; c < channels(); ++c) add_channel(designs, c, sums);
+  std::vector<VectorXd> out;
+  for (std::size_t d = 0; d < designs.size(); ++d) out.push_back(gains_of(designs[d], sums[d]));
+  return out;
 }
 
 /// Ratio of the gains on flipped residuals to those on normal innovations, at least one.
@@ -167,30 +195,56 @@ double NullDistribution::p_value(double gain, std::size_t candidate) const {
   return std::max(p_of(normal, scaled), p_of(flipped, scaled));
 }
 
+NullSimulator::NullSimulator(const Evidence& evidence, int simulations, std::mt19937_64& random)
+    : count_(simulations) {
+  std::normal_distribution<double> normal;
+  for (const EvidenceChannel& channel : evidence.channels) {
+    MatrixXd& noise = noise_.emplace_back(channel.rows(), simulations);
+    for (Index i = 0; i < noise.size(); ++i) noise.data()[i] = normal(random);
+    MatrixXd& signs = signs_.emplace_back(static_cast<Index>(channel.blocks.size()), simulations);
+    for (Index i = 0; i < signs.size(); ++i) signs.data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
+  }
+}
+
+NullDistribution NullSimulator::distribution(const NullModel& null,
+                                             const std::vector<NullCandidate>& candidates,
+                                             const RegressionOptions& options,
+                                             const std::vector<bool>& unchanged) {
+  const RandomRows random{noise_, signs_, count_};
+  const NullSimulation simulation(null, random);
+  best_.resize(candidates.size());
+  parallel(candidates.size(), [&](std::size_t k) {
+    if (!unchanged.empty() && unchanged[k] && best_[k].size() > 0) return;
+    best_[k] = VectorXd::Constant(2 * count_, -1e300);
+    const std::vector<EffectDesign>& designs = *candidates[k].designs;
+    const std::vector<VectorXd> gains = simulation.gains(designs);
+    for (std::size_t d = 0; d < designs.size(); ++d) {
+      const double besides = designs[d].optional ? candidates[k].optional_penalty : 0.0;
+      best_[k] = best_[k].cwiseMax((gains[d].array() - besides).matrix());
+    }
+  });
+  NullDistribution out;
+  VectorXd largest = VectorXd::Constant(2 * count_, -1e300);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    VectorXd best = best_[k];
+    const double scale = scale_of(best, options);
+    out.scale.push_back(scale);
+    out.penalty.push_back(candidates[k].penalty);
+    best.tail(count_) /= scale;
+    largest = largest.cwiseMax((best.array() - candidates[k].penalty).matrix());
+  }
+  out.normal.assign(largest.begin(), largest.begin() + count_);
+  out.flipped.assign(largest.begin() + count_, largest.end());
+  std::sort(out.normal.begin(), out.normal.end());
+  std::sort(out.flipped.begin(), out.flipped.end());
+  return out;
+}
+
 NullDistribution simulate_null_distribution(const NullModel& null,
                                             const std::vector<NullCandidate>& candidates,
                                             int simulations, std::mt19937_64& random,
                                             const RegressionOptions& options) {
-  const NullSimulation simulation(null, simulations, random);
-  NullDistribution out;
-  VectorXd largest = VectorXd::Constant(2 * simulations, -1e300);
-  for (const NullCandidate& candidate : candidates) {
-    VectorXd best = VectorXd::Constant(2 * simulations, -1e300);
-    for (const EffectDesign& d : *candidate.designs) {
-      const double besides = d.optional ? candidate.optional_penalty : 0.0;
-      best = best.cwiseMax((simulation.gains(d).array() - besides).matrix());
-    }
-    const double scale = scale_of(best, options);
-    out.scale.push_back(scale);
-    out.penalty.push_back(candidate.penalty);
-    best.tail(simulations) /= scale;
-    largest = largest.cwiseMax((best.array() - candidate.penalty).matrix());
-  }
-  out.normal.assign(largest.begin(), largest.begin() + simulations);
-  out.flipped.assign(largest.begin() + simulations, largest.end());
-  std::sort(out.normal.begin(), out.normal.end());
-  std::sort(out.flipped.begin(), out.flipped.end());
-  return out;
+  return NullSimulator(null.evidence, simulations, random).distribution(null, candidates, options);
 }
 
 }  // namespace sparflow

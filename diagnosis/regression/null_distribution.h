@@ -40,6 +40,25 @@ struct NullModel {
   std::vector<const EffectDesign*> accepted = {};
 };
 
+/// Simulates the null distribution for one model after another of the same evidence, each time on the same random numbers.
+class NullSimulator {
+ public:
+  /// @param simulations number of simulated residuals of either kind
+  NullSimulator(const Evidence& evidence, int simulations, std::mt19937_64& random);
+
+  /// @param unchanged by candidate: whether nothing that its gains depend on has changed since the last call; empty: all have
+  NullDistribution distribution(const NullModel& null, const std::vector<NullCandidate>& candidates,
+                                const RegressionOptions& options = {},
+                                const std::vector<bool>& unchanged = {});
+
+ private:
+  int count_;
+  std::vector<Eigen::MatrixXd> noise_;  // [channels]: [rows x simulations] normal innovations
+  std::vector<Eigen::MatrixXd> signs_;  // [channels]: [blocks x simulations] -1 or 1
+  std::vector<Eigen::VectorXd>
+      best_;  // [candidates]: [2 x simulations, nats] largest gain of its designs
+};
+
 /// @param simulations number of simulated residuals of either kind
 NullDistribution simulate_null_distribution(const NullModel& null,
                                             const std::vector<NullCandidate>& candidates,

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <random>
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/acceptance_tests.h"
@@ -22,7 +24,10 @@ class Search {
   /// @param follows whether to stop, with `updated_evidence` set, when a found effect changes the load-sensing leader
   Search(const Evidence& evidence, const std::vector<EffectAt>& effects,
          const SearchOptions& options, const SearchProgress& progress, bool follows)
-      : search_(evidence, effects, options, progress), random_(options.seed), follows_(follows) {}
+      : search_(evidence, effects, options, progress), follows_(follows) {
+    std::mt19937_64 random(options.seed);
+    null_.emplace(evidence, options.simulations, random);
+  }
 
   SearchResult run() {
     SearchResult result;
@@ -71,6 +76,23 @@ class Search {
     return search_.mechanisms().enabled(Mechanism::kFurther) ? further : first;
   }
 
+  /// Largest gain when no more is missing than `base`; simulated again for the candidates whose context has changed.
+  NullDistribution null_distribution(const std::vector<const EffectDesign*>& base,
+                                     const EffectFit& current) {
+    std::vector<NullCandidate> candidates;
+    std::vector<bool> unchanged;
+    null_contexts_.resize(search_.candidates.size());
+    for (std::size_t k = 0; k < search_.candidates.size(); ++k) {
+      const SearchCandidate& c = search_.candidates[k];
+      candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
+      std::vector<GainContext> now = search_.scores.contexts(base, current, k);
+      unchanged.push_back(same_contexts(now, null_contexts_[k]));
+      if (!unchanged.back()) null_contexts_[k] = std::move(now);
+    }
+    return null_->distribution({search_.evidence, current, base}, candidates,
+                               search_.options.regression, unchanged);
+  }
+
   /// Adds the best candidate while one passes the threshold and the acceptance tests.
   void select(std::vector<FoundEffect>& found, EffectFit& current, SearchResult& result) {
     const int most_steps = search_.options.steps_per_effect * search_.options.max_effects;
@@ -85,12 +107,7 @@ class Search {
         for (const CandidateScore& s : scores)
           result.ranking.emplace_back(search_.candidates[s.candidate].effect, s.gain);
       }
-      std::vector<NullCandidate> null_candidates;
-      for (const SearchCandidate& c : search_.candidates)
-        null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
-      const NullDistribution null = simulate_null_distribution(
-          {search_.evidence, current, base}, null_candidates, search_.options.simulations, random_,
-          search_.options.regression);
+      const NullDistribution null = null_distribution(base, current);
       const double level = level_of(found.size(), scores, null);
       const CandidateScore best = chosen(search_, scores, null, level, base);
       const double p = null.p_value(best.gain, best.candidate);
@@ -298,7 +315,8 @@ class Search {
   }
 
   SearchState search_;
-  std::mt19937_64 random_;
+  std::optional<NullSimulator> null_;
+  std::vector<std::vector<GainContext>> null_contexts_;  // by candidate, of its last simulation
   bool follows_;
 };
 

@@ -22,6 +22,29 @@ std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
 
 }  // namespace
 
+bool GainContext::same_as(const GainContext& other) const {
+  // fits of the same designs end within their tolerance of each other
+  constexpr double kSameFit = 1e-3;  // [nats]
+  if (others != other.others || log_likelihood.size() != other.log_likelihood.size()) return false;
+  for (std::size_t k = 0; k < log_likelihood.size(); ++k)
+    if (!(std::abs(log_likelihood[k] - other.log_likelihood[k]) <= kSameFit)) return false;
+  return true;
+}
+
+bool same_contexts(const std::vector<GainContext>& a, const std::vector<GainContext>& b) {
+  return !a.empty() &&
+         std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const GainContext& x, const GainContext& y) { return x.same_as(y); });
+}
+
+SearchScores::SearchScores(const Evidence& evidence, const std::vector<SearchCandidate>& candidates,
+                           const SearchOptions& options)
+    : evidence_(evidence),
+      candidates_(candidates),
+      options_(options),
+      cold_(WhitenedChannels::cold(evidence)),
+      known_(candidates.size()) {}
+
 /// The channels in which a design acts, and all that share a parameter with them through other designs.
 std::vector<bool> SearchScores::connected(const std::vector<const EffectDesign*>& designs,
                                           const EffectDesign& d) const {
@@ -58,10 +81,41 @@ bool SearchScores::may_hide(const EffectFit& current, const EffectDesign& d) con
   return false;
 }
 
+std::vector<GainContext> SearchScores::contexts(const std::vector<const EffectDesign*>& base,
+                                                const EffectFit& current,
+                                                std::size_t candidate) const {
+  std::vector<GainContext> all;
+  for (const EffectDesign& d : candidates_[candidate].designs) {
+    const std::vector<bool> active = connected(base, d);
+    GainContext context;
+    for (const EffectDesign* b : base) {
+      bool shares = false;
+      for (std::size_t c = 0; c < active.size(); ++c)
+        shares = shares || (active[c] && b->touches(c));
+      if (!shares) continue;
+      if (b->number == 0) return {};
+      context.others.push_back(b->number);
+    }
+    std::sort(context.others.begin(), context.others.end());
+    for (std::size_t c = 0; c < active.size(); ++c)
+      if (active[c]) context.log_likelihood.push_back(current.log_likelihood[c]);
+    all.push_back(std::move(context));
+  }
+  return all;
+}
+
 double SearchScores::gain(const std::vector<const EffectDesign*>& base, const EffectDesign& d,
                           const EffectFit& current, const std::vector<bool>& also,
                           bool only_there) const {
+  return gain_beside({base, current}, d, also, only_there);
+}
+
+double SearchScores::gain_beside(const Beside& beside, const EffectDesign& d,
+                                 const std::vector<bool>& also, bool only_there) const {
+  const std::vector<const EffectDesign*>& base = beside.base;
+  const EffectFit& current = beside.current;
   FitControl c;
+  c.first = beside.first;
   c.active = connected(base, d);
   for (std::size_t k = 0; k < also.size(); ++k) c.active[k] = c.active[k] || also[k];
   c.noise_passes = kPasses;
@@ -84,6 +138,7 @@ double SearchScores::gain(const std::vector<const EffectDesign*>& base, const Ef
   };
   const double from_current = gained(fit_effects(evidence_, with, &current, c));
   if (!may_hide(current, d)) return from_current;
+  c.first = &cold_;
   return std::max(from_current, gained(fit_effects(evidence_, with, nullptr, c)));
 }
 
@@ -96,14 +151,22 @@ std::vector<bool> SearchScores::touched_by(const EffectDesign& design) const {
 std::vector<CandidateScore> SearchScores::beside(const std::vector<const EffectDesign*>& base,
                                                  const EffectFit& current,
                                                  const std::vector<bool>& skip) const {
+  const WhitenedChannels first = WhitenedChannels::by(evidence_, current.noise);
   std::vector<CandidateScore> scores(candidates_.size());
   parallel(candidates_.size(), [&](std::size_t i) {
     if (skip[i]) return;
+    std::vector<GainContext> context = contexts(base, current, i);
+    KnownGain& known = known_[i];
+    if (same_contexts(context, known.contexts)) {
+      scores[i] = known.score;
+      return;
+    }
     for (std::size_t k = 0; k < candidates_[i].designs.size(); ++k) {
-      const double g = gain(base, candidates_[i].designs[k], current) -
+      const double g = gain_beside({base, current, &first}, candidates_[i].designs[k]) -
                        candidates_[i].penalty_of(candidates_[i].designs[k]);
       if (g > scores[i].gain) scores[i] = {i, k, g};
     }
+    known = {std::move(context), scores[i]};
   });
   return sorted(std::move(scores));
 }
@@ -113,6 +176,7 @@ std::vector<CandidateScore> SearchScores::instead_of(const EffectDesign& place,
                                                      const EffectFit& without,
                                                      const std::vector<bool>& skip) const {
   const std::vector<bool> touched = touched_by(place);
+  const WhitenedChannels first = WhitenedChannels::by(evidence_, without.noise);
   std::vector<CandidateScore> scores(candidates_.size());
   parallel(candidates_.size(), [&](std::size_t k) {
     const SearchCandidate& c = candidates_[k];
@@ -122,8 +186,8 @@ std::vector<CandidateScore> SearchScores::instead_of(const EffectDesign& place,
       for (std::size_t ch = 0; ch < touched.size(); ++ch)
         meets = meets || (touched[ch] && c.designs[d].touches(ch));
       if (!meets) return;
-      const double g =
-          gain(others, c.designs[d], without, touched, true) - c.penalty_of(c.designs[d]);
+      const double g = gain_beside({others, without, &first}, c.designs[d], touched, true) -
+                       c.penalty_of(c.designs[d]);
       if (g > scores[k].gain) scores[k] = {k, d, g};
     }
   });
@@ -146,7 +210,9 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
   const SearchCandidate& candidate = candidates_[score.candidate];
   EffectDesign d = candidate.designs[score.design];
   if (d.shape.empty()) return d;
-  double at_best = gain(base, d, current);
+  const WhitenedChannels first = WhitenedChannels::by(evidence_, current.noise);
+  const Beside beside{base, current, &first};
+  double at_best = gain_beside(beside, d);
   const std::vector<bool> choices = shape_choices(*d.effect.effect);
   for (std::size_t k = 0; k < d.shape.size(); ++k) {
     if (choices[k]) continue;
@@ -167,7 +233,7 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
       std::vector<double> shape = d.shape;
       shape[k] = x;
       trial = make_design(evidence_, d.effect, shape, {}, d.optional);
-      const double g = trial.acts() ? gain(base, trial, current) : -1e300;
+      const double g = trial.acts() ? gain_beside(beside, trial) : -1e300;
       if (g > at_best) {
         (right ? lo : hi) = d.shape[k];
         d = std::move(trial);

@@ -82,6 +82,7 @@ double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
 /// Columns of a found effect in other logs than the suspect ones.
 EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
   EffectDesign design = found;
+  design.number = 0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c)
     design.columns[c] = found.touches(c) ? evidence.columns(found.effect, found.shape,
                                                             evidence.channels[c], {}, where)

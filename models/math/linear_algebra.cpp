@@ -95,19 +95,36 @@ struct CholeskyQr {
 
 }  // namespace
 
-MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b, MatrixXd* coefficients) {
+Projection::Projection(const MatrixIn& b) {
   CholeskyQr fast;
-  if (fast.compute(b)) {
-    const MatrixXd on_basis = fast.q.transpose() * a;
-    if (coefficients != nullptr)
-      *coefficients =
-          fast.scale.asDiagonal() * fast.u.triangularView<Eigen::Upper>().solve(on_basis);
-    return a - fast.q * on_basis;
+  if (!fast.compute(b)) {
+    b_ = b;
+    return;
   }
-  MatrixXd x = Qr(b).solve(a);
-  MatrixXd left = a - b * x;
-  if (coefficients != nullptr) *coefficients = std::move(x);
-  return left;
+  q_ = std::move(fast.q);
+  u_ = std::move(fast.u);
+  scale_ = std::move(fast.scale);
+}
+
+MatrixXd Projection::without(const MatrixIn& a, MatrixXd* coefficients) const {
+  if (b_.cols() > 0) {
+    MatrixXd x = Qr(b_).solve(a);
+    MatrixXd left = a - b_ * x;
+    if (coefficients != nullptr) *coefficients = std::move(x);
+    return left;
+  }
+  if (q_.cols() == 0) {
+    if (coefficients != nullptr) coefficients->resize(0, a.cols());
+    return a;
+  }
+  const MatrixXd on_basis = q_.transpose() * a;
+  if (coefficients != nullptr)
+    *coefficients = scale_.asDiagonal() * u_.triangularView<Eigen::Upper>().solve(on_basis);
+  return a - q_ * on_basis;
+}
+
+MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b, MatrixXd* coefficients) {
+  return Projection(b).without(a, coefficients);
 }
 
 MatrixXd span_of(const MatrixIn& a) {

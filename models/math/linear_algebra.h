@@ -28,6 +28,17 @@ Eigen::VectorXd least_squares(const MatrixIn& a, const VectorIn& b);
 Eigen::MatrixXd least_norm_columns(const MatrixIn& a, const MatrixIn& b);
 /// argmin |A x - b| of least |x|, for A of any rank.
 Eigen::VectorXd least_squares_of_least_norm(const MatrixIn& a, const VectorIn& b);
+/// Subtracts from columns what columns B explain, by least squares; for many A beside one B.
+class Projection {
+ public:
+  explicit Projection(const MatrixIn& b);
+  /// See without_projection.
+  Eigen::MatrixXd without(const MatrixIn& a, Eigen::MatrixXd* coefficients = nullptr) const;
+
+ private:
+  Eigen::MatrixXd b_, q_, u_;  // b_ where q_ is not accurate; B diag(scale_) = q_ u_
+  Eigen::VectorXd scale_;
+};
 /// Columns of A - B X with X their least-squares coefficients on B; `coefficients` takes X where it is not null.
 Eigen::MatrixXd without_projection(const MatrixIn& a, const MatrixIn& b,
                                    Eigen::MatrixXd* coefficients = nullptr);

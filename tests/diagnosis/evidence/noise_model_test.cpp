@@ -144,7 +144,8 @@ TEST(NoiseModel, SettlesAfterCommandsAndIsThenWhatItIsWithoutThem) {
     NoiseModel truth = law;
     truth.transient = 8.0;
     truth.settling = 0.4;
-    const NoiseRows rows(blocks, since);
+    const SettlingTimes times(since);
+    const NoiseRows rows(blocks, times);
     const VectorXd even = draw(law, blocks, random), y = even.cwiseProduct(truth.scale_of(rows));
     const NoiseModel m = NoiseModel::estimate(y, rows, false),
                      same = NoiseModel::estimate(even, blocks, false);
@@ -163,7 +164,8 @@ TEST(NoiseModel, NoiseThatIsEvenDoesNotSettle) {
   std::mt19937_64 random(6);
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 60));
   for (const NoiseModel& law : laws())
-    EXPECT_EQ(NoiseModel::estimate(draw(law, blocks, random), {blocks, since_start(blocks)}, false)
+    EXPECT_EQ(NoiseModel::estimate(draw(law, blocks, random),
+                                   {blocks, SettlingTimes(since_start(blocks))}, false)
                   .transient,
               1.0);
 }
@@ -172,7 +174,8 @@ TEST(NoiseModel, WhiteningOfUnevenRowsIsTheInverseRootToo) {
   const std::vector<NoiseBlock> blocks = blocks_of({3, 17, 40});
   const Index n = testing_support::rows_of(blocks);
   const VectorXd since = since_start(blocks);
-  const NoiseRows rows(blocks, since);
+  const SettlingTimes times(since);
+  const NoiseRows rows(blocks, times);
   for (NoiseModel m : laws()) {
     m.transient = 5.0;
     MatrixXd w = MatrixXd::Identity(n, n);

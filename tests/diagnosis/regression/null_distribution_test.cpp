@@ -204,5 +204,27 @@ TEST(NullDistribution, SameSeedGivesTheSameDistribution) {
             simulate_null_distribution({null.evidence, fit}, null.candidates(), 20, b).normal);
 }
 
+TEST(NullDistribution, CandidatesThatAreUnchangedKeepTheirSimulation) {
+  const Null null(5);
+  const EffectDesign& known =
+      null.catalogue[0][0];  // in the first channel, as the first three candidates
+  const EffectFit before = fit_effects(null.evidence, {}),
+                  after = fit_effects(null.evidence, {&known});
+  std::mt19937_64 a(1), b(1);
+  NullSimulator used(null.evidence, kSimulations, a), anew(null.evidence, kSimulations, b);
+  const NullDistribution first = used.distribution({null.evidence, before}, null.candidates());
+  const NullModel next{null.evidence, after, {&known}};
+  const NullDistribution kept =
+      used.distribution(next, null.candidates(), {}, {false, false, false, true, true});
+  const NullDistribution whole = anew.distribution(next, null.candidates());
+  ASSERT_EQ(kept.normal.size(), whole.normal.size());
+  for (std::size_t k = 0; k < kept.normal.size(); ++k) {
+    // the second channel's fit is the same but for rounding
+    EXPECT_NEAR(kept.normal[k], whole.normal[k], 1e-6);
+    EXPECT_NEAR(kept.flipped[k], whole.flipped[k], 1e-6);
+  }
+  EXPECT_NE(first.normal, kept.normal);
+}
+
 }  // namespace
 }  // namespace sparflow
