@@ -311,6 +311,7 @@ std::optional<ResidualStructure> residual_structure_of(const Evidence& evidence,
     left.rms = oscillation.rms;
     left.noise = oscillation.noise;
     left.frequency = oscillation.frequency;
+    left.oscillation = true;
     left.depends_on.push_back(
         fmt::format("time, an oscillation near {:.1f} Hz", oscillation.frequency));
     return left;

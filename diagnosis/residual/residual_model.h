@@ -26,6 +26,7 @@ struct ResidualStructure {
   std::vector<std::string> depends_on;  ///< names of signals, strongest first
   double frequency = 0.0;               ///< [Hz] of a periodic structure, else 0
   bool event = false;                   ///< whether it is an isolated event
+  bool oscillation = false;             ///< whether it oscillates without a fixed frequency
 };
 
 /// Channels with unmodelled structure in the residual, the largest relative to noise first. @param fit with residuals

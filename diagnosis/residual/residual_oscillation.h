@@ -1,5 +1,6 @@
 #pragma once
-/// Structure of residuals over time: oscillations, spectral lines, isolated events. Used by residual_model.cpp only.
+/// Structure of residuals over time: oscillations, spectral lines, isolated events. Used by residual_model.cpp and by the
+/// comparison with references.
 #include "diagnosis/residual/residual_model.h"
 
 namespace sparflow {

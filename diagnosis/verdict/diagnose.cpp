@@ -184,6 +184,12 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
       d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
       continue;
     }
+    if (d.evidence.has_reference() && !chance_beyond_references(d, l.channel)) {
+      d.notes.push_back(
+          describe_residual_structure(d.evidence, l).sentence +
+          "; the references have too few motions there to tell whether that has changed");
+      continue;
+    }
     const double share = unmodelled_share(d, l);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
     if (share <

@@ -9,6 +9,7 @@
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/regression/size_by_logs.h"
+#include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/linear_algebra.h"
@@ -233,8 +234,9 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
                                    const DiagnoseOptions& options) {
   std::vector<bool> shared(left.size(), false);
   if (left.empty() || !d.evidence.has_reference()) return shared;
+  const Evidence swapped = references_first(d.evidence);
   const std::vector<ResidualStructure> there =
-      find_residual_structure(references_first(d.evidence), d.search.final, options.residual);
+      find_residual_structure(swapped, d.search.final, options.residual);
   for (std::size_t i = 0; i < left.size(); ++i) {
     const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
       return r.channel == left[i].channel &&
@@ -248,7 +250,12 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
         std::min(left[i].rms, suspect_rms(d.evidence, channel, d.search.final.residual[channel]));
     const bool room = rms * rms - (std::isfinite(floor) ? floor * floor : 0.0) >=
                       std::pow(d.thresholds.shared_structure_ratio * here, 2);
-    shared[i] = (found || room) && !exceeds_references(d, channel);
+    // one that is weaker than what counts as an oscillation is one all the same
+    const bool oscillates =
+        left[i].oscillation &&
+        strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
+            d.thresholds.shared_structure_ratio * left[i].rms;
+    shared[i] = (found || room || oscillates) && !exceeds_references(d, channel);
   }
   return shared;
 }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "diagnosis/residual/residual_oscillation.h"
+#include "diagnosis/verdict/reference_comparison.h"
 #include "models/effects/memory.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -108,28 +109,60 @@ TEST(ResidualModel, ASineIsFoundWithItsFrequency) {
   }
 }
 
+/// An oscillation of 1.8 Hz and 2.5 bar, the phase of which is lost the sooner the larger `diffusion` [rad/sqrt(s)].
+void oscillate(VectorXd& raw, double step, double diffusion, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  double phase = 0.0;
+  for (double& v : raw) {
+    phase += 2.0 * std::numbers::pi * 1.8 * step + diffusion * std::sqrt(step) * normal(random);
+    v += 2.5e5 * std::sin(phase);
+  }
+}
+
 TEST(ResidualModel, AnOscillationOfVaryingFrequencyIsFound) {
   std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
   Left left(21);
   const std::size_t c = left.channel(EvidenceKind::kPump, 0);
   EvidenceChannel& channel = left.evidence.channels[c];
   const double hz = 1.8;
-  for (std::size_t log = 0; log < channel.raw.size(); ++log) {
-    const double step = left.evidence.series[log].step;
-    double phase = 0.0;
-    for (double& v : channel.raw[log]) {
-      // the phase is lost within about two seconds: no line in a periodogram of 90 s
-      phase += 2.0 * std::numbers::pi * hz * step + 1.0 * std::sqrt(step) * normal(random);
-      v += 2.5e5 * std::sin(phase);
-    }
-  }
+  // the phase is lost within about two seconds: no line in a periodogram of 90 s
+  oscillate(channel.raw[0], left.evidence.series[0].step, 1.0, random);
   const std::vector<ResidualStructure> found = find_residual_structure(left.evidence, left.fit);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].channel, c);
   // The phase drifts by sqrt(0.28) = 0.5 rad in half a period, a sixth of it; twice that.
   EXPECT_NEAR(found[0].frequency, hz, 0.3 * hz);
   EXPECT_THAT(found[0].depends_on, Contains(HasSubstr("oscillation")));
+}
+
+TEST(ResidualModel, AnOscillationThatTheReferencesHaveLessRegularlyIsNoChange) {
+  std::mt19937_64 random(3);
+  Left left(21, motions_with_pressures());
+  const std::size_t c = left.channel(EvidenceKind::kPump, 0);
+  EvidenceChannel& channel = left.evidence.channels[c];
+  ASSERT_EQ(channel.raw.size(), 2U);
+  channel.noise_floor = 0.9e5;  // nearly all of the filtered residual, so that this says nothing
+  const double step = left.evidence.series[0].step;
+  const VectorXd quiet = channel.raw[1];
+  oscillate(channel.raw[0], step, 1.0, random);
+  // the phase is lost within a twelfth of a period: the autocorrelation has a minimum, but a shallow one
+  oscillate(channel.raw[1], step, 5.0, random);
+  Evidence reference = left.evidence;
+  std::swap(reference.series[0], reference.series[1]);
+  std::swap(reference.channels[c].raw[0], reference.channels[c].raw[1]);
+  const DiagnoseOptions options;
+  ASSERT_GT(strongest_oscillation(reference, reference.channels[c], options.residual).dip,
+            options.residual.deepest_dip)
+      << "the references' one does not count by itself";
+  Diagnosis d;
+  d.evidence = left.evidence;
+  d.search.final = left.fit;
+  const std::vector<ResidualStructure> found = find_residual_structure(d.evidence, left.fit);
+  ASSERT_FALSE(found.empty());
+  ASSERT_TRUE(found[0].channel == c && found[0].oscillation);
+  EXPECT_TRUE(shared_structure(d, found, options)[0]);
+  d.evidence.channels[c].raw[1] = quiet;
+  EXPECT_FALSE(shared_structure(d, found, options)[0]);
 }
 
 TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {
