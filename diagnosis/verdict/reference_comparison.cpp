@@ -143,8 +143,23 @@ bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
 
+/// Whether the found effect's columns act in all logs already, so that it is a difference.
+bool is_shared(const Evidence& evidence, const FoundEffect& f) {
+  const std::vector<AppliedEffect>& all = evidence.options.shared;
+  return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
+    return same_place(e, f.design.effect) && same_shape(e, f);
+  });
+}
+
+/// A chi-square value of `freedom` degrees as a normal deviate, zero where it is below its median (Wilson and Hilferty 1931,
+/// Proc. Natl. Acad. Sci. 17, 684).
+double deviate_of_chi_square(double value, double freedom) {
+  const double share = 2.0 / (9.0 * freedom);
+  return std::max(0.0, (std::cbrt(value / freedom) - (1.0 - share)) / std::sqrt(share));
+}
+
 /// Whether the last two groups of `linear` parameters differ: Wald's test with the covariance that is robust against dependence
-/// inside stretches of motion; its chi-square as a normal deviate (Wilson and Hilferty 1931).
+/// inside stretches of motion.
 template <class Significant>
 bool parameters_differ(const EffectFit& fit, Index linear, const Significant& significant) {
   const Index first = fit.theta.size() - 2 * linear;
@@ -169,9 +184,8 @@ bool parameters_differ(const EffectFit& fit, Index linear, const Significant& si
   const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
   const VectorXd z = scale.cwiseProduct(change);
-  const double k = static_cast<double>(n), share = 2.0 / (9.0 * k);
-  const double chi_square = z.dot(least_squares_of_least_norm(scaled, z));
-  return significant((std::cbrt(chi_square / k) - (1.0 - share)) / std::sqrt(share));
+  return significant(
+      deviate_of_chi_square(z.dot(least_squares_of_least_norm(scaled, z)), static_cast<double>(n)));
 }
 
 }  // namespace
@@ -260,15 +274,25 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
   return shared;
 }
 
-InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
-                           const SearchOptions& options) {
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  const bool shared = is_shared(d.evidence, d.search.found[found]);
   const EffectDesign& suspect = d.search.found[found].design;
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
   if (shared)
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
+  // The others may act in the references as well. Where they do and share a channel, this effect would take their part there
+  // and have another size for that reason alone.
+  std::vector<EffectDesign> others_there;
+  others_there.reserve(d.search.found.size());
   std::vector<const EffectDesign*> others;
-  for (std::size_t i = 0; i < d.search.found.size(); ++i)
-    if (i != found) others.push_back(&d.search.found[i].design);
+  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+    if (i == found) continue;
+    others.push_back(&d.search.found[i].design);
+    if (is_shared(d.evidence, d.search.found[i])) continue;  // acts there already
+    others_there.push_back(
+        design_in(d.evidence, d.search.found[i].design, ActingLogs::kReferences));
+    if (others_there.back().acts()) others.push_back(&others_there.back());
+  }
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     std::vector<const EffectDesign*> designs = others;
     designs.insert(designs.end(), more);
@@ -315,8 +339,12 @@ InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(
       d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
-  const double difference = std::max(std::abs(sizes.difference()),
-                                     suspect.linear > 1 ? std::abs(change.difference()) : 0.0);
+  // the direction in which they differ most is chosen by the data, so that its square has as many degrees of freedom
+  const double difference =
+      suspect.linear > 1
+          ? std::max(std::abs(sizes.difference()),
+                     deviate_of_chi_square(std::pow(change.difference(), 2), suspect.linear))
+          : std::abs(sizes.difference());
   if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size)
     return InReferences::kAlike;
   return significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot;
@@ -350,11 +378,8 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
     bool again = false;
     for (std::size_t i = 0; i < d.search.found.size(); ++i) {
       const FoundEffect& f = d.search.found[i];
-      const bool shared = std::any_of(now.evidence.shared.begin(), now.evidence.shared.end(),
-                                      [&](const AppliedEffect& e) {
-                                        return same_place(e, f.design.effect) && same_shape(e, f);
-                                      });
-      const InReferences there = in_references(d, i, shared, now.search);
+      const bool shared = is_shared(d.evidence, f);
+      const InReferences there = in_references(d, i, now.search);
       if (there != InReferences::kAlike && there != InReferences::kVaries) continue;
       again = true;
       if (shared) {

@@ -40,9 +40,8 @@ enum class InReferences {
   kAlike,  ///< not significantly different, or within the model-form error of its law
   kVaries  ///< its size in the suspect logs is not even significant beside its variation from motion to motion
 };
-/// @param shared whether the same columns act in all logs already, so that the effect found is a difference
-InReferences in_references(const Diagnosis& d, std::size_t found, bool shared,
-                           const SearchOptions& options);
+/// Other effects found have sizes of their own in the references meanwhile.
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options);
 
 /// Diagnosis of suspect logs against references, in three steps: what the model lacks in the references alone; the
 /// difference of the suspect logs, with those effects estimated in all logs; and again, where an effect that was found

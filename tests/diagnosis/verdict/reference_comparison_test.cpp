@@ -10,6 +10,7 @@
 #include "identification/learning/fit.h"
 #include "identification/signals/series.h"
 #include "models/effects/hydraulics.h"
+#include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
 
 namespace sparflow {
@@ -61,6 +62,36 @@ struct Compared {
 const Compared& compared() {
   static const Compared c;
   return c;
+}
+
+TEST(ReferenceComparison, TwoEffectsOfAChannelThatActInBothLogsAreAlike) {
+  // Dry and viscous friction have similar columns: without the other one, either takes its part over.
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  CraneModel model = CraneModel::untrained(loader());
+  Diagnosis d;
+  d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
+                                {make_signals(loader(), logs.reference)});
+  ASSERT_TRUE(d.evidence.has_reference());
+  const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
+  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+  std::mt19937_64 random(2);
+  NoiseModel noise;
+  noise.phi1 = 0.4;
+  noise.variance = 200.0 * 200.0;  // [N^2]
+  channel.y = testing_support::draw(noise, channel.blocks, random);
+  for (const auto& [id, size] : {std::pair{"coulomb_friction", 2e3}, {"viscous_friction", 5e4}}) {
+    const EffectAt effect{find_effect(id), 1};
+    channel.y += size * d.evidence.columns(effect, {}, channel, {}, ActingLogs::kAll).col(0);
+    FoundEffect found;
+    found.design = make_design(d.evidence, effect, {});
+    d.search.found.push_back(std::move(found));
+  }
+  FitControl control;
+  control.keep_residuals = true;
+  d.search.final = fit_effects(d.evidence, {&d.search.found[0].design, &d.search.found[1].design},
+                               nullptr, control);
+  EXPECT_EQ(in_references(d, 0, {}), InReferences::kAlike);
+  EXPECT_EQ(in_references(d, 1, {}), InReferences::kAlike);
 }
 
 TEST(ReferenceComparison, WhatBothLogsShowIsNoChange) {
