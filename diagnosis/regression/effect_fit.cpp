@@ -97,7 +97,12 @@ MatrixXd WhitenedBaseline::rows(const MatrixXd& columns, MatrixXd* baseline_coef
   all.leftCols(columns.cols()) = columns;
   if (columns.cols() > 0) noise_.whiten(channel_.noise_rows(), all.leftCols(columns.cols()));
   all.rightCols(1) = y_;
-  return baseline_.without(all, baseline_coefficients);
+  MatrixXd left = baseline_.without(all, baseline_coefficients);
+  // of a column in the span of the baseline only rounding is left, with which nothing must be estimated
+  constexpr double kRounding = 1e-16;  // of the square
+  for (Index i = 0; i < columns.cols(); ++i)
+    if (left.col(i).squaredNorm() < kRounding * all.col(i).squaredNorm()) left.col(i).setZero();
+  return left;
 }
 
 MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,

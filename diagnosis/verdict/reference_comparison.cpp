@@ -158,34 +158,35 @@ double deviate_of_chi_square(double value, double freedom) {
   return std::max(0.0, (std::cbrt(value / freedom) - (1.0 - share)) / std::sqrt(share));
 }
 
-/// Whether the last two groups of `linear` parameters differ: Wald's test with the covariance that is robust against dependence
+/// A design that acts in suspect and in reference logs, from the designs for either.
+EffectDesign in_all_logs(const EffectDesign& suspect, const EffectDesign& reference) {
+  EffectDesign all = suspect;
+  all.number = 0;
+  for (std::size_t c = 0; c < all.columns.size(); ++c) {
+    if (!reference.touches(c)) continue;
+    if (suspect.touches(c))
+      all.columns[c] += reference.columns[c];
+    else
+      all.columns[c] = reference.columns[c];
+  }
+  return all;
+}
+
+/// Whether the last `linear` parameters of a fit are not zero: Wald's test with the covariance that is robust against dependence
 /// inside stretches of motion.
 template <class Significant>
-bool parameters_differ(const EffectFit& fit, Index linear, const Significant& significant) {
-  const Index first = fit.theta.size() - 2 * linear;
+bool parameters_act(const EffectFit& fit, Index linear, const Significant& significant) {
+  const Index first = fit.theta.size() - linear;
   std::vector<Index> moving;  // a parameter without columns has no variance
-  for (Index k = 0; k < linear; ++k)
-    if (fit.covariance(first + k, first + k) > 0.0 &&
-        fit.covariance(first + linear + k, first + linear + k) > 0.0)
-      moving.push_back(k);
+  for (Index k = first; k < fit.theta.size(); ++k)
+    if (fit.covariance(k, k) > 0.0) moving.push_back(k);
   if (moving.empty()) return true;
-  const auto n = static_cast<Index>(moving.size());
-  VectorXd change(n);
-  MatrixXd covariance(n, n);
-  for (Index i = 0; i < n; ++i) {
-    const Index a = first + moving[static_cast<std::size_t>(i)], b = a + linear;
-    change[i] = fit.theta[a] - fit.theta[b];
-    for (Index j = 0; j < n; ++j) {
-      const Index c = first + moving[static_cast<std::size_t>(j)], e = c + linear;
-      covariance(i, j) =
-          fit.covariance(a, c) + fit.covariance(b, e) - fit.covariance(a, e) - fit.covariance(b, c);
-    }
-  }
+  const MatrixXd covariance = fit.covariance(moving, moving);
   const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
-  const VectorXd z = scale.cwiseProduct(change);
-  return significant(
-      deviate_of_chi_square(z.dot(least_squares_of_least_norm(scaled, z)), static_cast<double>(n)));
+  const VectorXd z = scale.cwiseProduct(VectorXd(fit.theta(moving)));
+  return significant(deviate_of_chi_square(z.dot(least_squares_of_least_norm(scaled, z)),
+                                           static_cast<double>(moving.size())));
 }
 
 }  // namespace
@@ -325,9 +326,12 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
   }
   if (shared) return significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries;
   // What learned laws take over of an effect, they take over from all motions together, so that it has no size in one of them.
-  if (both && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws)
-    return parameters_differ(apart, suspect.linear, significant) ? InReferences::kNot
-                                                                 : InReferences::kAlike;
+  if (both && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws) {
+    const EffectDesign everywhere = in_all_logs(suspect, reference);
+    const EffectFit difference = fit({&everywhere, &suspect});
+    return parameters_act(difference, suspect.linear, significant) ? InReferences::kNot
+                                                                   : InReferences::kAlike;
+  }
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
