@@ -325,14 +325,16 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
         in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
   }
   if (shared) return significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries;
-  // What learned laws take over of an effect, they take over from all motions together, so that it has no size in one of them.
-  if (both && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws) {
+  const SizeInLogs &here = sizes.suspects, &there = sizes.references;
+  // What learned laws take over of an effect, they take over from all motions together, so that it may have no size in one group.
+  const bool no_size =
+      std::min(here.blocks, there.blocks) == 0 || !significant(here.size / here.standard_error);
+  if (both && no_size && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws) {
     const EffectDesign everywhere = in_all_logs(suspect, reference);
     const EffectFit difference = fit({&everywhere, &suspect});
     return parameters_act(difference, suspect.linear, significant) ? InReferences::kNot
                                                                    : InReferences::kAlike;
   }
-  const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
     return InReferences::kVaries;
