@@ -97,8 +97,8 @@ void measured(const Machine& machine, const Log& log, int index, MachineSignals&
     out.notes.push_back(fmt::format(
         "the pressures of {} are not used: the machine file gives it no bore", cylinder.name));
   }
-  c.logs_a = c.pressure_a.size() > 0;
-  c.logs_b = c.pressure_b.size() > 0;
+  c.logs_a = c.pressure_a.array().isFinite().any();
+  c.logs_b = c.pressure_b.array().isFinite().any();
   if (c.force.size() == 0 && c.pressure_a.size() > 0 && c.pressure_b.size() > 0) {
     c.force = c.pressure_a * cylinder.area_piston() - c.pressure_b * cylinder.area_rod();
   }
