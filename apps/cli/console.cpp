@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -22,8 +23,9 @@
 namespace sparflow::cli {
 namespace {
 
-constexpr std::chrono::seconds kPrintPeriod{10};
-constexpr std::chrono::seconds kRedrawPeriod{1};
+/// A line on a terminal is drawn at each look, elsewhere at each tenth.
+constexpr std::chrono::seconds kLookPeriod{1};
+constexpr int kLooksAPrint = 10;
 /// Longest line of progress.
 /// @threshold [byte] 40..200; chosen: fits most terminals
 constexpr std::size_t kLine = 107;
@@ -40,13 +42,22 @@ volatile std::sig_atomic_t finish_first = 0;
 pid_t main_process = 0;
 bool stdout_is_taken = false;
 
+/// May interrupt itself: the second Ctrl-C ends the program also while the first one's text waits for a reader.
 void on_interrupt(int) {
   if (::getpid() != main_process) return;
   const int before = interrupt_count->fetch_add(1);
   if (before > 0 || finish_first == 0) ::_exit(kInterrupted);
+  const int error = errno;
   constexpr char kText[] =
       "\ninterrupted: finishing with the best so far; Ctrl-C again ends at once\n";
-  if (::write(2, kText, sizeof kText - 1) < 0) return;
+  // A reader that has stopped to read (Ctrl-S, a full pipe) must not hold up the answer.
+  pollfd out{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&out, 1, 0) > 0 && (out.revents & POLLOUT) != 0 &&
+      ::write(STDERR_FILENO, kText, sizeof kText - 1) < 0) {
+    errno = error;
+    return;
+  }
+  errno = error;
 }
 
 std::string& work() {
@@ -62,7 +73,16 @@ void catch_interrupts() {
                         MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of interrupts");
   interrupt_count = new (shared) std::atomic<int>(0);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, on_interrupt);
+  struct sigaction action {};
+  action.sa_handler = on_interrupt;
+  action.sa_flags = SA_RESTART | SA_NODEFER;
+  ::sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    ::sigaction(signal, nullptr, &before);
+    if (signal == SIGHUP && before.sa_handler == SIG_IGN) continue;  // nohup
+    ::sigaction(signal, &action, nullptr);
+  }
 }
 void finish_on_interrupt() { finish_first = 1; }
 bool interrupted() { return interrupt_count->load() > 0; }
@@ -133,9 +153,23 @@ Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatt
   printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
 }
 
-void Progress::watch(std::function<std::string()> doing) {
+void Progress::watch(std::function<Now()> work) {
   const std::lock_guard lock(mutex_);
-  watched_ = std::move(doing);
+  watched_ = std::move(work);
+}
+
+void Progress::look() {
+  if (watched_) {
+    Now now = watched_();
+    share_ = std::max(share_, now.share);
+    doing_ = std::move(now.doing);
+  }
+  /// Time from which on what is done counts for the forecast.
+  /// @threshold [s] 0..10; chosen: parts of a journal are read in it
+  constexpr double kCountFrom = 2.0;
+  if (first_seconds_ >= 0.0 || elapsed() < kCountFrom) return;
+  first_seconds_ = elapsed();
+  first_share_ = share_;
 }
 
 std::string Progress::left(double seconds) const {
@@ -144,22 +178,25 @@ std::string Progress::left(double seconds) const {
   constexpr double kForecastFrom = 5.0;
   /// @threshold [1] 0.01..0.5; chosen: less says nothing about the rest
   constexpr double kForecastShare = 0.05;
-  if (seconds < kForecastFrom || share_ < kForecastShare || share_ >= 1.0) return "";
-  return fmt::format(", about {:.0f} s left", seconds * (1.0 - share_) / share_);
+  const double gained = share_ - first_share_;
+  if (first_seconds_ < 0.0 || seconds < kForecastFrom || gained < kForecastShare || share_ >= 1.0)
+    return "";
+  return fmt::format(", about {:.0f} s left", (seconds - first_seconds_) * (1.0 - share_) / gained);
 }
 
 void Progress::print_periodically(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  const std::chrono::seconds period = terminal_ ? kRedrawPeriod : kPrintPeriod;
-  while (!ended_.wait_for(lock, stop, period, [&] { return stop.stop_requested(); })) {
+  int looks = 0;
+  while (!ended_.wait_for(lock, stop, kLookPeriod, [&] { return stop.stop_requested(); })) {
+    look();
     if (terminal_) {
       draw();
       continue;
     }
+    if (++looks % kLooksAPrint != 0) continue;
     const double seconds = elapsed();
-    const std::string doing = watched_ ? watched_() : doing_;
     complain(fmt::format("{}: {:.0f} s, {:.0f} %{}{}{}\n", what_, seconds, 100.0 * share_,
-                         left(seconds), doing.empty() ? "" : ", ", doing));
+                         left(seconds), doing_.empty() ? "" : ", ", doing_));
   }
 }
 
@@ -175,10 +212,9 @@ Progress::~Progress() {
 
 void Progress::draw() {
   const double seconds = elapsed();
-  const std::string line =
-      printable(fmt::format("{} {:3.0f} %  {:.0f} s{}  {}", what_, 100.0 * share_, seconds,
-                            left(seconds), watched_ ? watched_() : doing_),
-                kLine);
+  const std::string line = printable(fmt::format("{} {:3.0f} %  {:.0f} s{}  {}", what_,
+                                                 100.0 * share_, seconds, left(seconds), doing_),
+                                     kLine);
   rewrite_line(fmt::format("\r{:{}}", line, std::max(width_, line.size())));
   width_ = line.size();
 }

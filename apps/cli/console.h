@@ -12,7 +12,8 @@ namespace sparflow::cli {
 
 /// Progress on stderr. On a terminal it rewrites one line, at least every second; elsewhere (a file, a job's log) it prints a
 /// plain line at the beginning and one every ten seconds, also while nothing new is reported, to show that the work goes on.
-/// The share never goes back; from some seconds on the time left is forecast from it.
+/// The share never goes back; from some seconds on the time left is forecast from it. What was done in the first two seconds
+/// does not count there, because a journal of an earlier run gives much at once.
 class Progress {
  public:
   explicit Progress(std::string what);
@@ -20,13 +21,18 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   void operator()(double share, const std::string& what);
-  /// Words for what is at work, asked whenever a line is printed, for work that is done elsewhere.
-  /// @param doing must not use this object
-  void watch(std::function<std::string()> doing);
+  /// How far work is that is done elsewhere, and words for what is at work.
+  struct Now {
+    double share = 0.0;  ///< 0..1
+    std::string doing;
+  };
+  /// Asks for that whenever a line is printed. @param work must not use this object
+  void watch(std::function<Now()> work);
 
  private:
   void print_periodically(const std::stop_token& stop);
   void draw();
+  void look();                             ///< asks what is watched
   double elapsed() const;                  ///< [s]
   std::string left(double seconds) const;  ///< ", about 12 s left", or ""
 
@@ -38,7 +44,9 @@ class Progress {
   std::mutex mutex_;  ///< guards all but what_, terminal_ and begin_
   double share_ = 0.0;
   std::string doing_;
-  std::function<std::string()> watched_;
+  double first_seconds_ = -1.0,
+         first_share_ = 0.0;  ///< from which the rest is forecast; < 0: not yet
+  std::function<Now()> watched_;
   std::condition_variable_any ended_;
   std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
 };
@@ -46,7 +54,7 @@ class Progress {
 /// Lets Ctrl-C (SIGINT), SIGTERM and SIGHUP end the program with exit code 130 from now on.
 void catch_interrupts();
 /// Lets the first Ctrl-C only set interrupted() from now on, so that the verb finishes with the best result so far;
-/// the second ends the program.
+/// the second ends the program at once, also while the first is still being answered.
 void finish_on_interrupt();
 /// True once Ctrl-C was pressed, in child processes too.
 bool interrupted();

@@ -36,10 +36,7 @@ OptimizeResult optimize_from_seeds(const CraneModel& model, const MotionProblem&
   seed_options.count = 6;
   seeds = make_seeds(problem, seed_options, options.intervals);
   finish_on_interrupt();
-  options.progress = [&](int done, int all, const std::string& what) {
-    progress(static_cast<double>(done) / std::max(1, all), what);
-    return !interrupted();
-  };
+  options.progress = [&](double share, const std::string& what) { progress(share, what); };
   return optimize(model, problem, seeds.motions, options);
 }
 

@@ -97,6 +97,30 @@ void DiagnosisInputs::add_rest(CLI::App& app) {
   outputs_.add_to(app);
 }
 
+void DiagnosisInputs::add_resume(CLI::App& app) {
+  outputs_.add_resume_to(app);
+  resumable_ = true;
+}
+
+std::unique_ptr<Journal> DiagnosisInputs::open_journal(const std::string& options) const {
+  std::vector<std::string> files = {model_};
+  std::string numbers;  // of files by purpose, because the fingerprint has their names alone
+  for (const auto* list : {&logs_, &references_, &tests_, &own_.files}) {
+    files.insert(files.end(), list->begin(), list->end());
+    numbers += fmt::format(" {}", list->size());
+  }
+  if (!mapping_.empty()) files.push_back(mapping_);
+  std::unique_ptr<Journal> journal = outputs_.open_journal(
+      verb_,
+      run_fingerprint(files, fmt::format("{} files{} candidates {} {}", verb_, numbers,
+                                         fmt::join(candidates_, ","), options)),
+      output_);
+  if (journal->finished() > 0)
+    note(fmt::format("{} round{} finished before", journal->finished(),
+                     journal->finished() == 1 ? " was" : "s were"));
+  return journal;
+}
+
 DiagnosisFiles DiagnosisInputs::read() const {
   std::vector<NamedFile> inputs = {{"--model", model_}, {"--mapping", mapping_}};
   const std::pair<const char*, const std::vector<std::string>*> lists[] = {
@@ -109,6 +133,7 @@ DiagnosisFiles DiagnosisInputs::read() const {
   }
   std::vector<NamedFile> written = outputs_.files();
   written.push_back({"--output", output_});
+  if (resumable_) written.push_back({"the journal", outputs_.journal(output_)});
   check_outputs_apart(verb_, written, inputs);
   if (!output_.empty()) check_writable(output_);
   outputs_.check();

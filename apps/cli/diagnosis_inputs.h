@@ -1,5 +1,6 @@
 #pragma once
 /// Inputs that diagnose, selftest, extend and improve share: a fitted model, logs by purpose, candidate effects.
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,10 @@ class DiagnosisInputs {
   void add_threads(CLI::App& app);
   /// Adds --mapping, --effects, --json and --report, which --help lists last.
   void add_rest(CLI::App& app);
+  /// Adds --resume; the journal lies beside the JSON, the page or the model to write.
+  void add_resume(CLI::App& app);
+  /// @param options in words: all that the result depends on besides the files
+  std::unique_ptr<Journal> open_journal(const std::string& options) const;
 
   /// Checks that the outputs can be written and overwrite no input, then reads all inputs.
   /// @throws UsageError when a log is given for two purposes  @throws InputError
@@ -50,6 +55,7 @@ class DiagnosisInputs {
   int threads_ = 0;
   OwnEffects own_;
   Outputs outputs_;
+  bool resumable_ = false;
 };
 
 /// Notes on stderr, when there is no reference log and the model was not fitted on one of the logs, that the model

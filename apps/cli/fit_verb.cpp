@@ -96,9 +96,7 @@ std::string why_nothing_learned(const FitResult& r) {
       return std::any_of(s.cylinders.begin(), s.cylinders.end(), has);
     });
   };
-  if (!cylinders([](const CylinderSignals& c) {
-        return c.pressure_a.array().isFinite().any() || c.pressure_b.array().isFinite().any();
-      }))
+  if (!cylinders([](const CylinderSignals& c) { return c.logs_a || c.logs_b; }))
     missing.emplace_back("chamber pressures (pA_<cylinder>_bar, pB_<cylinder>_bar)");
   if (!measured(r, [](const MachineSignals& s) {
         return std::any_of(s.pumps.begin(), s.pumps.end(), [](const PumpSignals& p) {

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/cli/verbs.h"
@@ -20,6 +22,9 @@ int run(const ImproveArguments& a) {
   options.max_steps = a.max_steps;
   options.date = today();
   options.diagnose.candidates = files.candidates;
+  const std::unique_ptr<Journal> journal =
+      a.inputs.open_journal(fmt::format("--max-steps {}", a.max_steps));
+  options.journal = journal.get();
   finish_on_interrupt();
   const ExtendResult result = [&] {
     Progress progress("improve");
@@ -29,6 +34,7 @@ int run(const ImproveArguments& a) {
     });
   }();
   write_extended(a.inputs, result);
+  if (!result.interrupted) journal->remove();
   return result.interrupted ? kInterrupted : kDone;
 }
 
@@ -53,6 +59,7 @@ void add_improve_verb(CLI::App& app, int& code) {
   a->inputs.add_candidates(*verb, "candidate effects");
   a->inputs.add_threads(*verb);
   a->inputs.add_rest(*verb);
+  a->inputs.add_resume(*verb);
   verb->footer(
       "Examples:\n"
       "  sparflow improve --model crane.json --log train.csv --test test.csv -o crane2.json\n"

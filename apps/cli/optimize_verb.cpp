@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 
@@ -13,6 +14,7 @@
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/grid/driven_grid_path.h"
 #include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/child_progress.h"
 #include "problems/motion_table.h"
 
 namespace sparflow::cli {
@@ -58,41 +60,73 @@ OptimizeResult without_seeds(const CraneModel& model, const MotionProblem& probl
   return result;
 }
 
+/// A part of the computation of the bound.
+struct BoundPart {
+  const char* words;
+  double of_rest;  ///< share of the work left that it is expected to be [1]
+};
+/// Only the progress that is told depends on the shares.
+/// @threshold [1] 0..1; chosen: a timed bound evaluates a hundred bounds, the first parts two grids
+constexpr BoundPart kBoundParts[] = {{"path of the joint grid", 0.05},
+                                     {"bound of any duration", 0.1},
+                                     {"bound with the price of time", 0.5},
+                                     {"bound of the longest duration", 1.0}};
+
 /// Sets the energies found by dynamic programming alone, and the larger of two estimated lower bounds: that of any
 /// motion and that of motions within the problem's largest duration.
-void set_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
+/// @param begin called with the number of each part as it begins; gives the progress that the part is to tell
+void set_bound(const CraneModel& model, const MotionProblem& problem,
+               const std::function<WorkProgress(int part)>& begin, OptimizeResult& result) {
+  begin(0);
   const DrivenGridPath path = driven_grid_path(model, problem, result.duration);
   result.grid_path_energy = path.energy;
   result.unlimited_energy = path.slow_energy;
-  const EnergyBound bound = energy_bound(model, problem);
+  EnergyBoundOptions any;
+  any.progress = begin(1);
+  const EnergyBound bound = energy_bound(model, problem, any);
   result.bound_note = bound.message;
   if (!bound.valid) return;
   result.lower_bound = bound.lower_bound_J;
+  TimedBoundOptions options;
   if (problem.idle_power > 0.0 && !problem.duration.fixed()) {
-    const TimedBound cost = cost_bound(model, problem, problem.idle_power);
+    options.progress = begin(2);
+    const TimedBound cost = cost_bound(model, problem, problem.idle_power, options);
     if (cost.valid) result.lower_bound_cost = cost.value;
   }
   // Within half a percent of the bound of any motion, the limited time can raise the energy by no more than that.
   const double time = problem.duration.max;
   if (!std::isfinite(time) || result.energy.total < 1.005 * bound.lower_bound_J) return;
-  const TimedBound timed = energy_bound_at(model, problem, time);
+  options.progress = begin(3);
+  const TimedBound timed = energy_bound_at(model, problem, time, options);
   if (timed.valid && timed.price_W > 0.0 && timed.value > result.lower_bound) {
     result.lower_bound = timed.value;
     result.lower_bound_time = time;
   }
 }
 
-/// Computes the bound in a process of its own, which can be ended at any time.
+/// Computes the bound in a process of its own, which can be ended at any time, and adds its time to that of the result.
 void add_bound(const CraneModel& model, const MotionProblem& problem, OptimizeResult& result) {
   if (interrupted()) {
     result.interrupted = true;
     return;
   }
-  const Progress progress("bound");
+  const auto begin = std::chrono::steady_clock::now();
+  ChildProgress done(1);  // outlives the progress that shows it
+  Progress progress("bound");
+  std::atomic<int>& part = done.step();
+  progress.watch([&] { return Progress::Now{done.share(), kBoundParts[part.load()].words}; });
   const ChildResult child = run_in_child(
       [&] {
         OptimizeResult r = result;
-        set_bound(model, problem, r);
+        set_bound(
+            model, problem,
+            [&](int next) {
+              const double from = done.share();
+              part = next;
+              return part_of([&](double share, const std::string&) { done.set(0, share); }, from,
+                             from + kBoundParts[next].of_rest * (1.0 - from));
+            },
+            r);
         Packer p;
         p.number(r.grid_path_energy).number(r.unlimited_energy).number(r.lower_bound);
         p.number(r.lower_bound_time).number(r.lower_bound_cost).text(r.bound_note);
@@ -100,6 +134,8 @@ void add_bound(const CraneModel& model, const MotionProblem& problem, OptimizeRe
       },
       interrupted);
   result.interrupted = interrupted();
+  result.bound_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.solve_s += result.bound_s;
   if (!child.ok) {
     result.bound_note = "no lower bound: " + child.error;
     return;
@@ -150,19 +186,13 @@ int run(const OptimizeArguments& a) {
     }
     progress(0.2, fmt::format("solving from {} paths", seeds.motions.size()));
     finish_on_interrupt();
-    options.progress = [&](int done, int all, const std::string& what) {
-      progress(0.2 + 0.8 * done / std::max(1, all), what);
-      return !interrupted();
+    options.progress = [&](double share, const std::string& what) {
+      progress(0.2 + 0.8 * share, what);
     };
     result = seeds.motions.empty() ? without_seeds(model, problem, seeds, options)
                                    : optimize(model, problem, seeds.motions, options);
   }
-  if (a.bound && result.motion.size() > 1) {
-    const auto begin = std::chrono::steady_clock::now();
-    add_bound(model, problem, result);
-    result.solve_s +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
+  if (a.bound && result.motion.size() > 1) add_bound(model, problem, result);
   if (result.motion.size() > 1 && !a.output.empty()) {
     const Trajectory rows = a.rate > 0.0 ? at_rate(result.motion, a.rate) : result.motion;
     write_file_atomically(a.output, motion_csv(model, rows, problem.payload,

@@ -34,17 +34,18 @@ void Outputs::add_resume_to(CLI::App& verb) {
                 "in FILE.journal beside the JSON (or the page)");
 }
 
-std::string Outputs::journal() const {
-  const std::string& beside = json.empty() || json == kStandardOutput ? report : json;
+std::string Outputs::journal(const std::string& own) const {
+  const bool no_json = json.empty() || json == kStandardOutput;
+  const std::string& beside = !no_json ? json : report.empty() ? own : report;
   std::error_code error;
   const bool other =
       std::filesystem::exists(beside, error) && !std::filesystem::is_regular_file(beside, error);
   return beside.empty() || other ? "" : beside + ".journal";
 }
 
-std::unique_ptr<Journal> Outputs::open_journal(const std::string& verb,
-                                               const std::string& run) const {
-  const std::string path = journal();
+std::unique_ptr<Journal> Outputs::open_journal(const std::string& verb, const std::string& run,
+                                               const std::string& own) const {
+  const std::string path = journal(own);
   if (path.empty()) {
     if (!resume) return std::make_unique<Journal>();
     throw UsageError(

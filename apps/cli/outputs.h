@@ -29,11 +29,14 @@ struct Outputs {
   std::vector<NamedFile> files() const { return {{"--json", json}, {"--report", report}}; }
   /// Adds --resume, for a verb that keeps a journal of its finished parts.
   void add_resume_to(CLI::App& verb);
-  /// The journal's path: beside the first of these files; "" where that is none, or a device or FIFO.
-  std::string journal() const;
+  /// The journal's path: beside the first of these files, else beside the verb's own output; "" where that is none, or a
+  /// device or FIFO.
+  std::string journal(const std::string& own = "") const;
   /// Opens the journal, and tells what it holds. @param run of run_fingerprint()
   /// @throws UsageError for --resume without an output beside which a journal can lie  @throws InputError
-  std::unique_ptr<Journal> open_journal(const std::string& verb, const std::string& run) const;
+  /// @param own the verb's own output, as in journal()
+  std::unique_ptr<Journal> open_journal(const std::string& verb, const std::string& run,
+                                        const std::string& own = "") const;
 };
 
 /// Checks, before any long work, that the folder of `path` exists and can be written. @throws InputError

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/mman.h>
 
 #include <atomic>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/strategies_page.h"
 #include "models/math/error.h"
+#include "optimizer/solve/child_progress.h"
 #include "optimizer/solve/kept_work.h"
 
 namespace sparflow::cli {
@@ -129,24 +129,9 @@ StrategyComparison without_rows(const ProblemAndModel& task, const StrategyOptio
   return c;
 }
 
-/// Counts the solves of all processes; each adds to it.
-class SolveCount {
- public:
-  SolveCount() {
-    void* shared = ::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
-                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    SPARFLOW_CHECK(shared != MAP_FAILED, "mmap found no memory for the count of solves");
-    count_ = new (shared) std::atomic<int>(0);
-  }
-  ~SolveCount() { ::munmap(count_, sizeof(std::atomic<int>)); }
-  SolveCount(const SolveCount&) = delete;
-  SolveCount& operator=(const SolveCount&) = delete;
-  void add() { count_->fetch_add(1); }
-  int value() const { return count_->load(); }
-
- private:
-  std::atomic<int>* count_;
-};
+/// Share of a problem's work that the search of paths is, of which only the progress that is told depends.
+/// @threshold [1] 0..0.5; chosen: it takes some seconds at most, and a problem up to minutes
+constexpr double kPathShare = 0.1;
 
 StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
                               StrategyOptions options) {
@@ -159,7 +144,10 @@ StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArgum
   options.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
   options.baselines.intervals = options.optimize.intervals;
   options.baselines.optimize = options.optimize;
-  const Seeds seeds = make_seeds(task.problem, a.seeds, options.optimize.intervals);
+  SeedOptions paths = a.seeds;
+  paths.progress = part_of(options.progress, 0.0, kPathShare);
+  const Seeds seeds = make_seeds(task.problem, paths, options.optimize.intervals);
+  options.progress = part_of(options.progress, kPathShare, 1.0);
   if (!seeds.motions.empty())
     return compare_strategies(task.model, task.problem, seeds.motions, options);
   return without_rows(task, options, "infeasible. " + seeds.paths.message);
@@ -187,12 +175,6 @@ std::string part_name(int index) { return fmt::format("problem {}", index + 1); 
 std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
                                     const StrategiesArguments& a, const StrategyOptions& options,
                                     Journal& journal) {
-  SolveCount solves;
-  StrategyOptions counted = options;
-  counted.optimize.progress = [&](int, int, const std::string&) {
-    solves.add();
-    return !interrupted();
-  };
   const auto task = [&](int i) -> const ProblemAndModel& {
     return tasks[static_cast<std::size_t>(i)];
   };
@@ -200,21 +182,28 @@ std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
   work.count = static_cast<int>(tasks.size());
   work.at_once = a.processes > 0 ? a.processes : usable_processors();
   work.name = part_name;
-  work.work = [&](int i) { return packed(compare_in(task(i), a, counted)); };
+  ChildProgress done(work.count);  // outlives the progress that shows it; counts the starts
+  work.work = [&](int i) {
+    StrategyOptions told = options;
+    told.optimize.progress = [&](double, const std::string&) { ++done.step(); };
+    told.progress = [&](double share, const std::string&) { done.set(i, share); };
+    return packed(compare_in(task(i), a, told));
+  };
   work.complete = [](const std::string& bytes) { return !unpacked_comparison(bytes).interrupted; };
   work.stop = interrupted;
   const int before = finished_before(work, journal);
   if (before > 0) note(fmt::format("{} of {} problems were finished before", before, work.count));
-  std::atomic<int> done = before;  // outlives the progress that shows it
+  std::atomic<int> finished = before;
   Progress progress("strategies");
-  progress(0.0, fmt::format("{} problem{}", work.count, work.count > 1 ? "s" : ""));
   progress.watch([&] {
-    return fmt::format("{} of {} problem{} finished, {} starts solved", done.load(), work.count,
-                       work.count > 1 ? "s" : "", solves.value());
+    return Progress::Now{
+        done.share(), fmt::format("{} of {} problem{} finished, {} starts solved", finished.load(),
+                                  work.count, work.count > 1 ? "s" : "", done.step().load())};
   });
-  return run_kept(work, journal, [&](int i, int finished, const ChildResult&) {
-    done = finished;
-    progress(static_cast<double>(finished) / work.count, task(i).problem.name);
+  return run_kept(work, journal, [&](int i, int now, const ChildResult&) {
+    finished = now;
+    done.set(i, 1.0);
+    progress(done.share(), task(i).problem.name);
   });
 }
 

@@ -10,6 +10,7 @@
 #include "identification/comparison/error_change.h"
 #include "identification/comparison/model_change.h"
 #include "identification/learning/fit.h"
+#include "models/math/journal.h"
 
 namespace sparflow {
 
@@ -80,6 +81,9 @@ struct ExtendOptions {
   /// @threshold [folds] 2..10; chosen: two cost least, and half of the motions still determine what
   /// a diagnosis of all has found
   int folds = 2;
+  /// Keeps each round of `improve` that another one follows, so that a run that was ended can be resumed; null: none is kept.
+  /// It must outlive the run, and belong to these options, this model and these logs.
+  Journal* journal = nullptr;
   std::string date;  ///< "2025-03-14" for the record; empty = not recorded
 };
 

@@ -6,7 +6,9 @@
 #include <optional>
 
 #include "diagnosis/extension/extension_step.h"
+#include "diagnosis/extension/improve_round.h"
 #include "identification/data_checks/set_aside.h"
+#include "models/effects/registry.h"
 #include "models/math/error.h"
 #include "models/math/interruption.h"
 
@@ -172,14 +174,18 @@ class Improvement {
   Improvement(const RefitContext& context, ExtendResult& result, Judged& current)
       : context_(context), result_(result), current_(current) {}
 
-  /// Estimates `wanted` together with the effects of the model and removes what the data do not bear out.
-  /// @param diagnosis that named them
+  /// Estimates the effects of a round together with those of the model and removes what the data do not bear out. The round
+  /// gets what was removed; of one that an earlier run has made, that is removed and nothing else is tested.
+  /// @param diagnosis that named them; null in a round of an earlier run
   /// @return whether anything was kept
-  bool add(const std::vector<EffectAt>& wanted, const std::shared_ptr<const Diagnosis>& diagnosis,
+  bool add(ImproveRound& round, const std::shared_ptr<const Diagnosis>& diagnosis,
            const SearchProgress& progress) {
+    const std::vector<EffectAt> wanted = places(round.wanted);
     Trial trial{places_of(current_.model.effects), {}, diagnosis};
     trial.effects.insert(trial.effects.end(), wanted.begin(), wanted.end());
-    const std::vector<EffectAt> kept = eliminate(trial, wanted, progress);
+    const std::vector<EffectAt> kept = diagnosis == nullptr
+                                           ? remove(trial, wanted, places(round.removed), progress)
+                                           : eliminate(trial, wanted, progress);
     for (const EffectAt& e : kept) {
       TriedStep tried = try_adding(context_, current_, e, progress);
       tried.step.diagnosis = diagnosis;
@@ -188,7 +194,9 @@ class Improvement {
     }
     ++rounds_;
     if (!kept.empty()) aside_.clear();
+    round.removed.clear();
     for (ExtendStep& f : trial.failures) {
+      round.removed.push_back(f.added);
       aside_.push_back({f.effect.effect, f.effect.at});
       ++rejected_;
       result_.rejected.push_back(std::move(f));
@@ -221,70 +229,114 @@ class Improvement {
     std::shared_ptr<const Diagnosis> diagnosis;
   };
 
+  /// A set of effects estimated together, with the errors by which each of them is judged.
+  struct Joint {
+    Judged judged;
+    std::vector<EffectAt> all;
+    CompareResult measured;
+    std::optional<CompareResult> on_tests;
+  };
+  /// An effect taken out of a joint set, and whether the data bear it out.
+  struct Tested {
+    ExtendStep step;
+    bool stays = false;
+  };
+
+  std::vector<EffectAt> places(const std::vector<std::string>& keys) const {
+    std::vector<EffectAt> out;
+    out.reserve(keys.size());
+    for (const std::string& key : keys) out.push_back(parse_effect(key, context_.machine()));
+    return out;
+  }
+
   /// Backward elimination: removes from the set the one of `tested` that the data bear out least, until they bear out all.
   /// @return those of `tested` that stay
   std::vector<EffectAt> eliminate(Trial& trial, std::vector<EffectAt> tested,
                                   const SearchProgress& progress) const {
     while (!tested.empty()) {
-      const Judged joint = context_.with(current_, trial.effects, progress);
-      std::optional<ExtendStep> weakest = weakest_of(joint, tested, progress);
+      std::optional<ExtendStep> weakest = weakest_of(joint(trial, progress), tested, progress);
       if (!weakest) break;
-      weakest->diagnosis = trial.diagnosis;
-      const EffectAt e{weakest->effect.effect, weakest->effect.at};
-      trial.failures.push_back(std::move(*weakest));
-      tested = without(std::move(tested), e);
-      trial.effects = without(std::move(trial.effects), e);
+      fail(std::move(*weakest), trial, tested);
     }
     return tested;
   }
 
-  /// Of the tested effects the one that the data bear out least, if they do not bear out all. The errors of forces and
-  /// flows are those of a cross-validation; effects on pressures alone are judged as a step is.
-  std::optional<ExtendStep> weakest_of(const Judged& joint, const std::vector<EffectAt>& tested,
-                                       const SearchProgress& progress) const {
+  /// Removes these effects from the set, as an elimination did before. @return those of `tested` that stay
+  std::vector<EffectAt> remove(Trial& trial, std::vector<EffectAt> tested,
+                               const std::vector<EffectAt>& removed,
+                               const SearchProgress& progress) const {
+    for (const EffectAt& e : removed)
+      fail(without_one(joint(trial, progress), e, progress).step, trial, tested);
+    return tested;
+  }
+
+  static void fail(ExtendStep step, Trial& trial, std::vector<EffectAt>& tested) {
+    const EffectAt e{step.effect.effect, step.effect.at};
+    step.diagnosis = trial.diagnosis;
+    trial.failures.push_back(std::move(step));
+    std::erase(tested, e);
+    std::erase(trial.effects, e);
+  }
+
+  Joint joint(const Trial& trial, const SearchProgress& progress) const {
+    Joint j;
+    j.judged = context_.with(current_, trial.effects, progress);
+    j.all = places_of(j.judged.model.effects);
+    j.measured = context_.measured_errors(j.judged.model, j.all, progress);
+    j.on_tests = context_.tested_errors(j.judged.model, j.all, progress);
+    return j;
+  }
+
+  /// The step that takes one effect out of a joint set. The errors of forces and flows are those of a cross-validation;
+  /// effects on pressures alone are judged as a step is.
+  Tested without_one(const Joint& joint, const EffectAt& e, const SearchProgress& progress) const {
     const ExtendOptions& options = context_.options();
-    const std::vector<EffectAt> all = places_of(joint.model.effects);
-    const CompareResult measured = context_.measured_errors(joint.model, all, progress);
-    const std::optional<CompareResult> on_tests =
-        context_.tested_errors(joint.model, all, progress);
+    const CraneModel& model = joint.judged.model;
+    const std::vector<EffectAt> rest = without(joint.all, e);
+    const EffectStage stage = e.effect->info().stage;
+    const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+    Tested tested;
+    ExtendStep& step = tested.step;
+    step.added = effect_key(e.effect->info(), model.machine, e.at);
+    step.title = effect_title(e.effect->info(), model.machine, e.at);
+    step.effect = model.effects[static_cast<std::size_t>(
+        std::find(joint.all.begin(), joint.all.end(), e) - joint.all.begin())];
+    if (learned) {
+      judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
+                 step);
+    } else {
+      judge_step(context_, e, context_.measured_errors(model, rest, progress), joint.measured,
+                 step);
+      step.judged_on = context_.measured_on();
+    }
+    step.determined = is_determined(step.effect);
+    const bool falls = step.change.own * options.change.refit_moves < 1.0;
+    // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
+    const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
+    tested.stays = step.determined && (falls || unseen);
+    if (!tested.stays || !joint.on_tests || learned) return tested;
+    // Test logs do not choose an effect, but may contradict it.
+    ExtendStep test = step;
+    judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
+    tested.stays = !harms_its_own_place(test, model.machine, e);
+    if (!tested.stays) step = std::move(test);
+    return tested;
+  }
+
+  /// Of the tested effects the one that the data bear out least, if they do not bear out all.
+  std::optional<ExtendStep> weakest_of(const Joint& joint, const std::vector<EffectAt>& tested,
+                                       const SearchProgress& progress) const {
     std::optional<ExtendStep> weakest;
     double least = 0.0;
     for (const EffectAt& e : tested) {
-      const std::vector<EffectAt> rest = without(all, e);
-      const EffectStage stage = e.effect->info().stage;
-      const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
-      ExtendStep step;
-      step.added = effect_key(e.effect->info(), joint.model.machine, e.at);
-      step.title = effect_title(e.effect->info(), joint.model.machine, e.at);
-      step.effect = joint.model.effects[static_cast<std::size_t>(
-          std::find(all.begin(), all.end(), e) - all.begin())];
-      if (learned) {
-        judge_step(context_, e, context_.with(joint, rest, progress).error, joint.error, step);
-      } else {
-        judge_step(context_, e, context_.measured_errors(joint.model, rest, progress), measured,
-                   step);
-        step.judged_on = context_.measured_on();
-      }
-      step.determined = is_determined(step.effect);
-      const bool falls = step.change.own * options.change.refit_moves < 1.0;
-      // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
-      const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
-      bool stays = step.determined && (falls || unseen);
-      if (stays && on_tests &&
-          !learned) {  // test logs do not choose an effect, but may contradict it
-        ExtendStep test = step;
-        judge_step(context_, e, *context_.tested_errors(joint.model, rest, progress), *on_tests,
-                   test);
-        stays = !harms_its_own_place(test, joint.model.machine, e);
-        if (!stays) step = std::move(test);
-      }
-      if (stays) continue;
+      Tested one = without_one(joint, e, progress);
+      if (one.stays) continue;
       // an effect that the logs do not determine at all goes first
       const double worth =
-          step.determined ? -step.change.own : -std::numeric_limits<double>::infinity();
+          one.step.determined ? -one.step.change.own : -std::numeric_limits<double>::infinity();
       if (weakest && worth >= least) continue;
       least = worth;
-      weakest = std::move(step);
+      weakest = std::move(one.step);
     }
     return weakest;
   }
@@ -324,6 +376,12 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
   DiagnoseOptions diagnose_options = options.diagnose;
   const auto most = static_cast<std::size_t>(options.max_steps);
   try {
+    int rounds = 0;
+    for (; std::optional<ImproveRound> made = round_of(options.journal, rounds + 1); ++rounds) {
+      improvement.add(*made, nullptr, part(0.3));
+      add_notes(made->notes, result);
+      done += (1.0 - done) * 0.5;
+    }
     while (result.reason.empty()) {
       diagnose_options.candidates = choices(options, current.model, improvement.excluded());
       if (diagnose_options.candidates.empty()) {  // an empty list would mean the whole catalogue
@@ -343,15 +401,22 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
             fmt::format("the limit of {} steps is reached; {} would be next", options.max_steps,
                         effect_title(next.effect->info(), model.machine, next.at));
       } else {
-        const std::vector<EffectAt> wanted = of_one_round(named, most - improvement.added());
-        if (improvement.add(wanted, diagnosis, part(0.3))) {
+        ImproveRound round;
+        for (const EffectAt& e : of_one_round(named, most - improvement.added()))
+          round.wanted.push_back(effect_key(e.effect->info(), model.machine, e.at));
+        if (improvement.add(round, diagnosis, part(0.3))) {
           for (const DiagnosedEffect* e : named)
             if (!e->rivals.empty() && contains(places_of(current.model.effects), e->effect))
-              add_notes({stands_for(*e)}, result);
+              round.notes.push_back(stands_for(*e));
+          add_notes(round.notes, result);
         }
         done += (1.0 - done) * 0.3;
         if (improvement.rejected() > options.most_rejected)
           result.reason = "the effects found do not improve data that took no part";
+        // The result names the last diagnosis, so a round that none follows is made again.
+        if (result.reason.empty() &&
+            !choices(options, current.model, improvement.excluded()).empty())
+          keep_round(options.journal, ++rounds, round);
       }
     }
     improvement.test_again(part(0.5));

@@ -285,6 +285,7 @@ CompareResult compare_signals(const CraneModel& model, std::vector<MachineSignal
     if (options.find_regions) {
       for (SensorSlip& slip : find_sensor_slips(model.machine, signals[l]))
         result.slips.push_back({signals[l].file, std::move(slip)});
+      if (signals[l].slim) signals[l] = without_checked(std::move(signals[l]));
     }
     log.signals = with_effects(model, std::move(signals[l]));
     Comparison comparison(model, log.signals, only.empty() ? nullptr : &only[l]);

@@ -66,14 +66,14 @@ void each_series(const CompareResult& result, const PartKey& key, const Use& use
 /// The signals at a part's samples. @param used [parts of logs] number of the part's samples in each log's series
 std::vector<RegimeSignal> gathered_signals(const Machine& machine, const CompareResult& result,
                                            const PartKey& key,
-                                           const std::vector<std::vector<Index>>& rows) {
+                                           const std::vector<std::vector<int>>& rows) {
   Index count = 0;
-  for (const std::vector<Index>& r : rows) count += static_cast<Index>(r.size());
+  for (const std::vector<int>& r : rows) count += static_cast<Index>(r.size());
   std::vector<RegimeSignal> out;
   std::size_t series = 0;
   Index before = 0;
   each_series(result, key, [&](std::size_t l, const ComparedSeries& s) {
-    const std::vector<Index>& here = rows[series];
+    const std::vector<int>& here = rows[series];
     const bool first = series++ == 0;
     each_signal(machine, result.logs[l].signals, s, [&](RegimeSignal&& g) {
       auto known = std::find_if(out.begin(), out.end(),
@@ -119,19 +119,20 @@ ComparedPart gather(const CompareResult& result, const std::vector<Eigen::Vector
   each_row([&](std::size_t l, const ComparedSeries& s, Index k) {
     part.error[row++] = s.predicted[k] - s.measured[k];
     part.block.push_back(blocks[l][k]);
-    part.sample.push_back(k);
+    part.sample.push_back(static_cast<int>(k));
   });
   return part;
 }
 
 /// Rows of a part in each log's series, from the samples that it has in order of the logs.
-std::vector<std::vector<Index>> rows_by_series(const CompareResult& result, const PartKey& key,
-                                               const ComparedPart& part,
-                                               const std::vector<CompareBlock>& blocks) {
-  std::vector<std::vector<Index>> rows;
+std::vector<std::vector<int>> rows_by_series(const CompareResult& result, const PartKey& key,
+                                             const ComparedPart& part,
+                                             const std::vector<CompareBlock>& blocks) {
+  std::vector<std::vector<int>> rows;
   std::size_t i = 0;
   each_series(result, key, [&](std::size_t l, const ComparedSeries&) {
     rows.emplace_back();
+    if (result.logs.size() == 1) rows.back().reserve(part.sample.size());
     for (; i < part.block.size() && blocks[static_cast<std::size_t>(part.block[i])].log == l; ++i)
       rows.back().push_back(part.sample[i]);
   });

@@ -42,8 +42,8 @@ struct ComparedPart {
   std::string unit;       ///< of the field
   double scale = 1.0;     ///< SI value of one `unit`
   Eigen::VectorXd error;  ///< predicted - measured, SI
-  std::vector<int> block;            ///< index into the blocks
-  std::vector<Eigen::Index> sample;  ///< index into its log
+  std::vector<int> block;   ///< index into the blocks
+  std::vector<int> sample;  ///< index into its log; int, because logs of millions of rows have many
   /// Those that all logs have; for a force also its direction (+1, -1). Empty where `gather_signals` gives them.
   std::vector<RegimeSignal> signals;
   /// Gives the signals when they are needed, since those of all parts together take several times the memory of the logs.

@@ -43,7 +43,7 @@ void visit_cylinder(const Machine& machine, const MachineSignals& signals, int i
   const CylinderSignals& c = signals.cylinders[static_cast<std::size_t>(index)];
   visit({"speed_" + name + "_mm_s", name + " speed", "mm/s", 1e-3, c.speed.cwiseAbs()});
   visit({"acceleration_" + name + "_m_s2", name + " acceleration", "m/s2", 1.0, c.acceleration});
-  visit({"load_" + name + "_kN", name + " load", "kN", 1e3, c.static_force});
+  visit({"load_" + name + "_kN", name + " load", "kN", 1e3, c.statics()});
   if (c.has_command()) {
     visit({"u_" + name, name + " command", "", 1.0, c.command.cwiseAbs()});
   }

@@ -203,7 +203,7 @@ void Comparison::pressures(std::vector<ComparedSeries>& out, std::set<std::strin
     if (!cylinder.hydraulic()) continue;
     const CylinderSignals& c = signals_.cylinders[i];
     for (const bool bore : {true, false}) {
-      if ((bore ? c.pressure_a : c.pressure_b).size() > 0) continue;
+      if (bore ? c.logs_a : c.logs_b) continue;
       notes.insert(fmt::format("pressure of {} {}: not compared, needs p{}_{}_bar", cylinder.name,
                                bore ? "extending" : "retracting", bore ? "A" : "B", cylinder.name));
     }

@@ -100,11 +100,11 @@ class SlipSearch {
     const Cylinder& cylinder = machine_.cylinders[i];
     const std::vector<Index> moving = thinned(signals_.samples(), options_.most, [&](Index k) {
       return std::abs(c.speed[k]) > options_.firm_speed && std::isfinite(c.pressure_a[k]) &&
-             std::isfinite(c.pressure_b[k]) && std::isfinite(c.static_force[k]);
+             std::isfinite(c.pressure_b[k]) && std::isfinite(c.statics()[k]);
     });
     if (!enough(moving)) return;
     double square = 0.0;
-    for (const Index k : moving) square += c.static_force[k] * c.static_force[k];
+    for (const Index k : moving) square += c.statics()[k] * c.statics()[k];
     if (!(square > 0.0)) return;
     const auto read = [&](bool swapped, const OtherUnit* unit) {
       const double factor = unit == nullptr ? 1.0 : unit->factor;
@@ -113,7 +113,7 @@ class SlipSearch {
         const double a = swapped ? c.pressure_b[k] : c.pressure_a[k];
         const double b = swapped ? c.pressure_a[k] : c.pressure_b[k];
         const double force = (a * cylinder.area_piston() - b * cylinder.area_rod()) / factor;
-        sum += (force - c.static_force[k]) * (force - c.static_force[k]);
+        sum += (force - c.statics()[k]) * (force - c.statics()[k]);
       }
       return Reading{sum / square, swapped, unit};
     };
@@ -217,7 +217,7 @@ class SlipSearch {
         if (!c.has_force() || !std::isfinite(c.force[k]) || !c.moving[k]) continue;
         any = true;
         const double empty = statics.force()[static_cast<Index>(i)];
-        const double load = c.static_force[k] - empty;  // as the file's number gives it
+        const double load = c.statics()[k] - empty;  // as the file's number gives it
         square[i] += c.force[k] * c.force[k];
         for (std::size_t u = 0; u < error.size(); ++u) {
           const double factor = u == 0 ? 1.0 : kMassUnits[u - 1].factor;

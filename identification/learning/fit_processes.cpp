@@ -21,8 +21,8 @@ using Eigen::VectorXd;
 struct ProcessData {
   GpDataset set;
   std::vector<Index> position;  ///< running number over all logs, with a gap between logs
-  VectorXd measured;            ///< [Pa] measured, less the effects on the supply chamber
-  VectorXd back;                ///< [Pa] contribution of effects to the return chamber
+  VectorXd measured;  ///< [Pa] measured, less the effects on the supply chamber; as `back`
+  VectorXd back;  ///< [Pa] contribution of effects to the return chamber; empty where there is none
   bool has_back() const { return (back.array() != 0.0).any(); }
 
   /// Subtracts the part of `back` that reaches the supply chamber by the pressure model learned so far.
@@ -98,9 +98,11 @@ ProcessData process_data(const Machine& machine, const TrainingData& data, int c
   out.set.force = Eigen::Map<Eigen::ArrayXd>(force.data(), n);
   out.set.pressure = Eigen::Map<Eigen::ArrayXd>(pressure.data(), n);
   out.set.group = groups_of(data, log, row, block_s);
-  out.measured = out.set.pressure.matrix();
   out.back = Eigen::Map<VectorXd>(back.data(), n);
-  if (out.has_back()) {
+  if (!out.has_back()) {
+    out.back.resize(0);
+  } else {
+    out.measured = out.set.pressure.matrix();
     out.subtract_back(machine.cylinders[static_cast<std::size_t>(cylinder)], extend ? 1 : -1);
   }
   return out;
@@ -265,7 +267,7 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
     if (!machine.cylinders[static_cast<std::size_t>(i)].hydraulic()) continue;
     for (const bool extend : {true, false}) {
       samples.push_back(process_data(machine, data, i, extend, options.hold_out_block_s));
-      all.sets.push_back(samples.back().set);
+      all.sets.push_back(std::move(samples.back().set));  // lent, because long logs have many
       all.which.push_back(all.which.size());
       ProcessFit fitted;
       fitted.cylinder = i;
@@ -280,6 +282,8 @@ void learn_processes(const TrainingData& data, const FitOptions& options, FitPas
     };
   };
   learn(all, options, pass, tell(0.0));
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i].set = std::move(all.sets[i]);
+  all.sets.clear();
   subtract_backs(options, samples, pass);
 
   // Where thinned samples cannot be learned, the first fit is kept.

@@ -19,6 +19,7 @@ namespace {
 constexpr double kLargestAngle = 8.0 * std::numbers::pi;
 constexpr double kLargestLength = 50.0;
 constexpr double kLargestPressure = 1000.0 * units::kBar;
+constexpr double kPsi = 6894.757293168361;  // [Pa]
 constexpr double kLowestPressure =
     -2.0 * units::kBar;  // absolute zero is -1 bar gauge; sensors drift
 constexpr double kLargestCommand = 1.5;
@@ -170,9 +171,16 @@ void check_position(const Channel& channel, const Machine& machine, const Extent
 
 void check_pressure(const Channel& channel, const Extent& e, Log* log) {
   if (largest(e) > kLargestPressure) {
+    // The largest unit in which no value is beyond what machines have.
+    const char* unit = "Pa";
+    for (const auto& [name, pascals] : {std::pair{"psi", kPsi}, std::pair{"kPa", 1e3}}) {
+      if (largest(e) * pascals / units::kBar > kLargestPressure) continue;
+      unit = name;
+      break;
+    }
     log->warnings.push_back(
-        fmt::format("{}: values up to {:.4g} bar; are they in Pa? Then name the column {}_Pa",
-                    channel.column, largest(e) / units::kBar, channel.signal));
+        fmt::format("{}: values up to {:.4g} bar; are they in {}? Then name the column {}_{}",
+                    channel.column, largest(e) / units::kBar, unit, channel.signal, unit));
   } else if (e.lo < kLowestPressure) {
     log->warnings.push_back(
         fmt::format("{}: values down to {:.4g} bar, below vacuum; check the sensor's zero",

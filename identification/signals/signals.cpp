@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
@@ -96,6 +97,8 @@ void measured(const Machine& machine, const Log& log, int index, MachineSignals&
     out.notes.push_back(fmt::format(
         "the pressures of {} are not used: the machine file gives it no bore", cylinder.name));
   }
+  c.logs_a = c.pressure_a.array().isFinite().any();
+  c.logs_b = c.pressure_b.array().isFinite().any();
   if (c.force.size() == 0 && c.pressure_a.size() > 0 && c.pressure_b.size() > 0) {
     c.force = c.pressure_a * cylinder.area_piston() - c.pressure_b * cylinder.area_rod();
   }
@@ -256,12 +259,13 @@ void derive(const Machine& machine, const SavitzkyGolay& filter, const SignalOpt
   drop_dead_commands(machine, options.motion, out);
   find_motion(machine, options.motion, out);
   for (CylinderSignals& c : out.cylinders) {
-    c.model_force = c.static_force;
     if (out.slim) {
       c.pressure_a_smooth.resize(0);
       c.pressure_b_smooth.resize(0);
+      c.model_force = std::move(c.static_force);
+      c.static_force.resize(0);
     } else {
-      c.predicted_force = c.static_force;
+      c.model_force = c.predicted_force = c.static_force;
     }
   }
   for (PumpSignals& pump : out.pumps)
@@ -356,6 +360,12 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
         "{} of {} samples left out: pose, speed or payload is not known there", lost, n));
   }
   return out;
+}
+
+MachineSignals without_checked(MachineSignals signals) {
+  for (CylinderSignals& c : signals.cylinders)
+    for (VectorXd* v : {&c.length, &c.pressure_a, &c.pressure_b}) v->resize(0);
+  return signals;
 }
 
 MachineSignals::MachineSignals() = default;

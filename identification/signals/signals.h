@@ -17,7 +17,7 @@ using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 struct SignalOptions {
   SmoothingOptions smoothing;  ///< one filter for every signal of a log
   SegmentOptions motion;       ///< thresholds of "moving" and "commanded", and what one motion is
-  /// Only columns are kept that learning and comparing read where no effect acts: three quarters of the memory of a long
+  /// Only columns are kept that learning and comparing read where no effect acts: two thirds of the memory of a long
   /// log. Not for pages, diagnoses and models with effects.
   bool slim = false;
 };
@@ -38,6 +38,7 @@ struct CylinderSignals {
   /// Whether the log has the stroke and not the joint's position: speeds and flows are then measured, whatever angle belongs
   /// to the stroke.
   bool stroke_measured = false;
+  bool logs_a = false, logs_b = false;  ///< whether the log has the pressures of bore and rod side
 
   /// +1 extending, -1 retracting, 0 at rest. It follows the command where commands are logged, because the valve section
   /// connects the commanded side to the pump also while lag or load still move the rod the other way; else the speed.
@@ -66,6 +67,10 @@ struct CylinderSignals {
   bool has_command() const { return command.size() > 0; }
   bool has_force() const { return force.size() > 0; }
   bool has_pressure() const { return working_pressure.size() > 0; }
+  /// The static force; slim signals have no effects, and no column of their own for it.
+  const Eigen::VectorXd& statics() const {
+    return static_force.size() > 0 ? static_force : model_force;
+  }
   /// The predicted force; slim signals have no sensor effects, and no column of their own for it.
   const Eigen::VectorXd& predicted() const {
     return predicted_force.size() > 0 ? predicted_force : model_force;
@@ -123,6 +128,9 @@ struct MachineSignals {
   MachineSignals& operator=(MachineSignals&&) noexcept;
   ~MachineSignals();
 };
+
+/// The signals without what only checks of sensors read: chamber pressures as logged, and lengths.
+MachineSignals without_checked(MachineSignals signals);
 
 /// @throws InputError when the linkage cannot reach the measured stroke of a joint at any sample
 MachineSignals make_signals(const Machine& machine, const Log& log,

@@ -16,6 +16,9 @@ namespace {
 /// @threshold [1] 10..1000; derived: losses fall with the flow squared: a thousandth of those of the fastest motion
 /// is left
 constexpr double kVerySlow = 30.0;
+/// Parabolas for each idle power.
+/// @threshold [1] 0..10; chosen: the second one corrects what the curve's steps hide from the first
+constexpr int kParabolas = 2;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double energy_or_none(const std::vector<StrategyOutcome>& all, const std::string& kind) {
@@ -68,6 +71,15 @@ class CurveSearch {
     const std::function<bool()>& stop = options_.strategies.optimize.interrupted;
     return curve_.interrupted = curve_.interrupted || (stop && stop());
   }
+  /// Number of solves, should every idle power ask for all its durations.
+  int most_solves() const {
+    return 1 + options_.points + kParabolas * static_cast<int>(options_.idle_powers.size());
+  }
+  /// Lets the next solve tell its progress. @param what its words begin with
+  void begin_solve(const std::string& what);
+  void tell(double share, const std::string& what) {
+    if (options_.progress) go_on_ = go_on_ && !stopped() && options_.progress(share, what);
+  }
   double shortest_known() const;  ///< [s] of baselines and seeds; 0 = none
   /// Energies of motions without a limit of time. @param shortest [s]
   void set_limits(double shortest);
@@ -87,7 +99,7 @@ class CurveSearch {
   BaselineSet baselines_;
   OptimumSearch search_;
   StrategyOutcome fastest_;
-  int done_ = 0;       // durations
+  int solves_ = 0;     // begun
   bool go_on_ = true;  // as the caller's progress says
   ParetoCurve curve_;
 };
@@ -117,6 +129,16 @@ void CurveSearch::set_limits(double shortest) {
   }
 }
 
+void CurveSearch::begin_solve(const std::string& what) {
+  const double one = 1.0 / most_solves();
+  const WorkProgress whole = [this](double share, const std::string& words) { tell(share, words); };
+  const WorkProgress part =
+      part_of(whole, std::min(1.0, one * solves_), std::min(1.0, one * (solves_ + 1)));
+  ++solves_;
+  search_.tell(
+      [part, what](double share, const std::string& start) { part(share, what + ", " + start); });
+}
+
 ParetoPoint CurveSearch::point_at(double duration, bool thorough) {
   std::vector<StrategyOutcome> known = baseline_outcomes(model_, problem_, baselines_, duration);
   ParetoPoint p;
@@ -124,13 +146,10 @@ ParetoPoint CurveSearch::point_at(double duration, bool thorough) {
   p.sequential = energy_or_none(known, kSequential);
   p.simultaneous = energy_or_none(known, kJointLine);
   if (fastest_.found()) known.push_back(fastest_);
+  const std::string what = fmt::format("{:.2f} s", duration);
+  begin_solve(what);
   p.optimal = search_.at(duration, known, thorough);
-  ++done_;
-  if (options_.progress) {
-    go_on_ =
-        !stopped() && options_.progress(std::min(1.0, static_cast<double>(done_) / options_.points),
-                                        fmt::format("{:.2f} s", duration));
-  }
+  tell(std::min(1.0, static_cast<double>(solves_) / most_solves()), what);
   return p;
 }
 
@@ -154,9 +173,6 @@ double least_of_parabola(const std::array<double, 3>& x, const std::array<double
 }
 
 void CurveSearch::add_idle_points() {
-  /// Parabolas for each idle power.
-  /// @threshold [1] 0..10; chosen: the second one corrects what the curve's steps hide from the first
-  constexpr int kParabolas = 2;
   /// Distance of two durations, in the logarithm, below which a further point tells nothing.
   /// @threshold [1] 1e-4..0.1; chosen: near the optimum the cost changes with the square of it
   constexpr double kNear = 0.01;
@@ -223,6 +239,7 @@ ParetoCurve CurveSearch::filled() {
   }
   set_limits(anchor);
   // The fastest motion is solved first, because the curve begins there.
+  begin_solve("fastest");
   fastest_ = search_.fastest(motions_near_shortest(model_, problem_, baselines_, anchor));
   double low = fastest_.found() ? std::min(anchor, fastest_.duration) : anchor;
   if (!problem_.duration.fixed()) low = std::max(low, problem_.duration.min);

@@ -46,7 +46,8 @@ struct ParetoOptions {
   /// @threshold [nodes] 0..1e7; chosen: half of EnergyGridOptions::nodes, as one path is wanted only
   int grid_nodes = 20000;
   StrategyOptions strategies;
-  /// Called with the share done and what is being solved; false interrupts.
+  /// Called after each start of a solve and after each duration, with the share done, which never falls, and what was solved;
+  /// false interrupts.
   std::function<bool(double, const std::string&)> progress;
 };
 

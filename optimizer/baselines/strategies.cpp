@@ -88,7 +88,16 @@ OptimumSearch::OptimumSearch(const CraneModel& model, const MotionProblem& probl
       problem_(problem),
       seeds_(seeds),
       baselines_(baselines),
-      options_(std::move(options)) {}
+      options_(std::move(options)),
+      own_progress_(options_.optimize.progress) {}
+
+void OptimumSearch::tell(WorkProgress progress) {
+  options_.optimize.progress = [own = own_progress_, also = std::move(progress)](
+                                   double share, const std::string& what) {
+    if (own) own(share, what);
+    if (also) also(share, what);
+  };
+}
 
 std::vector<SeedMotion> OptimumSearch::starts_from(const std::vector<StrategyOutcome>& known,
                                                    bool thorough) const {
@@ -263,6 +272,18 @@ class ComparedStrategies {
 
  private:
   bool stopped() const { return options_.optimize.interrupted && options_.optimize.interrupted(); }
+  /// Number of parts of about the same work: what is known of paths, each solve of a search, the orders.
+  int parts() const {
+    return 1 + (options_.shortest_time ? 1 : 0) +
+           (options_.equal_time ? 2 + (options_.least_control ? 1 : 0) : 0) +
+           static_cast<int>(options_.factors.size()) + (options_.own_time ? 1 : 0);
+  }
+  /// Progress of the next part.
+  WorkProgress next_part() {
+    const double one = 1.0 / parts();
+    const int before = part_++;
+    return part_of(options_.progress, one * before, std::min(1.0, one * (before + 1)));
+  }
   /// [s] unit of the durations; one second where no motion is known
   double anchor() const { return out_.shortest > 0.0 ? out_.shortest : 1.0; }
   void take_shortest(double duration, const std::string& of);
@@ -279,6 +300,7 @@ class ComparedStrategies {
   OptimumSearch search_;
   StrategyOutcome fastest_;
   StrategyComparison out_;
+  int part_ = 0;  // of parts(), begun
 };
 
 ComparedStrategies::ComparedStrategies(const CraneModel& model, const MotionProblem& problem,
@@ -309,12 +331,18 @@ bool ComparedStrategies::keeps_limits(const SeedMotion& seed) const {
 }
 
 void ComparedStrategies::find_shortest() {
+  const WorkProgress progress = next_part();
   const auto is_shorter = [&](double duration) {
     return duration > 0.0 && !(out_.shortest > 0.0 && out_.shortest <= duration);
   };
   for (const std::string& kind : BaselineSet::kinds()) {
     shortest_.push_back(baselines_.shortest(kind));
     if (is_shorter(shortest_.back())) take_shortest(shortest_.back(), kind);
+    if (progress) {
+      progress(
+          static_cast<double>(shortest_.size()) / static_cast<double>(BaselineSet::kinds().size()),
+          kind);
+    }
   }
   for (const SeedMotion& s : seeds_) {
     if (is_shorter(s.shortest_duration) && keeps_limits(s))
@@ -323,7 +351,9 @@ void ComparedStrategies::find_shortest() {
 }
 
 void ComparedStrategies::find_fastest() {
-  if (!options_.shortest_time || out_.shortest <= 0.0) return;
+  if (!options_.shortest_time) return;
+  search_.tell(next_part());
+  if (out_.shortest <= 0.0) return;
   fastest_ = search_.fastest(motions_near_shortest(model_, problem_, baselines_, out_.shortest));
   if (fastest_.found() && fastest_.duration < out_.shortest)
     take_shortest(fastest_.duration, kMinimumTime);
@@ -337,10 +367,12 @@ StrategyRow ComparedStrategies::row_at(const std::string& name, double factor, d
   std::vector<StrategyOutcome> known = row.outcomes;
   if (fastest_.found()) known.push_back(fastest_);
   if (thorough && options_.least_control && factor == 0.0) {
+    search_.tell(next_part());
     row.outcomes.push_back(search_.gentlest(duration, known));
     known.push_back(row.outcomes.back());
   }
   if (thorough && fastest_.found() && factor == 0.0) row.outcomes.push_back(fastest_);
+  search_.tell(next_part());
   row.outcomes.push_back(search_.at(duration, known, thorough));
   row.outcomes.back().shortest = out_.shortest;
   return row;
@@ -359,6 +391,7 @@ void ComparedStrategies::add_equal_time() {
     if (found) m.why = "kept";
     out_.orders.push_back(std::move(m));
   }
+  if (const WorkProgress progress = next_part()) progress(1.0, "orders of the cylinders");
   const StrategyRow& row = out_.rows.back();
   if (!row.outcomes.back().found()) out_.message = row.outcomes.back().why;
 }
@@ -390,6 +423,7 @@ void ComparedStrategies::add_own_time() {
       first = m.duration;
     }
   }
+  search_.tell(next_part());
   row.outcomes.push_back(
       options_.idle_power > 0.0
           ? search_.at_own_best(first, options_.idle_power)

@@ -71,6 +71,8 @@ struct StrategyOptions {
   /// Keeps each solve of a search, so that a search that was ended can be resumed; null: none is kept. It must outlive the
   /// search, and belong to these options and to this problem and model.
   Journal* journal = nullptr;
+  /// Called as parts of a comparison are done, and within a solve after each of its starts.
+  WorkProgress progress;
 };
 
 /// Search for the energy-optimal motion from every baseline that keeps the limits, the seeds and earlier optima.
@@ -92,6 +94,8 @@ class OptimumSearch {
   /// The motion of this duration with the least integral of the squared valve commands, a common cost (Nurmi and Mattila),
   /// whatever its energy.
   StrategyOutcome gentlest(double duration, const std::vector<StrategyOutcome>& known);
+  /// Sets to whom the next solves tell their progress, beside the optimiser's own of the options.
+  void tell(WorkProgress progress);
 
  private:
   std::vector<SeedMotion> starts_from(const std::vector<StrategyOutcome>& known,
@@ -104,6 +108,7 @@ class OptimumSearch {
   const std::vector<SeedMotion>& seeds_;
   const BaselineSet& baselines_;
   StrategyOptions options_;
+  WorkProgress own_progress_;        // of the options' optimiser
   std::vector<SeedMotion> earlier_;  // optima at other durations, the latest last
   int solves_ = 0;                   // by which the journal's parts are named
 };

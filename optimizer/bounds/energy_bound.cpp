@@ -78,6 +78,13 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
   EnergyBound bound;
   bound.message = no_bound_reason(model, problem, options.most_joints);
   if (!bound.message.empty()) return bound;
+  // Equal parts: each is told when it is done.
+  const auto tell = [&](int done, const char* what) {
+    /// Number of parts that are told.
+    /// @threshold [1] 1..100; derived: the calls of `tell` below
+    constexpr double kParts = 4.0;
+    if (options.progress) options.progress(done / kParts, what);
+  };
   const int n = model.machine.joint_count();
   const auto loaded = effective_machine(model.machine, model.effects);
   const int probe = n <= 3 ? 12 : 8;
@@ -86,11 +93,13 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
                       lattice_forces(*loaded, coarse, problem.payload).range);
   const EnergyPotential rough(*loaded, problem, weights, coarse,
                               lattice_forces(*loaded, coarse, problem.payload));
+  tell(1, "coarse grid");
   const std::vector<int> cells =
       balanced_cells(rough.losses(), coarse, static_cast<double>(options.nodes));
   const Lattice fine = bound_lattice(problem, cells);
   EnergyPotential potential(*loaded, problem, weights, fine,
                             lattice_forces(*loaded, fine, problem.payload));
+  tell(2, "fine grid");
   for (const VectorXd& lines : potential.lattice().lines) {
     bound.lines.push_back(static_cast<int>(lines.size()));
   }
@@ -104,8 +113,10 @@ EnergyBound energy_bound(const CraneModel& model, const MotionProblem& problem,
     bound.checked_scale = 1.0 / ratio;
     potential.scale(bound.checked_scale);
   }
+  tell(3, "random postures");
   const LeastOnGoal least = least_on_goal(problem, *loaded, potential,
                                           {options.goal_accuracy, 2e-3, options.most_goal_cuts});
+  tell(4, "goal set");
   bound.capped = least.capped;
   if (least.capped) {
     bound.message = fmt::format(

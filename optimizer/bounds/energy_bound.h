@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "models/chain/crane_model.h"
+#include "models/math/work_progress.h"
 #include "problems/problem.h"
 
 namespace sparflow {
@@ -31,6 +32,7 @@ struct EnergyBoundOptions {
   /// Boxes of postures cut at most on the goal set (GoalAccuracy::most_cuts).
   /// @threshold [boxes] 1..1e9; chosen: as GoalAccuracy::most_cuts
   long most_goal_cuts = 1000000;
+  WorkProgress progress = {};  ///< called after each part
 };
 
 struct EnergyBound {

@@ -74,18 +74,35 @@ class TimedSearch {
     TimedBound bound;
     bound.value = -1.0;
     // The best shares on the small grid need not be the best on the fine one, so all candidates are evaluated there.
-    for (const Found& found : posture_shares(small, x)) {
+    const std::vector<Found> candidates = posture_shares(small, x);
+    int done = 0;
+    for (const Found& found : candidates) {
       base_ = found.base;
       set(found.x);
       const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
       TimedBound one = bound_on(
           grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
       if (one.value > bound.value) bound = std::move(one);
+      const double share = static_cast<double>(++done) / static_cast<double>(candidates.size());
+      tell(kSearchShare + (1.0 - kSearchShare) * share, "fine grid");
     }
     return bound;
   }
 
  private:
+  /// Share of the time that the search takes, of which only the progress that is told depends.
+  /// @threshold [1] 0.1..0.95; chosen: it evaluates a hundred bounds on a small grid; the fine grid has one or two
+  static constexpr double kSearchShare = 0.8;
+
+  void tell(double share, const char* what) const {
+    if (options_.progress) options_.progress(std::min(1.0, share), what);
+  }
+  /// Tells how much of the search is done; it may end before all evaluations are used.
+  void count_evaluation() {
+    // Constant shares first, then one and a half as many for each of one or two bases.
+    const double most = 2.5 * options_.evaluations;
+    tell(kSearchShare * std::min(1.0, ++evaluated_ / most), "prices of time");
+  }
   std::vector<int> uniform(int cells) const {
     return std::vector<int>(static_cast<std::size_t>(n_), cells);
   }
@@ -184,6 +201,7 @@ class TimedSearch {
   }
 
   double objective(const TimedGrid& g, const VectorXd& x) {
+    count_evaluation();
     set(x);
     const EnergyPotential potential(*loaded_, problem_, *weights_, g.lattice, g.forces);
     /// Relative accuracy of the least potential at the goal while shares are searched.
@@ -396,6 +414,7 @@ class TimedSearch {
   bool path_wanted_ = false;  // whether objective() keeps the shortest path
   std::vector<long> path_;    // nodes of that path, when it was evaluated last
   double ramp_ = 0.0;         // ramps' gain then
+  int evaluated_ = 0;         // bounds of the search
 };
 
 TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem,
@@ -435,9 +454,15 @@ TimedBound bound_with_time(const CraneModel& model, const MotionProblem& problem
 TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem, double duration,
                            const TimedBoundOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
-  TimedBound bound = bound_with_time(model, problem, options, {1.0, duration, 0.0});
+  /// Share of the time that the bound of this duration takes, of which only the progress that is told depends.
+  /// @threshold [1] 0.1..0.99; chosen: the other is one grid of many
+  constexpr double kTimed = 0.9;
+  TimedBoundOptions timed = options;
+  timed.progress = part_of(options.progress, 0.0, kTimed);
+  TimedBound bound = bound_with_time(model, problem, timed, {1.0, duration, 0.0});
   if (!bound.valid) return bound;
   EnergyBoundOptions unlimited;
+  unlimited.progress = part_of(options.progress, kTimed, 1.0);
   unlimited.nodes = options.nodes;
   unlimited.most_joints = options.most_joints;
   const EnergyBound slow = energy_bound(model, problem, unlimited);

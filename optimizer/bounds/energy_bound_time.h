@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "models/chain/crane_model.h"
+#include "models/math/work_progress.h"
 #include "problems/problem.h"
 
 namespace sparflow {
@@ -32,6 +33,7 @@ struct TimedBoundOptions {
   /// A machine with more joints gets no bound.
   /// @threshold [joints] 1..8; chosen: the nodes of a grid grow with the power of the joints
   int most_joints = 4;
+  WorkProgress progress = {};  ///< called after each evaluation
 };
 
 struct TimedBound {

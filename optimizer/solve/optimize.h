@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "models/math/work_progress.h"
 #include "optimizer/crane/exact_energy.h"
 #include "optimizer/nlp/ipopt_solver.h"
 #include "optimizer/phases/motion_modes.h"
@@ -118,8 +119,8 @@ struct OptimizeOptions {
   /// Replaces the crane's knot model at every solve, for comparisons of derivatives; empty = no replacement.
   std::function<std::shared_ptr<KnotModel>(const CraneKnotOptions&, std::shared_ptr<KnotModel>)>
       knot_wrapper;
-  /// Called with (starts done, starts in all, sentence); false interrupts.
-  std::function<bool(int, int, const std::string&)> progress;
+  /// Called after each start. Rounds of the search still to come are unknown; the share leaves room for them.
+  WorkProgress progress;
   /// Called once an iteration; true stops with the best motion so far.
   std::function<bool()> interrupted;
 };
@@ -203,7 +204,8 @@ struct OptimizeResult {
   /// [s] shortest motion found within all limits; it is sought when no start keeps them in the duration asked for. 0 = none.
   double shortest_duration = 0.0;
   bool interrupted = false;  ///< the search or what was asked beside it ended early
-  double solve_s = 0.0;      ///< wall time of everything
+  double solve_s = 0.0;      ///< wall time of everything, the bound included
+  double bound_s = 0.0;      ///< wall time of the bound
   double evaluated_durations = 1;
 };
 

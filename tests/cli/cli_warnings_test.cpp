@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "tests/cli/cli_fixture.h"
+#include "tests/cli/running_program.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {
@@ -174,85 +175,6 @@ TEST_F(CliSays, WhyAnEnergyErrorIsUndefined) {
   EXPECT_THAT(fitted.out, AllOf(Not(HasSubstr("nan")), HasSubstr("energy of main \u2013 %")));
 }
 
-/// The program in the background, in a process group of its own like that of a shell.
-class Running {
- public:
-  Running(const std::vector<std::string>& arguments, const std::string& out, const std::string& err)
-      : pid_(::fork()) {
-    if (pid_ != 0) return;
-    ::setpgid(0, 0);
-    if (std::freopen(out.c_str(), "w", stdout) == nullptr) ::_exit(99);
-    if (std::freopen(err.c_str(), "w", stderr) == nullptr) ::_exit(99);
-    std::vector<char*> argv;
-    std::vector<std::string> words = arguments;
-    words.insert(words.begin(), kProgram);
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    ::execv(kProgram.c_str(), argv.data());
-    ::_exit(99);
-  }
-  Running(const Running&) = delete;
-  Running& operator=(const Running&) = delete;
-  ~Running() {
-    if (pid_ > 0 && !ended_) {
-      ::kill(-pid_, SIGKILL);
-      ::waitpid(pid_, nullptr, 0);
-    }
-  }
-  pid_t pid() const { return pid_; }
-  /// Waits at most this many seconds. @return the exit code, -1 when the program has not ended
-  int wait(double seconds) {
-    for (int k = 0; k < 20.0 * seconds && !ended_; ++k) {
-      int status = 0;
-      if (::waitpid(pid_, &status, WNOHANG) == pid_) {
-        ended_ = true;
-        code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-      } else {
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      }
-    }
-    return ended_ ? code_ : -1;
-  }
-  /// Counts the processes of its group that still run (zombies do not count).
-  int alive() const {
-    int count = 0;
-    for (const auto& entry : fs::directory_iterator("/proc")) {
-      const std::string stat = slurp(entry.path() / "stat");
-      const std::size_t behind_name = stat.rfind(')');
-      if (behind_name == std::string::npos) continue;
-      std::istringstream fields(stat.substr(behind_name + 1));
-      char state = ' ';
-      int parent = 0, group = 0;
-      fields >> state >> parent >> group;
-      count += group == pid_ && state != 'Z' && state != 'X';
-    }
-    return count;
-  }
-
- private:
-  pid_t pid_ = -1;
-  bool ended_ = false;
-  int code_ = -1;
-};
-
-/// Waits until a file contains a match. @return whether it did in time
-bool comes(const std::string& path, const std::regex& pattern, double seconds) {
-  for (int k = 0; k < 10.0 * seconds; ++k) {
-    if (std::regex_search(slurp(path), pattern)) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
-  return false;
-}
-
-/// Waits until a file contains this text. @return whether it did in time
-bool comes(const std::string& path, const std::string& text, double seconds) {
-  for (int k = 0; k < 10.0 * seconds; ++k) {
-    if (slurp(path).find(text) != std::string::npos) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
-  return false;
-}
-
 TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
   // Starts on a very fine mesh between obstacles take minutes.
   Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_beam.yaml", "--model",
@@ -275,15 +197,20 @@ TEST_F(CliSays, HowFarLongWorkIsOffATerminalAndEndsAtOnceWithTheSecondCtrlC) {
   EXPECT_FALSE(fs::exists(at("o.json.tmp")));
 }
 
-TEST_F(CliSays, OneCtrlCKeepsTheBestSoFar) {
-  for (const bool whole_group : {false, true}) {
+TEST_F(CliSays, OneCtrlCOrSigtermKeepsTheBestSoFar) {
+  struct Way {
+    bool whole_group;
+    int signal;
+  };
+  for (const auto& [whole_group, signal] :
+       {Way{false, SIGINT}, Way{true, SIGINT}, Way{false, SIGTERM}}) {
     // Before the first seed is timed there is no result; how long that takes depends on the machine.
     for (int seconds = 3; seconds < 60; seconds *= 2) {
       Running program({"optimize", "-p", kData + "/reaches/loader_crane_over_wall.yaml", "--model",
                        model(), "-o", at("motion.csv"), "--json", at("o.json")},
                       at("out"), at("err"));
       std::this_thread::sleep_for(std::chrono::seconds(seconds));
-      ::kill(whole_group ? -program.pid() : program.pid(), SIGINT);
+      ::kill(whole_group ? -program.pid() : program.pid(), signal);
       ASSERT_EQ(program.wait(120.0), 130) << slurp(at("err"));
       if (!slurp(at("out")).empty()) break;
       EXPECT_FALSE(fs::exists(at("o.json")));

@@ -44,6 +44,32 @@ class CliDiagnose : public Cli {
   }
 };
 
+TEST_F(CliDiagnose, AFolderOfManyLogsIsOneLogOfTheirSize) {
+  // Twelve pieces of the bundled log, as a logger writes them hour by hour; a shell gives them all by one pattern.
+  std::istringstream in(slurp(kTest));
+  std::string header, line, logs;
+  std::getline(in, header);
+  int rows = 0, files = 0;
+  while (std::getline(in, line)) {
+    const std::string name = "piece_" + std::to_string(files) + ".csv";
+    std::string text = header + "\n" + line + "\n";
+    for (int k = 1; k < 500 && std::getline(in, line); ++k) text += line + "\n";
+    rows += static_cast<int>(std::count(text.begin(), text.end(), '\n')) - 1;
+    write(name, text);
+    logs += " " + at(name);
+    ++files;
+  }
+  ASSERT_EQ(files, 12);
+  const std::string model = kData + "/models/loader_crane.json";
+  const Outcome o = run("diagnose --model " + model + " --log" + logs + " --json " + at("d.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(test_support::parsed_json(slurp(at("d.json"))).at("verdict"), "none");
+  const Outcome compared =
+      run("compare --model " + model + " --log" + logs + " --json " + at("c.json"));
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  EXPECT_EQ(test_support::parsed_json(slurp(at("c.json"))).at("samples"), rows);
+}
+
 TEST_F(CliDiagnose, HelpHasExamples) {
   for (const char* verb : {"diagnose", "extend", "improve"}) {
     const Outcome o = run(std::string(verb) + " --help");

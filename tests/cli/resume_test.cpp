@@ -38,7 +38,10 @@ class Resume : public Cli {
   }
   /// Starts the program and kills it as soon as its journal holds one finished part.
   void kill_after_first_part(const std::string& stem) const {
-    const std::string line = "exec " + kProgram + " " + command(stem) + " >/dev/null 2>&1";
+    kill_after_part(command(stem), stem);
+  }
+  void kill_after_part(const std::string& arguments, const std::string& stem) const {
+    const std::string line = "exec " + kProgram + " " + arguments + " >/dev/null 2>&1";
     const pid_t child = ::fork();
     if (child == 0) {
       ::execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
@@ -117,6 +120,41 @@ TEST_F(Resume, ParetoKilledAtRandomEqualsAnUndisturbedRun) {
   for (const char* end : {".json", ".html", ".csv"})
     EXPECT_EQ(slurp(at(std::string("killed") + end)), slurp(at(std::string("whole") + end)));
   EXPECT_EQ(resumed.out, undisturbed.out);
+  EXPECT_FALSE(fs::exists(at("killed.json.journal")));
+}
+
+/// A document without what depends on the clock, wherever it stands.
+json without_times(json document) {
+  if (document.is_object()) document.erase("seconds");
+  if (document.is_structured())
+    for (json& inside : document) inside = without_times(std::move(inside));
+  return document;
+}
+
+TEST_F(Resume, ImproveEqualsAnUndisturbedRunAndRefusesOtherOptions) {
+  // One round adds the friction, a second diagnosis finds nothing more: the kill falls into that.
+  const std::string log = kData + "/logs/loader_crane_friction_";
+  ASSERT_EQ(run("fit -m " + kCrane + " -l " + log + "train.csv -o " + at("off.json")).code, 0);
+  const auto command = [&](const std::string& stem) {
+    return "improve --model " + at("off.json") + " --log " + log + "train.csv --test " + log +
+           "test.csv -o " + at(stem + "_model.json") + " --json " + at(stem + ".json") +
+           " --report " + at(stem + ".html");
+  };
+  const Outcome undisturbed = run(command("whole"));
+  ASSERT_EQ(undisturbed.code, 0) << undisturbed.err;
+  EXPECT_FALSE(fs::exists(at("whole.json.journal")));
+  kill_after_part(command("killed"), "killed");
+  const Outcome other = run(command("killed") + " --resume --max-steps 3");
+  EXPECT_EQ(other.code, 3);
+  EXPECT_THAT(other.err, HasSubstr("other inputs or options"));
+  const Outcome resumed = run(command("killed") + " --resume");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("1 round was finished before"));
+  EXPECT_EQ(slurp(at("killed_model.json")), slurp(at("whole_model.json")));
+  EXPECT_EQ(slurp(at("killed.html")), slurp(at("whole.html")));
+  const json whole = without_times(test_support::parsed_json(slurp(at("whole.json"))));
+  EXPECT_EQ(without_times(test_support::parsed_json(slurp(at("killed.json")))), whole);
+  EXPECT_EQ(whole.at("steps").size(), 1U);
   EXPECT_FALSE(fs::exists(at("killed.json.journal")));
 }
 

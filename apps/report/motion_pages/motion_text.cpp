@@ -213,9 +213,11 @@ std::string starts_text(const OptimizeResult& r) {
     usable += s.motion.size() > 1 && s.excess <= 1e-4;
     distinct += s.motion.size() > 1 && s.excess <= 1e-4 && s.same_as < 0;
   }
+  const std::string bound =
+      r.bound_s > 0.0 ? fmt::format(", of which {:.1f} s for the bound", r.bound_s) : "";
   return fmt::format(
-      "  starts               {} tried, {} kept all limits, {} distinct motions; {:.1f} s\n",
-      r.starts.size(), usable, distinct, r.solve_s);
+      "  starts               {} tried, {} kept all limits, {} distinct motions; {:.1f} s{}\n",
+      r.starts.size(), usable, distinct, r.solve_s, bound);
 }
 
 }  // namespace
@@ -281,6 +283,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
       {"headline", motion_headline(r)},
       {"duration_s", r.duration},
       {"solve_s", r.solve_s}};
+  if (r.bound_s > 0.0) out["bound_s"] = r.bound_s;
   if (r.shortest_duration > 0.0) out["shortest_duration_s"] = r.shortest_duration;
   int iterations = 0;
   for (const StartResult& s : r.starts) iterations += s.iterations;

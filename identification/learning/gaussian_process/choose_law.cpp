@@ -39,6 +39,15 @@ std::vector<int> parts_of(const std::vector<int>& group, int most) {
   return out;
 }
 
+/// Every k-th of these rows, at most so many (LearnGpOptions::most_samples).
+std::vector<Index> thinned_rows(const std::vector<Index>& rows, long most) {
+  const auto step = static_cast<std::size_t>((static_cast<long>(rows.size()) + most - 1) / most);
+  std::vector<Index> few;
+  for (std::size_t i = step / 2; i < rows.size(); i += std::max<std::size_t>(1, step))
+    few.push_back(rows[i]);
+  return few;
+}
+
 /// Sum of the squared errors at `test` of a law whose coefficients are learned from `train`.
 double squared_error(const GpPoints& train, const GpPoints& test, const GpHyper& hyper,
                      const LearnGpOptions& options) {
@@ -66,7 +75,8 @@ bool plane_is_not_worse(const LawChoice& choice, const LearnGpOptions& options, 
     for (std::size_t i = 0; i < part.size(); ++i)
       (part[i] == fold ? test : train).push_back(static_cast<Index>(i));
     if (test.empty() || static_cast<int>(train.size()) < options.min_samples) continue;
-    const GpPoints others = choice.points.select(train), left_out = choice.points.select(test);
+    const GpPoints others = choice.points.select(thinned_rows(train, options.most_samples)),
+                   left_out = choice.points.select(test);
     const double by_plane = squared_error(others, left_out, choice.plane, options);
     const double by_process = squared_error(others, left_out, choice.process, options);
     plane += by_plane;

@@ -54,9 +54,17 @@ Screening screen_outliers(const GpPoints& points, const std::vector<Index>& repr
   const GpPoints few = points.select(representatives);
   const GpPosterior posterior = exact_posterior(few, hyper);
   VectorXd residual = points.basis * posterior.beta - points.y;
-  residual.noalias() +=
-      kernel_matrix(posterior.x1, posterior.x2, points.x1, points.x2, hyper).transpose() *
-      posterior.weight;
+  /// Points whose covariances are in memory at a time.
+  /// @threshold [points] 1000..1e7; chosen: 64 MB where a hundred points represent all; the residuals do not depend on it
+  constexpr Index kAtOnce = 65536;
+  for (Index begin = 0; begin < points.size(); begin += kAtOnce) {
+    const Index count = std::min(kAtOnce, points.size() - begin);
+    residual.segment(begin, count).noalias() +=
+        kernel_matrix(posterior.x1, posterior.x2, points.x1.segment(begin, count),
+                      points.x2.segment(begin, count), hyper)
+            .transpose() *
+        posterior.weight;
+  }
   residual(representatives) = leave_one_out_residuals(few, hyper);
   Screening out;
   out.robust_std = robust_std(residual);

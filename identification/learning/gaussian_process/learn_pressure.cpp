@@ -139,8 +139,12 @@ std::vector<Index> every_kth(Index n, Index at_most) {
 
 /// Alternates between the choice of inducing points and the hyperparameters, which depend on each other, until the
 /// length-scales change little.
-GpPosterior fit_inducing(const Problem& problem, const GpPoints& points,
-                         const LearnGpOptions& options, GpHyper& hyper, GpReport& report) {
+GpPosterior fit_inducing(const Problem& problem, const GpPoints& all, const LearnGpOptions& options,
+                         GpHyper& hyper, GpReport& report) {
+  const bool too_many = all.size() > options.most_samples;
+  const GpPoints few =
+      too_many ? all.select(every_kth(all.size(), options.most_samples)) : GpPoints();
+  const GpPoints& points = too_many ? few : all;
   const auto choose = [&](const GpPoints& from) {
     const double tolerance = options.sparse_tolerance * std::exp(hyper[3] - hyper[2]);
     return choose_inducing(from.x1, from.x2, hyper, options.max_centres, tolerance);

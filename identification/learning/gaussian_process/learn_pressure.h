@@ -40,6 +40,11 @@ struct LearnGpOptions {
   /// @threshold [samples] 100..100000; tuned: on loader_crane/plain, table in
   /// docs/gaussian_process.md
   int hyper_samples = 1000;
+  /// Largest number of samples from which the weights of the inducing points are learned, every k-th of the log; all samples
+  /// are screened for outliers and judge the result.
+  /// @threshold [samples] 1000..1e8; chosen: a thousand for each of some hundred centres, so that what more would average
+  /// out is a thirtieth of the noise; time and memory of a log of millions of rows do not grow further
+  long most_samples = 100000;
   /// Largest change of the logarithm of a length-scale at which centres and hyperparameters, which
   /// depend on each other, are settled.
   /// @threshold [1] 1e-3..0.5; numerical: ends the alternate updates, at a tenth of a length-scale

@@ -207,6 +207,12 @@ TEST_F(LogFiles, ImplausibleLogsAreReadWithAWarning) {
            {"pascals called bar", with("pA_boom_bar", "8{}00000"),
             "pA_boom_bar: values up to 8.7e+06 bar; are they in Pa? Then name the column "
             "pA_boom_Pa"},
+           {"kilopascals called bar", with("pA_boom_bar", "2{}000"),
+            "pA_boom_bar: values up to 2.7e+04 bar; are they in kPa? Then name the column "
+            "pA_boom_kPa"},
+           {"pounds a square inch called bar", with("pA_boom_bar", "1{}00"),
+            "pA_boom_bar: values up to 1700 bar; are they in psi? Then name the column "
+            "pA_boom_psi"},
            {"below vacuum", with("pB_boom_bar", "-5.{}"),
             "pB_boom_bar: values down to -5.7 bar, below vacuum; check the sensor's zero"},
            {"a dead sensor",

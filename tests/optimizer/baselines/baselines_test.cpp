@@ -164,7 +164,18 @@ TEST(Strategies, OptimumIsNeverAboveABaselineInEqualTime) {
   options.smooth_seeds = 1;
   options.optimize.search_intervals = 40;
   options.optimize.sequence_rounds = 1;
+  std::vector<double> shares;
+  int starts = 0;
+  options.progress = [&](double share, const std::string&) { shares.push_back(share); };
+  options.optimize.progress = [&](double, const std::string&) { ++starts; };
   const StrategyComparison r = compare_strategies(c.model, c.problem, {}, options);
+  // The share follows the starts inside the problem.
+  EXPECT_GT(starts, 10);
+  EXPECT_GT(static_cast<int>(shares.size()), starts);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_LT(shares.front(), 0.2);
+  EXPECT_DOUBLE_EQ(shares.back(), 1.0);
+  for (std::size_t i = 1; i < shares.size(); ++i) EXPECT_LT(shares[i] - shares[i - 1], 0.3) << i;
   const StrategyRow* row = r.row("equal");
   ASSERT_NE(row, nullptr) << r.message;
   const StrategyOutcome* best = row->find(kOptimal);

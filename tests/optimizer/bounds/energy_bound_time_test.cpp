@@ -332,8 +332,15 @@ TEST(TimedBound, IsNeverBelowTheBoundOfUnlimitedTime) {
   options.evaluations = 1;
   const EnergyBound any = energy_bound(c.model, c.problem, {options.nodes, options.most_joints});
   ASSERT_TRUE(any.valid) << any.message;
+  std::vector<double> shares;
+  options.progress = [&](double share, const std::string&) { shares.push_back(share); };
   const TimedBound hour = energy_bound_at(c.model, c.problem, 3600.0, options);
   ASSERT_TRUE(hour.valid) << hour.message;
+  // The search, its fine grids and the bound of unlimited time are told in this order.
+  EXPECT_GE(shares.size(), 6U);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_LT(shares.front(), 0.9);
+  EXPECT_DOUBLE_EQ(shares.back(), 1.0);
   EXPECT_EQ(hour.value, any.lower_bound_J);
   EXPECT_EQ(hour.price_W, 0.0);
   EXPECT_EQ(hour.shares.cwiseAbs().maxCoeff(), 0.0);

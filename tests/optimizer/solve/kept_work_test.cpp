@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "optimizer/solve/child_progress.h"
+
 namespace sparflow {
 namespace {
 
@@ -101,6 +103,22 @@ TEST_F(KeptWorkTest, APartThatHangsIsEndedWhenPatienceEnds) {
   EXPECT_FALSE(results[0].ok);
   EXPECT_EQ(results[0].error, "interrupted");
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 20.0);
+}
+
+TEST(ChildProgress, SharesOfChildrenAreSeenHereAndNeverFall) {
+  ChildProgress progress(2);
+  EXPECT_EQ(progress.share(), 0.0);
+  run_in_children(2, 2, [&](int i) {
+    ++progress.step();
+    progress.set(i, i == 0 ? 1.0 : 0.5);
+    return std::string();
+  });
+  EXPECT_DOUBLE_EQ(progress.share(), 0.75);
+  EXPECT_EQ(progress.step().load(), 2);
+  progress.set(1, 0.2);
+  EXPECT_DOUBLE_EQ(progress.share(), 0.75);
+  progress.set(1, 7.0);
+  EXPECT_DOUBLE_EQ(progress.share(), 1.0) << "no part is more than whole";
 }
 
 }  // namespace

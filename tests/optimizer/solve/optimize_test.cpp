@@ -61,7 +61,15 @@ OptimizeOptions quick() {
 TEST(Optimize, UsesLessExactEnergyThanSeedAndStraightLineAndKeepsAllLimits) {
   const Case c = lift_case();
   ASSERT_FALSE(c.seeds.empty());
-  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, quick());
+  OptimizeOptions told = quick();
+  std::vector<double> shares;
+  told.progress = [&](double share, const std::string&) { shares.push_back(share); };
+  const OptimizeResult r = optimize(c.model, c.problem, c.seeds, told);
+  // One call a start, the share of which never falls and is not at its end long before the last one.
+  EXPECT_EQ(shares.size(), r.starts.size());
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_LT(shares[shares.size() / 2], 0.85);
+  EXPECT_LE(shares.back(), 1.0);
   ASSERT_EQ(r.status, OptimizeStatus::kOptimal) << r.message;
   ASSERT_GT(r.straight_line_energy, 0.0);
   EXPECT_LT(r.energy.total, r.straight_line_energy);
@@ -286,7 +294,15 @@ TEST(Optimize, IdlePowerShortensAFreeMotion) {
   options.sequential_starts = 2;
   c.seeds.resize(1);
   c.problem.idle_power = 200.0;
+  // Of the two searches from different durations none sets the share back, and both are seen in it.
+  std::vector<double> shares;
+  options.progress = [&](double share, const std::string&) { shares.push_back(share); };
   const OptimizeResult patient = optimize(c.model, c.problem, c.seeds, options);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  ASSERT_GT(shares.size(), 10U);
+  EXPECT_LT(shares[shares.size() / 2], 0.8);
+  EXPECT_LE(shares.back(), 1.0);
+  options.progress = {};
   c.problem.idle_power = 20e3;
   const OptimizeResult hurried = optimize(c.model, c.problem, c.seeds, options);
   ASSERT_EQ(patient.status, OptimizeStatus::kOptimal) << patient.message;

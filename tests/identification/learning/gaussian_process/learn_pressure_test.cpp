@@ -66,6 +66,22 @@ TEST(LearnPressure, LearnsTheLawAndItsNoise) {
   EXPECT_NEAR(learned.report.rmse, 0.8e5, 0.06e5);
 }
 
+TEST(LearnPressure, ManySamplesAreThinnedForTheWeightsAndAllAreScreenedAndJudged) {
+  Data d = make_data(6000, 0.8e5);
+  d.pressure[4321] += 30e5;  // an outlier that thinning alone would miss
+  LearnGpOptions options;
+  options.most_samples = 1500;
+  const LearnedGp thinned = learn_gp(d.flow, d.force, d.pressure, options);
+  EXPECT_EQ(thinned.report.outliers, 1);
+  EXPECT_EQ(thinned.report.used, 5999);
+  // As accurate as 1500 samples are (LearnsTheLawAndItsNoise).
+  EXPECT_LT(error_of(thinned.parameters), 0.15e5);
+  EXPECT_NEAR(thinned.report.rmse, 0.8e5, 0.03e5);  // four standard errors of 6000 samples
+  options.most_samples = 6000;
+  const LearnedGp all = learn_gp(d.flow, d.force, d.pressure, options);
+  EXPECT_LT(error_of(all.parameters), error_of(thinned.parameters) + 0.02e5);
+}
+
 TEST(LearnPressure, SparseAgreesWithExact) {
   const Data d = make_data(400, 0.8e5);
   LearnGpOptions options;
