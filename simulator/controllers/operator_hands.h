@@ -37,6 +37,22 @@ class Seen {
   std::deque<std::pair<double, Eigen::VectorXd>> past_;
 };
 
+/// A lever that moves nothing is pushed further, bit by bit, until something moves.
+class Push {
+ public:
+  Push(std::size_t cylinders, double sample_time)
+      : more_(cylinders, 0.0),
+        last_(cylinders, 0.0),
+        since_(cylinders, 0.0),
+        sample_time_(sample_time) {}
+  /// @param left way left as it is seen [m] @param lever that is meant @return the lever that is held
+  double lever(std::size_t cylinder, double left, double lever);
+
+ private:
+  std::vector<double> more_, last_, since_;  // [-], [m] and [s] where it was looked at last
+  double sample_time_;
+};
+
 /// Levers that follow wanted ones no faster than a hand.
 class Hands {
  public:

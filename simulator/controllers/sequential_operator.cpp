@@ -19,7 +19,8 @@ class SequentialOperator : public Controller {
   SequentialOperator(const Knowledge& knowledge, std::span<const double> gains)
       : know_(knowledge),
         gains_(OperatorGains::from(gains)),
-        hands_(knowledge.machine->cylinders.size(), knowledge.sample_time) {}
+        hands_(knowledge.machine->cylinders.size(), knowledge.sample_time),
+        push_(knowledge.machine->cylinders.size(), knowledge.sample_time) {}
 
   void begin(const Task& task, const Measurement& now) override {
     goal_ = goal_posture(*know_.machine, task, now.q);
@@ -43,7 +44,8 @@ class SequentialOperator : public Controller {
       const int j = machine.cylinders[k].joint;
       const double left = cylinder_length(machine, c, goal_[j]) - cylinder_length(machine, c, q[j]);
       const double cruise = share_ * know_.valves->full_speed(c, left > 0.0);
-      wanted[k] = know_.valves->lever(c, careful_speed(left, cruise, gains_.approach));
+      wanted[k] = push_.lever(k, left,
+                              know_.valves->lever(c, careful_speed(left, cruise, gains_.approach)));
       if (wanted[k] != 0.0) break;
       at_ = (at_ + 1) % order_.size();
     }
@@ -70,6 +72,7 @@ class SequentialOperator : public Controller {
   Knowledge know_;
   OperatorGains gains_;
   Hands hands_;
+  Push push_;
   Seen seen_;
   Eigen::VectorXd goal_;
   std::vector<int> order_;

@@ -14,7 +14,8 @@ class SimultaneousOperator : public Controller {
   SimultaneousOperator(const Knowledge& knowledge, std::span<const double> gains)
       : know_(knowledge),
         gains_(OperatorGains::from(gains)),
-        hands_(knowledge.machine->cylinders.size(), knowledge.sample_time) {}
+        hands_(knowledge.machine->cylinders.size(), knowledge.sample_time),
+        push_(knowledge.machine->cylinders.size(), knowledge.sample_time) {}
 
   void begin(const Task& task, const Measurement& now) override {
     const Machine& machine = *know_.machine;
@@ -42,8 +43,8 @@ class SimultaneousOperator : public Controller {
       const double left = cylinder_length(machine, c, goal_[j]) - cylinder_length(machine, c, q[j]);
       // a rod that has fallen short is brought in no slower than the hand can be held steady
       const double least = kSteady * know_.valves->full_speed(c, left > 0.0);
-      wanted[k] =
-          know_.valves->lever(c, careful_speed(left, std::max(cruise_[k], least), gains_.approach));
+      const double speed = careful_speed(left, std::max(cruise_[k], least), gains_.approach);
+      wanted[k] = push_.lever(k, left, know_.valves->lever(c, speed));
     }
     return hands_.move(wanted);
   }
@@ -55,6 +56,7 @@ class SimultaneousOperator : public Controller {
   Knowledge know_;
   OperatorGains gains_;
   Hands hands_;
+  Push push_;
   Seen seen_;
   Eigen::VectorXd goal_;
   std::vector<double> cruise_;  // [m/s] by cylinder

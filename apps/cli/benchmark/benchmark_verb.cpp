@@ -1,7 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -25,11 +26,11 @@ namespace sparflow::cli {
 namespace {
 
 struct BenchmarkArguments {
-  std::vector<std::string> scenarios, controllers, processes;
+  std::vector<std::string> scenarios, controllers, processes, gains;
   std::string model, csv, reference;
   int seeds = 0, jobs = 0;
   double step_budget = 0.5;
-  bool no_bound = false;
+  bool no_bound = false, no_optimum = false;
   Outputs outputs;
 };
 
@@ -37,7 +38,8 @@ struct BenchmarkArguments {
 struct Entrant {
   std::string name, words;
   const control::ControllerInfo* info = nullptr;
-  std::string command;
+  std::vector<double> gains;  ///< of a controller of the registry
+  std::string command;        ///< of one that is a process
 };
 
 /// One run.
@@ -121,6 +123,36 @@ void load_models(const BenchmarkArguments& a, Work& work) {
                     without.size(), work.scenarios.size()));
 }
 
+/// Sets one gain, as CONTROLLER.GAIN=VALUE says. @throws UsageError
+void set_gain(const std::string& text, std::vector<Entrant>& all) {
+  const std::size_t dot = text.find('.'), equals = text.find('=');
+  char* end = nullptr;
+  const double value =
+      equals == std::string::npos ? std::nan("") : std::strtod(text.c_str() + equals + 1, &end);
+  if (dot == std::string::npos || equals == std::string::npos || dot > equals || *end != '\0' ||
+      !std::isfinite(value))
+    throw UsageError(
+        fmt::format("benchmark: --gain got \"{}\"; expected CONTROLLER.GAIN=VALUE", text));
+  const std::string controller = text.substr(0, dot), name = text.substr(dot + 1, equals - dot - 1);
+  for (Entrant& e : all) {
+    if (e.name != controller || e.info == nullptr) continue;
+    std::vector<std::string> known;
+    for (std::size_t k = 0; k < e.info->gains.size(); ++k) {
+      const control::Gain& g = e.info->gains[k];
+      known.emplace_back(g.name);
+      if (g.name != name) continue;
+      if (value < g.lowest || value > g.highest)
+        throw UsageError(fmt::format("benchmark: --gain {}: expected {} to {} [{}]", text, g.lowest,
+                                     g.highest, g.unit));
+      e.gains[k] = value;
+      return;
+    }
+    throw UsageError(fmt::format("benchmark: {} has no gain \"{}\"; it has {}", controller, name,
+                                 fmt::join(known, ", ")));
+  }
+  throw UsageError(fmt::format("benchmark: --gain {}: no such controller runs", text));
+}
+
 std::vector<Entrant> entrants_of(const BenchmarkArguments& a) {
   std::vector<Entrant> all;
   std::vector<std::string> names = a.controllers;
@@ -134,15 +166,20 @@ std::vector<Entrant> entrants_of(const BenchmarkArguments& a) {
                                    near.empty() ? "" : ", did you mean " + near + "?",
                                    fmt::join(known, ", ")));
     }
-    all.push_back({name, std::string(info->words), info, ""});
+    all.push_back({name, std::string(info->words), info, {}, ""});
+    for (const control::Gain& g : info->gains) all.back().gains.push_back(g.value);
   }
   for (const std::string& p : a.processes) {
     const std::size_t equals = p.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == p.size())
       throw UsageError(fmt::format("benchmark: --process got \"{}\"; expected NAME=COMMAND", p));
-    all.push_back(
-        {p.substr(0, equals), "process: " + p.substr(equals + 1), nullptr, p.substr(equals + 1)});
+    all.push_back({p.substr(0, equals),
+                   "process: " + p.substr(equals + 1),
+                   nullptr,
+                   {},
+                   p.substr(equals + 1)});
   }
+  for (const std::string& gain : a.gains) set_gain(gain, all);
   std::set<std::string> seen;
   for (const Entrant& e : all)
     if (!seen.insert(e.name).second)
@@ -178,9 +215,10 @@ Work load_work(const BenchmarkArguments& a) {
 
 /// All that results depend on; the number of jobs is not part of it.
 std::string fingerprint(const Work& work, const BenchmarkArguments& a) {
-  std::string options =
-      fmt::format("benchmark bound {} seeds {} budget {}", !a.no_bound, a.seeds, a.step_budget);
-  for (const Entrant& e : work.entrants) options += fmt::format("; {} = {}", e.name, e.words);
+  std::string options = fmt::format("benchmark bound {} optimum {} seeds {} budget {}", !a.no_bound,
+                                    !a.no_optimum, a.seeds, a.step_budget);
+  for (const Entrant& e : work.entrants)
+    options += fmt::format("; {} = {} [{}]", e.name, e.words, fmt::join(e.gains, ", "));
   return run_fingerprint(work.files, options);
 }
 
@@ -195,9 +233,9 @@ std::vector<OptimalMotions> all_motions(const Work& work, const BenchmarkArgumen
   parts.work = [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     OptimalMotions none;
-    if (work.model_of[k] == nullptr) {
+    if (work.model_of[k] == nullptr || a.no_optimum) {
       none.legs.resize(1);
-      none.legs[0].message = "there is no model";
+      none.legs[0].message = a.no_optimum ? "it was left out" : "there is no model";
       return packed(none);
     }
     return packed(optimal_motions(work.scenarios[k], *work.model_of[k], options));
@@ -249,7 +287,7 @@ benchmark::Row one_run(const Work& work, const Run& run, const OptimalMotions& m
   return benchmark::run_closed_loop(
       s, e.name,
       [&]() -> std::unique_ptr<control::Controller> {
-        return e.info != nullptr ? control::make_controller(*e.info, know)
+        return e.info != nullptr ? e.info->make(know, e.gains)
                                  : control::foreign_controller(know, e.command, foreign);
       },
       run.seed, loop);
@@ -372,8 +410,12 @@ int run(const BenchmarkArguments& a) {
 
 std::string controllers_help() {
   std::string text = "Controllers:\n";
-  for (const control::ControllerInfo& info : control::controllers())
+  for (const control::ControllerInfo& info : control::controllers()) {
     text += fmt::format("  {:<22} {}\n", info.name, info.words);
+    for (const control::Gain& g : info.gains)
+      text += fmt::format("  {:<22}   {} = {:g}{}{}\n", "", g.name, g.value,
+                          g.unit == "-" ? "" : " ", g.unit == "-" ? "" : g.unit);
+  }
   return text;
 }
 
@@ -407,6 +449,10 @@ void add_benchmark_verb(CLI::App& app, int& code) {
       ->type_name("S")
       ->check(number_from(1e-3, 600.0))
       ->capture_default_str();
+  verb->add_option("--gain", a->gains, "another value for a gain of a controller; repeatable")
+      ->type_name("CONTROLLER.GAIN=VALUE");
+  verb->add_flag("--no-optimum", a->no_optimum,
+                 "leave the energy-optimal motions out; controllers that follow one fail");
   verb->add_flag("--no-bound", a->no_bound, "leave the lower bounds of the energy out");
   verb->add_option("--jobs,--processes", a->jobs,
                    "runs at the same time; absent: as many as there are processors")

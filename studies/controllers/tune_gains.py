@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""Tunes the gains of controllers on the tuning scenarios, all by the same procedure:
+
+    python3 studies/controllers/tune_gains.py build/sparflow problems/scenarios/tuning [ROUNDS]
+
+A coordinate search: each gain in turn is multiplied and divided by a factor (2, then 1.4, ... one a round), and the value with
+the least cost is kept. The cost is the mean over scenarios of energy and time over those of the first gains, tip errors over
+0.1 m, the levers' rate over 1/s, and 3 for a run that failed. Controllers that share a law share their gains: joint PI stands
+for the tracked optima, the plain tip control for the energy-weighted one, and both operators are tuned together."""
+import json
+import math
+import subprocess
+import sys
+
+PROGRAM, SCENARIOS = sys.argv[1], sys.argv[2]
+ROUNDS = int(sys.argv[3]) if len(sys.argv) > 3 else 2
+FACTORS = [2.0, 1.4, 1.2, 1.1]
+GROUPS = {
+    ("joint_pi",): {"proportional": 2.0, "integral": 0.5, "lead": 0.1},
+    ("tip_rate",): {"proportional": 1.5, "integral": 0.3, "lead": 0.1},
+    ("sequential_operator", "simultaneous_operator"): {"approach": 1.0, "hurry": 0.85},
+}
+BOUNDS = {"proportional": (0.1, 10.0), "integral": (0.01, 5.0), "lead": (0.01, 0.5), "approach": (0.2, 5.0), "hurry": (0.5, 1.0)}
+
+
+def rows(controllers, gains):
+    command = [PROGRAM, "benchmark", SCENARIOS, "--no-optimum", "--controllers", ",".join(controllers), "--json", "-"]
+    for controller in controllers:
+        for name, value in gains.items():
+            command += ["--gain", f"{controller}.{name}={value:.6g}"]
+    out = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False).stdout
+    return {(r["controller"], r["scenario"], r["seed"]): r for r in json.loads(out)["rows"]}
+
+
+def cost(found, first):
+    total = 0.0
+    for key, row in found.items():
+        start = first[key]
+        if row["status"] != "done":
+            total += 3.0
+            continue
+        total += row["energy_J"] / start["energy_J"] if start["energy_J"] else 1.0
+        total += row["time_s"] / (start["time_s"] or row["time_s"])
+        total += ((row["tip_error_path_m"] or 0.0) + row["tip_error_end_m"]) / 0.1 + row["roughness_1_s"]
+    return total / len(found)
+
+
+for controllers, gains in GROUPS.items():
+    first = rows(controllers, gains)
+    best = cost(first, first)
+    print(f"{'+'.join(controllers)}: cost {best:.4f} at {gains}", flush=True)
+    for factor in FACTORS[:ROUNDS]:
+        for name in gains:
+            for change in (factor, 1.0 / factor):
+                low, high = BOUNDS[name]
+                tried = dict(gains, **{name: min(high, max(low, gains[name] * change))})
+                if math.isclose(tried[name], gains[name]):
+                    continue
+                value = cost(rows(controllers, tried), first)
+                if value < best - 1e-4:
+                    best, gains = value, tried
+        print(f"  factor {factor}: cost {best:.4f} at " + ", ".join(f"{k} {v:.3g}" for k, v in gains.items()), flush=True)
