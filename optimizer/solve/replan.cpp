@@ -53,10 +53,9 @@ bool keeps_limits(const CraneModel& model, const MotionProblem& problem, const T
 }  // namespace
 
 std::optional<Trajectory> replan(const CraneModel& model, const MotionProblem& problem,
-                                 const Trajectory& current, double t, const MovingState& now,
-                                 const ReplanOptions& options) {
+                                 const Underway& now, const ReplanOptions& options) {
   MotionProblem left = problem;
-  const Trajectory rest = rest_of(current, t, options.intervals);
+  const Trajectory rest = rest_of(*now.motion, now.t, options.intervals);
   left.start = now.q;
   left.duration = {rest.duration(), rest.duration()};
   CraneKnotOptions knot;

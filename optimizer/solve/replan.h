@@ -27,15 +27,15 @@ struct ReplanOptions {
   double seconds = 3.0;
 };
 
-/// Where the machine is.
-struct MovingState {
-  Eigen::VectorXd q, qd;  ///< [rad] or [m], and their rates
+/// A machine that follows a motion.
+struct Underway {
+  const Trajectory* motion = nullptr;  ///< that is followed, whose goal is kept; not owned
+  double t = 0.0;                      ///< [s] since it began
+  Eigen::VectorXd q, qd;               ///< where the machine is, and its rates [rad] or [m]
 };
 
-/// @param current the motion that is followed, whose goal is kept @param t [s] since it began
 /// @return nothing when the solve does not converge or its motion breaks a limit
 std::optional<Trajectory> replan(const CraneModel& model, const MotionProblem& problem,
-                                 const Trajectory& current, double t, const MovingState& now,
-                                 const ReplanOptions& options = {});
+                                 const Underway& now, const ReplanOptions& options = {});
 
 }  // namespace sparflow

@@ -4,8 +4,8 @@
     python3 studies/controllers/tune_gains.py build/sparflow problems/scenarios/tuning [ROUNDS]
 
 A coordinate search: each gain in turn is multiplied and divided by a factor (2, then 1.4, ... one a round), and the value with
-the least cost is kept. The cost is the mean over scenarios of energy and time over those of the first gains, tip errors over
-0.1 m, the levers' rate over 1/s, and 3 for a run that failed. Controllers that share a law share their gains: joint PI stands
+the least cost is kept. The cost is the mean over scenarios of the energy over that of the first gains, the relative distance of
+the time from the scenario's, tip errors over 0.1 m, the levers' rate over 1/s, and 3 for a run that failed. Controllers that share a law share their gains: joint PI stands
 for the tracked optima, the plain tip control for the energy-weighted one, and both operators are tuned together."""
 import json
 import math
@@ -13,7 +13,7 @@ import subprocess
 import sys
 
 PROGRAM, SCENARIOS = sys.argv[1], sys.argv[2]
-ROUNDS = int(sys.argv[3]) if len(sys.argv) > 3 else 2
+ROUNDS = int(sys.argv[3]) if len(sys.argv) > 3 else 3
 FACTORS = [2.0, 1.4, 1.2, 1.1]
 GROUPS = {
     ("joint_pi",): {"proportional": 2.0, "integral": 0.5, "lead": 0.1},
@@ -29,7 +29,11 @@ def rows(controllers, gains):
         for name, value in gains.items():
             command += ["--gain", f"{controller}.{name}={value:.6g}"]
     out = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False).stdout
-    return {(r["controller"], r["scenario"], r["seed"]): r for r in json.loads(out)["rows"]}
+    result = json.loads(out)
+    durations = {s["id"]: s["duration_s"] for s in result["scenarios"]}
+    for row in result["rows"]:
+        row["duration_s"] = durations[row["scenario"]]
+    return {(r["controller"], r["scenario"], r["seed"]): r for r in result["rows"]}
 
 
 def cost(found, first):
@@ -40,7 +44,7 @@ def cost(found, first):
             total += 3.0
             continue
         total += row["energy_J"] / start["energy_J"] if start["energy_J"] else 1.0
-        total += row["time_s"] / (start["time_s"] or row["time_s"])
+        total += abs(row["time_s"] / row["duration_s"] - 1.0)
         total += ((row["tip_error_path_m"] or 0.0) + row["tip_error_end_m"]) / 0.1 + row["roughness_1_s"]
     return total / len(found)
 

@@ -184,6 +184,9 @@ std::string benchmark_json(const BenchmarkResult& r) {
   for (const benchmark::Scenario& s : r.scenarios) {
     ordered_json one = {
         {"id", s.id}, {"file", s.file}, {"set", s.set}, {"machine", s.machine.name}};
+    double duration = 0.0;
+    for (const benchmark::ScenarioGoal& g : s.goals) duration += g.duration;
+    one["duration_s"] = duration;
     const auto promise = r.promises.find(s.id);
     const bool known = promise != r.promises.end();
     one["predicted_optimum_J"] = known ? number(promise->second.energy) : ordered_json(nullptr);

@@ -293,12 +293,16 @@ benchmark::Row one_run(const Work& work, const Run& run, const OptimalMotions& m
       run.seed, loop);
 }
 
+/// Optimal motions by scenario, and how they were computed.
+struct Planned {
+  OptimalMotionOptions options;
+  std::vector<OptimalMotions> motions;
+};
+
 /// Runs everything that the journal lacks.
 /// @param broken gets the number of processes that ended without a result
 std::vector<benchmark::Row> all_rows(const Work& work, const BenchmarkArguments& a,
-                                     const std::vector<OptimalMotions>& motions,
-                                     const OptimalMotionOptions& options, Journal& journal,
-                                     int& broken) {
+                                     const Planned& planned, Journal& journal, int& broken) {
   const auto run = [&](int i) -> const Run& { return work.runs[static_cast<std::size_t>(i)]; };
   KeptWork parts;
   parts.count = static_cast<int>(work.runs.size());
@@ -309,7 +313,7 @@ std::vector<benchmark::Row> all_rows(const Work& work, const BenchmarkArguments&
   };
   parts.work = [&](int i) {
     return benchmark::packed(
-        one_run(work, run(i), motions[run(i).scenario], options, a.step_budget));
+        one_run(work, run(i), planned.motions[run(i).scenario], planned.options, a.step_budget));
   };
   parts.complete = [](const std::string& bytes) {
     return benchmark::row_from(bytes).reason != "interrupted";
@@ -370,12 +374,13 @@ int run(const BenchmarkArguments& a) {
   const std::unique_ptr<Journal> journal =
       a.outputs.open_journal("benchmark", fingerprint(work, a));
   finish_on_interrupt();
-  OptimalMotionOptions options;
-  options.bound = !a.no_bound;
-  options.interrupted = interrupted;
-  const std::vector<OptimalMotions> motions = all_motions(work, a, options, *journal);
+  Planned planned;
+  planned.options.bound = !a.no_bound;
+  planned.options.interrupted = interrupted;
+  planned.motions = all_motions(work, a, planned.options, *journal);
+  const std::vector<OptimalMotions>& motions = planned.motions;
   int broken = 0;
-  result.rows = all_rows(work, a, motions, options, *journal, broken);
+  result.rows = all_rows(work, a, planned, *journal, broken);
   for (std::size_t s = 0; s < work.scenarios.size(); ++s) {
     const std::string& id = work.scenarios[s].id;
     if (motions[s].found()) {

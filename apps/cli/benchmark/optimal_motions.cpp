@@ -170,7 +170,7 @@ std::optional<Trajectory> ScenarioMotions::motion_from(const control::Task& task
                                                        const control::Measurement& now,
                                                        const Trajectory& current, double t) {
   const MotionProblem problem = problem_of(scenario_, model_, task.leg, now.q, options_.flow_share);
-  return replan(model_, problem, current, t, {now.q, now.qd});
+  return replan(model_, problem, {&current, t, now.q, now.qd});
 }
 
 }  // namespace sparflow::cli

@@ -49,7 +49,15 @@ Table quality(const BenchmarkView& view) {
       {"what it does"}};
   for (const BenchmarkedController& c : view.controllers)
     table.rows.push_back({c.name, c.time_s, c.tip_path_mm, c.tip_end_mm, c.sway_deg, c.roughness,
-                          c.limits, c.step_median_ms, c.step_worst_ms, c.words});
+                          c.limits, c.step_median_ms, c.step_worst_ms});
+  return table;
+}
+
+Table what_they_do(const BenchmarkView& view) {
+  Table table;
+  table.title = "What each does";
+  table.columns = {{"controller"}, {"what it does"}};
+  for (const BenchmarkedController& c : view.controllers) table.rows.push_back({c.name, c.words});
   return table;
 }
 
@@ -175,6 +183,7 @@ Page benchmark_page(const BenchmarkView& view) {
   page.section("Comparison");
   page.table(compared(view));
   page.table(quality(view));
+  page.table(what_they_do(view));
   BarChart chart = bars(view);
   if (!chart.categories.empty()) page.plot(std::move(chart));
   add_scatters(page, view);
