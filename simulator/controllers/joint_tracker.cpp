@@ -67,7 +67,10 @@ JointTracker::JointTracker(const Knowledge& knowledge, const TrackerGains& gains
   reset();
 }
 
-void JointTracker::reset() { integral_.assign(know_.machine->cylinders.size(), 0.0); }
+void JointTracker::reset() {
+  integral_.assign(know_.machine->cylinders.size(), 0.0);
+  way_.assign(know_.machine->cylinders.size(), 0);
+}
 
 std::vector<double> JointTracker::step(const Trajectory& motion, double t, const Measurement& now) {
   const Machine& machine = *know_.machine;
@@ -79,6 +82,10 @@ std::vector<double> JointTracker::step(const Trajectory& motion, double t, const
     const double error =
         cylinder_length(machine, c, wanted.q[j]) - cylinder_length(machine, c, now.q[j]);
     const double speed = linkage_rates(machine, c, ahead.q[j]).d1 * ahead.qd[j];
+    // What the integral has learned holds for one way of one valve edge; carried on it would drive the rod past its stop.
+    const int way = speed > 0.0 ? 1 : speed < 0.0 ? -1 : 0;
+    if (way != way_[k]) integral_[k] = 0.0;
+    way_[k] = way;
     const bool resting = wanted.qd[j] == 0.0 && ahead.qd[j] == 0.0;
     if (resting && std::abs(error) < kRest) continue;
     const double asked = speed + gains_.proportional * error + integral_[k];

@@ -10,14 +10,14 @@ namespace sparflow::control {
 
 struct TrackerGains {
   /// Speed by which an error of the rod's position is corrected.
-  /// @threshold [1/s] 0.1..10; chosen: not tuned yet
-  double proportional = 2.0;
+  /// @threshold [1/s] 0.1..10; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double proportional = 1.0;
   /// Growth of that speed while the error stays.
-  /// @threshold [1/s2] 0..5; chosen: not tuned yet
-  double integral = 0.5;
+  /// @threshold [1/s2] 0..5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double integral = 1.4;
   /// Time by which the speed ahead is taken earlier, as valves follow late.
-  /// @threshold [s] 0..0.5; chosen: not tuned yet
-  double lead = 0.1;
+  /// @threshold [s] 0..0.5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double lead = 0.2;
   static std::vector<Gain> table();
   static TrackerGains from(std::span<const double> gains);
 };
@@ -43,6 +43,7 @@ class JointTracker {
   Knowledge know_;
   TrackerGains gains_;
   std::vector<double> integral_;  // [m/s] by cylinder
+  std::vector<int> way_;          // by cylinder: sign of the speed ahead
 };
 
 }  // namespace sparflow::control

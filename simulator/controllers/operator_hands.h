@@ -10,11 +10,11 @@ namespace sparflow::control {
 
 struct OperatorGains {
   /// Speed by which the rest of a rod's way is closed near the goal.
-  /// @threshold [1/s] 0.2..5; chosen: not tuned yet
+  /// @threshold [1/s] 0.2..5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
   double approach = 1.0;
   /// Share of the time given that the operator means to use; the rest is for care at the end.
-  /// @threshold [-] 0.5..1; chosen: not tuned yet
-  double hurry = 0.85;
+  /// @threshold [-] 0.5..1; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double hurry = 1.0;
   static std::vector<Gain> table();
   static OperatorGains from(std::span<const double> gains) { return {gains[0], gains[1]}; }
 };

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/cli/benchmark/learned_machine.h"
 #include "apps/cli/motion_inputs.h"
+#include "models/machine/linkage.h"
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/solve/child_processes.h"
@@ -31,6 +33,21 @@ double bound_of(const CraneModel& model, const MotionProblem& problem) {
   if (!any.valid) return 0.0;
   const TimedBound timed = energy_bound_at(model, problem, problem.duration.max);
   return std::max(any.lower_bound_J, timed.valid ? timed.value : 0.0);
+}
+
+/// Accelerations with which a valve takes its rod to full speed in no less than a time [s], with the lever arms at `q`.
+void limit_accelerations(const CraneModel& model, const Eigen::VectorXd& q, double ramp,
+                         MotionLimits& limits) {
+  const std::vector<control::ValveSection> sections = learned_sections(model);
+  for (int c = 0; c < model.machine.cylinder_count(); ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    const int j = model.machine.cylinders[k].joint;
+    const double arm = std::abs(linkage_rates(model.machine, c, q[j]).d1);
+    if (arm <= 0.0 || ramp <= 0.0) continue;
+    const double most = std::min(sections[k].full_extend, sections[k].full_retract) / arm / ramp;
+    Range& a = limits.acceleration[static_cast<std::size_t>(j)];
+    a = {std::max(a.lo, -most), std::min(a.hi, most)};
+  }
 }
 
 OptimalLeg solve_leg(const MotionProblem& problem, const CraneModel& model,
@@ -59,15 +76,16 @@ OptimalLeg solve_leg(const MotionProblem& problem, const CraneModel& model,
 }  // namespace
 
 MotionProblem problem_of(const benchmark::Scenario& s, const CraneModel& model, int leg,
-                         const Eigen::VectorXd& from, double flow_share) {
+                         const Eigen::VectorXd& from, const OptimalMotionOptions& o) {
   const benchmark::ScenarioGoal& goal = s.goals[static_cast<std::size_t>(leg)];
   MotionProblem p;
   p.name = fmt::format("{}, goal {}", s.id, leg + 1);
   p.file = s.file;
   p.machine = model.machine;
   p.limits = limits_of(model.machine);
-  p.limits.valve_fraction = flow_share;
-  for (double& flow : p.limits.pump_max_flow) flow *= flow_share;
+  p.limits.valve_fraction = o.flow_share;
+  for (double& flow : p.limits.pump_max_flow) flow *= o.flow_share;
+  limit_accelerations(model, from, o.ramp, p.limits);
   p.payload = payload_before(s, leg);
   p.start = from;
   if (goal.q) {
@@ -88,7 +106,7 @@ OptimalMotions optimal_motions(const benchmark::Scenario& s, const CraneModel& m
     if (g > 0 && all.legs.back().motion.size() < 2) {
       leg.message = "there is no motion to the goal before";
     } else {
-      leg = solve_leg(problem_of(s, model, g, from, o.flow_share), model, o);
+      leg = solve_leg(problem_of(s, model, g, from, o), model, o);
       if (leg.motion.size() > 1) from = leg.motion.q.row(leg.motion.size() - 1);
     }
     all.legs.push_back(std::move(leg));
@@ -169,7 +187,7 @@ Trajectory ScenarioMotions::motion(const control::Task& task) {
 std::optional<Trajectory> ScenarioMotions::motion_from(const control::Task& task,
                                                        const control::Measurement& now,
                                                        const Trajectory& current, double t) {
-  const MotionProblem problem = problem_of(scenario_, model_, task.leg, now.q, options_.flow_share);
+  const MotionProblem problem = problem_of(scenario_, model_, task.leg, now.q, options_);
   return replan(model_, problem, {&current, t, now.q, now.qd});
 }
 

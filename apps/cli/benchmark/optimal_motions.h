@@ -14,6 +14,9 @@ struct OptimalMotionOptions {
   /// Share of valves' and pumps' flows that the motion may use; the rest is the controller's.
   /// @threshold [1] 0.5..1; chosen: feedback must be able to catch up
   double flow_share = 0.9;
+  /// Time from rest to full speed that valves are given: it limits the joints' accelerations.
+  /// @threshold [s] 0..5; chosen: somewhat above an operator's lever time; spools and pilot lines follow within 0.4 s
+  double ramp = 0.8;
   /// Mesh intervals.
   /// @threshold [1] 20..500; chosen: two thirds of optimize's, as scenarios are many
   int intervals = 60;
@@ -47,7 +50,7 @@ OptimalMotions motions_from(const std::string& bytes);
 
 /// One goal as a motion problem. @param from where the machine then stands @param leg number of the goal
 MotionProblem problem_of(const benchmark::Scenario& scenario, const CraneModel& model, int leg,
-                         const Eigen::VectorXd& from, double flow_share);
+                         const Eigen::VectorXd& from, const OptimalMotionOptions& options);
 
 /// Gives controllers these motions, and new plans on the way.
 class ScenarioMotions : public control::MotionSource {

@@ -45,8 +45,7 @@ Table quality(const BenchmarkView& view) {
   table.columns = {
       {"controller"},          {"time", "s", 3},          {"tip error on the way", "mm", 3},
       {"at the end", "mm", 3}, {"sway", "deg", 3},        {"rate of the levers", "1/s", 3},
-      {"limits", "", 4},       {"step, median", "ms", 2}, {"step, worst", "ms", 2},
-      {"what it does"}};
+      {"limits", "", 4},       {"step, median", "ms", 2}, {"step, worst", "ms", 2}};
   for (const BenchmarkedController& c : view.controllers)
     table.rows.push_back({c.name, c.time_s, c.tip_path_mm, c.tip_end_mm, c.sway_deg, c.roughness,
                           c.limits, c.step_median_ms, c.step_worst_ms});
