@@ -10,14 +10,14 @@ namespace sparflow::control {
 
 struct TipGains {
   /// Speed by which an error of the tip is corrected.
-  /// @threshold [1/s] 0.1..10; chosen: not tuned yet
-  double proportional = 1.5;
+  /// @threshold [1/s] 0.1..10; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double proportional = 0.54;
   /// Growth of that speed while the error stays.
-  /// @threshold [1/s2] 0..5; chosen: not tuned yet
-  double integral = 0.3;
+  /// @threshold [1/s2] 0..5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double integral = 1.2;
   /// Time by which the speed ahead is taken earlier, as valves follow late.
-  /// @threshold [s] 0..0.5; chosen: not tuned yet
-  double lead = 0.1;
+  /// @threshold [s] 0..0.5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double lead = 0.14;
   static std::vector<Gain> table();
   static TipGains from(std::span<const double> gains) { return {gains[0], gains[1], gains[2]}; }
 };
