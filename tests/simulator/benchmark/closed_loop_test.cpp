@@ -6,8 +6,10 @@
 
 #include <cmath>
 
+#include "models/machine/kinematics.h"
 #include "problems/bundled.h"
 #include "simulator/benchmark/scenario_file.h"
+#include "simulator/controllers/goal_posture.h"
 #include "simulator/controllers/registry.h"
 #include "simulator/controllers/section_valves.h"
 #include "simulator/plant/parameters/plant_effects.h"
@@ -109,6 +111,23 @@ TEST(ClosedLoop, ASequentialOperatorMovesOneLeverAtATime) {
   // levers overlap while one falls and the next rises, half a second each
   EXPECT_LE(together(one), 8);
   EXPECT_GT(together(all), 15);
+}
+
+TEST(GoalPosture, IsFoundBehindTheColumnToo) {
+  const Scenario s =
+      load_scenario(bundled_file("scenarios/test/test_swing_crane_02.yaml"), bundled_file);
+  control::Task task;
+  task.tip = s.goals.front().tip;
+  task.tolerance = s.tolerance;
+  const Eigen::VectorXd q = control::goal_posture(s.machine, task, s.start);
+  EXPECT_LT((tip_position<double>(s.machine, q) - task.tip).norm(), s.tolerance);
+  for (int k = 0; k < s.machine.joint_count(); ++k) {
+    const Range r = s.machine.joints[static_cast<std::size_t>(k)].position;
+    EXPECT_GE(q[k], r.lo);
+    EXPECT_LE(q[k], r.hi);
+  }
+  task.tip = {100.0, 0.0, 0.0};
+  EXPECT_THROW(control::goal_posture(s.machine, task, s.start), control::ControllerFailure);
 }
 
 TEST(ClosedLoop, FailuresAreRowsWithASentence) {
