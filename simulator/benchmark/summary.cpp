@@ -102,6 +102,7 @@ void add_medians(const std::vector<Row>& rows, ControllerSummary& s) {
   }
   const auto median = [&](double Row::*value) {
     std::vector<double> v;
+    v.reserve(done.size());
     for (const Row* r : done) v.push_back(r->*value);
     return median_of(v);
   };

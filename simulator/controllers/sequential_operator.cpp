@@ -65,6 +65,7 @@ class SequentialOperator : public Controller {
     }
     std::sort(rise.begin(), rise.end());
     std::vector<int> cylinders;
+    cylinders.reserve(rise.size());
     for (const auto& [height, c] : rise) cylinders.push_back(c);
     return cylinders;
   }
