@@ -38,7 +38,7 @@ foreach(ROOM models identification diagnosis problems planners optimizer apps/re
     install(FILES ${CMAKE_SOURCE_DIR}/${HEADER} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sparflow/${FOLDER})
   endforeach()
 endforeach()
-foreach(DATA machines models plants reaches logs effects)
+foreach(DATA machines models plants reaches scenarios logs effects)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/problems/${DATA} DESTINATION ${CMAKE_INSTALL_DATADIR}/sparflow)
 endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sparflow)

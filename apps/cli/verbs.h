@@ -28,6 +28,7 @@ void add_plan_verb(CLI::App& app, int& code);
 void add_optimize_verb(CLI::App& app, int& code);
 void add_strategies_verb(CLI::App& app, int& code);
 void add_pareto_verb(CLI::App& app, int& code);
+void add_benchmark_verb(CLI::App& app, int& code);
 void add_evaluate_verb(CLI::App& app, int& code);
 void add_machine_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);

@@ -1,16 +1,12 @@
 #pragma once
-/// Sensors of the plant and the log that they write, in the program's own column names (docs/log_format.md).
-#include <deque>
+/// The log that the plant's sensors write, in the program's own column names (docs/log_format.md).
 #include <string>
-#include <vector>
 
-#include "simulator/plant/run/plant_run.h"
-#include "simulator/random/random.h"
+#include "simulator/sensors/sensors.h"
 
 namespace sparflow::plant {
 
-/// Collects records and writes them as sensors tell them. Positions, commands and payload come at once, pressures and forces
-/// after the sensors' delay; each channel has its own noise and its own gaps.
+/// Collects records and writes them as sensors tell them.
 class LogWriter {
  public:
   /// @param remark a line of comment at the head of the log; empty: none
@@ -22,24 +18,7 @@ class LogWriter {
   std::string text(const std::string& cut) const;
 
  private:
-  enum class Kind { kExact, kPosition, kPressure, kForce };
-  struct Column {
-    std::string name;
-    Kind kind;
-    double scale;   // number in the file = SI value / scale
-    double offset;  // SI
-    double gap_until = -1.0;
-  };
-  void add_column(const std::string& name, Kind kind, double scale, double offset = 0.0);
-  double sensed(Kind kind, double value);
-  std::vector<double> values(const Record& r) const;
-
-  const Machine& machine_;
-  SensorParameters sensors_;
-  simulator::Random random_;
-  std::vector<Column> columns_;
-  std::deque<std::pair<double, std::vector<double>>> past_;  // true values, for delayed channels
-  double largest_force_ = 0.0;
+  Sensors sensors_;
   std::string text_;
   int rows_ = 0;
 };

@@ -1,0 +1,33 @@
+#include "apps/cli/benchmark/learned_machine.h"
+
+#include <algorithm>
+
+namespace sparflow::cli {
+
+std::vector<control::ValveSection> learned_sections(const CraneModel& model) {
+  std::vector<control::ValveSection> sections = control::sections_of(model.machine);
+  for (std::size_t c = 0; c < sections.size(); ++c) {
+    const Cylinder& drive = model.machine.cylinders[c];
+    if (!drive.hydraulic()) continue;
+    control::ValveSection& s = sections[c];
+    const CylinderModel& learned = model.cylinders[c];
+    if (learned.valve_gain_extend > 0.0)
+      s.full_extend = learned.valve_gain_extend / drive.area_piston();
+    if (learned.valve_gain_retract > 0.0)
+      s.full_retract = learned.valve_gain_retract / drive.area_rod();
+    for (const AppliedEffect& e : model.effects) {
+      if (e.effect->info().id != "valve_deadband" || e.at != static_cast<int>(c)) continue;
+      s.dead_extend = e.values[0];
+      s.dead_retract = e.values[1];
+      // the gain is the slope of the line through zero; with the third value it is kept at full lever (valve_deadband.cpp)
+      const bool full = e.values.size() > 2 && e.values[2] >= 0.5;
+      if (!full) {
+        s.full_extend *= 1.0 - s.dead_extend;
+        s.full_retract *= 1.0 - s.dead_retract;
+      }
+    }
+  }
+  return sections;
+}
+
+}  // namespace sparflow::cli

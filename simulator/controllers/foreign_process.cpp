@@ -1,0 +1,242 @@
+#include "simulator/controllers/foreign_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "models/machine/linkage.h"
+#include "simulator/controllers/goal_posture.h"
+
+namespace sparflow::control {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+/// Longest line that is read.
+/// @threshold [bytes] 1000..1e8; chosen: an answer has some numbers; a program that writes without end is stopped
+constexpr std::size_t kLongestLine = 1 << 20;
+/// Part of a wrong answer that the message quotes.
+/// @threshold [bytes] 10..1000; chosen: enough to recognise it
+constexpr std::size_t kQuoted = 60;
+
+/// A child process with one socket for its input and output.
+class Child {
+ public:
+  explicit Child(const std::string& command) {
+    int ends[2];
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+      throw ControllerFailure("its process could not be started: no socket");
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::setpgid(0, 0);
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      if (::getppid() != parent) ::_exit(127);
+      ::dup2(ends[1], 0);
+      ::dup2(ends[1], 1);
+      ::signal(SIGPIPE, SIG_DFL);
+      ::signal(SIGINT, SIG_IGN);
+      ::execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    socket_ = ends[0];
+    if (pid_ < 0) {
+      ::close(socket_);
+      throw ControllerFailure("its process could not be started");
+    }
+    ::setpgid(pid_, pid_);  // here too, as it is not known which of the two comes first
+    ::fcntl(socket_, F_SETFL, O_NONBLOCK);
+  }
+  ~Child() {
+    ::close(socket_);
+    ::kill(-pid_, SIGKILL);
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  /// Writes a line and reads one, within a time [s].
+  std::string ask(const std::string& line, double budget, double t) {
+    const Clock::time_point end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                                     std::chrono::duration<double>(budget));
+    const std::string text = line + "\n";
+    for (std::size_t sent = 0; sent < text.size();) {
+      const ssize_t n = ::send(socket_, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
+      if (n > 0) {
+        sent += static_cast<std::size_t>(n);
+      } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+        wait(POLLOUT, end, budget, t);
+      } else if (errno != EINTR) {
+        break;  // it has ended; what it wrote before tells more than that
+      }
+    }
+    while (true) {
+      const std::size_t stop = buffer_.find('\n');
+      if (stop != std::string::npos) {
+        std::string answer = buffer_.substr(0, stop);
+        buffer_.erase(0, stop + 1);
+        return answer;
+      }
+      if (buffer_.size() > kLongestLine)
+        throw ControllerFailure(fmt::format(
+            "its process wrote a line of more than {} bytes at t = {:.2f} s", kLongestLine, t));
+      char bytes[4096];
+      const ssize_t n = ::recv(socket_, bytes, sizeof bytes, 0);
+      if (n > 0) {
+        buffer_.append(bytes, static_cast<std::size_t>(n));
+      } else if (n == 0 || errno == ECONNRESET) {
+        throw ControllerFailure(gone(t));
+      } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+        wait(POLLIN, end, budget, t);
+      } else if (errno != EINTR) {
+        throw ControllerFailure(gone(t));
+      }
+    }
+  }
+
+ private:
+  void wait(short what, Clock::time_point end, double budget, double t) const {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    pollfd p{socket_, what, 0};
+    if (left.count() <= 0 || ::poll(&p, 1, static_cast<int>(left.count()) + 1) == 0)
+      throw ControllerFailure(
+          fmt::format("its process gave no answer within {:g} s at t = {:.2f} s", budget, t));
+  }
+
+  /// How it ended; a moment is given to a process that is just ending.
+  std::string gone(double t) const {
+    int status = 0;
+    for (int k = 0; k < 50; ++k) {  // no threshold: half a second in all
+      siginfo_t info{};
+      if (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+          info.si_pid == pid_) {
+        status = info.si_status;
+        return info.si_code == CLD_EXITED
+                   ? fmt::format("its process ended with code {} at t = {:.2f} s", status, t)
+                   : fmt::format("its process was ended by signal {} at t = {:.2f} s", status, t);
+      }
+      ::usleep(10000);
+    }
+    return fmt::format("its process closed its output at t = {:.2f} s", t);
+  }
+
+  pid_t pid_ = -1;
+  int socket_ = -1;
+  std::string buffer_;
+};
+
+class Foreign : public Controller {
+ public:
+  Foreign(const Knowledge& knowledge, const std::string& command, const ForeignOptions& options)
+      : know_(knowledge), options_(options), child_(command) {}
+
+  void begin(const Task& task, const Measurement& now) override {
+    const Machine& m = *know_.machine;
+    json j;
+    j["type"] = "task";
+    j["t_s"] = now.t;
+    j["goal"] = {{"tip_m", {task.tip.x(), task.tip.y(), task.tip.z()}}};
+    const Eigen::VectorXd goal = goal_posture(m, task, now.q);
+    for (std::size_t k = 0; k < m.joints.size(); ++k)
+      j["goal"]["q"][m.joints[k].name] = goal[static_cast<Eigen::Index>(k)];
+    for (int c = 0; c < m.cylinder_count(); ++c) {
+      const Cylinder& drive = m.cylinders[static_cast<std::size_t>(c)];
+      j["goal"]["length_m"][drive.name] = cylinder_length(m, c, goal[drive.joint]);
+      json& valve = j["valves"][drive.name];
+      for (const bool extend : {true, false}) {
+        const double full = know_.valves->full_speed(c, extend);
+        valve[extend ? "extend_m_s" : "retract_m_s"] = full;
+        // the lever at a hundredth of the full speed is the dead band and a hundredth of the rest
+        const double lever = std::abs(know_.valves->lever(c, extend ? 0.01 * full : -0.01 * full));
+        valve[extend ? "dead_extend" : "dead_retract"] = std::max(0.0, (lever - 0.01) / 0.99);
+      }
+    }
+    j["duration_s"] = task.duration;
+    j["tolerance_m"] = task.tolerance;
+    j["sample_time_s"] = know_.sample_time;
+    j["machine"] = m.source_text;
+    const json answer = ask(j, now.t);
+    if (answer.value("type", "") != "ready")
+      fail("answered a task with something else than {\"type\": \"ready\"}", answer.dump(), now.t);
+  }
+
+  std::vector<double> step(const Measurement& now) override {
+    const Machine& m = *know_.machine;
+    json j;
+    j["type"] = "state";
+    j["t_s"] = now.t;
+    for (std::size_t k = 0; k < m.joints.size(); ++k) {
+      j["q"][m.joints[k].name] = now.q[static_cast<Eigen::Index>(k)];
+      j["qd"][m.joints[k].name] = now.qd[static_cast<Eigen::Index>(k)];
+    }
+    for (int c = 0; c < m.cylinder_count(); ++c) {
+      const auto k = static_cast<std::size_t>(c);
+      const Cylinder& drive = m.cylinders[k];
+      j["length_m"][drive.name] = cylinder_length(m, c, now.q[drive.joint]);
+      if (!drive.hydraulic()) continue;
+      j["pA_bar"][drive.name] = now.pressure_bore[k] / 1e5;
+      j["pB_bar"][drive.name] = now.pressure_rod[k] / 1e5;
+    }
+    for (std::size_t p = 0; p < m.pumps.size(); ++p)
+      j["p_bar"][m.pumps[p].name] = now.pump_pressure[p] / 1e5;
+    j["payload_kg"] = now.payload;
+    j["oil_C"] = now.oil;
+    const json answer = ask(j, now.t);
+    std::vector<double> u(m.cylinders.size(), 0.0);
+    const auto commands = answer.find("u");
+    if (commands == answer.end() || !commands->is_object())
+      fail("gave no commands {\"u\": {CYLINDER: lever}}", answer.dump(), now.t);
+    for (const auto& [name, value] : commands->items()) {
+      const int c = m.cylinder_index(name);
+      if (c < 0) fail("named a cylinder that the machine does not have", name, now.t);
+      if (!value.is_number()) fail("gave a command that is no number", value.dump(), now.t);
+      u[static_cast<std::size_t>(c)] = value.get<double>();
+    }
+    return u;
+  }
+
+ private:
+  [[noreturn]] static void fail(const std::string& what, const std::string& found, double t) {
+    std::string quoted;
+    for (const char c : found.substr(0, kQuoted)) quoted += c >= ' ' && c <= '~' ? c : '?';
+    throw ControllerFailure(fmt::format("its process {} at t = {:.2f} s: {}", what, t, quoted));
+  }
+
+  json ask(const json& message, double t) {
+    const std::string line =
+        child_.ask(message.dump(-1, ' ', false, json::error_handler_t::replace),
+                   started_ ? options_.step_budget : options_.start_budget, t);
+    started_ = true;
+    json answer = json::parse(line, nullptr, false);
+    if (!answer.is_object()) fail("printed a line that is no JSON object", line, t);
+    return answer;
+  }
+
+  Knowledge know_;
+  ForeignOptions options_;
+  Child child_;
+  bool started_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Controller> foreign_controller(const Knowledge& knowledge,
+                                               const std::string& command,
+                                               const ForeignOptions& options) {
+  return std::make_unique<Foreign>(knowledge, command, options);
+}
+
+}  // namespace sparflow::control

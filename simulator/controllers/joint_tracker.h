@@ -1,0 +1,49 @@
+#pragma once
+/// Follows joint positions over time: speed ahead through the learned valve model, proportional and integral feedback of
+/// the rod's position. Joint PI and the tracked optima are this one controller on different motions.
+#include <span>
+#include <vector>
+
+#include "simulator/controllers/registry.h"
+
+namespace sparflow::control {
+
+struct TrackerGains {
+  /// Speed by which an error of the rod's position is corrected.
+  /// @threshold [1/s] 0.1..10; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double proportional = 1.0;
+  /// Growth of that speed while the error stays.
+  /// @threshold [1/s2] 0..5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double integral = 1.4;
+  /// Time by which the speed ahead is taken earlier, as valves follow late.
+  /// @threshold [s] 0..0.5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
+  double lead = 0.2;
+  static std::vector<Gain> table();
+  static TrackerGains from(std::span<const double> gains);
+};
+
+/// A motion at any time: before it begins its first instant, after it ends its last, at rest.
+struct MotionInstant {
+  Eigen::VectorXd q, qd;
+};
+MotionInstant at_time(const Trajectory& motion, double t);
+
+/// A straight joint line from rest to rest: constant speed between ramps of a quarter of the time each.
+Trajectory joint_line(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double duration);
+
+class JointTracker {
+ public:
+  JointTracker(const Knowledge& knowledge, const TrackerGains& gains);
+  /// Forgets the errors of a motion before.
+  void reset();
+  /// @param t [s] since the motion began
+  std::vector<double> step(const Trajectory& motion, double t, const Measurement& now);
+
+ private:
+  Knowledge know_;
+  TrackerGains gains_;
+  std::vector<double> integral_;  // [m/s] by cylinder
+  std::vector<int> way_;          // by cylinder: sign of the speed ahead
+};
+
+}  // namespace sparflow::control
