@@ -92,7 +92,9 @@ RankedError ranked(const Machine& machine, const CompareResult& result, const St
   r.scale = scale_of(result, score, options.level_share);
   const double noise = std::isfinite(r.noise) ? r.noise : 0.0;
   const double beyond = std::sqrt(std::max(0.0, score.rmse * score.rmse - noise * noise));
-  r.unexplained = beyond > 0.0 && r.scale > 0.0 ? beyond / r.scale : 0.0;
+  // where nothing was measured but zero, an error explains nothing of it
+  const double share = r.scale > 0.0 ? beyond / r.scale : 1.0;
+  r.unexplained = beyond > 0.0 ? share : 0.0;
   r.grade = grade_of(r.unexplained, options);
   return r;
 }

@@ -203,6 +203,21 @@ TEST(OneRanking, NoGreenTileShowsANegativeFit) {
   EXPECT_EQ(result.ranking.at_fault()->words, "pressure of pump main");
 }
 
+TEST(OneRanking, WhereNothingButZeroIsMeasuredAnErrorExplainsNothing) {
+  // with a lever of reversed sign no rod moves as commanded, so that the measured flow is zero
+  Log log = arm_log(kSensorNoise);
+  channel(log, "u_arm").values *= -1.0;
+  const CompareResult result = compare(arm_model(), {log});
+  const std::vector<RankedError>& errors = result.ranking.errors;
+  const auto flow = std::find_if(errors.begin(), errors.end(),
+                                 [](const RankedError& e) { return e.stage == "flow"; });
+  ASSERT_NE(flow, errors.end());
+  ASSERT_EQ(flow->scale, 0.0);
+  ASSERT_GT(flow->error, 0.0);
+  EXPECT_EQ(flow->explained_percent(), 0.0);
+  EXPECT_EQ(flow->grade, Grade::kPoor);
+}
+
 TEST(OneRanking, StagesThatAMachineFileCannotPredictAreNowhere) {
   const CraneModel model = CraneModel::untrained(testing_support::arm_machine());
   CompareResult result = compare(model, {arm_log_with_friction(40e3)});
