@@ -350,6 +350,7 @@ WhitenedChannels WhitenedChannels::by(const Evidence& evidence, std::vector<Nois
 
 WhitenedChannels WhitenedChannels::cold(const Evidence& evidence) {
   std::vector<NoiseModel> noise;
+  noise.reserve(evidence.channels.size());
   for (const EvidenceChannel& c : evidence.channels)
     noise.push_back(settling_noise_of(c, evidence.options.noise));
   return by(evidence, std::move(noise));

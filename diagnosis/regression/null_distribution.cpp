@@ -126,6 +126,7 @@ MatrixXd NullSimulation::own_columns(const MatrixXd& columns, std::size_t c) con
 void NullSimulation::add_channel(const std::vector<EffectDesign>& designs, std::size_t c,
                                  std::vector<Sums>& sums) const {
   std::vector<const EffectDesign*> all;
+  all.reserve(designs.size());
   for (const EffectDesign& d : designs) all.push_back(&d);
   const MatrixXd columns = columns_of(all, c, null_.evidence.channels[c].rows());
   if (columns.cols() == 0) return;
@@ -161,11 +162,13 @@ VectorXd NullSimulation::gains_of(const EffectDesign& design, Sums& sums) const 
 
 std::vector<VectorXd> NullSimulation::gains(const std::vector<EffectDesign>& designs) const {
   std::vector<Sums> sums;
+  sums.reserve(designs.size());
   for (const EffectDesign& d : designs)
     sums.push_back({MatrixXd::Zero(d.linear, d.linear), MatrixXd::Zero(d.linear, 2 * random_.count),
                     VectorXd::Zero(d.linear), std::vector<MatrixXd>(channels())});
   for (std::size_t c = 0; c < channels(); ++c) add_channel(designs, c, sums);
   std::vector<VectorXd> out;
+  out.reserve(designs.size());
   for (std::size_t d = 0; d < designs.size(); ++d) out.push_back(gains_of(designs[d], sums[d]));
   return out;
 }

@@ -81,6 +81,8 @@ class Search {
                                      const EffectFit& current) {
     std::vector<NullCandidate> candidates;
     std::vector<bool> unchanged;
+    candidates.reserve(search_.candidates.size());
+    unchanged.reserve(search_.candidates.size());
     null_contexts_.resize(search_.candidates.size());
     for (std::size_t k = 0; k < search_.candidates.size(); ++k) {
       const SearchCandidate& c = search_.candidates[k];

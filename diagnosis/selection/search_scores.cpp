@@ -85,6 +85,7 @@ std::vector<GainContext> SearchScores::contexts(const std::vector<const EffectDe
                                                 const EffectFit& current,
                                                 std::size_t candidate) const {
   std::vector<GainContext> all;
+  all.reserve(candidates_[candidate].designs.size());
   for (const EffectDesign& d : candidates_[candidate].designs) {
     const std::vector<bool> active = connected(base, d);
     GainContext context;

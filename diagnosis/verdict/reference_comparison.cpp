@@ -189,6 +189,43 @@ bool parameters_act(const EffectFit& fit, Index linear, const Significant& signi
                                            static_cast<double>(moving.size())));
 }
 
+/// The other effects found, each with a size of its own in the references. Where they act there as well and share a channel,
+/// an effect would otherwise take their part there and have another size for that reason alone.
+struct OtherEffects {
+  std::vector<EffectDesign> in_references;
+  std::vector<const EffectDesign*> designs;  // in suspect logs, and those above
+
+  OtherEffects(const Diagnosis& d, std::size_t found) {
+    in_references.reserve(d.search.found.size());
+    for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+      if (i == found) continue;
+      const FoundEffect& f = d.search.found[i];
+      designs.push_back(&f.design);
+      if (is_shared(d.evidence, f)) continue;  // acts there already
+      in_references.push_back(design_in(d.evidence, f.design, ActingLogs::kReferences));
+      if (in_references.back().acts()) designs.push_back(&in_references.back());
+    }
+  }
+  OtherEffects(const OtherEffects&) = delete;
+  OtherEffects& operator=(const OtherEffects&) = delete;
+};
+
+/// Whether a channel's residual in the suspect logs exceeds that in the references once the action of a found effect is left
+/// in it, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
+bool needed(const Diagnosis& d, std::size_t found) {
+  Index first = 0;
+  for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
+  const EffectDesign& design = d.search.found[found].design;
+  Diagnosis without = d;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!design.touches(c)) continue;
+    without.search.final.residual[c] +=
+        design.columns[c] * d.search.final.theta.segment(first, design.linear);
+    if (exceeds_references(without, c)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 double reference_rms(const Diagnosis& d, std::size_t channel) {
@@ -281,19 +318,8 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
   if (shared)
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
-  // The others may act in the references as well. Where they do and share a channel, this effect would take their part there
-  // and have another size for that reason alone.
-  std::vector<EffectDesign> others_there;
-  others_there.reserve(d.search.found.size());
-  std::vector<const EffectDesign*> others;
-  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
-    if (i == found) continue;
-    others.push_back(&d.search.found[i].design);
-    if (is_shared(d.evidence, d.search.found[i])) continue;  // acts there already
-    others_there.push_back(
-        design_in(d.evidence, d.search.found[i].design, ActingLogs::kReferences));
-    if (others_there.back().acts()) others.push_back(&others_there.back());
-  }
+  const OtherEffects beside(d, found);
+  const std::vector<const EffectDesign*>& others = beside.designs;
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     std::vector<const EffectDesign*> designs = others;
     designs.insert(designs.end(), more);
@@ -324,16 +350,22 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
         effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
         in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
   }
-  if (shared) return significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries;
+  // What a learned law takes over has the form of the law. It is a change only where the suspect logs exceed the references
+  // without it.
+  const bool taken_over = d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws;
+  if (shared)
+    return significant(sizes.mean()) && (!taken_over || needed(d, found)) ? InReferences::kOther
+                                                                          : InReferences::kVaries;
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
-  // What learned laws take over of an effect, they take over from all motions together, so that it may have no size in one group.
+  // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
       std::min(here.blocks, there.blocks) == 0 || !significant(here.size / here.standard_error);
-  if (both && no_size && d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws) {
+  if (both && no_size && taken_over) {
     const EffectDesign everywhere = in_all_logs(suspect, reference);
     const EffectFit difference = fit({&everywhere, &suspect});
-    return parameters_act(difference, suspect.linear, significant) ? InReferences::kNot
-                                                                   : InReferences::kAlike;
+    return parameters_act(difference, suspect.linear, significant) && needed(d, found)
+               ? InReferences::kNot
+               : InReferences::kAlike;
   }
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
