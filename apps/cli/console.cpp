@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -147,7 +148,30 @@ void note(const std::string& sentence) {
   complain(harmless(sentence, QuoteOptions{}.sentence) + "\n");
 }
 
+namespace {
+
+/// The mutex of the progress that prints; a process that is forked meanwhile would inherit the allocator's locks as the printing
+/// thread holds them, and some allocators (that of AddressSanitizer) do not release them there.
+std::atomic<std::mutex*>& printing() {
+  static std::atomic<std::mutex*> mutex = nullptr;
+  return mutex;
+}
+std::mutex* held_by_fork = nullptr;
+
+void hold_printing() {
+  held_by_fork = printing();
+  if (held_by_fork != nullptr) held_by_fork->lock();
+}
+void release_printing() {
+  if (held_by_fork != nullptr) held_by_fork->unlock();
+  held_by_fork = nullptr;
+}
+
+}  // namespace
+
 Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(2) == 1) {
+  static const int registered = ::pthread_atfork(hold_printing, release_printing, release_printing);
+  if (registered == 0) printing() = &mutex_;
   begin_work(what_);
   if (!terminal_) complain(what_ + " ...\n");
   printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
@@ -205,6 +229,7 @@ double Progress::elapsed() const {
 }
 
 Progress::~Progress() {
+  printing() = nullptr;
   printer_.request_stop();
   printer_.join();
   if (terminal_ && width_ > 0) rewrite_line(fmt::format("\r{:{}}\r", "", width_));
