@@ -20,7 +20,8 @@ constexpr double kLeast = 0.05;
 
 class EnergyTipRate : public TipPath {
  public:
-  EnergyTipRate(const Knowledge& knowledge, const TipGains& gains) : TipPath(knowledge, gains) {
+  EnergyTipRate(const Knowledge& knowledge, std::span<const double> gains)
+      : TipPath(knowledge, gains) {
     if (know_.power == nullptr) throw ControllerFailure("it needs a learned model");
   }
 
@@ -28,7 +29,7 @@ class EnergyTipRate : public TipPath {
   Eigen::VectorXd weights(const Measurement& now, const Eigen::Matrix3Xd& jacobian,
                           const Eigen::Vector3d& v) override {
     Eigen::VectorXd w = full_rate_weights(know_, now.q);
-    const Eigen::VectorXd plain = weighted_rates(jacobian, w, v, 1e-3);
+    const Eigen::VectorXd plain = weighted_rates(jacobian, w, v, kTipDamping);
     Eigen::VectorXd power = Eigen::VectorXd::Zero(w.size()), rate = power;
     for (Eigen::Index k = 0; k < w.size(); ++k) {
       rate[k] = kAsked * full_rate(know_, now.q, static_cast<int>(k), plain[k] > 0.0);
@@ -54,10 +55,7 @@ ControllerInfo energy_tip_rate_info() {
           .words = "resolved-rate control of the tip with energy-weighted redundancy",
           .gains = TipGains::table(),
           .needs_model = true,
-          .make = [](const Knowledge& k, std::span<const double> gains) {
-            return std::unique_ptr<Controller>(
-                std::make_unique<EnergyTipRate>(k, TipGains::from(gains)));
-          }};
+          .make = made<EnergyTipRate>};
 }
 
 }  // namespace sparflow::control

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
 
 namespace sparflow::control {
@@ -97,6 +98,22 @@ std::vector<double> JointTracker::step(const Trajectory& motion, double t, const
     lever[k] = know_.valves->lever(c, asked);
   }
   return lever;
+}
+
+MotionSource& MotionFollower::motions() const {
+  if (know_.motions == nullptr) throw ControllerFailure("it needs a learned model");
+  return *know_.motions;
+}
+
+void MotionFollower::follow(Trajectory motion, double begin, bool goes_on) {
+  motion_ = std::move(motion);
+  begin_ = begin;
+  if (!goes_on) tracker_.reset();
+}
+
+std::vector<double> MotionFollower::step(const Measurement& now) {
+  tip_ = tip_position<double>(*know_.machine, at_time(motion_, now.t - begin_).q);
+  return tracker_.step(motion_, now.t - begin_, now);
 }
 
 }  // namespace sparflow::control

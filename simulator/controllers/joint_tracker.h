@@ -1,6 +1,6 @@
 #pragma once
 /// Follows joint positions over time: speed ahead through the learned valve model, proportional and integral feedback of
-/// the rod's position. Joint PI and the tracked optima are this one controller on different motions.
+/// the rod's position. Joint PI and the tracked optima are this one controller on different motions (MotionFollower).
 #include <span>
 #include <vector>
 
@@ -44,6 +44,29 @@ class JointTracker {
   TrackerGains gains_;
   std::vector<double> integral_;  // [m/s] by cylinder
   std::vector<int> way_;          // by cylinder: sign of the speed ahead
+};
+
+/// A controller that follows a motion of the joints with the joint tracker; which motion, `begin` says.
+class MotionFollower : public Controller {
+ public:
+  MotionFollower(const Knowledge& knowledge, std::span<const double> gains)
+      : know_(knowledge), tracker_(knowledge, TrackerGains::from(gains)) {}
+  std::vector<double> step(const Measurement& now) override;
+  std::optional<Eigen::Vector3d> intended_tip() const override { return tip_; }
+
+ protected:
+  /// The source of energy-optimal motions. @throws ControllerFailure without a learned model
+  MotionSource& motions() const;
+  /// From now on this motion, which begins at the time `begin` [s]. @param goes_on from the one before
+  void follow(Trajectory motion, double begin, bool goes_on = false);
+
+  Knowledge know_;
+  Trajectory motion_;
+  double begin_ = 0.0;  // [s]
+
+ private:
+  JointTracker tracker_;
+  Eigen::Vector3d tip_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace sparflow::control

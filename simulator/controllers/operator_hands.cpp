@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/machine/linkage.h"
+#include "simulator/controllers/goal_posture.h"
+
 namespace sparflow::control {
 namespace {
 
@@ -58,6 +61,34 @@ const std::vector<double>& Hands::move(const std::vector<double>& wanted) {
 double careful_speed(double left, double cruise, double approach) {
   if (std::abs(left) < kArrived) return 0.0;
   return std::copysign(std::min(cruise, approach * std::abs(left)), left);
+}
+
+Operator::Operator(const Knowledge& knowledge, std::span<const double> gains)
+    : know_(knowledge),
+      gains_(OperatorGains::from(gains)),
+      hands_(knowledge.machine->cylinders.size(), knowledge.sample_time),
+      push_(knowledge.machine->cylinders.size(), knowledge.sample_time) {}
+
+void Operator::aim(const Task& task, const Measurement& now) {
+  goal_ = goal_posture(*know_.machine, task, now.q);
+  seen_.clear();
+}
+
+double Operator::time_for(const Task& task, double pauses) const {
+  return std::max(kLeastTime * task.duration, gains_.hurry * task.duration - pauses);
+}
+
+double Operator::way_left(int cylinder, const Eigen::VectorXd& q) const {
+  const Machine& machine = *know_.machine;
+  const int joint = machine.cylinders[static_cast<std::size_t>(cylinder)].joint;
+  return cylinder_length(machine, cylinder, goal_[joint]) -
+         cylinder_length(machine, cylinder, q[joint]);
+}
+
+double Operator::lever(int cylinder, double left, double cruise) {
+  const double speed = careful_speed(left, cruise, gains_.approach);
+  return push_.lever(static_cast<std::size_t>(cylinder), left,
+                     know_.valves->lever(cylinder, speed));
 }
 
 }  // namespace sparflow::control

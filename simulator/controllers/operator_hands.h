@@ -68,8 +68,41 @@ class Hands {
 /// Rod speed towards a goal at which an operator drives. @param left way left [m] @param cruise [m/s]
 double careful_speed(double left, double cruise, double approach);
 
+/// Least share of a task's time that remains for moving, however long reaction and care take.
+/// @threshold [-] 0.05..1; chosen: an operator who is late hurries, within what the valves give
+inline constexpr double kLeastTime = 0.2;
+
+/// Least share of the full speed at which a lever is held.
+/// @threshold [-] 0.01..0.5; chosen: an operator does not creep over a long way, nor hold a lever steadier
+inline constexpr double kSteady = 0.05;
+
 /// Way left at which a rod counts as arrived.
 /// @threshold [m] 0.0005..0.02; chosen: the tip is then within some centimetres
 inline constexpr double kArrived = 0.003;
+
+/// What both operators have in common: eyes that see the posture late, and hands on the levers.
+class Operator : public Controller {
+ public:
+  Operator(const Knowledge& knowledge, std::span<const double> gains);
+
+ protected:
+  /// Aims at the posture that ends the task.
+  void aim(const Task& task, const Measurement& now);
+  /// Time that remains for moving. @param pauses for reaction and care [s] @return [s]
+  double time_for(const Task& task, double pauses) const;
+  /// Way of a rod from a posture to the goal. [m]
+  double way_left(int cylinder, const Eigen::VectorXd& q) const;
+  /// The lever that is held for a rod's speed near the goal. @param left way left as it is seen [m] @param cruise [m/s]
+  double lever(int cylinder, double left, double cruise);
+
+  Knowledge know_;
+  OperatorGains gains_;
+  Seen seen_;
+  Hands hands_;
+  Eigen::VectorXd goal_;
+
+ private:
+  Push push_;
+};
 
 }  // namespace sparflow::control

@@ -28,6 +28,12 @@ struct ControllerInfo {
   std::unique_ptr<Controller> (*make)(const Knowledge& knowledge, std::span<const double> gains);
 };
 
+/// A controller of type T, for ControllerInfo::make.
+template <class T>
+std::unique_ptr<Controller> made(const Knowledge& knowledge, std::span<const double> gains) {
+  return std::make_unique<T>(knowledge, gains);
+}
+
 std::span<const ControllerInfo> controllers();
 /// Null when there is none of that name.
 const ControllerInfo* find_controller(std::string_view name);

@@ -11,9 +11,6 @@
 namespace sparflow::control {
 namespace {
 
-/// Damping of the pseudo-inverse, as share of its core's trace.
-/// @threshold [-] 1e-6..0.1; chosen: rates stay within the valves near stretched postures
-constexpr double kTipDamping = 1e-3;
 /// Share of a joint's range at its ends in which it is not moved outwards.
 /// @threshold [-] 0..0.2; chosen: the way a rod needs to stop
 constexpr double kEnd = 0.02;
@@ -55,8 +52,8 @@ Eigen::VectorXd full_rate_weights(const Knowledge& knowledge, const Eigen::Vecto
   return w;
 }
 
-TipPath::TipPath(const Knowledge& knowledge, const TipGains& gains)
-    : know_(knowledge), gains_(gains) {}
+TipPath::TipPath(const Knowledge& knowledge, std::span<const double> gains)
+    : know_(knowledge), gains_(TipGains::from(gains)) {}
 
 void TipPath::begin(const Task& task, const Measurement& now) {
   task_ = task;

@@ -8,6 +8,10 @@
 
 namespace sparflow::control {
 
+/// Damping of the pseudo-inverse, as share of its core's trace.
+/// @threshold [-] 1e-6..0.1; chosen: rates stay within the valves near stretched postures
+inline constexpr double kTipDamping = 1e-3;
+
 struct TipGains {
   /// Speed by which an error of the tip is corrected.
   /// @threshold [1/s] 0.1..10; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
@@ -24,7 +28,7 @@ struct TipGains {
 
 class TipPath : public Controller {
  public:
-  TipPath(const Knowledge& knowledge, const TipGains& gains);
+  TipPath(const Knowledge& knowledge, std::span<const double> gains);
   void begin(const Task& task, const Measurement& now) override;
   std::vector<double> step(const Measurement& now) override;
   std::optional<Eigen::Vector3d> intended_tip() const override { return wanted_; }

@@ -21,9 +21,7 @@ ControllerInfo tip_rate_info() {
   return {.name = "tip_rate",
           .words = "resolved-rate control of the tip along a straight line, by pseudo-inverse",
           .gains = TipGains::table(),
-          .make = [](const Knowledge& k, std::span<const double> gains) {
-            return std::unique_ptr<Controller>(std::make_unique<TipRate>(k, TipGains::from(gains)));
-          }};
+          .make = made<TipRate>};
 }
 
 }  // namespace sparflow::control
