@@ -24,9 +24,9 @@
 namespace sparflow::cli {
 namespace {
 
-/// A line on a terminal is drawn at each look, elsewhere at each tenth.
-constexpr std::chrono::seconds kLookPeriod{1};
-constexpr int kLooksAPrint = 10;
+/// A line on a terminal is drawn at each look, elsewhere at each fiftieth.
+constexpr std::chrono::milliseconds kLookPeriod{200};
+constexpr int kLooksAPrint = 50;
 /// Longest line of progress.
 /// @threshold [byte] 40..200; chosen: fits most terminals
 constexpr std::size_t kLine = 107;
@@ -156,7 +156,7 @@ std::atomic<std::mutex*>& printing() {
   static std::atomic<std::mutex*> mutex = nullptr;
   return mutex;
 }
-std::mutex* held_by_fork = nullptr;
+thread_local std::mutex* held_by_fork = nullptr;
 
 void hold_printing() {
   held_by_fork = printing();
@@ -175,6 +175,9 @@ Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatt
   begin_work(what_);
   if (!terminal_) complain(what_ + " ...\n");
   printer_ = std::jthread([this](const std::stop_token& stop) { print_periodically(stop); });
+  // A thread that begins allocates as well: a process is forked only once it waits.
+  std::unique_lock lock(mutex_);
+  ended_.wait(lock, [this] { return begun_; });
 }
 
 void Progress::watch(std::function<Now()> work) {
@@ -210,6 +213,8 @@ std::string Progress::left(double seconds) const {
 
 void Progress::print_periodically(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
+  begun_ = true;
+  ended_.notify_all();
   int looks = 0;
   while (!ended_.wait_for(lock, stop, kLookPeriod, [&] { return stop.stop_requested(); })) {
     look();

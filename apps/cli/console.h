@@ -47,6 +47,7 @@ class Progress {
   double first_seconds_ = -1.0,
          first_share_ = 0.0;  ///< from which the rest is forecast; < 0: not yet
   std::function<Now()> watched_;
+  bool begun_ = false;  ///< printer_ waits
   std::condition_variable_any ended_;
   std::jthread printer_;  ///< declared last, so that it ends before the members that it uses
 };
