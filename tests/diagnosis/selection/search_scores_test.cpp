@@ -92,6 +92,11 @@ TEST(SearchScores, AContextIsWhatSharesAChannel) {
   EffectFit other = with;
   other.log_likelihood[0] += 1.0;
   EXPECT_FALSE(same_contexts(scores.contexts(base, with, 1), scores.contexts(base, other, 1)));
+  // as is a fit of the same likelihood with another design
+  EffectDesign replaced = *base[0];
+  replaced.number = 5;
+  EXPECT_FALSE(
+      same_contexts(scores.contexts(base, with, 1), scores.contexts({&replaced}, with, 1)));
   // and a design without a number makes no context known
   EffectDesign unnumbered = *base[0];
   unnumbered.number = 0;
