@@ -43,10 +43,22 @@ MatrixXd flipped_scores(const MatrixXd& x, const VectorXd& residual, const Vecto
 
 /// Random innovations and signs, see NullSimulator.
 struct RandomRows {
-  const std::vector<MatrixXd>& noise;
+  const std::vector<Eigen::MatrixXf>& noise;
   const std::vector<MatrixXd>& signs;
   int count = 0;
 };
+
+/// x^T noise, a few rows at a time, so that the noise never stands in memory as doubles.
+MatrixXd noise_product(const MatrixXd& x, const Eigen::MatrixXf& noise) {
+  constexpr Index kRows = 1024;  // 2.5 MB of doubles for 300 simulations
+  MatrixXd z = MatrixXd::Zero(x.cols(), noise.cols());
+  for (Index first = 0; first < x.rows(); first += kRows) {
+    const Index rows = std::min(kRows, x.rows() - first);
+    z +=
+        transposed_product(x.middleRows(first, rows), noise.middleRows(first, rows).cast<double>());
+  }
+  return z;
+}
 
 /// The simulated residuals of all channels, whitened and orthogonal to the accepted effects.
 class NullSimulation {
@@ -131,7 +143,7 @@ void NullSimulation::add_channel(const std::vector<EffectDesign>& designs, std::
   const MatrixXd columns = columns_of(all, c, null_.evidence.channels[c].rows());
   if (columns.cols() == 0) return;
   const MatrixXd x = own_columns(columns, c);
-  const MatrixXd z = transposed_product(x, random_.noise[c]);
+  const MatrixXd z = noise_product(x, random_.noise[c]);
   const VectorXd g = x.transpose() * residual_[c] / std::sqrt(null_.fit.noise[c].variance);
   Index at = 0;
   for (std::size_t d = 0; d < designs.size(); ++d) {
@@ -202,8 +214,8 @@ NullSimulator::NullSimulator(const Evidence& evidence, int simulations, std::mt1
     : count_(simulations) {
   std::normal_distribution<double> normal;
   for (const EvidenceChannel& channel : evidence.channels) {
-    MatrixXd& noise = noise_.emplace_back(channel.rows(), simulations);
-    for (Index i = 0; i < noise.size(); ++i) noise.data()[i] = normal(random);
+    Eigen::MatrixXf& noise = noise_.emplace_back(channel.rows(), simulations);
+    for (Index i = 0; i < noise.size(); ++i) noise.data()[i] = static_cast<float>(normal(random));
     MatrixXd& signs = signs_.emplace_back(static_cast<Index>(channel.blocks.size()), simulations);
     for (Index i = 0; i < signs.size(); ++i) signs.data()[i] = (random() & 1U) != 0U ? 1.0 : -1.0;
   }

@@ -53,7 +53,8 @@ class NullSimulator {
 
  private:
   int count_;
-  std::vector<Eigen::MatrixXd> noise_;  // [channels]: [rows x simulations] normal innovations
+  // [channels]: [rows x simulations] normal innovations, the largest part of a diagnosis' memory, hence floats
+  std::vector<Eigen::MatrixXf> noise_;
   std::vector<Eigen::MatrixXd> signs_;  // [channels]: [blocks x simulations] -1 or 1
   std::vector<Eigen::VectorXd>
       best_;  // [candidates]: [2 x simulations, nats] largest gain of its designs
