@@ -183,6 +183,7 @@ int main(int argc, char** argv) {
   cli::add_effects_verb(app, code);
   cli::add_plan_verb(app, code);
   cli::add_optimize_verb(app, code);
+  cli::add_audit_verb(app, code);
   cli::add_evaluate_verb(app, code);
   cli::add_strategies_verb(app, code);
   cli::add_pareto_verb(app, code);

@@ -29,6 +29,7 @@ void add_optimize_verb(CLI::App& app, int& code);
 void add_strategies_verb(CLI::App& app, int& code);
 void add_pareto_verb(CLI::App& app, int& code);
 void add_benchmark_verb(CLI::App& app, int& code);
+void add_audit_verb(CLI::App& app, int& code);
 void add_evaluate_verb(CLI::App& app, int& code);
 void add_machine_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);

@@ -40,7 +40,12 @@ MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, dou
             chain.evaluate({q.data(), qd.data(), qdd.data()}, payload, true);
         energy.total += step * state.power;
         for (std::size_t p = 0; p < state.pumps.size(); ++p) {
-          energy.pump[p] += step * state.pumps[p].pressure * state.pumps[p].flow;
+          const PumpState& pump = state.pumps[p];
+          energy.pump[p] += step * pump.pressure * pump.flow;
+          if (pump.leader >= 0)
+            energy.pressure_uncertainty +=
+                step * pump.flow *
+                state.cylinders[static_cast<std::size_t>(pump.leader)].pressure_std;
         }
         std::size_t moving = 0;
         for (std::size_t i = 0; i < cylinders; ++i) {

@@ -18,6 +18,9 @@ struct MotionEnergy {
   std::vector<double> useful;         ///< [J] by cylinder, integral of P_i Q_i
   double potential_difference = 0.0;  ///< [J] of machine and payload, end minus start
   double largest_pressure_std = 0.0;  ///< [Pa] largest standard deviation of a predicted pressure
+  /// [J] integral of the pumps' flows times the standard deviation of the pressure that leads each of them (constant-pressure
+  /// pumps: none): the energy's standard deviation if the errors of a pressure model are the same everywhere, the worst case.
+  double pressure_uncertainty = 0.0;
   double moving_share_outside_data =
       0.0;  ///< share of moving cylinder-time outside the data of its pressure model
   std::vector<double> share_moving;  ///< share of time with 0, 1, 2, ... cylinders moving

@@ -1,0 +1,143 @@
+#include "optimizer/baselines/move_audit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/machine/kinematics.h"
+#include "problems/time_parametrise.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::Index;
+
+/// The same problem with any posture that holds the tip where the recorded motion left it.
+MotionProblem to_tip(const MotionProblem& problem) {
+  MotionProblem to = problem;
+  to.goal = TipGoal{tip_position<double>(problem.machine, std::get<JointGoal>(problem.goal).q)};
+  return to;
+}
+
+/// Whether other postures hold the tip at the same point.
+bool redundant(const Machine& machine) {
+  return machine.joint_count() > static_cast<int>(moving_tip_directions(machine).cols());
+}
+
+OptimizeResult solve(const CraneModel& model, const MotionProblem& problem,
+                     const MoveAuditOptions& options) {
+  const std::vector<SeedMotion> seeds = options.seeds(problem);
+  if (!seeds.empty()) return optimize(model, problem, seeds, options.optimize);
+  OptimizeResult none;
+  none.status = OptimizeStatus::kInfeasible;
+  none.message = "no path within the machine's limits was found";
+  return none;
+}
+
+bool has_motion(const OptimizeResult& r) {
+  return r.motion.size() > 1 &&
+         (r.status == OptimizeStatus::kOptimal || r.status == OptimizeStatus::kFeasible);
+}
+
+/// Energy of the recorded path at an even pace in the same time; that of the recorded motion where it is less or the limits
+/// do not allow it. [J]
+double energy_at_even_pace(const CraneModel& model, const MotionProblem& problem,
+                           const Trajectory& recorded, double energy, int most_rows) {
+  /// Least distance of two rows of the path.
+  /// @threshold [rad or m] 1e-6..0.01; chosen: noise of a sensor at rest is no way
+  constexpr double kLeastStep = 1e-4;
+  const Index step = std::max<Index>(1, recorded.size() / most_rows), last = recorded.size() - 1;
+  std::vector<Index> rows;
+  for (Index k = 0; k < last; k += step) {
+    if (rows.empty() || (recorded.q.row(k) - recorded.q.row(rows.back())).norm() > kLeastStep)
+      rows.push_back(k);
+  }
+  rows.push_back(last);
+  Eigen::MatrixXd path(static_cast<Index>(rows.size()), recorded.q.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (Index j = 0; j < path.cols(); ++j) {  // the limits hold at its ends; noise may leave them
+      const Range& r = problem.limits.position[static_cast<std::size_t>(j)];
+      path(static_cast<Index>(i), j) = std::clamp(recorded.q(rows[i], j), r.lo, r.hi);
+    }
+  }
+  const TimedMotion timed = time_parametrise(problem, path, recorded.duration());
+  if (timed.status != TimingStatus::kOk || timed.motion.size() < 2) return energy;
+  return std::min(energy, exact_total_energy(model, timed.motion, problem.payload));
+}
+
+std::string why_no_optimum(const OptimizeResult& r, double duration) {
+  if (r.shortest_duration > duration)
+    return fmt::format(
+        "It took {:.1f} s; within the limits of machine file and model it takes {:.1f} s.",
+        duration, r.shortest_duration);
+  return "No optimum was found: " + r.message;
+}
+
+}  // namespace
+
+double MoveAudit::saving_std() const {
+  return std::hypot(recorded.pressure_uncertainty, optimum.pressure_uncertainty);
+}
+
+MotionProblem audit_problem(const Machine& machine, const Trajectory& recorded, double payload) {
+  MotionProblem problem;
+  problem.machine = machine;
+  problem.limits = limits_of(machine);
+  problem.payload = payload;
+  const Index last = recorded.size() - 1;
+  for (Index j = 0; j < recorded.q.cols(); ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    Range &q = problem.limits.position[i], &qd = problem.limits.velocity[i];
+    for (const Index k : {Index{0}, last}) {
+      q.lo = std::min(q.lo, recorded.q(k, j));
+      q.hi = std::max(q.hi, recorded.q(k, j));
+    }
+    qd.lo = std::min(qd.lo, recorded.qd.col(j).minCoeff());
+    qd.hi = std::max(qd.hi, recorded.qd.col(j).maxCoeff());
+  }
+  problem.start = recorded.q.row(0).transpose();
+  problem.goal = JointGoal{recorded.q.row(last).transpose()};
+  problem.duration = {recorded.duration(), recorded.duration()};
+  return problem;
+}
+
+MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double payload,
+                     const MoveAuditOptions& options) {
+  MoveAudit audit;
+  audit.problem = audit_problem(model.machine, recorded, payload);
+  audit.recorded = exact_energy(model, audit.problem, recorded, 1);
+  if (audit.recorded.moving_share_outside_data > options.most_outside) {
+    audit.not_judged = fmt::format(
+        "{:.0f} % of its moving time lies outside the flows and forces that the model has learned.",
+        100.0 * audit.recorded.moving_share_outside_data);
+    return audit;
+  }
+  if (audit.recorded.impossible()) {
+    audit.not_judged = "By the model the pumps give it less than machine and load gain.";
+    return audit;
+  }
+  const OptimizeResult there = solve(model, audit.problem, options);
+  audit.interrupted = there.interrupted;
+  if (!has_motion(there)) {
+    audit.not_judged = why_no_optimum(there, recorded.duration());
+    return audit;
+  }
+  audit.best = there.motion;
+  audit.optimum = there.energy;
+  const double even =
+      energy_at_even_pace(model, audit.problem, recorded, audit.recorded.total, options.path_rows);
+  audit.by_pace = audit.recorded.total - even;
+  audit.by_way = even - there.energy.total;
+  if (!redundant(model.machine) || audit.interrupted) return audit;
+  const OptimizeResult free_end = solve(model, to_tip(audit.problem), options);
+  audit.interrupted = free_end.interrupted;
+  if (has_motion(free_end) && free_end.energy.total < there.energy.total) {
+    audit.by_posture = there.energy.total - free_end.energy.total;
+    audit.by_posture_potential =
+        there.energy.potential_difference - free_end.energy.potential_difference;
+  }
+  return audit;
+}
+
+}  // namespace sparflow

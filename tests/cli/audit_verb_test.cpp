@@ -1,0 +1,54 @@
+// The verb audit, as a user runs it.
+#include "tests/cli/cli_fixture.h"
+#include "tests/parsed_json.h"
+
+namespace sparflow::test {
+namespace {
+
+const std::string kAudited = " --model " + kData + "/models/loader_crane.json";
+
+TEST_F(Cli, AuditComparesEachMoveWithItsOptimum) {
+  const Outcome o = run("audit " + kTest + kAudited + " --moves 2 --litres-per-kwh 0.4 --json " +
+                        at("a.json") + " --report " + at("a.html"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json a = test_support::parsed_json(slurp(at("a.json")));
+  ASSERT_EQ(a.at("moves").size(), 2U);
+  EXPECT_EQ(a.at("not_examined"), 10);
+  double saving = 0.0;
+  for (const json& m : a.at("moves")) {
+    ASSERT_TRUE(m.at("judged").get<bool>()) << m;
+    // model and log come from the same plant; its own noise and starts and stops are left
+    EXPECT_NEAR(m.at("model_J").get<double>() / m.at("measured_J").get<double>(), 1.0, 0.03);
+    EXPECT_LE(m.at("optimum_J"), m.at("model_J"));
+    EXPECT_LE(m.at("bound_J"), m.at("optimum_J"));
+    saving += m.at("saving_J").get<double>();
+  }
+  const json& total = a.at("total");
+  EXPECT_NEAR(total.at("saving_J").get<double>(), saving, 1e-6 * saving);
+  EXPECT_NEAR(total.at("saving_litres").get<double>(), 0.4 * saving / 3.6e6, 1e-9);
+  EXPECT_THAT(o.out, HasSubstr("2 of 2 moves judged"));
+  EXPECT_THAT(slurp(at("a.html")), HasSubstr("Where the difference arises"));
+}
+
+TEST_F(Cli, AuditSaysWhatItCannotJudge) {
+  const std::string text = slurp(kTest);
+  std::istringstream lines(text);
+  std::string line, kept;
+  for (int k = 0; std::getline(lines, line) && k < 200; ++k) kept += line + "\n";  // 4 s
+  write("short.csv", kept);
+  const Outcome o = run("audit " + at("short.csv") + kAudited);
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(o.out, HasSubstr("None of 1 moves could be judged"));
+  EXPECT_THAT(o.out, HasSubstr("It ends in motion"));
+  kept.clear();
+  lines = std::istringstream(text);
+  for (int k = 0; std::getline(lines, line) && k < 40; ++k) kept += line + "\n";  // at rest
+  write("rest.csv", kept);
+  const Outcome rest = run("audit " + at("rest.csv") + kAudited);
+  EXPECT_EQ(rest.code, 3);
+  EXPECT_THAT(rest.err, HasSubstr("no move of more than"));
+  EXPECT_EQ(run("audit " + kTest).code, 2);
+}
+
+}  // namespace
+}  // namespace sparflow::test
