@@ -22,16 +22,11 @@ enum class Mechanism : unsigned {
   kBound,            ///< acceptance: no parameter on its bound
   kHeldOut,          ///< acceptance: gain on motions left out
   kJoint,            ///< acceptance: joint significance
-  kProven,           ///< exemption from joint significance by the gain on motions left out
   kLeastGain,        ///< least gain beside the threshold of the null distribution
-  kFurther,          ///< lower false-alarm rate of every further effect
-  kSquaresPlainer,   ///< least-squares comparison of a refinement with the plainer effect
   kSquaresShape,     ///< least-squares comparison of points of the grid
   kPlainer,          ///< the plainer effect comes before its refinement
   kMerge,            ///< one effect for two
   kReshape,          ///< another variant of a law
-  kPrune,            ///< effects are dropped that gain too little beside the others
-  kSwap,             ///< effects are exchanged for better rivals
   kMinor,            ///< minor effects are not named
   kOnce,             ///< isolated event: a large gain without significance
   kEvent,            ///< event in the residual of a force or speed

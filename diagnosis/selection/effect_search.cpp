@@ -41,9 +41,8 @@ class Search {
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(search_, found, i, current) || reshaped;
       relinearise_angles(found, current);
-      prune(search_, found, current);
-      while (search_.mechanisms().enabled(Mechanism::kMerge) && merge(search_, found, current))
-        prune(search_, found, current);
+      while (search_.mechanisms().enabled(Mechanism::kMerge) && merge(search_, found, current)) {
+      }
       if (reshaped) {
         for (std::size_t i = 0; i < found.size(); ++i) search_.judge(found, i, current);
       }
@@ -60,20 +59,12 @@ class Search {
  private:
   bool lets(Mechanism m, bool decides) const { return search_.mechanisms().act(m, decides); }
 
-  /// False-alarm rate of the next step.
-  double level_of(std::size_t found, const std::vector<CandidateScore>& scores,
-                  const NullDistribution& null) const {
-    const double first = search_.options.false_alarm;
-    const double further = search_.options.further_false_alarm * first;
-    bool between = false;
+  /// Records the optional parameters of what is significant.
+  void record_optional_of(const std::vector<CandidateScore>& scores, const NullDistribution& null) {
     for (const CandidateScore& s : scores) {
-      const double p = null.p_value(s.gain, s.candidate);
-      between = between || (p >= further && p < first && s.gain >= search_.options.least_gain);
-      if (p < first) record_optional(search_, s);
+      if (null.p_value(s.gain, s.candidate) < search_.options.false_alarm)
+        record_optional(search_, s);
     }
-    if (found == 0) return first;
-    lets(Mechanism::kFurther, between);
-    return search_.mechanisms().enabled(Mechanism::kFurther) ? further : first;
   }
 
   /// Largest gain when no more is missing than `base`; simulated again for the candidates whose context has changed.
@@ -110,7 +101,8 @@ class Search {
           result.ranking.emplace_back(search_.candidates[s.candidate].effect, s.gain);
       }
       const NullDistribution null = null_distribution(base, current);
-      const double level = level_of(found.size(), scores, null);
+      record_optional_of(scores, null);
+      const double level = search_.options.false_alarm;
       const CandidateScore best = chosen(search_, scores, null, level, base);
       const double p = null.p_value(best.gain, best.candidate);
       if (tracing()) trace_scores(search_, step, scores, null);
@@ -280,12 +272,7 @@ class Search {
     for (std::size_t i = 0; i < found.size(); ++i) {
       std::string why = why_not_named(found[i], search_.options, search_.mechanisms());
       if (why.empty()) why = compensates_model_form(found, i, current);
-      // for an effect that refines no other, a clear gain on motions left out outweighs the joint significance test
-      const bool refinement = !found[i].design.effect.effect->info().refines.empty();
-      const bool proven = !refinement && found[i].held_out > search_.options.proven_errors *
-                                                                 found[i].held_out_error;
-      const bool doubtful = why.empty() && found[i].not_significant;
-      if (doubtful && !lets(Mechanism::kProven, proven) && lets(Mechanism::kJoint, true)) {
+      if (why.empty() && found[i].not_significant && lets(Mechanism::kJoint, true)) {
         why = "it fails the joint significance test: its 95 % region contains zero";
       }
       if (why.empty()) continue;
@@ -302,16 +289,12 @@ class Search {
     return false;
   }
 
-  /// Swap moves and indistinguishable sets, then the statistics of the acceptance tests.
+  /// Rivals and indistinguishable sets, then the statistics of the acceptance tests.
   void finish(std::vector<FoundEffect>& found, EffectFit& current) {
-    for (int round = 0; round < search_.options.swap_rounds; ++round) {
-      bool swapped = false;
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        search_.report(found.size(),
-                       "comparing " + search_.key(found[i].design.effect) + " with its rivals");
-        swapped = rivals(search_, found, i, current) || swapped;
-      }
-      if (!swapped) break;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      search_.report(found.size(),
+                     "comparing " + search_.key(found[i].design.effect) + " with its rivals");
+      list_rivals(search_, found, i, current);
     }
     for (std::size_t i = 0; i < found.size(); ++i) search_.judge(found, i, current);
   }

@@ -20,9 +20,6 @@ struct SearchOptions {
   /// Rate at which a search on logs with nothing missing names an effect.
   /// @threshold [1] 0..1; chosen: the usual 5 % of a test
   double false_alarm = 0.05;
-  /// False-alarm rate of every further effect, as a share of that of the first.
-  /// @threshold [1] 0..1; chosen: each further step is one more occasion for a false alarm
-  double further_false_alarm = 0.5;
   /// Largest number of effects found.
   /// @threshold [effects] 1..; chosen: stands for several faults of one machine at once; ends the
   /// search
@@ -34,9 +31,6 @@ struct SearchOptions {
   /// Rounds of adding, exchanging and dropping after which a search ends.
   /// @threshold [rounds] 1..; chosen: ends a search in which an effect is added and dropped in turn
   int rounds = 3;
-  /// Rounds in which every found effect is compared with its rivals.
-  /// @threshold [rounds] 1..; chosen: the second one sees the effects exchanged by the first
-  int swap_rounds = 2;
   /// Further searches on evidence with the load-sensing leaders that the last search implies.
   /// @threshold [searches] 0..; chosen: ends a search in which two leaders alternate
   int leader_searches = 3;
@@ -69,9 +63,9 @@ struct SearchOptions {
   /// Difference of gains below which two effects are indistinguishable.
   /// @threshold [nat] 0..; derived: odds of e^4 = 55
   double same_nats = 4.0;
-  /// Difference of gains above which a rival or another variant of a law replaces a found effect.
+  /// Difference of gains above which another variant of a law replaces a found effect.
   /// @threshold [nat] 0..; chosen: a smaller one would exchange equals, back and forth
-  double least_swap_gain = 1.0;
+  double least_reshape_gain = 1.0;
   /// Difference of gains up to which a rival is listed in FoundEffect::alternatives; indistinguishable ones
   /// (same_within) are listed whatever it is. It is another question than same_nats: how far a rival still lowers an
   /// effect's probability.
@@ -106,10 +100,6 @@ struct SearchOptions {
   /// @threshold [1] 0..1; derived: four of five folds less rounding. A few large steps may carry
   /// all evidence, and the gains of the folds then differ widely
   double improved_share = 0.79;
-  /// Gain on motions left out, in its standard errors, beyond which an effect that refines no other
-  /// needs no joint significance.
-  /// @threshold [1] 0..; derived: a normal error exceeds two standard errors in 2.3 % of cases
-  double proven_errors = 2.0;
   /// Variance of the block offsets, as a share of the noise's variance, above which the noise model
   /// may contain a slow effect. The effect is then also fitted from white noise.
   /// @threshold [1] 0..1; chosen: an effect that offsets could imitate must show in them

@@ -7,15 +7,6 @@
 namespace sparflow {
 namespace {
 
-/// Whether the least-squares comparison prefers `one` to `other` significantly.
-bool better_by_least_squares(const SearchState& search,
-                             const std::vector<const EffectDesign*>& base, const EffectDesign& one,
-                             const EffectDesign& other) {
-  return least_squares_advantage(search.evidence, search.scores.least_squares(base, one),
-                                 search.scores.least_squares(base, other),
-                                 search.options.regression) > 0.0;
-}
-
 /// The same candidate at that point of its grid which the least-squares comparison prefers most, if significantly.
 CandidateScore shaped(const SearchState& search, const std::vector<const EffectDesign*>& base,
                       const CandidateScore& score) {
@@ -49,11 +40,7 @@ CandidateScore chosen(const SearchState& search, const std::vector<CandidateScor
   for (const CandidateScore* s : passing) {
     const EffectAt& e = search.candidates[s->candidate].effect;
     if (e.at != best.at || e.effect->info().id != best.effect->info().refines) continue;
-    const bool plainer =
-        s->gain > search.options.plainer_share * first->gain ||
-        search.mechanisms().act(
-            Mechanism::kSquaresPlainer,
-            !better_by_least_squares(search, base, search.design_of(*first), search.design_of(*s)));
+    const bool plainer = s->gain > search.options.plainer_share * first->gain;
     if (search.mechanisms().act(Mechanism::kPlainer, plainer)) {
       return shaped(search, base, *s);
     }

@@ -43,25 +43,6 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
 
 }  // namespace
 
-void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current) {
-  for (bool changed = true; changed && found.size() > 1;) {
-    changed = false;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const EffectFit without = search.fit(designs_of(found, i));
-      found[i].gain = current.total() - without.total() - search.penalty_of(found[i].design);
-      if (!search.mechanisms().act(Mechanism::kPrune, found[i].gain <= search.options.least_gain))
-        continue;
-      if (tracing())
-        fmt::print(stderr, "  dropped {} ({:.1f})\n", search.key(found[i].design.effect),
-                   found[i].gain);
-      found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
-      current = without;
-      changed = true;
-      break;
-    }
-  }
-}
-
 bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current) {
   for (std::size_t i = 0; i < found.size(); ++i) {
     for (std::size_t j = i + 1; j < found.size(); ++j) {
@@ -79,7 +60,7 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
   const std::vector<const EffectDesign*> others = designs_of(found, i);
   const EffectFit without = fit_effects(search.evidence, others, &current, {});
   double most =
-      search.scores.gain(others, found[i].design, without) + search.options.least_swap_gain;
+      search.scores.gain(others, found[i].design, without) + search.options.least_reshape_gain;
   const CandidateScore* best = nullptr;
   std::vector<CandidateScore> variants;
   for (std::size_t c = 0; c < search.candidates.size(); ++c) {
@@ -111,46 +92,23 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
   return true;
 }
 
-bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
-            EffectFit& current) {
+void list_rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+                 const EffectFit& current) {
   FoundEffect& f = found[i];
   const std::vector<const EffectDesign*> others = designs_of(found, i);
   const EffectFit without = fit_effects(search.evidence, others, &current, {});
   const std::vector<CandidateScore> scores =
       search.scores.instead_of(f.design, others, without, search.skipped(found));
-  const double own =
+  f.gain =
       search.scores.gain_instead(f.design, f.design, others, without) - search.penalty_of(f.design);
-  f.gain = own;
-  const CandidateScore* challenger = nullptr;
-  if (!scores.empty() && scores.front().gain > own + search.options.least_swap_gain)
-    challenger = &scores.front();
-  if (challenger != nullptr) {
-    FoundEffect rival;
-    rival.design = search.scores.refined(others, *challenger, without);
-    rival.p_value = f.p_value;
-    std::vector<FoundEffect> trial = found;
-    trial[i] = rival;
-    const EffectFit fit = search.fit(designs_of(trial));
-    search.judge(trial, i, fit);
-    if (why_not_named(trial[i], search.options, search.mechanisms()).empty() &&
-        fit.total() > current.total() && search.mechanisms().act(Mechanism::kSwap)) {
-      if (tracing())
-        fmt::print(stderr, "  {} replaces {}\n", search.key(rival.design.effect),
-                   search.key(f.design.effect));
-      found = std::move(trial);
-      current = fit;
-      return true;
-    }
-  }
   f.alternatives.clear();
   const double listed =
       std::max(search.options.largest_alternative_loss, same_within(f, search.options));
   for (const CandidateScore& s : scores) {
-    if (s.gain < own - listed) break;
+    if (s.gain < f.gain - listed) break;
     record_optional(search, s);
-    f.alternatives.emplace_back(search.candidates[s.candidate].effect, own - s.gain);
+    f.alternatives.emplace_back(search.candidates[s.candidate].effect, f.gain - s.gain);
   }
-  return false;
 }
 
 }  // namespace sparflow

@@ -1,12 +1,9 @@
 #pragma once
-/// Moves that correct choices which forward selection made too early: dropping, merging, changing the variant of a law,
-/// swapping. Used by effect_search.cpp only. `current` is the fit of all found effects, before and after.
+/// Moves that correct choices which forward selection made too early: merging, and changing the variant of a law; and the
+/// rivals of what was found. Used by effect_search.cpp only. `current` is the fit of all found effects, before and after.
 #include "diagnosis/selection/search_state.h"
 
 namespace sparflow {
-
-/// Drops effects whose gain beside the others is no more than SearchOptions::least_gain.
-void prune(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current);
 
 /// Replaces two effects by one that explains as much. The first effect of such a pair was chosen while it explained
 /// two causes at once, and the second compensated its error for one of them. @return whether a pair was replaced
@@ -17,9 +14,8 @@ bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit
 bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
              EffectFit& current);
 
-/// Replaces found[i] by a rival that explains more, or else lists its rivals in FoundEffect::alternatives.
-/// @return whether it was replaced
-bool rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
-            EffectFit& current);
+/// Lists the rivals of found[i] in FoundEffect::alternatives.
+void list_rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+                 const EffectFit& current);
 
 }  // namespace sparflow

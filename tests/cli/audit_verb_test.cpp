@@ -27,7 +27,7 @@ TEST_F(Cli, AuditComparesEachMoveWithItsOptimum) {
   EXPECT_NEAR(total.at("saving_J").get<double>(), saving, 1e-6 * saving);
   EXPECT_NEAR(total.at("saving_litres").get<double>(), 0.4 * saving / 3.6e6, 1e-9);
   EXPECT_THAT(o.out, HasSubstr("2 of 2 moves judged"));
-  EXPECT_THAT(slurp(at("a.html")), HasSubstr("Where the difference arises"));
+  EXPECT_THAT(slurp(at("a.html")), HasSubstr("The moves worth changing first"));
 }
 
 TEST_F(Cli, AuditSaysWhatItCannotJudge) {

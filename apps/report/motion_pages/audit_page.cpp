@@ -95,7 +95,7 @@ Table table_of_causes(const Machine& machine, const AuditSums& s) {
   Table table;
   table.title = "Where the difference arises";
   table.note =
-      "Recorded less optimum, over all judged moves, by the model. The first three rows add up to "
+      "Recorded less optimum, over all judged moves, by the model. The first two rows add up to "
       "the "
       "saving, and so do the rows of the cylinders together: work on a cylinder that the optimum "
       "does "
@@ -122,7 +122,8 @@ Table table_of_moves(const AuditResult& result) {
       "by the model. Saving: model less optimum, with one standard deviation of the pressure "
       "models. "
       "Overlap: share of the moving time in which several cylinders move.";
-  table.columns = {{"move"},
+  table.columns = {{"", "", 3},
+                   {"move"},
                    {"measured", "kJ", 4},
                    {"model", "kJ", 4},
                    {"optimum", "kJ", 4},
@@ -137,13 +138,34 @@ Table table_of_moves(const AuditResult& result) {
     const MoveAudit& a = m.audit;
     const bool j = a.judged();
     const double share = 100.0 / std::max(a.recorded.total, 1e-9);
-    table.rows.push_back(
-        {name_of(m), m.measured / 1e3, a.recorded.total > 0.0 ? a.recorded.total / 1e3 : none,
-         j ? a.optimum.total / 1e3 : none, m.bound / 1e3, j ? share * a.saving() : none,
-         j ? share * a.saving_std() : none, j ? 100.0 * overlap(a.recorded) : none,
-         j ? 100.0 * overlap(a.optimum) : none, a.not_judged});
+    table.rows.push_back({static_cast<double>(table.rows.size() + 1), name_of(m), m.measured / 1e3,
+                          a.recorded.total > 0.0 ? a.recorded.total / 1e3 : none,
+                          j ? a.optimum.total / 1e3 : none, m.bound / 1e3,
+                          j ? share * a.saving() : none, j ? share * a.saving_std() : none,
+                          j ? 100.0 * overlap(a.recorded) : none,
+                          j ? 100.0 * overlap(a.optimum) : none, a.not_judged});
   }
   return table;
+}
+
+/// Energies of the moves worth changing first.
+BarChart bars(const AuditResult& result) {
+  BarChart chart;
+  chart.title = "The moves worth changing first";
+  chart.note = "By the model, with the same time, payload, start and end.";
+  chart.value_axis = {"energy", "kJ"};
+  chart.stacked = false;
+  const std::vector<std::size_t> order = result.by_saving();
+  const auto n = static_cast<Index>(std::min(order.size(), kDrawn));
+  Eigen::VectorXd recorded(n), optimum(n);
+  for (Index k = 0; k < n; ++k) {
+    const AuditedMove& m = result.moves[order[static_cast<std::size_t>(k)]];
+    chart.categories.push_back(fmt::format("{:.1f} s", m.from));
+    recorded[k] = m.audit.recorded.total / 1e3;
+    optimum[k] = m.audit.optimum.total / 1e3;
+  }
+  chart.series = {{"recorded", recorded}, {"optimum", optimum}};
+  return chart;
 }
 
 void draw_move(Page& page, const Machine& machine, const AuditedMove& m) {
@@ -303,6 +325,7 @@ Page audit_page(const CraneModel& model, const AuditResult& result) {
           fmt::format("\u00b1 {:.1f} kJ, {:.0f} %", std::sqrt(s.variance) / 1e3, share)},
          {display_number(100.0 * result.at_rest / std::max(result.seconds, 1e-9), 3), "%",
           "of the time no cylinder moves"}});
+    page.plot(bars(result));
     page.table(table_of_causes(machine, s));
   }
   page.table(table_of_moves(result));
