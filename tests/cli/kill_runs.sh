@@ -1,6 +1,6 @@
 #!/bin/bash
 # Kills runs of the verbs at random times and checks that no output is torn, lost or left in half.
-#   tests/cli/kill_runs.sh [COUNT] [PROGRAM] [SEED]      exit code 1 where an output is broken
+#   tests/cli/kill_runs.sh [COUNT] [PROGRAM] [SEED] ["VERB..."]      exit code 1 where an output is broken
 # An output is whole when it has the bytes from before, or those of a whole file: JSON that parses, a page that ends with
 # </html>, a table whose last line ends. A temporary file is left only between naming and renaming; these are counted.
 set -u
@@ -19,7 +19,7 @@ model=$work/model.json
 
 motion=$work/motion.csv
 "$program" plan -p "$reach" --paths 1 -o "$motion" >/dev/null 2>&1 || { echo "plan failed"; exit 1; }
-verbs=(fit compare diagnose selftest extend improve simulate machine plan optimize evaluate strategies pareto demo)
+read -r -a verbs <<<"${4:-fit compare diagnose selftest extend improve simulate machine plan optimize evaluate strategies pareto demo audit benchmark}"
 arguments() {
   case $1 in
     fit) echo "fit -m $crane -l $log -o out.json --report out.html" ;;
@@ -29,6 +29,8 @@ arguments() {
     extend) echo "extend --model $model --add coulomb_friction:boom -l $log -o out.json --report out.html" ;;
     machine) echo "machine $crane --json out.json --report out.html" ;;
     evaluate) echo "evaluate $motion -p $reach -o out.csv --json out.json --report out.html" ;;
+    audit) echo "audit $log --model $model --moves 2 --json out.json --report out.html" ;;
+    benchmark) echo "benchmark $data/scenarios/tuning/tuning_loader_crane_01.yaml --controllers joint_pi --no-optimum --no-bound --csv out.csv --json out.json --report out.html" ;;
     demo) echo "demo --out demo" ;;
     improve) echo "improve --model $model -l $log -o out.json --report out.html" ;;
     simulate) echo "simulate -m $crane --seconds 5 -o out.csv --json out.json" ;;
