@@ -115,8 +115,14 @@ AuditedMove examine(const CraneModel& model, const Found& f, const AuditArgument
         "first.",
         100.0 * out.model_error());
   if (out.audit.judged() && a.bound && !interrupted()) {
-    const EnergyBound bound = energy_bound(model, out.audit.problem);
-    if (bound.valid) out.bound = bound.lower_bound_J;
+    // in a process of its own, which can be ended at any time
+    const ChildResult child = run_in_child(
+        [&] {
+          const EnergyBound bound = energy_bound(model, out.audit.problem);
+          return Packer().number(bound.valid ? bound.lower_bound_J : std::nan("")).bytes();
+        },
+        interrupted);
+    if (child.ok) out.bound = Unpacker(child.bytes).number();
   }
   return out;
 }

@@ -36,6 +36,7 @@ std::string name_of(const AuditedMove& m) {
 
 /// Where most of a saving arises, in words.
 std::string reason(const Machine& machine, const MoveAudit& a) {
+  if (a.saving() <= 0.0) return "nothing to save";
   std::string words = a.by_way >= a.by_pace ? "way and overlap of the cylinders" : "uneven pace";
   std::size_t at = 0;
   double most = 0.0;
@@ -277,18 +278,21 @@ std::string audit_table(const CraneModel& model, const AuditResult& result) {
   const AuditSums s = sums_of(model.machine, result);
   std::string text = headline(result, s) + ".\n";
   if (s.judged > 0) text += explanation(result, s) + "\n";
-  text += fmt::format("\n{:<34} {:>9} {:>9} {:>9} {:>16}  {}\n", "move", "measured", "model",
+  std::size_t wide = 0;
+  for (const AuditedMove& m : result.moves) wide = std::max(wide, name_of(m).size());
+  text += fmt::format("\n{:<{}} {:>9} {:>9} {:>9} {:>16}  {}\n", "move", wide, "measured", "model",
                       "optimum", "saving", "mostly");
-  text += fmt::format("{:<34} {:>9} {:>9} {:>9} {:>16}\n", "", "kJ", "kJ", "kJ", "kJ");
+  text += fmt::format("{:<{}} {:>9} {:>9} {:>9} {:>16}\n", "", wide, "kJ", "kJ", "kJ", "kJ");
   std::size_t shown = 0;
   for (const std::size_t i : result.by_saving()) {
     if (++shown > kDrawn) break;
     const AuditedMove& m = result.moves[i];
     const MoveAudit& a = m.audit;
-    text += fmt::format("{:<34} {:>9} {:>9.1f} {:>9.1f} {:>8.1f} \u00b1 {:>5.1f}  {}\n", name_of(m),
-                        std::isfinite(m.measured) ? fmt::format("{:.1f}", m.measured / 1e3) : "-",
-                        a.recorded.total / 1e3, a.optimum.total / 1e3, a.saving() / 1e3,
-                        a.saving_std() / 1e3, reason(model.machine, a));
+    text +=
+        fmt::format("{:<{}} {:>9} {:>9.1f} {:>9.1f} {:>8.1f} \u00b1 {:>5.1f}  {}\n", name_of(m),
+                    wide, std::isfinite(m.measured) ? fmt::format("{:.1f}", m.measured / 1e3) : "-",
+                    a.recorded.total / 1e3, a.optimum.total / 1e3, a.saving() / 1e3,
+                    a.saving_std() / 1e3, reason(model.machine, a));
   }
   shown = 0;
   for (const AuditedMove& m : result.moves) {
