@@ -16,18 +16,18 @@ Mask any_moves(const MachineSignals& s) {
   return moves;
 }
 
-/// Stretches of motion in a run; rests shorter than `pause` do not end one.
-std::vector<SampleRange> stretches(const MachineSignals& s, const Mask& moves,
-                                   const SampleRange& run, double pause) {
-  std::vector<SampleRange> out;
-  for (Index k = run.begin; k < run.end; ++k) {
-    if (!moves[k]) continue;
-    if (out.empty() || s.time[k] - s.time[out.back().end - 1] >= pause) {
-      out.push_back({k, k + 1});
-    } else {
-      out.back().end = k + 1;
-    }
+/// Stretches of motion; rests shorter than `pause` do not end one.
+std::vector<Segment> stretches(const MachineSignals& s, double pause) {
+  const auto cylinders = static_cast<Index>(s.cylinders.size());
+  Eigen::MatrixXd velocity(s.samples(), cylinders);
+  for (Index i = 0; i < cylinders; ++i) {
+    const CylinderSignals& c = s.cylinders[static_cast<std::size_t>(i)];
+    velocity.col(i) = c.moving.select(c.speed.array(), 0.0);  // one definition of moving
   }
+  SegmentOptions options;
+  options.pause_s = pause;
+  std::vector<Segment> out = find_segments(s.time, velocity, {}, s.runs, options);
+  std::erase_if(out, [](const Segment& segment) { return !segment.moving; });
   return out;
 }
 
@@ -85,10 +85,10 @@ std::vector<RecordedMove> recorded_moves(const MachineSignals& signals,
                                          const MoveOptions& options) {
   const Mask moves = any_moves(signals);
   std::vector<RecordedMove> out;
-  for (const SampleRange& run : signals.runs) {
+  for (const Segment& stretch : stretches(signals, options.pause_s)) {
+    const SampleRange& run = signals.runs[static_cast<std::size_t>(stretch.run)];
     std::vector<SampleRange> parts;
-    for (const SampleRange& stretch : stretches(signals, moves, run, options.pause_s))
-      cut(signals, moves, stretch, options.longest_s, parts);
+    cut(signals, moves, stretch.samples, options.longest_s, parts);
     for (const SampleRange& part : parts) {
       RecordedMove move;
       move.from_rest = part.begin > run.begin;
