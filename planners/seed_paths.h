@@ -15,7 +15,7 @@ struct SeedOptions {
   /// @threshold [paths] 1..1000; chosen: each is a start of the optimiser, which takes much longer
   int count = 8;
   /// Time limit of the search; SeedResult::out_of_time says whether it was hit.
-  /// @threshold [s] 0.1..1e5; chosen: as long as a user waits for a start
+  /// @threshold [s] 0.1..1e5; chosen: the bundled problems need less than a second; beside narrow windows planners improve for some seconds
   double seconds = 5.0;
   /// The same seed gives the same paths unless the time limit is hit.
   std::uint64_t random_seed = 1;  // no threshold: any seed serves

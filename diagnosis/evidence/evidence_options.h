@@ -89,7 +89,8 @@ struct NoiseOptions {
   /// @threshold [1] 1..; chosen: beyond it transient rows have no weight left
   double largest_transient_ratio = 30.0;
   /// Gain in likelihood of a deviation that settles, below which it is constant.
-  /// @threshold [nat] 0..; chosen: as SearchOptions::least_gain, since rows are not quite independent
+  /// @threshold [nat] 0..; chosen: a likelihood ratio of e^10; rows are not quite independent, so that chance gains more than the
+  /// 2 nats of a test of two parameters
   double least_settling_gain = 10.0;
 };
 

@@ -13,7 +13,7 @@ struct Machine;
 
 struct ModelChangeOptions {
   /// Factor by which an RMS error must move to count as changed.
-  /// @threshold [1] 1..1.2; chosen: as ErrorChangeOptions::refit_moves, by which learning anew moves errors
+  /// @threshold [1] 1..1.2; chosen: learning a pressure model anew moves its centres and length scales, and errors by that much
   double moves = 1.02;
   /// Growth of the unexplained share (error_ranking.h) from which a larger error is worse, and likewise for better.
   /// @threshold [1] 0..0.1; chosen: for an energy this is ErrorChangeOptions::energy_moves, two in a thousand of it; the

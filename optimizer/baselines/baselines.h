@@ -37,8 +37,8 @@ struct BaselineMotion {
 
 struct BaselineOptions {
   /// Of the motions' mesh.
-  /// @threshold [intervals] 10..1000; chosen: as OptimizeOptions::intervals
-  int intervals = 100;
+  /// @threshold [intervals] 10..1000; chosen: that of the optimum, so that both have the same mesh error
+  int intervals = OptimizeOptions{}.intervals;
   /// Number of orders whose legs are optimised (optimize_with_modes), cheapest first.
   /// @threshold [1] 0..1000; chosen: time grows with it; estimates rank the orders well enough
   int polished_orders = 4;
@@ -46,11 +46,11 @@ struct BaselineOptions {
   /// @threshold [1] 1..1000; chosen: all orders of four joints
   int most_orders = 24;
   /// Number of trapezoidal time laws tried for the tip line of best redundancy.
-  /// @threshold [1] 1..20; chosen: as PathRedundancyOptions::speed_levels
+  /// @threshold [1] 1..20; chosen: the ends of the range of usual trapezoids, 1.12 and 2 times the mean speed
   int tip_speed_levels = 2;
   /// Relative overshoot that still counts as kept.
-  /// @threshold [1] 0..1e-2; chosen: as OptimizeOptions::limit_tolerance
-  double limit_tolerance = 1e-5;
+  /// @threshold [1] 0..1e-2; chosen: that of the optimum, so that both may do the same
+  double limit_tolerance = OptimizeOptions{}.limit_tolerance;
   OptimizeOptions optimize;  ///< for the legs
 };
 

@@ -20,7 +20,7 @@ namespace sparflow {
 
 struct PathRedundancyOptions {
   /// Of the motion.
-  /// @threshold [intervals] 10..1000; chosen: as OptimizeOptions::intervals
+  /// @threshold [intervals] 10..1000; chosen: the mesh error is then below a thousandth of the energy, as the optimum's
   int intervals = 100;
   /// Number of trapezoidal time laws tried, >= 1: the tip's top speed from 1.12 to 2 times its mean, in equal steps.
   /// @threshold [1] 1..20; chosen: the ends of the range of usual trapezoids; each further level between them takes a
@@ -33,7 +33,7 @@ struct PathRedundancyOptions {
   /// @threshold [1] 1..20; chosen: each takes several times as long as the one before
   int most_grids = 6;
   /// Relative overshoot that still counts as kept.
-  /// @threshold [1] 0..1e-2; chosen: as OptimizeOptions::limit_tolerance
+  /// @threshold [1] 0..1e-2; chosen: rounding of a solve with Ipopt's tolerance
   double limit_tolerance = 1e-5;
   /// Samples per mesh interval at which limits are checked.
   /// @threshold [1] 1..100; chosen: as OptimizeOptions::refine

@@ -64,8 +64,8 @@ struct StrategyOptions {
       true;  ///< optimise the shortest duration, else take that of the baselines and seeds
   bool least_control = true;  ///< solve for the least squared commands at equal duration
   /// Seeds of a thorough search, also solved with the smooth law.
-  /// @threshold [1] 0..100; chosen: as OptimizeOptions::smooth_starts
-  int smooth_seeds = 2;
+  /// @threshold [1] 0..100; chosen: as many as the optimiser solves with the smooth law
+  int smooth_seeds = OptimizeOptions{}.smooth_starts;
   BaselineOptions baselines;
   OptimizeOptions optimize;
   /// Keeps each solve of a search, so that a search that was ended can be resumed; null: none is kept. It must outlive the

@@ -30,7 +30,7 @@ struct EnergyBoundOptions {
   /// @threshold [1] 1e-6..1e-2; chosen: far below what the grid costs the bound
   double goal_accuracy = 2e-4;
   /// Boxes of postures cut at most on the goal set (GoalAccuracy::most_cuts).
-  /// @threshold [boxes] 1..1e9; chosen: as GoalAccuracy::most_cuts
+  /// @threshold [boxes] 1..1e9; chosen: the bundled reaches need some thousands; a million take a minute
   long most_goal_cuts = 1000000;
   WorkProgress progress = {};  ///< called after each part
 };

@@ -97,8 +97,8 @@ struct OptimizeOptions {
   /// @threshold [Pa] 1e3..1e6; chosen: 0.3 bar is below what pressure models know
   double pressure_in_modes = 0.3e5;
   /// Relative tolerance of the last solve.
-  /// @threshold [1] 1e-12..1e-2; chosen: as NlpOptions::tolerance
-  double tolerance = 1e-6;
+  /// @threshold [1] 1e-12..1e-2; chosen: the energy then changes by less than its mesh error
+  double tolerance = NlpOptions{}.tolerance;
   /// Samples per mesh interval at which limits are checked.
   /// @threshold [1] 1..100; chosen: a sixteenth of an interval
   int refine = 16;
@@ -110,7 +110,7 @@ struct OptimizeOptions {
   /// reaches of the loader crane two and ten give the same energies; five leave room for limits that change places
   int tightenings = 5;
   /// Number of starts solved in parallel.
-  /// @threshold [1] 1..1000; chosen: as many as a small computer has cores
+  /// @threshold [1] 1..1000; chosen: the smallest computers of users have two cores; the program asks for the machine's own number
   int processes = 2;
   /// Time limit of one start.
   /// @threshold [s] 1..1e6; chosen: bounds the time of the whole

@@ -14,7 +14,7 @@ struct ReplanOptions {
   /// @threshold [1] 8..500; chosen: a plan must be there within a second
   int intervals = 40;
   /// Smoothing beta, as OptimizeOptions::pressure_in_modes.
-  /// @threshold [Pa] 1e3..1e6; chosen: as OptimizeOptions::pressure_in_modes
+  /// @threshold [Pa] 1e3..1e6; chosen: 0.3 bar is below what pressure models know
   double pressure = 0.3e5;
   /// Relative tolerance of the solve.
   /// @threshold [1] 1e-8..1e-2; chosen: sensors tell the state no better

@@ -12,7 +12,7 @@ namespace sparflow::benchmark {
 
 struct LoopOptions {
   /// Time between two samples of sensors and commands.
-  /// @threshold [s] 0.001..0.1; chosen: as RunOptions::sample_time
+  /// @threshold [s] 0.001..0.1; chosen: 50 Hz is what controllers of mobile machines run at
   double sample_time = 0.02;
   /// Time constant of the filter of the joints' speeds.
   /// @threshold [s] 0..1; chosen: noise of the differences falls to a tenth, and valves are slower
