@@ -41,7 +41,7 @@ BenchmarkedRun run_of(const Machine& machine, const std::string& name) {
     run.motion.q.col(j) = Eigen::Vector3d(r.lo, 0.5 * (r.lo + r.hi), r.hi);
   }
   run.motion.qd = run.motion.qdd = Eigen::MatrixXd::Zero(3, machine.joint_count());
-  run.went_kJ = {{"gained in height", 3.0}, {"meter-in edge", 4.0}};
+  run.went = {{"gained in height", "", 3.0}, {"meter-in edge", "throttled", 4.0}};
   return run;
 }
 
@@ -55,8 +55,8 @@ TEST(BenchmarkPage, DrawsAllFiguresAndNamesEveryFailure) {
   view.machine = load_machine(bundled_file("machines/loader_crane.yaml"));
   view.runs = {run_of(view.machine, "best"), run_of(view.machine, "other <b>")};
   const Page page = benchmark_page(view);
-  // a bar chart, two clouds, two cranes, two charts over time, where it went
-  EXPECT_EQ(page.plot_count(), 8);
+  // a bar chart, two clouds, two cranes, two charts over time, where it went as bars and for each run as a Sankey diagram
+  EXPECT_EQ(page.plot_count(), 10);
   EXPECT_EQ(page.html(), benchmark_page(view).html());
   EXPECT_THAT(page.html(), HasSubstr("its process ended with code 7"));
   EXPECT_THAT(page.html(), HasSubstr("other &lt;b&gt;"));
@@ -67,7 +67,7 @@ TEST(BenchmarkPage, DrawsAllFiguresAndNamesEveryFailure) {
   std::filesystem::remove(path);
   if (!report.available) GTEST_SKIP() << "no chromium";
   EXPECT_THAT(report.errors, IsEmpty());
-  EXPECT_EQ(report.plots_drawn, 8);
+  EXPECT_EQ(report.plots_drawn, 10);
 }
 
 TEST(BenchmarkPage, IsWholeWithoutAnyRunThatWasDone) {

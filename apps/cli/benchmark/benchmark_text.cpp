@@ -106,12 +106,19 @@ BenchmarkedRun run_view(const Row& row) {
       run.motion.q.row(i) = vector_of(row.trace.q[static_cast<std::size_t>(i)]).transpose();
     run.motion.qd = run.motion.qdd = Eigen::MatrixXd::Zero(n, joints);
   }
-  run.went_kJ.emplace_back("gained in height", row.useful / 1e3);
+  using plant::Loss;
+  const auto throttles = [](std::size_t k) {
+    const auto place = static_cast<Loss>(k);
+    return place == Loss::kMeterIn || place == Loss::kMeterOut || place == Loss::kCounterbalance ||
+           place == Loss::kLine || place == Loss::kAntiCavitation;
+  };
+  run.went = {{"gained in height", "", row.useful / 1e3}};
   for (std::size_t k = 0; k < row.loss.size(); ++k)
-    run.went_kJ.emplace_back(plant::kLossWords[k], row.loss[k] / 1e3);
-  run.went_kJ.emplace_back("pump leakage, relief", row.pump_loss / 1e3);
-  run.went_kJ.emplace_back("return line", row.tank_loss / 1e3);
-  run.went_kJ.emplace_back("swing and bending", row.swing_loss / 1e3);
+    run.went.push_back({plant::kLossWords[k], throttles(k) ? "throttled" : "friction and leakage",
+                        row.loss[k] / 1e3});
+  run.went.push_back({"return line", "throttled", row.tank_loss / 1e3});
+  run.went.push_back({"pump leakage, relief", "friction and leakage", row.pump_loss / 1e3});
+  run.went.push_back({"swing and bending", "friction and leakage", row.swing_loss / 1e3});
   return run;
 }
 

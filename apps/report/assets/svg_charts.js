@@ -135,6 +135,59 @@
     };
   };
 
+  /* A Sankey diagram: nodes in columns, bands as wide as the amount, nodes of a column in the order of the spec. */
+  page.kinds.sankey = function (host, spec) {
+    const width = host.clientWidth, height = spec.height || 300, gap = 9, bar = 10, top = 8;
+    const drawing = root(host, width, height);
+    const sum = (flows) => flows.reduce((s, f) => s + f.amount, 0);
+    const nodes = spec.nodes.map((name, i) => {
+      const into = spec.flows.filter((f) => f.to === i), out = spec.flows.filter((f) => f.from === i);
+      return { name, into, out, amount: Math.max(sum(into), sum(out)), column: spec.columns[i], i };
+    });
+    const shown = nodes.filter((n) => n.amount > 0), last = Math.max(1, ...shown.map((n) => n.column));
+    const columns = Array.from({ length: last + 1 }, (_, c) => shown.filter((n) => n.column === c));
+    const fullest = Math.max(1e-300, spec.scale || 0, ...columns.map((c) => sum(c)));
+    const most = Math.max(1, ...columns.map((c) => c.length));
+    const scale = (height - 2 * top - gap * most - 14) / fullest;
+    const text = (n) => `${n.name} ${number(n.amount, 3)}`;
+    const room = 8 + Math.max(0, ...columns[last].map((n) => textWidth(text(n))));
+    const X = (column) => 2 + (column / last) * (width - room - bar - 6);
+    for (const column of columns) {
+      let y = top + 14;
+      for (const n of column) {
+        Object.assign(n, { y, tall: Math.max(1, n.amount * scale), leaves: y, enters: y });
+        y += n.tall + Math.max(gap, 14 - n.tall);
+      }
+    }
+    const color = (n) => theme.color(n.i);
+    for (const f of spec.flows) {
+      if (!(f.amount > 0)) continue;
+      const a = nodes[f.from], b = nodes[f.to], w = f.amount * scale;
+      const x0 = X(a.column) + bar, x1 = X(b.column), m = (x0 + x1) / 2;
+      const band = svg("path", { fill: color(b.out.length ? a : b), "fill-opacity": 0.45, d:
+        `M${x0} ${a.leaves}C${m} ${a.leaves} ${m} ${b.enters} ${x1} ${b.enters}v${w}` +
+        `C${m} ${b.enters + w} ${m} ${a.leaves + w} ${x0} ${a.leaves + w}z` });
+      band.append(svg("title", {}, `${a.name} to ${b.name}: ${number(f.amount)} ${spec.amount.unit}`));
+      drawing.append(band);
+      a.leaves += w;
+      b.enters += w;
+    }
+    for (const n of shown) {
+      drawing.append(svg("rect", { x: X(n.column), y: n.y, width: bar, height: n.tall, fill: color(n) }));
+      if (n.column === last) drawing.append(label(text(n), X(n.column) + bar + 5, n.y + n.tall / 2 + 4, "start", theme.ink()));
+      else drawing.append(label(text(n), X(n.column), n.y - 4, "start", theme.ink()));
+    }
+    if (shown.length === 0) drawing.append(label("no values", width / 2, top + 20, "middle"));
+    const low = Math.max(height, ...shown.map((n) => n.y + n.tall + top));
+    drawing.setAttribute("height", low);
+    drawing.setAttribute("viewBox", `0 0 ${width} ${low}`);
+    return {
+      picture: () => page.rasterised(drawing),
+      rows: () => [["from", "to", titled(spec.amount)]].concat(
+        spec.flows.map((f) => [spec.nodes[f.from], spec.nodes[f.to], f.amount])),
+    };
+  };
+
   /* Colour maps: stops of matplotlib's magma, reversed so that large values are dark, and blue - white - vermilion. */
   const kSequential = ["#fcf0c0", "#fdbc7d", "#f8765c", "#d3436e", "#982d80", "#5f187f", "#231151"];
   const kDiverging = ["#00446b", "#0072b2", "#86bfe0", "#f4f4f2", "#f0a878", "#d55e00", "#803800"];

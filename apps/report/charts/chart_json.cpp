@@ -122,6 +122,28 @@ void check_lines(const LineChart& chart) {
   }
 }
 
+/// Column of each node: one more than the last of those from which something comes.
+std::vector<int> sankey_columns(const SankeyChart& chart) {
+  const auto nodes = static_cast<int>(chart.nodes.size());
+  std::vector<int> columns(chart.nodes.size(), 0);
+  bool moved = true;
+  for (int round = 0; moved; ++round) {
+    SPARFLOW_CHECK(round <= nodes, fmt::format("diagram \"{}\": flows in a circle", chart.title));
+    moved = false;
+    for (const SankeyFlow& f : chart.flows) {
+      SPARFLOW_CHECK(
+          f.from >= 0 && f.to >= 0 && f.from < nodes && f.to < nodes && f.amount >= 0.0,
+          fmt::format("diagram \"{}\": a flow without nodes or below zero", chart.title));
+      int& to = columns[static_cast<std::size_t>(f.to)];
+      const int from = columns[static_cast<std::size_t>(f.from)];
+      if (to > from) continue;
+      to = from + 1;
+      moved = true;
+    }
+  }
+  return columns;
+}
+
 }  // namespace
 
 json number_json(double value, int digits) {
@@ -225,6 +247,20 @@ json chart_json(const BarChart& chart, Index /*most_points*/) {
                              {"color", color_number(s.color, next_color)},
                              {"values", numbers(s.values, kValueDigits)}});
   }
+  return out;
+}
+
+json chart_json(const SankeyChart& chart, Index /*most_points*/) {
+  json out = base("sankey", chart);
+  out["amount"] = quantity(chart.amount);
+  out["nodes"] = chart.nodes;
+  out["scale"] = number_json(chart.scale, kValueDigits);
+  out["flows"] = json::array();
+  const std::vector<int> columns = sankey_columns(chart);
+  out["columns"] = columns;
+  for (const SankeyFlow& f : chart.flows)
+    out["flows"].push_back(
+        {{"from", f.from}, {"to", f.to}, {"amount", number_json(f.amount, kValueDigits)}});
   return out;
 }
 

@@ -10,6 +10,7 @@ namespace sparflow {
 nlohmann::json chart_json(const LineChart& chart, Eigen::Index most_points);
 nlohmann::json chart_json(const ScatterChart& chart, Eigen::Index most_points);
 nlohmann::json chart_json(const BarChart& chart, Eigen::Index most_points);
+nlohmann::json chart_json(const SankeyChart& chart, Eigen::Index most_points);
 nlohmann::json chart_json(const HeatMap& chart, Eigen::Index most_points);
 nlohmann::json chart_json(const CraneDrawing& chart, Eigen::Index most_points);
 

@@ -93,6 +93,20 @@ struct BarChart : Figure {
   bool stacked = true;  ///< false: side by side
 };
 
+/// An amount that goes from one node of a Sankey diagram to another; nodes by number.
+struct SankeyFlow {
+  int from = 0, to = 0;
+  double amount = 0.0;  ///< >= 0, in the diagram's unit
+};
+
+/// Where an amount comes from and where it goes (Sankey 1898): nodes from left to right, bands as wide as what flows.
+struct SankeyChart : Figure {
+  Quantity amount;
+  std::vector<std::string> nodes;  ///< a flow's first node stands left of its second one
+  std::vector<SankeyFlow> flows;   ///< in the order in which they leave a node, without a circle
+  double scale = 0.0;  ///< amount that fills the height; 0: what this diagram's fullest column has
+};
+
 /// A scalar over the crane's working area.
 struct HeatMap : Figure {
   Quantity x_axis = {"x", "m"};

@@ -144,14 +144,67 @@ BarChart where_it_went(const BenchmarkView& view) {
       "and heat by place.";
   chart.value_axis = {"energy", "kJ"};
   for (const BenchmarkedRun& r : view.runs) chart.categories.push_back(r.controller);
-  for (std::size_t place = 0; !view.runs.empty() && place < view.runs[0].went_kJ.size(); ++place) {
-    BarSeries series{view.runs[0].went_kJ[place].first,
+  for (std::size_t place = 0; !view.runs.empty() && place < view.runs[0].went.size(); ++place) {
+    BarSeries series{view.runs[0].went[place].name,
                      Eigen::VectorXd(static_cast<Eigen::Index>(view.runs.size()))};
     for (std::size_t k = 0; k < view.runs.size(); ++k)
-      series.values[static_cast<Eigen::Index>(k)] = view.runs[k].went_kJ[place].second;
+      series.values[static_cast<Eigen::Index>(k)] = view.runs[k].went[place].kJ;
     chart.series.push_back(std::move(series));
   }
   return chart;
+}
+
+double came_in(const BenchmarkedRun& run) {
+  double sum = 0.0;
+  for (const EnergyPlace& p : run.went) sum += std::max(0.0, p.kJ);
+  return sum;
+}
+
+/// Pumps, and height that was given, on the left; what was gained and heat by place on the right.
+SankeyChart sankey(const BenchmarkedRun& run, double scale) {
+  SankeyChart chart;
+  chart.title = "Where the energy went: " + run.controller;
+  chart.amount = {"energy", "kJ"};
+  chart.width = FigureWidth::kHalf;
+  chart.scale = scale;
+  const auto node = [&](const std::string& name) {
+    const auto at = std::find(chart.nodes.begin(), chart.nodes.end(), name);
+    if (at != chart.nodes.end()) return static_cast<int>(at - chart.nodes.begin());
+    chart.nodes.push_back(name);
+    return static_cast<int>(chart.nodes.size()) - 1;
+  };
+  double given = 0.0;
+  for (const EnergyPlace& p : run.went) given += std::max(0.0, -p.kJ);
+  const int pumps = node("pumps"), oil = node("oil");
+  chart.flows.push_back({pumps, oil, std::max(0.0, came_in(run) - given)});
+  if (given > 0.0) chart.flows.push_back({node("height given"), oil, given});
+  std::vector<std::pair<int, double>> groups;
+  std::vector<SankeyFlow> places;
+  for (const EnergyPlace& p : run.went) {
+    const double kJ = std::max(0.0, p.kJ);
+    if (p.group.empty()) {
+      if (kJ > 0.0) chart.flows.push_back({oil, node(p.name), kJ});
+      continue;
+    }
+    const int group = node(p.group);
+    const auto known =
+        std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == group; });
+    if (known == groups.end())
+      groups.emplace_back(group, kJ);
+    else
+      known->second += kJ;
+    places.push_back({group, node(p.name), kJ});
+  }
+  for (const auto& [group, kJ] : groups) chart.flows.push_back({oil, group, kJ});
+  chart.flows.insert(chart.flows.end(), places.begin(), places.end());
+  return chart;
+}
+
+/// All diagrams of a scenario have one scale, so that their bands can be compared.
+void add_sankeys(Page& page, const BenchmarkView& view) {
+  double most = 0.0;
+  for (const BenchmarkedRun& run : view.runs) most = std::max(most, came_in(run));
+  for (const BenchmarkedRun& run : view.runs) page.plot(sankey(run, most));
 }
 
 void add_cranes(Page& page, const BenchmarkView& view) {
@@ -191,6 +244,7 @@ Page benchmark_page(const BenchmarkView& view) {
     add_cranes(page, view);
     add_over_time(page, view);
     page.plot(where_it_went(view));
+    add_sankeys(page, view);
   }
   if (!view.failures.empty()) {
     page.section("Failures");

@@ -21,12 +21,18 @@ struct BenchmarkedController {
   Eigen::VectorXd reference_energy;  ///< [kJ] of the reference in the same scenario, NaN: none
 };
 
+/// A place where energy of a run went.
+struct EnergyPlace {
+  std::string name, group;  ///< in words; group "" for what machine and payload gained in height
+  double kJ = 0.0;
+};
+
 /// One run of the scenario shown.
 struct BenchmarkedRun {
   std::string controller;
   Trajectory motion;  ///< true positions
   Eigen::VectorXd t, power_kW, loss_kW;
-  std::vector<std::pair<std::string, double>> went_kJ;  ///< where the energy went, by place
+  std::vector<EnergyPlace> went;  ///< all of the pumps' work, in the same order for every run
 };
 
 struct BenchmarkView {

@@ -184,6 +184,7 @@ void Page::table(Table table) { items_.emplace_back(std::move(table)); }
 void Page::plot(LineChart chart) { items_.emplace_back(std::move(chart)); }
 void Page::plot(ScatterChart chart) { items_.emplace_back(std::move(chart)); }
 void Page::plot(BarChart chart) { items_.emplace_back(std::move(chart)); }
+void Page::plot(SankeyChart chart) { items_.emplace_back(std::move(chart)); }
 void Page::plot(HeatMap chart) { items_.emplace_back(std::move(chart)); }
 void Page::plot(CraneDrawing chart) { items_.emplace_back(std::move(chart)); }
 

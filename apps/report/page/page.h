@@ -61,6 +61,7 @@ class Page {
   void plot(LineChart chart);
   void plot(ScatterChart chart);
   void plot(BarChart chart);
+  void plot(SankeyChart chart);
   void plot(HeatMap chart);
   void plot(CraneDrawing chart);
 
@@ -84,7 +85,7 @@ class Page {
     std::vector<Tile> tiles;
   };
   using Item = std::variant<Heading, Paragraph, Details, Tiles, Table, LineChart, ScatterChart,
-                            BarChart, HeatMap, CraneDrawing>;
+                            BarChart, SankeyChart, HeatMap, CraneDrawing>;
 
   std::string body(Eigen::Index most_points) const;
 
