@@ -102,26 +102,43 @@ std::vector<RecordedMove> recorded_moves(const MachineSignals& signals,
   return out;
 }
 
+PumpTrace measured_pumps(const Machine& machine, const MachineSignals& signals,
+                         const SampleRange& range) {
+  const auto pumps = static_cast<Index>(machine.pumps.size());
+  PumpTrace trace;
+  trace.t = signals.time.segment(range.begin, range.size());
+  trace.flow = Eigen::MatrixXd::Zero(range.size(), pumps);
+  trace.pressure = Eigen::MatrixXd::Constant(range.size(), pumps, std::nan(""));
+  for (Index p = 0; p < pumps; ++p) {
+    const PumpSignals& pump = signals.pumps[static_cast<std::size_t>(p)];
+    if (pump.pressure.size() > 0)
+      trace.pressure.col(p) = pump.pressure.segment(range.begin, range.size());
+  }
+  for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
+    const int p = machine.pump_of_cylinder(static_cast<int>(i));
+    if (p >= 0) trace.flow.col(p) += signals.cylinders[i].flow.segment(range.begin, range.size());
+  }
+  return trace;
+}
+
 std::vector<double> measured_energy(const Machine& machine, const MachineSignals& signals,
                                     const SampleRange& range) {
+  const PumpTrace trace = measured_pumps(machine, signals, range);
   std::vector<double> energy(machine.pumps.size(), 0.0);
   for (std::size_t p = 0; p < energy.size(); ++p) {
+    const auto column = static_cast<Index>(p);
     if (signals.pumps[p].pressure.size() == 0) {
       energy[p] = std::numeric_limits<double>::quiet_NaN();
       continue;
     }
     const auto power = [&](Index k) {
-      double flow = 0.0;
-      for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
-        if (machine.pump_of_cylinder(static_cast<int>(i)) == static_cast<int>(p))
-          flow += signals.cylinders[i].flow[k];
-      }
-      return flow == 0.0 ? 0.0 : signals.pumps[p].pressure[k] * flow;
+      const double flow = trace.flow(k, column);
+      return flow == 0.0 ? 0.0 : trace.pressure(k, column) * flow;
     };
-    double before = power(range.begin);
-    for (Index k = range.begin + 1; k < range.end; ++k) {
+    double before = power(0);
+    for (Index k = 1; k < trace.t.size(); ++k) {
       const double now = power(k);
-      energy[p] += 0.5 * (before + now) * (signals.time[k] - signals.time[k - 1]);
+      energy[p] += 0.5 * (before + now) * (trace.t[k] - trace.t[k - 1]);
       before = now;
     }
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "identification/signals/signals.h"
+#include "models/hydraulics/engine_map.h"
 
 namespace sparflow {
 
@@ -35,6 +36,10 @@ std::vector<RecordedMove> recorded_moves(const MachineSignals& signals,
 /// for a pump whose pressure the log lacks.
 std::vector<double> measured_energy(const Machine& machine, const MachineSignals& signals,
                                     const SampleRange& range);
+
+/// The pumps' logged pressures and the flows of the measured speeds; pressures are not numbers for a pump that the log lacks.
+PumpTrace measured_pumps(const Machine& machine, const MachineSignals& signals,
+                         const SampleRange& range);
 
 /// Time in which no cylinder moves, of the gap-free stretches of a log [s].
 double time_at_rest(const MachineSignals& signals);

@@ -102,6 +102,24 @@ MotionProblem audit_problem(const Machine& machine, const Trajectory& recorded, 
   return problem;
 }
 
+PumpTrace pumps_along(const CraneModel& model, const Trajectory& motion, double payload) {
+  Chain chain(model);
+  PumpTrace trace;
+  trace.t = motion.t;
+  trace.flow.resize(motion.size(), static_cast<Index>(model.machine.pumps.size()));
+  trace.pressure.resize(motion.size(), trace.flow.cols());
+  for (Index k = 0; k < motion.size(); ++k) {
+    const MachineState& s =
+        chain.evaluate({motion.q.row(k), motion.qd.row(k), motion.qdd.row(k)}, payload);
+    for (Index p = 0; p < trace.flow.cols(); ++p) {
+      const PumpState& pump = s.pumps[static_cast<std::size_t>(p)];
+      trace.flow(k, p) = pump.flow;
+      trace.pressure(k, p) = pump.pressure;
+    }
+  }
+  return trace;
+}
+
 MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double payload,
                      const MoveAuditOptions& options) {
   MoveAudit audit;

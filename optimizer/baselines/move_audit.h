@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "models/hydraulics/engine_map.h"
 #include "optimizer/solve/optimize.h"
 
 namespace sparflow {
@@ -47,6 +48,9 @@ struct MoveAudit {
 
 /// The problem of a move to its recorded posture: the machine's limits, widened to what the recorded motion did.
 MotionProblem audit_problem(const Machine& machine, const Trajectory& recorded, double payload);
+
+/// What the model's pumps give along a motion, at its rows.
+PumpTrace pumps_along(const CraneModel& model, const Trajectory& motion, double payload);
 
 /// @param recorded from rest to rest, at least two rows  @param payload [kg]
 MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double payload,

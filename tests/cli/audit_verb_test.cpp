@@ -30,6 +30,38 @@ TEST_F(Cli, AuditComparesEachMoveWithItsOptimum) {
   EXPECT_THAT(slurp(at("a.html")), HasSubstr("The moves worth changing first"));
 }
 
+TEST_F(Cli, AuditCountsLitresByTheMapOfEngineAndPump) {
+  // 0.3 l/kWh at any power and 2 l/h idle: litres follow from energies by hand
+  write(
+      "engine.yaml",
+      "engine: {power_kW: [0, 100], fuel_l_h: [2, 32]}\n"
+      "pump: {pressure_bar: [0, 400], flow_lpm: [0, 200], efficiency: [[0.8, 0.8], [0.8, 0.8]]}\n");
+  const std::string call = "audit " + kTest + kAudited + " --moves 1 --no-bound --engine-map ";
+  const Outcome o = run(call + at("engine.yaml") + " --json " + at("a.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json a = test_support::parsed_json(slurp(at("a.json")));
+  const json& move = a.at("moves").at(0);
+  const double seconds = move.at("t_s").at(1).get<double>() - move.at("t_s").at(0).get<double>();
+  const auto litres = [&](const json& joules) {
+    return 2.0 * seconds / 3600.0 + 0.3 * joules.get<double>() / 0.8 / 3.6e6;
+  };
+  // the trapezoidal rule over the rows against the exact integral over them
+  EXPECT_NEAR(move.at("model_litres").get<double>() / litres(move.at("model_J")), 1.0, 5e-3);
+  EXPECT_NEAR(move.at("optimum_litres").get<double>() / litres(move.at("optimum_J")), 1.0, 5e-3);
+  EXPECT_NEAR(a.at("fuel_at_rest_litres").get<double>(),
+              2.0 * a.at("at_rest_s").get<double>() / 3600.0, 1e-9);
+  EXPECT_GT(a.at("fuel_litres"), a.at("fuel_at_rest_litres"));
+  EXPECT_THAT(o.out, HasSubstr("By the map of engine and pump the logs took"));
+
+  write("twisted.yaml",
+        "engine: {power_kW: [0, 20, 10], fuel_l_h: [2, 3, 4]}\npump: {efficiency: 0.9}\n");
+  const Outcome twisted = run(call + at("twisted.yaml"));
+  EXPECT_EQ(twisted.code, 3);
+  EXPECT_THAT(twisted.err, HasSubstr("twisted.yaml:1:"));
+  EXPECT_THAT(twisted.err, HasSubstr("ascending order"));
+  EXPECT_EQ(run(call + at("engine.yaml") + " --litres-per-kwh 0.3").code, 2);
+}
+
 TEST_F(Cli, AuditSaysWhatItCannotJudge) {
   const std::string text = slurp(kTest);
   std::istringstream lines(text);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numeric>
+#include <optional>
 
 #include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
@@ -13,6 +14,7 @@
 #include "apps/report/motion_pages/audit_page.h"
 #include "identification/signals/moves.h"
 #include "identification/signals/recorded_motion.h"
+#include "models/files/engine_map_file.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
 #include "optimizer/bounds/energy_bound.h"
@@ -23,10 +25,11 @@ namespace sparflow::cli {
 namespace {
 
 struct AuditArguments {
-  std::string model, mapping, motions;
+  std::string model, mapping, motions, engine_map;
   std::vector<std::string> logs;
   double payload = -1.0;
   double litres = 0.0;
+  std::optional<EngineMap> engine;  ///< of the file engine_map
   int most = 40;
   int processes = 0;
   MoveOptions cutting;
@@ -124,7 +127,20 @@ AuditedMove examine(const CraneModel& model, const Found& f, const AuditArgument
         interrupted);
     if (child.ok) out.bound = Unpacker(child.bytes).number();
   }
+  if (out.audit.judged() && a.engine) {
+    out.fuel_recorded = fuel_of(*a.engine, pumps_along(model, out.recorded, out.payload));
+    out.fuel_optimum = fuel_of(*a.engine, pumps_along(model, out.audit.best, out.payload));
+  }
   return out;
+}
+
+/// Adds the fuel of a log, by its logged pressures.
+void add_fuel(const Machine& machine, const EngineMap& engine, const MachineSignals& signals,
+              AuditResult& result) {
+  result.engine_map = true;
+  for (const SampleRange& run : signals.runs)
+    result.fuel += fuel_of(engine, measured_pumps(machine, signals, run));
+  result.fuel_at_rest += engine.fuel_rate(0.0) * time_at_rest(signals);
 }
 
 /// Writes the proposed motion of each judged move to move_01.csv and so on, numbered as on the page.
@@ -160,10 +176,11 @@ void examine_all(const CraneModel& model, const std::vector<Found>& found, const
   result.interrupted = interrupted();
 }
 
-int run(const AuditArguments& a) {
+int run(AuditArguments a) {
   std::vector<NamedFile> inputs = named("LOG", a.logs);
   inputs.push_back({"--model", a.model});
   inputs.push_back({"--mapping", a.mapping});
+  inputs.push_back({"--engine-map", a.engine_map});
   check_outputs_apart("audit", a.outputs.files(), inputs);
   a.outputs.check();
   if (!a.motions.empty()) {
@@ -171,6 +188,7 @@ int run(const AuditArguments& a) {
     std::filesystem::create_directories(a.motions, error);
     check_writable(a.motions + "/move_01.csv");
   }
+  if (!a.engine_map.empty()) a.engine = load_engine_map(a.engine_map);
   const CraneModel model = load_model_with_warnings(a.model);
   const std::vector<std::string> missing = model.missing();
   if (!missing.empty())
@@ -188,6 +206,7 @@ int run(const AuditArguments& a) {
     const MachineSignals& s = signals.back();
     for (const SampleRange& run : s.runs) result.seconds += s.time[run.end - 1] - s.time[run.begin];
     result.at_rest += time_at_rest(s);
+    if (a.engine) add_fuel(model.machine, *a.engine, s, result);
     payload_known = payload_known && (s.payload_measured || a.payload >= 0.0);
     for (const PumpSignals& p : s.pumps) pressure_known = pressure_known && p.pressure.size() > 0;
   }
@@ -233,11 +252,16 @@ void add_audit_verb(CLI::App& app, int& code) {
   verb->add_option("--moves", a->most, "moves examined at most: those with the longest way")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
+  CLI::Option* litres = verb->add_option(
+      "--litres-per-kwh", a->litres,
+      "fuel for each kWh of hydraulic energy, where no map of the engine is at hand");
+  litres->check(number_from(0.0, 10.0));
   verb->add_option(
-          "--litres-per-kwh", a->litres,
-          "fuel for each kWh of hydraulic energy, by the map of engine and pump; absent: no "
-          "litres are told")
-      ->check(number_from(0.0, 10.0));
+          "--engine-map", a->engine_map,
+          "fuel of the engine over its power, and efficiency of the pump (YAML): litres over "
+          "the log, at rest, and saved")
+      ->type_name("FILE")
+      ->excludes(litres);
   verb->add_option("--motions", a->motions,
                    "folder for the proposed motion of each judged move (move_01.csv, ...)")
       ->type_name("DIR");

@@ -17,6 +17,7 @@ using Eigen::Index;
 using nlohmann::json;
 
 constexpr double kJoulesPerKWh = 3.6e6;
+constexpr double kLitresPerCubicMetre = 1e3;
 /// Moves that are listed and drawn.
 constexpr std::size_t kDrawn = 10;
 
@@ -89,6 +90,16 @@ std::string explanation(const AuditResult& result, const AuditSums& s) {
     text += fmt::format(" The model's energy of the recorded moves is {:+.1f} % off the measured.",
                         100.0 * (s.recorded / s.measured - 1.0));
   text += fmt::format(" No cylinder moves in {:.0f} of {:.0f} s.", result.at_rest, result.seconds);
+  if (!result.engine_map) return text;
+  if (std::isfinite(result.fuel))
+    text += fmt::format(
+        " By the map of engine and pump the logs took {:.3g} litres of fuel, {:.3g} of them while "
+        "no "
+        "cylinder moved.",
+        result.fuel * kLitresPerCubicMetre, result.fuel_at_rest * kLitresPerCubicMetre);
+  text +=
+      fmt::format(" The judged moves take {:.3g} litres by the model, the optimum {:.3g}.",
+                  s.fuel_recorded * kLitresPerCubicMetre, s.fuel_optimum * kLitresPerCubicMetre);
   return text;
 }
 
@@ -209,6 +220,8 @@ AuditSums sums_of(const Machine& machine, const AuditResult& result) {
     s.by_posture += a.by_posture;
     s.by_posture_potential += a.by_posture_potential;
     s.measured += m.measured;
+    s.fuel_recorded += m.fuel_recorded;
+    s.fuel_optimum += m.fuel_optimum;
     for (std::size_t i = 0; i < s.useful.size(); ++i) {
       s.throttling[i] += a.recorded.throttling[i] - a.optimum.throttling[i];
       s.useful[i] += a.recorded.useful[i] - a.optimum.useful[i];
@@ -247,6 +260,13 @@ std::string audit_json(const CraneModel& model, const AuditResult& result) {
                   {"work_J", by_cylinder(s.useful)}};
   if (result.litres_per_kWh > 0.0)
     out["total"]["saving_litres"] = s.saving() / kJoulesPerKWh * result.litres_per_kWh;
+  if (result.engine_map) {
+    out["fuel_litres"] = number(result.fuel * kLitresPerCubicMetre);
+    out["fuel_at_rest_litres"] = number(result.fuel_at_rest * kLitresPerCubicMetre);
+    out["total"]["model_litres"] = s.fuel_recorded * kLitresPerCubicMetre;
+    out["total"]["optimum_litres"] = s.fuel_optimum * kLitresPerCubicMetre;
+    out["total"]["saving_litres"] = (s.fuel_recorded - s.fuel_optimum) * kLitresPerCubicMetre;
+  }
   out["moves"] = json::array();
   for (const AuditedMove& m : result.moves) {
     const MoveAudit& a = m.audit;
@@ -263,6 +283,10 @@ std::string audit_json(const CraneModel& model, const AuditResult& result) {
       move["saving_J"] = a.saving();
       move["saving_std_J"] = a.saving_std();
       move["by"] = {{"pace", a.by_pace}, {"way", a.by_way}};
+      if (result.engine_map) {
+        move["model_litres"] = m.fuel_recorded * kLitresPerCubicMetre;
+        move["optimum_litres"] = m.fuel_optimum * kLitresPerCubicMetre;
+      }
       move["end_posture_J"] = a.by_posture;
       move["end_posture_potential_J"] = a.by_posture_potential;
       move["overlap"] = {{"recorded", overlap(a.recorded)}, {"optimum", overlap(a.optimum)}};

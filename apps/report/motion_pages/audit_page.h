@@ -18,6 +18,8 @@ struct AuditedMove {
   double bound = std::numeric_limits<double>::quiet_NaN();  ///< [J] estimated lower bound
   Trajectory recorded;
   MoveAudit audit;
+  /// Fuel by the map of engine and pump, of the recorded motion by the model and of the optimum. [m^3]
+  double fuel_recorded = 0.0, fuel_optimum = 0.0;
 
   /// Model over measured energy of the recorded motion, less one.
   double model_error() const { return audit.recorded.total / measured - 1.0; }
@@ -29,6 +31,9 @@ struct AuditResult {
   double at_rest = 0.0;            ///< [s] of these, no cylinder moves
   int not_examined = 0;            ///< further moves, beyond the largest number asked for
   double litres_per_kWh = 0.0;     ///< fuel for each kWh of hydraulic energy; 0 = not told
+  bool engine_map = false;         ///< whether the fuels below and of the moves are known
+  double fuel = 0.0;  ///< [m^3] of all logs, gaps left out; not a number without logged pressures
+  double fuel_at_rest = 0.0;       ///< [m^3] of these, while no cylinder moves
   std::vector<std::string> notes;  ///< whole sentences
   bool interrupted = false;
 
@@ -43,6 +48,7 @@ struct AuditSums {
   double by_pace = 0.0, by_way = 0.0;
   double by_posture = 0.0, by_posture_potential = 0.0;  ///< besides the saving
   double measured = 0.0;                                ///< not a number where a move has none
+  double fuel_recorded = 0.0, fuel_optimum = 0.0;       ///< [m^3]
   std::vector<double> throttling;                       ///< recorded less optimum, by cylinder
   std::vector<double> useful;                           ///< the same of the work on the cylinders
   double saving() const { return recorded - optimum; }
