@@ -12,11 +12,13 @@ namespace {
 using Eigen::Index;
 using Sign = Quantity::Sign;
 
+// no threshold: units
 constexpr double kCubicMetresPerLitre = 1e-3;
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kGramsPerKilogram = 1e3;
 constexpr double kWattsPerKilowatt = 1e3;
 
+// no threshold: units, and sizes beyond which a value has another unit than it should
 constexpr Quantity kPower{"power at the shaft", "kW", Sign::kNonNegative, kWattsPerKilowatt, 1e5};
 constexpr Quantity kFuel{"fuel", "l/h", Sign::kNonNegative, kCubicMetresPerLitre / kSecondsPerHour,
                          1e5};

@@ -109,8 +109,8 @@ PumpTrace pumps_along(const CraneModel& model, const Trajectory& motion, double 
   trace.flow.resize(motion.size(), static_cast<Index>(model.machine.pumps.size()));
   trace.pressure.resize(motion.size(), trace.flow.cols());
   for (Index k = 0; k < motion.size(); ++k) {
-    const MachineState& s =
-        chain.evaluate({motion.q.row(k), motion.qd.row(k), motion.qdd.row(k)}, payload);
+    const Eigen::VectorXd q = motion.q.row(k), qd = motion.qd.row(k), qdd = motion.qdd.row(k);
+    const MachineState& s = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
     for (Index p = 0; p < trace.flow.cols(); ++p) {
       const PumpState& pump = s.pumps[static_cast<std::size_t>(p)];
       trace.flow(k, p) = pump.flow;
