@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "identification/log/recordings/mdf/mdf.h"
+#include "identification/log/recordings/mdf/mdf_block.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -40,7 +42,9 @@ void make_names_unique(Recording* recording) {
 }  // namespace
 
 const std::vector<RecordingFormat>& recording_formats() {
-  static const std::vector<RecordingFormat> formats = {};
+  static const std::vector<RecordingFormat> formats = {
+      {"MDF 4", is_mdf, read_mdf},
+  };
   return formats;
 }
 

@@ -111,12 +111,12 @@ class DbcReader {
 
  private:
   [[noreturn]] void fail(const Token& token, const std::string& expected) const {
-    throw InputError({file_, token.line, 0}, "",
-                     fmt::format("found {}, expected {}",
-                                 token.kind == Token::Kind::kEnd
-                                     ? std::string("the end of the file")
-                                     : "\"" + printable(token.text) + "\"",
-                                 expected));
+    throw InputError(
+        {file_, token.line, 0}, "",
+        fmt::format("found {}, expected {}",
+                    token.kind == Token::Kind::kEnd ? std::string("the end of the file")
+                                                    : "\"" + printable(token.text) + "\"",
+                    expected));
   }
   Token word(const char* expected) {
     const Token token = tokens_.next();
@@ -161,8 +161,8 @@ class DbcReader {
              !tokens_.peek().is("BU_") && !tokens_.peek().is("BO_")) {
         tokens_.next();
       }
-    } else if (token.kind == Token::Kind::kWord && token.text.ends_with('_') &&
-               !token.is("BS_") && !token.is("BU_")) {
+    } else if (token.kind == Token::Kind::kWord && token.text.ends_with('_') && !token.is("BS_") &&
+               !token.is("BU_")) {
       skip();
     }
   }
@@ -221,7 +221,8 @@ class DbcReader {
         text.remove_suffix(1);
       }
       if (text.starts_with('m')) {
-        by = {true, number<std::uint64_t>(multiplex, text.substr(1), "a multiplexor's value, as m0")};
+        by = {true,
+              number<std::uint64_t>(multiplex, text.substr(1), "a multiplexor's value, as m0")};
       } else if (!text.empty()) {
         fail(multiplex, "\":\" or a mark of multiplexing (M, m0, m0M)");
       }
@@ -259,12 +260,11 @@ class DbcReader {
 
   void add_signal(DbcSignal signal, const Switched& by, const Token& length) {
     if (signal.length > 64) {
-      dbc_.warnings.push_back(fmt::format("{}:{}: signal {} left out: {} bits are no number",
-                                          file_, signal.line, signal.name, signal.length));
+      dbc_.warnings.push_back(fmt::format("{}:{}: signal {} left out: {} bits are no number", file_,
+                                          signal.line, signal.name, signal.length));
       return;
     }
-    if (signal.length == 0 || signal.start >= kFrameBits ||
-        8 * signal.bytes() > kFrameBits) {
+    if (signal.length == 0 || signal.start >= kFrameBits || 8 * signal.bytes() > kFrameBits) {
       fail(length, "a signal within the 64 bytes of the longest frame");
     }
     if (current_ == &ignored_) return;
@@ -279,7 +279,8 @@ class DbcReader {
 
   /// The signal that a statement names, or null for one that is unknown or left out.
   DbcSignal* named(const Token& id, const Token& name) {
-    const auto message = by_id_.find(number<std::uint32_t>(id, id.text, "the identifier of a message"));
+    const auto message =
+        by_id_.find(number<std::uint32_t>(id, id.text, "the identifier of a message"));
     if (message == by_id_.end()) return nullptr;
     const auto signal = by_name_.find({message->second, std::string(name.text)});
     if (signal == by_name_.end()) return nullptr;
@@ -324,9 +325,8 @@ class DbcReader {
       const std::size_t dash = part.find('-');
       const char* expected = "ranges of a multiplexor's values, as 0-3, 7-7";
       const auto from = number<std::uint64_t>(parent, part.substr(0, dash), expected);
-      const auto to = dash == part.npos
-                          ? from
-                          : number<std::uint64_t>(parent, part.substr(dash + 1), expected);
+      const auto to =
+          dash == part.npos ? from : number<std::uint64_t>(parent, part.substr(dash + 1), expected);
       signal->switches.emplace_back(from, to);
     }
   }

@@ -14,14 +14,16 @@ namespace sparflow {
 struct DbcSignal {
   enum class Kind { kUnsigned, kSigned, kFloat, kDouble };
   std::string name, unit, comment;
-  int line = 0;             ///< 1-based, in the file
-  std::uint32_t start = 0;  ///< bit 8 * byte + bit of the byte: the lowest bit of an Intel signal, the highest of a Motorola one
+  int line = 0;  ///< 1-based, in the file
+  std::uint32_t start =
+      0;  ///< bit 8 * byte + bit of the byte: the lowest bit of an Intel signal, the highest of a Motorola one
   std::uint32_t length = 0;  ///< [bit] 1 to 64
-  bool big_endian = false;   ///< Motorola: from the highest bit down, then to bit 7 of the next byte
+  bool big_endian = false;  ///< Motorola: from the highest bit down, then to bit 7 of the next byte
   Kind kind = Kind::kUnsigned;
   double factor = 1.0, offset = 0.0;  ///< value = factor * number + offset
   bool multiplexor = false;
-  int parent = -1;  ///< the multiplexor that switches it, as index in the message; -1 = always there
+  int parent =
+      -1;  ///< the multiplexor that switches it, as index in the message; -1 = always there
   std::vector<std::pair<std::uint64_t, std::uint64_t>> switches;  ///< values of it, ends included
   std::uint32_t bytes() const;                                    ///< that a frame must have
 };

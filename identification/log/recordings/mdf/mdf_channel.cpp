@@ -98,8 +98,7 @@ class Outline {
     if (channel.unit.empty()) channel.unit = channel.conversion->unit();
     channel.comment = file_.text(block.link(7));
     const std::uint64_t part = block.link(1);
-    const std::string_view composition =
-        part == 0 ? std::string_view{} : file_.block(part, "").id;
+    const std::string_view composition = part == 0 ? std::string_view{} : file_.block(part, "").id;
     channel.array = composition == "CA";
     channel.structure = composition == "CN";
     group->channels.push_back(std::move(channel));

@@ -137,8 +137,8 @@ void MdfConversions::read_formula(const MdfBlock& block, MdfConversion* rule) {
   try {
     rule->formula_ = Expression::parse(text, grammar);
   } catch (const TextError& error) {
-    rule->refusal_ = fmt::format("its formula \"{}\" is not understood ({})", printable(text),
-                                 error.what());
+    rule->refusal_ =
+        fmt::format("its formula \"{}\" is not understood ({})", printable(text), error.what());
   }
 }
 
@@ -188,9 +188,9 @@ std::shared_ptr<const MdfConversion> MdfConversions::read(std::uint64_t at, int 
   }
   rule->unit_ = file_.text(block.link(1));
   // no threshold: the standard's types, and how many numbers each has
-  constexpr std::array<Kind, 9> kKinds = {Kind::kIdentity, Kind::kLinear,  Kind::kRational,
-                                          Kind::kFormula,  Kind::kTable,   Kind::kNearest,
-                                          Kind::kRange,    Kind::kKeys,    Kind::kKeyRanges};
+  constexpr std::array<Kind, 9> kKinds = {Kind::kIdentity, Kind::kLinear, Kind::kRational,
+                                          Kind::kFormula,  Kind::kTable,  Kind::kNearest,
+                                          Kind::kRange,    Kind::kKeys,   Kind::kKeyRanges};
   if (type >= kKinds.size()) {
     rule->refusal_ = "its values are texts";
     return known_[at] = rule;

@@ -27,7 +27,17 @@ class MdfConversion {
 
  private:
   friend class MdfConversions;
-  enum class Kind { kIdentity, kLinear, kRational, kFormula, kTable, kNearest, kRange, kKeys, kKeyRanges };
+  enum class Kind {
+    kIdentity,
+    kLinear,
+    kRational,
+    kFormula,
+    kTable,
+    kNearest,
+    kRange,
+    kKeys,
+    kKeyRanges
+  };
   double nearest(double raw) const;
   double interpolated(double raw) const;
   double range(double raw, bool whole) const;
@@ -35,7 +45,8 @@ class MdfConversion {
 
   Kind kind_ = Kind::kIdentity;
   std::vector<double> numbers_;
-  std::vector<std::shared_ptr<const MdfConversion>> rules_;  ///< of kKeys and kKeyRanges; null: a text
+  std::vector<std::shared_ptr<const MdfConversion>>
+      rules_;  ///< of kKeys and kKeyRanges; null: a text
   Expression formula_;
   std::string unit_, refusal_;
   bool has_texts_ = false;

@@ -96,8 +96,9 @@ void check_place(const MdfFile& file, const MdfRecords& records, const MdfChanne
     const bool real = channel.data >= MdfChannel::kRealLittle;
     if (channel.bit_offset > 7 || channel.bit_count == 0 || channel.bit_count > 64 ||
         (real && channel.bit_count != 16 && channel.bit_count != 32 && channel.bit_count != 64)) {
-      fail(fmt::format("{} {} bits from bit {}, expected {}", real ? "a real number of" : "an integer of",
-                       channel.bit_count, channel.bit_offset, real ? "16, 32 or 64" : "1 to 64"));
+      fail(fmt::format("{} {} bits from bit {}, expected {}",
+                       real ? "a real number of" : "an integer of", channel.bit_count,
+                       channel.bit_offset, real ? "16, 32 or 64" : "1 to 64"));
     }
   }
   if (channel.byte_offset > records.group->data_bytes ||

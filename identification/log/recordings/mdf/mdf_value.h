@@ -12,8 +12,9 @@ namespace sparflow {
 /// The records of a channel group, one after another.
 struct MdfRecords {
   const MdfGroup* group = nullptr;
-  std::string_view data;     ///< records of `stride` bytes
-  std::string_view invalid;  ///< bytes of `invalid_stride` a record: behind the data or apart from it
+  std::string_view data;  ///< records of `stride` bytes
+  std::string_view
+      invalid;  ///< bytes of `invalid_stride` a record: behind the data or apart from it
   std::size_t count = 0, stride = 0, invalid_stride = 0;
 };
 
