@@ -366,6 +366,7 @@ RawTable recorded_table(const std::string& path, std::string_view bytes, const L
                         const LogOptions& options, const Machine& machine) {
   RecordingOptions reading;
   reading.limits = options.limits;
+  reading.dbc_files = mapping.dbc;
   const Recording recording = read_recording(bytes, path, reading);
   ClockOptions clock;
   clock.limits = options.limits;

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "identification/log/recordings/can/can_text.h"
 #include "identification/log/recordings/mdf/mdf.h"
 #include "identification/log/recordings/mdf/mdf_block.h"
 #include "models/math/error.h"
@@ -44,6 +45,7 @@ void make_names_unique(Recording* recording) {
 const std::vector<RecordingFormat>& recording_formats() {
   static const std::vector<RecordingFormat> formats = {
       {"MDF 4", is_mdf, read_mdf},
+      {"candump", is_candump, read_candump},
   };
   return formats;
 }
