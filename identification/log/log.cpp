@@ -13,6 +13,8 @@
 #include "identification/log/log_mapping.h"
 #include "identification/log/log_matlab.h"
 #include "identification/log/log_time.h"
+#include "identification/log/one_clock.h"
+#include "identification/log/recordings/recording_formats.h"
 #include "models/math/door.h"
 #include "models/math/error.h"
 #include "models/math/sha256.h"
@@ -359,6 +361,28 @@ LogMapping mapping_of(const LogOptions& options) {
   return options.mapping_file.empty() ? LogMapping{} : read_log_mapping(options.mapping_file);
 }
 
+/// The channels of a recording on one clock, which follows those with a meaning.
+RawTable recorded_table(const std::string& path, std::string_view bytes, const LogMapping& mapping,
+                        const LogOptions& options, const Machine& machine) {
+  RecordingOptions reading;
+  reading.limits = options.limits;
+  reading.dbc_files = mapping.dbc;
+  const Recording recording = read_recording(bytes, path, reading);
+  ClockOptions clock;
+  clock.limits = options.limits;
+  for (std::size_t i = 0; i < recording.channels.size(); ++i) {
+    const RecordedChannel& channel = recording.channels[i];
+    const bool mapped =
+        std::any_of(mapping.columns.begin(), mapping.columns.end(), [&](const MappedColumn& c) {
+          return c.expression.find(channel.name) != std::string::npos;
+        });
+    if (mapped || column_meaning(channel.name, channel.unit, machine).role != Role::kCandidate) {
+      clock.leading.push_back(i);
+    }
+  }
+  return on_one_clock(recording, clock);
+}
+
 }  // namespace
 
 const Channel* Log::find(Role role, int index) const {
@@ -385,6 +409,12 @@ Eigen::MatrixXd Log::matrix(Role role, int count) const {
 
 Log load_log(const std::string& path, const Machine& machine, const LogOptions& options) {
   std::string bytes = read_bytes(path, options.limits.log_bytes);
+  if (is_recording(bytes)) {
+    const LogMapping mapping = mapping_of(options);
+    RawTable table = recorded_table(path, bytes, mapping, options, machine);
+    apply_mapping(mapping, &table);
+    return clean_log(table, path, sha256_hex(bytes), machine, options);
+  }
   if (!is_matlab(bytes, path)) return log_from_text(path, std::move(bytes), machine, options);
   RawTable table = read_matlab(path, bytes, options.limits);
   apply_mapping(mapping_of(options), &table);

@@ -11,8 +11,8 @@
 namespace sparflow {
 namespace {
 
-const std::vector<std::string> kKeys = {"columns",   "ignore",  "delimiter",
-                                        "skip_rows", "decimal", "missing"};
+const std::vector<std::string> kKeys = {"columns", "ignore",  "delimiter", "skip_rows",
+                                        "decimal", "missing", "dbc"};
 
 FilePlace place_of(const std::string& file, const YAML::Node& node) {
   const YAML::Mark mark = node.Mark();
@@ -96,6 +96,11 @@ LogMapping read_root(const std::string& path, const YAML::Node& root) {
     } else if (key == "ignore") {
       mapping.ignore = scalars(path, value, key);
       mapping.ignore_place = place_of(path, value);
+    } else if (key == "dbc") {
+      const std::string folder = path.substr(0, path.find_last_of('/') + 1);
+      for (const std::string& name : scalars(path, value, key)) {
+        mapping.dbc.push_back(name.starts_with('/') ? name : folder + name);
+      }
     } else if (key == "missing") {
       mapping.dialect.missing = scalars(path, value, key);
     } else if (key == "delimiter") {
@@ -109,7 +114,7 @@ LogMapping read_root(const std::string& path, const YAML::Node& root) {
       throw InputError(place_of(path, entry.first), "",
                        fmt::format("unknown key \"{}\"; {}", key,
                                    near.empty() ? "known are columns, ignore, delimiter, decimal, "
-                                                  "skip_rows, missing"
+                                                  "skip_rows, missing, dbc"
                                                 : fmt::format("did you mean \"{}\"?", near)));
     }
   }

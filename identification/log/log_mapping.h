@@ -22,6 +22,8 @@ struct LogMapping {
   std::vector<std::string> ignore;  ///< columns of the log to leave out
   FilePlace ignore_place;
   DialectOptions dialect;
+  std::vector<std::string>
+      dbc;  ///< databases of CAN frames, beside the mapping file unless absolute
 };
 
 /// @throws InputError with file:line:column for unknown keys, wrong types, names given twice

@@ -1,0 +1,231 @@
+/// MDF 4 files written here byte by byte, with the offsets of the standard, and read back; and damaged ones.
+#include "identification/log/recordings/mdf/mdf.h"
+
+#include <gmock/gmock.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+using testing::HasSubstr;
+
+std::string le(std::uint64_t value, std::size_t size) {
+  std::string bytes;
+  for (std::size_t i = 0; i < size; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xFFU);
+  return bytes;
+}
+std::string real(double value) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, 8);
+  return le(bits, 8);
+}
+
+/// Appends blocks; a link is the place of a block that was appended before.
+struct Writer {
+  std::string file;
+  Writer() {
+    file = std::string("MDF     4.10    test    ") + le(0, 4) + le(410, 2) + std::string(34, '\0');
+    file += "##HD" + le(0, 4) + le(104, 8) + le(6, 8) + std::string(80, '\0');
+  }
+  std::uint64_t block(const std::string& id, const std::vector<std::uint64_t>& links,
+                      const std::string& data) {
+    file.resize((file.size() + 7) / 8 * 8);
+    const std::uint64_t at = file.size();
+    file += "##" + id + le(0, 4) + le(24 + 8 * links.size() + data.size(), 8) + le(links.size(), 8);
+    for (const std::uint64_t link : links) file += le(link, 8);
+    file += data;
+    return at;
+  }
+  void first(std::uint64_t data_group) { file.replace(64 + 24, 8, le(data_group, 8)); }
+  std::uint64_t text(const std::string& t) { return block("TX", {}, t + '\0'); }
+};
+
+struct Field {
+  std::string name;
+  unsigned type, sync, data, bit, byte, bits;
+  std::uint64_t conversion = 0;
+  unsigned flags = 0, invalid = 0;
+};
+
+std::uint64_t channels(Writer& w, const std::vector<Field>& fields) {
+  std::uint64_t next = 0;
+  for (std::size_t i = fields.size(); i-- > 0;) {
+    const Field& f = fields[i];
+    const std::uint64_t name = w.text(f.name);
+    next = w.block("CN", {next, 0, name, 0, f.conversion, 0, 0, 0},
+                   le(f.type, 1) + le(f.sync, 1) + le(f.data, 1) + le(f.bit, 1) + le(f.byte, 4) +
+                       le(f.bits, 4) + le(f.flags, 4) + le(f.invalid, 4) + std::string(52, '\0'));
+  }
+  return next;
+}
+
+std::uint64_t group(Writer& w, std::uint64_t next, std::uint64_t first_channel,
+                    const std::vector<unsigned>& id_cycles_data_invalid) {
+  const auto& n = id_cycles_data_invalid;
+  return w.block("CG", {next, first_channel, w.text("g"), 0, 0, 0},
+                 le(n[0], 8) + le(n[1], 8) + le(0, 8) + le(n[2], 4) + le(n[3], 4));
+}
+
+std::uint64_t conversion(Writer& w, unsigned type, const std::vector<double>& numbers) {
+  std::string data = le(type, 1) + le(0, 5) + le(numbers.size(), 2) + real(0) + real(0);
+  for (const double n : numbers) data += real(n);
+  return w.block("CC", {0, 0, 0, 0}, data);
+}
+
+constexpr unsigned kRows = 20;
+
+/// Time, 12 bits from bit 3 of byte 8, a big-endian int16, a float32; one byte of invalidation bits.
+std::string records() {
+  std::string all;
+  for (unsigned i = 0; i < kRows; ++i) {
+    const auto signed_value =
+        static_cast<std::uint16_t>(static_cast<std::int16_t>(-300 + 7 * static_cast<int>(i)));
+    const float f = 0.5F * static_cast<float>(i);
+    std::uint32_t word = 0;
+    std::memcpy(&word, &f, 4);
+    all += real(0.01 * i) + le((100U + i) << 3U, 2) + static_cast<char>(signed_value >> 8U) +
+           static_cast<char>(signed_value & 0xFFU) + le(word, 4) + le(i == 5 ? 2 : 0, 1);
+  }
+  return all;
+}
+
+std::string zipped(const std::string& in, bool transposed, unsigned columns) {
+  std::string turned;
+  const std::size_t rows = in.size() / columns;
+  for (std::size_t c = 0; transposed && c < columns; ++c) {
+    for (std::size_t r = 0; r < rows; ++r) turned += in[r * columns + c];
+  }
+  if (transposed) turned += in.substr(rows * columns);
+  const std::string& source = transposed ? turned : in;
+  uLongf size = compressBound(source.size());
+  std::string out(size, '\0');
+  compress(reinterpret_cast<Bytef*>(out.data()), &size,
+           reinterpret_cast<const Bytef*>(source.data()), source.size());
+  out.resize(size);
+  return "DT" + le(transposed ? 1 : 0, 1) + le(0, 1) + le(columns, 4) + le(in.size(), 8) +
+         le(size, 8) + out;
+}
+
+std::string written(int storage) {
+  Writer w;
+  const std::string data = records();
+  std::uint64_t at = 0;
+  if (storage == 0) {
+    at = w.block("DT", {}, data);
+  } else if (storage < 3) {
+    at = w.block("DZ", {}, zipped(data, storage == 2, 17));
+  } else {  // a list, cut inside a record, behind a header of lists
+    const auto a = w.block("DT", {}, data.substr(0, 50));
+    const auto b = w.block("DZ", {}, zipped(data.substr(50), true, 17));
+    const auto list = w.block("DL", {0, a, b}, le(0, 4) + le(2, 4) + le(0, 8) + le(50, 8));
+    at = w.block("HL", {list}, le(0, 8));
+  }
+  const auto rule = conversion(w, 1, {5.0, 0.5});
+  const auto first = channels(w, {{"t", 2, 1, 4, 0, 0, 64},
+                                  {"bits", 0, 0, 0, 3, 8, 12, rule},
+                                  {"big", 0, 0, 3, 0, 10, 16, 0, 2, 1},
+                                  {"f", 0, 0, 4, 0, 12, 32}});
+  const auto cg = group(w, 0, first, {0, kRows, 16, 1});
+  w.first(w.block("DG", {0, cg, at, 0}, le(0, 8)));
+  return w.file;
+}
+
+void expect_values(const Recording& r) {
+  ASSERT_EQ(r.channels.size(), 3u);
+  for (unsigned i = 0; i < kRows; ++i) {
+    EXPECT_DOUBLE_EQ(r.channels[0].time[i], 0.01 * i);
+    EXPECT_DOUBLE_EQ(r.channels[0].values[i], 5.0 + 0.5 * (100 + i));
+    EXPECT_EQ(std::isnan(r.channels[1].values[i]), i == 5);
+    if (i != 5) {
+      EXPECT_DOUBLE_EQ(r.channels[1].values[i], -300.0 + 7.0 * i);
+    }
+    EXPECT_DOUBLE_EQ(r.channels[2].values[i], 0.5 * i);
+  }
+}
+
+TEST(Mdf, EveryStorageOfRecordsGivesTheSameValues) {
+  for (int storage = 0; storage < 4; ++storage) {
+    SCOPED_TRACE(storage);
+    expect_values(read_recording(written(storage), "log.mf4"));
+  }
+}
+
+TEST(Mdf, UnsortedRecordsAreSortedByTheirNumbers) {
+  Writer w;
+  std::string data;
+  for (unsigned i = 0; i < 10; ++i) {
+    data += le(7, 2) + real(0.1 * i) + le(i, 1);
+    if (i % 2 == 0) data += le(300, 2) + le(1000 + i, 4);
+  }
+  const auto at = w.block("DT", {}, data);
+  const auto seconds = conversion(w, 1, {0.0, 0.2});
+  const auto b =
+      group(w, 0, channels(w, {{"t", 3, 1, 0, 0, 0, 0, seconds}, {"b", 0, 0, 0, 0, 0, 32}}),
+            {300, 5, 4, 0});
+  const auto a =
+      group(w, b, channels(w, {{"t", 2, 1, 4, 0, 0, 64}, {"a", 0, 0, 0, 0, 8, 8}}), {7, 10, 9, 0});
+  w.first(w.block("DG", {0, a, at, 0}, le(2, 8)));
+  const Recording r = read_recording(w.file, "log.mf4");
+  ASSERT_EQ(r.channels.size(), 2u);
+  EXPECT_EQ(r.channels[0].values[9], 9.0);
+  EXPECT_DOUBLE_EQ(r.channels[1].time[4], 0.8);  // of a virtual master
+  EXPECT_EQ(r.channels[1].values[4], 1008.0);
+}
+
+std::string error_of(const std::string& file) {
+  try {
+    read_recording(file, "log.mf4");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Mdf, DamageIsNamedWithByteAndBlock) {
+  const std::string good = written(0);
+  EXPECT_THAT(error_of(good.substr(0, 190)), HasSubstr("block DG"));
+  std::string more = good;  // the count of records of the only channel group
+  more.replace(good.find("##CG") + 24 + 48 + 8, 8, le(std::uint64_t{1} << 60U, 8));
+  EXPECT_THAT(error_of(more), HasSubstr("1152921504606846976 records by its count"));
+  std::string circle = good;  // the data group follows itself
+  circle.replace(good.find("##DG") + 24, 8, le(good.find("##DG"), 8));
+  EXPECT_THAT(error_of(circle), HasSubstr("block DG: links lead to this block twice"));
+  std::string bomb = written(1);
+  bomb.replace(bomb.find("##DZ") + 24 + 8, 8, le(std::uint64_t{1} << 60U, 8));
+  EXPECT_THAT(error_of(bomb), HasSubstr("block DZ"));
+}
+
+TEST(Mdf, ThreeThousandChangedFilesAreReadOrRefused) {
+  std::mt19937 random(1);
+  const auto below = [&](std::size_t n) { return random() % n; };
+  int refused = 0;
+  for (int k = 0; k < 3000; ++k) {
+    std::string file = written(k % 4);
+    for (std::size_t e = 1 + below(4); e > 0; --e) {
+      const std::size_t at = 64 + below(file.size() - 72);
+      if (below(3) == 0) {
+        file.replace(at / 8 * 8, 8,
+                     le(random() % 2 == 0 ? below(file.size()) / 8 * 8 : ~0ULL >> below(40), 8));
+      } else {
+        file[at] = static_cast<char>(below(256));
+      }
+    }
+    RecordingOptions options;
+    options.limits.log_bytes = 10'000'000, options.limits.log_values = 100'000;
+    try {
+      read_recording(file, "log.mf4", options);
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 500);  // one change in three or more hits a length or link
+}
+
+}  // namespace
+}  // namespace sparflow
