@@ -8,12 +8,13 @@ namespace sparflow {
 
 /// One channel with its own clock.
 struct RecordedChannel {
-  std::string name;            ///< as in the file (UTF-8); unique in a recording
-  std::string unit;            ///< as in the file, "" when it says none
-  std::string group;           ///< channel group, CAN message or topic it comes from
-  std::string comment;         ///< the file's own description, "" when there is none
-  std::vector<double> time;    ///< [s] from the recording's start, not decreasing
-  std::vector<double> values;  ///< physical values, one for each time; NaN = the file says that the value is not valid
+  std::string name;          ///< as in the file (UTF-8); unique in a recording
+  std::string unit;          ///< as in the file, "" when it says none
+  std::string group;         ///< channel group, CAN message or topic it comes from
+  std::string comment;       ///< the file's own description, "" when there is none
+  std::vector<double> time;  ///< [s] from the recording's start, not decreasing
+  std::vector<double>
+      values;  ///< physical values, one for each time; NaN = the file says that the value is not valid
 };
 
 struct Recording {
