@@ -7,6 +7,8 @@
 
 #include "identification/log/log_mapping.h"
 #include "identification/log/log_matlab.h"
+#include "identification/log/one_clock.h"
+#include "identification/log/recordings/recording_formats.h"
 #include "identification/mapping_proposal/channel_words.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
@@ -50,7 +52,7 @@ ClockCandidate clock_candidate(const RawColumn& column) {
 }
 
 /// @return the column that holds the time. @throws InputError where none rises
-ClockCandidate find_clock(const RawTable& table, const ClockOptions& options) {
+ClockCandidate find_clock(const RawTable& table, const TimeColumnOptions& options) {
   ClockCandidate best;
   for (const RawColumn& column : table.columns) {
     if (column.text) continue;
@@ -67,7 +69,7 @@ ClockCandidate find_clock(const RawTable& table, const ClockOptions& options) {
   return best;
 }
 
-void settle_clock_unit(const ClockCandidate& c, const ClockOptions& options, TimedChannels* out) {
+void settle_clock_unit(const ClockCandidate& c, const TimeColumnOptions& options, TimedChannels* out) {
   const ChannelUnit unit = c.column->name == "t_s" ? channel_unit("t", "s")
                                                    : channel_unit(c.column->name, c.column->unit);
   const bool suffix = c.column->name.ends_with("_s");
@@ -92,7 +94,7 @@ void settle_clock_unit(const ClockCandidate& c, const ClockOptions& options, Tim
 
 }  // namespace
 
-TimedChannels timed_channels(const RawTable& table, const ClockOptions& options) {
+TimedChannels timed_channels(const RawTable& table, const TimeColumnOptions& options) {
   TimedChannels out;
   out.recording.file = table.file;
   out.recording.format = table.dialect;
@@ -143,18 +145,31 @@ TimedChannels timed_channels(const RawTable& table, const ClockOptions& options)
   return out;
 }
 
-TimedChannels read_timed_channels(const std::string& path, const std::string& mapping_file,
-                                  const DoorLimits& limits, const ClockOptions& options) {
-  std::string bytes = read_bytes(path, limits.log_bytes);
-  const LogMapping mapping = mapping_file.empty() ? LogMapping{} : read_log_mapping(mapping_file);
-  RawTable table = is_matlab(bytes, path)
-                       ? read_matlab(path, bytes, limits)
-                       : read_delimited(path, std::move(bytes), mapping.dialect, limits);
-  apply_mapping(mapping, &table);
-  if (!mapping.columns.empty()) {
-    std::erase_if(table.columns, [](const RawColumn& c) { return c.mapped_from; });
+TimedChannels read_timed_channels(const std::string& path, const ChannelFileOptions& options) {
+  std::string bytes = read_bytes(path, options.limits.log_bytes);
+  const bool mapped = !options.mapping_file.empty();
+  const LogMapping mapping = mapped ? read_log_mapping(options.mapping_file) : LogMapping{};
+  RawTable table;
+  if (is_recording(bytes)) {
+    RecordingOptions reading;
+    reading.dbc_files = options.dbc_files;
+    reading.limits = options.limits;
+    Recording recording = read_recording(bytes, path, reading);
+    if (!mapped) {
+      TimedChannels out;
+      out.recording = std::move(recording);
+      out.clock_reason = "each channel has the time stamps of its own samples";
+      return out;
+    }
+    table = on_one_clock(recording);
+  } else if (is_matlab(bytes, path)) {
+    table = read_matlab(path, bytes, options.limits);
+  } else {
+    table = read_delimited(path, std::move(bytes), mapping.dialect, options.limits);
   }
-  return timed_channels(table, options);
+  apply_mapping(mapping, &table);
+  std::erase_if(table.columns, [](const RawColumn& c) { return c.mapped_from; });
+  return timed_channels(table, options.time);
 }
 
 }  // namespace sparflow

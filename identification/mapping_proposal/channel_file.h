@@ -1,6 +1,7 @@
 #pragma once
 /// Reads any log file (CSV, MAT, recordings with several clocks) into timed channels, without a machine.
 #include <string>
+#include <vector>
 
 #include "identification/log/log_table.h"
 #include "identification/log/recordings/recording.h"
@@ -9,7 +10,7 @@
 namespace sparflow {
 
 /// How the clock of a table is found.
-struct ClockOptions {
+struct TimeColumnOptions {
   /// Smallest share of rising steps of a column that may be a clock.
   /// @threshold [1] 0.8..1; chosen: a few repeated or torn rows do not make another column the clock
   double rising = 0.97;
@@ -29,12 +30,17 @@ struct TimedChannels {
   std::string clock_reason;  ///< a sentence: why this column, why this unit
 };
 
-/// @param mapping_file "" = none; the columns of a mapped table bear the program's names
+struct ChannelFileOptions {
+  std::string mapping_file;            ///< "" = none; mapped columns bear the program's names
+  std::vector<std::string> dbc_files;  ///< decode raw CAN frames
+  DoorLimits limits;
+  TimeColumnOptions time;
+};
+
 /// @throws InputError when the file cannot be read, or no column rises like a time
-TimedChannels read_timed_channels(const std::string& path, const std::string& mapping_file,
-                                  const DoorLimits& limits = {}, const ClockOptions& options = {});
+TimedChannels read_timed_channels(const std::string& path, const ChannelFileOptions& options = {});
 
 /// Channels of a table of which one column is the clock. @throws InputError as above
-TimedChannels timed_channels(const RawTable& table, const ClockOptions& options = {});
+TimedChannels timed_channels(const RawTable& table, const TimeColumnOptions& options = {});
 
 }  // namespace sparflow

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "identification/mapping_proposal/channel_words.h"
+#include "models/math/error.h"
 #include "models/math/units.h"
 
 namespace sparflow {
