@@ -89,9 +89,9 @@ class PairSearch {
   void descend(std::size_t g, double sum) {
     if (g == groups_.size()) {
       PairSet set{chosen_, sum};
-      const auto place = std::upper_bound(
-          best_.begin(), best_.end(), set,
-          [](const PairSet& a, const PairSet& b) { return a.total > b.total; });
+      const auto place =
+          std::upper_bound(best_.begin(), best_.end(), set,
+                           [](const PairSet& a, const PairSet& b) { return a.total > b.total; });
       best_.insert(place, std::move(set));
       if (best_.size() > count_) best_.pop_back();
       return;
@@ -122,7 +122,8 @@ class PairSearch {
 
 }  // namespace
 
-std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups, std::size_t count) {
+std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups,
+                                    std::size_t count) {
   if (count == 0) return {};
   return PairSearch(std::move(groups), count).run();
 }

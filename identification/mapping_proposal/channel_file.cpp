@@ -39,15 +39,18 @@ ClockCandidate clock_candidate(const RawColumn& column) {
   }
   if (steps.size() < 2) return c;
   const auto n = static_cast<double>(steps.size());
-  c.rising = static_cast<double>(std::count_if(steps.begin(), steps.end(),
-                                               [](double d) { return d > 0.0; })) / n;
+  c.rising = static_cast<double>(
+                 std::count_if(steps.begin(), steps.end(), [](double d) { return d > 0.0; })) /
+             n;
   std::vector<double> sorted = steps;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
   c.interval = sorted[sorted.size() / 2];
-  c.evenness = static_cast<double>(std::count_if(steps.begin(), steps.end(), [&](double d) {
-                 return std::abs(d - c.interval) <= 0.1 * std::abs(c.interval);
-               })) / n;
+  c.evenness =
+      static_cast<double>(std::count_if(
+          steps.begin(), steps.end(),
+          [&](double d) { return std::abs(d - c.interval) <= 0.1 * std::abs(c.interval); })) /
+      n;
   return c;
 }
 
@@ -69,12 +72,14 @@ ClockCandidate find_clock(const RawTable& table, const TimeColumnOptions& option
   return best;
 }
 
-void settle_clock_unit(const ClockCandidate& c, const TimeColumnOptions& options, TimedChannels* out) {
+void settle_clock_unit(const ClockCandidate& c, const TimeColumnOptions& options,
+                       TimedChannels* out) {
   const ChannelUnit unit = c.column->name == "t_s" ? channel_unit("t", "s")
                                                    : channel_unit(c.column->name, c.column->unit);
   const bool suffix = c.column->name.ends_with("_s");
   const std::string why =
-      c.named ? "by its name" : fmt::format("because it rises in {:.3g} % of its steps", 100.0 * c.rising);
+      c.named ? "by its name"
+              : fmt::format("because it rises in {:.3g} % of its steps", 100.0 * c.rising);
   if (unit.of == ChannelUnit::Of::kTime || suffix) {
     out->clock_unit = unit.of == ChannelUnit::Of::kTime ? unit.factor : 1.0;
     out->clock_reason = fmt::format("{} is the time {}; its unit is {}", c.column->name, why,

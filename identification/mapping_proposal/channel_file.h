@@ -25,7 +25,7 @@ struct TimeColumnOptions {
 /// The channels of a file and what is known of their clock.
 struct TimedChannels {
   Recording recording;
-  std::string clock;         ///< column that holds the time; "" where channels have clocks of their own
+  std::string clock;  ///< column that holds the time; "" where channels have clocks of their own
   double clock_unit = 1.0;   ///< [s] of one unit of that column
   std::string clock_reason;  ///< a sentence: why this column, why this unit
 };

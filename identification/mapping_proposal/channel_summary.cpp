@@ -54,7 +54,8 @@ double resolution_of(std::vector<double> values, const SummaryOptions& o) {
     const double k = d / least;
     return std::abs(k - std::round(k)) < 0.02 * std::max(1.0, std::sqrt(k));
   });
-  const bool grid = static_cast<double>(fits) >= o.on_the_grid * static_cast<double>(distances.size());
+  const bool grid =
+      static_cast<double>(fits) >= o.on_the_grid * static_cast<double>(distances.size());
   return grid && distances.size() > 1 ? least : 0.0;
 }
 
@@ -76,9 +77,9 @@ ChannelSummary summarise(const RecordedChannel& channel, const SummaryOptions& o
     finite.push_back(v);
     sum += v;
   }
-  s.missing_share = s.samples == 0 ? 0.0
-                                   : 1.0 - static_cast<double>(finite.size()) /
-                                               static_cast<double>(s.samples);
+  s.missing_share = s.samples == 0
+                        ? 0.0
+                        : 1.0 - static_cast<double>(finite.size()) / static_cast<double>(s.samples);
   if (finite.empty()) {
     s.smallest = s.largest = s.mean = kNaN;
     return s;
@@ -93,7 +94,8 @@ ChannelSummary summarise(const RecordedChannel& channel, const SummaryOptions& o
                                                  static_cast<Eigen::Index>(channel.values.size()));
   const std::vector<double> third = third_differences(values, 0, values.size());
   if (!third.empty()) {
-    const Eigen::Map<const Eigen::VectorXd> d(third.data(), static_cast<Eigen::Index>(third.size()));
+    const Eigen::Map<const Eigen::VectorXd> d(third.data(),
+                                              static_cast<Eigen::Index>(third.size()));
     s.noise = robust_std(d) / kThirdDifferenceNoise;
   }
   s.resolution = resolution_of(std::move(finite), o);
@@ -102,18 +104,19 @@ ChannelSummary summarise(const RecordedChannel& channel, const SummaryOptions& o
 
 std::string summary_table(const std::vector<ChannelSummary>& channels) {
   std::size_t width = 7;
-  for (const ChannelSummary& c : channels) width = std::max(width, std::min<std::size_t>(c.name.size(), 40));
-  std::string text = fmt::format("  {:<{}} {:<8} {:>8} {:>11} {:>11} {:>11} {:>5} {:>8} {:>11} {:>9}\n", "channel",
-                                 width, "unit", "rate Hz", "smallest", "largest", "mean", "gaps",
-                                 "missing", "resolution", "noise");
+  for (const ChannelSummary& c : channels)
+    width = std::max(width, std::min<std::size_t>(c.name.size(), 40));
+  std::string text = fmt::format(
+      "  {:<{}} {:<8} {:>8} {:>11} {:>11} {:>11} {:>5} {:>8} {:>11} {:>9}\n", "channel", width,
+      "unit", "rate Hz", "smallest", "largest", "mean", "gaps", "missing", "resolution", "noise");
   for (const ChannelSummary& c : channels) {
     const std::string missing =
         c.missing_share > 0.0 ? fmt::format("{:.2g} %", 100.0 * c.missing_share) : "-";
     const std::string resolution = c.resolution > 0.0 ? fmt::format("{:.3g}", c.resolution) : "-";
-    text += fmt::format("  {:<{}} {:<8} {:>8.4g} {:>11.5g} {:>11.5g} {:>11.5g} {:>5} {:>8} {:>11} {:>9}\n", c.name,
-                        width, c.unit.empty() ? "-" : c.unit, c.rate, c.smallest, c.largest, c.mean,
-                        c.gaps, missing, resolution,
-                        c.constant ? "constant" : fmt::format("{:.2g}", c.noise));
+    text += fmt::format(
+        "  {:<{}} {:<8} {:>8.4g} {:>11.5g} {:>11.5g} {:>11.5g} {:>5} {:>8} {:>11} {:>9}\n", c.name,
+        width, c.unit.empty() ? "-" : c.unit, c.rate, c.smallest, c.largest, c.mean, c.gaps,
+        missing, resolution, c.constant ? "constant" : fmt::format("{:.2g}", c.noise));
   }
   return text;
 }

@@ -29,8 +29,8 @@ struct ChannelSummary {
   double rate = 0.0;           ///< [Hz] one over the median interval; 0 = fewer than two samples
   double missing_share = 0.0;  ///< 0..1 of the samples
   int gaps = 0;
-  double longest_gap = 0.0;     ///< [s]
-  double longest_gap_at = 0.0;  ///< [s] where it begins
+  double longest_gap = 0.0;                          ///< [s]
+  double longest_gap_at = 0.0;                       ///< [s] where it begins
   double smallest = 0.0, largest = 0.0, mean = 0.0;  ///< in the channel's unit; NaN without values
   double resolution = 0.0;  ///< step of the values, in the channel's unit; 0 = none was found
   double noise = 0.0;       ///< standard deviation from third differences, in the channel's unit

@@ -111,15 +111,24 @@ Of quantity_of(const Meaning& meaning, const Machine& machine) {
       machine.joints[static_cast<std::size_t>(meaning.index)].type == JointType::kRevolute;
   if (meaning.kind == MeaningKind::kSpeed) return turns ? Of::kAngularSpeed : Of::kSpeed;
   switch (meaning.role) {
-    case Role::kJointPosition: return turns ? Of::kAngle : Of::kLength;
-    case Role::kStroke: return Of::kLength;
-    case Role::kCommand: return Of::kShare;
-    case Role::kForce: return Of::kForce;
-    case Role::kFlow: return Of::kFlow;
-    case Role::kPayload: return Of::kMass;
-    case Role::kOilTemperature: return Of::kTemperature;
-    case Role::kCandidate: return Of::kNothing;
-    default: return Of::kPressure;
+    case Role::kJointPosition:
+      return turns ? Of::kAngle : Of::kLength;
+    case Role::kStroke:
+      return Of::kLength;
+    case Role::kCommand:
+      return Of::kShare;
+    case Role::kForce:
+      return Of::kForce;
+    case Role::kFlow:
+      return Of::kFlow;
+    case Role::kPayload:
+      return Of::kMass;
+    case Role::kOilTemperature:
+      return Of::kTemperature;
+    case Role::kCandidate:
+      return Of::kNothing;
+    default:
+      return Of::kPressure;
   }
 }
 
@@ -156,16 +165,26 @@ const std::vector<ChannelUnit>& possible_units(const Meaning& meaning, const Mac
   static const std::vector<ChannelUnit> kTurns = {spelt("rad/s"), spelt("deg/s")};
   static const std::vector<ChannelUnit> kShares = {spelt("1"), spelt("%"), spelt("permille")};
   switch (quantity_of(meaning, machine)) {
-    case Of::kAngle: return kAngles;
-    case Of::kLength: return kLengths;
-    case Of::kPressure: return kPressures;
-    case Of::kForce: return kForces;
-    case Of::kFlow: return kFlows;
-    case Of::kMass: return kMasses;
-    case Of::kTemperature: return kTemperatures;
-    case Of::kSpeed: return kSpeeds;
-    case Of::kAngularSpeed: return kTurns;
-    default: return kShares;
+    case Of::kAngle:
+      return kAngles;
+    case Of::kLength:
+      return kLengths;
+    case Of::kPressure:
+      return kPressures;
+    case Of::kForce:
+      return kForces;
+    case Of::kFlow:
+      return kFlows;
+    case Of::kMass:
+      return kMasses;
+    case Of::kTemperature:
+      return kTemperatures;
+    case Of::kSpeed:
+      return kSpeeds;
+    case Of::kAngularSpeed:
+      return kTurns;
+    default:
+      return kShares;
   }
 }
 

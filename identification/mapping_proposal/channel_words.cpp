@@ -21,7 +21,18 @@ struct WordClass {
   Words clear, vague;
 };
 
-enum Class { kPosition, kStroke, kCommand, kPressure, kForce, kFlow, kPayload, kOil, kSpeed, kClasses };
+enum Class {
+  kPosition,
+  kStroke,
+  kCommand,
+  kPressure,
+  kForce,
+  kFlow,
+  kPayload,
+  kOil,
+  kSpeed,
+  kClasses
+};
 
 const std::array<WordClass, kClasses> kClassWords = {{
     {"position",
@@ -58,7 +69,8 @@ const std::array<WordClass, kSides> kSideWords = {{
 
 /// Names of machine parts that mean the same on different machines.
 const std::array<Words, 8> kPartWords = {{
-    {"boom", "main", "hauptarm", "hubarm", "hubzylinder", "hubzyl", "ausleger", "mast", "lift", "heben"},
+    {"boom", "main", "hauptarm", "hubarm", "hubzylinder", "hubzyl", "ausleger", "mast", "lift",
+     "heben"},
     {"jib", "knickarm", "knick", "knickzylinder", "wippe", "outer"},
     {"stick", "stiel", "arm", "dipper", "stielzylinder"},
     {"bucket", "loeffel", "schaufel", "loeffelzylinder"},
@@ -89,25 +101,38 @@ std::string_view found_in(const Words& vocabulary, const std::vector<std::string
 Class class_of(const Meaning& meaning) {
   if (meaning.kind == MeaningKind::kSpeed) return kSpeed;
   switch (meaning.role) {
-    case Role::kJointPosition: return kPosition;
-    case Role::kStroke: return kStroke;
-    case Role::kCommand: return kCommand;
-    case Role::kForce: return kForce;
-    case Role::kFlow: return kFlow;
-    case Role::kPayload: return kPayload;
-    case Role::kOilTemperature: return kOil;
-    default: return kPressure;
+    case Role::kJointPosition:
+      return kPosition;
+    case Role::kStroke:
+      return kStroke;
+    case Role::kCommand:
+      return kCommand;
+    case Role::kForce:
+      return kForce;
+    case Role::kFlow:
+      return kFlow;
+    case Role::kPayload:
+      return kPayload;
+    case Role::kOilTemperature:
+      return kOil;
+    default:
+      return kPressure;
   }
 }
 
 int side_of(const Meaning& meaning) {
   if (meaning.kind == MeaningKind::kSpeed) return -1;
   switch (meaning.role) {
-    case Role::kPressureA: return kA;
-    case Role::kPressureB: return kB;
-    case Role::kPumpPressure: return kPump;
-    case Role::kReturnPressure: return kReturn;
-    default: return -1;
+    case Role::kPressureA:
+      return kA;
+    case Role::kPressureB:
+      return kB;
+    case Role::kPumpPressure:
+      return kPump;
+    case Role::kReturnPressure:
+      return kReturn;
+    default:
+      return -1;
   }
 }
 
@@ -143,7 +168,8 @@ Evidence vocabulary_evidence(const std::array<WordClass, N>& all, std::size_t ow
 double part_score(const std::string& part, const std::vector<std::string>& words,
                   const WordOptions& o, std::string* word) {
   const std::vector<std::string> own = name_words(part);
-  if (!own.empty() && std::search(words.begin(), words.end(), own.begin(), own.end()) != words.end()) {
+  if (!own.empty() &&
+      std::search(words.begin(), words.end(), own.begin(), own.end()) != words.end()) {
     *word = part;
     return o.part_name;
   }
@@ -216,8 +242,14 @@ std::vector<std::string> name_words(const std::string& name) {
     const auto c = static_cast<unsigned char>(name[i]);
     if (c == 0xC3 && i + 1 < name.size()) {
       const auto d = static_cast<unsigned char>(name[++i]);
-      folded += d == 0xA4 ? "ae" : d == 0xB6 ? "oe" : d == 0xBC ? "ue" : d == 0x9F ? "ss"
-              : d == 0x84 ? "Ae" : d == 0x96 ? "Oe" : d == 0x9C ? "Ue" : " ";
+      folded += d == 0xA4   ? "ae"
+                : d == 0xB6 ? "oe"
+                : d == 0xBC ? "ue"
+                : d == 0x9F ? "ss"
+                : d == 0x84 ? "Ae"
+                : d == 0x96 ? "Oe"
+                : d == 0x9C ? "Ue"
+                            : " ";
     } else {
       folded += c < 0x80 ? static_cast<char>(c) : ' ';
     }
@@ -244,15 +276,15 @@ Evidence name_evidence(const std::string& name, const Meaning& meaning, const Ma
                        const WordOptions& o) {
   const ColumnMeaning own = column_meaning(name, "", machine);
   if (!own.is_time && own.role != Role::kCandidate && own.error.empty()) {
-    if (meaning.kind == MeaningKind::kRole && own.role == meaning.role && own.index == meaning.index) {
+    if (meaning.kind == MeaningKind::kRole && own.role == meaning.role &&
+        own.index == meaning.index) {
       return {o.own_name, "its name is the one that the program uses"};
     }
     return {-o.own_name, fmt::format("its name is the program's for {}",
                                      meaning_words({own.role, own.index}, machine))};
   }
   const std::vector<std::string> words = name_words(name);
-  std::vector<Evidence> parts = {
-      vocabulary_evidence(kClassWords, class_of(meaning), words, o)};
+  std::vector<Evidence> parts = {vocabulary_evidence(kClassWords, class_of(meaning), words, o)};
   if (const int side = side_of(meaning); side >= 0) {
     parts.push_back(vocabulary_evidence(kSideWords, static_cast<std::size_t>(side), words, o));
   }
@@ -273,18 +305,30 @@ std::string meaning_words(const Meaning& m, const Machine& machine) {
   const auto cylinder = [&] { return machine.cylinders[at].name; };
   const std::string_view rate = m.kind == MeaningKind::kSpeed ? "speed" : "";
   switch (m.role) {
-    case Role::kJointPosition: return fmt::format("{} of joint {}", rate.empty() ? "position" : rate, joint());
-    case Role::kStroke: return fmt::format("{} of cylinder {}", rate.empty() ? "stroke" : rate, cylinder());
-    case Role::kCommand: return fmt::format("command of cylinder {}", cylinder());
-    case Role::kPressureA: return fmt::format("bore-side pressure of cylinder {}", cylinder());
-    case Role::kPressureB: return fmt::format("rod-side pressure of cylinder {}", cylinder());
-    case Role::kForce: return fmt::format("measured force of cylinder {}", cylinder());
-    case Role::kFlow: return fmt::format("flow of cylinder {}", cylinder());
-    case Role::kPumpPressure: return fmt::format("pressure of pump {}", machine.pumps[at].name);
-    case Role::kReturnPressure: return "return pressure";
-    case Role::kPayload: return "payload";
-    case Role::kOilTemperature: return "oil temperature";
-    case Role::kCandidate: break;
+    case Role::kJointPosition:
+      return fmt::format("{} of joint {}", rate.empty() ? "position" : rate, joint());
+    case Role::kStroke:
+      return fmt::format("{} of cylinder {}", rate.empty() ? "stroke" : rate, cylinder());
+    case Role::kCommand:
+      return fmt::format("command of cylinder {}", cylinder());
+    case Role::kPressureA:
+      return fmt::format("bore-side pressure of cylinder {}", cylinder());
+    case Role::kPressureB:
+      return fmt::format("rod-side pressure of cylinder {}", cylinder());
+    case Role::kForce:
+      return fmt::format("measured force of cylinder {}", cylinder());
+    case Role::kFlow:
+      return fmt::format("flow of cylinder {}", cylinder());
+    case Role::kPumpPressure:
+      return fmt::format("pressure of pump {}", machine.pumps[at].name);
+    case Role::kReturnPressure:
+      return "return pressure";
+    case Role::kPayload:
+      return "payload";
+    case Role::kOilTemperature:
+      return "oil temperature";
+    case Role::kCandidate:
+      break;
   }
   return "another signal";
 }

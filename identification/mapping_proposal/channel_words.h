@@ -1,6 +1,6 @@
 #pragma once
 /// What the name and the unit of a channel say about its meaning, in English and German words of the field. All scores are
-/// log-odds [nat] that the channel has the meaning, against that it has another; docs/log_verb.md.
+/// log-odds [nat] that the channel has the meaning, against that it has another.
 #include <string>
 #include <vector>
 
@@ -51,12 +51,25 @@ struct Meaning {
 
 /// A unit as written, in SI.
 struct ChannelUnit {
-  enum class Of { kNothing, kTime, kAngle, kLength, kShare, kPressure, kForce, kFlow, kMass,
-                  kTemperature, kSpeed, kAngularSpeed, kOther };
+  enum class Of {
+    kNothing,
+    kTime,
+    kAngle,
+    kLength,
+    kShare,
+    kPressure,
+    kForce,
+    kFlow,
+    kMass,
+    kTemperature,
+    kSpeed,
+    kAngularSpeed,
+    kOther
+  };
   Of of = Of::kNothing;  ///< kNothing: no unit given; kOther: one that no quantity here has
   double factor = 1.0;   ///< SI = factor * number + offset
   double offset = 0.0;
-  std::string word;      ///< usual spelling, for sentences
+  std::string word;  ///< usual spelling, for sentences
 };
 
 /// Reads the unit of a channel from what the file says, from brackets in the name, or from its last part ("CH01_bar").

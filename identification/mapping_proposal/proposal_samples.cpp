@@ -46,13 +46,15 @@ void place_instants(const Recording& recording, const SampleOptions& o, Proposal
 /// within three of the channel's intervals of one
 double fill(const RecordedChannel& c, const ProposalSamples& s, Eigen::Ref<Eigen::VectorXd> out) {
   const double interval =
-      c.time.size() > 1 ? (c.time.back() - c.time.front()) / static_cast<double>(c.time.size() - 1) : 0.0;
+      c.time.size() > 1 ? (c.time.back() - c.time.front()) / static_cast<double>(c.time.size() - 1)
+                        : 0.0;
   const double half = 0.5 * s.step;
   Eigen::Index filled = 0;
   double held = kNaN, held_at = -1e300;
   for (Eigen::Index i = 0; i < s.instants(); ++i) {
     const double t = s.time[i];
-    auto k = static_cast<std::size_t>(std::lower_bound(c.time.begin(), c.time.end(), t - half) - c.time.begin());
+    auto k = static_cast<std::size_t>(std::lower_bound(c.time.begin(), c.time.end(), t - half) -
+                                      c.time.begin());
     double sum = 0.0;
     int n = 0;
     for (; k < c.time.size() && c.time[k] < t + half; ++k) {
@@ -62,7 +64,8 @@ double fill(const RecordedChannel& c, const ProposalSamples& s, Eigen::Ref<Eigen
       held_at = c.time[k];
       ++n;
     }
-    if (n == 0 && k > 0 && std::isfinite(c.values[k - 1])) held = c.values[k - 1], held_at = c.time[k - 1];
+    if (n == 0 && k > 0 && std::isfinite(c.values[k - 1]))
+      held = c.values[k - 1], held_at = c.time[k - 1];
     out[i] = n > 0 ? sum / n : held;
     if (n > 0 || (std::isfinite(held) && t - held_at <= 3.0 * interval)) ++filled;
   }
@@ -82,7 +85,8 @@ ChannelShape shape_of(const Eigen::VectorXd& v, const std::vector<SampleRange>& 
   const double range = v.maxCoeff() - v.minCoeff();
   shape.constant = range <= 1e-12 * std::max(1.0, v.cwiseAbs().maxCoeff());
   const double most = v.cwiseAbs().maxCoeff();
-  shape.zero = static_cast<double>((v.array().abs() <= 0.01 * most).count()) / static_cast<double>(v.size());
+  shape.zero =
+      static_cast<double>((v.array().abs() <= 0.01 * most).count()) / static_cast<double>(v.size());
   if (shape.constant) {
     shape.resting = 1.0;
     return shape;
@@ -123,7 +127,8 @@ ProposalSamples proposal_samples(const Recording& recording, const SampleOptions
   return s;
 }
 
-Eigen::VectorXd rate_of_change(const ProposalSamples& s, const Eigen::Ref<const Eigen::VectorXd>& v) {
+Eigen::VectorXd rate_of_change(const ProposalSamples& s,
+                               const Eigen::Ref<const Eigen::VectorXd>& v) {
   Eigen::VectorXd rate = Eigen::VectorXd::Zero(v.size());
   for (const SampleRange& run : s.runs) {
     for (Eigen::Index i = run.begin; i < run.end; ++i) {

@@ -26,12 +26,14 @@ struct SampleOptions {
 
 /// The look of one channel, in the file's unit.
 struct ChannelShape {
-  bool usable = false;      ///< enough values, all finite
+  bool usable = false;  ///< enough values, all finite
   bool constant = false;
   double low = 0.0, high = 0.0;  ///< 0.5 and 99.5 % quantiles
-  double roughness = 0.0;   ///< standard deviation of the step to the next instant over that of the values
-  double resting = 0.0;     ///< share of steps to the next instant that are zero but for a thousandth of the range
-  double zero = 0.0;        ///< share of values that are zero but for a hundredth of the largest
+  double roughness =
+      0.0;  ///< standard deviation of the step to the next instant over that of the values
+  double resting =
+      0.0;  ///< share of steps to the next instant that are zero but for a thousandth of the range
+  double zero = 0.0;  ///< share of values that are zero but for a hundredth of the largest
 };
 
 struct ProposalSamples {
