@@ -8,6 +8,7 @@
 #include "apps/cli/verbs.h"
 #include "identification/mapping_proposal/channel_file.h"
 #include "identification/mapping_proposal/channel_summary.h"
+#include "identification/mapping_proposal/channel_words.h"
 
 namespace sparflow::cli {
 namespace {
@@ -61,6 +62,8 @@ int run(const LogArguments& a) {
   channels.reserve(file.recording.channels.size());
   for (const RecordedChannel& channel : file.recording.channels) {
     channels.push_back(summarise(channel));
+    ChannelSummary& summary = channels.back();
+    if (summary.unit.empty()) summary.unit = channel_unit(channel.name, "").word;
   }
   for (const std::string& w : file.recording.warnings) warn(w);
   if (!a.outputs.json.empty()) a.outputs.write_json(channels_json(file, channels));
