@@ -173,6 +173,7 @@ int main(int argc, char** argv) {
   int code = cli::kDone;
   cli::add_demo_verb(app, code);
   cli::add_machine_verb(app, code);
+  cli::add_log_verb(app, code);
   cli::add_simulate_verb(app, code);
   cli::add_fit_verb(app, code);
   cli::add_compare_verb(app, code);

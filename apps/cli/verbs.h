@@ -32,6 +32,7 @@ void add_benchmark_verb(CLI::App& app, int& code);
 void add_audit_verb(CLI::App& app, int& code);
 void add_evaluate_verb(CLI::App& app, int& code);
 void add_machine_verb(CLI::App& app, int& code);
+void add_log_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);
 
 }  // namespace sparflow::cli

@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/cli/console.h"
+#include "apps/cli/outputs.h"
+#include "apps/cli/verbs.h"
+#include "identification/mapping_proposal/channel_file.h"
+#include "identification/mapping_proposal/channel_summary.h"
+#include "identification/mapping_proposal/channel_words.h"
+
+namespace sparflow::cli {
+namespace {
+
+struct LogArguments {
+  std::string log;
+  ChannelFileOptions reading;
+  Outputs outputs;
+};
+
+/// A number, or null where there is none.
+nlohmann::json number(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+std::string channels_json(const TimedChannels& file, const std::vector<ChannelSummary>& channels) {
+  nlohmann::json out = {{"file", file.recording.file},
+                        {"format", file.recording.format},
+                        {"clock", file.clock_reason},
+                        {"warnings", file.recording.warnings},
+                        {"channels", nlohmann::json::array()}};
+  for (const ChannelSummary& c : channels) {
+    out["channels"].push_back({{"name", c.name},
+                               {"unit", c.unit},
+                               {"group", c.group},
+                               {"comment", c.comment},
+                               {"samples", c.samples},
+                               {"duration_s", number(c.duration)},
+                               {"rate_Hz", number(c.rate)},
+                               {"missing_share", number(c.missing_share)},
+                               {"gaps", c.gaps},
+                               {"longest_gap_s", number(c.longest_gap)},
+                               {"longest_gap_at_s", number(c.longest_gap_at)},
+                               {"smallest", number(c.smallest)},
+                               {"largest", number(c.largest)},
+                               {"mean", number(c.mean)},
+                               {"resolution", number(c.resolution)},
+                               {"noise", number(c.noise)},
+                               {"constant", c.constant}});
+  }
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+int run(const LogArguments& a) {
+  check_outputs_apart("log", a.outputs.files(),
+                      {{"FILE", a.log}, {"--mapping", a.reading.mapping_file}});
+  a.outputs.check();
+  begin_work("reading " + a.log);
+  const TimedChannels file = read_timed_channels(a.log, a.reading);
+  std::vector<ChannelSummary> channels;
+  channels.reserve(file.recording.channels.size());
+  for (const RecordedChannel& channel : file.recording.channels) {
+    channels.push_back(summarise(channel));
+    ChannelSummary& summary = channels.back();
+    if (summary.unit.empty()) summary.unit = channel_unit(channel.name, "").word;
+  }
+  for (const std::string& w : file.recording.warnings) warn(w);
+  if (!a.outputs.json.empty()) a.outputs.write_json(channels_json(file, channels));
+  tell(fmt::format("{}: {}; {} channels\n  {}\n{}", file.recording.file, file.recording.format,
+                   channels.size(), file.clock_reason, summary_table(channels)));
+  return kDone;
+}
+
+}  // namespace
+
+void add_log_verb(CLI::App& app, int& code) {
+  auto a = std::make_shared<LogArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "log", "list the channels of a log: unit, rate, range, gaps, resolution and noise");
+  verb->add_option("log", a->log, "log (CSV, MAT, or a recording)")->required()->type_name("FILE");
+  verb->add_option("--mapping", a->reading.mapping_file,
+                   "mapping file (YAML); the columns then bear the program's names")
+      ->type_name("FILE");
+  a->outputs.add_to(*verb, false);
+  verb->callback([a, &code] { code = run(*a); });
+}
+
+}  // namespace sparflow::cli
