@@ -36,8 +36,8 @@ int run(const CompareArguments& a) {
                                : load_model_with_warnings(a.model);
   CompareOptions options;
   options.signals.slim = a.outputs.report.empty() && model.effects.empty();
-  const CompareResult result = compare_task(model, load_logs(a.logs, model.machine, a.mapping),
-                                            !a.model.empty(), options);
+  const CompareResult result =
+      compare_task(model, load_logs(a.logs, model.machine, a.mapping), !a.model.empty(), options);
   if (!a.outputs.json.empty()) a.outputs.write_json(compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   tell(fmt::format("{}\n", compare_table(result)));

@@ -84,14 +84,15 @@ bool done_within(Telling& telling, std::chrono::milliseconds time) {
 }
 
 /// Asks the work to end, and leaves it behind where it does not.
-void end(Telling& telling, std::jthread thread) {
+Ended end(Telling& telling, std::jthread thread) {
   telling.stop = true;
   if (done_within(telling, kPatience)) {
     const py::gil_scoped_release release;
     thread.join();
-    return;
+    return Ended::kInterrupted;
   }
   left_behind().push_back(std::move(thread));
+  return Ended::kLeft;
 }
 
 }  // namespace
@@ -103,8 +104,8 @@ WorkProgress progress_or_stop(const Listener& listener) {
   };
 }
 
-bool run_beside_python(const py::object& progress,
-                       const std::function<void(const Listener&)>& work) {
+Ended run_beside_python(const py::object& progress,
+                        const std::function<void(const Listener&)>& work) {
   auto telling = std::make_shared<Telling>();
   std::jthread thread([telling, work] {
     std::exception_ptr thrown;
@@ -127,8 +128,8 @@ bool run_beside_python(const py::object& progress,
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       hand_on(*telling, progress);
     } catch (py::error_already_set& e) {
-      end(*telling, std::move(thread));
-      if (e.matches(PyExc_KeyboardInterrupt)) return false;
+      const Ended ended = end(*telling, std::move(thread));
+      if (e.matches(PyExc_KeyboardInterrupt)) return ended;
       throw;
     }
   }
@@ -138,7 +139,7 @@ bool run_beside_python(const py::object& progress,
   }
   if (telling->thrown) std::rethrow_exception(telling->thrown);
   hand_on(*telling, progress);
-  return !telling->interrupted;
+  return telling->interrupted ? Ended::kInterrupted : Ended::kWhole;
 }
 
 void raise_interrupted(const py::object& result) {

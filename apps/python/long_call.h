@@ -16,11 +16,13 @@ namespace sparflow::python {
 /// The side of the work: what it tells, and whether it shall end.
 struct Telling;
 
+enum class Ended { kWhole, kInterrupted, kLeft };
+
 /// Runs the work. @param progress a Python callable (share, words), or None
-/// @return false when it was asked to end by Ctrl-C (then what it has done so far is its result, if it has one)
+/// @return how it ended; after kInterrupted what it has done so far is its result, if it has one, and after kLeft it still runs
 /// @throws what the work threw, and what `progress` raised
-bool run_beside_python(const pybind11::object& progress,
-                       const std::function<void(const Listener&)>& work);
+Ended run_beside_python(const pybind11::object& progress,
+                        const std::function<void(const Listener&)>& work);
 
 /// Raises sparflow.Interrupted with what was done.
 [[noreturn]] void raise_interrupted(const pybind11::object& result);
@@ -34,10 +36,12 @@ template <class T>
 std::shared_ptr<T> long_call(const pybind11::object& progress,
                              std::function<std::shared_ptr<T>(const Listener&)> work) {
   auto result = std::make_shared<std::shared_ptr<T>>();
-  const bool whole = run_beside_python(
+  const Ended ended = run_beside_python(
       progress,
       [result, work = std::move(work)](const Listener& listener) { *result = work(listener); });
-  if (!whole) raise_interrupted(*result ? pybind11::cast(*result) : pybind11::none());
+  if (ended == Ended::kLeft) raise_interrupted(pybind11::none());
+  if (ended == Ended::kInterrupted)
+    raise_interrupted(*result ? pybind11::cast(*result) : pybind11::none());
   return *result;
 }
 

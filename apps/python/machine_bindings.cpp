@@ -1,30 +1,23 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "apps/python/bindings.h"
+#include "apps/tasks/inputs.h"
 #include "models/effects/effect_text.h"
 #include "models/effects/formula/user_effect.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
-#include "models/machine/machine_check.h"
 
 namespace sparflow::python {
 namespace {
 
+Listener python_listener() { return {warn, warn, {}, {}}; }
+
 std::shared_ptr<Machine> load_machine_telling(const py::object& path) {
-  std::vector<std::string> warnings;
-  auto machine = std::make_shared<Machine>(load_machine(path_from(path), &warnings));
-  for (const std::string& w : warnings) warn(w);
-  return machine;
+  return std::make_shared<Machine>(read_machine(path_from(path), python_listener()));
 }
 
 std::shared_ptr<CraneModel> load_model_telling(const py::object& path) {
-  auto model = std::make_shared<CraneModel>(load_model(path_from(path)));
-  MachinePlaces places;
-  places.file = path_from(path);
-  for (const std::string& w : check_machine(model->machine, places)) warn(w);
-  return model;
+  return std::make_shared<CraneModel>(read_model(path_from(path), python_listener()));
 }
 
 std::vector<std::string> effect_keys(const CraneModel& model) {
@@ -63,16 +56,7 @@ void add_effects(const py::object& effects, CraneModel& model) {
                                     py::cast<std::string>(item.attr("place")), model.machine)
             : register_user_effects_file(path_from(py::reinterpret_borrow<py::object>(item)),
                                          &model.machine);
-    for (const Effect* e : added) {
-      if (std::find(model.user_effects.begin(), model.user_effects.end(), e) ==
-          model.user_effects.end()) {
-        model.user_effects.push_back(e);
-      }
-      if (e->places(model.machine).empty()) {
-        warn(fmt::format("{} has no place on {}, so diagnosis does not consider it", e->info().id,
-                         model.machine.name));
-      }
-    }
+    add_own_effects(added, python_listener(), model);
   }
 }
 

@@ -11,4 +11,5 @@ PYBIND11_MODULE(_sparflow, m) {
   bind_machine(m);
   bind_log(m);
   bind_learning(m);
+  bind_diagnosis(m);
 }

@@ -38,6 +38,21 @@ def fit_frame(result):
     return _pandas().DataFrame(to_dict(result)["processes"])
 
 
+def diagnosis_frame(result):
+    """The effects that passed their proofs, most probable first: id, at, stage, probability, parameters, ..."""
+    return _pandas().DataFrame(to_dict(result)["effects"])
+
+
+def extend_frame(result):
+    """The steps, a row each: added, removed, judged_on, error_ratio, ..."""
+    return _pandas().DataFrame(to_dict(result)["steps"])
+
+
+def selftest_frame(result):
+    """Every effect with its power on these logs, a row each."""
+    return _pandas().DataFrame(to_dict(result)["effects"])
+
+
 def log_frame(log):
     """All signals in SI, indexed by time [s]."""
     pandas = _pandas()
@@ -61,5 +76,8 @@ def attach():
     core.Result.to_dict = to_dict
     core.FitResult.to_frame = fit_frame
     core.CompareResult.to_frame = compare_frame
+    core.Diagnosis.to_frame = diagnosis_frame
+    core.ExtendResult.to_frame = extend_frame
+    core.Selftest.to_frame = selftest_frame
     core.Log.to_frame = log_frame
     core.Log.from_frame = staticmethod(log_from_frame)
