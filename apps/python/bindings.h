@@ -45,5 +45,6 @@ void bind_machine(py::module_& m);
 void bind_log(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_diagnosis(py::module_& m);
+void bind_motion(py::module_& m);
 
 }  // namespace sparflow::python

@@ -12,4 +12,5 @@ PYBIND11_MODULE(_sparflow, m) {
   bind_log(m);
   bind_learning(m);
   bind_diagnosis(m);
+  bind_motion(m);
 }

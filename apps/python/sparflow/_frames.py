@@ -53,6 +53,17 @@ def selftest_frame(result):
     return _pandas().DataFrame(to_dict(result)["effects"])
 
 
+def plan_frame(result):
+    """The paths, a row each: name, planner, waypoints, shortest_duration_s, end."""
+    return _pandas().DataFrame(to_dict(result)["paths"])
+
+
+def motion_frame(result):
+    """The motion by its rows, columns as in MOTION.csv (docs/commands.md)."""
+    import io
+    return _pandas().read_csv(io.StringIO(result.motion_csv()))
+
+
 def log_frame(log):
     """All signals in SI, indexed by time [s]."""
     pandas = _pandas()
@@ -79,5 +90,7 @@ def attach():
     core.Diagnosis.to_frame = diagnosis_frame
     core.ExtendResult.to_frame = extend_frame
     core.Selftest.to_frame = selftest_frame
+    core.PlanResult.to_frame = plan_frame
+    core.OptimizeResult.to_frame = motion_frame
     core.Log.to_frame = log_frame
     core.Log.from_frame = staticmethod(log_from_frame)

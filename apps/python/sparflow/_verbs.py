@@ -66,3 +66,24 @@ def selftest(model, logs, references=None, *, check=6, candidates=None, effects=
     """
     return core.selftest(model, dict(logs=logs, references=references, check=check, candidates=candidates,
                                      effects=effects, progress=progress))
+
+
+def plan(problem, *, paths=8, seconds=5.0, seed=1, progress=None):
+    """Finds collision-free paths by OMPL; returns a PlanResult. Raises InfeasibleError where there is none.
+
+    paths: largest number. seconds: time for the search [s]. seed: of the random search.
+    """
+    return core.plan(problem, dict(paths=paths, seconds=seconds, seed=seed, progress=progress))
+
+
+def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, seed=1, intervals=0, processes=0,
+             progress=None):
+    """Computes the energy-optimal motion of a Problem; returns an OptimizeResult.
+
+    bound: also an estimated lower bound. start_from: a Trajectory for a warm start. paths, seconds [s], seed: of the search
+    for paths. intervals: of the mesh, 0 is the problem's. processes: starts solved in parallel, 0 is two.
+    Raises InfeasibleError or NotConvergedError, whose `result` is what was tried; after Ctrl-C the exception's `result` has
+    the best motion so far, where the work answered in time.
+    """
+    return core.optimize(problem, dict(bound=bound, start_from=start_from, paths=paths, seconds=seconds, seed=seed,
+                                       intervals=intervals, processes=processes, progress=progress))
