@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/model_pages/compare_page.h"
+#include "apps/tasks/compare_task.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
@@ -19,17 +18,6 @@ struct CompareArguments {
   std::vector<std::string> logs;
   Outputs outputs;
 };
-
-/// Notes energies whose relative error is undefined, because the pump delivered nothing.
-void note_undefined_energies(CompareResult& result) {
-  for (const EnergyScore& e : result.energy) {
-    if (std::isfinite(e.relative_error)) continue;
-    result.notes.push_back(fmt::format(
-        "energy of pump {}: \u2013 %, the pump delivered nothing in the {:.1f} s compared, "
-        "because no cylinder is driven in them",
-        e.pump, e.duration));
-  }
-}
 
 int run(const CompareArguments& a) {
   std::vector<NamedFile> inputs = named("--log", a.logs);
@@ -48,10 +36,8 @@ int run(const CompareArguments& a) {
                                : load_model_with_warnings(a.model);
   CompareOptions options;
   options.signals.slim = a.outputs.report.empty() && model.effects.empty();
-  CompareResult result = compare(model, load_logs(a.logs, model.machine, a.mapping), options);
-  // A machine file alone gives forces and flows by geometry; pressures are learned.
-  if (a.model.empty()) keep_stages(model.machine, {"force", "flow_sensor"}, result);
-  note_undefined_energies(result);
+  const CompareResult result =
+      compare_task(model, load_logs(a.logs, model.machine, a.mapping), !a.model.empty(), options);
   if (!a.outputs.json.empty()) a.outputs.write_json(compare_json(result));
   if (!a.outputs.report.empty()) compare_page(model, result).write(a.outputs.report);
   tell(fmt::format("{}\n", compare_table(result)));

@@ -148,6 +148,10 @@ void note(const std::string& sentence) {
   complain(harmless(sentence, QuoteOptions{}.sentence) + "\n");
 }
 
+Listener console_listener(WorkProgress progress) {
+  return {warn, note, std::move(progress), interrupted};
+}
+
 namespace {
 
 /// The mutex of the progress that prints; a process that is forked meanwhile would inherit the allocator's locks as the printing

@@ -8,6 +8,8 @@
 #include <string>
 #include <thread>
 
+#include "apps/tasks/task.h"
+
 namespace sparflow::cli {
 
 /// Progress on stderr. On a terminal it rewrites one line, at least every second; elsewhere (a file, a job's log) it prints a
@@ -82,5 +84,7 @@ std::string memory_in_words();
 void warn(const std::string& sentence);
 /// Prints the sentence on stderr.
 void note(const std::string& sentence);
+/// Lets a task warn and note on stderr and end by Ctrl-C.
+Listener console_listener(WorkProgress progress = {});
 
 }  // namespace sparflow::cli

@@ -1,6 +1,3 @@
-#include <fmt/format.h>
-
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/cli/console.h"
@@ -8,6 +5,8 @@
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/model_pages/diagnose_page.h"
+#include "apps/tasks/diagnose_task.h"
+#include "apps/tasks/inputs.h"
 #include "diagnosis/extension/extend.h"
 #include "models/math/error.h"
 
@@ -19,23 +18,9 @@ struct DiagnoseArguments {
   bool skip_data_checks = false;
 };
 
-/// Adds the effects found to the model, one after the other, and judges each step on the test logs.
-/// @return nothing when there are no test logs or no effect is probable enough
-std::optional<ExtendResult> judge_on_tests(const DiagnosisFiles& files,
-                                           const Diagnosis& diagnosis) {
-  std::vector<EffectAt> found;
-  for (const DiagnosedEffect& e : diagnosis.effects) {
-    if (diagnosis.named(e)) found.push_back(e.effect);
-  }
-  if (files.logs.tests.empty() || found.empty()) return std::nullopt;
-  Progress progress("test logs");
-  return extend(files.model, found, files.logs, {},
-                [&](double share, const std::string& what) { progress(share, what); });
-}
-
 int run(const DiagnoseArguments& a) {
   const DiagnosisFiles files = a.inputs.read();
-  note_what_is_reference(files);
+  tell_what_is_reference(files.model, files.logs, console_listener());
   DiagnoseOptions options;
   options.candidates = files.candidates;
   options.check_data = !a.skip_data_checks;
@@ -44,24 +29,21 @@ int run(const DiagnoseArguments& a) {
     return diagnose(files.model, files.logs.suspects, files.logs.references, options,
                     [&](double share, const std::string& what) { progress(share, what); });
   }();
-  const std::optional<ExtendResult> tested = judge_on_tests(files, result);
+  const std::optional<ExtendResult> tested = [&] {
+    if (files.logs.tests.empty()) return std::optional<ExtendResult>();
+    Progress progress("test logs");
+    return judge_on_tests(files.model, files.logs, result,
+                          [&](double share, const std::string& what) { progress(share, what); });
+  }();
+  const ExtendResult* judged = tested ? &*tested : nullptr;
   const Outputs& outputs = a.inputs.outputs();
-  if (!outputs.json.empty()) {
-    nlohmann::ordered_json json = nlohmann::ordered_json::parse(result.json());
-    if (tested) {
-      json["headline"] = headline_on_tests(result, &*tested);
-      json["test"] = nlohmann::ordered_json::parse(tested->json());
-    }
-    outputs.write_json(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  }
+  if (!outputs.json.empty()) outputs.write_json(diagnosis_json(result, judged));
   if (!outputs.report.empty()) {
-    Page page = diagnose_page(files.model, result, tested ? &*tested : nullptr);
+    Page page = diagnose_page(files.model, result, judged);
     files.write_provenance(page);
     page.write(outputs.report);
   }
-  tell(result.table(headline_on_tests(result, tested ? &*tested : nullptr)));
-  if (tested)
-    tell(fmt::format("\nOn the test logs, with these effects in the model:\n{}", tested->table()));
+  tell(diagnosis_table(result, judged));
   return kDone;
 }
 

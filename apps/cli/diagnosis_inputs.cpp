@@ -2,47 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <chrono>
-#include <ctime>
-
 #include "apps/cli/console.h"
 #include "apps/cli/model_inputs.h"
 #include "apps/cli/outputs.h"
-#include "identification/data_checks/sensor_slips.h"
+#include "apps/tasks/inputs.h"
 #include "models/math/error.h"
 
 namespace sparflow::cli {
-namespace {
-
-/// Checks that each log is diagnosed, a reference or a test log, and only one of these. @throws UsageError
-void refuse_shared_logs(const std::string& verb, const ExtendLogs& logs) {
-  const auto refuse = [&](const std::vector<Log>& some, const std::vector<Log>& others,
-                          const char* one, const char* other) {
-    for (const Log& a : some) {
-      for (const Log& b : others) {
-        if (a.sha256 != b.sha256) continue;
-        throw UsageError(
-            fmt::format("{}: {} is given as {} and as {}; a log can be only one of them", verb,
-                        a.file, one, other));
-      }
-    }
-  };
-  refuse(logs.suspects, logs.references, "--log", "--reference");
-  refuse(logs.suspects, logs.tests, "--log", "--test");
-  refuse(logs.references, logs.tests, "--reference", "--test");
-}
-
-/// Warns of sensors that seem to be connected or named wrongly: a diagnosis would take them for missing physics.
-void warn_of_slips(const Machine& machine, const std::vector<Log>& logs) {
-  for (const Log& log : logs) {
-    for (const SensorSlip& slip : find_sensor_slips(machine, make_signals(machine, log)))
-      warn(log.file + ": " + slip.sentence);
-  }
-}
-
-}  // namespace
-
 void DiagnosisFiles::write_provenance(Page& page) const {
   const auto name = [&page](const char* what, const std::vector<Log>& some) {
     for (const Log& l : some) {
@@ -141,43 +107,12 @@ DiagnosisFiles DiagnosisInputs::read() const {
   files.model = load_model_with_warnings(model_);
   own_.load_into(files.model);
   const Machine& machine = files.model.machine;
-  for (const std::string& c : candidates_) {
-    const Effect* everywhere = c.find(':') == std::string::npos ? find_effect(c) : nullptr;
-    if (everywhere == nullptr || everywhere->places(machine).empty()) {
-      files.candidates.push_back(parse_effect(c, machine));  // its InputError names the mistake
-      continue;
-    }
-    for (const int at : everywhere->places(machine)) files.candidates.push_back({everywhere, at});
-  }
+  files.candidates = candidates_of(candidates_, machine);
   files.logs.suspects = load_logs(logs_, machine, mapping_);
   files.logs.references = load_logs(references_, machine, mapping_);
   files.logs.tests = load_logs(tests_, machine, mapping_);
-  warn_of_slips(machine, files.logs.suspects);
-  refuse_shared_logs(verb_, files.logs);
+  check_diagnosis_logs(verb_, machine, files.logs, console_listener());
   return files;
-}
-
-void note_what_is_reference(const DiagnosisFiles& files) {
-  if (!files.logs.references.empty()) return;
-  const auto seen = [&](const Log& log) {
-    return std::any_of(files.model.data.begin(), files.model.data.end(), [&](const DataSource& d) {
-      return d.use == "train" && d.sha256 == log.sha256;
-    });
-  };
-  const std::vector<Log>& suspects = files.logs.suspects;
-  const auto unseen = std::find_if_not(suspects.begin(), suspects.end(), seen);
-  if (unseen == suspects.end()) return;
-  note(
-      fmt::format("{}: the model was not fitted on this log; without --reference the model serves "
-                  "as reference for forces only, and pressures and flows are learned again",
-                  unseen->file));
-}
-
-std::string today() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  return fmt::format("{:04}-{:02}-{:02}", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday);
 }
 
 }  // namespace sparflow::cli

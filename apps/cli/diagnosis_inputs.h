@@ -58,14 +58,7 @@ class DiagnosisInputs {
   bool resumable_ = false;
 };
 
-/// Notes on stderr, when there is no reference log and the model was not fitted on one of the logs, that the model
-/// then serves as reference for forces only.
-void note_what_is_reference(const DiagnosisFiles& files);
-
 /// Writes the results of extend and improve: the model, the files asked for, the table on stdout.
 void write_extended(const DiagnosisInputs& inputs, const ExtendResult& result);
-
-/// Today's date (UTC) as "2025-03-14", for the history in the model file.
-std::string today();
 
 }  // namespace sparflow::cli

@@ -5,6 +5,7 @@
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/model_pages/improve_page.h"
+#include "apps/tasks/inputs.h"
 #include "diagnosis/extension/extend.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"

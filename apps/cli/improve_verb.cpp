@@ -3,6 +3,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/diagnosis_inputs.h"
 #include "apps/cli/verbs.h"
+#include "apps/tasks/inputs.h"
 #include "diagnosis/extension/extend.h"
 #include "models/math/interruption.h"
 
@@ -16,7 +17,7 @@ struct ImproveArguments {
 
 int run(const ImproveArguments& a) {
   const DiagnosisFiles files = a.inputs.read();
-  note_what_is_reference(files);
+  tell_what_is_reference(files.model, files.logs, console_listener());
   ExtendOptions options;
   options.fit.threads = a.inputs.threads();
   options.max_steps = a.max_steps;

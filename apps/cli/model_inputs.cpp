@@ -1,30 +1,17 @@
 #include "apps/cli/model_inputs.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
 #include "apps/cli/console.h"
+#include "apps/tasks/inputs.h"
 #include "models/effects/formula/user_effect.h"
-#include "models/files/machine_file.h"
-#include "models/files/model_file.h"
-#include "models/machine/machine_check.h"
 
 namespace sparflow::cli {
 
 Machine load_machine_with_warnings(const std::string& path) {
-  std::vector<std::string> warnings;
-  Machine machine = load_machine(path, &warnings);
-  for (const std::string& w : warnings) warn(w);
-  return machine;
+  return read_machine(path, console_listener());
 }
 
 CraneModel load_model_with_warnings(const std::string& path) {
-  CraneModel model = load_model(path);
-  MachinePlaces places;
-  places.file = path;
-  for (const std::string& w : check_machine(model.machine, places)) warn(w);
-  return model;
+  return read_model(path, console_listener());
 }
 
 void OwnEffects::add_to(CLI::App& verb) {
@@ -43,13 +30,7 @@ std::vector<const Effect*> OwnEffects::load(const Machine* machine) const {
 }
 
 void OwnEffects::load_into(CraneModel& model) const {
-  for (const Effect* e : load(&model.machine)) {
-    const auto known = std::find(model.user_effects.begin(), model.user_effects.end(), e);
-    if (known == model.user_effects.end()) model.user_effects.push_back(e);
-    if (!e->places(model.machine).empty()) continue;
-    warn(fmt::format("{} has no place on {}, so diagnosis does not consider it", e->info().id,
-                     model.machine.name));
-  }
+  add_own_effects(load(&model.machine), console_listener(), model);
 }
 
 std::vector<Log> load_logs(const std::vector<std::string>& paths, const Machine& machine,

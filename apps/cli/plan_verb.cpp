@@ -1,7 +1,3 @@
-#include <fmt/format.h>
-
-#include <nlohmann/json.hpp>
-
 #include "apps/cli/console.h"
 #include "apps/cli/motion_inputs.h"
 #include "apps/cli/outputs.h"
@@ -19,30 +15,6 @@ struct PlanArguments {
   Outputs outputs;
 };
 
-std::string path_csv(const Machine& machine, const std::vector<SeedPath>& paths) {
-  std::string text = "path,planner,waypoint";
-  for (const Joint& j : machine.joints)
-    text += fmt::format(",q_{}_{}", j.name, j.type == JointType::kRevolute ? "rad" : "m");
-  text += "\n";
-  for (std::size_t p = 0; p < paths.size(); ++p) {
-    for (Eigen::Index w = 0; w < paths[p].path.rows(); ++w) {
-      text += fmt::format("{},{},{}", p + 1, paths[p].planner, w + 1);
-      for (Eigen::Index j = 0; j < paths[p].path.cols(); ++j)
-        text += fmt::format(",{:.9g}", paths[p].path(w, j));
-      text += "\n";
-    }
-  }
-  return text;
-}
-
-/// The paths as the page draws them.
-PlannedPaths drawn(const Seeds& seeds) {
-  PlannedPaths paths{seeds.paths.message, {}, seeds.refused};
-  for (const SeedMotion& m : seeds.motions)
-    paths.motions.push_back({m.name, m.motion, m.shortest_duration});
-  return paths;
-}
-
 int run(const PlanArguments& a) {
   std::vector<NamedFile> outputs = a.outputs.files();
   outputs.push_back({"--output", a.output});
@@ -54,50 +26,16 @@ int run(const PlanArguments& a) {
   for (const std::string& n : problem.notes) note(n);
   const Seeds seeds = [&] {
     Progress progress("plan");
-    SeedOptions options = a.seeds;
-    options.progress = [&](double share, const std::string& what) { progress(share, what); };
-    return make_seeds(problem, options, problem.knots.value_or(100));
+    return plan_task(problem, a.seeds, console_listener([&](double share, const std::string& what) {
+                       progress(share, what);
+                     }));
   }();
-  nlohmann::json json = {{"message", seeds.paths.message},
-                         {"solve_s", seeds.paths.solve_s},
-                         {"paths", nlohmann::json::array()}};
-  tell(fmt::format("{}: {}\n", problem.name, seeds.paths.message));
-  if (!seeds.motions.empty())
-    tell(fmt::format("  {:<18} {:>9} {:>22}  goal configuration\n", "path", "waypoints",
-                     "shortest duration"));
-  for (std::size_t i = 0; i < seeds.paths.paths.size(); ++i) {
-    const SeedPath& path = seeds.paths.paths[i];
-    const std::string name = fmt::format("{} {}", path.planner, i + 1);
-    double shortest = 0.0;
-    for (const SeedMotion& m : seeds.motions) {
-      if (m.name == name) shortest = m.shortest_duration;
-    }
-    std::string posture;
-    nlohmann::json end;
-    for (Eigen::Index j = 0; j < path.path.cols(); ++j) {
-      const Joint& joint = problem.machine.joints[static_cast<std::size_t>(j)];
-      const double q = path.path(path.path.rows() - 1, j);
-      const bool turns = joint.type == JointType::kRevolute;
-      posture += fmt::format("{} {:.{}f} {}  ", joint.name, turns ? q * 57.29577951308232 : q,
-                             turns ? 1 : 2, turns ? "deg" : "m");
-      end[joint.name] = q;
-    }
-    tell(fmt::format(
-        "  {:<18} {:>9} {:>20}    {}\n", name, path.path.rows(),
-        shortest > 0.0 ? fmt::format("{:.2f} s", shortest) : std::string("cannot be driven"),
-        posture));
-    json["paths"].push_back({{"name", name},
-                             {"planner", path.planner},
-                             {"waypoints", path.path.rows()},
-                             {"shortest_duration_s", shortest},
-                             {"end", end}});
-  }
+  tell(plan_table(problem, seeds));
   for (const std::string& r : seeds.refused) warn(r);
   if (!a.output.empty())
-    write_file_atomically(a.output, path_csv(problem.machine, seeds.paths.paths));
-  if (!a.outputs.report.empty()) plan_page(problem, drawn(seeds)).write(a.outputs.report);
-  if (!a.outputs.json.empty())
-    a.outputs.write_json(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    write_file_atomically(a.output, plan_csv(problem.machine, seeds.paths.paths));
+  if (!a.outputs.report.empty()) plan_page(problem, drawn_paths(seeds)).write(a.outputs.report);
+  if (!a.outputs.json.empty()) a.outputs.write_json(plan_json(problem, seeds));
   return seeds.paths.status == SeedStatus::kFound ? kDone : kNotSolved;
 }
 

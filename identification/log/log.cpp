@@ -430,6 +430,39 @@ Log log_from_text(const std::string& path, std::string bytes, const Machine& mac
   return clean_log(table, path, sha256, machine, options);
 }
 
+Log log_from_columns(const std::string& name, std::vector<LogColumn> columns,
+                     const Machine& machine, const LogOptions& options) {
+  const std::size_t rows = columns.empty() ? 0 : columns.front().values.size();
+  if (static_cast<std::int64_t>(columns.size()) > options.limits.log_columns ||
+      static_cast<std::int64_t>(rows * columns.size()) > options.limits.log_values) {
+    throw InputError({name, 0, 0}, "",
+                     fmt::format("got {} columns of {} rows, more than a log may have "
+                                 "(docs/limits.md); give fewer columns or shorter ones",
+                                 columns.size(), rows));
+  }
+  RawTable table;
+  table.file = name;
+  table.dialect = "columns in memory";
+  table.columns.reserve(columns.size());
+  std::string bytes;
+  bytes.reserve(columns.size() * (rows * sizeof(double) + 32));
+  for (LogColumn& column : columns) {
+    if (column.values.size() != rows) {
+      throw InputError({name, 0, 0}, column.name,
+                       fmt::format("has {} values, {} has {}; expected one for each row in every "
+                                   "column",
+                                   column.values.size(), table.columns.front().name, rows));
+    }
+    bytes += column.name;
+    bytes.append(reinterpret_cast<const char*>(column.values.data()), rows * sizeof(double));
+    RawColumn& raw = table.columns.emplace_back();
+    raw.name = std::move(column.name);
+    raw.values = std::move(column.values);
+  }
+  apply_mapping(mapping_of(options), &table);
+  return clean_log(table, name, sha256_hex(bytes), machine, options);
+}
+
 Log::Log() = default;
 Log::Log(const Log&) = default;
 Log::Log(Log&&) noexcept = default;

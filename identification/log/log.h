@@ -108,6 +108,17 @@ struct LogOptions {
 ///   neither position nor stroke, a unit is unknown, or time decreases
 Log load_log(const std::string& path, const Machine& machine, const LogOptions& options = {});
 
+/// A column of measurements in memory, named as in a file ("pA_boom_bar"). NaN = missing.
+struct LogColumn {
+  std::string name;
+  std::vector<double> values;
+};
+
+/// Makes a log of columns of one length, by the same checks as a file's.
+/// @param name of the log in messages and reports  @throws InputError as `load_log`, and for columns of several lengths
+Log log_from_columns(const std::string& name, std::vector<LogColumn> columns,
+                     const Machine& machine, const LogOptions& options = {});
+
 /// Reads a text log from memory. @param path name for messages  @throws InputError as `load_log`
 Log log_from_text(const std::string& path, std::string bytes, const Machine& machine,
                   const LogOptions& options = {});

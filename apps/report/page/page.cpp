@@ -290,6 +290,32 @@ std::string Page::html() const {
   return head + middle + tail;
 }
 
+std::string Page::summary() const {
+  std::string html = fmt::format("<div class=\"sparflow\"><h4>{}</h4>\n", html_escape(title_));
+  if (!banner_.empty()) html += fmt::format("<p><strong>{}</strong></p>\n", html_escape(banner_));
+  if (!verdict_headline_.empty()) {
+    html += fmt::format("<p><strong>{}</strong> {}</p>\n", html_escape(verdict_headline_),
+                        html_escape(verdict_text_));
+  }
+  bool tiles_shown = false, table_shown = false;
+  for (const Item& item : items_) {
+    if (const Tiles* some = std::get_if<Tiles>(&item); some != nullptr && !tiles_shown) {
+      html += "<table><tbody>\n";
+      for (const Tile& tile : some->tiles) {
+        html += fmt::format("<tr><td>{}</td><td><strong>{}</strong> {}</td><td>{}</td></tr>\n",
+                            html_escape(tile.label), html_escape(tile.value),
+                            html_escape(tile.unit), html_escape(tile.note));
+      }
+      html += "</tbody></table>\n";
+      tiles_shown = true;
+    } else if (const Table* one = std::get_if<Table>(&item); one != nullptr && !table_shown) {
+      html += table_html(*one);
+      table_shown = true;
+    }
+  }
+  return html + "</div>\n";
+}
+
 void Page::write(const std::string& path) const { write_file_atomically(path, html()); }
 
 }  // namespace sparflow

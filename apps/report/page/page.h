@@ -66,6 +66,9 @@ class Page {
   void plot(CraneDrawing chart);
 
   int plot_count() const;
+  /// The page's summary as a piece of HTML without scripts and styles of its own beyond plain ones: banner, main result, the
+  /// first tiles and the first table, for a notebook.
+  std::string summary() const;
   /// Returns the whole file. Long series are thinned so that it stays below 3 MB; each figure states how far.
   std::string html() const;
   /// Writes html() to `path`. @throws InputError when the folder cannot be written

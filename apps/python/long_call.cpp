@@ -1,0 +1,155 @@
+#include "apps/python/long_call.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "apps/python/bindings.h"
+
+namespace sparflow::python {
+
+namespace py = pybind11;
+
+/// What both threads see.
+struct Telling {
+  std::mutex mutex;
+  std::condition_variable changed;
+  double share = 0.0;
+  std::string words;
+  bool new_progress = false;
+  std::vector<std::string> warnings;
+  std::exception_ptr thrown;
+  bool interrupted = false;  ///< the work ended by Interruption, without a result
+  bool done = false;
+  std::atomic<bool> stop = false;
+};
+
+namespace {
+
+/// Time between two looks at signals and progress.
+/// @threshold [ms] 5..200; chosen: a tenth of the half second in which Ctrl-C is answered
+constexpr std::chrono::milliseconds kLookEvery{40};
+/// Time in which the work must end after Ctrl-C; then it is left to end by itself.
+/// @threshold [ms] 0..1000; chosen: with the look it stays below half a second
+constexpr std::chrono::milliseconds kPatience{420};
+
+/// Threads whose work was left behind; the module waits for them when Python ends.
+std::vector<std::jthread>& left_behind() {
+  static std::vector<std::jthread> threads;
+  return threads;
+}
+
+/// Hands on what the work has told since the last time. The GIL is held; Python code may run and raise.
+void hand_on(Telling& telling, const py::object& progress) {
+  std::vector<std::string> warnings;
+  double share = 0.0;
+  std::string words;
+  bool told = false;
+  {
+    const std::lock_guard lock(telling.mutex);
+    warnings.swap(telling.warnings);
+    told = std::exchange(telling.new_progress, false);
+    share = telling.share;
+    words = telling.words;
+  }
+  for (const std::string& w : warnings) warn(w);
+  if (told && !progress.is_none()) progress(share, words);
+}
+
+Listener listener_of(const std::shared_ptr<Telling>& telling) {
+  Listener listener;
+  listener.warn = [telling](const std::string& sentence) {
+    const std::lock_guard lock(telling->mutex);
+    telling->warnings.push_back(sentence);
+  };
+  listener.note = listener.warn;
+  listener.progress = [telling](double share, const std::string& words) {
+    const std::lock_guard lock(telling->mutex);
+    telling->share = std::max(telling->share, share);
+    telling->words = words;
+    telling->new_progress = true;
+  };
+  listener.interrupted = [telling] { return telling->stop.load(); };
+  return listener;
+}
+
+/// Waits until the work is done, at most for a time. The GIL is released.
+bool done_within(Telling& telling, std::chrono::milliseconds time) {
+  const py::gil_scoped_release release;
+  std::unique_lock lock(telling.mutex);
+  return telling.changed.wait_for(lock, time, [&] { return telling.done; });
+}
+
+/// Asks the work to end, and leaves it behind where it does not.
+Ended end(Telling& telling, std::jthread thread) {
+  telling.stop = true;
+  if (done_within(telling, kPatience)) {
+    const py::gil_scoped_release release;
+    thread.join();
+    return Ended::kInterrupted;
+  }
+  left_behind().push_back(std::move(thread));
+  return Ended::kLeft;
+}
+
+}  // namespace
+
+WorkProgress progress_or_stop(const Listener& listener) {
+  return [listener](double share, const std::string& words) {
+    if (listener.progress) listener.progress(share, words);
+    if (listener.stop()) throw Interruption();
+  };
+}
+
+Ended run_beside_python(const py::object& progress,
+                        const std::function<void(const Listener&)>& work) {
+  auto telling = std::make_shared<Telling>();
+  std::jthread thread([telling, work] {
+    std::exception_ptr thrown;
+    bool interrupted = false;
+    try {
+      work(listener_of(telling));
+    } catch (const Interruption&) {
+      interrupted = true;
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    const std::lock_guard lock(telling->mutex);
+    telling->thrown = thrown;
+    telling->interrupted = interrupted;
+    telling->done = true;
+    telling->changed.notify_all();
+  });
+  while (!done_within(*telling, kLookEvery)) {
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      hand_on(*telling, progress);
+    } catch (py::error_already_set& e) {
+      const Ended ended = end(*telling, std::move(thread));
+      if (e.matches(PyExc_KeyboardInterrupt)) return ended;
+      throw;
+    }
+  }
+  {
+    const py::gil_scoped_release release;
+    thread.join();
+  }
+  if (telling->thrown) std::rethrow_exception(telling->thrown);
+  hand_on(*telling, progress);
+  return telling->interrupted ? Ended::kInterrupted : Ended::kWhole;
+}
+
+void raise_interrupted(const py::object& result) {
+  const py::object type = py::module_::import("sparflow._errors").attr("Interrupted");
+  py::object error =
+      type(result.is_none() ? "interrupted: nothing was found yet that could be kept"
+                            : "interrupted: what was done is kept in `result` of this exception");
+  error.attr("result") = result;
+  PyErr_SetObject(type.ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
+}  // namespace sparflow::python

@@ -1,0 +1,180 @@
+#include <fmt/format.h>
+
+#include "apps/python/bindings.h"
+#include "apps/python/long_call.h"
+#include "apps/python/result.h"
+#include "apps/tasks/optimize_task.h"
+#include "problems/motion_table.h"
+#include "problems/problem_file.h"
+
+namespace sparflow::python {
+namespace {
+
+using Task = std::shared_ptr<const ProblemAndModel>;
+
+/// A problem with the model that was given, or that its file names.
+struct Problem {
+  Task task;
+  bool has_model = false;
+};
+
+Problem load_problem_file(const py::object& path, const std::shared_ptr<CraneModel>& model) {
+  const Listener listener{warn, warn, {}, {}};
+  const std::string file = path_from(path);
+  if (model) {
+    return {std::make_shared<ProblemAndModel>(load_problem_for(file, *model, listener)), true};
+  }
+  if (auto both = load_problem_with_model(file, "", listener))
+    return {std::make_shared<ProblemAndModel>(std::move(*both)), true};
+  auto alone = std::make_shared<ProblemAndModel>();
+  alone->problem = load_problem(file);
+  return {alone, false};
+}
+
+/// Raises an exception of sparflow._errors with the result that it is about.
+[[noreturn]] void raise_unsolved(const char* type, const std::string& sentence,
+                                 const py::object& result) {
+  const py::object cls = py::module_::import("sparflow._errors").attr(type);
+  py::object error = cls(sentence);
+  error.attr("result") = result;
+  PyErr_SetObject(cls.ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
+class Planned final : public Result {
+ public:
+  Planned(Task task, Seeds seeds) : task_(std::move(task)), seeds_(std::move(seeds)) {}
+  std::string json() const override { return plan_json(task_->problem, seeds_); }
+  std::string text() const override { return plan_table(task_->problem, seeds_); }
+  std::string headline() const override { return seeds_.paths.message; }
+  Page page() const override { return plan_page(task_->problem, drawn_paths(seeds_)); }
+  const Seeds& seeds() const { return seeds_; }
+
+ private:
+  Task task_;
+  Seeds seeds_;
+};
+
+class Optimum final : public Result {
+ public:
+  Optimum(Task task, Optimized found) : task_(std::move(task)), found_(std::move(found)) {}
+  std::string json() const override {
+    return optimize_json(task_->model, task_->problem, found_.result);
+  }
+  std::string text() const override {
+    return optimize_table(task_->model, task_->problem, found_.result);
+  }
+  std::string headline() const override { return motion_headline(found_.result); }
+  Page page() const override {
+    return motion_page(task_->model, task_->problem, found_.result,
+                       compared_motion(found_.seeds, found_.result));
+  }
+  std::string csv(double rate) const {
+    const Trajectory& motion = found_.result.motion;
+    return motion_csv(task_->model, rate > 0.0 ? at_rate(motion, rate) : motion,
+                      task_->problem.payload,
+                      least_flows(task_->model.machine, task_->problem.limits));
+  }
+  const OptimizeResult& result() const { return found_.result; }
+
+ private:
+  Task task_;
+  Optimized found_;
+};
+
+std::shared_ptr<Planned> plan_paths(const Problem& problem, const py::dict& a) {
+  SeedOptions options;
+  options.count = a["paths"].cast<int>();
+  options.seconds = a["seconds"].cast<double>();
+  options.random_seed = a["seed"].cast<std::uint64_t>();
+  const Task task = problem.task;
+  std::shared_ptr<Planned> result =
+      long_call<Planned>(a["progress"], [task, options](const Listener& listener) {
+        Listener stopping = listener;
+        stopping.progress = progress_or_stop(listener);
+        return std::make_shared<Planned>(task, plan_task(task->problem, options, stopping));
+      });
+  if (result->seeds().paths.status != SeedStatus::kFound)
+    raise_unsolved("InfeasibleError", result->headline(), py::cast(result));
+  for (const std::string& r : result->seeds().refused) warn(r);
+  return result;
+}
+
+std::shared_ptr<Optimum> optimize_motion(const Problem& problem, const py::dict& a) {
+  if (!problem.has_model) throw no_model();
+  OptimizeTask task;
+  task.seeds.count = a["paths"].cast<int>();
+  task.seeds.seconds = a["seconds"].cast<double>();
+  task.seeds.random_seed = a["seed"].cast<std::uint64_t>();
+  task.intervals = a["intervals"].cast<int>();
+  task.processes = a["processes"].cast<int>();
+  if (!a["start_from"].is_none()) task.from = a["start_from"].cast<const Trajectory&>();
+  const bool bound = a["bound"].cast<bool>();
+  const Task both = problem.task;
+  std::shared_ptr<Optimum> result =
+      long_call<Optimum>(a["progress"], [both, task, bound](const Listener& listener) {
+        Optimized found = optimize_task(both->model, both->problem, task, listener);
+        if (bound && found.result.motion.size() > 1)
+          add_bound(both->model, both->problem, listener, found.result);
+        return std::make_shared<Optimum>(both, std::move(found));
+      });
+  const OptimizeResult& r = result->result();
+  if (r.status == OptimizeStatus::kInfeasible)
+    raise_unsolved("InfeasibleError", r.message, py::cast(result));
+  if (r.status == OptimizeStatus::kFailed)
+    raise_unsolved("NotConvergedError", r.message, py::cast(result));
+  return result;
+}
+
+}  // namespace
+
+void bind_motion(py::module_& m) {
+  py::class_<Problem>(m, "Problem", "A motion to be planned, from rest to rest, with its model.")
+      .def_static("load", &load_problem_file, py::arg("path"), py::arg("model") = nullptr,
+                  "Reads a problem file (YAML, docs/problem_file.md) and the model that it names, "
+                  "unless one is given. Raises InputError.")
+      .def_property_readonly("name", [](const Problem& p) { return p.task->problem.name; })
+      .def_property_readonly(
+          "payload", [](const Problem& p) { return p.task->problem.payload; }, "[kg] at the tip");
+  const auto viewed = [](auto member) {
+    return [member](const py::object& self) {
+      return view(self.cast<const Trajectory&>().*member, self);
+    };
+  };
+  py::class_<Trajectory>(m, "Trajectory",
+                         "A motion; rows are instants, columns the machine's joints. Views.")
+      .def_property_readonly("t", viewed(&Trajectory::t), "[s]")
+      .def_property_readonly("q", viewed(&Trajectory::q), "[rad] or [m]")
+      .def_property_readonly("qd", viewed(&Trajectory::qd), "[rad/s] or [m/s]")
+      .def_property_readonly("qdd", viewed(&Trajectory::qdd), "[rad/s^2] or [m/s^2]")
+      .def_property_readonly("duration", &Trajectory::duration, "[s]")
+      .def("__len__", &Trajectory::size);
+  py::class_<Planned, Result, std::shared_ptr<Planned>>(m, "PlanResult", "Collision-free paths.")
+      .def_property_readonly(
+          "paths",
+          [](const py::object& self) {
+            py::list paths;
+            for (const SeedPath& p : self.cast<const Planned&>().seeds().paths.paths)
+              paths.append(view(p.path, self));
+            return paths;
+          },
+          "Waypoints of each path [waypoints x joints], [rad] or [m], as views.");
+  py::class_<Optimum, Result, std::shared_ptr<Optimum>>(m, "OptimizeResult",
+                                                        "The energy-optimal motion.")
+      .def_property_readonly("status",
+                             [](const Optimum& o) { return to_string(o.result().status); })
+      .def_property_readonly(
+          "energy_exact_J", [](const Optimum& o) { return o.result().energy.total; },
+          "[J] by the exact law")
+      .def_property_readonly("duration_s", [](const Optimum& o) { return o.result().duration; })
+      .def_property_readonly("interrupted", [](const Optimum& o) { return o.result().interrupted; })
+      .def_property_readonly(
+          "motion", [](const Optimum& o) -> const Trajectory& { return o.result().motion; },
+          py::return_value_policy::reference_internal)
+      .def("motion_csv", &Optimum::csv, py::arg("rate") = 0.0,
+           "The text that `-o MOTION.csv` writes; rate [Hz], 0 is the mesh of the solve.");
+  m.def("plan", &plan_paths);
+  m.def("optimize", &optimize_motion);
+}
+
+}  // namespace sparflow::python

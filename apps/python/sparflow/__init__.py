@@ -1,0 +1,21 @@
+"""Sparflow: identifies the working pressures of hydraulic machines and computes energy-optimal motions.
+
+    import sparflow
+    machine = sparflow.Machine.load("crane.yaml")
+    fitted = sparflow.fit(machine, "monday.csv", test="tuesday.csv")
+    fitted.model.save("crane.json")
+
+Everything is SI; a unit that is not stands in the name (`_bar`, `_lpm`). Every result has `.json()` (the text that the
+program's `--json` writes), `.to_dict()`, `.to_frame()` (pandas), `.report(path)`, and shows its summary in a notebook.
+Every verb of the program is a function here: `help(sparflow.fit)`.
+"""
+
+from ._errors import (DefectError, Error, InfeasibleError, InputError, Interrupted, NotConvergedError,
+                      SparflowWarning, UsageError)
+from ._sparflow import *  # noqa: F401,F403
+from ._sparflow import __version__
+from ._verbs import compare, diagnose, extend, fit, improve, optimize, plan, selftest
+from . import _frames
+
+_frames.attach()
+del _frames

@@ -1,0 +1,68 @@
+"""plan and optimize give what the program gives; what is infeasible is an exception with its result."""
+
+import json
+import signal
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import sparflow
+from conftest import DATA
+
+TIMES = {"solve_s", "callbacks_s", "linear_solver_s", "stages"}
+
+
+def without_times(values):
+    if isinstance(values, dict):
+        return {k: without_times(v) for k, v in values.items() if k not in TIMES}
+    return [without_times(v) for v in values] if isinstance(values, list) else values
+
+
+def test_optimize_gives_the_programs_motion(fitted, program, tmp_path):
+    fitted.model.save(tmp_path / "crane.json")
+    lift = DATA / "reaches/loader_crane_lift.yaml"
+    subprocess.run([program, "optimize", "-p", lift, "--model", tmp_path / "crane.json", "-o", tmp_path / "motion.csv",
+                    "--json", tmp_path / "motion.json"], check=True, capture_output=True)
+    problem = sparflow.Problem.load(lift, fitted.model)
+    shares = []
+    ours = sparflow.optimize(problem, progress=lambda share, words: shares.append(share))
+    assert without_times(ours.to_dict()) == without_times(json.loads((tmp_path / "motion.json").read_text()))
+    assert ours.motion_csv() == (tmp_path / "motion.csv").read_text()
+    assert ours.status == "optimal" and shares == sorted(shares)
+    assert np.shares_memory(ours.motion.q, ours.motion.q) and not ours.motion.q.flags.owndata
+    assert len(ours.to_frame()) == len(ours.motion)
+
+
+def test_paths_are_planned_and_an_unreachable_goal_is_an_exception(tmp_path):
+    lift = DATA / "reaches/loader_crane_lift.yaml"
+    plan = sparflow.plan(sparflow.Problem.load(lift))
+    assert plan.paths and plan.paths[0].shape[1] == 3 and list(plan.to_frame()["name"])
+    import re
+    far = re.sub(r"tip: *\[.*?\]", "tip: [90.0, 0.0, 90.0]", lift.read_text())
+    far = re.sub(r"(machine|model): *(\.\./|[\w.])", lambda m: f"{m[1]}: {DATA}/reaches/{m[2]}" if m[2] == "../" else m[0], far)
+    assert "90.0" in far
+    (tmp_path / "far.yaml").write_text(far)
+    with pytest.raises(sparflow.InfeasibleError) as caught:
+        sparflow.plan(sparflow.Problem.load(tmp_path / "far.yaml"))
+    assert str(caught.value) == caught.value.result.headline
+
+
+def test_ctrl_c_ends_an_optimisation_within_half_a_second(fitted):
+    problem = sparflow.Problem.load(DATA / "reaches/loader_crane_lift.yaml", fitted.model)
+    begun = threading.Event()
+    pressed = []
+
+    def press():
+        begun.wait(60)
+        pressed.append(time.monotonic())
+        signal.raise_signal(signal.SIGINT)
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    with pytest.raises(sparflow.Interrupted):
+        sparflow.optimize(problem, progress=lambda share, words: share > 0.3 and begun.set())
+    assert time.monotonic() - pressed[0] < 0.5
+    thread.join()
