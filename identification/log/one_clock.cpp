@@ -76,7 +76,7 @@ class OneClock {
     if (values <= static_cast<double>(options_.limits.log_values)) return;
     fail(
         fmt::format("{:.3g} instants of {} channels are more than the {:.3g} values of a log "
-                    "(docs/limits.md); give a longer step `clock_s` in a mapping file",
+                    "(docs/limits.md); cut the recording into shorter files",
                     rows, timed_.size(), static_cast<double>(options_.limits.log_values)));
   }
 

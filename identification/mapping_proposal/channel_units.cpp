@@ -188,8 +188,8 @@ const std::vector<ChannelUnit>& possible_units(const Meaning& meaning, const Mac
   }
 }
 
-Evidence unit_evidence(const ChannelUnit& unit, const Meaning& meaning, const Machine& machine,
-                       const WordOptions& o) {
+WordEvidence unit_evidence(const ChannelUnit& unit, const Meaning& meaning, const Machine& machine,
+                           const WordOptions& o) {
   if (unit.of == Of::kNothing) return {};
   const Of wanted = quantity_of(meaning, machine);
   if (unit.of == wanted) return {o.right_unit, fmt::format("its unit is {}", unit.word)};

@@ -138,8 +138,8 @@ int side_of(const Meaning& meaning) {
 
 /// What the name says of one vocabulary among others that exclude each other.
 template <std::size_t N>
-Evidence vocabulary_evidence(const std::array<WordClass, N>& all, std::size_t own,
-                             const std::vector<std::string>& words, const WordOptions& o) {
+WordEvidence vocabulary_evidence(const std::array<WordClass, N>& all, std::size_t own,
+                                 const std::vector<std::string>& words, const WordOptions& o) {
   if (const auto word = found_in(all[own].clear, words); !word.empty()) {
     return {o.clear_word, fmt::format("\"{}\" in its name means {}", word, all[own].name)};
   }
@@ -208,11 +208,11 @@ std::vector<std::vector<std::string>> part_names(const Meaning& meaning, const M
   return parts;
 }
 
-Evidence part_evidence(const Meaning& meaning, const Machine& machine,
-                       const std::vector<std::string>& words, const WordOptions& o) {
+WordEvidence part_evidence(const Meaning& meaning, const Machine& machine,
+                           const std::vector<std::string>& words, const WordOptions& o) {
   if (meaning.index < 0) return {};
   const auto parts = part_names(meaning, machine);
-  Evidence best;
+  WordEvidence best;
   double others = 0.0;
   std::string other_word;
   for (std::size_t k = 0; k < parts.size(); ++k) {
@@ -272,8 +272,8 @@ std::vector<std::string> name_words(const std::string& name) {
   return words;
 }
 
-Evidence name_evidence(const std::string& name, const Meaning& meaning, const Machine& machine,
-                       const WordOptions& o) {
+WordEvidence name_evidence(const std::string& name, const Meaning& meaning, const Machine& machine,
+                           const WordOptions& o) {
   const ColumnMeaning own = column_meaning(name, "", machine);
   if (!own.is_time && own.role != Role::kCandidate && own.error.empty()) {
     if (meaning.kind == MeaningKind::kRole && own.role == meaning.role &&
@@ -284,13 +284,13 @@ Evidence name_evidence(const std::string& name, const Meaning& meaning, const Ma
                                      meaning_words({own.role, own.index}, machine))};
   }
   const std::vector<std::string> words = name_words(name);
-  std::vector<Evidence> parts = {vocabulary_evidence(kClassWords, class_of(meaning), words, o)};
+  std::vector<WordEvidence> parts = {vocabulary_evidence(kClassWords, class_of(meaning), words, o)};
   if (const int side = side_of(meaning); side >= 0) {
     parts.push_back(vocabulary_evidence(kSideWords, static_cast<std::size_t>(side), words, o));
   }
   parts.push_back(part_evidence(meaning, machine, words, o));
-  Evidence sum;
-  for (const Evidence& e : parts) {
+  WordEvidence sum;
+  for (const WordEvidence& e : parts) {
     sum.log_odds += e.log_odds;
     if (e.words.empty()) continue;
     if (!sum.words.empty()) sum.words += ", ";

@@ -34,7 +34,7 @@ struct WordOptions {
 };
 
 /// A reason for or against a meaning.
-struct Evidence {
+struct WordEvidence {
   double log_odds = 0.0;  ///< [nat] positive speaks for the meaning
   std::string words;      ///< a clause that can stand in a sentence, "" when nothing is to be said
 };
@@ -82,11 +82,11 @@ const std::vector<ChannelUnit>& possible_units(const Meaning& meaning, const Mac
 std::vector<std::string> name_words(const std::string& name);
 
 /// What name and unit of a channel say.
-Evidence name_evidence(const std::string& name, const Meaning& meaning, const Machine& machine,
-                       const WordOptions& options = {});
+WordEvidence name_evidence(const std::string& name, const Meaning& meaning, const Machine& machine,
+                           const WordOptions& options = {});
 /// What the unit says. @param unit of `channel_unit`
-Evidence unit_evidence(const ChannelUnit& unit, const Meaning& meaning, const Machine& machine,
-                       const WordOptions& options = {});
+WordEvidence unit_evidence(const ChannelUnit& unit, const Meaning& meaning, const Machine& machine,
+                           const WordOptions& options = {});
 
 /// "bore-side pressure of cylinder boom"
 std::string meaning_words(const Meaning& meaning, const Machine& machine);

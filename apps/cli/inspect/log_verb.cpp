@@ -20,7 +20,7 @@ struct LogArguments {
 };
 
 /// A number, or null where there is none.
-nlohmann::json number(double value) {
+nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
@@ -36,17 +36,17 @@ std::string channels_json(const TimedChannels& file, const std::vector<ChannelSu
                                {"group", c.group},
                                {"comment", c.comment},
                                {"samples", c.samples},
-                               {"duration_s", number(c.duration)},
-                               {"rate_Hz", number(c.rate)},
-                               {"missing_share", number(c.missing_share)},
+                               {"duration_s", json_number(c.duration)},
+                               {"rate_Hz", json_number(c.rate)},
+                               {"missing_share", json_number(c.missing_share)},
                                {"gaps", c.gaps},
-                               {"longest_gap_s", number(c.longest_gap)},
-                               {"longest_gap_at_s", number(c.longest_gap_at)},
-                               {"smallest", number(c.smallest)},
-                               {"largest", number(c.largest)},
-                               {"mean", number(c.mean)},
-                               {"resolution", number(c.resolution)},
-                               {"noise", number(c.noise)},
+                               {"longest_gap_s", json_number(c.longest_gap)},
+                               {"longest_gap_at_s", json_number(c.longest_gap_at)},
+                               {"smallest", json_number(c.smallest)},
+                               {"largest", json_number(c.largest)},
+                               {"mean", json_number(c.mean)},
+                               {"resolution", json_number(c.resolution)},
+                               {"noise", json_number(c.noise)},
                                {"constant", c.constant}});
   }
   return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";

@@ -16,8 +16,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-RecordedChannel channel(const std::string& name, const std::string& group, double step, int count,
-                        double start = 0.0) {
+RecordedChannel recorded(const std::string& name, const std::string& group, double step, int count,
+                         double start = 0.0) {
   RecordedChannel c;
   c.name = name;
   c.group = group;
@@ -39,8 +39,8 @@ double line(double t) { return 3.0 * t + 0.25; }
 
 TEST(OneClock, AGroupWithHalfOfTheChannelsKeepsItsStamps) {
   Recording r;
-  r.channels = {channel("a", "fast", 0.02, 51), channel("b", "fast", 0.02, 51),
-                channel("c", "slow", 0.1, 11)};
+  r.channels = {recorded("a", "fast", 0.02, 51), recorded("b", "fast", 0.02, 51),
+                recorded("c", "slow", 0.1, 11)};
   r.channels[0].time[7] += 0.003, r.channels[1].time[7] += 0.003;  // kept as it is
   const RawTable table = on_one_clock(r);
   EXPECT_EQ(column(table, "t_s"), r.channels[0].time);
@@ -54,8 +54,8 @@ TEST(OneClock, AGroupWithHalfOfTheChannelsKeepsItsStamps) {
 
 TEST(OneClock, WithoutSuchAGroupTheGridHasTheFastestRate) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 101), channel("b", "2", 0.01, 101, 0.003),
-                channel("c", "3", 0.05, 21)};
+  r.channels = {recorded("a", "1", 0.01, 101), recorded("b", "2", 0.01, 101, 0.003),
+                recorded("c", "3", 0.05, 21)};
   const RawTable table = on_one_clock(r);
   const auto& t = column(table, "t_s");
   ASSERT_EQ(t.size(), 101u);
@@ -68,7 +68,7 @@ TEST(OneClock, WithoutSuchAGroupTheGridHasTheFastestRate) {
 
 TEST(OneClock, NothingIsInventedInAGap) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 201), channel("b", "2", 0.02, 101)};
+  r.channels = {recorded("a", "1", 0.01, 201), recorded("b", "2", 0.02, 101)};
   RecordedChannel& b = r.channels[1];
   b.time.erase(b.time.begin() + 30, b.time.begin() + 40);
   b.values.erase(b.values.begin() + 30, b.values.begin() + 40);
@@ -82,7 +82,7 @@ TEST(OneClock, NothingIsInventedInAGap) {
 
 TEST(OneClock, WhereAllChannelsHaveAGapNoRowsStand) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 100), channel("b", "2", 0.01, 100, 0.001)};
+  r.channels = {recorded("a", "1", 0.01, 100), recorded("b", "2", 0.01, 100, 0.001)};
   for (RecordedChannel& c : r.channels) {
     for (std::size_t i = 50; i < 100; ++i) c.time[i] += 3600.0;
   }
@@ -93,7 +93,7 @@ TEST(OneClock, WhereAllChannelsHaveAGapNoRowsStand) {
 
 TEST(OneClock, StatesAreHeldAndReadingsInterpolated) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 5), channel("gear", "2", 0.02, 3)};
+  r.channels = {recorded("a", "1", 0.01, 5), recorded("gear", "2", 0.02, 3)};
   r.channels[1].values = {1.0, 3.0, 3.0};
   EXPECT_THAT(column(on_one_clock(r), "gear"), ElementsAre(1.0, 1.0, 3.0, 3.0, 3.0));
   r.channels[1].values = {1.0, 3.5, 3.0};
@@ -103,7 +103,7 @@ TEST(OneClock, StatesAreHeldAndReadingsInterpolated) {
 
 TEST(OneClock, BesideASampleThatIsNotValidNothingIsInterpolated) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 7), channel("b", "2", 0.02, 4)};
+  r.channels = {recorded("a", "1", 0.01, 7), recorded("b", "2", 0.02, 4)};
   r.channels[1].values[1] = kNaN;
   const auto table = on_one_clock(r);
   const auto& b = column(table, "b");
@@ -114,8 +114,8 @@ TEST(OneClock, BesideASampleThatIsNotValidNothingIsInterpolated) {
 
 TEST(OneClock, TheLeadingChannelsAndTheGivenStepDecide) {
   Recording r;
-  r.channels = {channel("noise", "1", 0.001, 1001), channel("a", "2", 0.02, 51),
-                channel("b", "3", 0.02, 51, 0.001)};
+  r.channels = {recorded("noise", "1", 0.001, 1001), recorded("a", "2", 0.02, 51),
+                recorded("b", "3", 0.02, 51, 0.001)};
   ClockOptions options;
   options.leading = {1, 2};
   EXPECT_THAT(column(on_one_clock(r, options), "t_s"), SizeIs(51));
@@ -125,8 +125,8 @@ TEST(OneClock, TheLeadingChannelsAndTheGivenStepDecide) {
 
 TEST(OneClock, WhatHasNoRateIsLeftOutWithASentence) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 5), channel("once", "2", 1.0, 1),
-                channel("back", "3", -0.1, 4)};
+  r.channels = {recorded("a", "1", 0.01, 5), recorded("once", "2", 1.0, 1),
+                recorded("back", "3", -0.1, 4)};
   const RawTable table = on_one_clock(r);
   EXPECT_THAT(table.columns, SizeIs(2));
   ASSERT_THAT(table.warnings, SizeIs(2));
@@ -136,7 +136,8 @@ TEST(OneClock, WhatHasNoRateIsLeftOutWithASentence) {
 
 TEST(OneClock, TooManyRowsAreRefusedBeforeTheyAreMade) {
   Recording r;
-  r.channels = {channel("a", "1", 0.01, 5), channel("b", "2", 1e12, 5), channel("c", "3", 0.01, 5)};
+  r.channels = {recorded("a", "1", 0.01, 5), recorded("b", "2", 1e12, 5),
+                recorded("c", "3", 0.01, 5)};
   ClockOptions options;
   options.step = 1e-9;
   options.leading = {1};
