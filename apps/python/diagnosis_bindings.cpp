@@ -175,8 +175,8 @@ void bind_diagnosis(py::module_& m) {
                              [](const Extended& e) { return e.result().interrupted; })
       .def_property_readonly("stopped_because",
                              [](const Extended& e) { return e.result().stopped_because; });
-  py::class_<Selftested, Result, std::shared_ptr<Selftested>>(m, "Selftest",
-                                                              "What these logs could reveal.");
+  const py::class_<Selftested, Result, std::shared_ptr<Selftested>> selftested(
+      m, "Selftest", "What these logs could reveal.");
   m.def("diagnose", &diagnose_logs);
   m.def("extend", &extend_model);
   m.def("improve", &improve_model);

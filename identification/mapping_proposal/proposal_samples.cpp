@@ -29,7 +29,8 @@ void place_instants(const Recording& recording, const SampleOptions& o, Proposal
   const double wanted = std::floor(duration / s->step) + 1.0;
   const bool whole = wanted <= static_cast<double>(o.most_instants);
   const int stretches = whole ? 1 : o.stretches;
-  const auto each = static_cast<Eigen::Index>(whole ? wanted : o.most_instants / o.stretches);
+  const Eigen::Index each =
+      whole ? static_cast<Eigen::Index>(wanted) : o.most_instants / o.stretches;
   s->time.resize(each * stretches);
   for (int k = 0; k < stretches; ++k) {
     const double spare = duration - static_cast<double>(each - 1) * s->step;
