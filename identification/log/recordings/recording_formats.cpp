@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "identification/log/recordings/can/can_asc.h"
 #include "identification/log/recordings/can/can_text.h"
 #include "identification/log/recordings/mdf/mdf.h"
 #include "identification/log/recordings/mdf/mdf_block.h"
@@ -46,6 +47,7 @@ const std::vector<RecordingFormat>& recording_formats() {
   static const std::vector<RecordingFormat> formats = {
       {"MDF 4", is_mdf, read_mdf},
       {"candump", is_candump, read_candump},
+      {"ASC", is_asc, read_asc},
   };
   return formats;
 }

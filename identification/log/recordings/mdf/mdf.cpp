@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "identification/log/recordings/mdf/mdf_block.h"
+#include "identification/log/recordings/mdf/mdf_can.h"
 #include "identification/log/recordings/mdf/mdf_channel.h"
 #include "identification/log/recordings/mdf/mdf_conversion.h"
 #include "identification/log/recordings/mdf/mdf_data.h"
@@ -21,7 +22,7 @@ namespace {
 class MdfReader {
  public:
   MdfReader(std::string_view bytes, const std::string& file, const RecordingOptions& options)
-      : file_(bytes, file, options.limits), conversions_(file_) {}
+      : file_(bytes, file, options.limits), options_(options), conversions_(file_) {}
 
   Recording read() {
     const std::vector<MdfDataGroup> outline = mdf_outline(file_, &conversions_);
@@ -39,6 +40,14 @@ class MdfReader {
             std::any_of(data.groups.begin(), data.groups.end(),
                         [&](const MdfGroup& group) { return (group.master_group != 0) == shared; });
         if (any) read_data_group(data, shared);
+      }
+    }
+    if (!frames_.empty()) {
+      if (options_.dbc_files.empty() && !recording_.channels.empty()) {
+        recording_.warnings.push_back(
+            "CAN frames are left out; a mapping file with `dbc: FILE.dbc` decodes them");
+      } else {
+        frames_.decode(file_.name(), options_, &recording_);
       }
     }
     recording_.format = fmt::format("MDF {:.2f}, {} channel group{}", file_.version() / 100.0,
@@ -84,6 +93,9 @@ class MdfReader {
       return;
     }
     const std::map<std::uint64_t, Buffers> sorted = sort_records(data, bytes.data);
+    variable_.clear();
+    for (const MdfGroup& group : data.groups)
+      if (group.signal_data()) variable_[group.at] = sorted.find(group.record_id)->second.records;
     for (const MdfGroup& group : data.groups) {
       if (group.signal_data() || (group.master_group != 0) != shared) continue;
       const auto found = sorted.find(group.record_id);
@@ -196,6 +208,10 @@ class MdfReader {
     const std::vector<double> time = times_of(records);
     if (time.empty()) return;
     if (const auto wanted = times_.find(group.at); wanted != times_.end()) wanted->second = time;
+    if (const auto frames = frame_channels(group)) {
+      add_frames(records, *frames, time);
+      return;
+    }
     for (const MdfChannel& channel : group.channels) {
       if (!readable(channel)) continue;
       check_place(file_, records, channel);
@@ -212,6 +228,26 @@ class MdfReader {
       recording_.channels.push_back({channel.name, channel.unit, group.name, channel.comment, time,
                                      mdf_values(records, channel)});
     }
+  }
+
+  void add_frames(const MdfRecords& records, const MdfFrameChannels& channels,
+                  const std::vector<double>& time) {
+    if (channels.bytes->type == MdfChannel::kLimited) {
+      leave_out("CAN frames whose data has a length of its own in the record (MLSD)",
+                records.group->name);
+      return;
+    }
+    if (channels.bytes->type != MdfChannel::kVariable) {
+      frames_.add(file_, records, channels, time, "");
+      return;
+    }
+    const std::uint64_t content = channels.bytes->content;
+    if (const auto found = variable_.find(content); found != variable_.end()) {
+      frames_.add(file_, records, channels, time, found->second);
+      return;
+    }
+    MdfData blocks(file_);
+    frames_.add(file_, records, channels, time, blocks.joined(content, "SD").data);
   }
 
   /// @return one time for each record; empty, with a sentence, where the group has none that can be used
@@ -269,7 +305,11 @@ class MdfReader {
   }
 
   MdfFile file_;
+  const RecordingOptions& options_;
   MdfConversions conversions_;
+  MdfFrames frames_;
+  /// Records of variable length of the data group that is being read, by the place of their channel group.
+  std::map<std::uint64_t, std::string_view> variable_;
   Recording recording_;
   std::map<std::uint64_t, std::vector<double>> times_;  ///< of the groups whose master others share
   std::map<std::string, std::string> left_out_;         ///< reason -> names

@@ -34,5 +34,46 @@ TEST_F(CanText, FramesBecomeChannelsByTheDatabase) {
               HasSubstr("a.log:5"));
 }
 
+TEST_F(CanText, AscHasEventsFdFramesAndTwoKindsOfNumbers) {
+  RecordingOptions options;
+  options.dbc_files = {write("a.dbc",
+                             "BO_ 291 A: 8 E\n SG_ a : 0|16@1+ (1,0) [0|0] \"\" E\n"
+                             "BO_ 2566848513 B: 12 E\n SG_ b : 80|8@1+ (1,0) [0|0] \"\" E\n")};
+  const std::string head = "date Wed Nov 25 09:21:13.159 am 2026\n";
+  const std::string hex =
+      head +
+      "base hex  timestamps absolute\ninternal events logged\n// version 9.0.0\n"
+      "Begin Triggerblock Wed Nov 25 09:21:13.159 am 2026\n"
+      "   0.000000 Start of measurement\n"
+      "   2.500000 1  123             Rx   d 2 28 0A  Length = 0 BitCount = 0\n"
+      "   2.510000 1  ErrorFrame\n   2.520000 1  123  Tx   r\n"
+      "   2.530000 CANFD   1 Rx 18FF0001x  Name 1 0 9 12 0 0 0 0 0 0 0 0 0 0 7F 0 1 2\n"
+      "   2.540000 CANFD   1 Rx 18FF0001x  1 0 9 12 0 0 0 0 0 0 0 0 0 0 80 0\n"
+      "   2.600000 1  123             Rx   d 2 FF 00\nEnd TriggerBlock\n";
+  ASSERT_TRUE(is_recording(hex));
+  const Recording r = read_recording(hex, "a.asc", options);
+  ASSERT_EQ(r.channels.size(), 2u);
+  EXPECT_THAT(r.channels[0].values, ElementsAre(0x0A28, 255));
+  EXPECT_NEAR(r.channels[0].time[1], 0.1, 1e-12);
+  EXPECT_THAT(r.channels[1].values, ElementsAre(0x7F, 0x80));
+  EXPECT_THAT(r.warnings, testing::Contains(HasSubstr("3 lines that are no data frames")));
+
+  const std::string dec = head +
+                          "base dec  timestamps relative\n"
+                          "   1.0 1  291  Rx   d 2 40 10\n   0.5 1  291  Rx   d 2 255 0\n";
+  const Recording d = read_recording(dec, "a.asc", options);
+  EXPECT_THAT(d.channels.at(0).values, ElementsAre(0x0A28, 255));
+  EXPECT_NEAR(d.channels[0].time[1], 0.5, 1e-12);
+  EXPECT_THAT(message_of([&] {
+                read_recording(head + "base hex  timestamps absolute\n 1.0 1 123 Rx d 2 28\n",
+                               "a.asc", options);
+              }),
+              HasSubstr("a.asc:3"));
+  EXPECT_THAT(message_of([&] {
+                read_recording(hex + "   2.100000 1  123  Rx   d 2 28 0A\n", "a.asc", options);
+              }),
+              HasSubstr("time decreases"));
+}
+
 }  // namespace
 }  // namespace sparflow

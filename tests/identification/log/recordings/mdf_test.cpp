@@ -9,6 +9,7 @@
 #include <random>
 
 #include "models/math/error.h"
+#include "tests/identification/log_machines.h"
 
 namespace sparflow {
 namespace {
@@ -51,6 +52,7 @@ struct Field {
   unsigned type, sync, data, bit, byte, bits;
   std::uint64_t conversion = 0;
   unsigned flags = 0, invalid = 0;
+  std::uint64_t content = 0;
 };
 
 std::uint64_t channels(Writer& w, const std::vector<Field>& fields) {
@@ -58,7 +60,7 @@ std::uint64_t channels(Writer& w, const std::vector<Field>& fields) {
   for (std::size_t i = fields.size(); i-- > 0;) {
     const Field& f = fields[i];
     const std::uint64_t name = w.text(f.name);
-    next = w.block("CN", {next, 0, name, 0, f.conversion, 0, 0, 0},
+    next = w.block("CN", {next, 0, name, 0, f.conversion, f.content, 0, 0},
                    le(f.type, 1) + le(f.sync, 1) + le(f.data, 1) + le(f.bit, 1) + le(f.byte, 4) +
                        le(f.bits, 4) + le(f.flags, 4) + le(f.invalid, 4) + std::string(52, '\0'));
   }
@@ -178,6 +180,78 @@ TEST(Mdf, UnsortedRecordsAreSortedByTheirNumbers) {
   EXPECT_EQ(r.channels[1].values[4], 1008.0);
 }
 
+/// Where a bus logger keeps the bytes of its frames.
+enum class Bytes { kInRecord, kSignalData, kRecordsOfTheirOwn };
+
+/// 40 frames of CAN: identifier 0x123 with a counter in its first byte, and every fourth an extended one.
+std::string bus_log(Bytes kept) {
+  Writer w;
+  std::string data, apart;
+  for (unsigned i = 0; i < 40; ++i) {
+    const bool extended = i % 4 == 3;
+    const std::string bytes = extended ? std::string("\x05", 1) : le(i, 1) + le(1000 - i, 2);
+    const std::string head = real(0.01 * i) + le(extended ? 0x18FF0001U : 0x123U, 4) +
+                             le((extended ? 1U : 0U) | bytes.size() << 1U, 1);
+    if (kept == Bytes::kInRecord) {
+      data += head + bytes + std::string(8 - bytes.size(), '\xFF');
+    } else if (kept == Bytes::kSignalData) {
+      data += head + le(apart.size(), 8);
+    } else {
+      data += le(2, 1) + le(bytes.size(), 4) + bytes + le(1, 1) + head + le(apart.size(), 8);
+    }
+    apart += le(bytes.size(), 4) + bytes;
+  }
+  const bool own = kept == Bytes::kRecordsOfTheirOwn;
+  const auto at = w.block("DT", {}, data);
+  std::uint64_t content = 0, second = 0;
+  if (kept == Bytes::kSignalData) content = w.block("SD", {}, apart);
+  if (own) {
+    second =
+        w.block("CG", {0, 0, w.text("bytes"), 0, 0, 0}, le(2, 8) + le(40, 8) + le(1, 8) + le(0, 8));
+    content = second;
+  }
+  const auto first = channels(w, {{"Timestamp", 2, 1, 4, 0, 0, 64},
+                                  {"CAN_DataFrame.ID", 0, 0, 0, 0, 8, 29},
+                                  {"CAN_DataFrame.IDE", 0, 0, 0, 0, 12, 1},
+                                  {"CAN_DataFrame.DataLength", 0, 0, 0, 1, 12, 7},
+                                  {"CAN_DataFrame.DataBytes", kept == Bytes::kInRecord ? 0U : 1U, 0,
+                                   10, 0, 13, 64, 0, 0, 0, content}});
+  const auto cg = group(w, second, first, {own ? 1U : 0U, 40, 21, 0});
+  w.first(w.block("DG", {0, cg, at, 0}, le(own ? 1 : 0, 8)));
+  return w.file;
+}
+
+class MdfBusLog : public test::LogFiles {};
+
+TEST_F(MdfBusLog, FramesAreDecodedWhereverTheirBytesStand) {
+  RecordingOptions options;
+  options.dbc_files = {write("a.dbc",
+                             "BO_ 291 A: 8 E\n SG_ count : 0|8@1+ (1,0) [0|0] \"\" E\n"
+                             " SG_ p : 8|16@1+ (0.5,0) [0|0] \"bar\" E\n"
+                             " SG_ beyond : 32|8@1+ (1,0) [0|0] \"\" E\n"
+                             "BO_ 2566848513 B: 1 E\n SG_ b : 0|8@1+ (1,0) [0|0] \"\" E\n")};
+  for (const Bytes kept : {Bytes::kInRecord, Bytes::kSignalData, Bytes::kRecordsOfTheirOwn}) {
+    SCOPED_TRACE(static_cast<int>(kept));
+    const Recording r = read_recording(bus_log(kept), "bus.mf4", options);
+    ASSERT_EQ(r.channels.size(), 3u);
+    EXPECT_EQ(r.channels[0].name, "count");
+    ASSERT_EQ(r.channels[0].values.size(), 30u);
+    EXPECT_EQ(r.channels[0].values[4], 5.0) << "the fourth frame is an extended one";
+    EXPECT_DOUBLE_EQ(r.channels[0].time[4], 0.05);
+    EXPECT_DOUBLE_EQ(r.channels[1].values[4], 0.5 * 995);
+    EXPECT_EQ(r.channels[1].unit, "bar");
+    EXPECT_EQ(r.channels[2].values.size(), 10u);
+    EXPECT_EQ(r.channels[2].values[0], 5.0);
+    EXPECT_THAT(r.warnings,
+                testing::Contains(HasSubstr("30 values left out: their frames are too short")));
+  }
+}
+
+TEST_F(MdfBusLog, WithoutADatabaseTheIdentifiersAreNamed) {
+  EXPECT_THAT(message_of([] { read_recording(bus_log(Bytes::kSignalData), "bus.mf4"); }),
+              HasSubstr("identifiers seen: 123 (30 frames), 18FF0001x (10 frames)"));
+}
+
 std::string error_of(const std::string& file) {
   try {
     read_recording(file, "log.mf4");
@@ -199,6 +273,10 @@ TEST(Mdf, DamageIsNamedWithByteAndBlock) {
   std::string bomb = written(1);
   bomb.replace(bomb.find("##DZ") + 24 + 8, 8, le(std::uint64_t{1} << 60U, 8));
   EXPECT_THAT(error_of(bomb), HasSubstr("block DZ"));
+  std::string lost =
+      bus_log(Bytes::kSignalData);  // the first frame's bytes lie beyond the signal data
+  lost.replace(lost.find("##DT") + 24 + 13, 8, le(1U << 20U, 8));
+  EXPECT_THAT(error_of(lost), HasSubstr("points to byte 1048576 of its data of variable length"));
 }
 
 TEST(Mdf, ThreeThousandChangedFilesAreReadOrRefused) {
@@ -206,7 +284,7 @@ TEST(Mdf, ThreeThousandChangedFilesAreReadOrRefused) {
   const auto below = [&](std::size_t n) { return random() % n; };
   int refused = 0;
   for (int k = 0; k < 3000; ++k) {
-    std::string file = written(k % 4);
+    std::string file = k % 7 < 4 ? written(k % 7) : bus_log(static_cast<Bytes>(k % 7 - 4));
     for (std::size_t e = 1 + below(4); e > 0; --e) {
       const std::size_t at = 64 + below(file.size() - 72);
       if (below(3) == 0) {
