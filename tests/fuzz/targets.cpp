@@ -14,6 +14,9 @@
 #include "identification/log/log_mapping.h"
 #include "identification/log/log_matlab.h"
 #include "identification/log/mat_file.h"
+#include "identification/log/one_clock.h"
+#include "identification/log/recordings/can/dbc.h"
+#include "identification/log/recordings/recording_formats.h"
 #include "models/effects/formula/effect_file.h"
 #include "models/expression/expression.h"
 #include "models/expression/unit_algebra.h"
@@ -105,12 +108,38 @@ void read_urdf(const std::string& bytes) {
   ::close(fd);
 }
 
+void read_any_recording(const std::string& bytes) {
+  RecordingOptions options;
+  options.dbc_files = {std::string(SPARFLOW_SOURCE_DIR) + "/tests/fuzz/corpus/dbc/bus.dbc"};
+  options.limits.log_bytes = 20'000'000;
+  options.limits.log_values = 1'000'000;
+  answered([&] {
+    const Recording recording = read_recording(bytes, "log.mf4", options);
+    ClockOptions clock;
+    clock.limits = options.limits;
+    on_one_clock(recording, clock);
+  });
+}
+
+void read_dbc(const std::string& bytes) {
+  answered([&] {
+    const Dbc dbc = parse_dbc("bus.dbc", text_as_utf8("bus.dbc", bytes));
+    // the first frame of every message, all ones
+    const std::vector<std::uint8_t> frame(64, 0xFF);
+    for (const DbcMessage& message : dbc.messages)
+      for (const DbcSignal& signal : message.signals)
+        if (signal.bytes() <= frame.size()) dbc_value(signal, dbc_bits(signal, frame));
+  });
+}
+
 }  // namespace
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
       {"log", read_log, {}},
       {"mat", read_mat_log, {}},
+      {"recording", read_any_recording, {}},
+      {"dbc", read_dbc, {}},
       {"machine",
        read_machine_file,
        {"machines/loader_crane.yaml", "machines/excavator.yaml", "machines/emps.yaml"}},

@@ -246,7 +246,10 @@ class DbcReader {
     signal.offset = real("an offset");
     mark(")", "behind factor and offset");
     mark("[", "before the range");
-    while (!tokens_.peek().is("]") && tokens_.peek().line == order.line) tokens_.next();
+    while (!tokens_.peek().is("]") && tokens_.peek().kind != Token::Kind::kEnd &&
+           tokens_.peek().line == order.line) {
+      tokens_.next();
+    }
     mark("]", "behind the range");
     const Token unit = tokens_.next();
     if (unit.kind != Token::Kind::kText) fail(unit, "the unit of a signal in quotes");

@@ -34,7 +34,7 @@ class MdfFile {
   /// Number of `size` bytes at `offset` of a block's data. @throws InputError where the block is too short
   std::uint64_t number(const MdfBlock& block, std::size_t offset, std::size_t size) const;
   double real(const MdfBlock& block, std::size_t offset) const;  ///< as `number`, of eight bytes
-  /// Text of a TX block, or the first <TX> element of an MD block; "" for a link of 0. Long texts are cut.
+  /// Text of a TX block, or the first element TX of an MD block; "" for a link of 0. Long texts are cut.
   std::string text(std::uint64_t at) const;
   [[noreturn]] void fail(std::uint64_t at, std::string_view id, const std::string& message) const;
   [[noreturn]] void fail(const MdfBlock& block, const std::string& message) const {
