@@ -10,6 +10,7 @@ program's `--json` writes), `.to_dict()`, `.to_frame()` (pandas), `.report(path)
 Every verb of the program is a function here: `help(sparflow.fit)`.
 """
 
+from ._effects import Effect, Formula, effect, positive, quantity, step
 from ._errors import (DefectError, Error, InfeasibleError, InputError, Interrupted, NotConvergedError,
                       SparflowWarning, UsageError)
 from ._sparflow import *  # noqa: F401,F403

@@ -9,7 +9,7 @@ def fit(machine, logs, test=None, *, threads=0, effects=None, progress=None):
 
     test: logs to judge the model on, from which nothing is learned; without any, motions are held out.
     threads: for learning; 0 is one for each processor.
-    effects: effects of your own (paths of YAML files) that the model's file shall contain.
+    effects: effects of your own (@sparflow.effect, or paths of YAML files) that the model's file shall contain.
     progress: called as progress(share, words) in this thread.
     Raises InputError where nothing could be learned, UsageError for a log given twice.
     """
@@ -29,7 +29,8 @@ def diagnose(model, logs, references=None, test=None, *, candidates=None, effect
 
     references: logs of the same machine from before the effect. test: logs on which the effects found are judged.
     candidates: keys of effects ('coulomb_friction:boom'; without a place at all places); None is the whole catalogue.
-    effects: effects of your own (paths of YAML files). check_data: look for stuck, jumping or noisy channels first.
+    effects: effects of your own (@sparflow.effect, or paths of YAML files).
+    check_data: look for stuck, jumping or noisy channels first.
     """
     return core.diagnose(model, dict(logs=logs, references=references, test=test, candidates=candidates,
                                      effects=effects, check_data=check_data, progress=progress))
