@@ -46,5 +46,6 @@ void bind_log(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_diagnosis(py::module_& m);
 void bind_motion(py::module_& m);
+void bind_law(py::module_& m);
 
 }  // namespace sparflow::python

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_sparflow, m) {
   bind_learning(m);
   bind_diagnosis(m);
   bind_motion(m);
+  bind_law(m);
 }

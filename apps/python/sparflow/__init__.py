@@ -15,7 +15,7 @@ from ._errors import (DefectError, Error, InfeasibleError, InputError, Interrupt
                       SparflowWarning, UsageError)
 from ._sparflow import *  # noqa: F401,F403
 from ._sparflow import __version__
-from ._verbs import compare, diagnose, extend, fit, improve, optimize, plan, selftest
+from ._verbs import compare, diagnose, evaluate, extend, fit, improve, optimize, plan, selftest
 from . import _frames
 
 _frames.attach()

@@ -88,3 +88,14 @@ def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, see
     """
     return core.optimize(problem, dict(bound=bound, start_from=start_from, paths=paths, seconds=seconds, seed=seed,
                                        intervals=intervals, processes=processes, progress=progress))
+
+
+def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
+    """The exact law of the Model on N states at once, without Python's lock; returns a dict of arrays, SI.
+
+    q, qd, qdd: [N x joints] positions [rad or m], rates and accelerations of the joints (None: no inertia forces).
+    Keys [N x cylinders]: 'speed' of the rods [m/s], 'static_force', 'total_force' with effects [N], 'flow' [m^3/s], working
+    'pressure' [Pa, 0 at rest]; [N x pumps]: 'pump_flow', 'pump_pressure'; [N x 1]: 'power' of the pumps [W].
+    Raises UsageError for another shape and for a posture in which a linkage cannot close.
+    """
+    return core.evaluate(model, q, qd, qdd, payload_kg, oil_C)
