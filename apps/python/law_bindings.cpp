@@ -32,7 +32,9 @@ struct Columns {
 };
 
 py::dict evaluate(const CraneModel& model, const States& q, const States& qd,
-                  const py::object& qdd_given, double payload, double oil) {
+                  const py::object& qdd_given, const py::dict& options) {
+  const auto payload = py::cast<double>(options["payload_kg"]);
+  const auto oil = py::cast<double>(options["oil_C"]);
   const auto joints = static_cast<Index>(model.machine.joints.size());
   const Index rows = q.ndim() > 0 ? q.shape(0) : 0;
   check_shape(q, "q", rows, joints);

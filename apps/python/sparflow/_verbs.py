@@ -98,4 +98,4 @@ def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
     'pressure' [Pa, 0 at rest]; [N x pumps]: 'pump_flow', 'pump_pressure'; [N x 1]: 'power' of the pumps [W].
     Raises UsageError for another shape and for a posture in which a linkage cannot close.
     """
-    return core.evaluate(model, q, qd, qdd, payload_kg, oil_C)
+    return core.evaluate(model, q, qd, qdd, dict(payload_kg=payload_kg, oil_C=oil_C))
