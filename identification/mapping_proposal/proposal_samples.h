@@ -24,7 +24,7 @@ struct SampleOptions {
   double least_filled = 0.3;
 };
 
-/// The look of one channel, in the file's unit.
+/// Range, roughness and shares of rest and zero of one channel, in the file's unit.
 struct ChannelShape {
   bool usable = false;  ///< enough values, all finite
   bool constant = false;

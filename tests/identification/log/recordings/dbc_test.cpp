@@ -13,9 +13,9 @@ namespace {
 
 const std::string kText =
     "VERSION \"\"\nNS_ :\n\tCM_\n\tSG_MUL_VAL_\nBS_:\nBU_: A\n"
-    "BO_ 291 Frame: 8 Vector__XXX\n"
-    " SG_ signal1 : 7|32@0- (1,0) [0|0] \"\" Vector__XXX\n"
-    " SG_ signal2 : 39|32@0- (1,0) [0|0] \"\" Vector__XXX\n"
+    "BO_ 291 Frame: 8 ECU\n"
+    " SG_ signal1 : 7|32@0- (1,0) [0|0] \"\" ECU\n"
+    " SG_ signal2 : 39|32@0- (1,0) [0|0] \"\" ECU\n"
     "BO_ 2147483650 Mux: 8 A\n"
     " SG_ M0 M : 0|8@1+ (1,0) [0|0] \"\" A\n"
     " SG_ a m0 : 12|12@1- (0.5,1) [0|0] \"bar\" A\n"
