@@ -156,10 +156,11 @@
       let y = top + 14;
       for (const n of column) {
         Object.assign(n, { y, tall: Math.max(1, n.amount * scale), leaves: y, enters: y });
-        y += n.tall + Math.max(gap, 14 - n.tall);
+        y += n.tall + Math.max(n.column < last ? 2 * gap : gap, 14 - n.tall);
       }
     }
     const color = (n) => theme.color(n.i);
+    const halo = { stroke: theme.paper(), "stroke-width": 3, "paint-order": "stroke" };  // readable on bands
     for (const f of spec.flows) {
       if (!(f.amount > 0)) continue;
       const a = nodes[f.from], b = nodes[f.to], w = f.amount * scale;
@@ -175,7 +176,7 @@
     for (const n of shown) {
       drawing.append(svg("rect", { x: X(n.column), y: n.y, width: bar, height: n.tall, fill: color(n) }));
       if (n.column === last) drawing.append(label(text(n), X(n.column) + bar + 5, n.y + n.tall / 2 + 4, "start", theme.ink()));
-      else drawing.append(label(text(n), X(n.column), n.y - 4, "start", theme.ink()));
+      else drawing.append(label(text(n), X(n.column), n.y - 4, "start", theme.ink(), halo));
     }
     if (shown.length === 0) drawing.append(label("no values", width / 2, top + 20, "middle"));
     const low = Math.max(height, ...shown.map((n) => n.y + n.tall + top));

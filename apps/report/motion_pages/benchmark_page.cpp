@@ -163,7 +163,7 @@ double came_in(const BenchmarkedRun& run) {
 /// Pumps, and height that was given, on the left; what was gained and heat by place on the right.
 SankeyChart sankey(const BenchmarkedRun& run, double scale) {
   SankeyChart chart;
-  chart.title = "Where the energy went: " + run.controller;
+  chart.title = "Where the energy went [kJ]: " + run.controller;
   chart.amount = {"energy", "kJ"};
   chart.width = FigureWidth::kHalf;
   chart.scale = scale;
