@@ -189,6 +189,7 @@ int main(int argc, char** argv) {
   cli::add_strategies_verb(app, code);
   cli::add_pareto_verb(app, code);
   cli::add_benchmark_verb(app, code);
+  cli::add_completion_verb(app, code);
   cli::refuse_empty_values(app);
   try {
     return cli::run(app, argc, argv, code);

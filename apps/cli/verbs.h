@@ -34,5 +34,6 @@ void add_evaluate_verb(CLI::App& app, int& code);
 void add_machine_verb(CLI::App& app, int& code);
 void add_log_verb(CLI::App& app, int& code);
 void add_demo_verb(CLI::App& app, int& code);
+void add_completion_verb(CLI::App& app, int& code);
 
 }  // namespace sparflow::cli
