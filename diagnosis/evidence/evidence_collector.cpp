@@ -101,6 +101,28 @@ VectorXd since_change(const MachineSeries& series, double least) {
   return since;
 }
 
+/// Lets the times begin anew also where the pressure of a pump moves faster than `fastest` [Pa/s]: behind a slow or swinging pump
+/// nothing is settled, however long the commands have stood.
+void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries& series,
+                              double fastest, VectorXd& since) {
+  const Index half =
+      std::max<Index>(1, static_cast<Index>(std::lround(0.5 * signals.window / signals.step)));
+  for (const PumpSignals& pump : signals.pumps) {
+    const VectorXd& p = pump.pressure_smooth;
+    if (p.size() == 0) continue;
+    for (const auto& [first, last] : series.runs) {
+      double moved = -std::numeric_limits<double>::infinity();
+      for (Index k = first; k < last; ++k) {
+        const Index a = std::max(first, k - half), b = std::min(last - 1, k + half);
+        const double rate =
+            std::abs(p[b] - p[a]) / std::max(series.time[b] - series.time[a], signals.step);
+        if (rate > fastest) moved = series.time[k];
+        since[k] = std::min(since[k], series.time[k] - moved);
+      }
+    }
+  }
+}
+
 std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
                                             const std::vector<MachineSignals>& references) {
   std::vector<const MachineSignals*> all;
@@ -185,8 +207,11 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
     e.series.push_back(make_series(model_, s));
     if (!is_suspect(log) && in_references != nullptr)
       e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
-    if (e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling))
-      e.since_change.push_back(since_change(e.series[log], e.options.least_change));
+    if (e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling)) {
+      VectorXd since = since_change(e.series[log], e.options.least_change);
+      restart_where_pumps_move(s, e.series[log], e.options.fastest_settled, since);
+      e.since_change.push_back(std::move(since));
+    }
     add_kernels(s);
     e.window = std::max(e.window, s.window);
     e.stride = std::max(e.stride,

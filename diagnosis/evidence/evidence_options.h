@@ -126,6 +126,10 @@ struct EvidenceOptions {
   /// Change of a command, as share of full command, from which machine and oil have to settle again.
   /// @threshold [1] 0..1; chosen: levers rest within a twentieth
   double least_change = 0.05;
+  /// Rate of a pump's pressure above which machine and oil are not settled.
+  /// @threshold [Pa/s] 1e5..1e8; chosen: a load that is driven through its range in two seconds changes its pressure as fast; a pump
+  /// that follows a demand is ten times faster
+  double fastest_settled = 5e6;
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows
   /// would cost time and add no information

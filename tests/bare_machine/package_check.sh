@@ -76,7 +76,7 @@ try "fit, compare, diagnose on the bundled logs" \
   "sparflow fit -m $data/machines/loader_crane.yaml --log $data/logs/loader_crane_train.csv -o crane.json &&
    sparflow compare --model crane.json --log $data/logs/loader_crane_train.csv --report compare.html && test -s compare.html &&
    sparflow diagnose --model crane.json --log $data/logs/loader_crane_train.csv"
-try "optimize" "sparflow optimize -p $data/reaches/loader_crane_lift.yaml --paths 1 --seconds 1 -o motion.csv && test -s motion.csv"
+try "optimize" "sparflow optimize -p $data/reaches/loader_crane_lift.yaml --model crane.json --paths 1 --seconds 1 -o motion.csv && test -s motion.csv"
 try "import sparflow in Python" \
   "python3 -c 'import sparflow; m = sparflow.Machine.load(\"$data/machines/loader_crane.yaml\"); print(m); help(sparflow.fit)'"
 try "completion and manual pages are in place" \
