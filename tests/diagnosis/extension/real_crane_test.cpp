@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "diagnosis/extension/extend.h"
 #include "identification/learning/fit.h"
@@ -13,6 +14,8 @@
 namespace sparflow {
 namespace {
 
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -173,6 +176,87 @@ TEST_F(RealCrane, ValveLogsShowTheDeadBand) {
   // Authors: 0.071 up, 0.126 down, read off by eye from slow ramps
   EXPECT_NEAR(band->values[0], 0.071, 0.025);
   EXPECT_NEAR(band->values[1], 0.126, 0.025);
+}
+
+/// A Butterworth low-pass of fourth order, forwards and backwards, so that nothing is delayed. @param cut share of the sampling rate
+VectorXd zero_phase(VectorXd x, double cut) {
+  const double w = std::tan(std::numbers::pi * cut);
+  for (const double damping : {std::cos(std::numbers::pi / 8), std::sin(std::numbers::pi / 8)}) {
+    const double norm = 1.0 / (1.0 + 2.0 * damping * w + w * w);
+    const double b = w * w * norm, a1 = 2.0 * (w * w - 1.0) * norm,
+                 a2 = (1.0 - 2.0 * damping * w + w * w) * norm;
+    for (int pass = 0; pass < 2; ++pass) {
+      double x1 = x[0], x2 = x[0], y1 = x[0], y2 = x[0];
+      for (double& value : x) {
+        const double y = b * (value + 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
+        x2 = x1, x1 = value, y2 = y1, y1 = y;
+        value = y;
+      }
+      x.reverseInPlace();
+    }
+  }
+  return x;
+}
+
+VectorXd central_difference(const VectorXd& x, double step) {
+  VectorXd d = VectorXd::Zero(x.size());
+  const Eigen::Index n = x.size() - 2;
+  d.segment(1, n) = (x.tail(n) - x.head(n)) / (2.0 * step);
+  return d;
+}
+
+/// The benchmark's own procedure: positions filtered at 100 Hz, central differences, every column low-passed and one row in ten
+/// taken, and the relative error |F - W theta| / |F| of the force.
+struct BenchmarkRegression {
+  MatrixXd w;
+  VectorXd force;
+
+  explicit BenchmarkRegression(const Log& log) {
+    constexpr double kStep = 1e-3;
+    const VectorXd q = zero_phase(log.find("q_axis")->values, 100.0 * kStep);
+    const VectorXd speed = central_difference(q, kStep);
+    MatrixXd all(q.size(), 5);
+    all << central_difference(speed, kStep), speed, speed.cwiseSign(), VectorXd::Ones(q.size()),
+        log.find("force_axis")->values;
+    constexpr Eigen::Index kEnds = 500, kEvery = 10;  // the filter begins with its first value
+    const Eigen::Index rows = (q.size() - 2 * kEnds) / kEvery;
+    MatrixXd kept(rows, 5);
+    for (Eigen::Index c = 0; c < 5; ++c) {
+      const VectorXd smooth = zero_phase(all.col(c), 50.0 * kStep);
+      for (Eigen::Index k = 0; k < rows; ++k) kept(k, c) = smooth[kEnds + kEvery * k];
+    }
+    w = kept.leftCols(4);
+    force = kept.col(4);
+  }
+  double relative_error(const Eigen::Vector4d& theta) const {
+    return (force - w * theta).norm() / force.norm();
+  }
+};
+
+/// Published: 4.083 % with the parameters below. The same procedure applied to what `improve` finds.
+TEST(RealDrive, RelativeForceErrorByTheBenchmarksProcedure) {
+  const std::string path = kRealLogs + "data/emps/estimation.csv";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no log of the drive beside the source tree";
+  const Machine machine = load_machine(kRealLogs + "machines/emps.yaml");
+  const Log log = load_log(path, machine);
+  const BenchmarkRegression benchmark(log);
+  const Eigen::Vector4d published(95.109, 203.50, 20.394, -3.165);
+  const Eigen::Vector4d least = benchmark.w.colPivHouseholderQr().solve(benchmark.force);
+  // The procedure is theirs: its least squares gives their parameters, but for the filter of the decimation, which is another, and
+  // the ends, of which more is left out: that moves the small offset by a hundredth.
+  const Eigen::Vector4d alike(0.005, 0.005, 0.005, 0.02);
+  for (Eigen::Index k = 0; k < 4; ++k)
+    EXPECT_NEAR(least[k], published[k], alike[k] * std::abs(published[k]));
+  const CraneModel model = improve(fit(machine, {log}).model, {{log}}).model;
+  const auto value = [&](const char* key) { return effect_of(model, key)->values[0]; };
+  const Eigen::Vector4d found(95.11 * value("inertia"), value("viscous_friction:axis"),
+                              value("coulomb_friction:axis"), value("force_offset:axis"));
+  RecordProperty("relative_error_percent", std::to_string(100.0 * benchmark.relative_error(found)));
+  std::printf(
+      "relative force error: found %.3f %%, published parameters %.3f %%, least squares %.3f %%\n",
+      100.0 * benchmark.relative_error(found), 100.0 * benchmark.relative_error(published),
+      100.0 * benchmark.relative_error(least));
+  EXPECT_LT(benchmark.relative_error(found), 0.0409);
 }
 
 TEST(RealDrive, FrictionAndInertiaAsPublished) {
