@@ -66,6 +66,12 @@ bool is_nonlinear_in_parameter(const Effect& effect) {
          effect.info().parameters.size() == 1;
 }
 
+bool is_replaced_when_changed(const Effect& effect) {
+  const std::vector<EffectParameter>& parameters = effect.info().parameters;
+  return std::any_of(parameters.begin(), parameters.end(),
+                     [](const EffectParameter& p) { return p.linear && p.lower > 0.0; });
+}
+
 Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
                                   const EvidenceChannel& channel, std::span<const double> about,
                                   ActingLogs where) const {
@@ -124,15 +130,12 @@ void Evidence::subtract_shared(std::size_t log, const EffectAt& effect,
   for (const AppliedEffect& known : options.shared) {
     if (known.effect != effect.effect || known.at != effect.at) continue;
     std::vector<double> before;
-    bool on = false;  // a linear parameter that cannot be zero multiplies the whole law
     const std::vector<EffectParameter>& parameters = known.effect->info().parameters;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
+    for (std::size_t p = 0; p < parameters.size(); ++p)
       if (!parameters[p].linear) before.push_back(known.values[p]);
-      on = on || (parameters[p].linear && parameters[p].lower > 0.0);
-    }
     Eigen::MatrixXd there;
     const bool other = !std::equal(before.begin(), before.end(), shape.begin(), shape.end());
-    if (on && other &&
+    if (is_replaced_when_changed(*known.effect) && other &&
         known.effect->columns(series[log], {channel.kind, channel.index}, known.at, before, there))
       columns -= there;
     return;

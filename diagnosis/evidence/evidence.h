@@ -57,6 +57,10 @@ struct EvidenceChannel {
 /// is nonlinear too, but is excluded: flows show its derivative alone, so it keeps the linearisation at its usual size.
 bool is_nonlinear_in_parameter(const Effect& effect);
 
+/// Whether a linear parameter that cannot be zero multiplies the whole law (a lag's share): another value of the effect then
+/// replaces the law, where that of other effects adds to it.
+bool is_replaced_when_changed(const Effect& effect);
+
 /// Logs in which an effect acts.
 enum class ActingLogs { kSuspects, kReferences, kAll };
 

@@ -41,6 +41,14 @@ bool merge_two(const SearchState& search, std::vector<FoundEffect>& found, std::
   return true;
 }
 
+/// Linear parameters of found[i] in a fit of all found.
+Eigen::VectorXd theta_of(const std::vector<FoundEffect>& found, std::size_t i,
+                         const EffectFit& fit) {
+  Eigen::Index first = 0;
+  for (std::size_t k = 0; k < i; ++k) first += found[k].design.linear;
+  return fit.theta.segment(first, found[i].design.linear);
+}
+
 }  // namespace
 
 bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit& current) {
@@ -59,9 +67,8 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
   if (std::find(choices.begin(), choices.end(), true) == choices.end()) return false;
   const std::vector<const EffectDesign*> others = designs_of(found, i);
   const EffectFit without = fit_effects(search.evidence, others, &current, {});
-  double most =
+  const double least =
       search.scores.gain(others, found[i].design, without) + search.options.least_reshape_gain;
-  const CandidateScore* best = nullptr;
   std::vector<CandidateScore> variants;
   for (std::size_t c = 0; c < search.candidates.size(); ++c) {
     if (!(search.candidates[c].effect == found[i].design.effect)) continue;
@@ -74,21 +81,33 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
       if (other) variants.push_back({c, d, 0.0});
     }
   }
-  for (CandidateScore& s : variants) {
+  for (CandidateScore& s : variants)
     s.gain = search.scores.gain(others, search.design_of(s), without);
-    if (s.gain > most) most = s.gain, best = &s;
-  }
-  if (!search.mechanisms().act(Mechanism::kReshape, best != nullptr)) return false;
-  FoundEffect variant;
-  variant.design = search.scores.refined(others, *best, without);
-  variant.p_value = found[i].p_value;
+  std::erase_if(variants, [&](const CandidateScore& s) { return !(s.gain > least); });
+  std::stable_sort(
+      variants.begin(), variants.end(),
+      [](const CandidateScore& a, const CandidateScore& b) { return a.gain > b.gain; });
+  // A variant whose parameters leave what is plausible would be refused; it does not take the place of one that is not.
+  std::vector<FoundEffect> with = found;
+  EffectFit fit;
+  const auto plausible = [&](const CandidateScore& s) {
+    with[i] = {};
+    with[i].design = search.scores.refined(others, s, without);
+    with[i].p_value = found[i].p_value;
+    fit = search.fit(designs_of(with));
+    return !rests_on_bound(with[i].design, theta_of(with, i, fit)) ||
+           rests_on_bound(found[i].design, theta_of(found, i, current));
+  };
+  if (!search.mechanisms().act(Mechanism::kReshape,
+                               std::any_of(variants.begin(), variants.end(), plausible)))
+    return false;
   if (tracing()) {
     fmt::print(stderr, "  {} changes shape [{:.4g}] -> [{:.4g}]\n",
-               search.key(variant.design.effect), fmt::join(found[i].design.shape, " "),
-               fmt::join(variant.design.shape, " "));
+               search.key(with[i].design.effect), fmt::join(found[i].design.shape, " "),
+               fmt::join(with[i].design.shape, " "));
   }
-  found[i] = std::move(variant);
-  current = search.fit(designs_of(found));
+  found = std::move(with);
+  current = std::move(fit);
   return true;
 }
 

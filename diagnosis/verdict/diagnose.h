@@ -119,6 +119,14 @@ struct VerdictOptions {
   /// from that in the references no more than from motion to motion.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double difference_false_alarm = 0.01;
+  /// The same probability for a difference that is a change by its size alone, whatever the residual says.
+  /// @threshold [1] 0..1; tuned on seeds 14..21 of plant_verdicts: true changes behind large residuals have 0.0002 and less, untrue ones
+  /// 0.0014 and more
+  double difference_alone_false_alarm = 0.001;
+  /// Chance of a residual that exceeds that of the references so far without a found effect, from which on the effect is no
+  /// change but a law that is not exact. The effect has passed the test above already.
+  /// @threshold [1] 0..0.5; chosen: one in twenty, in the effect's own channels
+  double excess_false_alarm = 0.05;
   /// Absorbed share of an effect from which its size in single motions is not compared, but its parameters in all of them.
   /// @threshold [1] 0..1; chosen: more of it is learned than left
   double absorbed_by_learned_laws = 0.5;

@@ -80,6 +80,34 @@ double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
   return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
 }
 
+/// Probabilities by chance that the residual of a channel in the suspect logs exceeds that in the references so far.
+struct Excess {
+  double level = 1.0;    ///< in the mean over the blocks
+  double largest = 1.0;  ///< in the largest block
+};
+constexpr double kWaysToExceed = 2.0;  // for Bonferroni's bound
+
+/// Nothing where there are no references, or too few motions of one kind.
+std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel) {
+  if (!d.evidence.has_reference()) return std::nullopt;
+  const BlockLevel suspect = block_level(d, channel, false),
+                   reference = block_level(d, channel, true);
+  if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
+  const Excess excess{chance_of_level(suspect, reference),
+                      chance_of_largest(suspect, reference, d.thresholds.least_excess_ratio)};
+  if (tracing())
+    fmt::print(stderr,
+               "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
+               "block {:.2g}, {} and {} blocks\n",
+               d.evidence.channels[channel].text,
+               suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
+                   d.evidence.channels[channel].unit.si,
+               reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
+               d.evidence.channels[channel].unit.name, excess.level, excess.largest, suspect.blocks,
+               reference.blocks);
+  return excess;
+}
+
 /// Columns of a found effect in other logs than the suspect ones.
 EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
   EffectDesign design = found;
@@ -151,6 +179,26 @@ bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   });
 }
 
+/// Whether the references have the same effect with the same values, as far as both can tell: for every parameter the 95 %
+/// interval of the difference contains zero. Only of effects that another value replaces; of others the found values are the
+/// difference itself. Each log prefers a nonlinear parameter of its own (the length of a rope by the phase of every swing), and the
+/// size of the one law in the other log then says that they differ.
+bool within_intervals_of_references(const Evidence& evidence, const FoundEffect& f) {
+  if (!is_replaced_when_changed(*f.design.effect.effect)) return false;
+  const std::vector<EffectParameter>& parameters = f.design.effect.effect->info().parameters;
+  const std::vector<AppliedEffect>& all = evidence.options.shared;
+  return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
+    if (!same_place(e, f.design.effect) || e.lower95.size() != e.values.size()) return false;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (parameters[p].choice) continue;
+      const double half =
+          std::hypot(0.5 * (e.upper95[p] - e.lower95[p]), 0.5 * (f.upper95[p] - f.lower95[p]));
+      if (!(std::abs(f.values[p] - e.values[p]) <= half)) return false;
+    }
+    return true;
+  });
+}
+
 /// A chi-square value of `freedom` degrees as a normal deviate, zero where it is below its median (Wilson and Hilferty 1931,
 /// Proc. Natl. Acad. Sci. 17, 684).
 double deviate_of_chi_square(double value, double freedom) {
@@ -210,22 +258,6 @@ struct OtherEffects {
   OtherEffects& operator=(const OtherEffects&) = delete;
 };
 
-/// Whether a channel's residual in the suspect logs exceeds that in the references once the action of a found effect is left
-/// in it, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
-bool needed(const Diagnosis& d, std::size_t found) {
-  Index first = 0;
-  for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
-  const EffectDesign& design = d.search.found[found].design;
-  Diagnosis without = d;
-  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
-    if (!design.touches(c)) continue;
-    without.search.final.residual[c] +=
-        design.columns[c] * d.search.final.theta.segment(first, design.linear);
-    if (exceeds_references(without, c)) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 double reference_rms(const Diagnosis& d, std::size_t channel) {
@@ -241,25 +273,10 @@ double reference_rms(const Diagnosis& d, std::size_t channel) {
 }
 
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {
-  if (!d.evidence.has_reference()) return std::nullopt;
-  const BlockLevel suspect = block_level(d, channel, false),
-                   reference = block_level(d, channel, true);
-  if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
-  const double level = chance_of_level(suspect, reference),
-               largest = chance_of_largest(suspect, reference, d.thresholds.least_excess_ratio);
-  if (tracing())
-    fmt::print(stderr,
-               "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
-               "block {:.2g}, {} and {} blocks\n",
-               d.evidence.channels[channel].text,
-               suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
-                   d.evidence.channels[channel].unit.si,
-               reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name, level, largest, suspect.blocks,
-               reference.blocks);
-  constexpr double kTests = 2.0;  // Bonferroni's bound, over the channels as well
-  return std::min(
-      1.0, kTests * static_cast<double>(d.evidence.channels.size()) * std::min(level, largest));
+  const std::optional<Excess> excess = excess_over_references(d, channel);
+  if (!excess) return std::nullopt;
+  return std::min(1.0, kWaysToExceed * static_cast<double>(d.evidence.channels.size()) *
+                           std::min(excess->level, excess->largest));
 }
 
 bool exceeds_references(const Diagnosis& d, std::size_t channel) {
@@ -312,8 +329,47 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
   return shared;
 }
 
-InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+namespace {
+
+/// What a difference needs beside its size to be called a change.
+enum class Proof {
+  kNone,        ///< its size alone is enough
+  kExcess,      ///< the residual without it exceeds that of the references in one of its channels
+  kClearExcess  ///< the same by the test over all channels: it has no sizes that could be compared
+};
+
+struct SizeVerdict {
+  InReferences in_references = InReferences::kAlike;
+  Proof proof = Proof::kClearExcess;
+};
+
+/// Whether the residual of one of its channels in the suspect logs exceeds that in the references once the action of a found
+/// effect is left in it, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
+bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
+  Index first = 0;
+  for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
+  const EffectDesign& design = d.search.found[found].design;
+  Diagnosis without = d;
+  double least = 1.0, tests = 0.0;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!design.touches(c)) continue;
+    without.search.final.residual[c] +=
+        design.columns[c] * d.search.final.theta.segment(first, design.linear);
+    const std::optional<Excess> excess = excess_over_references(without, c);
+    if (!excess) return true;
+    least = std::min({least, excess->level, excess->largest});
+    tests += kWaysToExceed;
+  }
+  // an effect whose size differs has been selected already, so that its own channels alone count
+  return proof == Proof::kExcess
+             ? tests * least < d.thresholds.excess_false_alarm
+             : kWaysToExceed * static_cast<double>(d.evidence.channels.size()) * least <
+                   d.thresholds.structure_false_alarm;
+}
+
+SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
   const bool shared = is_shared(d.evidence, d.search.found[found]);
+  if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
   const EffectDesign& suspect = d.search.found[found].design;
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
   if (shared)
@@ -335,10 +391,15 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
   const SizeByLogs sizes =
       size_by_logs(d.evidence, {suspect, reference, nothing, in_suspects, others}, apart);
   // two-sided, Bonferroni's bound over the effects found
-  const auto significant = [&](double z) {
+  const auto chance = [&](double z) {
     return std::erfc(std::abs(z) / std::numbers::sqrt2) *
-               static_cast<double>(d.search.found.size()) <
-           d.thresholds.difference_false_alarm;
+           static_cast<double>(d.search.found.size());
+  };
+  const auto significant = [&](double z) {
+    return chance(z) < d.thresholds.difference_false_alarm;
+  };
+  const auto certain = [&](double z) {
+    return chance(z) < d.thresholds.difference_alone_false_alarm;
   };
   if (tracing()) {
     const auto in = [](const SizeInLogs& s) {
@@ -350,12 +411,12 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
         effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
         in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
   }
-  // What a learned law takes over has the form of the law. It is a change only where the suspect logs exceed the references
-  // without it.
   const bool taken_over = d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws;
   if (shared)
-    return significant(sizes.mean()) && (!taken_over || needed(d, found)) ? InReferences::kOther
-                                                                          : InReferences::kVaries;
+    return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
+            taken_over              ? Proof::kClearExcess
+            : certain(sizes.mean()) ? Proof::kNone
+                                    : Proof::kExcess};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -363,15 +424,15 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
   if (both && no_size && taken_over) {
     const EffectDesign everywhere = in_all_logs(suspect, reference);
     const EffectFit difference = fit({&everywhere, &suspect});
-    return parameters_act(difference, suspect.linear, significant) && needed(d, found)
-               ? InReferences::kNot
-               : InReferences::kAlike;
+    return {parameters_act(difference, suspect.linear, significant) ? InReferences::kNot
+                                                                    : InReferences::kAlike,
+            Proof::kClearExcess};
   }
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
-    return InReferences::kVaries;
+    return {InReferences::kVaries, Proof::kClearExcess};
   if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
-    return InReferences::kNot;
+    return {InReferences::kNot, Proof::kExcess};
   const double form = form_share(*suspect.effect.effect, options.regression);
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
@@ -383,9 +444,28 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
           ? std::max(std::abs(sizes.difference()),
                      deviate_of_chi_square(std::pow(change.difference(), 2), suspect.linear))
           : std::abs(sizes.difference());
-  if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size)
-    return InReferences::kAlike;
-  return significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot;
+  if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size) return {};
+  return {
+      significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
+      certain(difference) ? Proof::kNone : Proof::kExcess};
+}
+
+}  // namespace
+
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  const auto [by, proof] = by_size(d, found, options);
+  if (by == InReferences::kAlike || by == InReferences::kVaries || proof == Proof::kNone) return by;
+  // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
+  // significant and no more is a change only where the suspect logs exceed the references without it.
+  const bool change = needed(d, found, proof);
+  if (tracing())
+    fmt::print(stderr, "  {} {} a change: without it the residual {} that of the references\n",
+               effect_key(d.search.found[found].design.effect.effect->info(),
+                          *d.evidence.series[0].machine, d.search.found[found].design.effect.at),
+               change ? "is" : "is not", change ? "exceeds" : "does not exceed");
+  if (change) return by;
+  return is_shared(d.evidence, d.search.found[found]) ? InReferences::kVaries
+                                                      : InReferences::kAlike;
 }
 
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
@@ -428,7 +508,10 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
       const auto described =
           std::find_if(d.effects.begin(), d.effects.end(),
                        [&](const DiagnosedEffect& e) { return e.effect == f.design.effect; });
-      if (described != d.effects.end() && there == InReferences::kAlike)
+      const bool listed = std::any_of(lacking.begin(), lacking.end(), [&](const auto& known) {
+        return known.first.effect == f.design.effect;
+      });
+      if (described != d.effects.end() && there == InReferences::kAlike && !listed)
         lacking.emplace_back(*described, d.evidence);
     }
     if (!again) break;
