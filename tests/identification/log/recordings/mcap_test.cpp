@@ -409,6 +409,17 @@ TEST_F(McapLog, ABagIsALogByAMappingFile) {
   const Channel* extension = log.find(Role::kJointPosition, 1);
   ASSERT_NE(extension, nullptr);
   EXPECT_NEAR(extension->values[20], 4.0, 1e-12);
+  // a clock of its own
+  options.mapping_file = write("c.yaml",
+                               "clock_s: 0.03\ncolumns:\n"
+                               "  q_boom_rad: \"/joint_states.position[boom] * 0.1\"\n"
+                               "  q_extension_m: \"0 - /joint_states.position[arm]\"\n");
+  const Log slow = load_log(bag, test::small_crane(), options);
+  ASSERT_EQ(slow.samples(), 14);  // 0 s to 0.39 s
+  EXPECT_NEAR(slow.time[1] - slow.time[0], 0.03, 1e-12);
+  options.mapping_file = write("d.yaml", "clock_s: -1\n");
+  EXPECT_THAT(message_of([&] { load_log(bag, test::small_crane(), options); }),
+              HasSubstr("d.yaml:1:10: clock_s: expected the time between two rows"));
 }
 
 TEST(Mcap, ThreeThousandChangedFilesAreReadOrRefused) {
