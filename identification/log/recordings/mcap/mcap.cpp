@@ -91,7 +91,9 @@ class McapReader : public McapVisitor {
  private:
   void leave_out(const std::string& why, const std::string& name) {
     constexpr std::size_t kLongestList = 300;  // no threshold: the length of a list in a message
-    std::string& names = left_out_[why];
+    constexpr std::size_t kMostReasons = 50;  // no threshold: more than the formats' own words give
+    const bool known = left_out_.size() < kMostReasons || left_out_.count(why) > 0;
+    std::string& names = left_out_[known ? why : "for other reasons"];
     if (names.size() > kLongestList) return;
     names += (names.empty() ? "" : ", ") + name;
     if (names.size() > kLongestList) names += ", ...";

@@ -13,9 +13,9 @@
 namespace sparflow {
 namespace {
 
-/// Places of a structure, over the channels that may come of them.
+/// Places of a structure, over the channels that may come of them; a topic with more counts as one with too many channels.
 /// @threshold [1] 2..100; chosen: structures nest, and each channel lies at the end of a few places
-constexpr std::int64_t kPlacesOfChannel = 10;
+constexpr std::size_t kPlacesOfChannel = 10;
 /// Longest name of an element that is told apart from others.
 /// @threshold [byte] 50..1000; chosen: that of a quotation, longer ones are cut in messages as well
 constexpr std::size_t kLongestKey = 200;
@@ -39,8 +39,8 @@ void SampleBudget::add_channel() {
 }
 
 void SampleBudget::add_place() {
-  if (++places_ > kPlacesOfChannel * limits_.log_columns)
-    fail(kPlacesOfChannel * limits_.log_columns, "parts of messages in the file");
+  const std::int64_t most = static_cast<std::int64_t>(kPlacesOfChannel) * limits_.log_columns;
+  if (++places_ > most) fail(most, "parts of messages in the file");
 }
 
 TopicSamples::TopicSamples(const std::string& topic, const TopicOptions& options,
@@ -77,6 +77,10 @@ TopicSamples::Place TopicSamples::inside(Place of, std::size_t index, std::strin
   }
   auto found = places_[of].inside.find(key);
   if (found == places_[of].inside.end()) {
+    if (places_.size() >= kPlacesOfChannel * options_.most_channels) {
+      crowded_ = true;  // the message is not kept, so that its numbers may stand anywhere
+      return of;
+    }
     budget_->add_place();
     Node node;
     node.key = key;
@@ -95,6 +99,7 @@ TopicSamples::Place TopicSamples::inside(Place of, std::size_t index, std::strin
 
 void TopicSamples::keep() {
   const auto message = static_cast<std::uint32_t>(messages_++);
+  if (crowded_ && !overfull_) give_up();
   for (const auto& [place, value] : pending_) {
     if (overfull_) break;
     Node& node = places_[place];

@@ -100,7 +100,7 @@ class TopicSamples {
   std::vector<std::pair<Place, double>> pending_;
   std::size_t messages_ = 0;
   std::int64_t values_ = 0, repeated_ = 0;
-  bool overfull_ = false;
+  bool overfull_ = false, crowded_ = false;
 };
 
 }  // namespace sparflow

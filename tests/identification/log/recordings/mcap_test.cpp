@@ -391,6 +391,18 @@ TEST(Mcap, HostileLengthsInMessagesAreLeftOut) {
       read_recording(file("uint8[60] x\nP[60] p\n===\nMSG: a/P\nuint8[60] y\n", bytes), "a.mcap")
           .warnings,
       Contains(HasSubstr("messages with more than 1000 numbers: /b")));
+  // points in points in points: more places than a topic may have, in one message
+  const std::string deep =
+      "P[] a\n===\nMSG: a/P\nQ[] b\n===\nMSG: a/Q\nR[] c\n===\nMSG: a/R\nuint8 x\n";
+  CdrMessage cube;
+  cube.put(std::uint32_t{40});
+  for (int i = 0; i < 40; ++i) {
+    cube.put(std::uint32_t{40});
+    for (int k = 0; k < 40; ++k) cube.put(std::vector<std::uint8_t>(40, 1));
+  }
+  const Recording r = read_recording(file(deep, cube.bytes()), "a.mcap");
+  EXPECT_THAT(r.channels, SizeIs(5));
+  EXPECT_THAT(r.warnings, Contains(HasSubstr("messages with more than 1000 numbers: /b")));
 }
 
 class McapLog : public test::LogFiles {};
