@@ -172,6 +172,26 @@ TEST(Mcap, EveryKindOfFieldHasItsValue) {
   }
 }
 
+TEST(Mcap, NamesThatDoNotFitGiveWayToNumbersAndARepeatedNameCountsOnce) {
+  const auto bag = [](const JointStates& joints) {
+    return McapWriter()
+        .add(McapWriter::schema(1, "sensor_msgs/msg/JointState", "ros2msg",
+                                test::joint_state_description()))
+        .add(McapWriter::channel(1, 1, "/j", "cdr"))
+        .add(McapWriter::message(1, ns_at(0), 0, test::joint_state(joints)))
+        .finished();
+  };
+  const Recording fewer = read_recording(bag({1.7e9, {"a"}, {5, 6}, {}, {7}}), "a.mcap");
+  ASSERT_THAT(fewer.channels, SizeIs(3));
+  EXPECT_EQ(find_channel(fewer, "/j.position[1]")->values[0], 6);
+  EXPECT_EQ(find_channel(fewer, "/j.effort[a]")->values[0], 7);
+  const Recording twice = read_recording(bag({1.7e9, {"a", "a"}, {5, 6}, {}, {}}), "a.mcap");
+  ASSERT_THAT(twice.channels, SizeIs(1));
+  EXPECT_THAT(twice.channels[0].values, ElementsAre(5));
+  EXPECT_THAT(twice.warnings,
+              ElementsAre("left out, values of a name that a message has twice: 1 of /j"));
+}
+
 TEST(Mcap, PublishersOfATopicAreOneAndOutOfOrderMessagesAreSorted) {
   const auto value = [](double v) { return CdrMessage().put(v).bytes(); };
   const std::string file =
