@@ -185,11 +185,35 @@ TEST(Mcap, NamesThatDoNotFitGiveWayToNumbersAndARepeatedNameCountsOnce) {
   ASSERT_THAT(fewer.channels, SizeIs(3));
   EXPECT_EQ(find_channel(fewer, "/j.position[1]")->values[0], 6);
   EXPECT_EQ(find_channel(fewer, "/j.effort[a]")->values[0], 7);
+  const Recording more = read_recording(bag({1.7e9, {"a", "b"}, {5}, {}, {}}), "a.mcap");
+  EXPECT_EQ(find_channel(more, "/j.position[0]")->values[0], 5);
   const Recording twice = read_recording(bag({1.7e9, {"a", "a"}, {5, 6}, {}, {}}), "a.mcap");
   ASSERT_THAT(twice.channels, SizeIs(1));
   EXPECT_THAT(twice.channels[0].values, ElementsAre(5));
   EXPECT_THAT(twice.warnings,
               ElementsAre("left out, values of a name that a message has twice: 1 of /j"));
+}
+
+TEST(Mcap, WhatStandsBehindALongSequenceIsRead) {
+  // 65 elements, each with an empty sequence of numbers of eight bytes, which need no padding when there are none
+  CdrMessage m;
+  m.put(3.0F).put(std::uint32_t{65});
+  for (int i = 0; i < 65; ++i) m.put(std::vector<double>{}).put(std::uint16_t{7});
+  m.put(std::vector<double>(100, 1.0)).put(42.0F);
+  const std::string file =
+      McapWriter()
+          .add(McapWriter::schema(
+              1, "a/msg/B", "ros2msg",
+              "float32 first\nP[] p\nfloat64[] q\nfloat32 last\n===\nMSG: a/P\nfloat64[] "
+              "x\nuint16 y\n"))
+          .add(McapWriter::channel(1, 1, "b", "cdr"))
+          .add(McapWriter::message(1, ns_at(0), 0, m.bytes()))
+          .finished();
+  const Recording r = read_recording(file, "a.mcap");
+  ASSERT_THAT(r.channels, SizeIs(2));
+  EXPECT_EQ(r.channels[1].name, "b.last");
+  EXPECT_EQ(r.channels[1].values[0], 42);
+  EXPECT_THAT(r.warnings, ElementsAre("left out, sequences of more than 64 elements: b.p, b.q"));
 }
 
 TEST(Mcap, PublishersOfATopicAreOneAndOutOfOrderMessagesAreSorted) {
