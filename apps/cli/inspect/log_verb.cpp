@@ -54,6 +54,7 @@ std::string channels_json(const TimedChannels& file, const std::vector<ChannelSu
 
 int run(const LogArguments& a) {
   std::vector<NamedFile> inputs = {{"FILE", a.log}, {"--mapping", a.reading.mapping_file}};
+  inputs.reserve(inputs.size() + a.reading.dbc_files.size());
   for (const std::string& dbc : a.reading.dbc_files) inputs.push_back({"--dbc", dbc});
   check_outputs_apart("log", a.outputs.files(), inputs);
   a.outputs.check();
