@@ -370,6 +370,7 @@ RawTable recorded_table(const std::string& path, std::string_view bytes, const L
   const Recording recording = read_recording(bytes, path, reading);
   ClockOptions clock;
   clock.limits = options.limits;
+  clock.step = mapping.clock;
   for (std::size_t i = 0; i < recording.channels.size(); ++i) {
     const RecordedChannel& channel = recording.channels[i];
     const bool mapped =

@@ -12,7 +12,7 @@ namespace sparflow {
 namespace {
 
 const std::vector<std::string> kKeys = {"columns", "ignore",  "delimiter", "skip_rows",
-                                        "decimal", "missing", "dbc"};
+                                        "decimal", "missing", "dbc",       "clock_s"};
 
 FilePlace place_of(const std::string& file, const YAML::Node& node) {
   const YAML::Mark mark = node.Mark();
@@ -82,6 +82,16 @@ int read_skip_rows(const std::string& file, const YAML::Node& node) {
   throw InputError(place_of(file, node), "skip_rows", "expected a number of lines, 0 or more");
 }
 
+double read_clock(const std::string& file, const YAML::Node& node) {
+  try {
+    const double step = node.as<double>();
+    if (step > 0.0 && std::isfinite(step)) return step;
+  } catch (const YAML::Exception&) {  // reported below
+  }
+  throw InputError(place_of(file, node), "clock_s",
+                   "expected the time between two rows, a positive number of seconds, e.g. 0.01");
+}
+
 LogMapping read_root(const std::string& path, const YAML::Node& root) {
   if (!root.IsMap()) {
     throw InputError({path, 1, 0}, "",
@@ -101,6 +111,8 @@ LogMapping read_root(const std::string& path, const YAML::Node& root) {
       for (const std::string& name : scalars(path, value, key)) {
         mapping.dbc.push_back(name.starts_with('/') ? name : folder + name);
       }
+    } else if (key == "clock_s") {
+      mapping.clock = read_clock(path, value);
     } else if (key == "missing") {
       mapping.dialect.missing = scalars(path, value, key);
     } else if (key == "delimiter") {
@@ -114,7 +126,7 @@ LogMapping read_root(const std::string& path, const YAML::Node& root) {
       throw InputError(place_of(path, entry.first), "",
                        fmt::format("unknown key \"{}\"; {}", key,
                                    near.empty() ? "known are columns, ignore, delimiter, decimal, "
-                                                  "skip_rows, missing, dbc"
+                                                  "skip_rows, missing, dbc, clock_s"
                                                 : fmt::format("did you mean \"{}\"?", near)));
     }
   }

@@ -23,7 +23,8 @@ struct LogMapping {
   FilePlace ignore_place;
   DialectOptions dialect;
   std::vector<std::string>
-      dbc;  ///< databases of CAN frames, beside the mapping file unless absolute
+      dbc;             ///< databases of CAN frames, beside the mapping file unless absolute
+  double clock = 0.0;  ///< [s] step of the clock of a recording; 0 = chosen from its channels
 };
 
 /// @throws InputError with file:line:column for unknown keys, wrong types, names given twice

@@ -158,6 +158,7 @@ TimedChannels read_timed_channels(const std::string& path, const ChannelFileOpti
   if (is_recording(bytes)) {
     RecordingOptions reading;
     reading.dbc_files = options.dbc_files;
+    reading.dbc_files.insert(reading.dbc_files.end(), mapping.dbc.begin(), mapping.dbc.end());
     reading.limits = options.limits;
     Recording recording = read_recording(bytes, path, reading);
     if (!mapped) {
@@ -166,7 +167,10 @@ TimedChannels read_timed_channels(const std::string& path, const ChannelFileOpti
       out.clock_reason = "each channel has the time stamps of its own samples";
       return out;
     }
-    table = on_one_clock(recording);
+    ClockOptions clock;
+    clock.limits = options.limits;
+    clock.step = mapping.clock;
+    table = on_one_clock(recording, clock);
   } else if (is_matlab(bytes, path)) {
     table = read_matlab(path, bytes, options.limits);
   } else {

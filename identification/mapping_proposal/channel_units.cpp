@@ -142,6 +142,8 @@ ChannelUnit channel_unit(const std::string& name, const std::string& unit) {
   const std::size_t open = name.find_last_of("[(");
   if (open != name.npos && open > 0 && (name.back() == ']' || name.back() == ')')) {
     const std::string inside = name.substr(open + 1, name.size() - open - 2);
+    // The second element of a list is called `x[1]`, a share without unit `x [1]`.
+    if (inside == "1" && name[open - 1] != ' ' && name[open - 1] != '_') return {};
     if (const ChannelUnit* found = find(inside)) return *found;
     return {};
   }

@@ -52,6 +52,20 @@ TEST_F(LogVerb, ListsTheChannelsOfABundledLogWithoutAMachine) {
   EXPECT_NEAR(result["channels"][0]["rate_Hz"].get<double>(), 50.0, 1e-6);
 }
 
+TEST_F(LogVerb, DatabasesDecodeTheFramesOfATrace) {
+  std::ofstream(folder / "bus.log") << "(10.0) can0 123#0100\n(10.5) can0 123#0300\n";
+  std::ofstream(folder / "bus.dbc")
+      << "BO_ 291 A: 2 E\n SG_ pressure : 0|16@1+ (0.5,0) [0|0] \"bar\" E\n";
+  EXPECT_EQ(run((folder / "bus.log").string()), 3);
+  EXPECT_THAT(read("err"), HasSubstr("123 (2 frames)"));
+  const std::string decoded = (folder / "bus.log").string() + " --json - --dbc ";
+  ASSERT_EQ(run(decoded + (folder / "bus.dbc").string()), 0) << read("err");
+  const auto channels = sparflow::test_support::parsed_json(read("out"))["channels"];
+  ASSERT_EQ(channels.size(), 1u);
+  EXPECT_EQ(channels[0]["name"], "pressure");
+  EXPECT_EQ(channels[0]["largest"], 1.5);
+}
+
 TEST_F(LogVerb, AFileWithoutAClockIsRefusedWithASentence) {
   std::ofstream(folder / "flat.csv") << "a,b\n1,2\n1,3\n1,2\n";
   EXPECT_EQ(run((folder / "flat.csv").string()), 3);

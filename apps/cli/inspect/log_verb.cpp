@@ -53,8 +53,10 @@ std::string channels_json(const TimedChannels& file, const std::vector<ChannelSu
 }
 
 int run(const LogArguments& a) {
-  check_outputs_apart("log", a.outputs.files(),
-                      {{"FILE", a.log}, {"--mapping", a.reading.mapping_file}});
+  std::vector<NamedFile> inputs = {{"FILE", a.log}, {"--mapping", a.reading.mapping_file}};
+  inputs.reserve(inputs.size() + a.reading.dbc_files.size());
+  for (const std::string& dbc : a.reading.dbc_files) inputs.push_back({"--dbc", dbc});
+  check_outputs_apart("log", a.outputs.files(), inputs);
   a.outputs.check();
   begin_work("reading " + a.log);
   const TimedChannels file = read_timed_channels(a.log, a.reading);
@@ -81,6 +83,9 @@ void add_log_verb(CLI::App& app, int& code) {
   verb->add_option("log", a->log, "log (CSV, MAT, or a recording)")->required()->type_name("FILE");
   verb->add_option("--mapping", a->reading.mapping_file,
                    "mapping file (YAML); the columns then bear the program's names")
+      ->type_name("FILE");
+  verb->add_option("--dbc", a->reading.dbc_files,
+                   "database that decodes CAN frames; may be given several times")
       ->type_name("FILE");
   a->outputs.add_to(*verb, false);
   verb->callback([a, &code] { code = run(*a); });

@@ -8,6 +8,8 @@
 
 #include "identification/log/recordings/can/can_asc.h"
 #include "identification/log/recordings/can/can_text.h"
+#include "identification/log/recordings/mcap/mcap.h"
+#include "identification/log/recordings/mcap/mcap_record.h"
 #include "identification/log/recordings/mdf/mdf.h"
 #include "identification/log/recordings/mdf/mdf_block.h"
 #include "models/math/error.h"
@@ -46,6 +48,7 @@ void make_names_unique(Recording* recording) {
 const std::vector<RecordingFormat>& recording_formats() {
   static const std::vector<RecordingFormat> formats = {
       {"MDF 4", is_mdf, read_mdf},
+      {"MCAP", is_mcap, read_mcap},
       {"candump", is_candump, read_candump},
       {"ASC", is_asc, read_asc},
   };

@@ -188,7 +188,7 @@ TEST_F(LogFiles, BrokenMappingFilesAreRefusedWithAMessage) {
   EXPECT_EQ(
       error("resample: 50\n"),
       "map.yaml:1:1: unknown key \"resample\"; known are columns, ignore, delimiter, decimal, "
-      "skip_rows, missing, dbc");
+      "skip_rows, missing, dbc, clock_s");
   EXPECT_EQ(error("- a\n"),
             "map.yaml:1: expected a mapping file: columns: {t_s: \"Time [ms] * 0.001\", ...}");
   EXPECT_EQ(

@@ -44,6 +44,11 @@ TEST(ChannelFile, ATableWithoutAClockIsRefused) {
   EXPECT_THROW(timed_channels(table_of({a})), InputError);
 }
 
+TEST(ChannelUnits, AnElementOfAListIsNoShare) {
+  EXPECT_EQ(channel_unit("slip [1]", "").word, "1");
+  EXPECT_EQ(channel_unit("/pressures.data[1]", "").word, "");
+}
+
 TEST(ChannelSummary, RateGapsMissingResolutionAndNoiseAreThoseOfTheChannel) {
   RecordedChannel channel;
   channel.name = "p";

@@ -232,11 +232,6 @@ class MdfReader {
 
   void add_frames(const MdfRecords& records, const MdfFrameChannels& channels,
                   const std::vector<double>& time) {
-    if (channels.bytes->type == MdfChannel::kLimited) {
-      leave_out("CAN frames whose data has a length of its own in the record (MLSD)",
-                records.group->name);
-      return;
-    }
     if (channels.bytes->type != MdfChannel::kVariable) {
       frames_.add(file_, records, channels, time, "");
       return;

@@ -35,6 +35,17 @@ std::string_view in_record(const MdfFile& file, const MdfRecords& records,
   return records.data.substr(record * records.stride + channel.byte_offset, size);
 }
 
+/// The channel that says how many bytes of a field of limited length (MLSD) are used; null for other fields.
+/// @throws InputError where the group has no such channel of numbers
+const MdfChannel* length_of(const MdfFile& file, const MdfGroup& group, const MdfChannel& field) {
+  if (field.type != MdfChannel::kLimited) return nullptr;
+  for (const MdfChannel& channel : group.channels)
+    if (channel.at == field.content && channel.is_number() && !channel.is_virtual())
+      return &channel;
+  file.fail(field.at, "CN",
+            "no channel of its group holds the length of its data (MLSD); the file is damaged");
+}
+
 /// Bytes of a frame that stand apart: four bytes of length, then the data.
 std::string_view apart(const MdfFile& file, const MdfChannel& channel, std::string_view variable,
                        std::uint64_t at) {
@@ -78,6 +89,8 @@ void MdfFrames::add(const MdfFile& file, const MdfRecords& records,
   for (const MdfChannel* c : {channels.id, channels.extended, channels.length, channels.code})
     if (c != nullptr) check_place(file, records, *c);
   const bool elsewhere = channels.bytes->type == MdfChannel::kVariable;
+  const MdfChannel* own_length = length_of(file, *records.group, *channels.bytes);
+  if (own_length != nullptr) check_place(file, records, *own_length);
   if (elsewhere) check_place(file, records, *channels.bytes);
   if (static_cast<std::int64_t>(frames_.size() + records.count) > file.limits().log_values) {
     file.fail(records.group->at, "CG",
@@ -91,6 +104,7 @@ void MdfFrames::add(const MdfFile& file, const MdfRecords& records,
         elsewhere ? apart(file, *channels.bytes, variable, mdf_bits(records, *channels.bytes, i))
                   : in_record(file, records, *channels.bytes, i);
     std::uint64_t size = data.size();
+    if (own_length != nullptr) size = std::min(size, mdf_bits(records, *own_length, i));
     if (channels.length != nullptr) {
       size = std::min(size, mdf_bits(records, *channels.length, i));
     } else if (channels.code != nullptr) {

@@ -34,6 +34,39 @@ TEST_F(CanText, FramesBecomeChannelsByTheDatabase) {
               HasSubstr("a.log:5"));
 }
 
+TEST_F(CanText, TheColumnsThatCandumpShowsAreReadAsItsLog) {
+  RecordingOptions options;
+  options.dbc_files = {write("a.dbc",
+                             "BO_ 291 A: 8 E\n SG_ a : 0|16@1+ (1,0) [0|0] \"\" E\n"
+                             "BO_ 2566848513 B: 12 E\n SG_ b : 88|8@1+ (1,0) [0|0] \"\" E\n")};
+  const std::string trace =
+      " (1436509052.250000)  can0  123   [8]  11 22 33 44 55 66 77 88\n"
+      " (1436509052.350000)  can0  TX - -  123   [3]  12 00 23   '.##'\n"
+      " (1436509052.450000)  can0  123   [0]  remote request\n"
+      " (1436509052.500000)  can0  20000088   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"
+      " (1436509052.550000)  can0  18FF0001  [12]  00 00 00 00 00 00 00 00 00 00 00 2A\n";
+  ASSERT_TRUE(is_recording(trace));
+  const Recording r = read_recording(trace, "a.log", options);
+  ASSERT_EQ(r.channels.size(), 2u);
+  EXPECT_THAT(r.channels[0].values, ElementsAre(0x2211, 0x12));
+  EXPECT_NEAR(r.channels[0].time[1], 0.1, 1e-6);  // stamps of 1970 have 2e-7 s
+  EXPECT_THAT(r.channels[1].values, ElementsAre(42));
+  EXPECT_NEAR(r.channels[1].time[0], 0.3, 1e-6);
+  EXPECT_THAT(r.warnings[0], HasSubstr("2 remote and error frames left out"));
+  // fewer bytes than the line says
+  EXPECT_THAT(message_of([&] {
+                read_recording(trace + " (1436509053.0)  can0  123   [3]  11 22\n", "a.log",
+                               options);
+              }),
+              HasSubstr("a.log:6"));
+  const std::string plain = "  can0  123   [8]  11 22 33 44 55 66 77 88\n";
+  ASSERT_TRUE(is_recording(plain));
+  EXPECT_THAT(message_of([&] { read_recording(plain, "a.log", options); }),
+              HasSubstr("a.log:1: the frames have no time stamps; record the trace with `candump "
+                        "-l`, or with `candump -ta`"));
+  EXPECT_FALSE(is_recording("t_s,q [rad]\n0,1\n"));
+}
+
 TEST_F(CanText, AscHasEventsFdFramesAndTwoKindsOfNumbers) {
   RecordingOptions options;
   options.dbc_files = {write("a.dbc",

@@ -9,76 +9,18 @@
 #include <random>
 
 #include "models/math/error.h"
+#include "tests/identification/log/recordings/mdf_writer.h"
 #include "tests/identification/log_machines.h"
 
 namespace sparflow {
 namespace {
 
+using test::conversion;
+using test::Field;
+using test::le;
+using test::MdfWriter;
+using test::real;
 using testing::HasSubstr;
-
-std::string le(std::uint64_t value, std::size_t size) {
-  std::string bytes;
-  for (std::size_t i = 0; i < size; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xFFU);
-  return bytes;
-}
-std::string real(double value) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &value, 8);
-  return le(bits, 8);
-}
-
-/// Appends blocks; a link is the place of a block that was appended before.
-struct Writer {
-  std::string file;
-  Writer() {
-    file = std::string("MDF     4.10    test    ") + le(0, 4) + le(410, 2) + std::string(34, '\0');
-    file += "##HD" + le(0, 4) + le(104, 8) + le(6, 8) + std::string(80, '\0');
-  }
-  std::uint64_t block(const std::string& id, const std::vector<std::uint64_t>& links,
-                      const std::string& data) {
-    file.resize((file.size() + 7) / 8 * 8);
-    const std::uint64_t at = file.size();
-    file += "##" + id + le(0, 4) + le(24 + 8 * links.size() + data.size(), 8) + le(links.size(), 8);
-    for (const std::uint64_t link : links) file += le(link, 8);
-    file += data;
-    return at;
-  }
-  void first(std::uint64_t data_group) { file.replace(64 + 24, 8, le(data_group, 8)); }
-  std::uint64_t text(const std::string& t) { return block("TX", {}, t + '\0'); }
-};
-
-struct Field {
-  std::string name;
-  unsigned type, sync, data, bit, byte, bits;
-  std::uint64_t conversion = 0;
-  unsigned flags = 0, invalid = 0;
-  std::uint64_t content = 0;
-};
-
-std::uint64_t channels(Writer& w, const std::vector<Field>& fields) {
-  std::uint64_t next = 0;
-  for (std::size_t i = fields.size(); i-- > 0;) {
-    const Field& f = fields[i];
-    const std::uint64_t name = w.text(f.name);
-    next = w.block("CN", {next, 0, name, 0, f.conversion, f.content, 0, 0},
-                   le(f.type, 1) + le(f.sync, 1) + le(f.data, 1) + le(f.bit, 1) + le(f.byte, 4) +
-                       le(f.bits, 4) + le(f.flags, 4) + le(f.invalid, 4) + std::string(52, '\0'));
-  }
-  return next;
-}
-
-std::uint64_t group(Writer& w, std::uint64_t next, std::uint64_t first_channel,
-                    const std::vector<unsigned>& id_cycles_data_invalid) {
-  const auto& n = id_cycles_data_invalid;
-  return w.block("CG", {next, first_channel, w.text("g"), 0, 0, 0},
-                 le(n[0], 8) + le(n[1], 8) + le(0, 8) + le(n[2], 4) + le(n[3], 4));
-}
-
-std::uint64_t conversion(Writer& w, unsigned type, const std::vector<double>& numbers) {
-  std::string data = le(type, 1) + le(0, 5) + le(numbers.size(), 2) + real(0) + real(0);
-  for (const double n : numbers) data += real(n);
-  return w.block("CC", {0, 0, 0, 0}, data);
-}
 
 constexpr unsigned kRows = 20;
 
@@ -115,7 +57,7 @@ std::string zipped(const std::string& in, bool transposed, unsigned columns) {
 }
 
 std::string written(int storage) {
-  Writer w;
+  MdfWriter w;
   const std::string data = records();
   std::uint64_t at = 0;
   if (storage == 0) {
@@ -129,11 +71,11 @@ std::string written(int storage) {
     at = w.block("HL", {list}, le(0, 8));
   }
   const auto rule = conversion(w, 1, {5.0, 0.5});
-  const auto first = channels(w, {{"t", 2, 1, 4, 0, 0, 64},
-                                  {"bits", 0, 0, 0, 3, 8, 12, rule},
-                                  {"big", 0, 0, 3, 0, 10, 16, 0, 2, 1},
-                                  {"f", 0, 0, 4, 0, 12, 32}});
-  const auto cg = group(w, 0, first, {0, kRows, 16, 1});
+  const auto first = test::channels(w, {{"t", 2, 1, 4, 0, 0, 64},
+                                        {"bits", 0, 0, 0, 3, 8, 12, rule},
+                                        {"big", 0, 0, 3, 0, 10, 16, 0, 2, 1},
+                                        {"f", 0, 0, 4, 0, 12, 32}});
+  const auto cg = test::group(w, 0, first, {0, kRows, 16, 1});
   w.first(w.block("DG", {0, cg, at, 0}, le(0, 8)));
   return w.file;
 }
@@ -159,7 +101,7 @@ TEST(Mdf, EveryStorageOfRecordsGivesTheSameValues) {
 }
 
 TEST(Mdf, UnsortedRecordsAreSortedByTheirNumbers) {
-  Writer w;
+  MdfWriter w;
   std::string data;
   for (unsigned i = 0; i < 10; ++i) {
     data += le(7, 2) + real(0.1 * i) + le(i, 1);
@@ -167,11 +109,11 @@ TEST(Mdf, UnsortedRecordsAreSortedByTheirNumbers) {
   }
   const auto at = w.block("DT", {}, data);
   const auto seconds = conversion(w, 1, {0.0, 0.2});
-  const auto b =
-      group(w, 0, channels(w, {{"t", 3, 1, 0, 0, 0, 0, seconds}, {"b", 0, 0, 0, 0, 0, 32}}),
-            {300, 5, 4, 0});
-  const auto a =
-      group(w, b, channels(w, {{"t", 2, 1, 4, 0, 0, 64}, {"a", 0, 0, 0, 0, 8, 8}}), {7, 10, 9, 0});
+  const auto b = test::group(
+      w, 0, test::channels(w, {{"t", 3, 1, 0, 0, 0, 0, seconds}, {"b", 0, 0, 0, 0, 0, 32}}),
+      {300, 5, 4, 0});
+  const auto a = test::group(
+      w, b, test::channels(w, {{"t", 2, 1, 4, 0, 0, 64}, {"a", 0, 0, 0, 0, 8, 8}}), {7, 10, 9, 0});
   w.first(w.block("DG", {0, a, at, 0}, le(2, 8)));
   const Recording r = read_recording(w.file, "log.mf4");
   ASSERT_EQ(r.channels.size(), 2u);
@@ -181,18 +123,18 @@ TEST(Mdf, UnsortedRecordsAreSortedByTheirNumbers) {
 }
 
 /// Where a bus logger keeps the bytes of its frames.
-enum class Bytes { kInRecord, kSignalData, kRecordsOfTheirOwn };
+enum class Bytes { kInRecord, kSignalData, kRecordsOfTheirOwn, kLimited };
 
 /// 40 frames of CAN: identifier 0x123 with a counter in its first byte, and every fourth an extended one.
 std::string bus_log(Bytes kept) {
-  Writer w;
+  MdfWriter w;
   std::string data, apart;
   for (unsigned i = 0; i < 40; ++i) {
     const bool extended = i % 4 == 3;
     const std::string bytes = extended ? std::string("\x05", 1) : le(i, 1) + le(1000 - i, 2);
     const std::string head = real(0.01 * i) + le(extended ? 0x18FF0001U : 0x123U, 4) +
                              le((extended ? 1U : 0U) | bytes.size() << 1U, 1);
-    if (kept == Bytes::kInRecord) {
+    if (kept == Bytes::kInRecord || kept == Bytes::kLimited) {
       data += head + bytes + std::string(8 - bytes.size(), '\xFF');
     } else if (kept == Bytes::kSignalData) {
       data += head + le(apart.size(), 8);
@@ -210,13 +152,20 @@ std::string bus_log(Bytes kept) {
         w.block("CG", {0, 0, w.text("bytes"), 0, 0, 0}, le(2, 8) + le(40, 8) + le(1, 8) + le(0, 8));
     content = second;
   }
-  const auto first = channels(w, {{"Timestamp", 2, 1, 4, 0, 0, 64},
-                                  {"CAN_DataFrame.ID", 0, 0, 0, 0, 8, 29},
-                                  {"CAN_DataFrame.IDE", 0, 0, 0, 0, 12, 1},
-                                  {"CAN_DataFrame.DataLength", 0, 0, 0, 1, 12, 7},
-                                  {"CAN_DataFrame.DataBytes", kept == Bytes::kInRecord ? 0U : 1U, 0,
-                                   10, 0, 13, 64, 0, 0, 0, content}});
-  const auto cg = group(w, second, first, {own ? 1U : 0U, 40, 21, 0});
+  // The channel of the length is found by its place where the data has a length of its own, and by its name elsewhere.
+  const bool limited = kept == Bytes::kLimited;
+  const auto length =
+      test::channels(w, {{limited ? "used" : "CAN_DataFrame.DataLength", 0, 0, 0, 1, 12, 7}});
+  if (limited) content = length;
+  const unsigned type = limited ? 5U : kept == Bytes::kInRecord ? 0U : 1U;
+  const auto first =
+      test::channels(w,
+                     {{"Timestamp", 2, 1, 4, 0, 0, 64},
+                      {"CAN_DataFrame.ID", 0, 0, 0, 0, 8, 29},
+                      {"CAN_DataFrame.IDE", 0, 0, 0, 0, 12, 1},
+                      {"CAN_DataFrame.DataBytes", type, 0, 10, 0, 13, 64, 0, 0, 0, content}},
+                     length);
+  const auto cg = test::group(w, second, first, {own ? 1U : 0U, 40, 21, 0});
   w.first(w.block("DG", {0, cg, at, 0}, le(own ? 1 : 0, 8)));
   return w.file;
 }
@@ -230,7 +179,8 @@ TEST_F(MdfBusLog, FramesAreDecodedWhereverTheirBytesStand) {
                              " SG_ p : 8|16@1+ (0.5,0) [0|0] \"bar\" E\n"
                              " SG_ beyond : 32|8@1+ (1,0) [0|0] \"\" E\n"
                              "BO_ 2566848513 B: 1 E\n SG_ b : 0|8@1+ (1,0) [0|0] \"\" E\n")};
-  for (const Bytes kept : {Bytes::kInRecord, Bytes::kSignalData, Bytes::kRecordsOfTheirOwn}) {
+  for (const Bytes kept :
+       {Bytes::kInRecord, Bytes::kSignalData, Bytes::kRecordsOfTheirOwn, Bytes::kLimited}) {
     SCOPED_TRACE(static_cast<int>(kept));
     const Recording r = read_recording(bus_log(kept), "bus.mf4", options);
     ASSERT_EQ(r.channels.size(), 3u);
@@ -284,7 +234,7 @@ TEST(Mdf, ThreeThousandChangedFilesAreReadOrRefused) {
   const auto below = [&](std::size_t n) { return random() % n; };
   int refused = 0;
   for (int k = 0; k < 3000; ++k) {
-    std::string file = k % 7 < 4 ? written(k % 7) : bus_log(static_cast<Bytes>(k % 7 - 4));
+    std::string file = k % 8 < 4 ? written(k % 8) : bus_log(static_cast<Bytes>(k % 8 - 4));
     for (std::size_t e = 1 + below(4); e > 0; --e) {
       const std::size_t at = 64 + below(file.size() - 72);
       if (below(3) == 0) {
