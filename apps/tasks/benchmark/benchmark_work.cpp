@@ -196,7 +196,7 @@ BenchmarkWork benchmark_work(const BenchmarkTask& a, const Listener& listener) {
   return work;
 }
 
-std::string fingerprint(const BenchmarkWork& work, const BenchmarkTask& a) {
+std::string benchmark_fingerprint(const BenchmarkWork& work, const BenchmarkTask& a) {
   std::string options = fmt::format("benchmark bound {} optimum {} seeds {} budget {}", !a.no_bound,
                                     !a.no_optimum, a.seeds, a.step_budget);
   for (const Entrant& e : work.entrants)

@@ -8,6 +8,7 @@
 #include "apps/tasks/simulate/simulate_programme.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
+#include "models/math/interruption.h"
 #include "models/math/units.h"
 #include "simulator/plant/parameters/plant_effects.h"
 #include "simulator/plant/parameters/plant_file.h"
@@ -118,7 +119,12 @@ plant::PlantParameters plant_of(const Machine& machine, const SimulateTask& task
 bool drive(const SimulateTask& task, plant::Programme& programme, plant::PlantRun& run,
            const Listener& listener, const std::function<void(plant::Record)>& add) {
   while (run.time() < task.seconds - 1e-9 && run.status() == plant::RunStatus::kRunning) {
-    plant::ProgrammeStep step = programme.step(run.record());
+    plant::ProgrammeStep step;
+    try {
+      step = programme.step(run.record());
+    } catch (const Interruption&) {  // whoever is asked for commands is not asked any more
+      return true;
+    }
     if (step.end) break;
     if (step.payload) run.set_payload(*step.payload);
     plant::Record row = run.record();
