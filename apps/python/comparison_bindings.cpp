@@ -207,7 +207,7 @@ void bind_comparison(py::module_& m) {
           "Whether Ctrl-C ended it, so that something is missing.")
       .def("motion", &Strategies::motion, py::arg("strategy"), py::arg("time") = "equal",
            py::arg("problem") = 0, py::return_value_policy::reference_internal,
-           "The Trajectory of a strategy ('optimal', 'sequential', 'joint_line', ...) at a time "
+           "The Trajectory of a strategy ('optimal', 'sequential', 'simultaneous', ...) at a time\n"
            "('equal', 'own', '1.5 x shortest') in a problem by its number.");
   py::class_<Pareto, Result, std::shared_ptr<Pareto>>(m, "ParetoResult",
                                                       "The least energy over the duration.")
