@@ -137,7 +137,7 @@ void bind_log(py::module_& m) {
       .def_static(
           "from_arrays", &log_from_arrays, py::arg("columns"), py::arg("machine"),
           py::arg("name") = "arrays", py::arg("mapping") = py::none(),
-          "Makes a log of arrays by column name, with its unit as in a file: {'t_s': ..., "
+          "Makes a log of arrays by column name, with its unit as in a file: {'t_s': ...,\n"
           "'q_boom_rad': ..., 'pA_boom_bar': ...}. Checked as a file is. Raises InputError.")
       .def_readonly("file", &Log::file, "Name without folder.")
       .def_readonly("sha256", &Log::sha256, "Of the file's bytes.")

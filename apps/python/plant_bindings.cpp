@@ -59,14 +59,15 @@ class Simulated final : public Result {
   Page page() const override { return simulation_page(simulation_view(simulation_)); }
   const Simulation& simulation() const { return simulation_; }
   std::shared_ptr<Log> log() const {
-    auto log =
-        std::make_shared<Log>(log_from_text("simulated", simulation_.log, *simulation_.machine));
-    for (const std::string& w : log->warnings) warn(w);
-    return log;
+    if (log_) return log_;
+    log_ = std::make_shared<Log>(log_from_text("simulated", simulation_.log, *simulation_.machine));
+    for (const std::string& w : log_->warnings) warn(w);
+    return log_;
   }
 
  private:
   Simulation simulation_;
+  mutable std::shared_ptr<Log> log_;  // once it was asked for
 };
 
 class Benchmarked final : public Result {
@@ -221,8 +222,7 @@ double sum_of(const std::vector<double>& values) {
 void bind_plant(py::module_& m) {
   py::class_<Simulated, Result, std::shared_ptr<Simulated>>(m, "Simulation",
                                                             "What the dynamic plant did.")
-      .def_property_readonly("log", &Simulated::log,
-                             "Its measurements as a Log, read from the text anew at each use.")
+      .def_property_readonly("log", &Simulated::log, "Its measurements as a Log.")
       .def_property_readonly(
           "csv", [](const Simulated& s) { return s.simulation().log; },
           "The text of the log that `-o LOG.csv` writes (docs/log_format.md).")

@@ -16,8 +16,8 @@ machine = sparflow.Machine.load(data / "machines/loader_crane.yaml")
 # The shortest one: lift the boom to 0.3 rad. The state has the keys of docs/benchmark.md.
 
 # %%
-run = sparflow.simulate(machine, seconds=6, start={"boom": 0.1, "jib": -1.2}, payload_kg=300,
-                        controller=lambda state: {"boom": 2.0 * (0.3 - state["q"]["boom"])})
+run = sparflow.simulate(machine, seconds=8, start={"boom": 0.1, "jib": -1.2}, payload_kg=300,
+                        controller=lambda state: {"boom": 5.0 * (0.3 - state["q"]["boom"])})
 print(run.headline)
 print(f"the boom ends at {run.log['q_boom'][-1]:.3f} rad")
 

@@ -31,9 +31,9 @@ print(forces[["at", "regime", "rmse", "unit", "fit_percent"]])
 # %%
 time, measured, predicted = compared.series("force", "boom")
 speed = sparflow.Signals(machine, test).cylinders[machine.cylinders.index("boom")].speed
-error = measured - predicted
+error = predicted - measured
 for name, side in (("extending", speed > 0.01), ("retracting", speed < -0.01)):
-    print(f"boom {name}: the force is {np.nanmedian(error[side]) / 1e3:+.1f} kN off (median)")
+    print(f"boom {name}: the model is {np.nanmedian(error[side]) / 1e3:+.1f} kN off (median)")
 
 # %% [markdown]
 # The diagnosis says which effect is missing, with a probability and its parameters; here three candidates take part. Leave
