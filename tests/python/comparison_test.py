@@ -10,23 +10,30 @@ import sparflow
 from conftest import DATA, interrupted_soon, without_times
 
 HOP = DATA / "reaches/loader_crane_short_hop.yaml"
-QUICK = dict(paths=1, intervals=10, processes=1)
-WORDS = ["--paths", "1", "--intervals", "10", "--processes", "1"]
+LIFT = DATA / "reaches/hmf_lift.yaml"  # of two joints, which are solved faster
+HMF = DATA / "models/hmf_2020_k4_load_sensing.json"
+QUICK = dict(paths=1, intervals=20, processes=1)
 MODEL = DATA / "models/loader_crane.json"
+WORDS = ["-p", LIFT, "--model", HMF, "--paths", "1", "--intervals", "20", "--processes", "1"]
 
 
-def test_strategies_gives_the_programs_json_and_a_row_for_each_strategy(program, tmp_path):
-    subprocess.run([program, "strategies", "-p", HOP, "--time", "equal", "--orders", "0", *WORDS, "--json",
+@pytest.fixture
+def lift():
+    return sparflow.Problem.load(LIFT, sparflow.Model.load(HMF))
+
+
+def test_strategies_gives_the_programs_json_and_a_row_for_each_strategy(lift, program, tmp_path):
+    subprocess.run([program, "strategies", "--time", "equal,1.5", "--orders", "0", *WORDS, "--json",
                     tmp_path / "s.json"], check=True, capture_output=True)
     shares = []
-    ours = sparflow.strategies(sparflow.Problem.load(HOP), time="equal", orders=0, **QUICK,
+    ours = sparflow.strategies(lift, time="equal,1.5", orders=0, **QUICK,
                                progress=lambda share, words: shares.append(share))
     assert without_times(ours.to_dict()) == without_times(json.loads((tmp_path / "s.json").read_text()))
     frame = ours.to_frame()
     equal = frame[frame["time"] == "equal"].set_index("strategy")
     assert equal.loc["optimal", "energy_J"] <= equal.loc["sequential", "energy_J"]
-    assert set(frame["time"]) == {"equal"}
-    assert ours.motion("optimal").duration == pytest.approx(5.0) and not ours.motion("optimal").q.flags.owndata
+    assert set(frame["time"]) == {"equal", 1.5}
+    assert ours.motion("optimal").duration == pytest.approx(25.0) and not ours.motion("optimal").q.flags.owndata
     with pytest.raises(KeyError, match="no motion of strategy"):
         ours.motion("optimum")
     assert shares == sorted(shares) and "energy-optimal motion" in ours.headline
@@ -48,10 +55,10 @@ def test_own_times_without_idle_power_are_warned_of_by_the_arguments_name():
             interrupted_soon(lambda progress: sparflow.strategies(sparflow.Problem.load(HOP), time="own", progress=progress))
 
 
-def test_pareto_gives_the_programs_curve(program, tmp_path):
-    subprocess.run([program, "pareto", "-p", HOP, "--points", "3", "--longest", "1.5", "--idle", "5", *WORDS, "--json",
+def test_pareto_gives_the_programs_curve(lift, program, tmp_path):
+    subprocess.run([program, "pareto", "--points", "3", "--longest", "1.5", "--idle", "5", *WORDS, "--json",
                     tmp_path / "p.json", "-o", tmp_path / "p.csv"], check=True, capture_output=True)
-    ours = sparflow.pareto(sparflow.Problem.load(HOP), points=3, longest=1.5, idle_kW=[5], **QUICK)
+    ours = sparflow.pareto(lift, points=3, longest=1.5, idle_kW=[5], **QUICK)
     assert without_times(ours.to_dict()) == without_times(json.loads((tmp_path / "p.json").read_text()))
     assert ours.csv() == (tmp_path / "p.csv").read_text()
     frame = ours.to_frame()
@@ -62,8 +69,8 @@ def test_pareto_gives_the_programs_curve(program, tmp_path):
         ours.motion(1000)
 
 
-def test_an_interrupted_comparison_keeps_the_problems_that_are_done():
-    problems = [sparflow.Problem.load(HOP), sparflow.Problem.load(DATA / "reaches/loader_crane_leisure.yaml")]
+def test_an_interrupted_comparison_keeps_the_problems_that_are_done(lift):
+    problems = [lift, sparflow.Problem.load(HOP)]
     with pytest.raises(sparflow.Interrupted) as caught:
         interrupted_soon(lambda progress: sparflow.strategies(problems, orders=0, **QUICK, progress=progress),
                          when=lambda share, words: words.startswith("1 of 2"))
