@@ -63,8 +63,12 @@ if(SPARFLOW_TESTS)
   file(GLOB PYTHON_EXAMPLES CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/examples/python/*.py)
   foreach(FILE ${PYTHON_EXAMPLES})
     get_filename_component(NAME ${FILE} NAME_WE)
+    set(LABEL fast_python)
+    if(NAME IN_LIST SPARFLOW_SLOW_PYTHON)
+      set(LABEL slow_python)
+    endif()
     add_test(NAME Notebooks.${NAME} COMMAND ${Python_EXECUTABLE} ${FILE})
-    set_tests_properties(Notebooks.${NAME} PROPERTIES LABELS fast_python TIMEOUT 600 WORKING_DIRECTORY ${CMAKE_BINARY_DIR} ENVIRONMENT
+    set_tests_properties(Notebooks.${NAME} PROPERTIES LABELS ${LABEL} TIMEOUT 600 WORKING_DIRECTORY ${CMAKE_BINARY_DIR} ENVIRONMENT
       "PYTHONPATH=${CMAKE_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1;OPENBLAS_NUM_THREADS=1")
   endforeach()
 endif()

@@ -5,7 +5,8 @@
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/pareto_page.h"
-#include "models/math/error.h"
+#include "apps/tasks/inputs.h"
+#include "apps/tasks/pareto_task.h"
 
 namespace sparflow::cli {
 namespace {
@@ -37,59 +38,34 @@ int run(const ParetoArguments& a) {
   check_outputs_apart("pareto", outputs, {{"--problem", a.problem}, {"--model", a.model}});
   check_writable(a.output);
   a.outputs.check();
-  const auto [problem, model] = load_problem_and_model(a.problem, a.model);
-  const std::vector<std::string> missing = model.missing();
-  if (!missing.empty()) {
-    throw InputError({problem.file, 0, 0}, "model",
-                     fmt::format("the model has no working pressure for {}; fit it on a log in "
-                                 "which that movement occurs",
-                                 fmt::join(missing, ", ")));
-  }
-  ParetoOptions options;
-  options.points = a.points;
-  options.longest = a.longest;
-  options.idle_powers.clear();
-  for (const double kw : a.idle_kw) options.idle_powers.push_back(1e3 * kw);
-  OptimizeOptions& optimize = options.strategies.optimize;
-  optimize.intervals = a.intervals > 0 ? a.intervals : problem.knots.value_or(101) - 1;
-  optimize.processes = a.processes > 0 ? a.processes : 2;
-  optimize.interrupted = interrupted;
-  options.strategies.smooth_seeds = 2;
-  options.strategies.baselines.intervals = optimize.intervals;
-  options.strategies.baselines.polished_orders = 2;
-  options.strategies.baselines.optimize = optimize;
+  const ProblemAndModel both = load_problem_and_model(a.problem, a.model);
+  const MotionProblem& problem = both.problem;
+  require_pressures(both.model, problem.file, "model");
+  ParetoTask task;
+  task.seeds = a.seeds;
+  task.points = a.points;
+  task.longest = a.longest;
+  task.idle_kw = a.idle_kw;
+  task.intervals = a.intervals;
+  task.processes = a.processes;
+  task.searching = finish_on_interrupt;
   const std::unique_ptr<Journal> journal =
       a.outputs.open_journal("pareto", fingerprint(a, problem));
   if (journal->finished() > 0)
     note(fmt::format("{} solves were finished before", journal->finished()));
-  options.strategies.journal = journal.get();
-  ParetoCurve curve;
-  {
+  const ParetoCurve curve = [&] {
     Progress progress("pareto");
-    SeedOptions seed_options = a.seeds;
-    seed_options.progress = [&](double share, const std::string& what) {
-      progress(0.1 * share, what);
-    };
-    const Seeds seeds = make_seeds(problem, seed_options, optimize.intervals);
-    finish_on_interrupt();
-    options.progress = [&](double share, const std::string& what) {
-      progress(0.1 + 0.9 * share, what);
-      return !interrupted();
-    };
-    if (seeds.motions.empty()) {
-      curve.message = "infeasible. " + seeds.paths.message;
-    } else {
-      curve = energy_against_time(model, problem, seeds.motions, options);
-    }
-  }
+    return pareto_task(
+        both, task, *journal,
+        console_listener([&](double share, const std::string& what) { progress(share, what); }));
+  }();
   if (!a.output.empty() && !curve.points.empty())
     write_file_atomically(a.output, pareto_csv(curve));
   if (!a.outputs.json.empty()) a.outputs.write_json(pareto_json(problem, curve));
-  if (!a.outputs.report.empty()) pareto_page(model, problem, curve).write(a.outputs.report);
-  const bool whole = !curve.interrupted && !interrupted();
-  if (whole) journal->remove();
+  if (!a.outputs.report.empty()) pareto_page(both.model, problem, curve).write(a.outputs.report);
+  if (!curve.interrupted) journal->remove();
   tell(pareto_table(problem, curve));
-  if (!whole) return kInterrupted;
+  if (curve.interrupted) return kInterrupted;
   return curve.points.empty() ? kNotSolved : kDone;
 }
 

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <atomic>
 #include <filesystem>
 #include <optional>
 
@@ -9,9 +8,8 @@
 #include "apps/cli/outputs.h"
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/strategies_page.h"
+#include "apps/tasks/strategies_task.h"
 #include "models/math/error.h"
-#include "optimizer/solve/child_progress.h"
-#include "optimizer/solve/kept_work.h"
 
 namespace sparflow::cli {
 namespace {
@@ -56,187 +54,37 @@ std::vector<ProblemPath> problem_files(const std::vector<std::string>& given) {
   return files;
 }
 
-/// Parses "equal", "own", "equal,own", "1.1,1.5,3" or any mixture of them. @throws UsageError
-void read_times(const std::string& text, StrategyOptions& options) {
-  options.equal_time = options.own_time = false;
-  std::size_t at = 0;
-  while (at <= text.size()) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    const std::string word = text.substr(at, comma - at);
-    at = comma + 1;
-    if (word == "equal") {
-      options.equal_time = true;
-    } else if (word == "own") {
-      options.own_time = true;
-    } else {
-      char* end = nullptr;
-      const double factor = std::strtod(word.c_str(), &end);
-      if (word.empty() || *end != '\0' || !(factor >= 1.0) || factor > 1000.0) {
-        throw UsageError(fmt::format(
-            "strategies: --time has \"{}\"; expected equal, own, or factors from 1 on of the "
-            "shortest time, separated by commas (1.1,1.5,3)",
-            word));
-      }
-      options.factors.push_back(factor);
-    }
-  }
-}
-
-/// Idle power of a problem: that of the command line, else the problem's own. [W]
-double idle_power(const StrategiesArguments& a, const ProblemAndModel& task) {
-  return a.idle_kw >= 0.0 ? 1e3 * a.idle_kw : task.problem.idle_power;
-}
-
 /// @throws InputError for a model without the pressures of a movement  @throws UsageError for a problem without a model
-std::vector<ProblemAndModel> load_tasks(const StrategiesArguments& a,
-                                        const std::vector<ProblemPath>& files, bool own_time) {
-  std::vector<ProblemAndModel> tasks;
-  tasks.reserve(files.size());
+std::vector<SharedProblem> load_problems(const StrategiesArguments& a,
+                                         const std::vector<ProblemPath>& files,
+                                         const StrategiesTask& task) {
+  std::vector<SharedProblem> problems;
+  problems.reserve(files.size());
   for (const auto& [file, of_folder] : files) {
-    std::optional<ProblemAndModel> task = load_problem_with_model(file, a.model);
-    if (!task) {
+    std::optional<ProblemAndModel> problem = load_problem_with_model(file, a.model);
+    if (!problem) {
       if (!of_folder) throw no_model();
       note(fmt::format("{} is left out: it names no model", file));
       continue;
     }
-    tasks.push_back(std::move(*task));
-    if (own_time && idle_power(a, tasks.back()) <= 0.0) {
-      warn(
-          fmt::format("{}: no idle power is given, so time costs nothing and the best time of each "
-                      "strategy is its shortest; give --idle KW to weigh time",
-                      tasks.back().problem.name));
-    }
-    const std::vector<std::string> missing = tasks.back().model.missing();
-    if (!missing.empty()) {
-      throw InputError({file, 0, 0}, "model",
-                       fmt::format("the model has no working pressure for {}; fit it on a log in "
-                                   "which that movement occurs",
-                                   fmt::join(missing, ", ")));
-    }
+    check_strategies_problem(task, *problem, console_listener());
+    problems.push_back(std::make_shared<ProblemAndModel>(std::move(*problem)));
   }
-  return tasks;
-}
-
-/// A problem for which nothing was found, and why.
-StrategyComparison without_rows(const ProblemAndModel& task, const StrategyOptions& options,
-                                const std::string& why) {
-  StrategyComparison c;
-  c.problem = task.problem.name;
-  c.file = task.problem.file;
-  c.payload = task.problem.payload;
-  c.idle_power = options.idle_power;
-  c.message = why;
-  return c;
-}
-
-/// Share of a problem's work that the search of paths is, of which only the progress that is told depends.
-/// @threshold [1] 0..0.5; chosen: it takes some seconds at most, and a problem up to minutes
-constexpr double kPathShare = 0.1;
-
-StrategyComparison compare_in(const ProblemAndModel& task, const StrategiesArguments& a,
-                              StrategyOptions options) {
-  options.idle_power = idle_power(a, task);
-  if (interrupted()) {
-    StrategyComparison none = without_rows(task, options, "interrupted before it began");
-    none.interrupted = true;
-    return none;
-  }
-  options.optimize.intervals = a.intervals > 0 ? a.intervals : task.problem.knots.value_or(101) - 1;
-  options.baselines.intervals = options.optimize.intervals;
-  options.baselines.optimize = options.optimize;
-  SeedOptions paths = a.seeds;
-  paths.progress = part_of(options.progress, 0.0, kPathShare);
-  const Seeds seeds = make_seeds(task.problem, paths, options.optimize.intervals);
-  options.progress = part_of(options.progress, kPathShare, 1.0);
-  if (!seeds.motions.empty())
-    return compare_strategies(task.model, task.problem, seeds.motions, options);
-  return without_rows(task, options, "infeasible. " + seeds.paths.message);
+  return problems;
 }
 
 /// All that a comparison depends on. The number of processes is not part of it.
-std::string fingerprint(const std::vector<ProblemAndModel>& tasks, const StrategiesArguments& a) {
+std::string fingerprint(const std::vector<SharedProblem>& problems, const StrategiesArguments& a) {
   std::vector<std::string> files;
-  for (const ProblemAndModel& task : tasks) {
-    files.push_back(task.problem.file);
-    files.push_back(a.model.empty() ? task.problem.model_path : a.model);
+  for (const SharedProblem& p : problems) {
+    files.push_back(p->problem.file);
+    files.push_back(a.model.empty() ? p->problem.model_path : a.model);
   }
   return run_fingerprint(
       files,
       fmt::format("strategies --time {} --idle {} --paths {} --orders {} --seed {} "
                   "--intervals {}",
                   a.time, a.idle_kw, a.seeds.count, a.orders, a.seeds.random_seed, a.intervals));
-}
-
-/// The name of a problem's comparison in the journal, whose run fixes the order of the problems.
-std::string part_name(int index) { return fmt::format("problem {}", index + 1); }
-
-/// Compares the strategies of every problem that the journal lacks, each in a process of its own.
-/// @return the results in the order of the problems
-std::vector<ChildResult> results_of(const std::vector<ProblemAndModel>& tasks,
-                                    const StrategiesArguments& a, const StrategyOptions& options,
-                                    Journal& journal) {
-  const auto task = [&](int i) -> const ProblemAndModel& {
-    return tasks[static_cast<std::size_t>(i)];
-  };
-  KeptWork work;
-  work.count = static_cast<int>(tasks.size());
-  work.at_once = a.processes > 0 ? a.processes : usable_processors();
-  work.name = part_name;
-  ChildProgress done(work.count);  // outlives the progress that shows it; counts the starts
-  work.work = [&](int i) {
-    StrategyOptions told = options;
-    told.optimize.progress = [&](double, const std::string&) { ++done.step(); };
-    told.progress = [&](double share, const std::string&) { done.set(i, share); };
-    return packed(compare_in(task(i), a, told));
-  };
-  work.complete = [](const std::string& bytes) { return !unpacked_comparison(bytes).interrupted; };
-  work.stop = interrupted;
-  const int before = finished_before(work, journal);
-  if (before > 0) note(fmt::format("{} of {} problems were finished before", before, work.count));
-  std::atomic<int> finished = before;
-  Progress progress("strategies");
-  progress.watch([&] {
-    return Progress::Now{
-        done.share(), fmt::format("{} of {} problem{} finished, {} starts solved", finished.load(),
-                                  work.count, work.count > 1 ? "s" : "", done.step().load())};
-  });
-  return run_kept(work, journal, [&](int i, int now, const ChildResult&) {
-    finished = now;
-    done.set(i, 1.0);
-    progress(done.share(), task(i).problem.name);
-  });
-}
-
-/// Compares the strategies of every problem.
-/// @param broken gets the number of processes that ended without a result
-std::vector<StrategyComparison> compare_all(const std::vector<ProblemAndModel>& tasks,
-                                            const StrategiesArguments& a,
-                                            const StrategyOptions& options, Journal& journal,
-                                            int& broken) {
-  const std::vector<ChildResult> children = results_of(tasks, a, options, journal);
-  std::vector<StrategyComparison> all;
-  all.reserve(children.size());
-  for (std::size_t i = 0; i < children.size(); ++i) {
-    if (children[i].ok) {
-      all.push_back(unpacked_comparison(children[i].bytes));
-      continue;
-    }
-    all.emplace_back();
-    all.back().problem = tasks[i].problem.name;
-    all.back().file = tasks[i].problem.file;
-    all.back().message = children[i].error;
-    all.back().interrupted = interrupted();
-    if (interrupted()) continue;
-    ++broken;
-    note(fmt::format("{}: {}", tasks[i].problem.file, children[i].error));
-  }
-  return all;
-}
-
-bool has_optimum(const StrategyComparison& c) {
-  return std::any_of(c.rows.begin(), c.rows.end(), [](const StrategyRow& row) {
-    return row.find(kOptimal) != nullptr && row.find(kOptimal)->found();
-  });
 }
 
 int run(const StrategiesArguments& a) {
@@ -247,32 +95,34 @@ int run(const StrategiesArguments& a) {
   outputs.push_back({"the journal", a.outputs.journal()});
   check_outputs_apart("strategies", outputs, inputs);
   a.outputs.check();
-  StrategyOptions options;
-  read_times(a.time, options);
-  options.baselines.polished_orders = a.orders;
-  options.optimize.processes = 1;
-  options.optimize.interrupted = interrupted;
-  const std::vector<ProblemAndModel> tasks = load_tasks(a, files, options.own_time);
+  StrategiesTask task;
+  read_times(a.time, task.options);
+  task.options.baselines.polished_orders = a.orders;
+  task.seeds = a.seeds;
+  task.idle_kw = a.idle_kw;
+  task.intervals = a.intervals;
+  task.processes = a.processes;
+  const std::vector<SharedProblem> problems = load_problems(a, files, task);
   const std::unique_ptr<Journal> journal =
-      a.outputs.open_journal("strategies", fingerprint(tasks, a));
+      a.outputs.open_journal("strategies", fingerprint(problems, a));
   finish_on_interrupt();
-  int broken = 0;
-  const std::vector<StrategyComparison> all = compare_all(tasks, a, options, *journal, broken);
-  std::vector<Machine> machines;
-  machines.reserve(tasks.size());
-  for (const ProblemAndModel& task : tasks) machines.push_back(task.model.machine);
-  if (!a.outputs.json.empty()) a.outputs.write_json(strategies_json(all, machines));
+  const ComparedStrategies compared = [&] {
+    Progress progress("strategies");
+    return strategies_task(
+        problems, task, *journal,
+        console_listener([&](double share, const std::string& what) { progress(share, what); }));
+  }();
+  if (!a.outputs.json.empty())
+    a.outputs.write_json(strategies_json(compared.all, machines_of(problems)));
   if (!a.outputs.report.empty()) {
-    const bool one = all.size() == 1;
-    strategies_page(all, one ? &tasks.front().model : nullptr,
-                    one ? &tasks.front().problem : nullptr)
+    const ProblemAndModel* one = compared.all.size() == 1 ? problems.front().get() : nullptr;
+    strategies_page(compared.all, one ? &one->model : nullptr, one ? &one->problem : nullptr)
         .write(a.outputs.report);
   }
-  if (!interrupted() && broken == 0) journal->remove();
-  tell(strategies_table(all));
+  if (!interrupted() && compared.broken == 0) journal->remove();
+  tell(strategies_table(compared.all));
   if (interrupted()) return kInterrupted;
-  if (broken > 0) return kNotSolved;
-  return std::any_of(all.begin(), all.end(), has_optimum) ? kDone : kNotSolved;
+  return compared.broken == 0 && compared.has_optimum() ? kDone : kNotSolved;
 }
 
 }  // namespace

@@ -67,7 +67,8 @@ std::string path_from(const py::object& given) {
 
 void warn(const std::string& sentence) {
   const py::object type = py::module_::import("sparflow._errors").attr("SparflowWarning");
-  if (PyErr_WarnEx(type.ptr(), sentence.c_str(), 1) != 0) throw py::error_already_set();
+  if (PyErr_WarnEx(type.ptr(), in_python_words(sentence).c_str(), 1) != 0)
+    throw py::error_already_set();
 }
 
 std::vector<Log> logs_from(const py::object& given, const Machine& machine) {

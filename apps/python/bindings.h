@@ -35,6 +35,9 @@ std::string path_from(const py::object& given);
 /// The effects of the user's own, as objects or paths of YAML files, added to the model.
 void add_effects(const py::object& effects, CraneModel& model);
 
+/// A sentence of the program whose options are named as the module's arguments.
+std::string in_python_words(const std::string& sentence);
+
 /// Gives a sentence to Python's warnings.
 void warn(const std::string& sentence);
 
@@ -46,6 +49,8 @@ void bind_log(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_diagnosis(py::module_& m);
 void bind_motion(py::module_& m);
+void bind_comparison(py::module_& m);
+void bind_plant(py::module_& m);
 void bind_law(py::module_& m);
 
 }  // namespace sparflow::python

@@ -170,11 +170,14 @@ void bind_diagnosis(py::module_& m) {
           "Keys of the effects that the verdict names, most probable first.");
   py::class_<Extended, Result, std::shared_ptr<Extended>>(
       m, "ExtendResult", "A model with effects, and each error before and after.")
-      .def_property_readonly("model", &Extended::model)
-      .def_property_readonly("interrupted",
-                             [](const Extended& e) { return e.result().interrupted; })
-      .def_property_readonly("stopped_because",
-                             [](const Extended& e) { return e.result().stopped_because; });
+      .def_property_readonly("model", &Extended::model,
+                             "The model with the effects that were kept.")
+      .def_property_readonly(
+          "interrupted", [](const Extended& e) { return e.result().interrupted; },
+          "Whether Ctrl-C ended it, so that something is missing.")
+      .def_property_readonly(
+          "stopped_because", [](const Extended& e) { return e.result().stopped_because; },
+          "Why no further effect was added, a phrase.");
   const py::class_<Selftested, Result, std::shared_ptr<Selftested>> selftested(
       m, "Selftest", "What these logs could reveal.");
   m.def("diagnose", &diagnose_logs);

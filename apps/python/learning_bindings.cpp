@@ -105,12 +105,19 @@ std::shared_ptr<Comparison> compare_with(std::shared_ptr<const CraneModel> model
 void bind_learning(py::module_& m) {
   py::class_<Fitted, Result, std::shared_ptr<Fitted>>(m, "FitResult", "What `fit` learned.")
       .def_property_readonly("model", &Fitted::model, "The fitted model.")
-      .def_property_readonly("notes", [](const Fitted& f) { return f.result().notes; })
-      .def_property_readonly("seconds", [](const Fitted& f) { return f.result().seconds; });
+      .def_property_readonly(
+          "notes", [](const Fitted& f) { return f.result().notes; },
+          "What was left out or could not be learned, sentences.")
+      .def_property_readonly(
+          "seconds", [](const Fitted& f) { return f.result().seconds; }, "[s] that the fit took");
   py::class_<Comparison, Result, std::shared_ptr<Comparison>>(
       m, "CompareResult", "A model against measurements, stage by stage.")
-      .def_property_readonly("samples", [](const Comparison& c) { return c.result().samples; })
-      .def_property_readonly("notes", [](const Comparison& c) { return c.result().notes; })
+      .def_property_readonly(
+          "samples", [](const Comparison& c) { return c.result().samples; },
+          "Number of samples of all logs.")
+      .def_property_readonly(
+          "notes", [](const Comparison& c) { return c.result().notes; },
+          "What could not be compared, sentences.")
       .def(
           "series",
           [](const py::object& self, const std::string& stage, const std::string& at,

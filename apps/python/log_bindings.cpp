@@ -137,13 +137,13 @@ void bind_log(py::module_& m) {
       .def_static(
           "from_arrays", &log_from_arrays, py::arg("columns"), py::arg("machine"),
           py::arg("name") = "arrays", py::arg("mapping") = py::none(),
-          "Makes a log of arrays by column name, with its unit as in a file: {'t_s': ..., "
+          "Makes a log of arrays by column name, with its unit as in a file: {'t_s': ...,\n"
           "'q_boom_rad': ..., 'pA_boom_bar': ...}. Checked as a file is. Raises InputError.")
       .def_readonly("file", &Log::file, "Name without folder.")
       .def_readonly("sha256", &Log::sha256, "Of the file's bytes.")
       .def_readonly("step", &Log::step, "[s] median sampling interval")
-      .def_readonly("warnings", &Log::warnings)
-      .def_property_readonly("duration", &Log::duration, "[s]")
+      .def_readonly("warnings", &Log::warnings, "Sentences on what is unusual in it.")
+      .def_property_readonly("duration", &Log::duration, "[s] from the first to the last sample")
       .def_property_readonly("time", viewed(&Log::time), "[s] view")
       .def_property_readonly("signals", &signal_names, "Names of the signals, without units.")
       .def(

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/python/bindings.h"
+#include "optimizer/solve/child_progress.h"
 
 namespace sparflow::python {
 
@@ -22,10 +23,25 @@ struct Telling {
   bool new_progress = false;
   std::vector<std::string> warnings;
   std::exception_ptr thrown;
+  const std::function<void()>* call = nullptr;  ///< that the work waits for
   bool interrupted = false;  ///< the work ended by Interruption, without a result
   bool done = false;
-  std::atomic<bool> stop = false;
+  ChildProgress shared{
+      1};  ///< its step is not 0 when the work is to end, in child processes as well
+  bool stopping() { return shared.step().load() != 0; }
 };
+
+std::shared_ptr<Telling> new_telling() { return std::make_shared<Telling>(); }
+
+void in_calling_thread(Telling& telling, const std::function<void()>& call) {
+  std::unique_lock lock(telling.mutex);
+  telling.call = &call;
+  telling.changed.notify_all();
+  telling.changed.wait(lock, [&] { return telling.call == nullptr || telling.stopping(); });
+  const bool served = telling.call == nullptr;
+  telling.call = nullptr;
+  if (!served) throw Interruption();
+}
 
 namespace {
 
@@ -72,7 +88,7 @@ Listener listener_of(const std::shared_ptr<Telling>& telling) {
     telling->words = words;
     telling->new_progress = true;
   };
-  listener.interrupted = [telling] { return telling->stop.load(); };
+  listener.interrupted = [telling] { return telling->stopping(); };
   return listener;
 }
 
@@ -83,9 +99,36 @@ bool done_within(Telling& telling, std::chrono::milliseconds time) {
   return telling.changed.wait_for(lock, time, [&] { return telling.done; });
 }
 
+/// Waits until the work is done or wants a call of Python, at most until the next look. The GIL is released.
+bool done_or_wants_call(Telling& telling) {
+  const py::gil_scoped_release release;
+  std::unique_lock lock(telling.mutex);
+  telling.changed.wait_for(lock, kLookEvery,
+                           [&] { return telling.done || telling.call != nullptr; });
+  return telling.done;
+}
+
+/// Calls Python for the work. The GIL is held.
+void serve_call(Telling& telling) {
+  const std::function<void()>* call = nullptr;
+  {
+    const std::lock_guard lock(telling.mutex);
+    call = telling.call;
+  }
+  if (call == nullptr) return;
+  (*call)();  // the work waits, so that it stays where it is
+  const std::lock_guard lock(telling.mutex);
+  telling.call = nullptr;
+  telling.changed.notify_all();
+}
+
 /// Asks the work to end, and leaves it behind where it does not.
 Ended end(Telling& telling, std::jthread thread) {
-  telling.stop = true;
+  {
+    const std::lock_guard lock(telling.mutex);
+    telling.shared.step() = 1;
+    telling.changed.notify_all();
+  }
   if (done_within(telling, kPatience)) {
     const py::gil_scoped_release release;
     thread.join();
@@ -104,9 +147,8 @@ WorkProgress progress_or_stop(const Listener& listener) {
   };
 }
 
-Ended run_beside_python(const py::object& progress,
+Ended run_beside_python(const py::object& progress, const std::shared_ptr<Telling>& telling,
                         const std::function<void(const Listener&)>& work) {
-  auto telling = std::make_shared<Telling>();
   std::jthread thread([telling, work] {
     std::exception_ptr thrown;
     bool interrupted = false;
@@ -123,10 +165,11 @@ Ended run_beside_python(const py::object& progress,
     telling->done = true;
     telling->changed.notify_all();
   });
-  while (!done_within(*telling, kLookEvery)) {
+  while (!done_or_wants_call(*telling)) {
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       hand_on(*telling, progress);
+      serve_call(*telling);
     } catch (py::error_already_set& e) {
       const Ended ended = end(*telling, std::move(thread));
       if (e.matches(PyExc_KeyboardInterrupt)) return ended;
@@ -142,12 +185,40 @@ Ended run_beside_python(const py::object& progress,
   return telling->interrupted ? Ended::kInterrupted : Ended::kWhole;
 }
 
+bool LeftBehind::ended() const {
+  const std::lock_guard lock(telling_->mutex);
+  return telling_->done;
+}
+
+bool LeftBehind::wait(double seconds) const {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  while (!done_within(*telling_, kLookEvery)) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (seconds >= 0.0 && std::chrono::duration<double>(Clock::now() - begin).count() >= seconds)
+      return false;
+  }
+  return true;
+}
+
+py::object LeftBehind::result() const { return ended() ? result_() : py::none(); }
+
 void raise_interrupted(const py::object& result) {
   const py::object type = py::module_::import("sparflow._errors").attr("Interrupted");
   py::object error =
       type(result.is_none() ? "interrupted: nothing was found yet that could be kept"
                             : "interrupted: what was done is kept in `result` of this exception");
-  error.attr("result") = result;
+  error.attr("_result") = result;
+  PyErr_SetObject(type.ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
+void raise_left_behind(LeftBehind work) {
+  const py::object type = py::module_::import("sparflow._errors").attr("Interrupted");
+  py::object error = type(
+      "interrupted: the work is at a part that it ends first; `wait()` of this exception gives "
+      "what was done");
+  error.attr("_left_behind") = py::cast(std::move(work));
   PyErr_SetObject(type.ptr(), error.ptr());
   throw py::error_already_set();
 }

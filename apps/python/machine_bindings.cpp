@@ -75,7 +75,7 @@ void bind_machine(py::module_& m) {
           },
           py::arg("text"), py::arg("name") = "text", py::arg("folder") = ".",
           "Reads the text of a machine file. `folder` is the base of relative paths in it.")
-      .def_readonly("name", &Machine::name)
+      .def_readonly("name", &Machine::name, "Name in its file.")
       .def_property_readonly("joints", &joint_names, "Names of the joints, base to tip.")
       .def_property_readonly("cylinders", &cylinder_names, "Names of the cylinders.")
       .def_property_readonly("pumps", &pump_names, "Names of the pumps.")

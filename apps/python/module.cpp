@@ -13,5 +13,7 @@ PYBIND11_MODULE(_sparflow, m) {
   bind_learning(m);
   bind_diagnosis(m);
   bind_motion(m);
+  bind_comparison(m);
+  bind_plant(m);
   bind_law(m);
 }

@@ -2,6 +2,7 @@
 
 #include "apps/python/bindings.h"
 #include "apps/python/long_call.h"
+#include "apps/python/motion.h"
 #include "apps/python/result.h"
 #include "apps/tasks/optimize_task.h"
 #include "problems/motion_table.h"
@@ -11,12 +12,6 @@ namespace sparflow::python {
 namespace {
 
 using Task = std::shared_ptr<const ProblemAndModel>;
-
-/// A problem with the model that was given, or that its file names.
-struct Problem {
-  Task task;
-  bool has_model = false;
-};
 
 Problem load_problem_file(const py::object& path, const std::shared_ptr<CraneModel>& model) {
   const Listener listener{warn, warn, {}, {}};
@@ -29,16 +24,6 @@ Problem load_problem_file(const py::object& path, const std::shared_ptr<CraneMod
   auto alone = std::make_shared<ProblemAndModel>();
   alone->problem = load_problem(file);
   return {alone, false};
-}
-
-/// Raises an exception of sparflow._errors with the result that it is about.
-[[noreturn]] void raise_unsolved(const char* type, const std::string& sentence,
-                                 const py::object& result) {
-  const py::object cls = py::module_::import("sparflow._errors").attr(type);
-  py::object error = cls(sentence);
-  error.attr("result") = result;
-  PyErr_SetObject(cls.ptr(), error.ptr());
-  throw py::error_already_set();
 }
 
 class Planned final : public Result {
@@ -128,12 +113,21 @@ std::shared_ptr<Optimum> optimize_motion(const Problem& problem, const py::dict&
 
 }  // namespace
 
+void raise_unsolved(const char* type, const std::string& sentence, const py::object& result) {
+  const py::object cls = py::module_::import("sparflow._errors").attr(type);
+  py::object error = cls(in_python_words(sentence));
+  error.attr("result") = result;
+  PyErr_SetObject(cls.ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
 void bind_motion(py::module_& m) {
   py::class_<Problem>(m, "Problem", "A motion to be planned, from rest to rest, with its model.")
       .def_static("load", &load_problem_file, py::arg("path"), py::arg("model") = nullptr,
                   "Reads a problem file (YAML, docs/problem_file.md) and the model that it names, "
                   "unless one is given. Raises InputError.")
-      .def_property_readonly("name", [](const Problem& p) { return p.task->problem.name; })
+      .def_property_readonly(
+          "name", [](const Problem& p) { return p.task->problem.name; }, "Name in its file.")
       .def_property_readonly(
           "payload", [](const Problem& p) { return p.task->problem.payload; }, "[kg] at the tip");
   const auto viewed = [](auto member) {
@@ -143,11 +137,12 @@ void bind_motion(py::module_& m) {
   };
   py::class_<Trajectory>(m, "Trajectory",
                          "A motion; rows are instants, columns the machine's joints. Views.")
-      .def_property_readonly("t", viewed(&Trajectory::t), "[s]")
+      .def_property_readonly("t", viewed(&Trajectory::t), "[s] of each row")
       .def_property_readonly("q", viewed(&Trajectory::q), "[rad] or [m]")
       .def_property_readonly("qd", viewed(&Trajectory::qd), "[rad/s] or [m/s]")
       .def_property_readonly("qdd", viewed(&Trajectory::qdd), "[rad/s^2] or [m/s^2]")
-      .def_property_readonly("duration", &Trajectory::duration, "[s]")
+      .def_property_readonly("duration", &Trajectory::duration,
+                             "[s] from the first to the last row")
       .def("__len__", &Trajectory::size);
   py::class_<Planned, Result, std::shared_ptr<Planned>>(m, "PlanResult", "Collision-free paths.")
       .def_property_readonly(
@@ -161,16 +156,20 @@ void bind_motion(py::module_& m) {
           "Waypoints of each path [waypoints x joints], [rad] or [m], as views.");
   py::class_<Optimum, Result, std::shared_ptr<Optimum>>(m, "OptimizeResult",
                                                         "The energy-optimal motion.")
-      .def_property_readonly("status",
-                             [](const Optimum& o) { return to_string(o.result().status); })
+      .def_property_readonly(
+          "status", [](const Optimum& o) { return to_string(o.result().status); },
+          "'optimal', 'feasible', 'infeasible', 'failed' or 'interrupted'.")
       .def_property_readonly(
           "energy_exact_J", [](const Optimum& o) { return o.result().energy.total; },
           "[J] by the exact law")
-      .def_property_readonly("duration_s", [](const Optimum& o) { return o.result().duration; })
-      .def_property_readonly("interrupted", [](const Optimum& o) { return o.result().interrupted; })
+      .def_property_readonly(
+          "duration_s", [](const Optimum& o) { return o.result().duration; }, "[s] of the motion")
+      .def_property_readonly(
+          "interrupted", [](const Optimum& o) { return o.result().interrupted; },
+          "Whether Ctrl-C ended it, so that something is missing.")
       .def_property_readonly(
           "motion", [](const Optimum& o) -> const Trajectory& { return o.result().motion; },
-          py::return_value_policy::reference_internal)
+          py::return_value_policy::reference_internal, "The motion, a Trajectory.")
       .def("motion_csv", &Optimum::csv, py::arg("rate") = 0.0,
            "The text that `-o MOTION.csv` writes; rate [Hz], 0 is the mesh of the solve.");
   m.def("plan", &plan_paths);

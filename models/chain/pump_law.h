@@ -60,7 +60,7 @@ struct SmoothPumpPressure {
 /// The smooth law of one pump at one instant, for plain numbers and Jets.
 struct SmoothPumpLaw {
   double standby = 0.0;  ///< [Pa]
-  double beta = 1e5;     ///< [Pa] smoothing
+  double beta = 1e5;  ///< [Pa] smoothing; 0: the exact maximum, with the derivatives of its leader
 
   /// The largest term is factored out, so that no exponential overflows.
   /// @param cylinders those that the pump feeds  @param demand_of returns the SmoothDemand of a cylinder
@@ -75,6 +75,7 @@ struct SmoothPumpLaw {
       if (one.demand != nullptr) exact.add(i, plain(*one.demand));
     }
     const double top = exact.pressure();
+    if (!(beta > 0.0)) return exact_pressure<T>(exact.leader(), cylinders, demand_of);
     T standby_share = std::exp((standby - top) / beta);
     T total = standby_share;
     for (const int i : cylinders) {
@@ -89,6 +90,20 @@ struct SmoothPumpLaw {
     }
     standby_share /= total;
     return {top + beta * log(total), standby_share, exact.leader()};
+  }
+
+ private:
+  template <class T, class DemandOf>
+  SmoothPumpPressure<T> exact_pressure(int leader, const std::vector<int>& cylinders,
+                                       const DemandOf& demand_of) const {
+    SmoothPumpPressure<T> law{T(standby), T(leader < 0 ? 1.0 : 0.0), leader};
+    for (const int i : cylinders) {
+      const SmoothDemand<T> one = demand_of(i);
+      if (one.demand == nullptr) continue;
+      *one.share = T(i == leader ? 1.0 : 0.0);
+      if (i == leader) law.pressure = *one.demand;
+    }
+    return law;
   }
 };
 

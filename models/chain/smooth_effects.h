@@ -43,6 +43,8 @@ class SmoothEffects {
   const Jet& pump_pressure(int p) const {
     return pressure_[static_cast<std::size_t>(p)];
   }  ///< [Pa]
+  /// All quantities of the last evaluation; of a free cylinder those of its first direction.
+  const Instant<Jet>& instant() const { return first_; }
 
  private:
   /// Quantities of a cylinder that do not depend on the direction being evaluated.

@@ -22,7 +22,7 @@ inline constexpr double kNegligibleShare = 1e-14;
 
 struct Smoothing {
   double speed = 2e-3;    ///< eps [m/s]
-  double pressure = 1e5;  ///< beta [Pa]
+  double pressure = 1e5;  ///< beta [Pa]; 0: the exact maximum of the demands
 };
 
 /// Each thread needs its own object; nothing is allocated after construction. Order of the variables everywhere:

@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "models/machine/linkage.h"
 #include "simulator/controllers/goal_posture.h"
@@ -26,6 +27,7 @@ using Clock = std::chrono::steady_clock;
 /// Longest line that is read.
 /// @threshold [bytes] 1000..1e8; chosen: an answer has some numbers; a program that writes without end is stopped
 constexpr std::size_t kLongestLine = 1 << 20;
+
 /// Part of a wrong answer that the message quotes.
 /// @threshold [bytes] 10..1000; chosen: enough to recognise it
 constexpr std::size_t kQuoted = 60;
@@ -138,10 +140,10 @@ class Child {
   std::string buffer_;
 };
 
-class Foreign : public Controller {
+class Asked : public Controller {
  public:
-  Foreign(const Knowledge& knowledge, const std::string& command, const ForeignOptions& options)
-      : know_(knowledge), options_(options), child_(command) {}
+  Asked(const Knowledge& knowledge, std::string who, Ask ask)
+      : know_(knowledge), who_(std::move(who)), ask_(std::move(ask)) {}
 
   void begin(const Task& task, const Measurement& now) override {
     const Machine& m = *know_.machine;
@@ -209,34 +211,43 @@ class Foreign : public Controller {
   }
 
  private:
-  [[noreturn]] static void fail(const std::string& what, const std::string& found, double t) {
+  [[noreturn]] void fail(const std::string& what, const std::string& found, double t) const {
     std::string quoted;
     for (const char c : found.substr(0, kQuoted)) quoted += c >= ' ' && c <= '~' ? c : '?';
-    throw ControllerFailure(fmt::format("its process {} at t = {:.2f} s: {}", what, t, quoted));
+    throw ControllerFailure(fmt::format("{} {} at t = {:.2f} s: {}", who_, what, t, quoted));
   }
 
-  json ask(const json& message, double t) {
-    const std::string line =
-        child_.ask(message.dump(-1, ' ', false, json::error_handler_t::replace),
-                   started_ ? options_.step_budget : options_.start_budget, t);
-    started_ = true;
+  json ask(const json& message, double t) const {
+    const std::string line = ask_(message.dump(-1, ' ', false, json::error_handler_t::replace), t);
     json answer = json::parse(line, nullptr, false);
     if (!answer.is_object()) fail("printed a line that is no JSON object", line, t);
     return answer;
   }
 
   Knowledge know_;
-  ForeignOptions options_;
-  Child child_;
-  bool started_ = false;
+  std::string who_;
+  Ask ask_;
 };
 
 }  // namespace
 
+std::unique_ptr<Controller> asked_controller(const Knowledge& knowledge, const std::string& who,
+                                             const Ask& ask) {
+  return std::make_unique<Asked>(knowledge, who, ask);
+}
+
 std::unique_ptr<Controller> foreign_controller(const Knowledge& knowledge,
                                                const std::string& command,
                                                const ForeignOptions& options) {
-  return std::make_unique<Foreign>(knowledge, command, options);
+  const auto child = std::make_shared<Child>(command);
+  return asked_controller(
+      knowledge, "its process",
+      [child, options, started = false](const std::string& line, double t) mutable {
+        std::string answer =
+            child->ask(line, started ? options.step_budget : options.start_budget, t);
+        started = true;
+        return answer;
+      });
 }
 
 }  // namespace sparflow::control

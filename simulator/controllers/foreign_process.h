@@ -1,12 +1,20 @@
 #pragma once
-/// A controller that is a program of the user's own: lines of JSON on its standard input and output (docs/benchmark.md). What
-/// it does wrong (hang, end, print what is no answer) is a ControllerFailure with a sentence.
+/// A controller of the user's own that is asked by lines of JSON (docs/benchmark.md): a program on its standard input and output,
+/// or whatever answers them. What it does wrong (hang, end, print what is no answer) is a ControllerFailure with a sentence.
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "simulator/controllers/controller.h"
 
 namespace sparflow::control {
+
+/// Hands a line of JSON to the controller and gives its answer. @param t [s] for sentences @throws ControllerFailure
+using Ask = std::function<std::string(const std::string& line, double t)>;
+
+/// @param who the begin of sentences on what it does wrong: "its process", "its function"
+std::unique_ptr<Controller> asked_controller(const Knowledge& knowledge, const std::string& who,
+                                             const Ask& ask);
 
 struct ForeignOptions {
   /// Time in which a step must be answered.

@@ -2,6 +2,9 @@
 
 import os
 import pathlib
+import signal
+import threading
+import time
 
 import pytest
 
@@ -34,3 +37,33 @@ def fitted(machine, train, test_log):
 @pytest.fixture(scope="session")
 def program():
     return pathlib.Path(os.environ["SPARFLOW_BINARY_DIR"]) / "sparflow"
+
+
+TIMES = {"solve_s", "callbacks_s", "linear_solver_s", "stages", "bound_s"}
+
+
+def without_times(values):
+    """A result without what differs from run to run."""
+    if isinstance(values, dict):
+        return {k: without_times(v) for k, v in values.items() if k not in TIMES}
+    return [without_times(v) for v in values] if isinstance(values, list) else values
+
+
+def interrupted_soon(call, when=lambda share, words: share > 0, limit_s=0.5):
+    """Presses Ctrl-C in a call as soon as its progress says so; the call must end within half a second, which is promised."""
+    begun, pressed = threading.Event(), []
+
+    def press():
+        begun.wait(120)
+        pressed.append(time.monotonic())
+        signal.raise_signal(signal.SIGINT)
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    try:
+        return call(lambda share, words: when(share, words) and begun.set())
+    finally:
+        ended = time.monotonic()
+        begun.set()
+        thread.join()
+        assert pressed and ended - pressed[0] < limit_s

@@ -41,3 +41,37 @@ def test_other_shapes_are_refused():
         sparflow.evaluate(model, q, q[:, :2])
     with pytest.raises(sparflow.UsageError, match=r"q has the shape \(3\)"):
         sparflow.evaluate(model, q[0], q[0])
+
+
+def test_derivatives_are_those_of_the_law():
+    model = sparflow.Model.load(DATA / "models/loader_crane.json")
+    generator = np.random.default_rng(7)
+    # The middle half of the joints' ranges, and rates at which every cylinder moves.
+    q = np.array([0.4, -1.2, 1.2]) + generator.uniform(-0.25, 0.25, (40, 3))
+    qd = generator.uniform(0.02, 0.08, (40, 3)) * generator.choice([-1.0, 1.0], (40, 3))
+    qdd = np.zeros_like(q)
+    exact = sparflow.derivatives(model, q, qd, qdd, payload_kg=300)
+    step = 1e-6
+    for variable, (at, rate) in dict(q=(1, 0), qd=(0, 1)).items():
+        for joint in range(3):
+            move = np.zeros(3)
+            move[joint] = step
+            after = sparflow.evaluate(model, q + at * move, qd + rate * move, qdd, payload_kg=300)
+            before = sparflow.evaluate(model, q - at * move, qd - rate * move, qdd, payload_kg=300)
+            for quantity, value in after.items():
+                numeric = (value - before[quantity]) / (2 * step)
+                ours = exact[quantity][variable][:, :, joint]
+                # Central differences: their error is some 1e-10 of the value over the step, and the second derivative's part.
+                scale = np.abs(value).max() + np.abs(numeric).max()
+                assert np.allclose(ours, numeric, rtol=1e-5, atol=1e-6 * scale), (quantity, variable, joint)
+    assert np.abs(exact["power"]["qd"]).min(axis=2).max() > 0 and not exact["power"]["qdd"].any()
+
+
+def test_derivatives_at_rest_are_those_of_rest():
+    model = sparflow.Model.load(DATA / "models/loader_crane.json")
+    q = np.array([[0.4, -1.2, 1.2]])
+    rest = sparflow.derivatives(model, q, 0 * q, payload_kg=300)
+    assert not rest["power"]["qd"].any() and not rest["flow"]["qd"].any() and rest["static_force"]["q"].any()
+    assert rest["speed"]["qd"].any()
+    with pytest.raises(sparflow.UsageError, match="derivatives: qd has the shape"):
+        sparflow.derivatives(model, q, q[:, :2])

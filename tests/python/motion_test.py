@@ -1,24 +1,13 @@
 """plan and optimize give what the program gives; what is infeasible is an exception with its result."""
 
 import json
-import signal
 import subprocess
-import threading
-import time
 
 import numpy as np
 import pytest
 
 import sparflow
-from conftest import DATA
-
-TIMES = {"solve_s", "callbacks_s", "linear_solver_s", "stages"}
-
-
-def without_times(values):
-    if isinstance(values, dict):
-        return {k: without_times(v) for k, v in values.items() if k not in TIMES}
-    return [without_times(v) for v in values] if isinstance(values, list) else values
+from conftest import DATA, interrupted_soon, without_times
 
 
 def test_optimize_gives_the_programs_motion(fitted, program, tmp_path):
@@ -52,17 +41,18 @@ def test_paths_are_planned_and_an_unreachable_goal_is_an_exception(tmp_path):
 
 def test_ctrl_c_ends_an_optimisation_within_half_a_second(fitted):
     problem = sparflow.Problem.load(DATA / "reaches/loader_crane_lift.yaml", fitted.model)
-    begun = threading.Event()
-    pressed = []
+    with pytest.raises(sparflow.Interrupted) as caught:
+        interrupted_soon(lambda progress: sparflow.optimize(problem, progress=progress),
+                         when=lambda share, words: share > 0.3)
+    # Whatever was found until then is there once the work has ended, and stays the same object.
+    done = caught.value.wait(20)
+    assert caught.value.ended and done is caught.value.result
 
-    def press():
-        begun.wait(60)
-        pressed.append(time.monotonic())
-        signal.raise_signal(signal.SIGINT)
 
-    thread = threading.Thread(target=press)
-    thread.start()
-    with pytest.raises(sparflow.Interrupted):
-        sparflow.optimize(problem, progress=lambda share, words: share > 0.3 and begun.set())
-    assert time.monotonic() - pressed[0] < 0.5
-    thread.join()
+def test_ctrl_c_during_the_bound_keeps_the_motion(fitted):
+    problem = sparflow.Problem.load(DATA / "reaches/loader_crane_lift.yaml", fitted.model)
+    with pytest.raises(sparflow.Interrupted) as caught:
+        interrupted_soon(lambda progress: sparflow.optimize(problem, intervals=20, bound=True, progress=progress),
+                         when=lambda share, words: "bound" in words or "joint grid" in words)
+    done = caught.value.wait(20)
+    assert done.interrupted and len(done.motion) > 1 and done.energy_exact_J > 0

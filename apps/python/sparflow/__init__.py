@@ -15,8 +15,12 @@ from ._errors import (DefectError, Error, InfeasibleError, InputError, Interrupt
                       SparflowWarning, UsageError)
 from ._sparflow import *  # noqa: F401,F403
 from ._sparflow import __version__
-from ._verbs import compare, diagnose, evaluate, extend, fit, improve, optimize, plan, selftest
+from ._verbs import (audit, benchmark, compare, derivatives, diagnose, evaluate, extend, fit, improve, optimize, pareto, plan,
+                     selftest, simulate, strategies)
 from . import _frames
 
 _frames.attach()
-del _frames
+for _thing in list(globals().values()):
+    if getattr(_thing, "__module__", "") == "sparflow._sparflow" and isinstance(_thing, type):
+        _thing.__module__ = "sparflow"  # where help() and error messages shall find it
+del _frames, _thing

@@ -36,9 +36,33 @@ class DefectError(Error, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C in a long call. `result` is what was done until then, None where nothing can be kept."""
+    """Ctrl-C in a long call: it ends within half a second.
 
-    result = None
+    `result` is what was done until then: the object that the call returns, as far as it came, or None where nothing can be
+    kept. Work that is at a part which it cannot leave ends that part in a thread of its own; until then `result` is None, and
+    `wait()` waits for it.
+    """
+
+    _result = None
+    _left_behind = None
+
+    @property
+    def result(self):
+        """What was done; None where nothing can be kept, or the work is still at a part that it ends first."""
+        if self._result is None and self._left_behind is not None:
+            self._result = self._left_behind.result()
+        return self._result
+
+    @property
+    def ended(self):
+        """Whether the work has ended, so that `result` is final."""
+        return self._left_behind is None or self._left_behind.ended()
+
+    def wait(self, seconds=None):
+        """Waits until the work has ended, at most so many seconds [s] (None: as long as it takes); returns `result`."""
+        if self._left_behind is not None:
+            self._left_behind.wait(-1.0 if seconds is None else float(seconds))
+        return self.result
 
 
 class SparflowWarning(UserWarning):

@@ -10,9 +10,9 @@ def _pandas():
     return pandas
 
 
-def to_dict(result):
+def to_dict(self):
     """The result as Python's own types, with the keys of `--json` (docs/commands.md)."""
-    return json.loads(result.json())
+    return json.loads(self.json())
 
 
 def _scores(stages):
@@ -28,46 +28,90 @@ def _scores(stages):
     return rows
 
 
-def compare_frame(result):
+def compare_frame(self):
     """Scores of every stage, a row each: stage, at, regime, rmse, unit, fit_percent, n, ..."""
-    return _pandas().DataFrame(_scores(to_dict(result)["stages"]))
+    return _pandas().DataFrame(_scores(to_dict(self)["stages"]))
 
 
-def fit_frame(result):
+def fit_frame(self):
     """The pressure models, a row each: cylinder, direction, samples, rmse_bar, noise_bar, ..."""
-    return _pandas().DataFrame(to_dict(result)["processes"])
+    return _pandas().DataFrame(to_dict(self)["processes"])
 
 
-def diagnosis_frame(result):
+def diagnosis_frame(self):
     """The effects that passed their proofs, most probable first: id, at, stage, probability, parameters, ..."""
-    return _pandas().DataFrame(to_dict(result)["effects"])
+    return _pandas().DataFrame(to_dict(self)["effects"])
 
 
-def extend_frame(result):
+def extend_frame(self):
     """The steps, a row each: added, removed, judged_on, error_ratio, ..."""
-    return _pandas().DataFrame(to_dict(result)["steps"])
+    return _pandas().DataFrame(to_dict(self)["steps"])
 
 
-def selftest_frame(result):
+def selftest_frame(self):
     """Every effect with its power on these logs, a row each."""
-    return _pandas().DataFrame(to_dict(result)["effects"])
+    return _pandas().DataFrame(to_dict(self)["effects"])
 
 
-def plan_frame(result):
+def plan_frame(self):
     """The paths, a row each: name, planner, waypoints, shortest_duration_s, end."""
-    return _pandas().DataFrame(to_dict(result)["paths"])
+    return _pandas().DataFrame(to_dict(self)["paths"])
 
 
-def motion_frame(result):
+def motion_frame(self):
     """The motion by its rows, columns as in MOTION.csv (docs/commands.md)."""
+    return _csv_frame(self.motion_csv())
+
+
+def strategies_frame(self):
+    """The strategies, a row each: problem, time ('equal', 'own', a factor), strategy, energy_J, duration_s, ..."""
+    rows = []
+    for problem in to_dict(self)["problems"]:
+        times = [(f["factor"], f["strategies"]) for f in problem.get("factors", [])]
+        if "own_time" in problem:
+            times.insert(0, ("own", problem["own_time"]))
+        if problem["strategies"] and problem["strategies"] != problem.get("own_time"):
+            times.insert(0, ("equal", problem["strategies"]))
+        for time, outcomes in times:
+            for strategy, outcome in outcomes.items():
+                rows.append({"problem": problem["name"], "time": time, "strategy": strategy, **_plain(outcome)})
+    return _pandas().DataFrame(rows)
+
+
+def _plain(values):
+    return {k: v for k, v in values.items() if not isinstance(v, (dict, list))}
+
+
+def _csv_frame(text):
     import io
-    return _pandas().read_csv(io.StringIO(result.motion_csv()))
+    return _pandas().read_csv(io.StringIO(text))
 
 
-def log_frame(log):
+def pareto_frame(self):
+    """The curve, a row a duration: duration_s, energy_J, sequential_J, simultaneous_J, share_moving_0, ..."""
+    return _csv_frame(self.csv())
+
+
+def audit_frame(self):
+    """The moves, a row each: log, from_s, to_s, payload_kg, measured_J, model_J, optimum_J, saving_J, ..."""
+    return _pandas().DataFrame([{"log": move["log"], "from_s": move["t_s"][0], "to_s": move["t_s"][1], **_plain(move)}
+                                for move in to_dict(self)["moves"]])
+
+
+def simulation_frame(self):
+    """The log of the run: all signals in SI, indexed by time [s]."""
+    return log_frame(self.log)
+
+
+def benchmark_frame(self):
+    """The runs, a row each: scenario, controller, seed, status, energy_J, ... (docs/benchmark.md)."""
+    return _csv_frame(self.csv())
+
+
+def log_frame(self):
     """All signals in SI, indexed by time [s]."""
     pandas = _pandas()
-    return pandas.DataFrame({name: log[name] for name in log.signals}, index=pandas.Index(log.time, name="t_s"))
+    return pandas.DataFrame({name: self[name] for name in self.signals}, index=pandas.Index(self.time, name="t_s"))
 
 
 def log_from_frame(frame, machine, name="frame", mapping=None):
@@ -92,5 +136,10 @@ def attach():
     core.Selftest.to_frame = selftest_frame
     core.PlanResult.to_frame = plan_frame
     core.OptimizeResult.to_frame = motion_frame
+    core.StrategiesResult.to_frame = strategies_frame
+    core.ParetoResult.to_frame = pareto_frame
+    core.AuditResult.to_frame = audit_frame
+    core.Simulation.to_frame = simulation_frame
+    core.BenchmarkResult.to_frame = benchmark_frame
     core.Log.to_frame = log_frame
     core.Log.from_frame = staticmethod(log_from_frame)

@@ -1,5 +1,8 @@
 """The verbs of the program as functions (docs/commands.md). Logs are a Log, a path, or a sequence of these."""
 
+import os
+
+from . import _controllers
 from . import _sparflow as core
 from ._errors import UsageError
 
@@ -90,6 +93,111 @@ def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, see
                                        intervals=intervals, processes=processes, progress=progress))
 
 
+def _several(given, one):
+    return [given] if isinstance(given, one) else list(given)
+
+
+def strategies(problems, *, time="equal", idle_kW=None, paths=8, orders=4, seed=1, intervals=0, processes=0, progress=None):
+    """Compares sequential, simultaneous and energy-optimal motions of one Problem or several; returns a StrategiesResult.
+
+    time: 'equal' (the problem's duration), 'own' (the best time of each strategy, with idle power), factors of the shortest
+    time, or several of these separated by commas: 'equal,1.1,1.5'. idle_kW: idle power [kW]; None is the problem's.
+    paths, seed: of the search for paths. orders: of the cylinders, whose segments are optimised. intervals: of the mesh, 0 is
+    the problem's. processes: problems solved in parallel, 0 is one for each processor.
+    Raises InfeasibleError where no energy-optimal motion was found; after Ctrl-C the exception's `result` has the problems done.
+    """
+    return core.strategies(_several(problems, core.Problem),
+                           dict(time=str(time), idle_kW=idle_kW, paths=paths, orders=orders, seed=seed, intervals=intervals,
+                                processes=processes, progress=progress))
+
+
+def pareto(problem, *, points=14, longest=6.0, idle_kW=(1, 2, 5, 10, 15), paths=8, seed=1, intervals=0, processes=0,
+           progress=None):
+    """Computes the least energy over the duration of a Problem; returns a ParetoResult.
+
+    points: number of durations besides those that search for the shortest. longest: the longest duration over the shortest.
+    idle_kW: idle powers [kW] for which the best duration is told. paths, seed, intervals: as in optimize. processes: starts
+    solved in parallel, 0 is two.
+    Raises InfeasibleError where there is no motion; after Ctrl-C the exception's `result` has the points done.
+    """
+    return core.pareto(problem, dict(points=points, longest=longest, idle_kW=list(idle_kW), paths=paths, seed=seed,
+                                     intervals=intervals, processes=processes, progress=progress))
+
+
+def audit(model, logs, *, payload_kg=None, pause_s=1.0, moves=40, litres_per_kWh=0.0, engine_map=None, bound=True,
+          processes=0, progress=None):
+    """Compares each recorded move with its energy-optimal motion: what was wasted, where, why; returns an AuditResult.
+
+    payload_kg: payload [kg]; None is that of the log. pause_s: shortest rest that ends a move [s].
+    moves: moves examined at most, those with the longest way. litres_per_kWh: fuel for each kWh of hydraulic energy
+    [l/kWh]; engine_map: path of the engine's fuel over its power (YAML) in its place. bound: also lower bounds of the energy.
+    processes: starts solved in parallel, 0 is one for each processor.
+    Raises InputError where the logs have no move; after Ctrl-C the exception's `result` has the moves examined.
+    """
+    if litres_per_kWh and engine_map is not None:
+        raise UsageError("audit: give either litres_per_kWh or engine_map")
+    return core.audit(model, dict(logs=logs, payload_kg=payload_kg, pause_s=pause_s, moves=moves, litres_per_kWh=litres_per_kWh,
+                                  engine_map=engine_map, bound=bound, processes=processes, progress=progress))
+
+
+def simulate(machine, *, seconds=60.0, rate=50.0, seed=1, effects=(), plant=None, programme="operator", track=None, replay=None,
+             motion=None, controller=None, start=None, payload_kg=None, progress=None):
+    """Lets the dynamic plant, which knows no law of the model, do something; returns a Simulation with its log.
+
+    seconds: duration [s]. rate: samples a second [Hz]. seed: of the random work and the sensors.
+    effects: items 'NAME[:AT][=VALUE|=off]', 'none' or 'all', in their order (plant_effects() lists them). plant: path of a file
+    with parameters of the plant (docs/plant.md).
+    One of these drives it: programme, 'operator' or 'cycles'; track, a Trajectory or the path of a motion or log, whose joint
+    positions are followed; replay, the path of a file with commands; motion, one that diagnose proposes, by its words or number;
+    controller, a function of the state that returns levers from -1 to 1 by cylinder, {'boom': 0.3}; one that is not named is 0.
+    The state is a dict with 't_s' [s], 'q' and 'qd' by joint [rad, rad/s or m, m/s], 'length_m' of the cylinders pin to pin,
+    'pA_bar' and 'pB_bar' by cylinder, 'p_bar' by pump, 'payload_kg' and 'oil_C': true values of the plant.
+    start: joint positions by name for a controller [rad or m]; others stand in the middle of their ranges.
+    payload_kg: payload [kg]; None is that of the file, or drawn, for a controller 0.
+    A run that ends early, because the machine leaves its kinematics, is told by a warning and by `status`; after Ctrl-C the
+    exception's `result` has the log so far. What the controller raises ends the run and is raised here.
+    """
+    if programme not in ("operator", "cycles"):
+        raise UsageError(f"simulate: programme is 'operator' or 'cycles'; got {programme!r}")
+    if not 0.1 <= seconds <= 1e6 or not 10.0 <= rate <= 1000.0:
+        raise UsageError(f"simulate: expected 0.1 to 1e6 seconds and a rate from 10 to 1000; got {seconds} s, {rate}")
+    if start is not None and controller is None:
+        raise UsageError("simulate: start is for a controller; programmes begin where they say")
+    if controller is not None:
+        _controllers.check(controller)
+    return core.simulate(machine, dict(
+        seconds=seconds, rate=rate, seed=seed, effects=_several(effects, str), plant=plant, programme=programme, track=track,
+        replay=replay, motion=motion, ask=None if controller is None else _controllers.asked(controller), start=dict(start or {}),
+        payload_kg=payload_kg, progress=progress))
+
+
+def benchmark(scenarios, controllers=None, *, model=None, functions=None, processes=None, gains=None, reference="", seeds=0,
+              optimum=True, bound=True, step_budget_s=0.5, jobs=0, progress=None):
+    """Compares controllers on the dynamic plant: true energy, time, errors; returns a BenchmarkResult.
+
+    scenarios: a path of a scenario or a folder of them, or several. controllers: names of the program's; None is all of them,
+    or none where functions or processes are given.
+    functions: controllers of your own by name, {'mine': function of the state} as in simulate, but with what sensors tell. An
+    object with a method begin(task) is told each goal (the keys are those of docs/benchmark.md); of a class a new object is made
+    for each run. They run in this process, one run after another; what they raise is the reason of a failed run.
+    processes: programs of your own by name, {'mine': 'python3 mine.py'}, which must answer a step in step_budget_s [s].
+    model: a Model or the path of one; None is the one that each scenario names. gains: {'joint_pi.proportional': 1.2}.
+    reference: name of the controller that others are compared with; '' is tracked_optimum, or the first. seeds: runs of each
+    controller in each scenario; 0 is the scenario's seeds. optimum, bound: also the energy-optimal motion and its lower bound.
+    jobs: runs at the same time, 0 is one for each processor. After Ctrl-C the exception's `result` has the runs done.
+    """
+    functions, processes = dict(functions or {}), dict(processes or {})
+    for function in functions.values():
+        _controllers.check(function)
+    names = [controllers] if isinstance(controllers, str) else list(controllers or ())
+    return core.benchmark(dict(
+        scenarios=_several(scenarios, (str, os.PathLike)), controllers=names, no_others=bool(functions or processes),
+        functions=[(name, _controllers.words(f), lambda f=f: _controllers.asked(f)) for name, f in functions.items()],
+        processes=[f"{name}={command}" for name, command in processes.items()],
+        gains=[f"{name}={value!r}" for name, value in dict(gains or {}).items()], model=model, reference=reference, seeds=seeds,
+        optimum=optimum, bound=bound, step_budget_s=step_budget_s, jobs=jobs, progress=progress))
+
+
 def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
     """The exact law of the Model on N states at once, without Python's lock; returns a dict of arrays, SI.
 
@@ -98,4 +206,16 @@ def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
     'pressure' [Pa, 0 at rest]; [N x pumps]: 'pump_flow', 'pump_pressure'; [N x 1]: 'power' of the pumps [W].
     Raises UsageError for another shape and for a posture in which a linkage cannot close.
     """
-    return core.evaluate(model, q, qd, qdd, dict(payload_kg=payload_kg, oil_C=oil_C))
+    return core.evaluate(model, dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))
+
+
+def derivatives(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
+    """The exact first derivatives of what `evaluate` gives, on N states at once; returns a dict of dicts of arrays, SI.
+
+    derivatives(...)['power']['qd'] is the derivative of the power by the joints' rates, [N x 1 x joints] [W s/rad or W s/m];
+    quantities are those of `evaluate` with [N x cylinders x joints] or [N x pumps x joints], and variables 'q', 'qd', 'qdd'
+    (by accelerations only what inertia forces reach). Derivatives do not exist at rest, where flows have a kink and pressures
+    jump, and where two demands on a pump are equal: there those of rest and of the first demand are given.
+    Raises UsageError as `evaluate` does, InputError for a machine of more than ten joints (seven with inertia).
+    """
+    return core.derivatives(model, dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))

@@ -46,6 +46,7 @@ class Page {
   void subtitle(std::string text);
   /// Sets the main result, which stands in a box above everything else.
   void verdict(Tone tone, std::string headline, std::string text);
+  const std::string& headline() const { return verdict_headline_; }  ///< of verdict()
   /// Adds a line above everything else that says the result is not whole ("Interrupted: ..."). Empty text: none.
   void banner(std::string text);
   /// Adds a line to the footer (program version, input files and their hashes, seed ...), in the order of the calls.

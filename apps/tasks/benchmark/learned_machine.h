@@ -3,7 +3,7 @@
 #include "models/chain/crane_model.h"
 #include "simulator/controllers/section_valves.h"
 
-namespace sparflow::cli {
+namespace sparflow {
 
 /// Sections by the model's valve gains and, where it has that effect, dead bands; where nothing was learned those of the
 /// machine file.
@@ -22,4 +22,4 @@ class LearnedPower : public control::PowerModel {
   Chain chain_;
 };
 
-}  // namespace sparflow::cli
+}  // namespace sparflow

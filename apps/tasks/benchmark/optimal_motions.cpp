@@ -1,12 +1,12 @@
-#include "apps/cli/benchmark/optimal_motions.h"
+#include "apps/tasks/benchmark/optimal_motions.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "apps/cli/benchmark/learned_machine.h"
-#include "apps/cli/motion_inputs.h"
+#include "apps/tasks/benchmark/learned_machine.h"
+#include "apps/tasks/motion_inputs.h"
 #include "models/machine/linkage.h"
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
@@ -14,7 +14,7 @@
 #include "optimizer/solve/optimize.h"
 #include "optimizer/solve/replan.h"
 
-namespace sparflow::cli {
+namespace sparflow {
 namespace {
 
 /// Payload before a goal is reached. [kg]
@@ -191,4 +191,4 @@ std::optional<Trajectory> ScenarioMotions::motion_from(const control::Task& task
   return replan(model_, problem, {&current, t, now.q, now.qd});
 }
 
-}  // namespace sparflow::cli
+}  // namespace sparflow

@@ -8,7 +8,7 @@
 #include "simulator/benchmark/scenario.h"
 #include "simulator/controllers/controller.h"
 
-namespace sparflow::cli {
+namespace sparflow {
 
 struct OptimalMotionOptions {
   /// Share of valves' and pumps' flows that the motion may use; the rest is the controller's.
@@ -70,4 +70,4 @@ class ScenarioMotions : public control::MotionSource {
   OptimalMotionOptions options_;
 };
 
-}  // namespace sparflow::cli
+}  // namespace sparflow

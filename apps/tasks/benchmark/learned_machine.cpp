@@ -1,8 +1,8 @@
-#include "apps/cli/benchmark/learned_machine.h"
+#include "apps/tasks/benchmark/learned_machine.h"
 
 #include <algorithm>
 
-namespace sparflow::cli {
+namespace sparflow {
 
 std::vector<control::ValveSection> learned_sections(const CraneModel& model) {
   std::vector<control::ValveSection> sections = control::sections_of(model.machine);
@@ -30,4 +30,4 @@ std::vector<control::ValveSection> learned_sections(const CraneModel& model) {
   return sections;
 }
 
-}  // namespace sparflow::cli
+}  // namespace sparflow

@@ -1,13 +1,14 @@
-#include "apps/cli/benchmark/benchmark_text.h"
+#include "apps/tasks/benchmark/benchmark_text.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "models/math/units.h"
 
-namespace sparflow::cli {
+namespace sparflow {
 namespace {
 
 using benchmark::ControllerSummary;
@@ -143,6 +144,12 @@ void add_detail(const BenchmarkResult& r, BenchmarkView& view) {
 
 }  // namespace
 
+bool BenchmarkResult::any_done() const {
+  return std::any_of(rows.begin(), rows.end(), [](const Row& r) { return r.done; });
+}
+
+std::string benchmark_headline(const BenchmarkResult& r) { return headline(r); }
+
 std::string benchmark_table(const BenchmarkResult& r) {
   std::string text = fmt::format(
       "{} scenarios, {} controllers, {} runs, {} of them failed\n\n{:<22} {:>9} {:>5} {:>8} "
@@ -263,4 +270,4 @@ BenchmarkView benchmark_view(const BenchmarkResult& r) {
   return view;
 }
 
-}  // namespace sparflow::cli
+}  // namespace sparflow
