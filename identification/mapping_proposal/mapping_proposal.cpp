@@ -97,7 +97,7 @@ class ProposalRows {
       row.required = true;
       return row;
     }
-    const Reading& r = c->reading;
+    const ChannelReading& r = c->reading;
     const Meaning meaning = r.stroke ? Meaning{Role::kStroke, machine_.cylinder_of_joint(joint)}
                                      : Meaning{Role::kJointPosition, joint};
     MeaningProposal row = begun(meaning, r.channel);

@@ -27,7 +27,7 @@ struct ConfidenceOptions {
 
 struct ProposalOptions {
   WordOptions words;
-  EvidenceOptions evidence;
+  ChannelEvidenceOptions evidence;
   PositionOptions positions;
   PressureOptions pressures;
   ConfidenceOptions confidence;

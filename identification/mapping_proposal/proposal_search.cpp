@@ -140,9 +140,9 @@ std::vector<std::vector<int>> ProposalSearch::position_sets(const Ban& ban, int 
   const std::size_t joints = candidates_.size();
   std::vector<std::vector<ColumnPair>> groups(joints);
   for (std::size_t j = 0; j < joints; ++j) {
-    groups[j].push_back({-1, -1, 0.0});
+    groups[j].push_back({-1, -1, -options_.positions.missing});
     for (std::size_t k = 0; k < candidates_[j].size(); ++k) {
-      const Reading& r = candidates_[j][k].reading;
+      const ChannelReading& r = candidates_[j][k].reading;
       if (ban.kind == Ban::Kind::kPosition && ban.index == static_cast<int>(j) &&
           ban.channel == r.channel)
         continue;
@@ -180,7 +180,7 @@ StaticForces ProposalSearch::forces(const Assignment& a) const {
       q.col(j).setConstant(0.5 * (range.lo + range.hi));
     }
   }
-  return static_forces(machine, q);
+  return forces_along(machine, q);
 }
 
 std::vector<ProposedCylinder> ProposalSearch::cylinders(const Assignment& a) const {
@@ -219,7 +219,7 @@ std::vector<ColumnPair> ProposalSearch::pair_candidates(const JudgedSet& set, in
         a[i] = b[i] = -1e6;
     }
   }
-  const EvidenceOptions& o = options_.evidence;
+  const ChannelEvidenceOptions& o = options_.evidence;
   if (position == nullptr) {
     for (int i = 0; i < n; ++i) {
       pairs.push_back({i, -1, a[i] - o.single_chamber.price});
@@ -253,8 +253,9 @@ ProposalSearch::JudgedSet ProposalSearch::judge(const std::vector<int>& position
   JudgedSet set;
   set.positions = positions;
   for (std::size_t j = 0; j < positions.size(); ++j) {
-    if (positions[j] >= 0)
-      set.position_score += candidates_[j][static_cast<std::size_t>(positions[j])].reading.score;
+    set.position_score +=
+        positions[j] < 0 ? -options_.positions.missing
+                         : candidates_[j][static_cast<std::size_t>(positions[j])].reading.score;
   }
   Assignment a;
   a.positions = positions;

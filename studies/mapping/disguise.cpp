@@ -49,6 +49,7 @@ std::string part_of(const Meaning& m, const Machine& machine) {
 }
 
 /// A name in one of three ways of writing, without unit.
+// Over 80 lines because it is a table of names.
 std::string other_name(const Meaning& m, const Machine& machine, Names names) {
   const std::string part = part_of(m, machine);
   const bool one_pump = machine.pump_count() == 1;

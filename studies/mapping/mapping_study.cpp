@@ -106,9 +106,15 @@ Machine drawn(Machine machine, simulator::Random random) {
   return machine;
 }
 
-void simulated(const std::string& file, std::uint64_t seed, double seconds,
-               const std::vector<Names>& kinds, const ProposalOptions& options,
-               std::vector<Judged>* all) {
+struct SimulatedCase {
+  std::string file;  ///< bundled machine
+  std::uint64_t seed = 1;
+  double seconds = 150.0;
+};
+
+void simulated(const SimulatedCase& c, const std::vector<Names>& kinds,
+               const ProposalOptions& options, std::vector<Judged>* all) {
+  const auto& [file, seed, seconds] = c;
   simulator::Random random(seed, file);
   simulator::LogRequest request;
   Machine machine = load_machine(bundled_file(fmt::format("machines/{}.yaml", file)));
@@ -233,7 +239,7 @@ int run(int argc, char** argv) {
   } else {
     for (const std::string& machine : machines) {
       for (int k = 0; k < seeds; ++k)
-        simulated(machine, first + static_cast<std::uint64_t>(k), seconds, kinds, options, &all);
+        simulated({machine, first + static_cast<std::uint64_t>(k), seconds}, kinds, options, &all);
     }
   }
   if (verbose) {

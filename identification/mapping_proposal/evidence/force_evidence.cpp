@@ -151,7 +151,7 @@ std::vector<int> payload_channels(const ProposalData& data, const PressureOption
   return best;
 }
 
-StaticForces static_forces(const Machine& machine, const MatrixXd& position) {
+StaticForces forces_along(const Machine& machine, const MatrixXd& position) {
   constexpr double kMass = 1000.0;
   StaticForce model(machine);
   StaticForces out;

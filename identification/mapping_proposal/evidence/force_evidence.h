@@ -57,7 +57,7 @@ std::vector<int> payload_channels(const ProposalData& data, const PressureOption
 struct StaticForces {
   Eigen::MatrixXd empty, by_mass;
 };
-StaticForces static_forces(const Machine& machine, const Eigen::MatrixXd& position);
+StaticForces forces_along(const Machine& machine, const Eigen::MatrixXd& position);
 
 /// Changes of pressure while the cylinder moves against those while it rests. [n] [nat]
 Eigen::VectorXd activity_scores(const ProposalData& data, const PressureSet& pressures,

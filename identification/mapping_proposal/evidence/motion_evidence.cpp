@@ -17,6 +17,26 @@ using Eigen::VectorXd;
 /// @threshold [1] 0.005..0.1; chosen: above the noise of positions, below creeping
 constexpr double kRestShare = 0.03;
 
+/// Loss of a unit that is not the usual one where the file gives none.
+/// @threshold [nat] 0..4; chosen: between a vague and a clear word
+constexpr double kUnusualUnit = 1.5;
+/// Loss of a flow that has both signs.
+/// @threshold [nat] 0..4; chosen: as above; flows are counted in the direction of the pump
+constexpr double kSignedFlow = 1.5;
+
+/// Misfit up to which the slopes of a command mean something.
+/// @threshold [1] 0.5..1; chosen: a third of the rod speed's square is explained
+constexpr double kExplained = 0.8;
+/// Largest loss by slopes that are not those of the valve's flows.
+/// @threshold [nat] 0..6; chosen: valve tables are often those of another spool
+constexpr double kSlopeLoss = 2.5;
+/// Spread of the logarithm of extending over retracting speed, which needs no unit of the command.
+/// @threshold [1] 0.1..1; tuned: seeds 1..40 of docs/mapping_proposal.md
+constexpr double kRatioSpread = 0.3;
+/// Spread of the logarithm of the speed at full command.
+/// @threshold [1] 0.1..1; tuned: as above; full command is limited by many controllers
+constexpr double kGainSpread = 0.4;
+
 double neutral_of(const Eigen::Ref<const VectorXd>& v, const VectorXd& speed) {
   const double rest = kRestShare * std::max(quantile(speed.cwiseAbs(), 0.98), 1e-9);
   std::vector<double> resting;
@@ -38,7 +58,9 @@ CopyFit copy_fit(const Eigen::Ref<const VectorXd>& v, const std::vector<ChannelU
   for (const ChannelUnit& unit : units) {
     const double misfit =
         std::sqrt(std::min(1.0, (unit.factor * v - expected).squaredNorm() / all));
-    if (misfit < best.misfit) best = {misfit, unit.factor, unit, weight.log_odds(misfit)};
+    // A unit that the file does not give is rather the usual one.
+    const double odds = weight.log_odds(misfit) - (&unit == &units.front() ? 0.0 : kUnusualUnit);
+    if (misfit < 1.0 && odds > best.log_odds) best = {misfit, unit.factor, unit, odds};
   }
   return best;
 }
@@ -90,9 +112,31 @@ CommandFit fit_command(const ProposalData& data, int channel, const PositionCand
   best.log_odds = data.options.command.log_odds(best.misfit);
   // Levers rest at one value exactly; speeds and flows that are measured do not.
   const double mode = data.mode_shares[static_cast<std::size_t>(channel)];
+  best.log_odds -= slope_loss(data, channel, position.joint, best);
   best.log_odds += best.sign < 0.0 ? -1.0 : 0.0;
   best.log_odds += mode > 0.05 ? 0.8 : -0.8;
   return best;
+}
+
+double slope_loss(const ProposalData& data, int channel, int joint, const CommandFit& fit) {
+  const int cylinder = data.machine->cylinder_of_joint(joint);
+  const Valve* valve = cylinder < 0 ? nullptr : data.machine->valve_of_cylinder(cylinder);
+  if (valve == nullptr || fit.misfit > kExplained) return 0.0;
+  const Cylinder& c = data.machine->cylinders[static_cast<std::size_t>(cylinder)];
+  const double full[2] = {valve->max_flow_extend / c.area_piston(),
+                          valve->max_flow_retract / c.area_rod()};
+  const double slope[2] = {std::abs(fit.slope[0]), std::abs(fit.slope[1])};
+  if (!(full[0] > 0.0 && full[1] > 0.0 && slope[0] > 0.0 && slope[1] > 0.0)) return 0.0;
+  const auto loss = [](double ratio, double spread) {
+    const double off = std::log(ratio) / spread;
+    return std::min(kSlopeLoss, 0.5 * off * off);
+  };
+  double sum = loss(slope[0] / slope[1] * full[1] / full[0], kRatioSpread);
+  const ChannelUnit& unit = data.units[static_cast<std::size_t>(channel)];
+  if (unit.of == ChannelUnit::Of::kShare) {
+    sum += loss(std::sqrt(slope[0] * slope[1] / (full[0] * full[1])) / unit.factor, kGainSpread);
+  }
+  return sum;
 }
 
 CopyFit fit_speed(const ProposalData& data, int channel, const Meaning& meaning,
@@ -105,8 +149,12 @@ CopyFit fit_flow(const ProposalData& data, int channel, int cylinder, const Vect
   const Cylinder& c = data.machine->cylinders[static_cast<std::size_t>(cylinder)];
   const VectorXd expected = rod_speed.unaryExpr(
       [&](double v) { return v > 0.0 ? c.area_piston() * v : -c.area_rod() * v; });
-  return copy_fit(data.samples.values.col(channel).cwiseAbs(),
-                  units_of(data, channel, {Role::kFlow, cylinder}), expected, data.options.flow);
+  CopyFit fit =
+      copy_fit(data.samples.values.col(channel).cwiseAbs(),
+               units_of(data, channel, {Role::kFlow, cylinder}), expected, data.options.flow);
+  const ChannelShape& shape = data.shape(channel);
+  if (shape.low < -0.1 * shape.high) fit.log_odds -= kSignedFlow;
+  return fit;
 }
 
 CopyFit fit_copy(const ProposalData& data, int channel, const Meaning& meaning,

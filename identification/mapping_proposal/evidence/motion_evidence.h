@@ -18,6 +18,9 @@ struct CommandFit {
 };
 CommandFit fit_command(const ProposalData& data, int channel, const PositionCandidate& position);
 
+/// Loss by slopes that are not those of the valve's flows in the machine file. [nat]
+double slope_loss(const ProposalData& data, int channel, int joint, const CommandFit& fit);
+
 /// Fraction of a squared signal that a measured copy of it leaves.
 struct CopyFit {
   double misfit = 1.0;

@@ -108,6 +108,9 @@ std::vector<PositionCandidate> position_candidates(const ProposalData& data, int
   const bool direct =
       cylinder < 0 || std::holds_alternative<DirectLinkage>(
                           machine.cylinders[static_cast<std::size_t>(cylinder)].linkage);
+  const bool rack =
+      cylinder >= 0 && std::holds_alternative<RackLinkage>(
+                           machine.cylinders[static_cast<std::size_t>(cylinder)].linkage);
   std::vector<PositionCandidate> all;
   for (const bool stroke : {false, true}) {
     if (stroke && cylinder < 0) continue;
@@ -127,9 +130,12 @@ std::vector<PositionCandidate> position_candidates(const ProposalData& data, int
         VectorXd values = data.samples.values.col(m) * unit.factor;
         const auto [fit, words] = travel_score(data, m, values, travel, o);
         PositionCandidate c;
-        c.reading = {m, unit, stroke, said + fit, said, reasons};
+        c.joint = joint;
+        // The stroke of a rack is the joint's position in another unit, and rarely logged.
+        const double rare = rack && stroke ? o.rare : 0.0;
+        c.reading = {m, unit, stroke, said + fit - rare, said, reasons};
         c.reading.reasons.push_back(words);
-        if (c.reading.score <= 0.0) continue;
+        if (c.reading.score <= -o.missing) continue;
         c.position = std::move(values);
         all.push_back(std::move(c));
       }

@@ -25,6 +25,12 @@ struct PositionOptions {
   /// Roughness from which a channel is no motion.
   /// @threshold [1] 0.03..0.5; chosen: between two instants a machine covers a small part of its range
   double rough = 0.12;
+  /// Loss of a rack's stroke against the angle.
+  /// @threshold [nat] 0..4; chosen: below a clear word
+  double rare = 0.7;
+  /// Loss of a joint without a channel.
+  /// @threshold [nat] 0..6; chosen: a log cannot be read without its positions
+  double missing = 1.5;
   /// Candidates of a joint that the search considers.
   /// @threshold [1] 2..20; chosen: as many as joints of a machine with a few distractors
   int candidates = 9;
@@ -32,12 +38,13 @@ struct PositionOptions {
 
 /// A channel read as the position of a joint.
 struct PositionCandidate {
-  Reading reading;
+  int joint = -1;
+  ChannelReading reading;
   Eigen::VectorXd position;  ///< [instants] joint coordinate [rad] or [m]
   Eigen::VectorXd speed;  ///< [instants] dx/dt of its cylinder [m/s], of a joint without one dq/dt
 };
 
-/// @return best first; empty when none has a score above that of no channel (0)
+/// @return best first; empty when none has a score above that of no channel
 std::vector<PositionCandidate> position_candidates(const ProposalData& data, int joint,
                                                    const PositionOptions& options = {});
 

@@ -97,7 +97,7 @@ double ProposalData::said(int channel, const Meaning& meaning,
 }
 
 ProposalData proposal_data(const TimedChannels& file, const Machine& machine,
-                           const WordOptions& words, const EvidenceOptions& options) {
+                           const WordOptions& words, const ChannelEvidenceOptions& options) {
   ProposalData data;
   data.file = &file;
   data.machine = &machine;

@@ -20,27 +20,27 @@ struct FitWeight {
 };
 
 /// Weights of what values say. All were tuned on simulated logs of crane seeds 1..40 (docs/mapping_proposal.md).
-struct EvidenceOptions {
+struct ChannelEvidenceOptions {
   /// Rod speed by the command's two slopes; ramps, dead bands and the other cylinders' flow are the misfit.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: seeds 1..40 of docs/mapping_proposal.md
+  /// @threshold [1] 0.1..10; tuned: seeds 1..40 of docs/mapping_proposal.md
   FitWeight command = {5.0, 0.4, 1.0};
   /// A measured speed is the derivative itself; noise of both is the misfit.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight speed = {6.0, 0.15, 2.0};
   /// Flow = area times rod speed, but for leaks and compression of the oil.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight flow = {6.0, 0.15, 2.0};
   /// Chamber forces against the static force, as a share of half the largest force of the cylinder.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight force = {7.0, 0.12, 1.5};
   /// One chamber alone: the other's pressure is not known.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight single_chamber = {2.5, 0.25, 2.0};
   /// Pump pressure above the largest working pressure, as a share of a third of the pump's largest pressure.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight pump = {4.0, 0.10, 1.0};
   /// Payload: force that the masses of the machine leave.
-  /// @threshold [1, -, nat] weight, spread, price; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: as above
   FitWeight payload = {4.0, 0.30, 0.5};
   /// Delay of the rod behind its command that is tried at most.
   /// @threshold [instants] 0..20; chosen: half a second; longer delays are no valve's
@@ -57,7 +57,7 @@ struct EvidenceOptions {
 };
 
 /// One channel's values in SI by one reading of its unit.
-struct Reading {
+struct ChannelReading {
   int channel = -1;  ///< in the recording
   ChannelUnit unit;
   bool stroke = false;      ///< of a position: it measures the cylinder
@@ -71,7 +71,7 @@ struct ProposalData {
   const TimedChannels* file = nullptr;
   const Machine* machine = nullptr;
   WordOptions words;
-  EvidenceOptions options;
+  ChannelEvidenceOptions options;
   ProposalSamples samples;         ///< thinned to `physics_instants`
   std::vector<int> considered;     ///< channels, at most `most_channels`
   std::vector<ChannelUnit> units;  ///< of every channel, as the file says
@@ -90,7 +90,7 @@ struct ProposalData {
 };
 
 ProposalData proposal_data(const TimedChannels& file, const Machine& machine,
-                           const WordOptions& words, const EvidenceOptions& options);
+                           const WordOptions& words, const ChannelEvidenceOptions& options);
 
 /// Values of a channel at `lag` instants before, held at the begin of each run.
 Eigen::VectorXd delayed(const ProposalSamples& samples, const Eigen::Ref<const Eigen::VectorXd>& v,
