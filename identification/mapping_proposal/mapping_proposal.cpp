@@ -85,9 +85,25 @@ class ProposalRows {
     const double odds = confidence_.at_zero + confidence_.by_margin * margin;
     row->margin = margin;
     row->confidence = std::min(confidence_.most, 1.0 / (1.0 + std::exp(-odds)));
+    if (rests_unnamed(*row)) {
+      row->confidence = std::min(row->confidence, confidence_.resting);
+      row->reasons.push_back("its joint rests throughout, and the name says nothing");
+    }
     if (other.positions.empty()) return;
     const int m = channel_of(other);
     if (m >= 0) row->other = data_.name(m);
+  }
+
+  /// Whether neither motion nor name tells a meaning of a joint or cylinder.
+  bool rests_unnamed(const MeaningProposal& row) const {
+    const Meaning& m = row.meaning;
+    if (m.index < 0 || m.role == Role::kPumpPressure) return false;
+    const int joint = m.role == Role::kJointPosition
+                          ? m.index
+                          : machine_.cylinders[static_cast<std::size_t>(m.index)].joint;
+    const PositionCandidate* p = search_.position(best_, joint);
+    if (p != nullptr && p->moves) return false;
+    return data_.said(row.channel, m, nullptr) <= data_.words.right_unit;
   }
 
   MeaningProposal position_row(int joint) {

@@ -20,6 +20,9 @@ struct ConfidenceOptions {
   /// Below it a meaning stands in the written mapping as a comment only.
   /// @threshold [1] 0.5..0.99; chosen: a mapping with twenty columns should rarely hold a wrong one
   double unsure_below = 0.7;
+  /// Largest confidence of a meaning whose joint rests throughout, where the name says nothing.
+  /// @threshold [1] 0..0.7; chosen: nothing but range and unit speaks for it
+  double resting = 0.5;
   /// Largest confidence that is told.
   /// @threshold [1] 0.9..0.9999; chosen: no log proves what a channel is
   double most = 0.99;

@@ -60,9 +60,12 @@ std::pair<double, std::string> travel_score(const ProposalData& data, int channe
   // A joint that was not moved is no contradiction, one that is too fast is.
   const double speed_loss = std::min(0.5 * off * off, off < 0.0 ? 2.5 : o.outside);
   const double rough = data.shape(channel).roughness;
-  const double rough_loss = data.shape(channel).constant
-                                ? 0.0
-                                : std::min(o.outside, 25.0 * std::max(0.0, rough - o.rough));
+  // Noise about one value is no motion of its own: it counts by the part of the range that it covers.
+  const double covered = std::min(1.0, (hi - lo) / (o.rough_span * width));
+  const double rough_loss =
+      data.shape(channel).constant
+          ? 0.0
+          : covered * std::min(o.outside, 25.0 * std::max(0.0, rough - o.rough));
   const double outside_loss = o.outside * std::min(1.0, outside / o.outside_share);
   const double span = 0.5 * std::log(std::min(1.0, (hi - lo) / width) + 0.05) + 0.5;
   if (outside < 0.02) {
@@ -157,6 +160,10 @@ std::vector<PositionCandidate> position_candidates(const ProposalData& data, int
     if (same) continue;
     if (c.reading.stroke && !direct && !joint_positions(machine, cylinder, &c.position)) continue;
     c.speed = speed_of(data, joint, c.position);
+    const Joint& j = machine.joints[static_cast<std::size_t>(joint)];
+    const double limit = std::max(j.velocity.hi, -j.velocity.lo);
+    c.moves =
+        quantile(rate_of_change(data.samples, c.position).cwiseAbs(), 0.98) > o.resting * limit;
     kept.push_back(std::move(c));
     if (static_cast<int>(kept.size()) >= o.candidates) break;
   }

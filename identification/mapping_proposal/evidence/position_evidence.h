@@ -31,6 +31,12 @@ struct PositionOptions {
   /// Loss of a joint without a channel.
   /// @threshold [nat] 0..6; chosen: a log cannot be read without its positions
   double missing = 1.5;
+  /// Share of the range that a rough channel covers where its roughness counts fully.
+  /// @threshold [1] 0.02..1; chosen: noise of a resting sensor covers a hundredth
+  double rough_span = 0.2;
+  /// Rate, as a share of the joint's limit, below which a joint rests throughout.
+  /// @threshold [1] 0.005..0.2; chosen: noise of position sensors stays below it
+  double resting = 0.05;
   /// Candidates of a joint that the search considers.
   /// @threshold [1] 2..20; chosen: as many as joints of a machine with a few distractors
   int candidates = 9;
@@ -41,6 +47,7 @@ struct PositionCandidate {
   int joint = -1;
   ChannelReading reading;
   Eigen::VectorXd position;  ///< [instants] joint coordinate [rad] or [m]
+  bool moves = false;        ///< it does not rest throughout
   Eigen::VectorXd speed;  ///< [instants] dx/dt of its cylinder [m/s], of a joint without one dq/dt
 };
 
