@@ -40,7 +40,13 @@ class ProposalRows {
         best_(search->best()),
         confidence_(confidence),
         forces_(search->forces(best_)),
-        parts_(search->cylinders(best_)) {}
+        parts_(search->cylinders(best_)) {
+    payload_.resize(data.samples.instants(), 0);
+    for (std::size_t r = 0; r < search->rest().size(); ++r) {
+      if (search->rest()[r].role == Role::kPayload && best_.rest[r] >= 0)
+        payload_ = data.samples.values.col(best_.rest[r]);
+    }
+  }
 
   std::vector<MeaningProposal> rows() {
     std::vector<MeaningProposal> all;
@@ -97,12 +103,20 @@ class ProposalRows {
   /// Whether neither motion nor name tells a meaning of a joint or cylinder.
   bool rests_unnamed(const MeaningProposal& row) const {
     const Meaning& m = row.meaning;
-    if (m.index < 0 || m.role == Role::kPumpPressure) return false;
-    const int joint = m.role == Role::kJointPosition
-                          ? m.index
-                          : machine_.cylinders[static_cast<std::size_t>(m.index)].joint;
-    const PositionCandidate* p = search_.position(best_, joint);
-    if (p != nullptr && p->moves) return false;
+    if (m.index < 0) return false;
+    std::vector<int> joints;
+    if (m.role == Role::kPumpPressure) {
+      for (const int c : machine_.pumps[static_cast<std::size_t>(m.index)].feeds)
+        joints.push_back(machine_.cylinders[static_cast<std::size_t>(c)].joint);
+    } else if (m.role == Role::kJointPosition) {
+      joints.push_back(m.index);
+    } else {
+      joints.push_back(machine_.cylinders[static_cast<std::size_t>(m.index)].joint);
+    }
+    for (const int joint : joints) {
+      const PositionCandidate* p = search_.position(best_, joint);
+      if (p != nullptr && p->moves) return false;
+    }
     return data_.said(row.channel, m, nullptr) <= data_.words.right_unit;
   }
 
@@ -142,15 +156,17 @@ class ProposalRows {
     if (!set.open_unit.empty())
       row.reasons.push_back(fmt::format("values fit in {}", set.open_unit));
     if (parts_[c].speed != nullptr && best_.pairs[c][0] >= 0) {
-      const Eigen::MatrixXd none(data_.samples.instants(), 0);
-      const CylinderForces forces(data_, {set, cylinder, forces_, *parts_[c].speed, none});
+      const CylinderForces forces(data_, {set, cylinder, forces_, *parts_[c].speed, payload_});
       const ForceFit fit = forces.fit(best_.pairs[c][0], best_.pairs[c][1]);
-      const double largest = forces_.empty.col(cylinder).cwiseAbs().maxCoeff();
+      const double largest =
+          (set.values.col(best_.pairs[c][0]) * machine_.cylinders[c].area_piston())
+              .cwiseAbs()
+              .maxCoeff();
       row.reasons.push_back(
-          fmt::format("{} follows the static force of {} within {:.2g} kN rms (largest {:.3g} kN), "
-                      "friction {:.2g} kN",
+          fmt::format("{} follows the static force of {} within {:.2g} kN rms (largest chamber "
+                      "force {:.3g} kN)",
                       best_.pairs[c][1] >= 0 ? "A pA - B pB" : "A pA", machine_.cylinders[c].name,
-                      1e-3 * fit.rms, 1e-3 * largest, 1e-3 * fit.friction));
+                      1e-3 * fit.rms, 1e-3 * largest));
     }
     judge(&row, {side == 0 ? Ban::Kind::kPressureA : Ban::Kind::kPressureB, cylinder, row.channel},
           [&](const Assignment& a) {
@@ -278,6 +294,7 @@ class ProposalRows {
   ConfidenceOptions confidence_;
   StaticForces forces_;
   std::vector<ProposedCylinder> parts_;
+  Eigen::MatrixXd payload_;  ///< [instants x 0 or 1] values of the proposed payload
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace sparflow {
 /// Confidence of a meaning by its margin: the loss of the best other assignment of all channels [nat].
 struct ConfidenceOptions {
   /// Log-odds at margin zero, of a meaning that the names say nothing about.
-  /// @threshold [nat] -5..5; tuned: seeds 1..40 of docs/mapping_proposal.md
+  /// @threshold [nat] -5..5; tuned: seeds 1..4 of docs/mapping_proposal.md
   double at_zero = -1.0;
   /// Growth of the log-odds with the margin.
   /// @threshold [1] 0.1..3; tuned: as above

@@ -147,7 +147,7 @@ std::vector<std::string> channel_guesses(const TimedChannels& file) {
     }
     if (of < compared) {
       sentence +=
-          fmt::format("{}is the derivative of {} times {:.4g} but for {:.0f} %",
+          fmt::format("{}moves as the derivative of {} times {:.4g} but for {:.0f} %",
                       sentence.empty() ? "" : ", ", channels[of].name, factor, 100.0 * best);
     }
     out.push_back(std::move(sentence));

@@ -108,7 +108,7 @@ TEST_F(LogVerb, WithoutAMachineDerivativesAreNamed) {
   }
   out.close();
   ASSERT_EQ(run((folder / "rates.csv").string() + " --propose"), 0) << read("err");
-  EXPECT_THAT(read("out"), HasSubstr("CH2 is the derivative of way [mm]"));
+  EXPECT_THAT(read("out"), HasSubstr("CH2 moves as the derivative of way [mm]"));
 }
 
 TEST_F(LogVerb, AFileWithoutAClockIsRefusedWithASentence) {

@@ -22,7 +22,7 @@ struct PressureOptions {
   /// @threshold [1] 0.005..0.1; chosen: a return line
   double idle = 0.03;
   /// Weight of pressure changes that coincide with the cylinder's own motion.
-  /// @threshold [nat] 0..3; tuned: seeds 1..40 of docs/mapping_proposal.md
+  /// @threshold [nat] 0..3; tuned: seeds 1..4 of docs/mapping_proposal.md
   double activity = 0.8;
   /// Loss of a friction that would drive the cylinder, or a payload below zero.
   /// @threshold [nat] 0..10; chosen: as a clear word

@@ -31,7 +31,7 @@ constexpr double kExplained = 0.8;
 /// @threshold [nat] 0..6; chosen: valve tables are often those of another spool
 constexpr double kSlopeLoss = 2.5;
 /// Spread of the logarithm of extending over retracting speed, which needs no unit of the command.
-/// @threshold [1] 0.1..1; tuned: seeds 1..40 of docs/mapping_proposal.md
+/// @threshold [1] 0.1..1; tuned: seeds 1..4 of docs/mapping_proposal.md
 constexpr double kRatioSpread = 0.3;
 /// Spread of the logarithm of the speed at full command.
 /// @threshold [1] 0.1..1; tuned: as above; full command is limited by many controllers

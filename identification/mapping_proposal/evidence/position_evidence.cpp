@@ -162,8 +162,11 @@ std::vector<PositionCandidate> position_candidates(const ProposalData& data, int
     c.speed = speed_of(data, joint, c.position);
     const Joint& j = machine.joints[static_cast<std::size_t>(joint)];
     const double limit = std::max(j.velocity.hi, -j.velocity.lo);
+    // Noise has a rate as well, but covers nothing.
+    const double span = quantile(c.position, 0.995) - quantile(c.position, 0.005);
     c.moves =
-        quantile(rate_of_change(data.samples, c.position).cwiseAbs(), 0.98) > o.resting * limit;
+        quantile(rate_of_change(data.samples, c.position).cwiseAbs(), 0.98) > o.resting * limit &&
+        span > o.resting * (j.position.hi - j.position.lo);
     kept.push_back(std::move(c));
     if (static_cast<int>(kept.size()) >= o.candidates) break;
   }

@@ -8,7 +8,7 @@ namespace sparflow {
 
 struct PositionOptions {
   /// Log-odds of values that are smooth, in range, and as fast as the joint can be.
-  /// @threshold [nat] 0..4; tuned: seeds 1..40 of docs/mapping_proposal.md
+  /// @threshold [nat] 0..4; tuned: seeds 1..4 of docs/mapping_proposal.md
   double fits = 1.0;
   /// Largest loss by values outside the range.
   /// @threshold [nat] 2..20; chosen: as WordOptions::own_name, so that no name outweighs impossible values

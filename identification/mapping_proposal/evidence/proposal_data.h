@@ -19,10 +19,10 @@ struct FitWeight {
   double log_odds(double misfit) const;
 };
 
-/// Weights of what values say. All were tuned on simulated logs of crane seeds 1..40 (docs/mapping_proposal.md).
+/// Weights of what values say. All were tuned on simulated logs of seeds 1..4 (docs/mapping_proposal.md).
 struct ChannelEvidenceOptions {
   /// Rod speed by the command's two slopes; ramps, dead bands and the other cylinders' flow are the misfit.
-  /// @threshold [1] 0.1..10; tuned: seeds 1..40 of docs/mapping_proposal.md
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight command = {5.0, 0.4, 1.0};
   /// A measured speed is the derivative itself; noise of both is the misfit.
   /// @threshold [1] 0.1..10; tuned: as above
