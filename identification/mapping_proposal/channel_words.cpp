@@ -41,18 +41,20 @@ const std::array<WordClass, kClasses> kClassWords = {{
      {"q", "alpha", "beta", "axis", "achse", "ist"}},
     {"stroke",
      {"stroke", "hub", "weg", "laenge", "length", "displacement", "auszug"},
-     {"x", "s", "position", "pos", "wegsensor"}},
+     {"x", "s", "position", "pos", "wegsensor", "len"}},
     {"command",
      {"command", "cmd", "joystick", "joy", "hebel", "lever", "stell", "soll", "setpoint", "valve",
       "ventil", "spool", "schieber", "steuer", "ansteuerung", "pwm", "control"},
-     {"u", "y", "ref", "input", "strom", "current"}},
+     {"u", "y", "ref", "input", "strom", "current", "js"}},
     {"pressure", {"pressure", "druck", "press"}, {"p", "pa", "pb", "pt", "pr", "dr"}},
     {"force", {"force", "kraft", "loadcell"}, {"f"}},
     {"flow", {"flow", "volumenstrom", "durchfluss", "foerderstrom"}, {"q", "lpm"}},
     {"payload",
      {"payload", "nutzlast", "traglast", "gewicht", "weight", "masse", "mass"},
      {"load", "last", "m"}},
-    {"oil temperature", {"temperature", "temperatur", "temp", "oil", "oel"}, {"fluid", "t"}},
+    {"oil temperature",
+     {"oil", "oel", "oilt", "toil", "temperature", "temperatur", "temp"},
+     {"fluid", "t"}},
     {"speed",
      {"velocity", "speed", "geschwindigkeit", "drehrate", "omega", "winkelgeschwindigkeit"},
      {"v", "vel", "rate", "qd", "dq"}},
@@ -63,7 +65,7 @@ enum Side { kA, kB, kPump, kReturn, kSides };
 const std::array<WordClass, kSides> kSideWords = {{
     {"bore side", {"bore", "cap", "piston", "kolben", "boden"}, {"a", "pa"}},
     {"rod side", {"rod", "stange", "ring", "annulus"}, {"b", "pb"}},
-    {"pump", {"pump", "pumpe", "supply", "versorgung"}, {"system", "hd"}},
+    {"pump", {"pump", "pumpe", "pmp", "supply", "versorgung"}, {"system", "hd"}},
     {"return line", {"return", "tank", "ruecklauf", "drain"}, {"t", "nd"}},
 }};
 
@@ -79,6 +81,16 @@ const std::array<Words, 8> kPartWords = {{
     {"cross", "quer"},
     {"grapple", "greifer"},
 }};
+
+/// Words of signals that no machine file asks for.
+const Words kForeignWords = {"engine",   "coolant",  "kuehlwasser", "kuehlmittel", "drehzahl",
+                             "rpm",      "voltage",  "spannung",    "battery",     "batterie",
+                             "fuel",     "diesel",   "ambient",     "umgebung",    "gps",
+                             "latitude", "longitude"};
+
+/// Shortest beginning of a part's name that may stand for it ("ext" for extension).
+/// @threshold [1] 2..5; chosen: as column names abbreviate
+constexpr std::size_t kShortestBeginning = 3;
 
 /// Shortest word that may be part of a longer one, as in "Kolbendruck".
 /// @threshold [1] 3..8; chosen: shorter ones occur in words by chance
@@ -172,6 +184,13 @@ double part_score(const std::string& part, const std::vector<std::string>& words
       std::search(words.begin(), words.end(), own.begin(), own.end()) != words.end()) {
     *word = part;
     return o.part_name;
+  }
+  if (own.size() == 1 && std::any_of(words.begin(), words.end(), [&](const std::string& w) {
+        return w.size() >= kShortestBeginning && w.size() < own.front().size() &&
+               own.front().starts_with(w);
+      })) {
+    *word = part.substr(0, kShortestBeginning);
+    return o.part_synonym;
   }
   for (const Words& set : kPartWords) {
     if (std::none_of(own.begin(), own.end(), [&](const std::string& w) {
@@ -289,6 +308,7 @@ WordEvidence name_evidence(const std::string& name, const Meaning& meaning, cons
     parts.push_back(vocabulary_evidence(kSideWords, static_cast<std::size_t>(side), words, o));
   }
   parts.push_back(part_evidence(meaning, machine, words, o));
+  if (!found_in(kForeignWords, words).empty()) parts.push_back({-2.0 * o.clear_word, ""});
   WordEvidence sum;
   for (const WordEvidence& e : parts) {
     sum.log_odds += e.log_odds;
@@ -297,6 +317,33 @@ WordEvidence name_evidence(const std::string& name, const Meaning& meaning, cons
     sum.words += e.words;
   }
   return sum;
+}
+
+std::string looks_like(const std::string& name, const ChannelUnit& unit) {
+  const std::vector<std::string> words = name_words(name);
+  // The unit decides where it names one quantity; names say the rest.
+  static const std::vector<std::pair<Of, std::string>> kByUnit = {
+      {Of::kPressure, "pressure"},
+      {Of::kForce, "force"},
+      {Of::kFlow, "flow"},
+      {Of::kMass, "payload"},
+      {Of::kTemperature, "temperature"},
+      {Of::kSpeed, "speed"},
+      {Of::kAngularSpeed, "speed"},
+      {Of::kAngle, "position"},
+      {Of::kLength, "position or stroke"}};
+  std::string what;
+  for (const auto& [of, word] : kByUnit) {
+    if (unit.of == of) what = word;
+  }
+  for (std::size_t k = 0; what.empty() && k < kClassWords.size(); ++k) {
+    if (!found_in(kClassWords[k].clear, words).empty()) what = kClassWords[k].name;
+  }
+  if (what != "pressure") return what;
+  for (const WordClass& side : kSideWords) {
+    if (!found_in(side.clear, words).empty()) return fmt::format("{} ({})", what, side.name);
+  }
+  return what;
 }
 
 std::string meaning_words(const Meaning& m, const Machine& machine) {

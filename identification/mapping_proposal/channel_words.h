@@ -88,6 +88,9 @@ WordEvidence name_evidence(const std::string& name, const Meaning& meaning, cons
 WordEvidence unit_evidence(const ChannelUnit& unit, const Meaning& meaning, const Machine& machine,
                            const WordOptions& options = {});
 
+/// What name and unit of a channel say without a machine: "pressure (bore side)"; "" when they say nothing.
+std::string looks_like(const std::string& name, const ChannelUnit& unit);
+
 /// "bore-side pressure of cylinder boom"
 std::string meaning_words(const Meaning& meaning, const Machine& machine);
 

@@ -4,9 +4,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -64,6 +67,62 @@ TEST_F(LogVerb, DatabasesDecodeTheFramesOfATrace) {
   ASSERT_EQ(channels.size(), 1u);
   EXPECT_EQ(channels[0]["name"], "pressure");
   EXPECT_EQ(channels[0]["largest"], 1.5);
+}
+
+TEST_F(LogVerb, ProposesAMappingForAMachineAndWritesItOnlyWhenAsked) {
+  const std::string problems = std::string(SPARFLOW_SOURCE_DIR) + "/problems";
+  // the bundled log under names of another kind
+  std::ifstream in(problems + "/logs/loader_crane_train.csv");
+  std::string header, rest((std::istreambuf_iterator<char>(in)), {});
+  header = rest.substr(0, rest.find('\n'));
+  rest = rest.substr(rest.find('\n'));
+  const std::string other =
+      "Zeit [s],Winkel Hubarm [rad],Winkel Knickarm [rad],Weg Teleskop [m],Hebel Hubarm,Hebel "
+      "Knickarm,Hebel Teleskop,"
+      "Druck Kolben Hubarm [bar],Druck Stange Hubarm [bar],Druck Kolben Knickarm [bar],Druck "
+      "Stange Knickarm [bar],"
+      "Druck Kolben Teleskop [bar],Druck Stange Teleskop [bar],Pumpendruck [bar],Nutzlast "
+      "[kg],Temperatur Öl [°C]";
+  ASSERT_EQ(std::count(other.begin(), other.end(), ','),
+            std::count(header.begin(), header.end(), ','));
+  const std::string log = (folder / "de.csv").string(),
+                    mapping = (folder / "mapping.yaml").string();
+  std::ofstream(log) << other << rest;
+  const std::string machine = problems + "/machines/loader_crane.yaml";
+  ASSERT_EQ(run(log + " -m " + machine), 0) << read("err");
+  EXPECT_FALSE(fs::exists(mapping));
+  EXPECT_THAT(read("out"), HasSubstr("bore-side pressure of cylinder boom -> pA_boom_bar"));
+  ASSERT_EQ(run(log + " -m " + machine + " --write-mapping " + mapping + " --json " +
+                (folder / "log.json").string() + " --report " + (folder / "log.html").string()),
+            0)
+      << read("err");
+  EXPECT_THAT(read("mapping.yaml"), HasSubstr("pB_jib_bar: \"`Druck Stange Knickarm [bar]`\""));
+  const auto result = sparflow::test_support::parsed_json(read("log.json"));
+  EXPECT_GE(result["proposal"]["meanings"].size(), 14u);
+  EXPECT_THAT(read("log.html"), HasSubstr("Proposed mapping"));
+  // the mapping is what `--mapping` of the program reads
+  ASSERT_EQ(run(log + " --mapping " + mapping), 0) << read("err");
+  EXPECT_THAT(read("out"), HasSubstr("pA_extension_bar"));
+}
+
+TEST_F(LogVerb, AMappingWithoutAMachineIsWrongUse) {
+  const std::string log =
+      std::string(SPARFLOW_SOURCE_DIR) + "/problems/logs/loader_crane_train.csv";
+  EXPECT_EQ(run(log + " --write-mapping " + (folder / "m.yaml").string()), 2);
+  EXPECT_THAT(read("err"), HasSubstr("needs -m MACHINE"));
+  EXPECT_FALSE(fs::exists(folder / "m.yaml"));
+}
+
+TEST_F(LogVerb, WithoutAMachineDerivativesAreNamed) {
+  std::ofstream out(folder / "rates.csv");
+  out << "t_s,way [mm],CH2\n";
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 0.02 * i;
+    out << t << ',' << 100.0 * std::sin(0.5 * t) << ',' << 50.0 * std::cos(0.5 * t) << '\n';
+  }
+  out.close();
+  ASSERT_EQ(run((folder / "rates.csv").string() + " --propose"), 0) << read("err");
+  EXPECT_THAT(read("out"), HasSubstr("CH2 moves as the derivative of way [mm]"));
 }
 
 TEST_F(LogVerb, AFileWithoutAClockIsRefusedWithASentence) {
