@@ -367,6 +367,17 @@ bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
                    d.thresholds.structure_false_alarm;
 }
 
+void trace_sizes(const Diagnosis& d, const EffectAt& effect, const SizeByLogs& sizes, bool shared) {
+  if (!tracing()) return;
+  const auto in = [](const SizeInLogs& s) {
+    return fmt::format("{:.3g} +- {:.2g} in {} blocks", s.size, s.standard_error, s.blocks);
+  };
+  fmt::print(stderr, "  {}{}: size {}, in the references {}, variation {:.2g}, difference {:.3g}\n",
+             shared ? "change of " : "",
+             effect_key(effect.effect->info(), *d.evidence.series[0].machine, effect.at),
+             in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
+}
+
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
   const bool shared = is_shared(d.evidence, d.search.found[found]);
   if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
@@ -401,16 +412,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const auto certain = [&](double z) {
     return chance(z) < d.thresholds.difference_alone_false_alarm;
   };
-  if (tracing()) {
-    const auto in = [](const SizeInLogs& s) {
-      return fmt::format("{:.3g} +- {:.2g} in {} blocks", s.size, s.standard_error, s.blocks);
-    };
-    fmt::print(
-        stderr, "  {}{}: size {}, in the references {}, variation {:.2g}, difference {:.3g}\n",
-        shared ? "change of " : "",
-        effect_key(suspect.effect.effect->info(), *d.evidence.series[0].machine, suspect.effect.at),
-        in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
-  }
+  trace_sizes(d, suspect.effect, sizes, shared);
   const bool taken_over = d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws;
   if (shared)
     return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,

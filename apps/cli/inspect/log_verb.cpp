@@ -59,9 +59,8 @@ std::string channels_json(const TimedChannels& file, const std::vector<ChannelSu
 }
 
 int run(const LogArguments& a) {
-  std::vector<NamedFile> inputs = {{"FILE", a.log},
-                                   {"--mapping", a.reading.mapping_file},
-                                   {"--machine", a.proposal.machine}};
+  std::vector<NamedFile> inputs = {
+      {"FILE", a.log}, {"--mapping", a.reading.mapping_file}, {"--machine", a.proposal.machine}};
   inputs.reserve(inputs.size() + a.reading.dbc_files.size());
   for (const std::string& dbc : a.reading.dbc_files) inputs.push_back({"--dbc", dbc});
   std::vector<NamedFile> outputs = a.outputs.files();

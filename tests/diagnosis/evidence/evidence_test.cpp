@@ -414,5 +414,39 @@ TEST(Evidence, PositionsAloneGiveNoChannelAndNoCrash) {
   EXPECT_EQ(fit.total(), 0.0);
 }
 
+/// Behind a pump whose pressure swings nothing is settled, however long the levers have stood.
+TEST(Evidence, WhileAPumpsPressureMovesNothingIsSettled) {
+  const Machine machine = testing_support::drawn_machine("loader_crane");
+  const auto logs = testing_support::hidden_case(machine, {}, {5, 60.0});
+  EvidenceOptions options;
+  options.settles = true;
+  const CraneModel model = CraneModel::untrained(machine);
+  const auto settled_since = [&](const Log& log) {
+    const Evidence e = collect_evidence(model, {make_signals(machine, log)}, {}, nullptr, options);
+    return e.since_change.at(0);
+  };
+  const VectorXd still = settled_since(logs.train);
+  // in the middle of the longest time for which commands and pump stand
+  Eigen::Index last = 0;
+  still.unaryExpr([](double t) { return std::isfinite(t) ? t : 0.0; }).maxCoeff(&last);
+  ASSERT_GT(still[last], 1.5);
+  const double middle = logs.train.time[last] - 0.5 * still[last];
+  Log swinging = logs.train;
+  for (Channel& c : swinging.channels) {
+    if (c.role != Role::kPumpPressure) continue;
+    for (Eigen::Index k = 0; k < swinging.samples(); ++k) {
+      const double t = swinging.time[k] - middle;
+      if (std::abs(t) < 0.5) c.values[k] += 30e5 * std::sin(2.0 * std::numbers::pi * t);
+    }
+  }
+  const VectorXd since = settled_since(swinging);
+  Eigen::Index at = 0;
+  (swinging.time.array() - middle).abs().minCoeff(&at);
+  EXPECT_EQ(since[at], 0.0);
+  // half a window after the swing the clock runs again, as after a command
+  EXPECT_NEAR(since[last], 0.5 * still[last] - 0.5, 0.2);
+  EXPECT_GT(still[at], 0.5);
+}
+
 }  // namespace
 }  // namespace sparflow

@@ -94,6 +94,41 @@ TEST(ReferenceComparison, TwoEffectsOfAChannelThatActInBothLogsAreAlike) {
   EXPECT_EQ(in_references(d, 1, {}), InReferences::kAlike);
 }
 
+/// A lag whose time constant differs less between both logs than either tells it is no change, whatever the sizes of the one law in
+/// the other log say; a lag whose intervals exclude each other is one.
+TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  const CraneModel model = CraneModel::untrained(loader());
+  const Effect* lag = find_effect("pump_lag");
+  for (const double half : {0.1, 0.01}) {  // [s] half width of the intervals of the time constants
+    EvidenceOptions options;
+    options.shared = {{lag, 0, {1.0, 0.30, 0.0}, {0.9, 0.30 - half, 0.0}, {1.1, 0.30 + half, 0.0}}};
+    Diagnosis d;
+    d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
+                                  {make_signals(loader(), logs.reference)}, nullptr, options);
+    const auto at = d.evidence.find(EvidenceKind::kPump, 0) - d.evidence.channels.data();
+    EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+    FoundEffect found;
+    found.design = make_design(d.evidence, {lag, 0}, {0.36, 0.0});
+    found.values = {1.0, 0.36, 0.0};
+    found.lower95 = {0.9, 0.36 - half, 0.0};
+    found.upper95 = {1.1, 0.36 + half, 0.0};
+    std::mt19937_64 random(2);
+    NoiseModel noise;
+    noise.variance = 1e5 * 1e5;  // [Pa^2]
+    channel.y = testing_support::draw(noise, channel.blocks, random) +
+                found.design.columns[static_cast<std::size_t>(at)].col(0);
+    d.search.found.push_back(std::move(found));
+    FitControl control;
+    control.keep_residuals = true;
+    d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
+    if (half > 0.05)
+      EXPECT_EQ(in_references(d, 0, {}), InReferences::kAlike);
+    else
+      EXPECT_NE(in_references(d, 0, {}), InReferences::kAlike);
+  }
+}
+
 TEST(ReferenceComparison, WhatBothLogsShowIsNoChange) {
   const Diagnosis d = compared().with({{"coulomb_friction", "boom", 1.0, 0}});
   EXPECT_EQ(d.verdict, Verdict::kNone) << d.table();
