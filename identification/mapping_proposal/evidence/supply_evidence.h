@@ -29,7 +29,7 @@ struct PumpFit {
 PumpFit fit_pump(const ProposalData& data, const Eigen::VectorXd& pressure, int pump,
                  const Eigen::VectorXd& working);
 
-/// A low pressure that rises with the flow of the return lines. @param speeds of all moving cylinders
+/// A low pressure that rises with the flow of the return lines. @param cylinders their speeds give that flow
 double return_log_odds(const ProposalData& data, const Eigen::VectorXd& pressure,
                        const std::vector<ProposedCylinder>& cylinders);
 
