@@ -25,22 +25,22 @@ struct ChannelEvidenceOptions {
   /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight command = {5.0, 0.4, 1.0};
   /// A measured speed is the derivative itself; noise of both is the misfit.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight speed = {6.0, 0.15, 2.0};
   /// Flow = area times rod speed, but for leaks and compression of the oil.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight flow = {6.0, 0.15, 2.0};
   /// Chamber forces against the static force, as a share of half the largest force of the cylinder.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight force = {7.0, 0.12, 1.5};
   /// One chamber alone: the other's pressure is not known.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight single_chamber = {2.5, 0.25, 2.0};
   /// Pump pressure above the largest working pressure, as a share of a third of the pump's largest pressure.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight pump = {4.0, 0.10, 1.0};
   /// Payload: force that the masses of the machine leave.
-  /// @threshold [1] 0.1..10; tuned: as above
+  /// @threshold [1] 0.1..10; tuned: seeds 1..4 of docs/mapping_proposal.md
   FitWeight payload = {4.0, 0.30, 0.5};
   /// Delay of the rod behind its command that is tried at most.
   /// @threshold [instants] 0..20; chosen: half a second; longer delays are no valve's
