@@ -105,8 +105,11 @@ VectorXd since_change(const MachineSeries& series, double least) {
 /// nothing is settled, however long the commands have stood.
 void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries& series,
                               double fastest, VectorXd& since) {
-  const Index half =
-      std::max<Index>(1, static_cast<Index>(std::lround(0.5 * signals.window / signals.step)));
+  /// Time over which a rate is taken.
+  /// @threshold [s] 0.05..1; chosen: noise of 1 bar then stands for 7 bar/s, a seventh of the limit, whatever the filter
+  constexpr double kSpan = 0.2;
+  const auto half = std::max<Index>(
+      1, static_cast<Index>(std::lround(0.5 * std::max(signals.window, kSpan) / signals.step)));
   for (const PumpSignals& pump : signals.pumps) {
     const VectorXd& p = pump.pressure_smooth;
     if (p.size() == 0) continue;

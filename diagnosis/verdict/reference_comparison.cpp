@@ -190,7 +190,10 @@ bool within_intervals_of_references(const Evidence& evidence, const FoundEffect&
   return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
     if (!same_place(e, f.design.effect) || e.lower95.size() != e.values.size()) return false;
     for (std::size_t p = 0; p < parameters.size(); ++p) {
-      if (parameters[p].choice) continue;
+      if (parameters[p].choice) {  // another variant of the law
+        if (f.values[p] != e.values[p]) return false;
+        continue;
+      }
       const double half =
           std::hypot(0.5 * (e.upper95[p] - e.lower95[p]), 0.5 * (f.upper95[p] - f.lower95[p]));
       if (!(std::abs(f.values[p] - e.values[p]) <= half)) return false;
@@ -434,7 +437,9 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
     return {InReferences::kVaries, Proof::kClearExcess};
   if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
-    return {InReferences::kNot, Proof::kExcess};
+    return {InReferences::kNot, here.blocks > 0 && certain(here.size / here.standard_error)
+                                    ? Proof::kNone
+                                    : Proof::kExcess};
   const double form = form_share(*suspect.effect.effect, options.regression);
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
@@ -466,8 +471,10 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
                           *d.evidence.series[0].machine, d.search.found[found].design.effect.at),
                change ? "is" : "is not", change ? "exceeds" : "does not exceed");
   if (change) return by;
-  return is_shared(d.evidence, d.search.found[found]) ? InReferences::kVaries
-                                                      : InReferences::kAlike;
+  // Only what the references show as well is named as lacking in both.
+  return is_shared(d.evidence, d.search.found[found]) || by == InReferences::kNot
+             ? InReferences::kVaries
+             : InReferences::kAlike;
 }
 
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
@@ -506,7 +513,12 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
         std::erase(now.candidates, f.design.effect);
         continue;
       }
+      // Another value of what the references have joins it once and is no candidate afterwards.
+      const bool had_before =
+          std::any_of(now.evidence.shared.begin(), now.evidence.shared.end(),
+                      [&](const AppliedEffect& e) { return same_place(e, f.design.effect); });
       add(applied_of(f));
+      if (had_before) std::erase(now.candidates, f.design.effect);
       const auto described =
           std::find_if(d.effects.begin(), d.effects.end(),
                        [&](const DiagnosedEffect& e) { return e.effect == f.design.effect; });

@@ -12,10 +12,10 @@ namespace sparflow {
 /// Confidence of a meaning by its margin: the loss of the best other assignment of all channels [nat].
 struct ConfidenceOptions {
   /// Log-odds at margin zero, of a meaning that the names say nothing about.
-  /// @threshold [nat] -5..5; chosen: proposals of 0.9 and more are right in 99.9 % on seeds 301..306 (docs/mapping_proposal.md)
+  /// @threshold [nat] -5..5; chosen: real logs hold more than the simulator, so that the confidence stays below the share that is right
   double at_zero = -1.0;
   /// Growth of the log-odds with the margin.
-  /// @threshold [1] 0.1..3; chosen: as many of 0.5 to 0.7 are right as it says, or more, on the same seeds
+  /// @threshold [1] 0.1..3; chosen: ten nats make a meaning sure, three do not
   double by_margin = 0.9;
   /// Below it a meaning stands in the written mapping as a comment only.
   /// @threshold [1] 0.5..0.99; chosen: a mapping with twenty columns should rarely hold a wrong one

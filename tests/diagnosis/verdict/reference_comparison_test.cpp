@@ -17,6 +17,7 @@ namespace sparflow {
 namespace {
 
 using simulator::HiddenEffect;
+using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -100,7 +101,8 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
   const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
   const CraneModel model = CraneModel::untrained(loader());
   const Effect* lag = find_effect("pump_lag");
-  for (const double half : {0.1, 0.01}) {  // [s] half width of the intervals of the time constants
+  // [s] half width of the intervals of the time constants, and the variant of the law in the suspect log
+  for (const auto& [half, form] : {std::pair{0.1, 0.0}, {0.01, 0.0}, {0.1, 1.0}}) {
     EvidenceOptions options;
     options.shared = {{lag, 0, {1.0, 0.30, 0.0}, {0.9, 0.30 - half, 0.0}, {1.1, 0.30 + half, 0.0}}};
     Diagnosis d;
@@ -109,10 +111,10 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
     const auto at = d.evidence.find(EvidenceKind::kPump, 0) - d.evidence.channels.data();
     EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
     FoundEffect found;
-    found.design = make_design(d.evidence, {lag, 0}, {0.36, 0.0});
-    found.values = {1.0, 0.36, 0.0};
-    found.lower95 = {0.9, 0.36 - half, 0.0};
-    found.upper95 = {1.1, 0.36 + half, 0.0};
+    found.design = make_design(d.evidence, {lag, 0}, {0.36, form});
+    found.values = {1.0, 0.36, form};
+    found.lower95 = {0.9, 0.36 - half, form};
+    found.upper95 = {1.1, 0.36 + half, form};
     std::mt19937_64 random(2);
     NoiseModel noise;
     noise.variance = 1e5 * 1e5;  // [Pa^2]
@@ -122,11 +124,45 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
     FitControl control;
     control.keep_residuals = true;
     d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
-    if (half > 0.05)
+    if (half > 0.05 && form == 0.0)
       EXPECT_EQ(in_references(d, 0, {}), InReferences::kAlike);
     else
-      EXPECT_NE(in_references(d, 0, {}), InReferences::kAlike);
+      EXPECT_THAT(in_references(d, 0, {}), AnyOf(InReferences::kNot, InReferences::kOther));
   }
+}
+
+/// A friction of the boom in white noise, of one size in the suspect and of another in the reference log.
+InReferences compared_sizes(double suspect, double reference) {
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  Diagnosis d;
+  d.evidence =
+      collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
+                       {make_signals(loader(), logs.reference)});
+  const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
+  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+  std::mt19937_64 random(2);
+  NoiseModel noise;
+  noise.variance = 2000.0 * 2000.0;  // [N^2]
+  const EffectAt friction{find_effect("coulomb_friction"), 1};
+  FoundEffect found;
+  found.design = make_design(d.evidence, friction, {});
+  channel.y =
+      testing_support::draw(noise, channel.blocks, random) +
+      suspect * found.design.columns[static_cast<std::size_t>(at)].col(0) +
+      reference * d.evidence.columns(friction, {}, channel, {}, ActingLogs::kReferences).col(0);
+  d.search.found.push_back(std::move(found));
+  FitControl control;
+  control.keep_residuals = true;
+  d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
+  return in_references(d, 0, {});
+}
+
+/// The residual of 2 kN is no larger with the friction left in it. In this draw the sizes then differ by 3.0, 3.9 and 7.5 standard
+/// errors: chances of 0.003, 0.0001 and less, of which the first lies between both levels.
+TEST(ReferenceComparison, ADifferenceIsAChangeByItsSizeAloneOnlyIfItIsCertain) {
+  EXPECT_EQ(compared_sizes(1000.0, 1100.0), InReferences::kAlike);
+  EXPECT_EQ(compared_sizes(1000.0, 950.0), InReferences::kOther);
+  EXPECT_EQ(compared_sizes(1000.0, 350.0), InReferences::kNot);
 }
 
 TEST(ReferenceComparison, WhatBothLogsShowIsNoChange) {
