@@ -332,6 +332,7 @@ Log clean_log(const RawTable& table, const std::string& path, const std::string&
               const Machine& machine, const LogOptions& options) {
   Log log;
   log.path = path;
+  log.machine_parts = parts_of(machine);
   log.file = path.substr(path.find_last_of('/') + 1);
   log.sha256 = sha256;
   log.dialect = table.dialect;
@@ -385,6 +386,16 @@ RawTable recorded_table(const std::string& path, std::string_view bytes, const L
 }
 
 }  // namespace
+
+std::string parts_of(const Machine& machine) {
+  const auto listed = [](const char* title, const auto& parts) {
+    std::string names;
+    for (const auto& part : parts) names += (names.empty() ? "" : ", ") + part.name;
+    return fmt::format("{} {}", title, names.empty() ? "none" : names);
+  };
+  return fmt::format("{}; {}; {}", listed("joints", machine.joints),
+                     listed("cylinders", machine.cylinders), listed("pumps", machine.pumps));
+}
 
 const Channel* Log::find(Role role, int index) const {
   const auto it = std::find_if(channels.begin(), channels.end(), [&](const Channel& c) {

@@ -62,6 +62,7 @@ struct Log {
   std::string file;               ///< file name without folder
   std::string sha256;             ///< of the file's bytes
   std::string dialect;            ///< separator, decimal mark and units row, in words
+  std::string machine_parts;      ///< parts_of the machine whose channels these are; "" = not known
   Eigen::VectorXd time;           ///< [s], [samples], strictly increasing
   double step = 0.0;              ///< [s] median sampling interval
   std::vector<Channel> channels;  ///< roles first, candidates last, each in the file's order
@@ -86,6 +87,9 @@ struct Log {
   Log& operator=(Log&&) noexcept;
   ~Log();
 };
+
+/// The names of a machine's joints, cylinders and pumps, in their order: what the indices of a log's channels refer to.
+std::string parts_of(const Machine& machine);
 
 struct LogOptions {
   std::string mapping_file;  ///< "" = the columns have the program's names

@@ -326,6 +326,13 @@ MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signa
 }
 
 MachineSignals make_signals(const Machine& machine, const Log& log, const SignalOptions& options) {
+  if (const std::string parts = parts_of(machine);
+      !log.machine_parts.empty() && log.machine_parts != parts)
+    throw InputError({log.path, 0, 0}, "",
+                     fmt::format("this log was read for another machine: its channels belong to "
+                                 "{}, and the machine here has {}; read "
+                                 "the log again with this machine",
+                                 log.machine_parts, parts));
   MachineSignals out;
   out.file = log.file;
   out.sha256 = log.sha256;
