@@ -61,12 +61,37 @@ std::vector<int> best_assignment(const Eigen::MatrixXd& score, double* total) {
   return taken;
 }
 
+PairSet greedy_pairs(const std::vector<std::vector<ColumnPair>>& groups) {
+  PairSet set;
+  set.pairs.resize(groups.size());
+  std::set<int> used;
+  std::vector<bool> done(groups.size(), false);
+  for (std::size_t round = 0; round < groups.size(); ++round) {
+    std::size_t at = groups.size();
+    ColumnPair best;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (done[g]) continue;
+      for (const ColumnPair& p : groups[g]) {
+        if (used.count(p.first) > 0 || used.count(p.second) > 0) continue;
+        if (at == groups.size() || p.score > best.score) at = g, best = p;
+      }
+    }
+    if (at == groups.size()) break;
+    done[at] = true;
+    set.pairs[at] = best;
+    set.total += best.score;
+    if (best.first >= 0) used.insert(best.first);
+    if (best.second >= 0) used.insert(best.second);
+  }
+  return set;
+}
+
 namespace {
 
 class PairSearch {
  public:
-  PairSearch(std::vector<std::vector<ColumnPair>> groups, std::size_t count)
-      : groups_(std::move(groups)), count_(count), bound_(groups_.size() + 1, 0.0) {
+  PairSearch(std::vector<std::vector<ColumnPair>> groups, std::size_t count, std::int64_t steps)
+      : groups_(std::move(groups)), count_(count), steps_(steps), bound_(groups_.size() + 1, 0.0) {
     for (auto& group : groups_) {
       std::stable_sort(group.begin(), group.end(),
                        [](const ColumnPair& a, const ColumnPair& b) { return a.score > b.score; });
@@ -78,6 +103,11 @@ class PairSearch {
 
   std::vector<PairSet> run() {
     descend(0, 0.0);
+    if (steps_ < 0) {
+      // Of a search that was ended nothing says that its sets are good; the greedy one is a floor.
+      PairSet greedy = greedy_pairs(groups_);
+      if (best_.empty() || greedy.total > best_.front().total) keep(std::move(greedy));
+    }
     return std::move(best_);
   }
 
@@ -86,17 +116,21 @@ class PairSearch {
     return best_.size() < count_ ? -std::numeric_limits<double>::infinity() : best_.back().total;
   }
 
+  void keep(PairSet set) {
+    const auto place =
+        std::upper_bound(best_.begin(), best_.end(), set,
+                         [](const PairSet& a, const PairSet& b) { return a.total > b.total; });
+    best_.insert(place, std::move(set));
+    if (best_.size() > count_) best_.pop_back();
+  }
+
   void descend(std::size_t g, double sum) {
     if (g == groups_.size()) {
-      PairSet set{chosen_, sum};
-      const auto place =
-          std::upper_bound(best_.begin(), best_.end(), set,
-                           [](const PairSet& a, const PairSet& b) { return a.total > b.total; });
-      best_.insert(place, std::move(set));
-      if (best_.size() > count_) best_.pop_back();
+      keep({chosen_, sum});
       return;
     }
     for (const ColumnPair& pair : groups_[g]) {
+      if (--steps_ < 0) return;
       if (sum + pair.score + bound_[g + 1] <= least()) break;
       if ((pair.first >= 0 && used_.count(pair.first) > 0) ||
           (pair.second >= 0 && used_.count(pair.second) > 0)) {
@@ -114,6 +148,7 @@ class PairSearch {
 
   std::vector<std::vector<ColumnPair>> groups_;
   std::size_t count_;
+  std::int64_t steps_;         ///< that are left; negative: the search was ended
   std::vector<double> bound_;  ///< best sum of the groups from here on, columns shared or not
   std::vector<ColumnPair> chosen_;
   std::set<int> used_;
@@ -122,10 +157,10 @@ class PairSearch {
 
 }  // namespace
 
-std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups,
-                                    std::size_t count) {
+std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups, std::size_t count,
+                                    const PairSearchOptions& options) {
   if (count == 0) return {};
-  return PairSearch(std::move(groups), count).run();
+  return PairSearch(std::move(groups), count, options.steps).run();
 }
 
 }  // namespace sparflow

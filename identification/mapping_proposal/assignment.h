@@ -1,6 +1,7 @@
 #pragma once
 /// Assignment problems: which channel takes which meaning so that the sum of scores is largest.
 #include <Eigen/Dense>
+#include <cstdint>
 #include <vector>
 
 namespace sparflow {
@@ -24,9 +25,19 @@ struct PairSet {
   double total = 0.0;
 };
 
+/// The best pair of each group in turn, the clearest group first.
+PairSet greedy_pairs(const std::vector<std::vector<ColumnPair>>& groups);
+
+struct PairSearchOptions {
+  /// Pairs that are tried before the search ends with the best sets so far, or the greedy one.
+  /// @threshold [1] 1e3..1e8; numerical: tens of milliseconds; the search grows exponentially where many channels are alike
+  std::int64_t steps = 50'000;
+};
+
 /// The best sets of pairs, one pair from each group, in which no column occurs twice; by branch and bound.
 /// @param groups candidates of each group, each of which should hold the empty pair
 /// @param count at most so many sets, best first
-std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups, std::size_t count);
+std::vector<PairSet> best_pair_sets(std::vector<std::vector<ColumnPair>> groups, std::size_t count,
+                                    const PairSearchOptions& options = {});
 
 }  // namespace sparflow

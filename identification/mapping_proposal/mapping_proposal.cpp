@@ -162,11 +162,13 @@ class ProposalRows {
           (set.values.col(best_.pairs[c][0]) * machine_.cylinders[c].area_piston())
               .cwiseAbs()
               .maxCoeff();
-      row.reasons.push_back(
-          fmt::format("{} follows the static force of {} within {:.2g} kN rms (largest chamber "
-                      "force {:.3g} kN)",
-                      best_.pairs[c][1] >= 0 ? "A pA - B pB" : "A pA", machine_.cylinders[c].name,
-                      1e-3 * fit.rms, 1e-3 * largest));
+      if (fit.log_odds > 0.0) {
+        row.reasons.push_back(
+            fmt::format("{} follows the static force of {} within {:.2g} kN rms (largest chamber "
+                        "force {:.3g} kN)",
+                        best_.pairs[c][1] >= 0 ? "A pA - B pB" : "A pA", machine_.cylinders[c].name,
+                        1e-3 * fit.rms, 1e-3 * largest));
+      }
     }
     judge(&row, {side == 0 ? Ban::Kind::kPressureA : Ban::Kind::kPressureB, cylinder, row.channel},
           [&](const Assignment& a) {
@@ -196,11 +198,16 @@ class ProposalRows {
       const OilFit fit = fit_oil(data_, row.channel);
       row.factor = fit.unit.factor;
       row.expression = column_times(row.channel_name, fit.unit.factor, fit.unit.offset);
-      row.reasons.push_back("it is slow and lies among temperatures of oil");
+      if (fit.slow && fit.within)
+        row.reasons.push_back("it is slow and lies among temperatures of oil");
     } else if (meaning.role == Role::kForce) {
       row.factor = data_.units[static_cast<std::size_t>(row.channel)].factor;
       row.expression = column_times(row.channel_name, row.factor, 0.0);
-      row.reasons.push_back("follows static force, friction and acceleration");
+      const double left = force_misfit(data_, row.channel, meaning.index, parts_, forces_);
+      if (data_.options.force.log_odds(left) > 0.0) {
+        row.reasons.push_back(fmt::format(
+            "follows static force, friction and acceleration but for {:.0f} %", 100.0 * left));
+      }
     } else {
       explain_copy(&row);
     }

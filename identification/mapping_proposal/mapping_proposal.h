@@ -1,9 +1,11 @@
 #pragma once
 /// Proposes which channel of a log is which stroke, pressure, command or pump of a machine, by names, units and physics, with a
 /// confidence and what speaks for it. docs/mapping_proposal.md says how, and how often it is right. Nothing uses it unasked.
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "identification/mapping_proposal/assignment.h"
 #include "identification/mapping_proposal/evidence/force_evidence.h"
 #include "identification/mapping_proposal/evidence/position_evidence.h"
 
@@ -43,6 +45,9 @@ struct ProposalOptions {
   /// Joints times sets that the search can afford.
   /// @threshold [1] 100..1e6; numerical: the static force of a chain grows with the square of its joints
   int affordable_sets = 1200;
+  PairSearchOptions pair_search;
+  /// Called several times a second; may throw Interruption to end the search. May be empty.
+  std::function<void()> progress;
 };
 
 /// One meaning of the machine's log, and the channel that fits best.

@@ -18,9 +18,6 @@ constexpr std::size_t kPairs = 40;
 /// Sets of pairs that are judged with pump, flows and commands.
 /// @threshold [1] 1..10; chosen: they differ in the cylinder that is least clear
 constexpr std::size_t kPairSets = 2;
-/// Rod speed at which the dry friction of a drive counts fully.
-/// @threshold [m/s] 1e-3..0.02; chosen: twice the noise of speeds
-constexpr double kSlipSpeed = 4e-3;
 /// Joints or cylinders up to which all combinations are searched; of larger machines each part is judged for itself.
 /// @threshold [1] 2..12; numerical: the search grows exponentially where many channels are alike
 constexpr int kSearchedParts = 8;
@@ -54,31 +51,9 @@ std::vector<Meaning> rest_meanings(const Machine& machine) {
   return rest;
 }
 
-/// The best pair of each cylinder in turn, the clearest cylinder first.
-PairSet greedy_pairs(const std::vector<std::vector<ColumnPair>>& groups) {
-  PairSet set;
-  set.pairs.resize(groups.size());
-  std::set<int> used;
-  std::vector<bool> done(groups.size(), false);
-  for (std::size_t round = 0; round < groups.size(); ++round) {
-    std::size_t at = groups.size();
-    ColumnPair best;
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (done[g]) continue;
-      for (const ColumnPair& p : groups[g]) {
-        if (used.count(p.first) > 0 || used.count(p.second) > 0) continue;
-        if (at == groups.size() || p.score > best.score) at = g, best = p;
-      }
-    }
-    if (at == groups.size()) break;
-    done[at] = true;
-    set.pairs[at] = best;
-    set.total += best.score;
-    if (best.first >= 0) used.insert(best.first);
-    if (best.second >= 0) used.insert(best.second);
-  }
-  return set;
-}
+/// Score of what must not be chosen, whatever else speaks for it.
+// no threshold: below any sum of evidence
+constexpr double kNever = -1e6;
 
 /// A joint's channel, a reading of it in `second` so that each reading is a column of its own.
 constexpr int kReadings = 1000;
@@ -120,7 +95,6 @@ ProposalSearch::ProposalSearch(const ProposalData& data, PressureSet pressures,
   for (const std::vector<int>& set :
        position_sets({}, std::min(options_.position_sets, affordable))) {
     JudgedSet judged = judge(set);
-    judged_.emplace_back(judged.best.total, set);
     if (judged.best.total > best_.total) best_ = judged.best;
     const auto place = std::upper_bound(
         kept_.begin(), kept_.end(), judged,
@@ -152,7 +126,8 @@ std::vector<std::vector<int>> ProposalSearch::position_sets(const Ban& ban, int 
   }
   std::vector<PairSet> sets;
   if (joints <= static_cast<std::size_t>(kSearchedParts)) {
-    sets = best_pair_sets(groups, static_cast<std::size_t>(std::max(1, count)));
+    sets =
+        best_pair_sets(groups, static_cast<std::size_t>(std::max(1, count)), options_.pair_search);
   } else {
     sets.push_back(greedy_pairs(groups));
   }
@@ -216,7 +191,7 @@ std::vector<ColumnPair> ProposalSearch::pair_candidates(const JudgedSet& set, in
       const int p = set.positions[j];
       if (p >= 0 && candidates_[j][static_cast<std::size_t>(p)].reading.channel ==
                         pressures_.channels[static_cast<std::size_t>(i)])
-        a[i] = b[i] = -1e6;
+        a[i] = b[i] = kNever;
     }
   }
   const ChannelEvidenceOptions& o = options_.evidence;
@@ -242,7 +217,6 @@ std::vector<ColumnPair> ProposalSearch::pair_candidates(const JudgedSet& set, in
   std::erase_if(pairs, [](const ColumnPair& p) { return p.score < 0.0; });
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const ColumnPair& x, const ColumnPair& y) { return x.score > y.score; });
-  if (pairs.size() > kPairs) pairs.resize(kPairs);
   if (std::none_of(pairs.begin(), pairs.end(),
                    [](const ColumnPair& p) { return p.first < 0 && p.second < 0; }))
     pairs.push_back({-1, -1, 0.0});
@@ -267,17 +241,33 @@ ProposalSearch::JudgedSet ProposalSearch::judge(const std::vector<int>& position
   return set;
 }
 
-Assignment ProposalSearch::solve(const JudgedSet& set, const Ban& ban) {
-  std::vector<std::vector<ColumnPair>> groups = set.pairs;
-  if (ban.kind == Ban::Kind::kPressureA || ban.kind == Ban::Kind::kPressureB) {
-    std::erase_if(groups[static_cast<std::size_t>(ban.index)], [&](const ColumnPair& p) {
+std::vector<std::vector<ColumnPair>> ProposalSearch::allowed_pairs(const JudgedSet& set,
+                                                                   const Ban& ban) const {
+  const bool of_pressure = ban.kind == Ban::Kind::kPressureA || ban.kind == Ban::Kind::kPressureB;
+  std::vector<std::vector<ColumnPair>> groups(set.pairs.size());
+  for (std::size_t c = 0; c < groups.size(); ++c) {
+    const bool banned = of_pressure && ban.index == static_cast<int>(c);
+    groups[c].reserve(kPairs + 1);
+    for (const ColumnPair& p : set.pairs[c]) {
+      const bool empty = p.first < 0 && p.second < 0;
+      if (groups[c].size() >= kPairs && !empty) continue;
       const int column = ban.kind == Ban::Kind::kPressureA ? p.first : p.second;
-      return column >= 0 && pressures_.channels[static_cast<std::size_t>(column)] == ban.channel;
-    });
+      if (banned && column >= 0 &&
+          pressures_.channels[static_cast<std::size_t>(column)] == ban.channel)
+        continue;
+      groups[c].push_back(p);
+    }
   }
-  const std::vector<PairSet> pair_sets = groups.size() <= static_cast<std::size_t>(kSearchedParts)
-                                             ? best_pair_sets(groups, kPairSets)
-                                             : std::vector<PairSet>{greedy_pairs(groups)};
+  return groups;
+}
+
+Assignment ProposalSearch::solve(JudgedSet& set, const Ban& ban) {
+  if (options_.progress) options_.progress();
+  const std::vector<std::vector<ColumnPair>> groups = allowed_pairs(set, ban);
+  const std::vector<PairSet> pair_sets =
+      groups.size() <= static_cast<std::size_t>(kSearchedParts)
+          ? best_pair_sets(groups, kPairSets, options_.pair_search)
+          : std::vector<PairSet>{greedy_pairs(groups)};
   Assignment best;
   for (const PairSet& pairs : pair_sets) {
     Assignment a;
@@ -315,7 +305,7 @@ Assignment ProposalSearch::solve(const JudgedSet& set, const Ban& ban) {
   return best;
 }
 
-MatrixXd ProposalSearch::rest_scores(const JudgedSet& set, const Assignment& a,
+MatrixXd ProposalSearch::rest_scores(JudgedSet& set, const Assignment& a,
                                      const std::vector<int>& free) {
   MatrixXd score(static_cast<Eigen::Index>(rest_.size()), static_cast<Eigen::Index>(free.size()));
   const std::vector<ProposedCylinder> parts = cylinders(a);
@@ -350,7 +340,7 @@ MatrixXd ProposalSearch::rest_scores(const JudgedSet& set, const Assignment& a,
 double ProposalSearch::supply_score(const Meaning& meaning, int channel, const VectorXd& working,
                                     const std::vector<ProposedCylinder>& parts) {
   const auto place = std::find(pressures_.channels.begin(), pressures_.channels.end(), channel);
-  if (place == pressures_.channels.end()) return -options_.pressures.outside;
+  if (place == pressures_.channels.end()) return kNever;  // it has no reading as a pressure
   const auto k = place - pressures_.channels.begin();
   const VectorXd pressure = pressures_.values.col(k);
   const double range = pressures_.range_score[static_cast<std::size_t>(k)];
@@ -359,19 +349,14 @@ double ProposalSearch::supply_score(const Meaning& meaning, int channel, const V
   return range + fit_pump(data_, pressure, meaning.index, working).log_odds;
 }
 
-double ProposalSearch::force_score(const JudgedSet& set, const std::vector<ProposedCylinder>& parts,
+double ProposalSearch::force_score(JudgedSet& set, const std::vector<ProposedCylinder>& parts,
                                    int cylinder, int channel) {
-  const FitWeight& weight = options_.evidence.force;
-  const VectorXd* speed = parts[static_cast<std::size_t>(cylinder)].speed;
-  const VectorXd y = data_.samples.values.col(channel);
-  if (speed == nullptr || !(y.squaredNorm() > 0.0)) return -weight.price;
-  MatrixXd z(y.size(), 4);
-  z.col(0) = set.forces.empty.col(cylinder);
-  z.col(1) = speed->unaryExpr([](double v) { return std::tanh(v / kSlipSpeed); });
-  z.col(2) = *speed;
-  z.col(3) = rate_of_change(data_.samples, *speed);
-  const VectorXd left = y - z * z.completeOrthogonalDecomposition().solve(y);
-  return weight.log_odds(left.norm() / y.norm());
+  const auto [score, is_new] = set.force_scores.try_emplace({cylinder, channel}, 0.0);
+  if (is_new) {
+    score->second =
+        options_.evidence.force.log_odds(force_misfit(data_, channel, cylinder, parts, set.forces));
+  }
+  return score->second;
 }
 
 double ProposalSearch::motion_score(const Assignment& a, const Meaning& meaning, int channel) {
@@ -441,7 +426,7 @@ double ProposalSearch::margin(const Ban& ban, Assignment* other) {
         offer(judge(positions).best);
     }
   } else {
-    for (const JudgedSet& set : kept_) {
+    for (JudgedSet& set : kept_) {
       if (set.best.total > next.total) offer(solve(set, ban));
     }
   }

@@ -53,19 +53,23 @@ class ProposalSearch {
     std::vector<int> positions;
     double position_score = 0.0;
     StaticForces forces;
-    std::vector<std::vector<ColumnPair>> pairs;  ///< candidates, by cylinder
+    std::vector<std::vector<ColumnPair>>
+        pairs;  ///< all that are worth more than nothing, by cylinder, best first
+    std::map<std::array<int, 2>, double> force_scores;  ///< by cylinder and channel
     Assignment best;
   };
   std::vector<std::vector<int>> position_sets(const Ban& ban, int count) const;
   JudgedSet judge(const std::vector<int>& positions);
   std::vector<ColumnPair> pair_candidates(const JudgedSet& set, int cylinder);
-  Assignment solve(const JudgedSet& set, const Ban& ban);
+  /// The best candidates of each cylinder without those that are banned.
+  std::vector<std::vector<ColumnPair>> allowed_pairs(const JudgedSet& set, const Ban& ban) const;
+  /// @param set its cache of force scores grows
+  Assignment solve(JudgedSet& set, const Ban& ban);
   /// [rest x free] log-odds of each meaning beside positions and chamber pressures for each channel that is left.
-  Eigen::MatrixXd rest_scores(const JudgedSet& set, const Assignment& a,
-                              const std::vector<int>& free);
+  Eigen::MatrixXd rest_scores(JudgedSet& set, const Assignment& a, const std::vector<int>& free);
   double supply_score(const Meaning& meaning, int channel, const Eigen::VectorXd& working,
                       const std::vector<ProposedCylinder>& parts);
-  double force_score(const JudgedSet& set, const std::vector<ProposedCylinder>& parts, int cylinder,
+  double force_score(JudgedSet& set, const std::vector<ProposedCylinder>& parts, int cylinder,
                      int channel);
   double motion_score(const Assignment& a, const Meaning& meaning, int channel);
 
@@ -80,7 +84,6 @@ class ProposalSearch {
   std::map<std::array<int, 3>, CommandFit> commands_;
   std::map<std::array<int, 5>, double> motions_;
   std::vector<JudgedSet> kept_;
-  std::vector<std::pair<double, std::vector<int>>> judged_;
   Assignment best_;
 };
 

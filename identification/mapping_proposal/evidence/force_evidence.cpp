@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identification/log/log_columns.h"
 #include "models/machine/static_force.h"
 #include "models/math/robust.h"
 
@@ -42,6 +43,14 @@ bool may_be_pressure(const ProposalData& data, int channel) {
   return of == Of::kPressure || (!s.constant && s.high > 0.0 && s.low > -0.1 * s.high);
 }
 
+/// Whether a channel bears the name that the program itself uses for a pressure of this machine.
+bool has_own_name(const ProposalData& data, int channel) {
+  const ColumnMeaning own = column_meaning(data.name(channel), "", *data.machine);
+  if (own.is_time || !own.error.empty()) return false;
+  return own.role == Role::kPressureA || own.role == Role::kPressureB ||
+         own.role == Role::kPumpPressure || own.role == Role::kReturnPressure;
+}
+
 PressureSet pressure_set(const ProposalData& data, const std::vector<int>& channels,
                          const ChannelUnit& open, const PressureOptions& o) {
   PressureSet set;
@@ -51,6 +60,7 @@ PressureSet pressure_set(const ProposalData& data, const std::vector<int>& chann
     int channel;
     ChannelUnit unit;
     double range, best;
+    bool own_name;
   };
   std::vector<Ranked> all;
   all.reserve(channels.size());
@@ -65,12 +75,16 @@ PressureSet pressure_set(const ProposalData& data, const std::vector<int>& chann
       best = std::max({best, data.said(m, {Role::kPressureA, c}, nullptr),
                        data.said(m, {Role::kPressureB, c}, nullptr)});
     }
-    if (range + best > -o.outside) all.push_back({m, unit, range, range + best});
+    if (range + best > -o.outside)
+      all.push_back({m, unit, range, range + best, has_own_name(data, m)});
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Ranked& a, const Ranked& b) { return a.best > b.best; });
-  if (all.size() > static_cast<std::size_t>(o.channels))
-    all.resize(static_cast<std::size_t>(o.channels));
+  std::stable_sort(all.begin(), all.end(), [](const Ranked& a, const Ranked& b) {
+    return a.own_name != b.own_name ? a.own_name : a.best > b.best;
+  });
+  // A log in the program's own names keeps all its pressures, however many cylinders the machine has.
+  const auto own = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(), [](const Ranked& r) { return r.own_name; }));
+  all.resize(std::min(all.size(), std::max(own, static_cast<std::size_t>(o.channels))));
   const auto n = static_cast<Eigen::Index>(all.size());
   set.values.resize(data.samples.instants(), n);
   set.said_a.resize(n, cylinders);

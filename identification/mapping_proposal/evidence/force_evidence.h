@@ -27,7 +27,7 @@ struct PressureOptions {
   /// Loss of a friction that would drive the cylinder, or a payload below zero.
   /// @threshold [nat] 0..10; chosen: as a clear word
   double impossible = 3.0;
-  /// Pressure channels among which pairs are sought.
+  /// Pressure channels among which pairs are sought; those in the program's own names are all kept.
   /// @threshold [1] 4..200; chosen: two for each cylinder of a large machine and its ports
   int channels = 40;
   /// Channels of few levels that are tried as payload.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace sparflow {
@@ -55,10 +56,12 @@ std::vector<int> considered_channels(const ProposalData& data) {
   if (usable.size() <= most) return usable;
   // Names are judged on the first channels only as far as this takes a moment.
   const std::vector<Meaning> meanings = all_meanings(*data.machine);
-  std::vector<double> said(data.samples.shapes.size(), 0.0);
-  const std::size_t affordable = 200'000 / std::max<std::size_t>(1, meanings.size());
+  // A channel that is not judged comes behind all that are.
+  std::vector<double> said(data.samples.shapes.size(), -std::numeric_limits<double>::infinity());
+  const std::size_t affordable = static_cast<std::size_t>(std::max(0, data.options.judged_names)) /
+                                 std::max<std::size_t>(1, meanings.size());
   for (std::size_t k = 0; k < std::min(usable.size(), affordable); ++k) {
-    double best = -1e9;
+    double best = -std::numeric_limits<double>::max();
     for (const Meaning& m : meanings) best = std::max(best, data.said(usable[k], m, nullptr));
     said[static_cast<std::size_t>(usable[k])] = best;
   }

@@ -20,6 +20,9 @@ constexpr double kPressureNoise = 3e5;
 /// Weight of the share of time in which the pump is lower than what it moves.
 /// @threshold [nat] 1..20; chosen: a third of the time outweighs a clear word
 constexpr double kPumpBelow = 8.0;
+/// Rod speed at which the dry friction of a drive counts fully.
+/// @threshold [m/s] 1e-3..0.02; chosen: twice the noise of speeds
+constexpr double kSlipSpeed = 4e-3;
 /// Temperatures of hydraulic oil.
 /// @threshold [degC] -30..120; chosen: cold start to the limit of seals
 constexpr Range kOilRange = {-25.0, 100.0};
@@ -107,6 +110,20 @@ double return_log_odds(const ProposalData& data, const VectorXd& pressure,
   return -1.5 + level + 2.5 * std::max(0.0, correlation_of(flow, pressure) - 0.2);
 }
 
+double force_misfit(const ProposalData& data, int channel, int cylinder,
+                    const std::vector<ProposedCylinder>& cylinders, const StaticForces& forces) {
+  const VectorXd* speed = cylinders[static_cast<std::size_t>(cylinder)].speed;
+  const VectorXd y = data.samples.values.col(channel);
+  if (speed == nullptr || !(y.squaredNorm() > 0.0)) return 1.0;
+  Eigen::MatrixXd z(y.size(), 4);
+  z.col(0) = forces.empty.col(cylinder);
+  z.col(1) = speed->unaryExpr([](double v) { return std::tanh(v / kSlipSpeed); });
+  z.col(2) = *speed;
+  z.col(3) = rate_of_change(data.samples, *speed);
+  const VectorXd left = y - z * z.completeOrthogonalDecomposition().solve(y);
+  return left.norm() / y.norm();
+}
+
 PayloadFit fit_payload(const ProposalData& data, const PressureSet& pressures, int channel,
                        const std::vector<ProposedCylinder>& cylinders, const StaticForces& forces) {
   const ChannelShape& shape = data.shape(channel);
@@ -149,14 +166,14 @@ OilFit fit_oil(const ProposalData& data, int channel) {
   OilFit best;
   best.unit = possible_units({Role::kOilTemperature, -1}, *data.machine).front();
   best.log_odds = -6.0;
-  const bool slow = shape.roughness < 0.05 || shape.constant;
+  best.slow = shape.roughness < 0.05 || shape.constant;
   for (const ChannelUnit& unit : units_for(data, channel, {Role::kOilTemperature, -1})) {
     const double lo = unit.factor * shape.low + unit.offset,
                  hi = unit.factor * shape.high + unit.offset;
     if (lo < kOilRange.lo || hi > kOilRange.hi) continue;
     const double odds =
-        (slow ? -0.5 : -3.0) - (hi < 5.0 ? 2.0 : 0.0) - (shape.constant ? 2.0 : 0.0);
-    if (odds > best.log_odds) best = {unit, odds};
+        (best.slow ? -0.5 : -3.0) - (hi < 5.0 ? 2.0 : 0.0) - (shape.constant ? 2.0 : 0.0);
+    if (odds > best.log_odds) best = {unit, odds, best.slow, true};
   }
   return best;
 }

@@ -33,6 +33,11 @@ PumpFit fit_pump(const ProposalData& data, const Eigen::VectorXd& pressure, int 
 double return_log_odds(const ProposalData& data, const Eigen::VectorXd& pressure,
                        const std::vector<ProposedCylinder>& cylinders);
 
+/// What static force, dry and viscous friction and acceleration leave of a measured force, as a share of it; 1 where the cylinder's
+/// speed is not known.
+double force_misfit(const ProposalData& data, int channel, int cylinder,
+                    const std::vector<ProposedCylinder>& cylinders, const StaticForces& forces);
+
 struct PayloadFit {
   double share = 0.0;  ///< of the left force that it explains
   ChannelUnit unit;
@@ -45,6 +50,8 @@ PayloadFit fit_payload(const ProposalData& data, const PressureSet& pressures, i
 struct OilFit {
   ChannelUnit unit;
   double log_odds = 0.0;
+  bool slow = false;
+  bool within = false;  ///< all values lie among temperatures of oil
 };
 OilFit fit_oil(const ProposalData& data, int channel);
 

@@ -132,5 +132,31 @@ TEST(Assignment, PairSetsShareNoColumnAndComeBestFirst) {
   EXPECT_GE(sets[1].total, sets[2].total);
 }
 
+TEST(Assignment, APairSearchThatIsEndedGivesTheGreedySetAtLeast) {
+  // Twelve groups that like the same ten columns: all orders of them would have to be tried.
+  std::vector<std::vector<ColumnPair>> groups(12);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    groups[g].push_back({-1, -1, 0.0});
+    for (int c = 0; c < 10; ++c) {
+      groups[g].push_back({c, -1, 1.0 + 0.1 * std::sin(static_cast<double>(g) * 7.0 + c)});
+    }
+  }
+  const PairSet greedy = greedy_pairs(groups);
+  for (const std::int64_t steps : {1, 1000}) {
+    const std::vector<PairSet> sets = best_pair_sets(groups, 2, {steps});
+    ASSERT_FALSE(sets.empty());
+    EXPECT_GE(sets[0].total, greedy.total);
+    double sum = 0.0;
+    std::vector<int> count(10, 0);
+    for (const ColumnPair& p : sets[0].pairs) {
+      sum += p.score;
+      if (p.first >= 0) {
+        EXPECT_EQ(++count[static_cast<std::size_t>(p.first)], 1);
+      }
+    }
+    EXPECT_NEAR(sum, sets[0].total, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace sparflow

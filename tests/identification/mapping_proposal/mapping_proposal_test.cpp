@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "identification/log/log_columns.h"
 #include "identification/log/log_mapping.h"
 #include "models/files/machine_file.h"
 #include "models/machine/static_force.h"
+#include "models/math/interruption.h"
 #include "problems/bundled.h"
 #include "simulator/hidden_effects/hidden_effect.h"
 #include "studies/mapping/disguise.h"
@@ -83,7 +86,7 @@ TEST(MappingProposal, GermanNamesAndOtherUnitsAreReadOnEveryMachine) {
     all.right += s.right;
     all.sure_and_wrong += s.sure_and_wrong;
   }
-  // 95 % is what docs/mapping_proposal.md promises for logs with names.
+  // All were right in the study of docs/mapping_proposal.md; one in twenty may fall to the two noisy copies among the channels.
   EXPECT_GE(all.right, 0.95 * all.meant);
   EXPECT_EQ(all.sure_and_wrong, 0);
 }
@@ -93,7 +96,8 @@ TEST(MappingProposal, WithoutNamesAndUnitsThePhysicsFindsMostOfALoaderCrane) {
   const DisguisedLog log = disguised_log(simulated(machine, 202, 120.0), machine,
                                          {Names::kAnonymous}, simulator::Random(202));
   const Score s = score_of(log, propose_mapping(log.file, machine));
-  // 85 % is promised; the oil among two temperatures is not identifiable and counts as missed.
+  // The study of docs/mapping_proposal.md finds nine in ten without names over six machines; the oil among two temperatures cannot be
+  // told and counts as missed. A single log may lie half as far again below.
   EXPECT_GE(s.right, 0.85 * s.meant);
   EXPECT_EQ(s.sure_and_wrong, 0);
 }
@@ -109,8 +113,123 @@ TEST(MappingProposal, AMachineThatRestsGivesNothingThatIsSure) {
   }
   const DisguisedLog log =
       disguised_log(columns, machine, {Names::kAnonymous, false, false}, simulator::Random(203));
+  int proposed = 0;
   for (const MeaningProposal& m : propose_mapping(log.file, machine).meanings) {
     EXPECT_LT(m.confidence, 0.9) << m.column << " <- " << m.channel_name;
+    proposed += m.channel >= 0 ? 1 : 0;
+  }
+  EXPECT_GT(proposed, 0);  // ranges and units still say something
+}
+
+/// A log in the program's own names, the pump's pressure last.
+TimedChannels own_log(const Machine& machine, std::uint64_t seed, const std::string& pump_name) {
+  TimedChannels file;
+  const std::vector<LogColumn> columns = simulated(machine, seed, 20.0);
+  RecordedChannel pump;
+  for (const LogColumn& c : columns) {
+    if (c.name == "t_s") continue;
+    RecordedChannel channel;
+    channel.name = c.name;
+    channel.time = columns.front().values;
+    channel.values = c.values;
+    if (column_meaning(c.name, "", machine).role == Role::kPumpPressure) {
+      pump = channel;
+    } else {
+      file.recording.channels.push_back(std::move(channel));
+    }
+  }
+  if (!pump_name.empty()) pump.name = pump_name;
+  file.recording.channels.push_back(std::move(pump));
+  return file;
+}
+
+const MeaningProposal* proposal_for(const MappingProposal& p, const Meaning& meaning) {
+  for (const MeaningProposal& m : p.meanings)
+    if (m.meaning == meaning) return &m;
+  return nullptr;
+}
+
+TEST(MappingProposal, PressuresInTheProgramsOwnNamesAreKeptBeyondTheLimit) {
+  const Machine machine = bundled("loader_crane");
+  ProposalOptions options;
+  options.pressures.channels = 3;  // of two for each cylinder and the pump's
+  const MappingProposal own = propose_mapping(own_log(machine, 207, ""), machine, options);
+  for (const MeaningProposal& m : own.meanings) {
+    const Role role = m.meaning.role;
+    if (role != Role::kPressureA && role != Role::kPressureB && role != Role::kPumpPressure)
+      continue;
+    EXPECT_EQ(m.channel_name, m.column);
+  }
+  // A pump of another name falls behind them; it then is no pump, whatever its name says.
+  options.words.clear_word = 20.0;
+  const MappingProposal other = propose_mapping(
+      own_log(machine, 207, "pump pressure " + machine.pumps[0].name + " [bar]"), machine, options);
+  const MeaningProposal* pump = proposal_for(other, {Role::kPumpPressure, 0});
+  ASSERT_NE(pump, nullptr);
+  EXPECT_EQ(pump->channel, -1);
+}
+
+TEST(MappingProposal, AReasonIsGivenOnlyWhereTheValuesHaveIt) {
+  const Machine machine = bundled("loader_crane");
+  TimedChannels file = own_log(machine, 208, "");
+  RecordedChannel oil = file.recording.channels.front();
+  oil.name = usual_name(Role::kOilTemperature, -1, machine);
+  const auto reasons = [&](double mean, double swing) {
+    for (std::size_t i = 0; i < oil.values.size(); ++i)
+      oil.values[i] = mean + swing * std::sin(3.0 * oil.time[i]);
+    TimedChannels with = file;
+    with.recording.channels.push_back(oil);
+    const MappingProposal p = propose_mapping(with, machine);
+    const MeaningProposal* m = proposal_for(p, {Role::kOilTemperature, -1});
+    EXPECT_TRUE(m != nullptr && m->channel >= 0);  // by its name
+    return m == nullptr ? std::vector<std::string>() : m->reasons;
+  };
+  const std::string reason = "it is slow and lies among temperatures of oil";
+  EXPECT_THAT(reasons(50.0, 0.0), testing::Contains(reason));
+  EXPECT_THAT(reasons(100.0, 90.0), testing::Not(testing::Contains(reason)));
+}
+
+TEST(MappingProposal, ChannelsWhoseNamesWereNotJudgedComeLast) {
+  const Machine machine = bundled("loader_crane");
+  TimedChannels file = own_log(machine, 209, "");
+  auto& channels = file.recording.channels;
+  channels.resize(6);
+  for (std::size_t k = 0; k < channels.size(); ++k) channels[k].name = fmt::format("ch{}", k);
+  channels[0].name = "engine speed [rpm]";
+  ChannelEvidenceOptions options;
+  options.most_channels = 1;
+  options.judged_names = 1 << 20;
+  EXPECT_THAT(proposal_data(file, machine, {}, options).considered,
+              testing::Not(testing::Contains(0)));
+  // Few enough that the names of the first channel only can be judged, with whatever number of meanings.
+  const int meanings =
+      machine.joint_count() + 6 * machine.cylinder_count() + machine.pump_count() + 3;
+  options.judged_names = meanings;
+  EXPECT_THAT(proposal_data(file, machine, {}, options).considered, testing::ElementsAre(0));
+}
+
+TEST(MappingProposal, AsksWhetherItShallEnd) {
+  const Machine machine = bundled("loader_crane");
+  ProposalOptions options;
+  int asked = 0;
+  options.progress = [&] {
+    if (++asked == 3) throw Interruption{};
+  };
+  EXPECT_THROW(propose_mapping(own_log(machine, 210, ""), machine, options), Interruption);
+}
+
+TEST(MappingProposal, TheLimitOfTheSearchIsNotReachedOnALoaderCrane) {
+  const Machine machine = bundled("loader_crane");
+  const DisguisedLog log = disguised_log(simulated(machine, 211, 30.0), machine,
+                                         {Names::kAnonymous}, simulator::Random(211));
+  ProposalOptions unlimited;
+  unlimited.pair_search.steps = std::numeric_limits<std::int64_t>::max();
+  const MappingProposal a = propose_mapping(log.file, machine);
+  const MappingProposal b = propose_mapping(log.file, machine, unlimited);
+  ASSERT_EQ(a.meanings.size(), b.meanings.size());
+  for (std::size_t k = 0; k < a.meanings.size(); ++k) {
+    EXPECT_EQ(a.meanings[k].channel, b.meanings[k].channel);
+    EXPECT_EQ(a.meanings[k].margin, b.meanings[k].margin);
   }
 }
 

@@ -71,7 +71,7 @@ bool CdrReader::structure(std::size_t type, Place place, std::size_t depth) {
   const Ros2Type& described = definition_->types[type];
   if (described.fields.empty()) return skip(1);
   if (names_.size() <= depth) names_.resize(depth + 1);
-  names_[depth].clear();
+  names_[depth] = {};
   for (std::size_t i = 0; i < described.fields.size(); ++i) {
     const Ros2Field& field = described.fields[i];
     if (depth == 0 && !stamp_ && field.repeat == Repeat::kOne && field.kind == Kind::kStruct &&
@@ -82,7 +82,8 @@ bool CdrReader::structure(std::size_t type, Place place, std::size_t depth) {
       continue;
     }
     Place inside;
-    if (place && can_matter(field)) inside = samples_->field(*place, i, field.name);
+    if (place && can_matter(field) && !samples_->crowded())
+      inside = samples_->field(*place, i, field.name);
     const bool whole =
         field.repeat == Repeat::kOne ? one(field, inside, depth) : several(field, inside, depth);
     if (!whole) return false;
@@ -98,26 +99,29 @@ bool CdrReader::several(const Ros2Field& field, Place place, std::size_t depth) 
     too_long_.insert(field.name);
     place.reset();
   }
+  // What a crowded message still holds is skipped; whether it is whole decides about its topic.
+  if (place && samples_->crowded()) place.reset();
   const std::size_t bytes = ros2_bytes(field.kind);
   if (!place && bytes > 0) {
     return size == 0 || (align(bytes) && skip(std::uint64_t{bytes} * size));
   }
   if (field.names) {
     // Names are kept while the structure is read; what is left out needs none.
-    std::vector<std::string_view>& names = names_[depth];
-    names.clear();
+    ElementNames& names = names_[depth];
+    names = {{}, size};
     for (std::uint32_t i = 0; i < size; ++i) {
       std::string_view name;
       if (!text(&name)) return false;
-      if (i < options_.longest_sequence) names.push_back(name);
+      if (i < options_.longest_sequence) names.kept.push_back(name);
     }
     return true;
   }
-  const bool named = place && names_[depth].size() == size;
+  const bool named = place && names_[depth].count == size;
   for (std::uint32_t i = 0; i < size; ++i) {
     Place element;
-    if (place) {
-      element = named ? samples_->named(*place, i, names_[depth][i]) : samples_->element(*place, i);
+    if (place && !samples_->crowded()) {
+      element =
+          named ? samples_->named(*place, i, names_[depth].kept[i]) : samples_->element(*place, i);
     }
     if (!one(field, element, depth)) return false;
   }

@@ -21,6 +21,7 @@ enum class MessageState : std::uint8_t {
   kLonger,     ///< read, but bytes follow
   kDamaged,    ///< it ends before its description does, or is no such text
   kOtherForm,  ///< not XCDR version 1
+  kTooLong,    ///< JSON of more than TopicOptions::longest_json
 };
 
 /// Numbers of messages of one topic.
@@ -37,6 +38,10 @@ class CdrReader {
 
  private:
   using Place = std::optional<TopicSamples::Place>;  ///< nothing: its numbers are not wanted
+  struct ElementNames {
+    std::vector<std::string_view> kept;  ///< at most TopicOptions::longest_sequence
+    std::uint32_t count = 0;             ///< of the message
+  };
   bool structure(std::size_t type, Place place, std::size_t depth);
   bool several(const Ros2Field& field, Place place, std::size_t depth);
   bool one(const Ros2Field& field, Place place, std::size_t depth);
@@ -56,7 +61,7 @@ class CdrReader {
   TopicSamples* samples_ = nullptr;
   bool header_ = false;  ///< the next time is the header's
   std::optional<std::int64_t> stamp_;
-  std::vector<std::vector<std::string_view>> names_;  ///< of elements, for each depth of structures
+  std::vector<ElementNames> names_;  ///< of elements, for each depth of structures
   std::set<std::string> too_long_;
 };
 

@@ -9,6 +9,7 @@ using nlohmann::json;
 
 bool walk(const json& value, const TopicOptions& options, int deepest, TopicSamples::Place place,
           TopicSamples* samples) {
+  if (samples->crowded()) return true;  // the topic is left out
   if (value.is_number()) {
     samples->add(place, value.get<double>());
   } else if (value.is_boolean()) {
@@ -58,6 +59,7 @@ std::optional<std::int64_t> stamp_of(const json& message) {
 
 MessageState read_json_message(std::string_view message, const TopicOptions& options, int deepest,
                                TopicSamples* samples, std::optional<std::int64_t>* stamp) {
+  if (message.size() > options.longest_json) return MessageState::kTooLong;
   json parsed = json::parse(message, nullptr, false);
   if (!parsed.is_object()) return MessageState::kDamaged;
   *stamp = stamp_of(parsed);

@@ -30,7 +30,7 @@ struct Topic {
   std::unique_ptr<TopicSamples> samples;
   TopicTimes times;
   std::size_t messages = 0;
-  std::size_t damaged = 0, longer = 0, other_form = 0;
+  std::size_t damaged = 0, longer = 0, other_form = 0, too_long = 0;
 };
 
 class McapReader : public McapVisitor {
@@ -155,7 +155,8 @@ class McapReader : public McapVisitor {
     if (state == MessageState::kDamaged) ++topic->damaged;
     if (state == MessageState::kOtherForm) ++topic->other_form;
     if (state == MessageState::kLonger) ++topic->longer;
-    if (state == MessageState::kDamaged || state == MessageState::kOtherForm) {
+    if (state == MessageState::kTooLong) ++topic->too_long;
+    if (state != MessageState::kRead && state != MessageState::kLonger) {
       samples.drop();
       return;
     }
@@ -177,8 +178,18 @@ class McapReader : public McapVisitor {
                 name);
     }
     const auto part = [&](std::size_t count) { return fmt::format("{} of {}", count, name); };
-    if (topic.damaged > 0)
-      leave_out("messages that end before their description does", part(topic.damaged));
+    if (topic.damaged > 0) {
+      leave_out(
+          topic.cdr != nullptr
+              ? "messages that end before their description does"
+              : fmt::format("messages that are no JSON object, or one nested more than {} deep",
+                            options_.limits.nesting),
+          part(topic.damaged));
+    }
+    if (topic.too_long > 0) {
+      leave_out(fmt::format("JSON messages of more than {} bytes", topic_options_.longest_json),
+                part(topic.too_long));
+    }
     if (topic.other_form > 0)
       leave_out("messages that are not CDR of version 1", part(topic.other_form));
     if (topic.longer > 0) {

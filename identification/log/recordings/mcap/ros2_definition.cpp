@@ -136,7 +136,8 @@ class DefinitionText {
     const std::size_t open = type.find('[');
     if (open != type.npos) {
       const std::string_view inside = std::string_view(type).substr(open + 1);
-      if (!inside.ends_with(']')) refuse(number_, fmt::format("got \"{}\", expected ]", type));
+      if (!inside.ends_with(']'))
+        refuse(number_, fmt::format("got \"{}\", expected ]", printable(type)));
       const std::string_view count = inside.substr(0, inside.size() - 1);
       written->field.repeat = Repeat::kSequence;
       if (!count.empty() && !count.starts_with("<=")) {

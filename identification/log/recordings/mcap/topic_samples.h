@@ -21,6 +21,9 @@ struct TopicOptions {
   /// Largest number of channels of a topic; a topic with more is left out.
   /// @threshold [1] 100..1e4; chosen: joint states of a hundred joints have 300; drawings have more
   std::size_t most_channels = 1000;
+  /// Largest message in JSON that is read.
+  /// @threshold [byte] 1e5..1e8; chosen: a thousand numbers take 50 kB, and a text takes up to sixteen times its size in memory
+  std::size_t longest_json = 4'000'000;
 };
 
 /// What all topics of a file may hold together.
@@ -58,9 +61,17 @@ class TopicSamples {
   void set_unit(Place place, const char* unit) { places_[place].unit = unit; }
 
   /// A number of the present message; it counts when `keep` follows.
-  void add(Place place, double value) { pending_.emplace_back(place, value); }
+  void add(Place place, double value) {
+    if (pending_.size() >= options_.most_channels) crowded_ = true;
+    if (!crowded_) pending_.emplace_back(place, value);
+  }
   void keep();
-  void drop() { pending_.clear(); }
+  void drop() {
+    pending_.clear();
+    crowded_ = false;
+  }
+  /// The present message has more numbers or parts than a topic may have; what follows in it is of no use.
+  bool crowded() const { return crowded_; }
 
   std::size_t messages() const { return messages_; }
   bool has_channels() const { return !leaves_.empty(); }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "identification/log/recordings/mcap/topic_samples.h"
 #include "models/math/error.h"
 #include "tests/identification/log/recordings/mcap_writer.h"
 #include "tests/identification/log_machines.h"
@@ -187,6 +188,14 @@ TEST(Mcap, NamesThatDoNotFitGiveWayToNumbersAndARepeatedNameCountsOnce) {
   EXPECT_EQ(find_channel(fewer, "/j.effort[a]")->values[0], 7);
   const Recording more = read_recording(bag({1.7e9, {"a", "b"}, {5}, {}, {}}), "a.mcap");
   EXPECT_EQ(find_channel(more, "/j.position[0]")->values[0], 5);
+  // Of 100 names 64 are kept; that they are as many as the positions is chance.
+  std::vector<std::string> many(100);
+  for (std::size_t i = 0; i < many.size(); ++i) many[i] = fmt::format("n{}", i);
+  const Recording beside = read_recording(
+      bag({1.7e9, many, std::vector<double>(TopicOptions{}.longest_sequence, 5), {}, {}}),
+      "a.mcap");
+  EXPECT_NE(find_channel(beside, "/j.position[0]"), nullptr);
+  EXPECT_EQ(find_channel(beside, "/j.position[n0]"), nullptr);
   const Recording twice = read_recording(bag({1.7e9, {"a", "a"}, {5, 6}, {}, {}}), "a.mcap");
   ASSERT_THAT(twice.channels, SizeIs(1));
   EXPECT_THAT(twice.channels[0].values, ElementsAre(5));
@@ -282,8 +291,84 @@ TEST(Mcap, JsonMessagesOfNumbersAreRead) {
   EXPECT_THAT(find_channel(r, "press.p[1]")->values, ElementsAre(2, 4));
   EXPECT_THAT(find_channel(r, "press.p[1]")->time, ElementsAre(0, 0.5));
   EXPECT_THAT(find_channel(r, "press.on")->values, ElementsAre(1, 0));
-  EXPECT_THAT(r.warnings, ElementsAre("left out, messages that end before their description does: "
-                                      "1 of press (3 messages)"));
+  EXPECT_THAT(r.warnings,
+              ElementsAre("left out, messages that are no JSON object, or one nested more "
+                          "than 64 deep: 1 of press (3 messages)"));
+}
+
+TEST(Mcap, AJsonMessageAboveTheLimitIsLeftOutBeforeItIsParsed) {
+  const std::string small = R"({"p":1.5})";
+  // longer than TopicOptions::longest_json, and otherwise a message like the other
+  const std::string large =
+      R"({"p":2.5,"who":")" + std::string(TopicOptions{}.longest_json, 'x') + R"("})";
+  const Recording r = read_recording(McapWriter()
+                                         .add(McapWriter::channel(4, 0, "press", "json"))
+                                         .add(McapWriter::message(4, ns_at(0), 0, small))
+                                         .add(McapWriter::message(4, ns_at(1), 0, large))
+                                         .finished(),
+                                     "a.mcap");
+  ASSERT_THAT(r.channels, SizeIs(1));
+  EXPECT_THAT(r.channels[0].values, ElementsAre(1.5));
+  EXPECT_THAT(r.warnings, ElementsAre("left out, JSON messages of more than 4000000 bytes: 1 of "
+                                      "press (2 messages)"));
+}
+
+TEST(Mcap, NumbersOfAMessageAreKeptUpToTheLimitOnly) {
+  SampleBudget budget("a.mcap", {});
+  TopicOptions options;
+  options.most_channels = 10;
+  TopicSamples samples("t", options, &budget);
+  const auto place = samples.field(TopicSamples::kMessage, 0, "x");
+  // One place many times: neither places nor channels reach their limits, the numbers do.
+  const auto add = [&](int count) {
+    for (int i = 0; i < count; ++i) samples.add(place, i);
+  };
+  add(11);
+  EXPECT_TRUE(samples.crowded());
+  samples.drop();  // a damaged message says nothing about the topic
+  add(10);
+  samples.keep();
+  EXPECT_FALSE(samples.overfull());
+  add(11);
+  samples.keep();
+  EXPECT_TRUE(samples.overfull());
+}
+
+TEST(Mcap, ACrowdedMessageThatIsDamagedLeavesItsTopicToTheOthers) {
+  // 40 lists of 40 bytes are 1600 numbers, more than a topic may have
+  CdrMessage m;
+  m.put(std::uint32_t{40});
+  for (int i = 0; i < 40; ++i) m.put(std::vector<std::uint8_t>(40, 7));
+  const std::string cut = m.bytes().substr(0, m.bytes().size() - 1);
+  const auto bag = [&](const std::string& crowded) {
+    return read_recording(
+        McapWriter()
+            .add(bag_records())
+            .add(McapWriter::schema(3, "a/msg/B", "ros2msg", "P[] p\n===\nMSG: a/P\nuint8[] x\n"))
+            .add(McapWriter::channel(3, 3, "/b", "cdr"))
+            .add(McapWriter::message(3, ns_at(0), 0, crowded))
+            .add(McapWriter::message(
+                3, ns_at(0.1), 0,
+                CdrMessage().put(std::uint32_t{1}).put(std::vector<std::uint8_t>{5}).bytes()))
+            .finished(),
+        "a.mcap");
+  };
+  const Recording damaged = bag(cut);
+  ASSERT_NE(find_channel(damaged, "/b.p[0].x[0]"), nullptr);
+  EXPECT_THAT(damaged.warnings, ElementsAre(HasSubstr("1 of /b (2 messages)")));
+  const Recording whole = bag(m.bytes());
+  EXPECT_EQ(find_channel(whole, "/b.p[0].x[0]"), nullptr);
+  EXPECT_THAT(whole.warnings,
+              ElementsAre("left out, messages with more than 1000 numbers: /b (2 messages)"));
+}
+
+TEST(Mcap, ADescriptionIsQuotedWithoutItsControlCharacters) {
+  McapWriter w;
+  w.add(bag_records());
+  w.add(McapWriter::schema(3, "a/msg/B", "ros2msg", "float64[3\x1b x\n"));
+  w.add(McapWriter::channel(3, 3, "/b", "cdr"));
+  EXPECT_THAT(read_recording(w.finished(), "a.mcap").warnings,
+              Contains(HasSubstr("got \"float64[3?\", expected ]")));
 }
 
 TEST(Mcap, WhatIsNotReadIsNamedWithItsReason) {
