@@ -3,11 +3,15 @@
 /// (models/chain/smooth_effects.h), with the direction of each cylinder prescribed as it moves and the exact maximum of the
 /// demands, so that nothing is smoothed. Derivatives do not exist where a cylinder comes to rest (its flow has a kink there, and
 /// its pressure jumps) and where two demands are equal: there those of rest and of the first demand are given.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <vector>
 
 #include "models/chain/crane_model.h"
 #include "models/chain/smooth_effects.h"
+#include "models/effects/effective_machine.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 
@@ -26,12 +30,16 @@ class ChainDerivatives {
   int joints() const { return n_; }
   /// Whether anything depends on accelerations; otherwise the Jets have no such variables.
   bool uses_acceleration() const { return law_.uses_acceleration(); }
-  /// Values with derivatives in the order (q, qd) or (q, qd, qdd), each by joint.
+  /// Values with derivatives in the order (q, qd) or (q, qd, qdd), each by joint. Its `pump_pressure` is that before effects on the
+  /// pumps, as these see it; pump_pressure() has them.
   const Instant<Jet>& instant() const { return law_.instant(); }
-  const Jet& pump_pressure(int p) const { return law_.pump_pressure(p); }  ///< [Pa]
+  const Jet& pump_pressure(int p) const { return law_.pump_pressure(p); }  ///< [Pa] with effects
   const Jet& power() const { return law_.power(); }                        ///< [W]
 
  private:
+  /// The model, if a Jet can hold the variables of its machine.
+  static const CraneModel& that_fits(const CraneModel& model);
+
   int n_;
   Chain chain_;
   SmoothEffects law_;
@@ -39,8 +47,22 @@ class ChainDerivatives {
   std::vector<double> z_;
 };
 
+inline const CraneModel& ChainDerivatives::that_fits(const CraneModel& model) {
+  const int n = model.machine.joint_count(), without = Jet::kMax / 2;
+  const bool inertia =
+      sparflow::uses_acceleration(*effective_machine(model.machine, model.effects), model.effects);
+  const int most = inertia ? Jet::kMax / 3 : without;
+  if (n <= most) return model;
+  throw InputError(
+      {}, "joints",
+      fmt::format("machine {} has {} joints; expected at most {} for derivatives{}; {}take "
+                  "differences of the law's values",
+                  model.machine.name, n, most, inertia ? " of a law with inertia" : "",
+                  inertia && n <= without ? "remove what depends on accelerations, or " : ""));
+}
+
 inline ChainDerivatives::ChainDerivatives(const CraneModel& model)
-    : n_(model.machine.joint_count()), chain_(model), law_(model) {
+    : n_(model.machine.joint_count()), chain_(model), law_(that_fits(model)) {
   law_.smoothing.pressure = 0.0;
   modes_.resize(model.cylinders.size());
   z_.resize(static_cast<std::size_t>(law_.size()));
