@@ -95,3 +95,22 @@ def test_audit_gives_the_programs_json_and_proposes_motions(program, tmp_path):
     assert ours.to_frame()["saving_J"][0] == pytest.approx(move.saving_J)
     with pytest.raises(sparflow.UsageError, match="either litres_per_kWh or engine_map"):
         sparflow.audit(model, test, litres_per_kWh=0.4, engine_map="map.yaml")
+
+
+def test_numbers_outside_their_ranges_are_refused(lift):
+    model, test = sparflow.Model.load(MODEL), DATA / "logs/loader_crane_test.csv"
+    nan = float("nan")
+    for call, wrong, words in (
+            (sparflow.pareto, dict(points=10**9), "pareto: points= got 1000000000; expected 3 to 200"),
+            (sparflow.pareto, dict(longest=0.5), "longest= got 0.5; expected 1.2 to 100"),
+            (sparflow.pareto, dict(idle_kW=[5, -1]), "idle_kW= got -1; expected 0 to 1000"),
+            (sparflow.strategies, dict(intervals=1), "strategies: intervals= got 1; expected 10 to 5000"),
+            (sparflow.strategies, dict(idle_kW=-1), "strategies: idle_kW= got -1; expected 0 to 1000"),
+            (sparflow.optimize, dict(intervals=1), "optimize: intervals= got 1; expected 10 to 5000"),
+            (sparflow.plan, dict(seconds=nan), "plan: seconds= got nan; expected 0.001 to"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(moves=0), "audit: moves= got 0; expected 1 to 100000"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(moves=-1), "moves= got -1"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(payload_kg=-1), "payload_kg= got -1; expected 0 to"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(pause_s=nan), "pause_s= got nan")):
+        with pytest.raises(sparflow.UsageError, match=words):
+            call(lift, **wrong)
