@@ -1,7 +1,9 @@
 """strategies, pareto and audit give what the program gives; what is not found or interrupted is an exception with its result."""
 
 import json
+import signal
 import subprocess
+import time
 
 import numpy as np
 import pytest
@@ -114,3 +116,31 @@ def test_numbers_outside_their_ranges_are_refused(lift):
             (lambda _, **a: sparflow.audit(model, test, **a), dict(pause_s=nan), "pause_s= got nan")):
         with pytest.raises(sparflow.UsageError, match=words):
             call(lift, **wrong)
+
+
+def test_what_the_work_raises_after_ctrl_c_is_not_lost():
+    # The same log many times, without a move, because a move must be longer than any: the signals of all of them are made
+    # before that is known, and nothing asks whether to stop between them.
+    model = sparflow.Model.load(MODEL)
+    still = {name: np.full(20000, at) for name, at in (("q_boom_rad", 0.3), ("q_jib_rad", -1.1), ("q_extension_m", 1.0))}
+    logs = [sparflow.Log.from_arrays({"t_s": np.arange(20000) * 0.02, **still}, model.machine) for _ in range(10)]
+    begin = time.monotonic()
+    with pytest.raises(sparflow.InputError, match="no move"):
+        sparflow.audit(model, logs)
+    whole = time.monotonic() - begin
+
+    def press(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, press)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, whole / 4)
+        with pytest.raises(sparflow.Interrupted) as caught:
+            sparflow.audit(model, logs)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    for _ in range(2):
+        with pytest.raises(sparflow.InputError, match="no move"):
+            caught.value.wait()
+    assert isinstance(caught.value.__cause__, sparflow.InputError) and caught.value.result is None
