@@ -6,6 +6,7 @@
 #include "apps/python/result.h"
 #include "apps/report/motion_pages/pareto_page.h"
 #include "apps/report/motion_pages/strategies_page.h"
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/audit_task.h"
 #include "apps/tasks/inputs.h"
 #include "apps/tasks/pareto_task.h"
@@ -89,15 +90,24 @@ class Audited final : public Result {
   AuditResult result_;
 };
 
+/// A number of which a negative one stands for none in the task, but not in Python. @throws UsageError outside 0 to `most`
+double number_given(const char* option, const py::object& value, double most) {
+  const auto number = value.cast<double>();
+  require_range(option, number, 0.0, most);
+  return number;
+}
+
 std::shared_ptr<Strategies> compare_problems(const std::vector<Problem>& given, const py::dict& a) {
   StrategiesTask task;
   read_times(a["time"].cast<std::string>(), task.options);
   task.options.baselines.polished_orders = a["orders"].cast<int>();
   task.seeds.count = a["paths"].cast<int>();
   task.seeds.random_seed = a["seed"].cast<std::uint64_t>();
-  if (!a["idle_kW"].is_none()) task.idle_kw = a["idle_kW"].cast<double>();
+  if (!a["idle_kW"].is_none())
+    task.idle_kw = number_given("strategies: --idle", a["idle_kW"], 1000.0);
   task.intervals = a["intervals"].cast<int>();
   task.processes = a["processes"].cast<int>();
+  check_ranges(task);
   const Listener listener{warn, warn, {}, {}};
   std::vector<SharedProblem> problems;
   problems.reserve(given.size());
@@ -142,13 +152,15 @@ std::shared_ptr<Pareto> energy_over_time(const Problem& problem, const py::dict&
 std::shared_ptr<Audited> audit_logs(const std::shared_ptr<CraneModel>& model, const py::dict& a) {
   require_pressures(*model, model->machine.name, "cylinders");
   AuditTask task;
-  if (!a["payload_kg"].is_none()) task.payload = a["payload_kg"].cast<double>();
+  if (!a["payload_kg"].is_none())
+    task.payload = number_given("audit: --payload", a["payload_kg"], 1e6);
   task.litres_per_kWh = a["litres_per_kWh"].cast<double>();
   if (!a["engine_map"].is_none()) task.engine = load_engine_map(path_from(a["engine_map"]));
   task.cutting.pause_s = a["pause_s"].cast<double>();
   task.most = a["moves"].cast<int>();
   task.bound = a["bound"].cast<bool>();
   task.processes = a["processes"].cast<int>();
+  check_ranges(task);
   auto logs = std::make_shared<std::vector<Log>>(logs_from(a["logs"], model->machine));
   if (logs->empty()) throw UsageError("audit: expected at least one log, got none");
   return long_call<Audited>(a["progress"], [model, logs, task](const Listener& listener) {

@@ -15,7 +15,7 @@ namespace sparflow::python {
 namespace {
 
 /// Words of the command line and the module's words for the same; an option that is not among them has the same name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 15> kWords{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kWords{{
     {"--model MODEL.json", "model="},
     {"--idle KW", "idle_kW="},
     {"`sparflow simulate --list-effects` names them", "sparflow.plant_effects() names them"},
@@ -26,6 +26,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 15> kWords{{
     {"--gain", "gains="},
     {"--process ", "processes= "},
     {"--log", "logs="},
+    {"--pause", "pause_s="},
     {"--step-budget", "step_budget_s="},
     {"--litres-per-kwh", "litres_per_kWh="},
     {"in --json", "in to_dict()"},
@@ -83,6 +84,7 @@ void bind_errors(py::module_& m) {
       .def("ended", &LeftBehind::ended)
       .def("wait", &LeftBehind::wait, py::arg("seconds"))
       .def("result", &LeftBehind::result);
+  py::module_::import("atexit").attr("register")(py::cpp_function(&join_left_behind));
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

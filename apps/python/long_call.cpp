@@ -1,8 +1,10 @@
 #include "apps/python/long_call.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -52,10 +54,33 @@ constexpr std::chrono::milliseconds kLookEvery{40};
 /// @threshold [ms] 0..1000; chosen: with the look it stays below half a second
 constexpr std::chrono::milliseconds kPatience{420};
 
-/// Threads whose work was left behind; the module waits for them when Python ends.
-std::vector<std::jthread>& left_behind() {
-  static std::vector<std::jthread> threads;
+/// A thread whose work was left behind.
+struct LeftThread {
+  std::shared_ptr<Telling> telling;
+  std::jthread thread;
+  bool done() const {
+    const std::lock_guard lock(telling->mutex);
+    return telling->done;
+  }
+};
+
+/// The threads left behind. The GIL, which is held, guards the list.
+std::vector<LeftThread>& left_behind() {
+  static std::vector<LeftThread> threads;
   return threads;
+}
+
+/// Keeps a thread for the end of Python, and forgets those whose work has ended since.
+void leave_behind(std::shared_ptr<Telling> telling, std::jthread thread) {
+  std::vector<LeftThread> ended;
+  std::vector<LeftThread>& all = left_behind();
+  const auto first =
+      std::stable_partition(all.begin(), all.end(), [](const LeftThread& t) { return !t.done(); });
+  ended.assign(std::make_move_iterator(first), std::make_move_iterator(all.end()));
+  all.erase(first, all.end());
+  all.push_back({std::move(telling), std::move(thread)});
+  const py::gil_scoped_release release;
+  ended.clear();  // joins them
 }
 
 /// Hands on what the work has told since the last time. The GIL is held; Python code may run and raise.
@@ -123,19 +148,29 @@ void serve_call(Telling& telling) {
 }
 
 /// Asks the work to end, and leaves it behind where it does not.
-Ended end(Telling& telling, std::jthread thread) {
+Ended end(const std::shared_ptr<Telling>& telling, std::jthread thread) {
   {
-    const std::lock_guard lock(telling.mutex);
-    telling.shared.step() = 1;
-    telling.changed.notify_all();
+    const std::lock_guard lock(telling->mutex);
+    telling->shared.step() = 1;
+    telling->changed.notify_all();
   }
-  if (done_within(telling, kPatience)) {
+  if (done_within(*telling, kPatience)) {
     const py::gil_scoped_release release;
     thread.join();
     return Ended::kInterrupted;
   }
-  left_behind().push_back(std::move(thread));
+  leave_behind(telling, std::move(thread));
   return Ended::kLeft;
+}
+
+/// What was thrown, as the exception that Python would see. The GIL is held.
+py::object as_python_error(const std::exception_ptr& thrown) {
+  try {
+    py::cpp_function([thrown] { std::rethrow_exception(thrown); })();
+  } catch (py::error_already_set& e) {
+    return e.value();
+  }
+  return py::none();
 }
 
 }  // namespace
@@ -171,8 +206,11 @@ Ended run_beside_python(const py::object& progress, const std::shared_ptr<Tellin
       hand_on(*telling, progress);
       serve_call(*telling);
     } catch (py::error_already_set& e) {
-      const Ended ended = end(*telling, std::move(thread));
+      const Ended ended = end(telling, std::move(thread));
       if (e.matches(PyExc_KeyboardInterrupt)) return ended;
+      throw;
+    } catch (...) {  // the work waits for its call, and would wait for ever
+      end(telling, std::move(thread));
       throw;
     }
   }
@@ -198,17 +236,27 @@ bool LeftBehind::wait(double seconds) const {
     if (seconds >= 0.0 && std::chrono::duration<double>(Clock::now() - begin).count() >= seconds)
       return false;
   }
+  const std::lock_guard lock(telling_->mutex);
+  if (telling_->thrown) std::rethrow_exception(telling_->thrown);
   return true;
 }
 
 py::object LeftBehind::result() const { return ended() ? result_() : py::none(); }
 
-void raise_interrupted(const py::object& result) {
+void join_left_behind() {
+  std::vector<LeftThread> all = std::move(left_behind());
+  left_behind().clear();
+  const py::gil_scoped_release release;
+  all.clear();  // joins them
+}
+
+void raise_interrupted(const py::object& result, const Telling& telling) {
   const py::object type = py::module_::import("sparflow._errors").attr("Interrupted");
   py::object error =
       type(result.is_none() ? "interrupted: nothing was found yet that could be kept"
                             : "interrupted: what was done is kept in `result` of this exception");
   error.attr("_result") = result;
+  if (telling.thrown) error.attr("__cause__") = as_python_error(telling.thrown);
   PyErr_SetObject(type.ptr(), error.ptr());
   throw py::error_already_set();
 }

@@ -36,6 +36,7 @@ class LeftBehind {
       : telling_(std::move(telling)), result_(std::move(result)) {}
   bool ended() const;
   /// Waits at most for a time [s] without the interpreter's lock; negative: as long as it takes. Ctrl-C ends the waiting.
+  /// @throws what the work threw as it ended
   bool wait(double seconds) const;
   /// What it has done; None where it has no result, or is still at work.
   pybind11::object result() const;
@@ -45,8 +46,12 @@ class LeftBehind {
   std::function<pybind11::object()> result_;
 };
 
-/// Raises sparflow.Interrupted with what was done, or with the work that will still give it.
-[[noreturn]] void raise_interrupted(const pybind11::object& result);
+/// Waits without the interpreter's lock for all work that was left behind; the module asks for it when Python ends.
+void join_left_behind();
+
+/// Raises sparflow.Interrupted with what was done, or with the work that will still give it. What the work threw as it ended is its
+/// cause.
+[[noreturn]] void raise_interrupted(const pybind11::object& result, const Telling& telling);
 [[noreturn]] void raise_left_behind(LeftBehind work);
 
 /// Progress that ends work which cannot be asked to stop in another way.
@@ -66,7 +71,7 @@ std::shared_ptr<T> long_call(const pybind11::object& progress,
       progress, telling,
       [result, work = std::move(work)](const Listener& listener) { *result = work(listener); });
   if (ended == Ended::kLeft) raise_left_behind({telling, as_object});
-  if (ended == Ended::kInterrupted) raise_interrupted(as_object());
+  if (ended == Ended::kInterrupted) raise_interrupted(as_object(), *telling);
   return *result;
 }
 

@@ -26,6 +26,11 @@ control::Ask asked_in_python(const py::object& ask, const std::shared_ptr<Tellin
   };
 }
 
+/// A text of Python, which may have characters that UTF-8 lacks; these become question marks. @throws what Python raised
+std::string replaced_text(const py::object& text) {
+  return py::cast<std::string>(py::str(text).attr("encode")("utf-8", "replace"));
+}
+
 /// What Python raised in a call, in words; "" where nothing. Ctrl-C and the like go on. The lock is held.
 std::string failure_of(const std::function<void()>& call) {
   try {
@@ -33,8 +38,13 @@ std::string failure_of(const std::function<void()>& call) {
     return "";
   } catch (py::error_already_set& e) {
     if (!e.matches(PyExc_Exception)) throw;
-    return fmt::format("{}: {}", py::cast<std::string>(e.type().attr("__name__")),
-                       py::cast<std::string>(py::str(e.value())));
+    const std::string name = replaced_text(e.type().attr("__name__"));
+    try {
+      return fmt::format("{}: {}", name, replaced_text(e.value()));
+    } catch (py::error_already_set& untold) {  // an exception of the caller's own may have no text
+      if (!untold.matches(PyExc_Exception)) throw;
+      return name;
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/motion_inputs.h"
 #include "identification/signals/recorded_motion.h"
 #include "models/math/error.h"
@@ -145,8 +146,17 @@ void examine_all(const CraneModel& model, const std::vector<Found>& found, const
 
 }  // namespace
 
+void check_ranges(const AuditTask& task) {
+  require_range_or("audit: --payload", task.payload, -1.0, 0.0, 1e6);
+  require_range("audit: --pause", task.cutting.pause_s, 0.1, 60.0);
+  require_range("audit: --moves", task.most, 1, 100000);
+  require_range("audit: --litres-per-kwh", task.litres_per_kWh, 0.0, 10.0);
+  require_range("audit: --processes", task.processes, 0, 256);
+}
+
 AuditResult audit_task(const CraneModel& model, std::vector<Log>&& logs, const AuditTask& task,
                        const Listener& listener) {
+  check_ranges(task);
   std::vector<MachineSignals> signals;
   signals.reserve(logs.size());
   AuditResult result;

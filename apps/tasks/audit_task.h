@@ -23,9 +23,12 @@ struct AuditTask {
   std::function<void()> searching;  ///< called when there is something that Ctrl-C would keep
 };
 
+/// @throws UsageError for a number outside its range (docs/commands.md)
+void check_ranges(const AuditTask& task);
+
 /// @param model with all pressures that a motion needs (require_pressures)  @param logs at least one; given back as soon
 /// as their signals are made
-/// @throws InputError when the logs have no move
+/// @throws UsageError as check_ranges  @throws InputError when the logs have no move
 AuditResult audit_task(const CraneModel& model, std::vector<Log>&& logs, const AuditTask& task,
                        const Listener& listener);
 

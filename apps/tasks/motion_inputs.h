@@ -50,7 +50,7 @@ Seeds make_seeds(const MotionProblem& problem, const SeedOptions& options, int i
 /// seed where no straight line keeps the limits; nothing when no seed does.
 std::optional<ComparedMotion> compared_motion(const Seeds& seeds, const OptimizeResult& result);
 
-/// The work of `plan`. @param options its progress is the listener's
+/// The work of `plan`. @param options its progress is the listener's  @throws UsageError for a number outside its range
 Seeds plan_task(const MotionProblem& problem, SeedOptions options, const Listener& listener);
 /// The paths as the page draws them, as JSON (keys: docs/commands.md), as text of one screen, and all waypoints as CSV.
 PlannedPaths drawn_paths(const Seeds& seeds);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "apps/tasks/argument_range.h"
 #include "models/math/interruption.h"
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
@@ -91,8 +92,16 @@ Seeds warm_seeds(const Trajectory& from, OptimizeOptions& options) {
 
 }  // namespace
 
+void check_ranges(const OptimizeTask& task) {
+  require_range("optimize: --paths", task.seeds.count, 1, 64);
+  require_range("optimize: --seconds", task.seeds.seconds, 1e-3, 1e6);
+  require_range_or("optimize: --intervals", task.intervals, 0, 10, 5000);
+  require_range("optimize: --processes", task.processes, 0, 256);
+}
+
 Optimized optimize_task(const CraneModel& model, const MotionProblem& problem,
                         const OptimizeTask& task, const Listener& listener) {
+  check_ranges(task);
   OptimizeOptions options;
   options.intervals = intervals_of(problem, task.intervals);
   options.processes = task.processes > 0 ? task.processes : 2;

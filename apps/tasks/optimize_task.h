@@ -21,7 +21,10 @@ struct Optimized {
   OptimizeResult result;
 };
 
-/// @throws InputError when the model lacks a pressure model that the machine needs
+/// @throws UsageError for a number outside its range (docs/commands.md)
+void check_ranges(const OptimizeTask& task);
+
+/// @throws UsageError as check_ranges  @throws InputError when the model lacks a pressure model that the machine needs
 /// @throws Interruption when it is stopped before the optimiser has begun
 Optimized optimize_task(const CraneModel& model, const MotionProblem& problem,
                         const OptimizeTask& task, const Listener& listener);

@@ -1,9 +1,21 @@
 #include "apps/tasks/pareto_task.h"
 
+#include "apps/tasks/argument_range.h"
+
 namespace sparflow {
+
+void check_ranges(const ParetoTask& task) {
+  require_range("pareto: --points", task.points, 3, 200);
+  require_range("pareto: --longest", task.longest, 1.2, 100.0);
+  for (const double kw : task.idle_kw) require_range("pareto: --idle", kw, 0.0, 1000.0);
+  require_range("pareto: --paths", task.seeds.count, 1, 64);
+  require_range_or("pareto: --intervals", task.intervals, 0, 10, 5000);
+  require_range("pareto: --processes", task.processes, 0, 256);
+}
 
 ParetoCurve pareto_task(const ProblemAndModel& both, const ParetoTask& task, Journal& journal,
                         const Listener& listener) {
+  check_ranges(task);
   const auto& [problem, model] = both;
   ParetoOptions options;
   options.points = task.points;

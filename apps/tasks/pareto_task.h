@@ -16,7 +16,10 @@ struct ParetoTask {
   std::function<void()> searching;  ///< called when there is something that Ctrl-C would keep
 };
 
-/// @param both with all pressures that a motion needs (require_pressures)
+/// @throws UsageError for a number outside its range (docs/commands.md)
+void check_ranges(const ParetoTask& task);
+
+/// @param both with all pressures that a motion needs (require_pressures)  @throws UsageError as check_ranges
 ParetoCurve pareto_task(const ProblemAndModel& both, const ParetoTask& task, Journal& journal,
                         const Listener& listener);
 

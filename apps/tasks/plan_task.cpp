@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/motion_inputs.h"
 
 namespace sparflow {
@@ -22,6 +23,8 @@ std::string name_of(const Seeds& seeds, std::size_t path) {
 }  // namespace
 
 Seeds plan_task(const MotionProblem& problem, SeedOptions options, const Listener& listener) {
+  require_range("plan: --paths", options.count, 1, 64);
+  require_range("plan: --seconds", options.seconds, 1e-3, 1e6);
   options.progress = listener.progress;
   return make_seeds(problem, options, problem.knots.value_or(100));
 }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdlib>
 
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/inputs.h"
 #include "models/math/error.h"
 #include "optimizer/solve/child_progress.h"
@@ -129,6 +130,14 @@ void read_times(const std::string& text, StrategyOptions& options) {
   }
 }
 
+void check_ranges(const StrategiesTask& task) {
+  require_range_or("strategies: --idle", task.idle_kw, -1.0, 0.0, 1000.0);
+  require_range("strategies: --paths", task.seeds.count, 1, 64);
+  require_range("strategies: --orders", task.options.baselines.polished_orders, 0, 120);
+  require_range_or("strategies: --intervals", task.intervals, 0, 10, 5000);
+  require_range("strategies: --processes", task.processes, 0, 256);
+}
+
 void check_strategies_problem(const StrategiesTask& task, const ProblemAndModel& problem,
                               const Listener& listener) {
   if (task.options.own_time && idle_power_of(task, problem) <= 0.0) {
@@ -143,6 +152,7 @@ void check_strategies_problem(const StrategiesTask& task, const ProblemAndModel&
 ComparedStrategies strategies_task(const std::vector<SharedProblem>& problems,
                                    const StrategiesTask& task, Journal& journal,
                                    const Listener& listener) {
+  check_ranges(task);
   const std::vector<ChildResult> children = comparisons_of(problems, task, journal, listener);
   ComparedStrategies compared;
   compared.all.reserve(children.size());

@@ -34,12 +34,15 @@ struct ComparedStrategies {
 /// Sets the times of "equal", "own", "equal,own", "1.1,1.5,3" or any mixture of them. @throws UsageError
 void read_times(const std::string& text, StrategyOptions& options);
 
+/// @throws UsageError for a number outside its range (docs/commands.md)
+void check_ranges(const StrategiesTask& task);
+
 /// Checks one problem, and warns where own times are asked for without idle power.
 /// @throws InputError for a model without the pressures of a movement
 void check_strategies_problem(const StrategiesTask& task, const ProblemAndModel& problem,
                               const Listener& listener);
 
-/// Compares the strategies of every problem that the journal lacks.
+/// Compares the strategies of every problem that the journal lacks. @throws UsageError as check_ranges
 ComparedStrategies strategies_task(const std::vector<SharedProblem>& problems,
                                    const StrategiesTask& task, Journal& journal,
                                    const Listener& listener);

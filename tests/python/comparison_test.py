@@ -1,7 +1,9 @@
 """strategies, pareto and audit give what the program gives; what is not found or interrupted is an exception with its result."""
 
 import json
+import signal
 import subprocess
+import time
 
 import numpy as np
 import pytest
@@ -95,3 +97,50 @@ def test_audit_gives_the_programs_json_and_proposes_motions(program, tmp_path):
     assert ours.to_frame()["saving_J"][0] == pytest.approx(move.saving_J)
     with pytest.raises(sparflow.UsageError, match="either litres_per_kWh or engine_map"):
         sparflow.audit(model, test, litres_per_kWh=0.4, engine_map="map.yaml")
+
+
+def test_numbers_outside_their_ranges_are_refused(lift):
+    model, test = sparflow.Model.load(MODEL), DATA / "logs/loader_crane_test.csv"
+    nan = float("nan")
+    for call, wrong, words in (
+            (sparflow.pareto, dict(points=10**9), "pareto: points= got 1000000000; expected 3 to 200"),
+            (sparflow.pareto, dict(longest=0.5), "longest= got 0.5; expected 1.2 to 100"),
+            (sparflow.pareto, dict(idle_kW=[5, -1]), "idle_kW= got -1; expected 0 to 1000"),
+            (sparflow.strategies, dict(intervals=1), "strategies: intervals= got 1; expected 10 to 5000"),
+            (sparflow.strategies, dict(idle_kW=-1), "strategies: idle_kW= got -1; expected 0 to 1000"),
+            (sparflow.optimize, dict(intervals=1), "optimize: intervals= got 1; expected 10 to 5000"),
+            (sparflow.plan, dict(seconds=nan), "plan: seconds= got nan; expected 0.001 to"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(moves=0), "audit: moves= got 0; expected 1 to 100000"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(moves=-1), "moves= got -1"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(payload_kg=-1), "payload_kg= got -1; expected 0 to"),
+            (lambda _, **a: sparflow.audit(model, test, **a), dict(pause_s=nan), "pause_s= got nan")):
+        with pytest.raises(sparflow.UsageError, match=words):
+            call(lift, **wrong)
+
+
+def test_what_the_work_raises_after_ctrl_c_is_not_lost():
+    # The same log many times, without a move, because a move must be longer than any: the signals of all of them are made
+    # before that is known, and nothing asks whether to stop between them.
+    model = sparflow.Model.load(MODEL)
+    still = {name: np.full(20000, at) for name, at in (("q_boom_rad", 0.3), ("q_jib_rad", -1.1), ("q_extension_m", 1.0))}
+    logs = [sparflow.Log.from_arrays({"t_s": np.arange(20000) * 0.02, **still}, model.machine) for _ in range(10)]
+    begin = time.monotonic()
+    with pytest.raises(sparflow.InputError, match="no move"):
+        sparflow.audit(model, logs)
+    whole = time.monotonic() - begin
+
+    def press(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, press)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, whole / 4)
+        with pytest.raises(sparflow.Interrupted) as caught:
+            sparflow.audit(model, logs)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    for _ in range(2):
+        with pytest.raises(sparflow.InputError, match="no move"):
+            caught.value.wait()
+    assert isinstance(caught.value.__cause__, sparflow.InputError) and caught.value.result is None

@@ -149,6 +149,40 @@ def test_benchmark_gives_the_programs_rows_and_failures_have_reasons(scenario, p
         sparflow.benchmark(scenario, "joint_pi", gains={"joint_pi.proportional": 1000})
 
 
+def test_what_a_function_raises_may_have_any_text(scenario):
+    class Untold(Exception):
+        def __str__(self):
+            raise TypeError("no text")
+
+    def surrogate(state):
+        raise ValueError("\udcff")
+
+    def untold(state):
+        raise Untold()
+
+    result = sparflow.benchmark(scenario, functions={"surrogate": surrogate, "untold": untold}, seeds=1, optimum=False)
+    reasons = [row["reason"] for row in result.to_dict()["rows"]]
+    assert reasons == ["its function raised ValueError: ? at t = 0.00 s", "its function raised Untold at t = 0.00 s"]
+
+
+def test_numbers_outside_their_ranges_are_refused(machine, scenario):
+    for wrong, words in ((dict(seeds=10**9), "seeds= got 1000000000; expected 0 to 1000"),
+                         (dict(step_budget_s=float("nan")), "step_budget_s= got nan; expected 0.001 to 600"),
+                         (dict(jobs=-1), "jobs= got -1; expected 0 to 256")):
+        with pytest.raises(sparflow.UsageError, match=words):
+            sparflow.benchmark(scenario, "joint_pi", **wrong)
+    with pytest.raises(sparflow.UsageError, match="payload_kg= got -5; expected 0 to 1"):
+        sparflow.simulate(machine, payload_kg=-5)
+
+
+def test_a_trajectory_of_another_machine_is_not_tracked(machine):
+    hop = DATA / "reaches/loader_crane_short_hop.yaml"
+    motion = sparflow.optimize(sparflow.Problem.load(hop), intervals=20, paths=2).motion
+    other = sparflow.Machine.load(DATA / "machines/swing_crane.yaml")
+    with pytest.raises(sparflow.UsageError, match="the motion to track has 3 joints; machine .* has 4"):
+        sparflow.simulate(other, track=motion)
+
+
 def test_an_interrupted_benchmark_keeps_its_runs(scenario):
     with pytest.raises(sparflow.Interrupted) as caught:
         interrupted_soon(lambda progress: sparflow.benchmark(scenario, "joint_pi", seeds=200, optimum=False, jobs=1,

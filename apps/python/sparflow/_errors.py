@@ -40,7 +40,7 @@ class Interrupted(KeyboardInterrupt):
 
     `result` is what was done until then: the object that the call returns, as far as it came, or None where nothing can be
     kept. Work that is at a part which it cannot leave ends that part in a thread of its own; until then `result` is None, and
-    `wait()` waits for it.
+    `wait()` waits for it. Where the work failed after Ctrl-C, `wait()` raises what it raised, which is also the `__cause__` once known.
     """
 
     _result = None
@@ -61,7 +61,13 @@ class Interrupted(KeyboardInterrupt):
     def wait(self, seconds=None):
         """Waits until the work has ended, at most so many seconds [s] (None: as long as it takes); returns `result`."""
         if self._left_behind is not None:
-            self._left_behind.wait(-1.0 if seconds is None else float(seconds))
+            try:
+                self._left_behind.wait(-1.0 if seconds is None else float(seconds))
+            except Exception as failure:
+                self.__cause__ = failure
+                raise
+        elif self.__cause__ is not None:
+            raise self.__cause__
         return self.result
 
 

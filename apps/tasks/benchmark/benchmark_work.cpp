@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <set>
 
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/inputs.h"
 #include "models/math/error.h"
 #include "models/math/journal.h"
@@ -170,6 +171,9 @@ std::string reference_of(const BenchmarkTask& a, const BenchmarkWork& work) {
 }  // namespace
 
 BenchmarkWork benchmark_work(const BenchmarkTask& a, const Listener& listener) {
+  require_range("benchmark: --seeds", a.seeds, 0, 1000);
+  require_range("benchmark: --step-budget", a.step_budget, 1e-3, 600.0);
+  require_range("benchmark: --jobs", a.jobs, 0, 256);
   BenchmarkWork work;
   work.entrants = entrants_of(a);
   std::map<std::string, std::string> file_of;

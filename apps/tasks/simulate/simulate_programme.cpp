@@ -91,8 +91,31 @@ const MotionRecipe& proposed(const std::vector<MotionRecipe>& menu, const std::s
       fmt::format("simulate: no motion \"{}\"; there are\n{}", wanted, listed_motions(menu)));
 }
 
+/// @throws UsageError where a motion from memory is not one of this machine
+void check_trajectory(const Trajectory& motion, const Machine& machine) {
+  const auto refuse = [](const std::string& why) {
+    throw UsageError("simulate: the motion to track " + why);
+  };
+  if (motion.q.cols() != machine.joint_count() && motion.size() > 0)
+    refuse(fmt::format("has {} joints; machine {} has {}", motion.q.cols(), machine.name,
+                       machine.joint_count()));
+  if (motion.size() < 2 || motion.q.rows() != motion.t.size())
+    refuse(
+        fmt::format("has {} rows of positions at {} times; expected two or more, as many of "
+                    "both",
+                    motion.q.rows(), motion.t.size()));
+  if (!motion.q.allFinite() || !motion.t.allFinite())
+    refuse("has a time or a position that is no finite number");
+  for (Eigen::Index i = 1; i < motion.t.size(); ++i)
+    if (!(motion.t[i] > motion.t[i - 1]))
+      refuse(fmt::format("has time {} s in row {} after {} s; times must increase", motion.t[i],
+                         i + 1, motion.t[i - 1]));
+}
+
 /// A motion as a table. Its rows keep the payload of the start.
-plant::TimeTable trajectory_table(const Trajectory& motion, double payload) {
+plant::TimeTable trajectory_table(const Trajectory& motion, const Machine& machine,
+                                  double payload) {
+  check_trajectory(motion, machine);
   plant::TimeTable table;
   table.t = motion.t;
   table.values = motion.q;
@@ -155,7 +178,8 @@ std::unique_ptr<plant::Programme> simulate_programme(const SimulateTask& a, cons
   if (!std::isnan(a.payload)) request.payload = a.payload;
   if (a.controller) return std::make_unique<Controlled>(machine, a);
   if (a.trajectory)
-    return plant::tracked_motion(machine, parameters, trajectory_table(*a.trajectory, a.payload));
+    return plant::tracked_motion(machine, parameters,
+                                 trajectory_table(*a.trajectory, machine, a.payload));
   if (!a.track.empty())
     return plant::tracked_motion(machine, parameters,
                                  motion_table(load_log(a.track, machine), machine, a));

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "apps/tasks/argument_range.h"
 #include "apps/tasks/simulate/simulate_programme.h"
 #include "models/machine/linkage.h"
 #include "models/math/error.h"
@@ -147,9 +148,16 @@ void check_one_programme(const SimulateTask& t) {
     throw UsageError("simulate: give one of --track, --replay, --motion");
 }
 
+void check_ranges(const SimulateTask& task) {
+  require_range("simulate: --seconds", task.seconds, 0.1, 1e6);
+  require_range("simulate: --rate", task.rate, 10.0, 1000.0);
+  if (!std::isnan(task.payload)) require_range("simulate: --payload", task.payload, 0.0, 1e6);
+}
+
 Simulation simulate_task(std::shared_ptr<const Machine> machine, const SimulateTask& task,
                          const Listener& listener) {
   check_one_programme(task);
+  check_ranges(task);
   const plant::PlantParameters parameters = plant_of(*machine, task);
   const std::unique_ptr<plant::Programme> programme =
       simulate_programme(task, *machine, parameters);

@@ -59,6 +59,9 @@ struct Simulation {
 /// @throws UsageError where more than one of track, replay, motion, trajectory and controller is given
 void check_one_programme(const SimulateTask& task);
 
+/// @throws UsageError for a number outside its range (docs/commands.md)
+void check_ranges(const SimulateTask& task);
+
 /// @throws UsageError  @throws InputError for files and effects that are wrong
 Simulation simulate_task(std::shared_ptr<const Machine> machine, const SimulateTask& task,
                          const Listener& listener);
