@@ -53,7 +53,7 @@ std::vector<Meaning> rest_meanings(const Machine& machine) {
 
 /// Score of what must not be chosen, whatever else speaks for it.
 // no threshold: below any sum of evidence
-constexpr double kNever = -1e6;
+constexpr double kNeverTaken = -1e6;
 
 /// A joint's channel, a reading of it in `second` so that each reading is a column of its own.
 constexpr int kReadings = 1000;
@@ -191,7 +191,7 @@ std::vector<ColumnPair> ProposalSearch::pair_candidates(const JudgedSet& set, in
       const int p = set.positions[j];
       if (p >= 0 && candidates_[j][static_cast<std::size_t>(p)].reading.channel ==
                         pressures_.channels[static_cast<std::size_t>(i)])
-        a[i] = b[i] = kNever;
+        a[i] = b[i] = kNeverTaken;
     }
   }
   const ChannelEvidenceOptions& o = options_.evidence;
@@ -340,7 +340,7 @@ MatrixXd ProposalSearch::rest_scores(JudgedSet& set, const Assignment& a,
 double ProposalSearch::supply_score(const Meaning& meaning, int channel, const VectorXd& working,
                                     const std::vector<ProposedCylinder>& parts) {
   const auto place = std::find(pressures_.channels.begin(), pressures_.channels.end(), channel);
-  if (place == pressures_.channels.end()) return kNever;  // it has no reading as a pressure
+  if (place == pressures_.channels.end()) return kNeverTaken;  // it has no reading as a pressure
   const auto k = place - pressures_.channels.begin();
   const VectorXd pressure = pressures_.values.col(k);
   const double range = pressures_.range_score[static_cast<std::size_t>(k)];

@@ -63,13 +63,14 @@ Eigen::VectorXd moving_state(const Machine& machine, Random& random) {
   return x;
 }
 
-constexpr double kPayload = 600.0;  // [kg]
+constexpr double kCarriedMass = 600.0;  // [kg]
 
 /// Total forces, working pressures, pressures of the pumps and power, one after another.
 struct ExactLaw {
   explicit ExactLaw(const CraneModel& model) : chain(model), n(model.machine.joint_count()) {}
   Eigen::VectorXd operator()(const Eigen::VectorXd& x) {
-    const MachineState& s = chain.evaluate({x.data(), x.data() + n, x.data() + 2 * n}, kPayload);
+    const MachineState& s =
+        chain.evaluate({x.data(), x.data() + n, x.data() + 2 * n}, kCarriedMass);
     const auto m = static_cast<Eigen::Index>(s.cylinders.size());
     const auto p = static_cast<Eigen::Index>(s.pumps.size());
     Eigen::VectorXd all(2 * m + p + 1);
@@ -114,7 +115,7 @@ std::pair<int, int> check_derivatives(const CraneModel& model, const std::string
     const std::vector<int> leaders = exact.leaders;
     for (const int leader : leaders) ++(leader < 0 ? led.second : led.first);
     const Eigen::Index n = exact.n;
-    law.evaluate({x.data(), x.data() + n, x.data() + 2 * n}, kPayload);
+    law.evaluate({x.data(), x.data() + n, x.data() + 2 * n}, kCarriedMass);
     const std::vector<const Jet*> jets = same_of(law);
     for (Eigen::Index k = 0; k < (law.uses_acceleration() ? 3 : 2) * n; ++k) {
       bool same_leaders = true;
@@ -180,9 +181,9 @@ TEST(ChainDerivatives, OfEqualDemandsTheFirstLeadsAsInTheChain) {
   ChainDerivatives law(model);
   Chain chain(model);
   const double q[] = {0.4, -1.1, 2.0}, qd[] = {0.0, -0.08, 0.1};
-  const MachineState& s = chain.evaluate({q, qd}, kPayload);
+  const MachineState& s = chain.evaluate({q, qd}, kCarriedMass);
   ASSERT_EQ(s.cylinders[1].pressure, s.cylinders[2].pressure);
-  law.evaluate({q, qd}, kPayload);
+  law.evaluate({q, qd}, kCarriedMass);
   EXPECT_EQ(s.pumps[0].leader, 1);
   EXPECT_EQ(law.instant().leader[0], 1);
   EXPECT_EQ(law.pump_pressure(0).value, s.pumps[0].pressure);
