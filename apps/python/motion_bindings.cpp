@@ -165,7 +165,10 @@ void bind_motion(py::module_& m) {
       .def_property_readonly(
           "duration_s", [](const Optimum& o) { return o.result().duration; }, "[s] of the motion")
       .def_property_readonly(
-          "interrupted", [](const Optimum& o) { return o.result().interrupted; },
+          "interrupted",
+          [](const Optimum& o) {
+            return o.result().interrupted || o.result().status == OptimizeStatus::kInterrupted;
+          },
           "Whether Ctrl-C ended it, so that something is missing.")
       .def_property_readonly(
           "motion", [](const Optimum& o) -> const Trajectory& { return o.result().motion; },

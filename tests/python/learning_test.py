@@ -75,6 +75,37 @@ def test_arrays_and_frames_become_the_same_log_as_the_file(machine, test_log):
     assert list(frame.columns) == test_log.signals and len(frame) == len(test_log)
 
 
+def test_columns_of_a_frame_are_read_whatever_their_type(machine, test_log):
+    import pandas
+    endings = {"pA_boom": ("_bar", 1e5), "p_main": ("_bar", 1e5)}
+    columns = {"t_s": test_log.time, "note": ["as built"] * len(test_log)}
+    for name in ("q_boom", "q_jib", "u_boom", "pA_boom", "p_main"):
+        ending, scale = endings.get(name, ("_rad" if name.startswith("q") else "", 1.0))
+        columns[name + ending] = test_log[name] / scale
+    columns["q_extension_m"] = test_log["q_extension"]
+    frame = pandas.DataFrame(columns)
+    # One missing value makes a column one of objects, or of pandas' own numbers.
+    mixed = frame.astype({"pA_boom_bar": object, "p_main_bar": "Float64"})
+    mixed.loc[5, "pA_boom_bar"] = None
+    mixed.loc[7, "p_main_bar"] = pandas.NA
+    with pytest.warns(UserWarning, match="note holds no numbers and is left out"):
+        log = sparflow.Log.from_frame(mixed, machine)
+    np.testing.assert_allclose(log["pA_boom"][10:], test_log["pA_boom"][10:], rtol=1e-15)
+    assert "p_main" in log
+    mixed.loc[9, "pA_boom_bar"] = "broken"
+    with pytest.raises(sparflow.InputError, match="pA_boom_bar: expected numbers, found 'broken' at 9"):
+        sparflow.Log.from_frame(mixed, machine)
+    with pytest.raises(sparflow.InputError, match="two columns of the frame have this name"):
+        sparflow.Log.from_frame(pandas.concat([frame, frame[["u_boom"]]], axis=1), machine)
+
+
+def test_a_log_of_another_machine_is_refused(test_log):
+    other = sparflow.Machine.load(DATA / "machines/excavator.yaml")
+    for call in (lambda: sparflow.fit(other, test_log), lambda: sparflow.Signals(other, test_log)):
+        with pytest.raises(sparflow.InputError, match="read for another machine"):
+            call()
+
+
 def test_signals_of_a_log_are_those_that_errors_are_judged_by(machine, test_log):
     signals = sparflow.Signals(machine, test_log)
     boom = signals.cylinders[machine.cylinders.index("boom")]

@@ -1,8 +1,10 @@
 """Tables of results for pandas, which is imported only when one is asked for."""
 
 import json
+import warnings
 
 from . import _sparflow as core
+from ._errors import InputError, SparflowWarning
 
 
 def _pandas():
@@ -121,9 +123,31 @@ def log_from_frame(frame, machine, name="frame", mapping=None):
     """
     if "t_s" not in frame.columns and frame.index.name == "t_s":
         frame = frame.reset_index()
-    numbers = frame.select_dtypes("number")
-    return core.Log.from_arrays({str(c): numbers[c].to_numpy(dtype=float) for c in numbers.columns},
-                                machine, name, mapping)
+    columns = {}
+    for position, label in enumerate(frame.columns):
+        if str(label) in columns:
+            raise InputError(f"{label}: two columns of the frame have this name; rename one")
+        numbers = _numbers(frame.iloc[:, position], str(label))
+        if numbers is not None:
+            columns[str(label)] = numbers
+    return core.Log.from_arrays(columns, machine, name, mapping)
+
+
+def _numbers(column, name):
+    """A column as floats, NaN where a value is missing; None, with a warning, where it holds text alone."""
+    pandas = _pandas()
+    if pandas.api.types.is_datetime64_any_dtype(column) or pandas.api.types.is_timedelta64_dtype(column):
+        raise InputError(f"{name}: expected numbers, found times; give seconds, "
+                              "such as (t - t[0]).dt.total_seconds()")
+    numbers = pandas.to_numeric(column, errors="coerce")
+    unread = column[numbers.isna() & column.notna()]
+    if len(unread) > 0 and len(unread) == int(column.notna().sum()):
+        warnings.warn(f"{name} holds no numbers and is left out (its first value is {unread.iloc[0]!r})", SparflowWarning, stacklevel=3)
+        return None
+    if len(unread) > 0:
+        raise InputError(f"{name}: expected numbers, found {unread.iloc[0]!r} at {unread.index[0]!r}; "
+                              "remove it or write NaN")
+    return numbers.to_numpy(dtype=float, na_value=float("nan"))
 
 
 def attach():
