@@ -87,11 +87,11 @@ void MdfFrames::add(const MdfFile& file, const MdfRecords& records,
                     const MdfFrameChannels& channels, const std::vector<double>& time,
                     std::string_view variable) {
   for (const MdfChannel* c : {channels.id, channels.extended, channels.length, channels.code})
-    if (c != nullptr) check_place(file, records, *c);
+    if (c != nullptr) check_bits(file, records, *c);
   const bool elsewhere = channels.bytes->type == MdfChannel::kVariable;
   const MdfChannel* own_length = length_of(file, *records.group, *channels.bytes);
-  if (own_length != nullptr) check_place(file, records, *own_length);
-  if (elsewhere) check_place(file, records, *channels.bytes);
+  if (own_length != nullptr) check_bits(file, records, *own_length);
+  if (elsewhere) check_bits(file, records, *channels.bytes);
   if (static_cast<std::int64_t>(frames_.size() + records.count) > file.limits().log_values) {
     file.fail(records.group->at, "CG",
               fmt::format("more than {:g} frames in the file, the limit of a log (docs/limits.md)",

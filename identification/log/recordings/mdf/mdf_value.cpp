@@ -108,6 +108,17 @@ void check_place(const MdfFile& file, const MdfRecords& records, const MdfChanne
   }
 }
 
+void check_bits(const MdfFile& file, const MdfRecords& records, const MdfChannel& channel) {
+  if (channel.is_virtual() || channel.bit_offset > 7 || channel.bit_count == 0 ||
+      channel.bit_count > 64) {
+    file.fail(channel.at, "CN",
+              fmt::format("channel {}: an integer of {} bits from bit {}, expected 1 to 64; the "
+                          "file is damaged",
+                          printable(channel.name), channel.bit_count, channel.bit_offset));
+  }
+  check_place(file, records, channel);
+}
+
 std::uint64_t mdf_bits(const MdfRecords& records, const MdfChannel& channel, std::size_t record) {
   return bits_at(records.data.data() + record * records.stride + channel.byte_offset, channel);
 }

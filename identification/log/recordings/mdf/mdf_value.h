@@ -20,6 +20,8 @@ struct MdfRecords {
 
 /// @throws InputError where the channel reaches beyond its record, or has bits that no number has
 void check_place(const MdfFile& file, const MdfRecords& records, const MdfChannel& channel);
+/// The same for a channel of any type whose bits are read as an integer (`mdf_bits`).
+void check_bits(const MdfFile& file, const MdfRecords& records, const MdfChannel& channel);
 
 /// The stored number, before its conversion; of a virtual channel the record's number. `check_place` holds.
 double mdf_raw(const MdfRecords& records, const MdfChannel& channel, std::size_t record);
