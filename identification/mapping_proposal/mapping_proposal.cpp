@@ -153,9 +153,15 @@ class ProposalRows {
     row.factor = unit.factor;
     row.expression =
         column_times(row.channel_name, unit.factor / units::kBar, unit.offset / units::kBar);
-    if (!set.open_unit.empty())
+    const bool has_unit =
+        data_.units[static_cast<std::size_t>(row.channel)].of == ChannelUnit::Of::kPressure;
+    if (!set.open_unit.empty() && !has_unit)
       row.reasons.push_back(fmt::format("values fit in {}", set.open_unit));
-    if (parts_[c].speed != nullptr && best_.pairs[c][0] >= 0) {
+    const PositionCandidate* position = search_.position(best_, machine_.cylinders[c].joint);
+    bool exchanged = false;
+    // where nothing moves every constant follows the static force
+    if (position != nullptr && position->moves && parts_[c].speed != nullptr &&
+        best_.pairs[c][0] >= 0) {
       const CylinderForces forces(data_, {set, cylinder, forces_, *parts_[c].speed, payload_});
       const ForceFit fit = forces.fit(best_.pairs[c][0], best_.pairs[c][1]);
       const double largest =
@@ -169,12 +175,22 @@ class ProposalRows {
                         best_.pairs[c][1] >= 0 ? "A pA - B pB" : "A pA", machine_.cylinders[c].name,
                         1e-3 * fit.rms, 1e-3 * largest));
       }
+      if (best_.pairs[c][1] >= 0) {
+        const ForceFit other = forces.fit(best_.pairs[c][1], best_.pairs[c][0]);
+        exchanged = other.log_odds > fit.log_odds + confidence_.decisive;
+        if (exchanged)
+          row.reasons.push_back(fmt::format(
+              "bore and rod side seem to be exchanged: the other way round the force is followed "
+              "within {:.2g} kN",
+              1e-3 * other.rms));
+      }
     }
     judge(&row, {side == 0 ? Ban::Kind::kPressureA : Ban::Kind::kPressureB, cylinder, row.channel},
           [&](const Assignment& a) {
             const int k = a.pairs[c][static_cast<std::size_t>(side)];
             return k < 0 ? -1 : set.channels[static_cast<std::size_t>(k)];
           });
+    if (exchanged) row.confidence = std::min(row.confidence, confidence_.resting);
     return row;
   }
 
@@ -229,10 +245,12 @@ class ProposalRows {
       return;
     }
     const CommandFit& fit = search_.command_fit(joint, candidate, row->channel);
-    row->reasons.push_back(fmt::format("explains {:.0f} % of the rod speed, {:.1f} s later",
-                                       100.0 * (1.0 - fit.misfit * fit.misfit),
-                                       fit.lag * data_.samples.step));
-    if (fit.sign < 0.0) row->reasons.push_back("its sign is reversed");
+    if (fit.log_odds > 0.0) {
+      row->reasons.push_back(fmt::format("explains {:.0f} % of the rod speed, {:.1f} s later",
+                                         100.0 * (1.0 - fit.misfit * fit.misfit),
+                                         fit.lag * data_.samples.step));
+    }
+    if (fit.log_odds > 0.0 && fit.sign < 0.0) row->reasons.push_back("its sign is reversed");
     std::string scale;
     row->expression = command_expression(data_, row->channel, row->meaning.index, fit, &scale);
     row->reasons.push_back(scale);

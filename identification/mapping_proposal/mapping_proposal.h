@@ -22,7 +22,11 @@ struct ConfidenceOptions {
   /// Below it a meaning stands in the written mapping as a comment only.
   /// @threshold [1] 0.5..0.99; chosen: a mapping with twenty columns should rarely hold a wrong one
   double unsure_below = 0.7;
-  /// Largest confidence of a meaning whose joint rests throughout, where the name says nothing.
+  /// Log-odds by which the forces must speak for the other side of a cylinder before names and forces contradict each other.
+  /// @threshold [nat] 1..20; chosen: odds of e^4, with which a name is not doubted by chance
+  double decisive = 4.0;
+  /// Largest confidence of a meaning whose joint rests throughout, where the name says nothing, and of pressures of a cylinder
+  /// whose names and forces contradict each other.
   /// @threshold [1] 0..0.7; chosen: nothing but range and unit speaks for it
   double resting = 0.5;
   /// Largest confidence that is told.

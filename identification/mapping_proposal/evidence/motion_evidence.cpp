@@ -21,7 +21,7 @@ constexpr double kRestShare = 0.03;
 /// @threshold [nat] 0..4; chosen: between a vague and a clear word
 constexpr double kUnusualUnit = 1.5;
 /// Loss of a flow that has both signs.
-/// @threshold [nat] 0..4; chosen: as above; flows are counted in the direction of the pump
+/// @threshold [nat] 0..4; chosen: as a unit that is not the usual one; flows are counted in the direction of the pump
 constexpr double kSignedFlow = 1.5;
 
 /// Misfit up to which the slopes of a command mean something.
@@ -34,7 +34,7 @@ constexpr double kSlopeLoss = 2.5;
 /// @threshold [1] 0.1..1; tuned: seeds 1..4 of docs/mapping_proposal.md
 constexpr double kRatioSpread = 0.3;
 /// Spread of the logarithm of the speed at full command.
-/// @threshold [1] 0.1..1; tuned: as above; full command is limited by many controllers
+/// @threshold [1] 0.1..1; tuned: seeds 1..4 of docs/mapping_proposal.md; full command is limited by many controllers
 constexpr double kGainSpread = 0.4;
 
 double neutral_of(const Eigen::Ref<const VectorXd>& v, const VectorXd& speed) {

@@ -189,6 +189,50 @@ TEST(MappingProposal, AReasonIsGivenOnlyWhereTheValuesHaveIt) {
   EXPECT_THAT(reasons(100.0, 90.0), testing::Not(testing::Contains(reason)));
 }
 
+TEST(MappingProposal, ConstantChannelsWithNamesHaveNoReasonFromPhysics) {
+  const Machine machine = bundled("loader_crane");
+  TimedChannels file = own_log(machine, 209, "");
+  for (RecordedChannel& c : file.recording.channels)
+    std::fill(c.values.begin(), c.values.end(), 1.0);
+  const MappingProposal p = propose_mapping(file, machine);
+  for (const MeaningProposal& m : p.meanings) {
+    for (const std::string& reason : m.reasons) {
+      EXPECT_THAT(reason, testing::Not(testing::HasSubstr("follows"))) << m.column;
+      EXPECT_THAT(reason, testing::Not(testing::HasSubstr("explains"))) << m.column;
+    }
+  }
+  const MeaningProposal* boom = proposal_for(p, {Role::kPressureA, 0});
+  ASSERT_NE(boom, nullptr);
+  EXPECT_EQ(boom->channel_name, "pA_boom_bar");  // by its name
+}
+
+TEST(MappingProposal, NamesOfBoreAndRodSideThatContradictTheForcesAreUnsure) {
+  const Machine machine = bundled("loader_crane");
+  TimedChannels file = own_log(machine, 210, "");
+  const auto boom_is_sure = [&] {
+    const MappingProposal p = propose_mapping(file, machine);
+    const MeaningProposal* boom = proposal_for(p, {Role::kPressureA, 0});
+    const MeaningProposal* jib = proposal_for(p, {Role::kPressureA, 1});
+    EXPECT_TRUE(boom != nullptr && jib != nullptr);
+    if (boom == nullptr || jib == nullptr) return false;
+    EXPECT_GT(jib->confidence, 0.9);
+    const bool told = std::any_of(boom->reasons.begin(), boom->reasons.end(), [](const auto& r) {
+      return r.find("seem to be exchanged") != std::string::npos;
+    });
+    EXPECT_NE(told, boom->confidence > 0.9);
+    return boom->confidence > 0.9;
+  };
+  EXPECT_TRUE(boom_is_sure());
+  RecordedChannel *a = nullptr, *b = nullptr;
+  for (RecordedChannel& c : file.recording.channels) {
+    if (c.name == "pA_boom_bar") a = &c;
+    if (c.name == "pB_boom_bar") b = &c;
+  }
+  ASSERT_TRUE(a != nullptr && b != nullptr);
+  std::swap(a->values, b->values);
+  EXPECT_FALSE(boom_is_sure());
+}
+
 TEST(MappingProposal, ChannelsWhoseNamesWereNotJudgedComeLast) {
   const Machine machine = bundled("loader_crane");
   TimedChannels file = own_log(machine, 209, "");

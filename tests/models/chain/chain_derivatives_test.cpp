@@ -10,6 +10,7 @@
 #include "models/effects/registry.h"
 #include "models/math/error.h"
 #include "models/math/units.h"
+#include "tests/models/small_process.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {
@@ -17,29 +18,15 @@ namespace {
 
 using test_support::numeric_partial;
 using test_support::Random;
+using test_support::small_process;
 using units::kBar;
-
-/// A process of three centres, whose pressure depends on flow and force.
-GpParameters curved_process(double constant, double slope) {
-  GpParameters p;
-  p.length_flow = 6e-4;
-  p.length_force = 8e4;
-  p.signal_std = 12 * kBar;
-  p.noise_std = 1 * kBar;
-  p.mean_constant = constant;
-  p.mean_slope = slope;
-  p.flow = Eigen::Array3d(3e-4, 1e-3, 1.6e-3);
-  p.force = Eigen::Array3d(1e4, 6e4, 1.2e5);
-  p.weight = Eigen::Array3d(4e-7, -2e-7, 5e-7);
-  return p;
-}
 
 CraneModel model_of(const Machine& machine) {
   CraneModel model = CraneModel::untrained(machine);
   for (std::size_t i = 0; i < model.cylinders.size(); ++i) {
     const double n = static_cast<double>(i);
-    model.cylinders[i].extend = GaussianProcess(curved_process((60 + 7 * n) * kBar, 40.0 + n));
-    model.cylinders[i].retract = GaussianProcess(curved_process((75 + 9 * n) * kBar, -20.0 - n));
+    model.cylinders[i].extend = GaussianProcess(small_process((60 + 7 * n) * kBar, 40.0 + n));
+    model.cylinders[i].retract = GaussianProcess(small_process((75 + 9 * n) * kBar, -20.0 - n));
     model.cylinders[i].margin = (11 + n) * kBar;
   }
   return model;
@@ -175,7 +162,7 @@ INSTANTIATE_TEST_SUITE_P(Machines, ChainDerivativesOf,
 
 TEST(ChainDerivatives, OfEqualDemandsTheFirstLeadsAsInTheChain) {
   CraneModel model = CraneModel::untrained(test_support::loader_crane());
-  GpParameters flat = curved_process(80 * kBar, 0.0);
+  GpParameters flat = small_process(80 * kBar, 0.0);
   flat.weight.setZero();
   for (CylinderModel& c : model.cylinders) c.extend = c.retract = GaussianProcess(flat);
   ChainDerivatives law(model);

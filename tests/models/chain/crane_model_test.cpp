@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "models/math/units.h"
+#include "tests/models/small_process.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow {
@@ -13,22 +14,8 @@ namespace {
 
 using test_support::Random;
 using test_support::random_configuration;
+using test_support::small_process;
 using units::kBar;
-
-/// A process of three centres around (1e-3 m^3/s, 50 kN), small enough to be summed by hand.
-GpParameters small_process(double constant, double slope) {
-  GpParameters p;
-  p.length_flow = 6e-4;
-  p.length_force = 8e4;
-  p.signal_std = 12 * kBar;
-  p.noise_std = 1 * kBar;
-  p.mean_constant = constant;
-  p.mean_slope = slope;
-  p.flow = Eigen::Array3d(3e-4, 1e-3, 1.6e-3);
-  p.force = Eigen::Array3d(1e4, 6e4, 1.2e5);
-  p.weight = Eigen::Array3d(4e-7, -2e-7, 5e-7);
-  return p;
-}
 
 /// The formula in the head of models/hydraulics/gaussian_process.h, term by term.
 double by_hand(const GpParameters& p, double flow, double force) {
