@@ -66,13 +66,21 @@ void suggest_options(const CLI::App& app, int argc, char** argv) {
   }
 }
 
-/// `sparflow help VERB` is `sparflow VERB --help`, `sparflow help` is `sparflow --help`.
-std::vector<std::string> spelt_out(int argc, char** argv) {
+bool is_verb(const CLI::App& app, const std::string& word) {
+  const std::vector<const CLI::App*> verbs =
+      app.get_subcommands([&](const CLI::App* v) { return v->get_name() == word; });
+  return !verbs.empty();
+}
+
+/// `sparflow help VERB` is `sparflow VERB --help`, `sparflow help` is `sparflow --help`; what is no verb is asked for as one, so
+/// that it is refused.
+std::vector<std::string> spelt_out(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
     words.resize(std::min<std::size_t>(words.size(), 1));
-    words.emplace_back("--help");
+    if (words.empty() || words.front().rfind('-', 0) == 0 || is_verb(app, words.front()))
+      words.emplace_back("--help");
   }
   std::reverse(words.begin(), words.end());  // as the command line's library takes them
   return words;
@@ -88,14 +96,15 @@ void print_parsed(const CLI::App& app, const CLI::ParseError& e) {
 
 int run(CLI::App& app, int argc, char** argv, const int& code) {
   try {
-    app.parse(spelt_out(argc, argv));
+    app.parse(spelt_out(app, argc, argv));
     return code;
   } catch (const CLI::Success& e) {  // --help, --version
     print_parsed(app, e);
     return kDone;
   } catch (const CLI::ParseError& e) {
     print_parsed(app, e);
-    if (argc > 1 && argv[1][0] != '-') suggest_verb(app, argv[1]);
+    const int verb = argc > 2 && std::string(argv[1]) == "help" ? 2 : 1;
+    if (argc > verb && argv[verb][0] != '-') suggest_verb(app, argv[verb]);
     suggest_options(app, argc, argv);
     return kUsage;
   }

@@ -71,6 +71,8 @@ TEST_F(Completion, OffersVerbsOptionsValuesAndFiles) {
   EXPECT_EQ(offered({"sparflow", "effects", "coulomb"}),
             std::vector<std::string>{"coulomb_friction"});
   EXPECT_EQ(offered({"sparflow", "help", "par"}), std::vector<std::string>{"pareto"});
+  EXPECT_EQ(offered({"sparflow", "completion", ""}),
+            (std::vector<std::string>{"bash", "zsh", "fish"}));
 }
 
 TEST_F(Completion, AValueThatIsANumberOffersNoFile) {

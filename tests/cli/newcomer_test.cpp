@@ -269,6 +269,9 @@ TEST_F(Cli, WordsOfTheCommandLineHelp) {
   const Outcome help = run("help fit");
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.out, run("fit --help").out);
+  const Outcome unknown = run("help optimise");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("Did you mean \"sparflow optimize\"?"));
   const Outcome typo = run("compare --modle x.json -l " + kTest);
   EXPECT_EQ(typo.code, 2);
   EXPECT_THAT(typo.err, HasSubstr("Did you mean --model?"));

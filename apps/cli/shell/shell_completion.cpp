@@ -53,18 +53,21 @@ std::string bash_verb(const CompletedVerb& verb) {
             : fmt::format("words={}", in_quotes(fmt::format("{}", fmt::join(option.values, " "))));
     cases += fmt::format("        {}) {} ;;\n", fmt::join(option.names, "|"), offer);
   }
+  // a verb whose words are known takes no file
+  const std::string rest =
+      fmt::format("words={} files={}", in_quotes(fmt::format("{}", fmt::join(verb.words, " "))),
+                  verb.words.empty() ? "1" : "");
   return fmt::format(
       "    {})\n"
       "      options={}\n"
-      "      words={} files=1\n"
+      "      {}\n"
       "      case $before in\n"
       "        -*) files= ;;&\n"
       "{}"
-      "        -*) words={} files=1 ;;\n"
+      "        -*) {} ;;\n"
       "      esac\n"
       "      ;;\n",
-      verb.name, in_quotes(all), in_quotes(fmt::format("{}", fmt::join(verb.words, " "))), cases,
-      in_quotes(fmt::format("{}", fmt::join(verb.words, " "))));
+      verb.name, in_quotes(all), rest, cases, rest);
 }
 
 std::string zsh_value(const CompletedOption& option) {
