@@ -9,6 +9,7 @@
 #include "apps/report/motion_pages/benchmark_page.h"
 #include "apps/tasks/benchmark/benchmark_task.h"
 #include "apps/tasks/simulate/simulate_task.h"
+#include "apps/tasks/trust/trust_task.h"
 #include "models/math/error.h"
 #include "simulator/controllers/foreign_process.h"
 #include "simulator/plant/parameters/plant_effects.h"
@@ -92,6 +93,38 @@ class Benchmarked final : public Result {
  private:
   BenchmarkResult result_;
 };
+
+class Trusted final : public Result {
+ public:
+  explicit Trusted(TrustLoop loop)
+      : loop_(std::move(loop)),
+        before_(std::make_shared<CraneModel>(loop_.before())),
+        after_(std::make_shared<CraneModel>(loop_.after())) {}
+  std::string json() const override { return trust_json(loop_); }
+  std::string text() const override { return trust_table(loop_); }
+  std::string headline() const override { return trust_headline(loop_); }
+  Page page() const override { return trust_page(loop_); }
+  const TrustLoop& loop() const { return loop_; }
+  std::shared_ptr<CraneModel> before() const { return before_; }
+  std::shared_ptr<CraneModel> after() const { return after_; }
+
+ private:
+  TrustLoop loop_;
+  std::shared_ptr<CraneModel> before_, after_;
+};
+
+std::shared_ptr<Trusted> loop_of_trust(const std::shared_ptr<Machine>& machine, const py::dict& a) {
+  TrustTask task;
+  task.effects = a["effects"].cast<std::vector<std::string>>();
+  task.train_seconds = a["train_seconds"].cast<double>();
+  task.test_seconds = a["test_seconds"].cast<double>();
+  task.moves = a["moves"].cast<int>();
+  task.seed = a["seed"].cast<std::uint64_t>();
+  task.processes = a["processes"].cast<int>();
+  return long_call<Trusted>(a["progress"], [machine, task](const Listener& listener) {
+    return std::make_shared<Trusted>(trust_task(machine, task, listener));
+  });
+}
 
 /// Positions by joint for those that Python names, the middle of their ranges for others. @throws KeyError
 std::vector<double> start_of(const py::dict& given, const Machine& machine) {
@@ -261,10 +294,19 @@ void bind_plant(py::module_& m) {
       .def(
           "csv", [](const Benchmarked& b) { return benchmark_csv(b.result()); },
           "The text that `--csv` writes.");
+  py::class_<Trusted, Result, std::shared_ptr<Trusted>>(
+      m, "TrustLoop",
+      "Predicted energy against true energy on the plant, before and after improve.")
+      .def_property_readonly("before", &Trusted::before, "The model as it was fitted.")
+      .def_property_readonly("after", &Trusted::after, "The model that improve made of it.")
+      .def_property_readonly(
+          "interrupted", [](const Trusted& t) { return t.loop().interrupted; },
+          "Whether Ctrl-C ended it, so that something is missing.");
   m.def("plant_effects", &plant::effects_help,
         "Lists the effects that `simulate` can switch: name, nominal value, what it is.");
   m.def("simulate", &simulate);
   m.def("benchmark", &run_benchmark);
+  m.def("loop_of_trust", &loop_of_trust);
 }
 
 }  // namespace sparflow::python

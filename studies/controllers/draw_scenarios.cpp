@@ -8,84 +8,16 @@
 #include <filesystem>
 #include <fstream>
 
+#include "apps/tasks/benchmark/drawn_moves.h"
 #include "models/files/machine_file.h"
 #include "models/machine/kinematics.h"
-#include "models/machine/static_force.h"
 #include "models/math/error.h"
 #include "problems/bundled.h"
-#include "problems/time_parametrise.h"
-#include "simulator/programmes/programmes.h"
-#include "simulator/random/random.h"
 
 namespace sparflow::bench {
 namespace {
 
-/// Share of the pump's pressure that a drawn posture may ask for.
-constexpr double kHoldingShare = 0.7;
-constexpr double kLeastWay = 1.2;  // [m] of the tip in a move
-constexpr double kFlowShare =
-    0.85;  // of valves and pumps, in the shortest time that durations are factors of
-
 double rounded(double x, double step) { return step * std::round(x / step); }
-
-class Drawing {
- public:
-  Drawing(const Machine& machine, std::uint64_t seed)
-      : machine_(machine), random_(seed, "scenarios"), statics_(machine) {}
-
-  /// A posture that the pumps can hold with this payload, the tip not far below the base.
-  Eigen::VectorXd posture(double payload) {
-    while (true) {
-      Eigen::VectorXd q(machine_.joint_count());
-      for (int k = 0; k < machine_.joint_count(); ++k) {
-        const Range r = machine_.joints[static_cast<std::size_t>(k)].position;
-        const bool driven = machine_.cylinder_of_joint(k) >= 0;
-        q[k] = rounded(r.lo + (r.hi - r.lo) * (driven ? random_.uniform(0.1, 0.9) : 0.5), 1e-3);
-      }
-      if (holds(q, payload) && tip_position<double>(machine_, q).z() > -1.0) return q;
-    }
-  }
-
-  bool holds(const Eigen::VectorXd& q, double payload) {
-    statics_.update(q.data(), payload, 0);
-    for (int c = 0; c < machine_.cylinder_count(); ++c) {
-      const Cylinder& drive = machine_.cylinders[static_cast<std::size_t>(c)];
-      const int pump = machine_.pump_of_cylinder(c);
-      if (!drive.hydraulic() || pump < 0) continue;
-      const double force = statics_.force()[c];
-      const double area = force > 0.0 ? drive.area_piston() : drive.area_rod();
-      const double most = machine_.pumps[static_cast<std::size_t>(pump)].max_pressure;
-      if (std::abs(force) / area > kHoldingShare * most) return false;
-    }
-    return true;
-  }
-
-  /// Whether the straight joint line can be held throughout, and its shortest time [s]; 0: it cannot.
-  double shortest(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double payload) {
-    for (int k = 1; k < 12; ++k)
-      if (!holds(from + k / 12.0 * (to - from), payload)) return 0.0;
-    MotionProblem p;
-    p.machine = machine_;
-    p.limits = limits_of(machine_);
-    p.limits.valve_fraction = kFlowShare;
-    for (double& flow : p.limits.pump_max_flow) flow *= kFlowShare;
-    p.payload = payload;
-    p.start = from;
-    p.goal = JointGoal{to};
-    Eigen::MatrixXd path(2, from.size());
-    path.row(0) = from;
-    path.row(1) = to;
-    return time_parametrise(p, path, 0.0).shortest;
-  }
-
-  simulator::Random& random() { return random_; }
-  const Machine& machine() const { return machine_; }
-
- private:
-  const Machine& machine_;
-  simulator::Random random_;
-  StaticForce statics_;
-};
 
 std::string posture_text(const Machine& machine, const Eigen::VectorXd& q) {
   std::string text;
@@ -96,16 +28,15 @@ std::string posture_text(const Machine& machine, const Eigen::VectorXd& q) {
 }
 
 /// Goals of one scenario as YAML, or nothing where a move is too short or cannot be held.
-std::string goals(Drawing& d, Eigen::VectorXd from, double payload, double usual) {
+std::string goals(MoveDrawing& d, Eigen::VectorXd from, double payload) {
   const int moves = d.random().chance(0.7) ? 1 : d.random().chance(0.5) ? 2 : 3;
   std::string text;
   for (int g = 0; g < moves; ++g) {
     const Eigen::VectorXd to = d.posture(payload);
     const Eigen::Vector3d tip = tip_position<double>(d.machine(), to);
     const double time = d.shortest(from, to, payload);
-    if (time <= 0.0 || (tip - tip_position<double>(d.machine(), from)).norm() < kLeastWay)
-      return "";
-    const double duration = std::max(6.0, rounded(d.random().uniform(1.3, 2.5) * time + 1.0, 0.5));
+    if (time <= 0.0 || !d.far_apart(from, to)) return "";
+    const double duration = d.duration(time);
     const bool by_tip = d.random().chance(0.7);
     text +=
         by_tip
@@ -115,7 +46,8 @@ std::string goals(Drawing& d, Eigen::VectorXd from, double payload, double usual
     text += fmt::format(", duration_s: {:g}", duration);
     if (g + 1 < moves) {
       // a load is put down, or taken within what the posture holds
-      double next = payload > 0.0 ? 0.0 : rounded(d.random().uniform(0.2, 0.7) * usual, 10.0);
+      double next =
+          payload > 0.0 ? 0.0 : rounded(d.random().uniform(0.2, 0.7) * d.usual_payload(), 10.0);
       if (!d.holds(to, next)) next = 0.0;
       if (next != payload) text += fmt::format(", payload_kg: {:g}", next);
       payload = next;
@@ -140,15 +72,13 @@ int run(int argc, char** argv) {
     if (option == "-o") output = value;
   }
   const Machine machine = load_machine(bundled_file("machines/" + machine_name + ".yaml"));
-  const double usual = plant::usual_payload(machine);
   std::filesystem::create_directories(output);
   for (int k = 0; k < count;) {
     static std::uint64_t draw = 0;
-    Drawing d(machine, static_cast<std::uint64_t>(seed) * 100000 + draw++);
-    const double payload =
-        d.random().chance(0.25) ? 0.0 : rounded(d.random().uniform(0.2, 0.8) * usual, 10.0);
+    MoveDrawing d(machine, static_cast<std::uint64_t>(seed) * 100000 + draw++);
+    const double payload = d.payload();
     const Eigen::VectorXd start = d.posture(payload);
-    const std::string moves = goals(d, start, payload, usual);
+    const std::string moves = goals(d, start, payload);
     if (moves.empty()) continue;
     const std::string id = fmt::format("{}_{}_{:02}", set, machine_name, ++k);
     std::ofstream file(output + "/" + id + ".yaml");

@@ -4,11 +4,9 @@
 
 #include <optional>
 
-#include "apps/tasks/benchmark/learned_machine.h"
-#include "apps/tasks/benchmark/optimal_motions.h"
+#include "apps/tasks/benchmark/learned_run.h"
 #include "models/math/interruption.h"
 #include "optimizer/solve/kept_work.h"
-#include "simulator/benchmark/closed_loop.h"
 #include "simulator/controllers/foreign_process.h"
 
 namespace sparflow {
@@ -101,28 +99,15 @@ void Benchmark::plan() {
 benchmark::Row Benchmark::run(const BenchmarkRun& run) const {
   const benchmark::Scenario& s = work_.scenarios[run.scenario];
   const Entrant& e = work_.entrants[run.entrant];
-  const CraneModel* model = work_.model_of[run.scenario].get();
-  const control::SectionValves valves(model != nullptr ? learned_sections(*model)
-                                                       : control::sections_of(s.machine));
-  std::optional<LearnedPower> power;
-  std::optional<ScenarioMotions> source;
-  if (model != nullptr) {
-    power.emplace(*model);
-    source.emplace(s, *model, motions_[run.scenario], planning_);
-  }
   benchmark::LoopOptions loop;
   loop.stop = [this] { return listener_.stop(); };
-  control::Knowledge know;
-  know.machine = &s.machine;
-  know.valves = &valves;
-  know.power = power ? &*power : nullptr;
-  know.motions = source ? &*source : nullptr;
-  know.sample_time = loop.sample_time;
   control::ForeignOptions foreign;
   foreign.step_budget = task_.step_budget;
-  return benchmark::run_closed_loop(
-      s, e.name,
-      [&]() -> std::unique_ptr<control::Controller> {
+  const LearnedRun learned{s, work_.model_of[run.scenario].get(), motions_[run.scenario],
+                           planning_};
+  return learned.run(
+      e.name,
+      [&](const control::Knowledge& know) -> std::unique_ptr<control::Controller> {
         if (e.make) return e.make(know);
         return e.info != nullptr ? e.info->make(know, e.gains)
                                  : control::foreign_controller(know, e.command, foreign);

@@ -107,6 +107,7 @@ std::optional<Log> recording_of(const SimulateTask& a, const Machine& machine) {
 }
 
 plant::PlantParameters plant_of(const Machine& machine, const SimulateTask& task) {
+  if (task.parameters) return *task.parameters;
   plant::PlantParameters parameters = plant::default_parameters(machine);
   if (!task.plant.empty()) plant::load_plant_file(task.plant, machine, parameters);
   std::vector<plant::EffectSetting> settings;

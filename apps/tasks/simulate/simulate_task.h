@@ -21,8 +21,9 @@ using ControllerOf =
     std::function<std::unique_ptr<control::Controller>(const control::Knowledge& knowledge)>;
 
 struct SimulateTask {
-  std::vector<std::string> effects;      ///< items of --effects, in their order
-  std::string plant;                     ///< file with parameters of the plant; empty: none
+  std::vector<std::string> effects;  ///< items of --effects, in their order
+  std::string plant;                 ///< file with parameters of the plant; empty: none
+  std::optional<plant::PlantParameters> parameters;  ///< in place of that file and of effects
   std::string programme = "operator";    ///< or "cycles", where none of the following is given
   std::string track, replay;             ///< files
   std::string motion;                    ///< proposed by `diagnose`: its words or its number
