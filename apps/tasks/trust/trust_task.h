@@ -17,6 +17,8 @@ struct TrustTask {
   std::optional<plant::PlantParameters> parameters;  ///< of the plant, in place of effects
   double train_seconds = 200.0;                      ///< [s] of the log to learn from
   double test_seconds = 100.0;                       ///< [s] of the log to judge on
+  double rate = 25.0;                                ///< [Hz] samples of both logs
+  int most_effects = ExtendOptions{}.max_steps;      ///< that improve may add
   int moves = 3;                                     ///< drawn from the seed
   std::uint64_t seed = 1;
   int processes =
