@@ -46,13 +46,18 @@ OptimizeResult optimize_from_seeds(const CraneModel& model, const MotionProblem&
 /// The same crane as a dynamic plant: does what the model promises come true?
 TrustLoop loop_of_trust(const Machine& machine) {
   TrustTask task;
-  /// The logs' lengths and the moves of the demo.
-  /// @threshold [s] 20..1e5; chosen: every pressure is learned, and the demo stays below a minute
+  /// Length of the log to learn from.
+  /// @threshold [s] 20..1e5; chosen: every pressure is learned from it
   constexpr double kTrainSeconds = 120.0;
+  /// Length of the log to judge on.
   /// @threshold [s] 10..1e5; chosen: half of what is learned from
   constexpr double kTestSeconds = 60.0;
+  /// Effects that may enter the model.
+  /// @threshold [1] 1..20; chosen: the largest ones; each takes some seconds
+  constexpr int kMostEffects = 4;
   task.train_seconds = kTrainSeconds;
   task.test_seconds = kTestSeconds;
+  task.most_effects = kMostEffects;
   task.told = [](const std::string& sentence) { tell("   " + sentence + "\n"); };
   Progress progress("trust");
   return trust_task(

@@ -118,6 +118,8 @@ std::shared_ptr<Trusted> loop_of_trust(const std::shared_ptr<Machine>& machine, 
   task.effects = a["effects"].cast<std::vector<std::string>>();
   task.train_seconds = a["train_seconds"].cast<double>();
   task.test_seconds = a["test_seconds"].cast<double>();
+  task.rate = a["rate"].cast<double>();
+  task.most_effects = a["most_effects"].cast<int>();
   task.moves = a["moves"].cast<int>();
   task.seed = a["seed"].cast<std::uint64_t>();
   task.processes = a["processes"].cast<int>();

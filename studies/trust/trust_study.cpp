@@ -1,6 +1,6 @@
 // The loop of trust over plants of the dynamic simulator, drawn anew: how far the energy that a model predicts of its optima is from
 // the true energy of tracking them, before and after `improve`. docs/benchmark.md.
-//   trust_study [--plants 20] [--seed 1] [--machines loader_crane] [--moves 4] [--seconds 200] [--processes 2] [--csv FILE] [--journal FILE]
+//   trust_study [--plants 20] [--seed 1] [--machines loader_crane] [--moves 4] [--seconds 200] [--effects 8] [--processes 2] [--csv FILE] [--journal FILE]
 #include <fmt/format.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ namespace sparflow::bench {
 namespace {
 
 struct Arguments {
-  int plants = 20, moves = 4, processes = 2;
+  int plants = 20, moves = 4, processes = 2, effects = 8;
   std::uint64_t seed = 1;
   double seconds = 200.0;
   std::vector<std::string> machines = {"loader_crane"};
@@ -90,6 +90,7 @@ Plant closed(std::uint64_t seed, const Arguments& a) {
     task.train_seconds = a.seconds;
     task.test_seconds = 0.5 * a.seconds;
     task.moves = a.moves;
+    task.most_effects = a.effects;
     task.processes = 1;
     const TrustLoop loop = trust_task(machine, task, {});
     for (const ExtendStep& s : loop.improved.steps)
@@ -169,6 +170,7 @@ int run_with(int argc, char** argv) {
   app.add("--machines", a.machines, "bundled machines, in turn");
   app.add("--moves", a.moves, "moves of each plant").positive();
   app.add("--seconds", a.seconds, "of the log to learn from").range(20.0, 1e5);
+  app.add("--effects", a.effects, "that improve may add, at most").range(1, 20);
   app.add("--processes", a.processes, "plants at a time").positive();
   app.add("--csv", a.csv, "file for the moves");
   app.add_journal();

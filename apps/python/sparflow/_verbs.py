@@ -196,16 +196,18 @@ def benchmark(scenarios, controllers=None, *, model=None, functions=None, proces
         optimum=optimum, bound=bound, step_budget_s=step_budget_s, jobs=jobs, progress=progress))
 
 
-def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, moves=3, seed=1, effects=(), processes=0, progress=None):
+def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0, most_effects=8, moves=3, seed=1, effects=(),
+                  processes=0, progress=None):
     """Closes the loop on the dynamic plant: does what a model promises come true? Returns a TrustLoop.
 
     The plant writes train_seconds [s] of an operator's work to learn from and test_seconds [s] to judge on; a model is fitted,
     diagnosed and improved; moves drawn from the seed are optimised by the model before and after, and tracked on the plant, beside
     a sequential operator and joint PI. True energy is the pumps' pressure times their flow.
+    rate: samples a second [Hz]. most_effects: that improve may add. moves: number of them.
     effects: of the plant, as in simulate. processes: motions at the same time, 0 is one for each processor.
     """
     return core.loop_of_trust(machine, dict(
-        train_seconds=train_seconds, test_seconds=test_seconds, moves=moves, seed=seed, effects=_several(effects, str),
+        train_seconds=train_seconds, test_seconds=test_seconds, rate=rate, most_effects=most_effects, moves=moves, seed=seed, effects=_several(effects, str),
         processes=processes, progress=progress))
 
 

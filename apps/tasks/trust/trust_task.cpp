@@ -38,18 +38,36 @@ plant::PlantParameters parameters_of(const Machine& machine, const TrustTask& ta
 }
 
 /// An operator's work on the plant, as its sensors tell it.
-Log simulated_log(const std::shared_ptr<const Machine>& machine,
-                  const plant::PlantParameters& parameters, double seconds, std::uint64_t seed,
+Log simulated_log(const std::shared_ptr<const Machine>& machine, const SimulateTask& work,
                   const Listener& listener) {
-  SimulateTask work;
-  work.parameters = parameters;
-  work.seconds = seconds;
-  work.seed = seed;
   const Simulation s = simulate_task(machine, work, listener);
   if (s.interrupted) throw Interruption();
   if (!s.whole()) throw InputError({}, "plant", "its run ended early: " + s.message);
-  Log log = log_from_text(fmt::format("simulated_{}.csv", seed), s.log, *machine);
-  return log;
+  return log_from_text(fmt::format("simulated_{}.csv", work.seed), s.log, *machine);
+}
+
+/// The logs to learn from and to judge on, of one plant at different work.
+struct SimulatedLogs {
+  std::vector<Log> train, test;
+};
+SimulatedLogs simulated_logs(const std::shared_ptr<const Machine>& machine,
+                             const plant::PlantParameters& parameters, const TrustTask& task,
+                             const Listener& listener) {
+  SimulateTask work;
+  work.parameters = parameters;
+  work.rate = task.rate;
+  const double learned = task.train_seconds / (task.train_seconds + task.test_seconds);
+  Listener part = listener;
+  SimulatedLogs logs;
+  work.seconds = task.train_seconds;
+  work.seed = task.seed;
+  part.progress = part_of(listener.progress, 0.0, kSimulated * learned);
+  logs.train.push_back(simulated_log(machine, work, part));
+  work.seconds = task.test_seconds;
+  work.seed = task.seed + 1;
+  part.progress = part_of(listener.progress, kSimulated * learned, kSimulated);
+  logs.test.push_back(simulated_log(machine, work, part));
+  return logs;
 }
 
 /// What is done with one move: three motions of one kind each.
@@ -158,27 +176,29 @@ void track_all(const std::vector<benchmark::Scenario>& moves, const TrustTask& t
 }
 
 /// Learns, diagnoses and extends.
-void learn(const Machine& machine, const std::vector<Log>& train, const std::vector<Log>& test,
+void learn(const Machine& machine, const SimulatedLogs& logs, const TrustTask& task,
            const Listener& listener, TrustLoop& loop) {
   const WorkProgress progress = part_of(listener.progress, kSimulated, kImproved);
   const auto told = [&](double share, const std::string& what) {
     if (progress) progress(share, what);
     if (listener.stop()) throw Interruption();
   };
-  loop.fitted = fit(machine, train, test, {},
-                    [&](double share, const std::string& what) { told(0.1 * share, what); });
+  /// Share of this part that the fit is, on which only the progress that is told depends.
+  /// @threshold [1] 0..0.5; chosen: a diagnosis is ten times the work
+  constexpr double kFit = 0.1;
+  loop.fitted = fit(machine, logs.train, logs.test, {},
+                    [&](double share, const std::string& what) { told(kFit * share, what); });
   if (!loop.fitted.model.complete())
     throw InputError(
         {}, "plant",
         "the simulated log is too short to learn every pressure; ask for more seconds");
-  ExtendLogs logs;
-  logs.suspects = train;
-  logs.tests = test;
   ExtendOptions options;
   options.date = today();
-  loop.improved =
-      improve(loop.fitted.model, logs, options,
-              [&](double share, const std::string& what) { told(0.1 + 0.9 * share, what); });
+  options.max_steps = task.most_effects;
+  options.fit.threads = task.processes;
+  loop.improved = improve(
+      loop.fitted.model, {logs.train, {}, logs.test}, options,
+      [&](double share, const std::string& what) { told(kFit + (1.0 - kFit) * share, what); });
 }
 
 }  // namespace
@@ -186,6 +206,8 @@ void learn(const Machine& machine, const std::vector<Log>& train, const std::vec
 void check_ranges(const TrustTask& task) {
   require_range("trust: train seconds", task.train_seconds, 20.0, 1e5);
   require_range("trust: test seconds", task.test_seconds, 10.0, 1e5);
+  require_range("trust: rate", task.rate, 10.0, 1000.0);
+  require_range("trust: most effects", task.most_effects, 1, 20);
   require_range("trust: moves", task.moves, 1, 10000);
   require_range("trust: processes", task.processes, 0, 256);
 }
@@ -204,23 +226,13 @@ TrustLoop trust_task(std::shared_ptr<const Machine> machine, const TrustTask& ta
   loop.train_seconds = task.train_seconds;
   loop.test_seconds = task.test_seconds;
   const plant::PlantParameters parameters = parameters_of(*machine, task);
-  const double whole = task.train_seconds + task.test_seconds;
-  const auto simulating = [&](double from, double to) {
-    Listener part = listener;
-    part.progress = part_of(listener.progress, kSimulated * from / whole, kSimulated * to / whole);
-    return part;
-  };
-  const std::vector<Log> train = {simulated_log(machine, parameters, task.train_seconds, task.seed,
-                                                simulating(0.0, task.train_seconds))};
-  const std::vector<Log> test = {simulated_log(machine, parameters, task.test_seconds,
-                                               task.seed + 1,
-                                               simulating(task.train_seconds, whole))};
+  const SimulatedLogs logs = simulated_logs(machine, parameters, task, listener);
   say(fmt::format(
       "Simulated {:.0f} s of an operator's work to learn from and {:.0f} s to judge on.",
       task.train_seconds, task.test_seconds));
-  learn(*machine, train, test, listener, loop);
-  loop.test_before = compare(loop.before(), test);
-  loop.test_after = compare(loop.after(), test);
+  learn(*machine, logs, task, listener, loop);
+  loop.test_before = compare(loop.before(), logs.test);
+  loop.test_after = compare(loop.after(), logs.test);
   say(trust_story(loop));
   loop.interrupted = loop.improved.interrupted || listener.stop();
   if (!loop.interrupted)
