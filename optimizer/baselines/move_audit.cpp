@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "models/machine/kinematics.h"
+#include "optimizer/solve/optimize_outcome.h"
 #include "problems/time_parametrise.h"
 
 namespace sparflow {
@@ -25,9 +26,11 @@ bool redundant(const Machine& machine) {
   return machine.joint_count() > static_cast<int>(moving_tip_directions(machine).cols());
 }
 
+/// @param starts besides those of the options
 OptimizeResult solve(const CraneModel& model, const MotionProblem& problem,
-                     const MoveAuditOptions& options) {
-  const std::vector<SeedMotion> seeds = options.seeds(problem);
+                     const MoveAuditOptions& options, const std::vector<SeedMotion>& starts) {
+  std::vector<SeedMotion> seeds = options.seeds(problem);
+  seeds.insert(seeds.end(), starts.begin(), starts.end());
   if (!seeds.empty()) return optimize(model, problem, seeds, options.optimize);
   OptimizeResult none;
   none.status = OptimizeStatus::kInfeasible;
@@ -40,10 +43,8 @@ bool has_motion(const OptimizeResult& r) {
          (r.status == OptimizeStatus::kOptimal || r.status == OptimizeStatus::kFeasible);
 }
 
-/// Energy of the recorded path at an even pace in the same time; that of the recorded motion where it is less or the limits
-/// do not allow it. [J]
-double energy_at_even_pace(const CraneModel& model, const MotionProblem& problem,
-                           const Trajectory& recorded, double energy, int most_rows) {
+/// The recorded path at an even pace in the same time; empty where the limits do not allow it.
+Trajectory at_even_pace(const MotionProblem& problem, const Trajectory& recorded, int most_rows) {
   /// Least distance of two rows of the path.
   /// @threshold [rad or m] 1e-6..0.01; chosen: noise of a sensor at rest is no way
   constexpr double kLeastStep = 1e-4;
@@ -61,9 +62,16 @@ double energy_at_even_pace(const CraneModel& model, const MotionProblem& problem
       path(static_cast<Index>(i), j) = std::clamp(recorded.q(rows[i], j), r.lo, r.hi);
     }
   }
-  const TimedMotion timed = time_parametrise(problem, path, recorded.duration());
-  if (timed.status != TimingStatus::kOk || timed.motion.size() < 2) return energy;
-  return std::min(energy, exact_total_energy(model, timed.motion, problem.payload));
+  TimedMotion timed = time_parametrise(problem, path, recorded.duration());
+  return timed.status == TimingStatus::kOk ? std::move(timed.motion) : Trajectory{};
+}
+
+/// What the operator did as starts of the search, besides its own: the recorded motion with its modes, and its path at an
+/// even pace. Without them the search may miss a way and an order of the cylinders that the operator had found.
+std::vector<SeedMotion> recorded_starts(const Trajectory& recorded, const Trajectory& even) {
+  std::vector<SeedMotion> starts = {{"recorded", recorded, 0.0, false}};
+  if (even.size() > 1) starts.push_back({"recorded path, even pace", even, 0.0, false});
+  return starts;
 }
 
 std::string why_no_optimum(const OptimizeResult& r, double duration) {
@@ -72,6 +80,23 @@ std::string why_no_optimum(const OptimizeResult& r, double duration) {
         "It took {:.1f} s; within the limits of machine file and model it takes {:.1f} s.",
         duration, r.shortest_duration);
   return "No optimum was found: " + r.message;
+}
+
+/// Where the recorded motion takes less than the optimum that was found: with all limits kept it is the better optimum; with
+/// one broken the two cannot be compared, and the move is not judged.
+void keep_cheaper_record(const CraneModel& model, const Trajectory& recorded,
+                         const MoveAuditOptions& options, MoveAudit& audit) {
+  if (audit.recorded.total >= audit.optimum.total) return;
+  const std::vector<LimitCheck> checks = check_limits(model, audit.problem, recorded, 1);
+  if (worst_excess(checks) <= options.limit_tolerance) {
+    audit.best = recorded;
+    audit.optimum = audit.recorded;
+    return;
+  }
+  if (audit.optimum.total - audit.recorded.total <= options.as_cheap * audit.recorded.total) return;
+  audit.not_judged = fmt::format(
+      "Its recording takes less than any motion within the limits of machine file and model: {}.",
+      limit_text(worst_limit(checks)));
 }
 
 }  // namespace
@@ -135,7 +160,9 @@ MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double
     audit.not_judged = "By the model the pumps give it less than machine and load gain.";
     return audit;
   }
-  const OptimizeResult there = solve(model, audit.problem, options);
+  const Trajectory even = at_even_pace(audit.problem, recorded, options.path_rows);
+  const std::vector<SeedMotion> starts = recorded_starts(recorded, even);
+  const OptimizeResult there = solve(model, audit.problem, options, starts);
   audit.interrupted = there.interrupted;
   if (!has_motion(there)) {
     audit.not_judged = why_no_optimum(there, recorded.duration());
@@ -143,17 +170,22 @@ MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double
   }
   audit.best = there.motion;
   audit.optimum = there.energy;
-  const double even =
-      energy_at_even_pace(model, audit.problem, recorded, audit.recorded.total, options.path_rows);
-  audit.by_pace = audit.recorded.total - even;
-  audit.by_way = even - there.energy.total;
+  keep_cheaper_record(model, recorded, options, audit);
+  if (!audit.judged()) return audit;
+  const double paced =
+      even.size() < 2
+          ? audit.recorded.total
+          : std::min(audit.recorded.total, exact_total_energy(model, even, audit.problem.payload));
+  audit.by_pace = audit.recorded.total - paced;
+  audit.by_way = paced - audit.optimum.total;
   if (!redundant(model.machine) || audit.interrupted) return audit;
-  const OptimizeResult free_end = solve(model, to_tip(audit.problem), options);
+  const OptimizeResult free_end =
+      solve(model, to_tip(audit.problem), options, {{"fixed end", audit.best, 0.0, false}});
   audit.interrupted = free_end.interrupted;
-  if (has_motion(free_end) && free_end.energy.total < there.energy.total) {
-    audit.by_posture = there.energy.total - free_end.energy.total;
+  if (has_motion(free_end) && free_end.energy.total < audit.optimum.total) {
+    audit.by_posture = audit.optimum.total - free_end.energy.total;
     audit.by_posture_potential =
-        there.energy.potential_difference - free_end.energy.potential_difference;
+        audit.optimum.potential_difference - free_end.energy.potential_difference;
   }
   return audit;
 }

@@ -21,6 +21,13 @@ struct MoveAuditOptions {
   /// Rows of the recorded path that is driven again at an even pace, at most.
   /// @threshold [rows] 10..1000; chosen: a second of a long move, and corners of a path are kept
   int path_rows = 40;
+  /// Relative overshoot of a limit with which a recorded motion keeps it.
+  /// @threshold [1] 0..0.1; chosen: what smoothing and rounding of a log leave open
+  double limit_tolerance = 0.01;
+  /// Share of the recorded motion's energy by which the optimum may be dearer where the recorded motion breaks a limit. A
+  /// larger share leaves the move without a judgement.
+  /// @threshold [1] 0..0.1; chosen: the mesh of the optimum and the rows of the log leave so much open
+  double as_cheap = 0.01;
 };
 
 struct MoveAudit {

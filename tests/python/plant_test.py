@@ -191,3 +191,16 @@ def test_an_interrupted_benchmark_keeps_its_runs(scenario):
     result = caught.value.wait(10)
     status = result.to_frame()["status"]
     assert result.interrupted and (status == "done").any() and (status == "failed").any()
+
+
+def test_the_loop_of_trust_gives_both_models_and_their_errors(machine):
+    result = sparflow.loop_of_trust(machine, train_seconds=60, test_seconds=20, most_effects=1, moves=1, seed=3)
+    told = json.loads(result.json())
+    assert len(told["moves"]) == 1
+    move = told["moves"][0]
+    for way in ("before", "after"):
+        assert move[way]["done"], move[way]
+        assert move[way]["relative_error"] == pytest.approx(move[way]["predicted_J"] / move[way]["true_J"] - 1)
+    assert result.before.effects == [] and len(result.after.effects) == len(told["steps"])
+    with pytest.raises(sparflow.UsageError, match="moves"):
+        sparflow.loop_of_trust(machine, moves=0)

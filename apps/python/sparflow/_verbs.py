@@ -207,8 +207,8 @@ def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0
     effects: of the plant, as in simulate. processes: motions at the same time, 0 is one for each processor.
     """
     return core.loop_of_trust(machine, dict(
-        train_seconds=train_seconds, test_seconds=test_seconds, rate=rate, most_effects=most_effects, moves=moves, seed=seed, effects=_several(effects, str),
-        processes=processes, progress=progress))
+        train_seconds=train_seconds, test_seconds=test_seconds, rate=rate, most_effects=most_effects, moves=moves, seed=seed,
+        effects=_several(effects, str), processes=processes, progress=progress))
 
 
 def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):

@@ -99,6 +99,45 @@ TEST(MoveAudit, AHurryInTheMiddleIsPace) {
   EXPECT_NEAR(hurried.by_pace, hurried.recorded.total - slower, 0.02 * slower);
 }
 
+/// A search that may neither try sequences nor the grid, and whose only seed is a bad one: a detour.
+MoveAuditOptions hardly_searching(const Audited& a) {
+  MoveAuditOptions poor = a.options;
+  poor.optimize.sequential_starts = poor.optimize.grid_starts = poor.optimize.sequence_rounds = 0;
+  poor.optimize.smooth_starts = 0;
+  poor.optimize.phase_iterations = 1;
+  poor.seeds = [&a](const MotionProblem&) {
+    const Trajectory detour = a.path({kFrom, posture(0.7, -1.4, 0.8), kTo}, 14.0);
+    return std::vector<SeedMotion>{{"detour", detour, detour.duration(), false}};
+  };
+  return poor;
+}
+
+TEST(MoveAudit, TheOptimumIsNeverDearerThanARecordedMotionWithinTheLimits) {
+  const Audited a;
+  const MoveAuditOptions poor = hardly_searching(a);
+  // what a good search finds is recorded, and the poor search finds nothing as cheap by itself
+  const MoveAudit good = a.audit(a.path({kFrom, kTo}, 14.0));
+  ASSERT_TRUE(good.judged()) << good.not_judged;
+  const OptimizeResult alone =
+      optimize(a.model, good.problem, poor.seeds(good.problem), poor.optimize);
+  ASSERT_GT(alone.energy.total, 1.02 * good.optimum.total) << "the search is no poor one";
+  const MoveAudit m = audit_move(a.model, good.best, 500.0, poor);
+  ASSERT_TRUE(m.judged()) << m.not_judged;
+  EXPECT_LE(m.optimum.total, m.recorded.total);
+  EXPECT_NEAR(m.by_pace + m.by_way, m.saving(), 1e-9 * m.recorded.total);
+}
+
+TEST(MoveAudit, ACheaperRecordingThatBreaksALimitIsNotJudged) {
+  Audited a;
+  const MoveAudit good = a.audit(a.path({kFrom, kTo}, 14.0));
+  ASSERT_TRUE(good.judged()) << good.not_judged;
+  // in this machine file the pump gives half of what the recording took, and the search finds a slower detour at most
+  a.model.machine.pumps[0].max_flow = 0.5 * pumps_along(a.model, good.best, 500.0).flow.maxCoeff();
+  const MoveAudit m = audit_move(a.model, good.best, 500.0, hardly_searching(a));
+  EXPECT_FALSE(m.judged());
+  EXPECT_FALSE(m.not_judged.empty());
+}
+
 TEST(MoveAudit, WhatTheModelHasNotLearnedIsNotJudged) {
   Audited a;
   a.options.most_outside = -1.0;
