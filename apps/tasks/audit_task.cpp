@@ -7,6 +7,8 @@
 #include <numeric>
 
 #include "apps/tasks/argument_range.h"
+#include "apps/tasks/benchmark/learned_machine.h"
+#include "apps/tasks/benchmark/optimal_motions.h"
 #include "apps/tasks/motion_inputs.h"
 #include "identification/signals/recorded_motion.h"
 #include "models/math/error.h"
@@ -123,6 +125,19 @@ void add_fuel(const Machine& machine, const EngineMap& engine, const MachineSign
   result.fuel_at_rest += engine.fuel_rate(0.0) * time_at_rest(signals);
 }
 
+/// Lets the optimum accelerate no joint faster than valves can, or than the recording did where that was faster.
+void narrow_accelerations(const CraneModel& model, const Trajectory& recorded,
+                          MotionLimits& limits) {
+  const std::vector<Range> machine = limits.acceleration;
+  limit_accelerations(model, recorded.q.row(0).transpose(), OptimalMotionOptions{}.ramp, limits);
+  for (Eigen::Index j = 0; j < recorded.qdd.cols(); ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    Range& a = limits.acceleration[k];
+    a.lo = std::max(machine[k].lo, std::min(a.lo, recorded.qdd.col(j).minCoeff()));
+    a.hi = std::min(machine[k].hi, std::max(a.hi, recorded.qdd.col(j).maxCoeff()));
+  }
+}
+
 void examine_all(const CraneModel& model, const std::vector<Found>& found, const AuditTask& a,
                  const Listener& listener, AuditResult& result) {
   MoveAuditOptions options;
@@ -132,6 +147,9 @@ void examine_all(const CraneModel& model, const std::vector<Found>& found, const
     SeedOptions paths;
     paths.seconds = 1.0;  // without obstacles the straight lines are nearly all that is needed
     return make_seeds(problem, paths, options.optimize.intervals).motions;
+  };
+  options.narrow = [&](const Trajectory& recorded, MotionLimits& limits) {
+    narrow_accelerations(model, recorded, limits);
   };
   if (a.searching) a.searching();
   for (std::size_t i = 0; i < found.size() && !listener.stop(); ++i) {

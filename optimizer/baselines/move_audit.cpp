@@ -83,11 +83,20 @@ std::string why_no_optimum(const OptimizeResult& r, double duration) {
 }
 
 /// Where the recorded motion takes less than the optimum that was found: with all limits kept it is the better optimum; with
-/// one broken the two cannot be compared, and the move is not judged.
+/// one broken the two cannot be compared, and the move is not judged. Accelerations do not count, as those of a recording are
+/// differences of smoothed positions.
 void keep_cheaper_record(const CraneModel& model, const Trajectory& recorded,
-                         const MoveAuditOptions& options, MoveAudit& audit) {
+                         const MotionLimits& machine_limits, const MoveAuditOptions& options,
+                         MoveAudit& audit) {
   if (audit.recorded.total >= audit.optimum.total) return;
-  const std::vector<LimitCheck> checks = check_limits(model, audit.problem, recorded, 1);
+  MotionProblem problem = audit.problem;
+  problem.limits = machine_limits;
+  for (Index j = 0; j < recorded.q.cols(); ++j) {
+    Range& a = problem.limits.acceleration[static_cast<std::size_t>(j)];
+    a.lo = std::min(a.lo, recorded.qdd.col(j).minCoeff());
+    a.hi = std::max(a.hi, recorded.qdd.col(j).maxCoeff());
+  }
+  const std::vector<LimitCheck> checks = check_limits(model, problem, recorded, 1);
   if (worst_excess(checks) <= options.limit_tolerance) {
     audit.best = recorded;
     audit.optimum = audit.recorded;
@@ -149,6 +158,8 @@ MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double
                      const MoveAuditOptions& options) {
   MoveAudit audit;
   audit.problem = audit_problem(model.machine, recorded, payload);
+  const MotionLimits machine_limits = audit.problem.limits;
+  if (options.narrow) options.narrow(recorded, audit.problem.limits);
   audit.recorded = exact_energy(model, audit.problem, recorded, 1);
   if (audit.recorded.moving_share_outside_data > options.most_outside) {
     audit.not_judged = fmt::format(
@@ -170,7 +181,7 @@ MoveAudit audit_move(const CraneModel& model, const Trajectory& recorded, double
   }
   audit.best = there.motion;
   audit.optimum = there.energy;
-  keep_cheaper_record(model, recorded, options, audit);
+  keep_cheaper_record(model, recorded, machine_limits, options, audit);
   if (!audit.judged()) return audit;
   const double paced =
       even.size() < 2

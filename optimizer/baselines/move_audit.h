@@ -15,6 +15,9 @@ struct MoveAuditOptions {
   OptimizeOptions optimize;
   /// Seed paths of a problem, as plain data.
   std::function<std::vector<SeedMotion>(const MotionProblem&)> seeds;
+  /// Narrows the limits of a move's problem, to those that valves can follow, say; empty: they stay. They bind the optimum and
+  /// not the recorded motion.
+  std::function<void(const Trajectory& recorded, MotionLimits& limits)> narrow;
   /// Largest share of a move's moving time outside the flows and forces of the pressure models' data.
   /// @threshold [1] 0..1; chosen: three quarters of a move must rest on what was learned
   double most_outside = 0.25;

@@ -1,6 +1,9 @@
 #include "apps/tasks/benchmark/learned_machine.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "models/machine/linkage.h"
 
 namespace sparflow {
 
@@ -28,6 +31,20 @@ std::vector<control::ValveSection> learned_sections(const CraneModel& model) {
     }
   }
   return sections;
+}
+
+void limit_accelerations(const CraneModel& model, const Eigen::VectorXd& q, double ramp,
+                         MotionLimits& limits) {
+  const std::vector<control::ValveSection> sections = learned_sections(model);
+  for (int c = 0; c < model.machine.cylinder_count(); ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    const int j = model.machine.cylinders[k].joint;
+    const double arm = std::abs(linkage_rates(model.machine, c, q[j]).d1);
+    if (arm <= 0.0 || ramp <= 0.0) continue;
+    const double most = std::min(sections[k].full_extend, sections[k].full_retract) / arm / ramp;
+    Range& a = limits.acceleration[static_cast<std::size_t>(j)];
+    a = {std::max(a.lo, -most), std::min(a.hi, most)};
+  }
 }
 
 }  // namespace sparflow

@@ -7,7 +7,6 @@
 
 #include "apps/tasks/benchmark/learned_machine.h"
 #include "apps/tasks/motion_inputs.h"
-#include "models/machine/linkage.h"
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
 #include "optimizer/solve/child_processes.h"
@@ -33,21 +32,6 @@ double bound_of(const CraneModel& model, const MotionProblem& problem) {
   if (!any.valid) return 0.0;
   const TimedBound timed = energy_bound_at(model, problem, problem.duration.max);
   return std::max(any.lower_bound_J, timed.valid ? timed.value : 0.0);
-}
-
-/// Accelerations with which a valve takes its rod to full speed in no less than a time [s], with the lever arms at `q`.
-void limit_accelerations(const CraneModel& model, const Eigen::VectorXd& q, double ramp,
-                         MotionLimits& limits) {
-  const std::vector<control::ValveSection> sections = learned_sections(model);
-  for (int c = 0; c < model.machine.cylinder_count(); ++c) {
-    const auto k = static_cast<std::size_t>(c);
-    const int j = model.machine.cylinders[k].joint;
-    const double arm = std::abs(linkage_rates(model.machine, c, q[j]).d1);
-    if (arm <= 0.0 || ramp <= 0.0) continue;
-    const double most = std::min(sections[k].full_extend, sections[k].full_retract) / arm / ramp;
-    Range& a = limits.acceleration[static_cast<std::size_t>(j)];
-    a = {std::max(a.lo, -most), std::min(a.hi, most)};
-  }
 }
 
 OptimalLeg solve_leg(const MotionProblem& problem, const CraneModel& model,
