@@ -58,6 +58,10 @@ TrustLoop loop_of_trust(const Machine& machine) {
   task.train_seconds = kTrainSeconds;
   task.test_seconds = kTestSeconds;
   task.most_effects = kMostEffects;
+  /// Moves that are optimised with both models and tracked.
+  /// @threshold [1] 1..100; chosen: the demo stays below a minute and a half on two cores
+  constexpr int kMoves = 2;
+  task.moves = kMoves;
   task.told = [](const std::string& sentence) { tell("   " + sentence + "\n"); };
   Progress progress("trust");
   return trust_task(
