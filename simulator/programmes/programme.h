@@ -44,6 +44,9 @@ struct FollowerOptions {
   /// Error of the stroke that is left alone while the reference rests.
   /// @threshold [m] 0..0.05; chosen: no hunting in the valve's dead band
   double rest = 0.003;
+  /// Time by which the flow ahead is taken earlier, as spools, pilot lines and oil follow late.
+  /// @threshold [s] 0..0.5; tuned: the lead of TrackerGains, on problems/scenarios/tuning
+  double lead = 0.2;
 };
 
 /// @param q, qd wanted joint positions and rates

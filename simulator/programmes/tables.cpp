@@ -30,18 +30,28 @@ class TrackedMotion : public Programme {
   ProgrammeStep step(const Record& r) override {
     ProgrammeStep s;
     const double t = r.t + motion_.t[0];
-    const Eigen::Index rows = motion_.t.size(), i = std::min(row_at(motion_.t, t), rows - 2);
-    const double width = motion_.t[i + 1] - motion_.t[i];
-    const double share = std::clamp((t - motion_.t[i]) / width, 0.0, 1.0);
-    const Eigen::VectorXd rate = (motion_.values.row(i + 1) - motion_.values.row(i)) / width;
-    const Eigen::VectorXd at = motion_.values.row(i).transpose() + share * width * rate;
-    s.end = t > motion_.t[rows - 1];
-    s.command = follow(levers_, r, at, s.end ? Eigen::VectorXd::Zero(at.size()) : rate);
+    const Eigen::Index i = segment(t);
+    const double share = std::clamp((t - motion_.t[i]) / width(i), 0.0, 1.0);
+    const Eigen::VectorXd at =
+        motion_.values.row(i).transpose() + share * width(i) * rate(motion_.t[i]);
+    s.end = t > motion_.t[motion_.t.size() - 1];
+    s.command = follow(levers_, r, at, rate(t + FollowerOptions{}.lead));
     s.payload = changed_payload(motion_, i, r.payload);
     return s;
   }
 
  private:
+  Eigen::Index segment(double t) const {
+    return std::min(row_at(motion_.t, t), motion_.t.size() - 2);
+  }
+  double width(Eigen::Index i) const { return motion_.t[i + 1] - motion_.t[i]; }
+  /// Mean rate of the rows around an instant; behind the last one the motion rests.
+  Eigen::VectorXd rate(double t) const {
+    if (t > motion_.t[motion_.t.size() - 1]) return Eigen::VectorXd::Zero(motion_.values.cols());
+    const Eigen::Index i = segment(t);
+    return (motion_.values.row(i + 1) - motion_.values.row(i)).transpose() / width(i);
+  }
+
   LeverMap levers_;
   TimeTable motion_;
 };
