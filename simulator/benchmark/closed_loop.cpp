@@ -192,6 +192,19 @@ class Loop {
   }
   Eigen::Vector3d tip() const { return tip_position<double>(s_.machine, posture()); }
 
+  /// Largest distance of a rod from that of the posture that a goal asks for; 0 where it asks for none. [m]
+  double rods_away(const ScenarioGoal& goal) const {
+    if (!goal.q) return 0.0;
+    const Eigen::VectorXd now = posture();
+    double most = 0.0;
+    for (int c = 0; c < s_.machine.cylinder_count(); ++c) {
+      const int j = s_.machine.cylinders[static_cast<std::size_t>(c)].joint;
+      most = std::max(most, std::abs(cylinder_length(s_.machine, c, now[j]) -
+                                     cylinder_length(s_.machine, c, (*goal.q)[j])));
+    }
+    return most;
+  }
+
   /// One goal. @return whether it was reached and held
   bool reach(control::Controller& controller, int g) {
     const ScenarioGoal& goal = s_.goals[static_cast<std::size_t>(g)];
@@ -207,7 +220,8 @@ class Loop {
       const Eigen::Vector3d at = tip();
       const double speed = (at - before).norm() / o_.sample_time;
       before = at;
-      const bool there = (at - goal.tip).norm() <= s_.tolerance && speed <= o_.rest_speed;
+      const bool there = (at - goal.tip).norm() <= s_.tolerance &&
+                         rods_away(goal) <= s_.tolerance && speed <= o_.rest_speed;
       if (!there) {
         since = kNotKnown;
         sway = 0.0;
@@ -225,6 +239,8 @@ class Loop {
         row_.tip_error_end = std::max(row_.tip_error_end, (at - goal.tip).norm());
         row_.reason = fmt::format("goal {} was not reached in {:.0f} s: the tip is {:.3f} m away",
                                   g + 1, record.t - task.begin, (at - goal.tip).norm());
+        if (rods_away(goal) > s_.tolerance)
+          row_.reason += fmt::format(", a rod {:.3f} m from the posture", rods_away(goal));
         return false;
       }
       if (o_.stop && o_.stop()) {

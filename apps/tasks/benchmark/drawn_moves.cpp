@@ -28,7 +28,7 @@ MoveDrawing::MoveDrawing(const Machine& machine, std::uint64_t seed,
 Eigen::VectorXd MoveDrawing::posture(double payload) {
   /// Postures that are drawn until one can be held, at most.
   /// @threshold [1] 100..1e7; chosen: on the bundled machines about one in two can be held
-  constexpr int kMostPostures = 100000;
+  constexpr int kMostPostures = 20000;
   for (int draw = 0; draw < kMostPostures; ++draw) {
     Eigen::VectorXd q(machine_.joint_count());
     for (int k = 0; k < machine_.joint_count(); ++k) {

@@ -64,7 +64,8 @@ Row run_levers(const Scenario& s, const std::vector<double>& u) {
 }
 
 TEST(ClosedLoop, EveryControllerWithoutModelReachesTheGoalAndAccountsForItsEnergy) {
-  const Scenario s = lift();
+  Scenario s = lift();
+  s.goals.front().q.reset();  // the point alone, which all of them can reach
   int runs = 0;
   for (const control::ControllerInfo& info : control::controllers()) {
     if (info.needs_model) continue;
@@ -152,6 +153,19 @@ TEST(ClosedLoop, FailuresAreRowsWithASentence) {
   row = run_levers(s, {1.0, 0.0, 0.0});  // against the stop
   EXPECT_FALSE(row.done);
   EXPECT_THAT(row.limits, ::testing::Contains("cut-off of pump main"));
+}
+
+TEST(ClosedLoop, AnotherPostureAtTheSameTipIsNotTheOneAskedFor) {
+  Scenario s = lift();
+  s.time_limit = 30.0;
+  s.goals.front().tip = tip_position<double>(s.machine, s.start);
+  s.goals.front().duration = 3.0;
+  // levers that rest keep the tip where it is; the posture of the goal is another one
+  const Row other = run_levers(s, {0.0, 0.0, 0.0});
+  EXPECT_FALSE(other.done);
+  EXPECT_THAT(other.reason, HasSubstr("a rod"));
+  s.goals.front().q.reset();
+  EXPECT_TRUE(run_levers(s, {0.0, 0.0, 0.0}).done);
 }
 
 TEST(ClosedLoop, ARowReadsBackAsItWasPacked) {
