@@ -47,11 +47,11 @@ OptimizeResult optimize_from_seeds(const CraneModel& model, const MotionProblem&
 TrustLoop loop_of_trust(const Machine& machine) {
   TrustTask task;
   /// Length of the log to learn from.
-  /// @threshold [s] 20..1e5; chosen: every pressure is learned from it
-  constexpr double kTrainSeconds = 120.0;
+  /// @threshold [s] 20..1e5; chosen: every pressure is learned from it, with the loads that inertia adds
+  constexpr double kTrainSeconds = 200.0;
   /// Length of the log to judge on.
   /// @threshold [s] 10..1e5; chosen: half of what is learned from
-  constexpr double kTestSeconds = 60.0;
+  constexpr double kTestSeconds = 100.0;
   /// Effects that may enter the model.
   /// @threshold [1] 1..20; chosen: the largest ones; each takes some seconds
   constexpr int kMostEffects = 4;

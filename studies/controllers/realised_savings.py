@@ -1,6 +1,6 @@
 """How much of the saving that `audit` promises is realised when the proposed motions are tracked on the dynamic plant.
 
-    python3 studies/controllers/realised_savings.py build/sparflow problems [SEED]
+    python3 studies/controllers/realised_savings.py build/sparflow problems [SEED [SECONDS [MACHINE...]]]
 
 A simulated operator works for 200 s; each judged move's proposal is tracked with the move's payload. Promised: the audit's saving over
 the model's energy of the recorded move. Realised: one less the tracked energy over the measured energy. docs/audit.md has the result.
@@ -21,12 +21,12 @@ def run(*words):
         sys.exit(f"{' '.join(map(str, words))}: exit code {done.returncode}\n{done.stderr[-500:]}")
 
 
-def moves_of(program, problems, machine, seed, folder):
+def moves_of(program, problems, machine, work, folder):
     """Yields (name, measured, tracked, promised) of each judged move; energies in J, promised as a share."""
     file = problems / "machines" / f"{machine}.yaml"
     log, result = folder / f"{machine}.csv", folder / f"{machine}.json"
     proposals = folder / machine
-    run(program, "simulate", "-m", file, "--seconds", 200, "--seed", seed, "-o", log)
+    run(program, "simulate", "-m", file, "--seed", work[0], "--seconds", work[1], "-o", log)
     run(program, "audit", log, "--model", problems / "models" / f"{machine}_plant.json", "--motions", proposals, "--json", result)
     for number, move in enumerate(json.loads(result.read_text())["moves"], 1):
         if not move["judged"]:
@@ -41,10 +41,11 @@ def moves_of(program, problems, machine, seed, folder):
 def main():
     program, problems = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
     seed = int(sys.argv[3]) if len(sys.argv) > 3 else 31
+    seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 200
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for machine in MACHINES:
-            rows += moves_of(program, problems, machine, seed, pathlib.Path(folder))
+        for machine in sys.argv[5:] or MACHINES:
+            rows += moves_of(program, problems, machine, (seed, seconds), pathlib.Path(folder))
     print(f"{'move':<34} {'measured kJ':>11} {'tracked kJ':>11} {'promised %':>11} {'realised %':>11}")
     differences = []
     for name, measured, tracked, promised in rows:
