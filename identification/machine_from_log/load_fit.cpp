@@ -116,7 +116,7 @@ void Balance::evaluate() {
     const AreaState& area = fit_.areas[i];
     const double piston = area.piston, rod = area.rod;
     const Index n = l.rows();
-    const VectorXd load = l.known + l.masses * theta_.head(unknowns_) +
+    const VectorXd load = l.known + l.inertia + l.masses * theta_.head(unknowns_) +
                           theta_[p.coulomb] * l.direction + theta_[p.viscous] * l.speed +
                           theta_[p.inertia] * l.acceleration;
     VectorXd r = l.load_cell
@@ -169,7 +169,10 @@ void Balance::evaluate() {
 /// One Gauss-Newton step in the directions that the rows determine.
 void Balance::step() {
   VectorXd scale(size_);
-  for (Index k = 0; k < size_; ++k) scale[k] = std::max(jacobian_.col(k).norm(), 1e-300);
+  for (Index k = 0; k < size_; ++k) {
+    scale[k] = jacobian_.col(k).norm();
+    if (!(scale[k] > 0.0)) scale[k] = 1.0;
+  }
   const MatrixXd scaled = jacobian_ * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(transposed_product(scaled, scaled));
   const VectorXd along = eigen.eigenvectors().transpose() * (scaled.transpose() * residual_);
@@ -245,7 +248,7 @@ void Balance::free_directions(const MatrixXd& information) {
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     if (!fit_.used[i]) continue;
     const LoadRows& l = loads_[i];
-    const VectorXd all = l.known + l.masses * fit_.masses;
+    const VectorXd all = l.known + l.inertia + l.masses * fit_.masses;
     const VectorXd r = l.load_cell ? VectorXd(l.force - all)
                                    : VectorXd((l.pressure_a - l.pressure_b) * fit_.areas[i].piston +
                                               fit_.areas[i].rod * l.pressure_b - all);
@@ -309,7 +312,7 @@ bool start_areas(const LoadRows& l, const LoadFit& fit, const MachineFromLogOpti
   if (n < kFewestRows || l.load_cell) return false;
   // F = A_A (pA - pB) + A_D pB; what is known goes to the right side, what is free beside the areas to the left.
   std::vector<VectorXd> pressures;
-  VectorXd known = l.known + l.masses * fit.masses;
+  VectorXd known = l.known + l.inertia + l.masses * fit.masses;
   if (area.bore_open) {
     pressures.push_back(l.pressure_a - l.pressure_b);
   } else {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "models/machine/inertial_torque.h"
 #include "models/machine/static_force.h"
 #include "models/math/nan.h"
 
@@ -93,6 +94,8 @@ LoadRows load_rows(const Known& given, int cylinder, bool held_out) {
                       &out.speed, &out.acceleration})
     v->resize(n);
   out.block.resize(n);
+  out.row = kept;
+  out.inertia = VectorXd::Zero(n);
   // The known part: open masses weigh nothing, open centres are at their frame's origin.
   Machine known = machine;
   for (int l = 0; l < static_cast<int>(known.links.size()); ++l) {
@@ -138,6 +141,17 @@ LoadRows load_rows(const Known& given, int cylinder, bool held_out) {
     }
   }
   return out;
+}
+
+void add_inertia(const Machine& machine, const SketchRows& rows, LoadRows& load) {
+  if (load.rows() == 0) return;
+  const int joint = machine.cylinders[static_cast<std::size_t>(load.cylinder)].joint;
+  for (Index k = 0; k < load.rows(); ++k) {
+    const Index row = load.row[static_cast<std::size_t>(k)];
+    const VectorXd q = rows.q.row(row), qd = rows.qd.row(row), qdd = rows.qdd.row(row);
+    const VectorXd torque = inertial_torque<double>(machine, q, qd, qdd, rows.payload[row]);
+    load.inertia[k] = torque[joint] / linkage_rates(machine, load.cylinder, q[joint]).d1;
+  }
 }
 
 }  // namespace sparflow::from_log

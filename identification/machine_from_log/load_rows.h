@@ -38,10 +38,15 @@ struct LoadRows {
   Eigen::VectorXd speed;         ///< [m/s]
   Eigen::VectorXd acceleration;  ///< [m/s^2]
   Eigen::VectorXi block;
+  std::vector<Eigen::Index> row;  ///< of the samples
+  Eigen::VectorXd inertia;        ///< [N] of a machine's masses, for add_inertia; zero at first
   Eigen::Index rows() const { return known.size(); }
 };
 
 /// @param known machine with linkages found; open masses are ignored  @param held_out which part of the rows
 LoadRows load_rows(const Known& known, int cylinder, bool held_out);
+
+/// Fills the inertial forces of a machine whose masses were found, so that what remains of accelerations biases no friction.
+void add_inertia(const Machine& machine, const SketchRows& rows, LoadRows& load);
 
 }  // namespace sparflow::from_log

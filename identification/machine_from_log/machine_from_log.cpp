@@ -145,23 +145,45 @@ class Estimate {
       loads_.push_back(std::move(load));
       tests_.push_back(std::move(test));
     }
-    const LoadFit fit = fit_loads(known, loads_);
+    const std::string obstacle =
+        obstacle_.empty() ? "no cylinder has moving rows with pressures and a known or found area, "
+                            "or a measured force, in these logs"
+                          : obstacle_;
+    LoadFit fit = fit_loads(known, loads_);
+    RealisedMasses masses = realise_masses(known, loads_, fit, obstacle);
+    // What the masses found have of inertia is no error of the balance: a second estimate knows it.
+    const Machine heavy = with_masses(masses);
+    for (LoadRows& load : loads_) add_inertia(heavy, rows_, load);
+    for (LoadRows& load : tests_) add_inertia(heavy, rows_, load);
+    fit = fit_loads(known, loads_);
+    masses = realise_masses(known, loads_, fit, obstacle);
     AreaAnswers areas = answer_areas(known, loads_, fit, obstacle_);
     out_.values.insert(out_.values.end(), areas.values.begin(), areas.values.end());
     out_.questions.insert(out_.questions.end(), areas.questions.begin(), areas.questions.end());
     for (const AreaAnswers::Diameter& d : areas.diameters)
       complete(d.kind, d.cylinder, number(d.value), d.remark);
-    const std::string obstacle =
-        obstacle_.empty() ? "no cylinder has moving rows with pressures and a known or found area, "
-                            "or a measured force, in these logs"
-                          : obstacle_;
-    const RealisedMasses masses = realise_masses(known, loads_, fit, obstacle);
     append(out_.notes, masses.notes);
     out_.questions.insert(out_.questions.end(), masses.questions.begin(), masses.questions.end());
     out_.combinations = masses.combinations;
     if (masses.possible) complete_masses(masses);
     tell_of_unused(fit, masses);
     judge(known, fit, masses);
+  }
+
+  /// The machine with open masses as they were found, where they are possible.
+  Machine with_masses(const RealisedMasses& masses) const {
+    Machine machine = machine_;
+    for (int l = 0; l < static_cast<int>(machine.links.size()); ++l) {
+      const bool cog_open = sketch_.is_open(OpenKind::kCog, l);
+      if (!sketch_.is_open(OpenKind::kMass, l) && !cog_open) continue;
+      const LinkMoments& found = masses.links[static_cast<std::size_t>(l)];
+      Link& link = machine.links[static_cast<std::size_t>(l)];
+      link.mass = masses.possible ? found.mass : 0.0;
+      if (cog_open)
+        link.cog = link.mass > 0.0 ? Eigen::Vector3d(found.moment / link.mass)
+                                   : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    }
+    return machine;
   }
 
   /// Forces of a cylinder that took no part are only as good as the masses that others tell.
@@ -183,16 +205,12 @@ class Estimate {
   }
 
   void complete_masses(const RealisedMasses& masses) {
+    const Machine found = with_masses(masses);
     for (int l = 0; l < static_cast<int>(machine_.links.size()); ++l) {
       const bool mass_open = sketch_.is_open(OpenKind::kMass, l);
       const bool cog_open = sketch_.is_open(OpenKind::kCog, l);
       if (!mass_open && !cog_open) continue;
-      const LinkMoments& found = masses.links[static_cast<std::size_t>(l)];
-      Link& link = machine_.links[static_cast<std::size_t>(l)];
-      link.mass = found.mass;
-      if (cog_open)
-        link.cog =
-            found.mass > 0.0 ? Eigen::Vector3d(found.moment / found.mass) : Eigen::Vector3d::Zero();
+      const Link& link = found.links[static_cast<std::size_t>(l)];
       const std::string source =
           fmt::format("from the log: {} of {} that {} the static forces it shows",
                       mass_open ? "mass" : "centre", link.name,

@@ -71,7 +71,7 @@ struct MachineQuestion {
 struct HeldOutError {
   std::string cylinder;
   double force_rmse =
-      0.0;  ///< [N] measured minus static force minus friction found; NaN: no forces
+      0.0;  ///< [N] measured minus static force, inertia and friction; NaN: no forces
   double force_static = 0.0;     ///< [N] measured minus static force alone
   double force_variation = 0.0;  ///< [N] standard deviation of the measured force
   Eigen::Index force_rows = 0;

@@ -53,7 +53,8 @@ std::string held_out_lines(const std::vector<HeldOutError>& errors) {
                         e.force_rows, cell(1e3 * e.stroke_rmse, 2));
   }
   return text +
-         "  force: measured minus static force and friction found, RMS; static: without friction\n";
+         "  force: measured minus static force, inertia and friction, RMS; static: minus static "
+         "force alone\n";
 }
 
 }  // namespace

@@ -49,7 +49,10 @@ VectorXd half_widths(const MatrixXd& jacobian, const VectorXd& residual,
   const double unknown = std::numeric_limits<double>::infinity();
   if (jacobian.rows() <= p || p == 0) return VectorXd::Constant(p, unknown);
   VectorXd scale(p);
-  for (Index k = 0; k < p; ++k) scale[k] = std::max(jacobian.col(k).norm(), 1e-300);
+  for (Index k = 0; k < p; ++k) {
+    scale[k] = jacobian.col(k).norm();
+    if (!(scale[k] > 0.0)) scale[k] = 1.0;
+  }
   const MatrixXd scaled = jacobian * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(transposed_product(scaled, scaled));
   /// Smallest eigenvalue of the scaled information that is not rounding.

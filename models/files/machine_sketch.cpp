@@ -35,12 +35,25 @@ constexpr OpenBar kPins[] = {{"barrel", OpenKind::kBarrelPin},
                              {"rocker", OpenKind::kRockerPin},
                              {"coupler", OpenKind::kCouplerPin}};
 
-/// Text without line breaks and control characters, which would end a comment.
-std::string one_line(std::string words) {
+/// Lines of comment with these words, each indented so. Line breaks and control characters would end a comment.
+std::string comment(std::string words, const std::string& indent) {
   for (char& c : words) {
     if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';
   }
-  return words;
+  /// Width of a comment's lines.
+  /// @threshold [1] 40..200; chosen: a terminal and a half
+  constexpr std::size_t kWidth = 116;
+  std::string text;
+  while (!words.empty()) {
+    std::size_t end = words.size();
+    if (end > kWidth) {
+      end = words.rfind(' ', kWidth);
+      if (end == std::string::npos || end == 0) end = std::min(words.find(' ', 1), words.size());
+    }
+    text += indent + "# " + words.substr(0, end) + "\n";
+    words.erase(0, std::min(words.find_first_not_of(' ', end), words.size()));
+  }
+  return text;
 }
 
 /// Begin of line `line` (from 1), npos when there is none.
@@ -190,20 +203,23 @@ std::string completed_text(const MachineSketch& sketch, const std::vector<Comple
                            const std::vector<std::string>& heading) {
   SPARFLOW_CHECK(completions.size() == sketch.open.size(), "a completion for each open value");
   std::string text = sketch.text;
-  // From the end on, so that places before stay valid; a remark goes behind the whole line, when all its values are in.
+  // From the end on, so that places before stay valid; remarks stand before the line of their values.
   std::string remarks;
   for (std::size_t k = completions.size(); k-- > 0;) {
     const OpenValue& open = sketch.open[k];
     const Completion& completion = completions[k];
-    if (!completion.remark.empty()) remarks = "  # " + one_line(completion.remark) + "\n" + remarks;
+    const std::size_t begin = line_begin(sketch.text, open.place.line);
+    const std::size_t content = sketch.text.find_first_not_of(' ', begin);
+    const std::string indent(content - begin, ' ');
+    remarks = comment(completion.remark, indent) + remarks;
     if (!completion.value.empty()) text.replace(open.begin, open.length, completion.value);
     const bool first_of_line = k == 0 || sketch.open[k - 1].place.line != open.place.line;
     if (!first_of_line || remarks.empty()) continue;
-    text.insert(line_begin(text, open.place.line), remarks);
+    text.insert(begin, remarks);
     remarks.clear();
   }
   std::string head;
-  for (const std::string& line : heading) head += "# " + one_line(line) + "\n";
+  for (const std::string& line : heading) head += comment(line, "");
   return head + text;
 }
 

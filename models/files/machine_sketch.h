@@ -61,8 +61,7 @@ MachineSketch parse_sketch(const std::string& text, const std::string& name,
 /// A value for an open place, as YAML ("0.1234", "[0.4, 0, 0.5]"); empty: it stays open.
 struct Completion {
   std::string value;
-  std::string
-      remark;  ///< one line, written behind the line of the value as a comment; may be empty
+  std::string remark;  ///< comment before the line of the value; may be empty
 };
 
 /// The sketch's text with these values in the places of its open ones; all else stays as it is.

@@ -26,7 +26,7 @@ void add_held_out(Page& page, const MachineFromLog& found) {
   table.title = "Motions that took no part in the estimate";
   table.columns = {{"cylinder"},
                    {"force error", "kN", 3},
-                   {"without friction", "kN", 3},
+                   {"of static force alone", "kN", 3},
                    {"force varies by", "kN", 3},
                    {"rows"},
                    {"stroke error", "mm", 3},
