@@ -38,8 +38,9 @@ std::string payload_words(const SketchRows& rows) {
 }
 
 /// Why an area is not known at all.
-std::string why_not(const Machine& machine, int i, const SketchRows& rows, const LoadRows& load,
-                    const std::string& obstacle) {
+std::string why_not(const Known& known, int i, const LoadRows& load, const std::string& obstacle) {
+  const Machine& machine = known.machine;
+  const SketchRows& rows = known.rows;
   const Cylinder& c = machine.cylinders[static_cast<std::size_t>(i)];
   const CylinderRows& measured = rows.cylinders[static_cast<std::size_t>(i)];
   const bool pressures = measured.pressure_a.size() > 0 && measured.pressure_b.size() > 0;
@@ -54,6 +55,11 @@ std::string why_not(const Machine& machine, int i, const SketchRows& rows, const
         "measured flow (Q_{0}_lpm); give it, or log them",
         c.name);
   }
+  if (!known.resolved[static_cast<std::size_t>(i)])
+    return fmt::format(
+        "forces and speeds of {} follow from its linkage, which is asked for too; "
+        "answer that, or give it",
+        c.name);
   if (!obstacle.empty()) return obstacle + "; give it, or log that";
   if (load.rows() == 0)
     return fmt::format("{} never moves steadily in these logs; give it, or a log in which it moves",
@@ -91,7 +97,7 @@ AreaAnswers answer_areas(const Known& known, const std::vector<LoadRows>& loads,
       const OpenValue* open = sketch.find(side.kind, i);
       if (open == nullptr) continue;
       if (!area.has_scale) {
-        out.questions.push_back({open->path, why_not(machine, i, rows, loads[index], obstacle)});
+        out.questions.push_back({open->path, why_not(known, i, loads[index], obstacle)});
         continue;
       }
       const double diameter =

@@ -147,7 +147,7 @@ class Search {
   /// Angle of the child pin in the plane when both pins are open: onto the line to the next joint.
   static constexpr double kChildAngle = 0.0;
   void conclude(const StrokeRows& data, const CurveFit& best, LinkageFit& fit);
-  double largest_half_width(const Searched& s, double value) const;
+  double largest_half_width(const Searched& s, double value, const StrokeRows& data) const;
 
   const MachineSketch& sketch_;
   int index_;
@@ -389,11 +389,11 @@ CurveFit Search::fitted(const StrokeRows& data, const VectorXd& start, int itera
   return fit;
 }
 
-double Search::largest_half_width(const Searched& s, double value) const {
+double Search::largest_half_width(const Searched& s, double value, const StrokeRows& data) const {
   if (s.unit == "rad") return options_.largest_width;
   if (s.name.find("pin, ") != std::string::npos) return options_.largest_width * plane_.reach();
   if (s.name == path(OpenKind::kZeroLength))
-    return options_.largest_width * std::max(std::abs(value), plane_.reach() * 0.1);
+    return options_.largest_width * std::abs(value + median(data.stroke));  // the cylinder's length
   return options_.largest_width * std::abs(value);
 }
 
@@ -407,7 +407,7 @@ void Search::conclude(const StrokeRows& data, const CurveFit& best, LinkageFit& 
   for (Index p = 0; p < half.size(); ++p) {
     const Searched& s = names[static_cast<std::size_t>(p)];
     fit.values.push_back({s.name, best.theta[p], half[p], s.unit, source, ""});
-    if (half[p] <= largest_half_width(s, best.theta[p])) continue;
+    if (half[p] <= largest_half_width(s, best.theta[p], data)) continue;
     if (fit.determined) {
       ask(fit, fmt::format(
                    "the logs tell {} only to {:.3g} ± {:.2g} {} (95 %), over {:.3g} of {:.3g} {} "

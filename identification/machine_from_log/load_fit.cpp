@@ -379,7 +379,7 @@ LoadFit fit_loads(const Known& known, const std::vector<LoadRows>& loads) {
       fit.used[i] = pressures && (loads[i].load_cell || c.hydraulic());
       continue;
     }
-    areas_from_flow(machine, static_cast<int>(i), rows, options, area);
+    if (known.resolved[i]) areas_from_flow(machine, static_cast<int>(i), rows, options, area);
     area.has_scale = false;
     fit.used[i] = pressures && loads[i].load_cell;  // areas take no part then
     const bool piston = !area.bore_open || area.flow_piston_std > 0.0;

@@ -135,7 +135,7 @@ class Estimate {
   }
 
   void find_loads() {
-    const Known known{sketch_, machine_, rows_, options_};
+    const Known known{sketch_, machine_, rows_, resolved_, options_};
     for (int i = 0; i < machine_.cylinder_count(); ++i) {
       LoadRows load, test;
       if (obstacle_.empty() && resolved_[static_cast<std::size_t>(i)]) {
@@ -217,9 +217,10 @@ class Estimate {
                       mass_open && cog_open ? "with its centre gives" : "gives");
       complete(OpenKind::kMass, l, number(link.mass), source);
       complete(OpenKind::kCog, l, pin_text(link.joint, link.cog), mass_open ? "" : source);
-      out_.values.push_back(
-          {fmt::format("links[{}].mass", link.name), link.mass, std::nan(""), "kg",
-           mass_open ? "static forces, by the convention for centres" : "given", ""});
+      const std::string path = fmt::format("links[{}].mass", link.name);
+      if (!mass_open || asked(path)) continue;
+      out_.values.push_back({path, link.mass, std::nan(""), "kg",
+                             "static forces, by the convention for centres", ""});
     }
   }
 

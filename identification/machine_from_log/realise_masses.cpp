@@ -174,6 +174,10 @@ void ask_for_idle_links(const Known& known, const std::vector<LoadRows>& loads, 
   const MachineSketch& sketch = known.sketch;
   const Machine& machine = known.machine;
   const std::vector<Indices> links = indices_of(machine, mass_unknowns(sketch));
+  std::string used;
+  for (std::size_t i = 0; i < loads.size(); ++i) {
+    if (fit.used[i]) used += (used.empty() ? "" : ", ") + machine.cylinders[i].name;
+  }
   for (std::size_t l = 0; l < links.size(); ++l) {
     if (links[l].mass < 0 && links[l].moment < 0) continue;
     double effect = 0.0;
@@ -190,9 +194,10 @@ void ask_for_idle_links(const Known& known, const std::vector<LoadRows>& loads, 
       if (v.part != static_cast<int>(l) || v.kind > OpenKind::kCog) continue;
       out.questions.push_back(
           {v.path,
-           any ? fmt::format("no force in these logs depends on it: {} carries its load past every "
-                             "cylinder that was measured; give it (it matters for inertia alone)",
-                             name)
+           any ? fmt::format(
+                     "no force that could be used depends on it (used: {}); answer what is asked "
+                     "about the cylinders that carry {}, or give it",
+                     used, name)
                : obstacle + "; give it, or a log that has this"});
     }
   }

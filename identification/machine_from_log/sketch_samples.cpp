@@ -56,7 +56,8 @@ void put_channel(const Picker& pick, const SavitzkyGolay& filter, Role role, int
 void put_cylinder(const Picker& pick, const SavitzkyGolay& filter, int index, CylinderRows& c) {
   if (const Channel* stroke = pick.log.find(Role::kStroke, index)) {
     put(pick, stroke->values, c.stroke);
-    const Smoothed smooth = filter.smooth(stroke->values);
+    Smoothed smooth = filter.smooth(stroke->values);
+    quieten_acceleration(pick.log.time, pick.log.runs, stroke->values, filter, smooth.second);
     put(pick, smooth.value, c.stroke_value);
     put(pick, smooth.first, c.stroke_rate);
     put(pick, smooth.second, c.stroke_bend);
@@ -93,7 +94,8 @@ void put_log(const Machine& machine, const Picker& pick, const MachineFromLogOpt
   for (int j = 0; j < machine.joint_count(); ++j) {
     const Channel* channel = log.find(Role::kJointPosition, j);
     if (channel == nullptr) continue;
-    const Smoothed smooth = filter.smooth(channel->values);
+    Smoothed smooth = filter.smooth(channel->values);
+    quieten_acceleration(log.time, log.runs, channel->values, filter, smooth.second);
     out.position.col(j).segment(at, n) = pick.picked(channel->values);
     out.q.col(j).segment(at, n) = pick.picked(smooth.value);
     out.qd.col(j).segment(at, n) = pick.picked(smooth.first);

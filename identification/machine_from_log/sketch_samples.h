@@ -38,6 +38,7 @@ struct Known {
   const MachineSketch& sketch;
   const Machine& machine;
   const SketchRows& rows;
+  const std::vector<bool>& resolved;  ///< by cylinder: its linkage is known
   const MachineFromLogOptions& options;
 };
 

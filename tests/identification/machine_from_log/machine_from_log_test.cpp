@@ -104,7 +104,8 @@ TEST(MachineFromLogs, IntervalsOfPinsCoverTheTruthInNinetyFivePercentOfLogs) {
   for (int seed = 1; seed <= kSeeds; ++seed) {
     LogPlan plan;
     plan.seed = static_cast<std::uint64_t>(seed);
-    plan.seconds = 60.0;
+    plan.seconds = 120.0;
+    plan.motion = 3.0;  // the whole range several times
     plan.pressures = false;
     const MachineFromLog found = found_from(text, truth, plan);
     const auto covers = [&](const std::string& name, double expected) {

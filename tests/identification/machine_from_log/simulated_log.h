@@ -17,7 +17,7 @@ namespace sparflow::testing_support {
 
 struct LogPlan {
   std::uint64_t seed = 1;
-  double seconds = 120.0;
+  double seconds = 240.0;
   double step = 0.02;                                  ///< [s]
   std::vector<double> payloads = {0.0, 300.0, 600.0};  ///< [kg] one after the other
   bool strokes = true, positions = true, pressures = true, flows = false, payload_logged = true;
