@@ -29,6 +29,9 @@ constexpr int kPasses = 15;
 /// Residual of a cylinder, as share of its load, that it has at least.
 /// @threshold [1] 1e-6..0.01; numerical: digits of a log
 constexpr double kLeastResidual = 1e-4;
+/// Share of the known force's square below which what is left of it beside free masses is rounding.
+/// @threshold [1] 1e-14..1e-4; numerical: a ten-thousandth of the force
+constexpr double kRoundedForce = 1e-8;
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 /// Places of a cylinder's unknowns in the vector; -1: known.
@@ -312,7 +315,8 @@ bool start_areas(const LoadRows& l, const LoadFit& fit, const MachineFromLogOpti
   if (n < kFewestRows || l.load_cell) return false;
   // F = A_A (pA - pB) + A_D pB; what is known goes to the right side, what is free beside the areas to the left.
   std::vector<VectorXd> pressures;
-  VectorXd known = l.known + l.inertia + l.masses * fit.masses;
+  // Static forces alone: what a payload's inertia adds is too small to set a scale.
+  VectorXd known = l.known + l.masses * fit.masses;
   if (area.bore_open) {
     pressures.push_back(l.pressure_a - l.pressure_b);
   } else {
@@ -341,7 +345,7 @@ bool start_areas(const LoadRows& l, const LoadFit& fit, const MachineFromLogOpti
   const VectorXd alone = known - beside * least_squares_of_least_norm(beside, known);
   const VectorXd found = least_squares_of_least_norm(all, known);
   const double left = (known - all * found).squaredNorm(), before = alone.squaredNorm();
-  const bool explained = before > 1e-12 * known.squaredNorm() && before > 0.0 &&
+  const bool explained = before > kRoundedForce * known.squaredNorm() && before > 0.0 &&
                          1.0 - left / before >= options.least_explained;
   if (!explained) return false;
   Index at = 0;

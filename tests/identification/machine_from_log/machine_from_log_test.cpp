@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 
 #include "models/files/machine_file.h"
@@ -178,6 +179,57 @@ TEST(MachineFromLogs, ExcavatorsKnuckleLengthAndPinsComeBack) {
               0.01);
 }
 
+/// Prints the table of docs/machine_from_log.md.
+TEST(MachineFromLogs, AccuracyOfThreeMachinesOverSeeds) {
+  struct Case {
+    const char* machine;
+    std::vector<std::pair<std::string, std::string>> blanks;
+    const char* what;
+  };
+  const std::vector<Case> cases = {
+      {"loader_crane", all_of(kAreas, kMasses), "6 diameters, 2 links"},
+      {"excavator",
+       {{"bore: 0.120\n    rod: 0.085\n    parallel",
+         "bore: unknown\n    rod: 0.085\n    parallel"},
+        {"bore: 0.140", "bore: unknown"},
+        {"mass: 1600, cog: [2.60, 0, 0.55]", "mass: 1600, cog: unknown"},
+        {"mass: 830,  cog: [0.95, 0, 0.16]", "mass: 830, cog: unknown"}},
+       "2 diameters, 2 centres"},
+      {"swing_crane",
+       {{"bore: 0.125", "bore: unknown"},
+        {"bore: 0.110", "bore: unknown"},
+        {"mass: 310, cog: [1.45, 0.06, 0]", "mass: unknown, cog: unknown"},
+        {"mass: 170, cog: [0.95, 0.03, 0]", "mass: unknown, cog: unknown"}},
+       "2 diameters, 2 links"}};
+  constexpr int kSeeds = 6;
+  std::printf("| machine | blanked | complete | largest error of a bore | of a static force |\n");
+  for (const Case& c : cases) {
+    const Machine truth = load_machine(machine_path(c.machine));
+    double bore = 0.0, force = 0.0;
+    int complete = 0;
+    for (int seed = 11; seed < 11 + kSeeds; ++seed) {
+      LogPlan plan;
+      plan.seed = static_cast<std::uint64_t>(seed);
+      const MachineFromLog found = found_from(blanked(c.machine, c.blanks), truth, plan);
+      if (!found.complete()) continue;
+      ++complete;
+      for (int i = 0; i < truth.cylinder_count(); ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        bore = std::max(bore,
+                        std::abs(found.machine->cylinders[k].bore / truth.cylinders[k].bore - 1.0));
+        if (std::holds_alternative<RackLinkage>(truth.cylinders[k].linkage)) continue;  // no load
+        force = std::max(force, force_error(truth, *found.machine, i, 500.0));
+      }
+    }
+    std::printf("| %s | %s | %d of %d | %.1f %% | %.1f %% |\n", c.machine, c.what, complete, kSeeds,
+                100.0 * bore, 100.0 * force);
+    EXPECT_GE(complete, kSeeds - 1) << c.machine;
+    // Two per cent of a diameter are its interval in the worst of these logs; forces then err by twice as much.
+    EXPECT_LT(bore, 0.02) << c.machine;
+    EXPECT_LT(force, 0.06) << c.machine;
+  }
+}
+
 TEST(MachineFromLogs, ConstantPayloadLeavesAreasAndMassesToBeAskedFor) {
   const Machine truth = load_machine(machine_path("loader_crane"));
   LogPlan plan;
@@ -238,8 +290,10 @@ TEST(MachineFromLogs, MachineWithoutOpenValuesIsOnlyJudged) {
   ASSERT_TRUE(found.complete());
   EXPECT_TRUE(found.values.empty());
   for (const HeldOutError& e : found.held_out) {
-    // 0.5 bar on 10 to 250 cm^2, smoothed, and half a millimetre of stroke beside half a milliradian.
-    EXPECT_LT(e.force_rmse, 0.1 * e.force_variation) << e.cylinder;
+    // What the program warns of: noise of 0.5 bar on 38 cm^2 is a tenth of the telescope's small force.
+    EXPECT_LT(e.force_rmse, MachineFromLogOptions{}.warn_residual * e.force_variation)
+        << e.cylinder;
+    // Half a millimetre of the stroke and half a milliradian of the position.
     EXPECT_LT(e.stroke_rmse, 1e-3) << e.cylinder;
   }
 }
