@@ -80,7 +80,6 @@ AreaAnswers answer_areas(const Known& known, const std::vector<LoadRows>& loads,
                          const std::string& obstacle) {
   const MachineSketch& sketch = known.sketch;
   const Machine& machine = known.machine;
-  const SketchRows& rows = known.rows;
   const MachineFromLogOptions& options = known.options;
   AreaAnswers out;
   for (int i = 0; i < machine.cylinder_count(); ++i) {

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 /// Rows of one direction below which its area is not estimated.
 /// @threshold [1] 10..1000; chosen: half a second to a second of motion
-constexpr Index kFewest = 40;
+constexpr Index kFewestFlowRows = 40;
 
 struct FlowRows {
   std::vector<double> flow, speed, speed_noise;
@@ -52,7 +52,7 @@ void areas_from_flow(const Machine& machine, int cylinder, const SketchRows& row
   }
   for (const FlowRows& side : sides) {
     const auto n = static_cast<Index>(side.flow.size());
-    if (n < kFewest) continue;
+    if (n < kFewestFlowRows) continue;
     MatrixXd columns(n, 2);
     columns.col(0) = VectorXd::Map(side.speed.data(), n);
     columns.col(1).setOnes();

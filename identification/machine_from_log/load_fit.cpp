@@ -22,7 +22,7 @@ using Eigen::VectorXd;
 
 /// Rows of a cylinder below which its forces tell nothing.
 /// @threshold [1] 10..1000; chosen: a second of motion at 50 Hz
-constexpr Index kFewestRows = 50;
+constexpr Index kFewestLoadRows = 50;
 /// Passes of Gauss-Newton with new weights.
 /// @threshold [1] 3..100; numerical: the areas converge quadratically
 constexpr int kPasses = 15;
@@ -312,7 +312,7 @@ void Balance::solve() {
 bool start_areas(const LoadRows& l, const LoadFit& fit, const MachineFromLogOptions& options,
                  AreaState& area) {
   const Index n = l.rows();
-  if (n < kFewestRows || l.load_cell) return false;
+  if (n < kFewestLoadRows || l.load_cell) return false;
   // F = A_A (pA - pB) + A_D pB; what is known goes to the right side, what is free beside the areas to the left.
   std::vector<VectorXd> pressures;
   // Static forces alone: what a payload's inertia adds is too small to set a scale.
@@ -378,7 +378,7 @@ LoadFit fit_loads(const Known& known, const std::vector<LoadRows>& loads) {
     area.rod_open = sketch.is_open(OpenKind::kRod, static_cast<int>(i));
     area.piston = area.bore_open ? 0.0 : c.area_piston();
     area.rod = area.rod_open ? 0.0 : std::numbers::pi / 4.0 * c.rod * c.rod * c.parallel;
-    const bool pressures = loads[i].rows() >= kFewestRows;
+    const bool pressures = loads[i].rows() >= kFewestLoadRows;
     if (!area.bore_open && !area.rod_open) {
       fit.used[i] = pressures && (loads[i].load_cell || c.hydraulic());
       continue;

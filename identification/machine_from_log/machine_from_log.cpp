@@ -19,15 +19,15 @@ namespace {
 
 using namespace from_log;
 
-std::string number(double value) { return fmt::format("{:.6g}", value + 0.0); }
+std::string file_number(double value) { return fmt::format("{:.6g}", value + 0.0); }
 
-std::string vector(const Eigen::Vector3d& v) {
+std::string file_vector(const Eigen::Vector3d& v) {
   // Micrometres of rounding would read as if they were measured.
-  const auto shown = [](double x) { return number(std::abs(x) < 1e-9 ? 0.0 : x); };
+  const auto shown = [](double x) { return file_number(std::abs(x) < 1e-9 ? 0.0 : x); };
   return fmt::format("[{}, {}, {}]", shown(v.x()), shown(v.y()), shown(v.z()));
 }
 
-void append(std::vector<std::string>& to, const std::vector<std::string>& from) {
+void append_all(std::vector<std::string>& to, const std::vector<std::string>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
@@ -72,8 +72,8 @@ class Estimate {
     for (int i = 0; i < machine_.cylinder_count(); ++i) {
       if (!sketch_.linkage_open(i)) continue;
       LinkageFit fit = fit_linkage(sketch_, i, rows_, options_, machine_);
-      append(out_.notes, fit.notes);
-      append(out_.warnings, fit.warnings);
+      append_all(out_.notes, fit.notes);
+      append_all(out_.warnings, fit.warnings);
       out_.questions.insert(out_.questions.end(), fit.questions.begin(), fit.questions.end());
       Cylinder& c = machine_.cylinders[static_cast<std::size_t>(i)];
       if (fit.determined) {
@@ -89,8 +89,8 @@ class Estimate {
   }
 
   std::string pin_text(int frame, const Eigen::Vector3d& pin) const {
-    return vector(frame < 0 ? pin
-                            : sketch_.file_frames[static_cast<std::size_t>(frame)].inverse() * pin);
+    return file_vector(
+        frame < 0 ? pin : sketch_.file_frames[static_cast<std::size_t>(frame)].inverse() * pin);
   }
 
   void complete_linkage(int i, const std::vector<FoundValue>& values) {
@@ -114,12 +114,12 @@ class Estimate {
       put(OpenKind::kBarrelPin, pin_text(parent, bar->barrel));
       put(OpenKind::kRockerPin, pin_text(parent, bar->rocker));
       put(OpenKind::kCouplerPin, pin_text(own, bar->coupler));
-      put(OpenKind::kRockerLength, number(bar->rocker_length));
-      put(OpenKind::kCouplerLength, number(bar->coupler_length));
+      put(OpenKind::kRockerLength, file_number(bar->rocker_length));
+      put(OpenKind::kCouplerLength, file_number(bar->coupler_length));
     } else if (const auto* rack = std::get_if<RackLinkage>(&c.linkage)) {
-      put(OpenKind::kRadius, number(rack->radius));
+      put(OpenKind::kRadius, file_number(rack->radius));
     }
-    put(OpenKind::kZeroLength, number(c.length_at_zero_stroke.value_or(0.0)));
+    put(OpenKind::kZeroLength, file_number(c.length_at_zero_stroke.value_or(0.0)));
   }
 
   void find_positions() {
@@ -161,8 +161,8 @@ class Estimate {
     out_.values.insert(out_.values.end(), areas.values.begin(), areas.values.end());
     out_.questions.insert(out_.questions.end(), areas.questions.begin(), areas.questions.end());
     for (const AreaAnswers::Diameter& d : areas.diameters)
-      complete(d.kind, d.cylinder, number(d.value), d.remark);
-    append(out_.notes, masses.notes);
+      complete(d.kind, d.cylinder, file_number(d.value), d.remark);
+    append_all(out_.notes, masses.notes);
     out_.questions.insert(out_.questions.end(), masses.questions.begin(), masses.questions.end());
     out_.combinations = masses.combinations;
     if (masses.possible) complete_masses(masses);
@@ -215,7 +215,7 @@ class Estimate {
           fmt::format("from the log: {} of {} that {} the static forces it shows",
                       mass_open ? "mass" : "centre", link.name,
                       mass_open && cog_open ? "with its centre gives" : "gives");
-      complete(OpenKind::kMass, l, number(link.mass), source);
+      complete(OpenKind::kMass, l, file_number(link.mass), source);
       complete(OpenKind::kCog, l, pin_text(link.joint, link.cog), mass_open ? "" : source);
       const std::string path = fmt::format("links[{}].mass", link.name);
       if (!mass_open || asked(path)) continue;
@@ -270,7 +270,7 @@ class Estimate {
     try {
       std::vector<std::string> warnings;
       Machine machine = parse_machine(out_.text, sketch_.file, sketch_.folder, &warnings);
-      append(out_.warnings, warnings);
+      append_all(out_.warnings, warnings);
       if (machine.source_text != out_.text) {  // a URDF's joints and links are written out
         std::string head;
         for (const std::string& line : heading) head += "# " + line + "\n";

@@ -118,7 +118,7 @@ void add_machine_verb(CLI::App& app, int& code) {
   verb->add_option("--mapping", a->mapping, "mapping file for logs with other column names (YAML)")
       ->type_name("FILE");
   verb->add_option("--out,-o", a->out, "machine file to write; what is asked for stays open in it")
-      ->type_name("MACHINE.yaml");
+      ->type_name("FILE");
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });
 }
