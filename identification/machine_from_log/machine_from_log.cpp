@@ -15,9 +15,8 @@
 #include "models/files/model_file.h"
 
 namespace sparflow {
+namespace from_log {
 namespace {
-
-using namespace from_log;
 
 std::string file_number(double value) { return fmt::format("{:.6g}", value + 0.0); }
 
@@ -295,6 +294,7 @@ class Estimate {
 };
 
 }  // namespace
+}  // namespace from_log
 
 MachineFromLog machine_from_logs(const MachineSketch& sketch, const std::vector<Log>& logs,
                                  const std::vector<Log>& tests,
@@ -307,7 +307,7 @@ MachineFromLog machine_from_logs(const MachineSketch& sketch, const std::vector<
         throw InputError({log.path, 0, 0}, "", "this log was read for another machine");
     }
   }
-  return Estimate(sketch, logs, tests, options).run();
+  return from_log::Estimate(sketch, logs, tests, options).run();
 }
 
 }  // namespace sparflow
