@@ -111,7 +111,7 @@ BenchmarkedRun run_view(const Row& row) {
   const auto throttles = [](std::size_t k) {
     const auto place = static_cast<Loss>(k);
     return place == Loss::kMeterIn || place == Loss::kMeterOut || place == Loss::kCounterbalance ||
-           place == Loss::kLine || place == Loss::kAntiCavitation;
+           place == Loss::kLine || place == Loss::kAntiCavitation || place == Loss::kPortRelief;
   };
   run.went = {{"gained in height", "", row.useful / 1e3}};
   for (std::size_t k = 0; k < row.loss.size(); ++k)

@@ -16,6 +16,7 @@ constexpr double kFrictionPressure = 2e5;   // [Pa] on the piston area
 constexpr double kViscousPressure = 0.2e5;  // [Pa] on the piston area at full speed
 constexpr double kPistonLeak = 0.02;        // [l/min] at 100 bar
 constexpr double kSetOverPump = 1.0;  // [-] counterbalance setting over the pump's largest pressure
+constexpr double kReliefOverPump = 1.2;  // [-] port relief valves over the pump's largest pressure
 constexpr double kPumpLeakShare = 0.08;  // [-] of the largest flow at the largest pressure
 constexpr double kCornerPower = 0.75;    // [-] of largest pressure times largest flow
 constexpr double kDriveLag = 0.05;       // [s] of a drive without hydraulics
@@ -63,6 +64,7 @@ void size_hydraulics(const Machine& machine, int c, CylinderParameters& p) {
   p.dead_volume = 0.05 * area * stroke_of(machine, c);
   p.hose_volume = p.max_flow_extend / kHoseVelocity * hose_length(machine, drive.joint);
   p.counterbalance.set_pressure = kSetOverPump * pump.max_pressure;
+  p.port_relief = kReliefOverPump * pump.max_pressure;
 }
 
 }  // namespace

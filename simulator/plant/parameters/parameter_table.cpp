@@ -8,7 +8,7 @@ namespace sparflow::plant {
 namespace {
 
 // clang-format off
-constexpr std::array<ParameterRow, 69> kTable = {{
+constexpr std::array<ParameterRow, 70> kTable = {{
     {Place::kPlant, "bulk_modulus_MPa", "MPa", 1e6, 200.0, 1000000.0,
      "1500", "bulk modulus of oil without air",
      "Merritt 1967, ch. 2; Jelali, Kroll 2003, ch. 3",
@@ -169,6 +169,10 @@ constexpr std::array<ParameterRow, 69> kTable = {{
      "20", "spool's return edge at full flow",
      "PVG 32 technical information",
      [](PlantParameters& p, std::size_t i) -> double& { return p.cylinders[i].return_drop; }},
+    {Place::kCylinder, "port_relief_bar", "bar", 1e5, 10.0, 100000.0,
+     "1.2 times the pump's largest pressure", "relief valves at the chambers' ports, which end the pressure of a load that is stopped",
+     "PVG 32 technical information, shock valves PVLP",
+     [](PlantParameters& p, std::size_t i) -> double& { return p.cylinders[i].port_relief; }},
     {Place::kCylinder, "spool_frequency_Hz", "Hz", 1, 0.1, 200.0,
      "6", "natural frequency of the spool",
      "PVG 32 with PVEH: 0.12 to 0.23 s to full travel",

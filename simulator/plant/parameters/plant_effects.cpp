@@ -10,7 +10,7 @@
 namespace sparflow::plant {
 namespace {
 
-constexpr std::array<PlantEffect, 31> kEffects = {{
+constexpr std::array<PlantEffect, 32> kEffects = {{
     {"coulomb_friction", "coulomb_friction_N", 0.0, true, "dry friction with presliding (LuGre)"},
     {"stiction", "stiction_ratio", 1.0, true, "breakaway above dry friction"},
     {"viscous_friction", "viscous_friction_N_s_m", 0.0, true,
@@ -31,6 +31,7 @@ constexpr std::array<PlantEffect, 31> kEffects = {{
     {"valve_lag", "spool_frequency_Hz", 60.0, true, "second-order spool"},
     {"counterbalance", "counterbalance", 0.0, true,
      "load-holding valves with pilot; off: the return edge limits the flow"},
+    {"port_relief", "port_relief_bar", 1e5, true, "relief valves at the chambers' ports"},
     {"end_cushion", "cushion_length_m", 0.0, true, "throttles the last part of the stroke"},
     {"load_sensing_delay", "line_delay_s", 0.002, true, "of the load-sensing line"},
     {"pump_lag", "response_s", 0.008, true, "of the pump's pressure control"},

@@ -25,6 +25,7 @@ struct CylinderParameters {
   double max_flow_retract = 0.0;  ///< [m^3/s] into the rod side
   double compensator = 7e5;       ///< [Pa]
   double return_drop = 20e5;      ///< [Pa] over the spool's return edge at full flow
+  double port_relief = 1e9;       ///< [Pa] opens the relief valve at a chamber's port
   double line_drop = 5e5;         ///< [Pa] between valve and cylinder at full flow
   double leakage = 0.0;           ///< [m^3/s/Pa] across the piston, oil at 40 degC
   double dead_volume = 0.0;       ///< [m^3] of each chamber at its end of the stroke

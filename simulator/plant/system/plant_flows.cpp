@@ -14,9 +14,10 @@ constexpr double kNeutralDrain =
     0.05;  // [-] of the return edge that stays open in neutral, for counterbalance valves
 constexpr double kReturnReserve =
     1.03;  // of a limited return edge over its supply edge, else the two would lock
-constexpr double kCracking = 0.3e5;    // [Pa] of anti-cavitation valves
-constexpr double kRefillDrop = 2e5;    // [Pa] over them at the port's full flow
-constexpr double kReliefRange = 10e5;  // [Pa] from closed to the pump's full flow
+constexpr double kCracking = 0.3e5;        // [Pa] of anti-cavitation valves
+constexpr double kRefillDrop = 2e5;        // [Pa] over them at the port's full flow
+constexpr double kReliefRange = 10e5;      // [Pa] from closed to the pump's full flow
+constexpr double kPortReliefRange = 20e5;  // [Pa] from closed to the port's full flow
 constexpr double kDriveIntegral =
     0.2;  // [s] reset time of the speed control of a drive without hydraulics
 
@@ -111,6 +112,8 @@ void PlantSystem::evaluate_hydraulics(const double* state, int c, double viscosi
   const double suck_a = pt - pa - kCracking, suck_b = pt - pb - kCracking;
   if (suck_a > 0.0) i.refill_a = throttle(1.0, suck_a, k.full_a, kRefillDrop);
   if (suck_b > 0.0) i.refill_b = throttle(1.0, suck_b, k.full_b, kRefillDrop);
+  i.relief_a = k.full_a * std::max(pa - p.port_relief, 0.0) / kPortReliefRange;
+  i.relief_b = k.full_b * std::max(pb - p.port_relief, 0.0) / kPortReliefRange;
   PumpInstant& pump = at.pumps[place(k.pump)];
   pump.taken += i.in_a + i.in_b;
   const double ws = oil_.at(ps).flow_work, wt = oil_.at(pt).flow_work;
@@ -129,6 +132,7 @@ void PlantSystem::evaluate_hydraulics(const double* state, int c, double viscosi
   loss(port(holds_rod(v), i.port_b)) += i.port_b * (whb - wb);
   loss(Loss::kLeakage) = i.leak * (wa - wb);
   loss(Loss::kAntiCavitation) = i.refill_a * (wt - wa) + i.refill_b * (wt - wb);
+  loss(Loss::kPortRelief) = i.relief_a * (wa - wt) + i.relief_b * (wb - wt);
 }
 
 void PlantSystem::evaluate_force(const double* state, int c, double viscosity, double command,
@@ -198,10 +202,12 @@ void PlantSystem::hydraulic_rates(const double* state, const std::vector<double>
     const Chamber h = hose(c);
     set(StateLayout::kPressureA,
         chamber_a(c, i.length)
-            .pressure_rate(oil_.at(pa), pa, i.port_a - i.leak + i.refill_a, k.area_a * i.speed));
+            .pressure_rate(oil_.at(pa), pa, i.port_a - i.leak + i.refill_a - i.relief_a,
+                           k.area_a * i.speed));
     set(StateLayout::kPressureB,
         chamber_b(c, i.length)
-            .pressure_rate(oil_.at(pb), pb, i.port_b + i.leak + i.refill_b, -k.area_b * i.speed));
+            .pressure_rate(oil_.at(pb), pb, i.port_b + i.leak + i.refill_b - i.relief_b,
+                           -k.area_b * i.speed));
     set(StateLayout::kHoseA, h.pressure_rate(oil_.at(ha), ha, i.in_a - i.out_a - i.port_a, 0.0));
     set(StateLayout::kHoseB, h.pressure_rate(oil_.at(hb), hb, i.in_b - i.out_b - i.port_b, 0.0));
     const SpoolRates s =
@@ -212,7 +218,7 @@ void PlantSystem::hydraulic_rates(const double* state, const std::vector<double>
     set(StateLayout::kSpoolRate, s.velocity);
     set(StateLayout::kPilotA, (hb - value(StateLayout::kPilotA)) / p.counterbalance.lag);
     set(StateLayout::kPilotB, (ha - value(StateLayout::kPilotB)) / p.counterbalance.lag);
-    into_tank_line += i.out_a + i.out_b - i.refill_a - i.refill_b;
+    into_tank_line += i.out_a + i.out_b + i.relief_a + i.relief_b - i.refill_a - i.refill_b;
   }
   for (int p = 0; p < layout_.pumps; ++p) {
     const PumpParameters& q = parameters_.pumps[place(p)];

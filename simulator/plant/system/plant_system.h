@@ -19,18 +19,25 @@ enum class Loss {
   kLine,            ///< hose, and the valve's check on the way in
   kLeakage,
   kAntiCavitation,
+  kPortRelief,  ///< relief valves of the chambers' ports
   kFriction,
   kEndStop
 };
-inline constexpr int kLosses = 8;
+inline constexpr int kLosses = 9;
 /// Keys of files.
 inline constexpr std::array<const char*, kLosses> kLossNames = {
-    "meter_in", "meter_out",       "counterbalance", "line",
-    "leakage",  "anti_cavitation", "friction",       "end_stop"};
+    "meter_in",        "meter_out",   "counterbalance", "line",    "leakage",
+    "anti_cavitation", "port_relief", "friction",       "end_stop"};
 /// Words for people.
-inline constexpr std::array<const char*, kLosses> kLossWords = {
-    "meter-in edge",         "meter-out edge", "counterbalance valve", "line", "leakage",
-    "anti-cavitation valve", "friction",       "end stop and cushion"};
+inline constexpr std::array<const char*, kLosses> kLossWords = {"meter-in edge",
+                                                                "meter-out edge",
+                                                                "counterbalance valve",
+                                                                "line",
+                                                                "leakage",
+                                                                "anti-cavitation valve",
+                                                                "port relief valve",
+                                                                "friction",
+                                                                "end stop and cushion"};
 
 /// Places of the parts in the state vector.
 struct StateLayout {
@@ -71,6 +78,7 @@ struct CylinderInstant {
   double port_a = 0.0, port_b = 0.0;      ///< hose to chamber
   double leak = 0.0;                      ///< bore side to rod side
   double refill_a = 0.0, refill_b = 0.0;  ///< tank line to chamber, anti-cavitation valves
+  double relief_a = 0.0, relief_b = 0.0;  ///< chamber to tank line, port relief valves
   std::array<double, kLosses> loss{};     ///< [W]
   double stored = 0.0;                    ///< [J] bristles and stops
   double bristle_rate = 0.0;              ///< [m/s]
