@@ -105,5 +105,42 @@ TEST(SwayFile, LimitsAreReadAndBadOnesRefused) {
               HasSubstr("larger than limit_deg"));
 }
 
+TEST(VelocityFile, RatesAreReadAndThoseThatLeadOutOfTheLimitsRefused) {
+  using testing::HasSubstr;
+  const auto with = [](const std::string& start, const std::string& goal) {
+    return "machine: loader_crane\nduration_s: 20\nstart: {q: {boom: 0.2, jib: -1.6, extension: "
+           "0.8}, " +
+           start + "}\ngoal: " + goal + "\n";
+  };
+  const auto why = [](const std::string& text) {
+    try {
+      read_problem(text);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string posture = "{q: {boom: 0.5, jib: -1.0, extension: 2}";
+  const MotionProblem p =
+      read_problem(with("velocity: {jib: 0.05}", posture + ", velocity: {extension: 0.1}}"));
+  EXPECT_EQ(p.start_velocity, Eigen::Vector3d(0.0, 0.05, 0.0));
+  EXPECT_EQ(p.goal_velocity, Eigen::Vector3d(0.0, 0.0, 0.1));
+  EXPECT_TRUE(moves_at_an_end(p));
+  EXPECT_THAT(why(with("velocity: {jib: 5}", posture + "}")), HasSubstr("within the limits"));
+  EXPECT_THAT(why(with("velocity: {jib: .nan}", posture + "}")), HasSubstr("nan"));
+  EXPECT_THAT(why(with("velocity: {arm: 0.1}", posture + "}")), HasSubstr("arm"));
+  EXPECT_THAT(why(with("velocity: {jib: 0.05}", "{tip: [7, 0, 3], velocity: {jib: 0.1}}")),
+              HasSubstr("needs a goal with a posture"));
+  // 0.2 m/s need 3.3 cm to stop at 0.6 m/s2, and the telescope has 1 cm left.
+  EXPECT_THAT(
+      why("machine: loader_crane\nduration_s: 20\n"
+          "start: {q: {boom: 0.2, jib: -1.6, extension: 5.99}, velocity: {extension: 0.2}}\n"
+          "goal: " +
+          posture + "}\n"),
+      HasSubstr("its range ends before"));
+  EXPECT_THAT(why(with("velocity: {boom: 0.1, jib: 0.17, extension: 0.29}", posture + "}")),
+              HasSubstr("times the limit of"));
+}
+
 }  // namespace
 }  // namespace sparflow
