@@ -2,10 +2,12 @@
 
 #include "apps/python/bindings.h"
 #include "apps/tasks/inputs.h"
+#include "apps/tasks/machine_from_log_task.h"
 #include "models/effects/effect_text.h"
 #include "models/effects/formula/user_effect.h"
 #include "models/files/machine_file.h"
 #include "models/files/model_file.h"
+#include "models/math/error.h"
 
 namespace sparflow::python {
 namespace {
@@ -14,6 +16,33 @@ Listener python_listener() { return {warn, warn, {}, {}}; }
 
 std::shared_ptr<Machine> load_machine_telling(const py::object& path) {
   return std::make_shared<Machine>(read_machine(path_from(path), python_listener()));
+}
+
+/// Paths given as one path or a sequence of them; None: no path.
+std::vector<std::string> paths_from(const py::object& given) {
+  if (given.is_none()) return {};
+  if (py::isinstance<py::str>(given) || py::hasattr(given, "__fspath__")) return {path_from(given)};
+  std::vector<std::string> paths;
+  for (const py::handle item : given)
+    paths.push_back(path_from(py::reinterpret_borrow<py::object>(item)));
+  return paths;
+}
+
+/// Finds the open values of a sketch; a machine that lacks some is an error that names all of them.
+std::shared_ptr<Machine> machine_from_log(const py::object& sketch, const py::object& logs,
+                                          const py::object& test, const py::object& mapping) {
+  const MachineFromLogTask task{path_from(sketch), paths_from(logs), paths_from(test),
+                                mapping.is_none() ? "" : path_from(mapping)};
+  std::vector<std::string> told;
+  const Listener listener{[&told](const std::string& s) { told.push_back(s); }, {}, {}, {}};
+  MachineFromLog found;
+  {
+    const py::gil_scoped_release release;
+    found = machine_from_log_task(task, listener);
+  }
+  for (const std::string& sentence : told) warn(sentence);
+  if (!found.complete()) throw InputError({task.sketch, 0, 0}, "", questions_in_words(found));
+  return std::make_shared<Machine>(*std::move(found.machine));
 }
 
 std::shared_ptr<CraneModel> load_model_telling(const py::object& path) {
@@ -65,6 +94,13 @@ void bind_machine(py::module_& m) {
       m, "Machine", "Joints, masses, cylinders with their linkages, pumps and valves. SI.")
       .def_static("load", &load_machine_telling, py::arg("path"),
                   "Reads a machine file (YAML, docs/machine_file.md). Raises InputError.")
+      .def_static(
+          "from_log", &machine_from_log, py::arg("sketch"), py::arg("logs"),
+          py::arg("test") = py::none(), py::arg("mapping") = py::none(),
+          "Finds what a machine file leaves open (`unknown`) from logs: pins and lengths [m] "
+          "from strokes and joint\npositions, bores [m], masses [kg] and centres [m] from "
+          "pressures (docs/machine_from_log.md). `logs`, `test`: paths; `test`\nlogs judge. "
+          "Raises InputError with all that the logs do not determine.")
       .def_static(
           "parse",
           [](const std::string& text, const std::string& name, const std::string& folder) {

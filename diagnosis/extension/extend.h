@@ -65,9 +65,9 @@ struct ExtendOptions {
   DiagnoseOptions diagnose;   ///< used by `improve` only
   ErrorChangeOptions change;  ///< whether a step is kept
   /// Largest number of steps that `improve` keeps.
-  /// @threshold [steps] 0..; chosen: as many effects as a diagnosis may find
-  /// (SearchOptions::max_effects).
-  int max_steps = 8;
+  /// @threshold [steps] 0..; chosen: above the ten that stay on logs of a real crane with two cylinders before nothing more
+  /// is found
+  int max_steps = 12;
   /// Steps that `improve` may reject before it stops.
   /// @threshold [steps] 0..; chosen: as many as it may keep, because each may need another
   /// diagnosis.

@@ -59,13 +59,14 @@ class RefitContext {
   std::string measured_on() const { return folds_.empty() ? judged_on_ : "held-out motions"; }
 
   /// Training and test logs, for the record.
-  std::vector<DataSource> data() const;
-
- private:
   /// The model of forces and flows with these effects, estimated and learned without some samples.
+  /// @param left_out [logs] masks of these samples; empty = none
   CraneModel measured_model(const CraneModel& from, const std::vector<EffectAt>& effects,
                             const std::vector<Mask>& left_out,
                             const SearchProgress& progress) const;
+  std::vector<DataSource> data() const;
+
+ private:
   /// @param base its effects that are not in `effects` are left out  @param leave_out [logs] masks; empty = none
   EffectEstimate estimate(CraneModel base, const std::vector<EffectAt>& effects,
                           const std::vector<Mask>& leave_out, const SearchProgress& progress) const;

@@ -7,6 +7,7 @@
 
 #include "models/files/cylinder_file.h"
 #include "models/files/file_quantities.h"
+#include "models/files/open_values.h"
 #include "models/files/urdf_import.h"
 #include "models/machine/machine_check.h"
 #include "models/math/door.h"
@@ -30,10 +31,27 @@ class MachineReader {
       : folder_(std::move(folder)), places_{file, {}, {}, {}, {}, {}} {}
 
   Machine read(const std::string& text, std::vector<std::string>* warnings) {
-    const YamlMap root = parse_yaml(text, places_.file)
-                             .map("a machine: name, joints, links, cylinders, pumps, valves",
-                                  {"name", "gravity", "joints", "kinematics", "tip", "links",
-                                   "cylinders", "pumps", "valves"});
+    const YamlValue document = parse_yaml(text, places_.file);
+    refuse_open_values(document, text);
+    const YamlMap root = read_parts(document);
+    const std::vector<std::string> found = check_machine(machine_, places_);
+    warnings_.insert(warnings_.end(), found.begin(), found.end());
+    if (warnings != nullptr) *warnings = warnings_;
+    machine_.source_text = root.has("kinematics") ? write_machine(machine_) : text;
+    return machine_;
+  }
+
+  Machine read_unchecked(const std::string& text, FileFrames* frames) {
+    read_parts(parse_yaml(text, places_.file));
+    if (frames != nullptr) *frames = frames_;
+    return machine_;
+  }
+
+ private:
+  YamlMap read_parts(const YamlValue& document) {
+    const YamlMap root = document.map("a machine: name, joints, links, cylinders, pumps, valves",
+                                      {"name", "gravity", "joints", "kinematics", "tip", "links",
+                                       "cylinders", "pumps", "valves"});
     machine_.name = root.need("name", "the machine's name").text("the machine's name");
     if (const auto gravity = root.find("gravity")) machine_.gravity = gravity->vector3(kGravity);
     if (root.has("kinematics")) {
@@ -62,14 +80,9 @@ class MachineReader {
     if (const auto valves = root.find("valves")) {
       for (const YamlValue& v : valves->list("valves", kParts)) read_valve(v);
     }
-    const std::vector<std::string> found = check_machine(machine_, places_);
-    warnings_.insert(warnings_.end(), found.begin(), found.end());
-    if (warnings != nullptr) *warnings = warnings_;
-    machine_.source_text = root.has("kinematics") ? write_machine(machine_) : text;
-    return machine_;
+    return root;
   }
 
- private:
   /// Names are looked up while reading, so that a second one of a kind is reported before anything else.
   template <class Part>
   static void must_be_new(const YamlValue& value, const std::string& name,
@@ -362,6 +375,11 @@ class MachineReader {
 Machine parse_machine(const std::string& text, const std::string& name, const std::string& folder,
                       std::vector<std::string>* warnings) {
   return MachineReader(name, folder).read(text, warnings);
+}
+
+Machine parse_unchecked_machine(const std::string& text, const std::string& name,
+                                const std::string& folder, FileFrames* frames) {
+  return MachineReader(name, folder).read_unchecked(text, frames);
 }
 
 Machine load_machine(const std::string& path, std::vector<std::string>* warnings) {

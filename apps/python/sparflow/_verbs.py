@@ -52,7 +52,7 @@ def extend(model, logs, add=(), test=None, *, remove="", threads=0, effects=None
                                    progress=progress))
 
 
-def improve(model, logs, references=None, test=None, *, max_steps=8, candidates=None, threads=0, effects=None,
+def improve(model, logs, references=None, test=None, *, max_steps=12, candidates=None, threads=0, effects=None,
             progress=None):
     """Repeats diagnose and extend until no effect is missing; returns an ExtendResult.
 

@@ -1,0 +1,234 @@
+#include "diagnosis/extension/improvement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/effects/registry.h"
+#include "models/math/error.h"
+
+namespace sparflow {
+namespace {
+
+/// Whether the logs determine that an effect is there at all: the 95 % interval of one of the parameters to which it is
+/// proportional excludes zero. True for an effect without such a parameter or without intervals.
+bool is_determined(const AppliedEffect& e) {
+  if (e.lower95.size() != e.values.size()) return true;
+  bool proportional = false;
+  for (std::size_t k = 0; k < e.values.size(); ++k) {
+    if (!e.effect->info().parameters[k].linear) continue;
+    if (e.lower95[k] > 0.0 || e.upper95[k] < 0.0) return true;
+    proportional = true;
+  }
+  return !proportional;
+}
+
+/// Whether the error of the quantity that an effect acts on grew significantly; of an effect at no single cylinder, that of
+/// any quantity of its stage.
+bool harms_its_own_place(const ExtendStep& step, const Machine& machine, const EffectAt& e) {
+  const std::vector<HarmedError> harmed = harmed_measured(step);
+  const bool one = e.at >= 0 && e.effect->info().place == EffectPlace::kCylinder;
+  return std::any_of(harmed.begin(), harmed.end(), [&](const HarmedError& h) {
+    return !one || h.at == machine.cylinders[static_cast<std::size_t>(e.at)].name;
+  });
+}
+
+std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
+  std::erase(list, e);
+  return list;
+}
+
+}  // namespace
+
+bool contains(const std::vector<EffectAt>& list, const EffectAt& e) {
+  return std::find(list.begin(), list.end(), e) != list.end();
+}
+
+bool Improvement::add(ImproveRound& round, const std::shared_ptr<const Diagnosis>& diagnosis,
+                      const SearchProgress& progress) {
+  const std::vector<EffectAt> wanted = places(round.wanted);
+  Trial trial{places_of(current_.model.effects), {}, diagnosis};
+  trial.effects.insert(trial.effects.end(), wanted.begin(), wanted.end());
+  const std::vector<EffectAt> kept = diagnosis == nullptr
+                                         ? remove(trial, wanted, places(round.removed), progress)
+                                         : eliminate(trial, wanted, progress);
+  for (const EffectAt& e : kept) {
+    TriedStep tried = try_adding(context_, current_, e, progress);
+    tried.step.diagnosis = diagnosis;
+    keep(std::move(tried), context_, current_, result_);
+    added_.push_back(e);
+  }
+  ++rounds_;
+  if (!kept.empty()) aside_.clear();
+  round.removed.clear();
+  for (ExtendStep& f : trial.failures) {
+    round.removed.push_back(f.added);
+    aside_.push_back({f.effect.effect, f.effect.at});
+    ++rejected_;
+    result_.rejected.push_back(std::move(f));
+  }
+  return !kept.empty();
+}
+
+void Improvement::test_again(const SearchProgress& progress) {
+  if (rounds_ < 2) return;
+  Trial trial{places_of(current_.model.effects), {}, nullptr};
+  const std::vector<EffectAt> still = eliminate(trial, added_, progress);
+  for (const EffectAt& e : added_) {
+    if (!contains(still, e))
+      keep(try_removing(context_, current_, e, progress), context_, current_, result_);
+  }
+  added_ = still;
+}
+
+void Improvement::merge(const SearchProgress& progress) {
+  while (const std::optional<Merge> best = best_merge(progress)) {
+    for (const EffectAt& e : {best->first, best->second}) {
+      keep(try_removing(context_, current_, e, progress), context_, current_, result_);
+      std::erase(added_, e);
+    }
+    keep(try_adding(context_, current_, best->by, progress), context_, current_, result_);
+    added_.push_back(best->by);
+  }
+}
+
+std::vector<Improvement::Merge> Improvement::possible_merges() const {
+  std::vector<Merge> out;
+  const auto one_place = [](const EffectAt& a, const EffectAt& b) {
+    const EffectStage stage = a.effect->info().stage;
+    return (stage == EffectStage::kForce || stage == EffectStage::kFlow) && a.at == b.at &&
+           stage == b.effect->info().stage && a.effect->info().place == b.effect->info().place;
+  };
+  const std::vector<EffectAt> all = places_of(current_.model.effects);
+  for (std::size_t i = 0; i < added_.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!one_place(added_[i], added_[j])) continue;
+      for (const EffectAt& by : candidates(context_.machine()))
+        if (one_place(added_[i], by) && !contains(all, by))
+          out.push_back({added_[i], added_[j], by});
+    }
+  }
+  return out;
+}
+
+std::optional<Improvement::Merge> Improvement::best_merge(const SearchProgress& progress) const {
+  const std::vector<Merge> possible = possible_merges();
+  std::optional<Merge> best;
+  if (possible.empty()) return best;
+  const std::vector<EffectAt> all = places_of(current_.model.effects);
+  const CompareResult now = context_.measured_errors(current_.model, all, progress);
+  double least = context_.options().change.refit_moves;
+  for (const Merge& m : possible) {
+    std::vector<EffectAt> effects = without(without(all, m.first), m.second);
+    effects.push_back(m.by);
+    ExtendStep step;
+    try {
+      judge_step(context_, m.by, now, context_.measured_errors(current_.model, effects, progress),
+                 step);
+      if (!(step.change.own < least) || !harmed_measured(step).empty()) continue;
+      step.effect = context_.measured_model(current_.model, effects, {}, progress).effects.back();
+    } catch (const InputError&) {
+      continue;  // these logs do not show that effect
+    }
+    if (!is_determined(step.effect)) continue;
+    least = step.change.own;
+    best = m;
+  }
+  return best;
+}
+
+std::vector<EffectAt> Improvement::places(const std::vector<std::string>& keys) const {
+  std::vector<EffectAt> out;
+  out.reserve(keys.size());
+  for (const std::string& key : keys) out.push_back(parse_effect(key, context_.machine()));
+  return out;
+}
+
+std::vector<EffectAt> Improvement::eliminate(Trial& trial, std::vector<EffectAt> tested,
+                                             const SearchProgress& progress) const {
+  while (!tested.empty()) {
+    std::optional<ExtendStep> weakest = weakest_of(joint(trial, progress), tested, progress);
+    if (!weakest) break;
+    fail(std::move(*weakest), trial, tested);
+  }
+  return tested;
+}
+
+std::vector<EffectAt> Improvement::remove(Trial& trial, std::vector<EffectAt> tested,
+                                          const std::vector<EffectAt>& removed,
+                                          const SearchProgress& progress) const {
+  for (const EffectAt& e : removed)
+    fail(without_one(joint(trial, progress), e, progress).step, trial, tested);
+  return tested;
+}
+
+void Improvement::fail(ExtendStep step, Trial& trial, std::vector<EffectAt>& tested) {
+  const EffectAt e{step.effect.effect, step.effect.at};
+  step.diagnosis = trial.diagnosis;
+  trial.failures.push_back(std::move(step));
+  std::erase(tested, e);
+  std::erase(trial.effects, e);
+}
+
+Improvement::Joint Improvement::joint(const Trial& trial, const SearchProgress& progress) const {
+  Joint j;
+  j.judged = context_.with(current_, trial.effects, progress);
+  j.all = places_of(j.judged.model.effects);
+  j.measured = context_.measured_errors(j.judged.model, j.all, progress);
+  j.on_tests = context_.tested_errors(j.judged.model, j.all, progress);
+  return j;
+}
+
+Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt& e,
+                                             const SearchProgress& progress) const {
+  const ExtendOptions& options = context_.options();
+  const CraneModel& model = joint.judged.model;
+  const std::vector<EffectAt> rest = without(joint.all, e);
+  const EffectStage stage = e.effect->info().stage;
+  const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+  Tested tested;
+  ExtendStep& step = tested.step;
+  step.added = effect_key(e.effect->info(), model.machine, e.at);
+  step.title = effect_title(e.effect->info(), model.machine, e.at);
+  step.effect = model.effects[static_cast<std::size_t>(
+      std::find(joint.all.begin(), joint.all.end(), e) - joint.all.begin())];
+  if (learned) {
+    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
+               step);
+  } else {
+    judge_step(context_, e, context_.measured_errors(model, rest, progress), joint.measured, step);
+    step.judged_on = context_.measured_on();
+  }
+  step.determined = is_determined(step.effect);
+  const bool falls = step.change.own * options.change.refit_moves < 1.0;
+  // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
+  const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
+  tested.stays = step.determined && (falls || unseen);
+  if (!tested.stays || !joint.on_tests || learned) return tested;
+  // Test logs do not choose an effect, but may contradict it.
+  ExtendStep test = step;
+  judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
+  tested.stays = !harms_its_own_place(test, model.machine, e);
+  if (!tested.stays) step = std::move(test);
+  return tested;
+}
+
+std::optional<ExtendStep> Improvement::weakest_of(const Joint& joint,
+                                                  const std::vector<EffectAt>& tested,
+                                                  const SearchProgress& progress) const {
+  std::optional<ExtendStep> weakest;
+  double least = 0.0;
+  for (const EffectAt& e : tested) {
+    Tested one = without_one(joint, e, progress);
+    if (one.stays) continue;
+    // an effect that the logs do not determine at all goes first
+    const double worth =
+        one.step.determined ? -one.step.change.own : -std::numeric_limits<double>::infinity();
+    if (weakest && worth >= least) continue;
+    least = worth;
+    weakest = std::move(one.step);
+  }
+  return weakest;
+}
+
+}  // namespace sparflow

@@ -1,0 +1,107 @@
+#pragma once
+/// Rounds of `improve` on one model: effects estimated together, backward elimination, merging. Used by improve.cpp only.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/extension/extension_step.h"
+#include "diagnosis/extension/improve_round.h"
+
+namespace sparflow {
+
+/// @return whether the list has the effect at that place
+bool contains(const std::vector<EffectAt>& list, const EffectAt& e);
+
+/// Repeated rounds of diagnosis, joint estimate and backward elimination.
+class Improvement {
+ public:
+  Improvement(const RefitContext& context, ExtendResult& result, Judged& current)
+      : context_(context), result_(result), current_(current) {}
+
+  /// Estimates the effects of a round together with those of the model and removes what the data do not bear out. The round
+  /// gets what was removed; of one that an earlier run has made, that is removed and nothing else is tested.
+  /// @param diagnosis that named them; null in a round of an earlier run
+  /// @return whether anything was kept
+  bool add(ImproveRound& round, const std::shared_ptr<const Diagnosis>& diagnosis,
+           const SearchProgress& progress);
+
+  /// Tests the effects of former rounds again beside those that came after them, and removes what has become useless.
+  void test_again(const SearchProgress& progress);
+
+  /// Replaces two effects of one place by one that predicts as well: what one law explains need not be two. Dry friction
+  /// at nearly one speed resembles viscous friction, and a later round then adds a Stribeck part that bends it back.
+  void merge(const SearchProgress& progress);
+
+  /// Effects that the next diagnosis must not name.
+  const std::vector<EffectAt>& excluded() const { return aside_; }
+  std::size_t rejected() const { return rejected_; }
+  std::size_t added() const { return added_.size(); }
+
+ private:
+  /// A set of effects, and what was removed from it.
+  struct Trial {
+    std::vector<EffectAt> effects;
+    std::vector<ExtendStep> failures;
+    std::shared_ptr<const Diagnosis> diagnosis;
+  };
+
+  /// A set of effects estimated together, with the errors by which each of them is judged.
+  struct Joint {
+    Judged judged;
+    std::vector<EffectAt> all;
+    CompareResult measured;
+    std::optional<CompareResult> on_tests;
+  };
+  /// An effect taken out of a joint set, and whether the data bear it out.
+  struct Tested {
+    ExtendStep step;
+    bool stays = false;
+  };
+
+  struct Merge {
+    EffectAt first, second;  ///< that are replaced
+    EffectAt by;
+  };
+
+  /// Pairs of added effects of one stage and place, each with every other effect of the catalogue there.
+  std::vector<Merge> possible_merges() const;
+
+  /// Of the possible merges the one with the smallest error in its place, if that error is no more than learning anew may
+  /// change it and no other measured error grows.
+  std::optional<Merge> best_merge(const SearchProgress& progress) const;
+
+  std::vector<EffectAt> places(const std::vector<std::string>& keys) const;
+
+  /// Backward elimination: removes from the set the one of `tested` that the data bear out least, until they bear out all.
+  /// @return those of `tested` that stay
+  std::vector<EffectAt> eliminate(Trial& trial, std::vector<EffectAt> tested,
+                                  const SearchProgress& progress) const;
+
+  /// Removes these effects from the set, as an elimination did before. @return those of `tested` that stay
+  std::vector<EffectAt> remove(Trial& trial, std::vector<EffectAt> tested,
+                               const std::vector<EffectAt>& removed,
+                               const SearchProgress& progress) const;
+
+  static void fail(ExtendStep step, Trial& trial, std::vector<EffectAt>& tested);
+
+  Joint joint(const Trial& trial, const SearchProgress& progress) const;
+
+  /// The step that takes one effect out of a joint set. The errors of forces and flows are those of a cross-validation;
+  /// effects on pressures alone are judged as a step is.
+  Tested without_one(const Joint& joint, const EffectAt& e, const SearchProgress& progress) const;
+
+  /// Of the tested effects the one that the data bear out least, if they do not bear out all.
+  std::optional<ExtendStep> weakest_of(const Joint& joint, const std::vector<EffectAt>& tested,
+                                       const SearchProgress& progress) const;
+
+  const RefitContext& context_;
+  ExtendResult& result_;
+  Judged& current_;
+  std::vector<EffectAt> added_;  ///< by this call, and still there
+  std::vector<EffectAt> aside_;  ///< not kept since the last round that kept one
+  std::size_t rejected_ = 0;
+  int rounds_ = 0;
+};
+
+}  // namespace sparflow
