@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "models/machine/linkage.h"
@@ -70,8 +71,10 @@ std::string motion_header(const CraneModel& model) {
 
 }  // namespace
 
-std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
-                       const LeastFlows& least) {
+namespace {
+
+std::string motion_rows(const CraneModel& model, const Trajectory& motion,
+                        const std::function<double(double)>& payload_of, const LeastFlows& least) {
   std::string text = motion_header(model);
   const auto out = std::back_inserter(text);
   const std::vector<std::size_t> with_command = commanded_cylinders(model);
@@ -85,6 +88,7 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
     for (const Eigen::MatrixXd* m : {&motion.q, &motion.qd, &motion.qdd}) {
       for (Eigen::Index j = 0; j < m->cols(); ++j) fmt::format_to(out, ",{:.12g}", (*m)(k, j));
     }
+    const double payload = payload_of(motion.t[k]);
     const MachineState& state = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
     const auto moves = [&](std::size_t i) {
       return firmly_moving(least, i, state.cylinders[i].flow, state.cylinders[i].speed);
@@ -111,6 +115,30 @@ std::string motion_csv(const CraneModel& model, const Trajectory& motion, double
   return text;
 }
 
+}  // namespace
+
+std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
+                       const LeastFlows& least) {
+  return motion_rows(
+      model, motion, [payload](double) { return payload; }, least);
+}
+
+double payload_at(const MotionProblem& problem, const Trajectory& motion, double t) {
+  /// Time before a stop's instant that counts as the stop, because rows of a file are rounded.
+  /// @threshold [s] 0..1e-3; numerical: the last digit of t_s
+  constexpr double kSameInstant = 1e-7;
+  std::size_t leg = 0;
+  while (leg < motion.stops.size() && motion.stops[leg] <= t + kSameInstant) ++leg;
+  return payload_on(problem, leg);
+}
+
+std::string motion_csv(const CraneModel& model, const MotionProblem& problem,
+                       const Trajectory& motion) {
+  return motion_rows(
+      model, motion, [&](double t) { return payload_at(problem, motion, t); },
+      least_flows(model.machine, problem.limits));
+}
+
 Trajectory at_rate(const Trajectory& motion, double rate) {
   SPARFLOW_CHECK(rate > 0.0 && motion.size() > 1, "a rate and a motion");
   /// Part of a step below which the last instant and the end of the motion are one.
@@ -120,6 +148,7 @@ Trajectory at_rate(const Trajectory& motion, double rate) {
   const auto steps = static_cast<Eigen::Index>(std::ceil(whole - kSameInstant));
   const Eigen::Index n = motion.q.cols();
   Trajectory out;
+  out.stops = motion.stops;
   out.t.resize(steps + 1);
   for (Eigen::MatrixXd* m : {&out.q, &out.qd, &out.qdd}) m->resize(steps + 1, n);
   Eigen::Index interval = 0;

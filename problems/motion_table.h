@@ -14,6 +14,13 @@ namespace sparflow {
 std::string motion_csv(const CraneModel& model, const Trajectory& motion, double payload,
                        const LeastFlows& least = {});
 
+/// The same with the problem's payload and its valves' least flows; of a cycle the payload changes at its stops.
+std::string motion_csv(const CraneModel& model, const MotionProblem& problem,
+                       const Trajectory& motion);
+
+/// Payload at an instant of a motion; at a stop it is the one from then on. [kg]
+double payload_at(const MotionProblem& problem, const Trajectory& motion, double t);
+
 /// The same motion at a fixed rate: positions and speeds are those of the motion at each instant, accelerations are the
 /// mean over each step, so that the rows are a motion again. The last step ends with the motion and may be shorter.
 /// @param rate [Hz], > 0

@@ -57,6 +57,40 @@ Eigen::Matrix3Xd moving_tip_directions(const Machine& machine) {
   return complement_of(still);
 }
 
+bool moves_at_an_end(const MotionProblem& problem) {
+  const auto moves = [](const Eigen::VectorXd& v) { return v.size() > 0 && !v.isZero(0.0); };
+  return moves(problem.start_velocity) || moves(problem.goal_velocity);
+}
+
+double payload_on(const MotionProblem& problem, std::size_t leg) {
+  double payload = problem.payload;
+  for (std::size_t s = 0; s < leg && s < problem.stops.size(); ++s)
+    payload = problem.stops[s].payload.value_or(payload);
+  return payload;
+}
+
+std::string end_of_leg(const MotionProblem& problem, std::size_t leg) {
+  return leg < problem.stops.size() ? problem.stops[leg].name : problem.goal_name;
+}
+
+double total_dwell(const MotionProblem& problem) {
+  double time = 0.0;
+  for (const Stop& stop : problem.stops) time += stop.dwell;
+  return time;
+}
+
+MotionProblem leg_of(const MotionProblem& problem, std::size_t leg, const Eigen::VectorXd& start) {
+  MotionProblem one = problem;
+  one.payload = payload_on(problem, leg);
+  one.start = start;
+  if (leg < problem.stops.size()) {
+    one.goal = problem.stops[leg].goal;
+    one.goal_name = problem.stops[leg].name;
+  }
+  one.stops.clear();
+  return one;
+}
+
 MotionProblem::MotionProblem() = default;
 MotionProblem::MotionProblem(const MotionProblem&) = default;
 MotionProblem::MotionProblem(MotionProblem&&) noexcept = default;

@@ -1,5 +1,5 @@
 #pragma once
-/// A motion to be planned: from rest at `start` to rest at `goal`. Plain data, SI, base frame; read from
+/// A motion to be planned: from `start` to `goal`, from rest to rest unless velocities are given there. Plain data, SI, base frame; read from
 /// YAML by problems/problem_file.h, used by planners and optimizer.
 #include <Eigen/Dense>
 #include <optional>
@@ -14,11 +14,15 @@ namespace sparflow {
 /// Goal position of the tip; the goal configuration is free. [m], base frame.
 struct TipGoal {
   Eigen::Vector3d tip = Eigen::Vector3d::Zero();
+  double tolerance =
+      0.0;  ///< of a stop of a cycle: the tip may rest anywhere in a ball of this radius [m]
 };
 
 /// Goal configuration, in the machine's joint order. [rad] or [m]
 struct JointGoal {
   Eigen::VectorXd q;
+  Eigen::VectorXd tolerance =
+      {};  ///< of a stop of a cycle: each joint may be so far away; empty = 0
 };
 
 using Goal = std::variant<TipGoal, JointGoal>;
@@ -73,6 +77,22 @@ struct TipLine {
   double tolerance = 0.0;  ///< largest distance of the tip from the line [m]
 };
 
+/// A place of a cycle where the machine comes to rest, before the next one.
+struct Stop {
+  std::string name;  ///< as given, or "stop 1" and so on
+  Goal goal;
+  std::optional<double> payload;  ///< [kg] from then on; absent: as before
+  double dwell = 0.0;             ///< [s] for which it rests there
+};
+
+/// Limits of the load's sway on its rope.
+struct SwayLimit {
+  double cable = 0.0;  ///< length of the rope from the tip to the load [m]
+  double limit = 0.0;  ///< largest angle of the rope from the vertical [rad]
+  double end_limit =
+      0.0;  ///< largest angle to which it swings after the end and after each stop [rad]
+};
+
 /// Cost = energy * (E [J] + idle power * T) + time * T + commands * integral of sum_i u_i^2 dt
 ///        + smoothness * integral of sum_j qdd_j^2 dt, with u_i the command of valve i (1 = full flow).
 struct ObjectiveWeights {
@@ -96,14 +116,20 @@ struct MotionProblem {
   double payload = 0.0;   ///< [kg], hangs at the tip
   Eigen::VectorXd start;  ///< [rad] or [m], in the machine's joint order
   Goal goal;
+  /// Rates of the joints at the start and at the goal, which is then a posture; empty = at rest. [rad/s] or [m/s]
+  Eigen::VectorXd start_velocity, goal_velocity;
   /// Points that the tip passes in this order without having to stop [m]; the instants are free.
   std::vector<Eigen::Vector3d> waypoints;
+  /// Stops of a cycle before `goal`, which is its last one; empty = one move from rest to rest.
+  std::vector<Stop> stops;
+  std::string goal_name;  ///< of a cycle: name of its last stop
   Duration duration;
   double idle_power = 0.0;  ///< engine power while time passes [W]
   MotionLimits limits;
   std::vector<Obstacle> obstacles;
   double clearance = 0.0;  ///< least distance of the machine from every obstacle [m]
   std::optional<TipLine> tip_line;
+  std::optional<SwayLimit> sway;
   ObjectiveWeights objective;
   std::optional<int> knots;  ///< knots of the transcription; absent: the optimiser's choice
 
@@ -115,6 +141,19 @@ struct MotionProblem {
   MotionProblem& operator=(MotionProblem&&) noexcept;
   ~MotionProblem();
 };
+
+/// One leg of a cycle as a motion problem of its own, from `start` with the payload that it carries; leg 0 ends at the first stop,
+/// the last one at the goal. A problem without stops is its only leg. Its duration is that of the whole.
+MotionProblem leg_of(const MotionProblem& problem, std::size_t leg, const Eigen::VectorXd& start);
+/// Payload on a leg. [kg]
+double payload_on(const MotionProblem& problem, std::size_t leg);
+/// Name of the stop in which a leg ends.
+std::string end_of_leg(const MotionProblem& problem, std::size_t leg);
+/// Time for which the machine rests at stops. [s]
+double total_dwell(const MotionProblem& problem);
+
+/// Whether the machine moves at the start or at the goal.
+bool moves_at_an_end(const MotionProblem& problem);
 
 /// The machine's own limits without overrides.
 MotionLimits limits_of(const Machine& machine);

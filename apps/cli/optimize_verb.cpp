@@ -69,8 +69,7 @@ int run(const OptimizeArguments& a) {
   }
   if (result.motion.size() > 1 && !a.output.empty()) {
     const Trajectory rows = a.rate > 0.0 ? at_rate(result.motion, a.rate) : result.motion;
-    write_file_atomically(a.output, motion_csv(model, rows, problem.payload,
-                                               least_flows(model.machine, problem.limits)));
+    write_file_atomically(a.output, motion_csv(model, problem, rows));
   }
   if (!a.outputs.json.empty()) a.outputs.write_json(optimize_json(model, problem, result));
   if (!a.outputs.report.empty()) {

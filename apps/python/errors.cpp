@@ -15,7 +15,7 @@ namespace sparflow::python {
 namespace {
 
 /// Words of the command line and the module's words for the same; an option that is not among them has the same name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kWords{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 17> kWords{{
     {"--model MODEL.json", "model="},
     {"--idle KW", "idle_kW="},
     {"`sparflow simulate --list-effects` names them", "sparflow.plant_effects() names them"},
@@ -31,6 +31,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kWords{{
     {"--litres-per-kwh", "litres_per_kWh="},
     {"in --json", "in to_dict()"},
     {"--no-bound", "bound=False"},
+    {"--sway", "sway_deg="},
     {"--no-optimum", "optimum=False"},
 }};
 

@@ -56,9 +56,7 @@ class Optimum final : public Result {
   }
   std::string csv(double rate) const {
     const Trajectory& motion = found_.result.motion;
-    return motion_csv(task_->model, rate > 0.0 ? at_rate(motion, rate) : motion,
-                      task_->problem.payload,
-                      least_flows(task_->model.machine, task_->problem.limits));
+    return motion_csv(task_->model, task_->problem, rate > 0.0 ? at_rate(motion, rate) : motion);
   }
   const OptimizeResult& result() const { return found_.result; }
 

@@ -223,6 +223,7 @@ BenchmarkTask benchmark_of(const py::dict& a) {
   task.jobs = a["jobs"].cast<int>();
   task.step_budget = a["step_budget_s"].cast<double>();
   task.no_optimum = !a["optimum"].cast<bool>();
+  task.sway_limit = a["sway_deg"].cast<double>();
   task.no_bound = !a["bound"].cast<bool>();
   return task;
 }

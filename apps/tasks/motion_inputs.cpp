@@ -67,6 +67,20 @@ ProblemAndModel load_problem_and_model(const std::string& problem_path,
   return std::move(*both);
 }
 
+void require_one_move(const std::string& verb, const MotionProblem& problem) {
+  if (moves_at_an_end(problem)) {
+    throw InputError({problem.file, 0, 0}, "velocity",
+                     fmt::format("{} knows motions from rest to rest only; drop the velocities, or "
+                                 "use `optimize`",
+                                 verb));
+  }
+  if (problem.stops.empty()) return;
+  throw InputError({problem.file, 0, 0}, "cycle",
+                   fmt::format("{} knows single moves only, and this problem is a cycle of {}; "
+                               "`optimize` solves cycles, or give one leg as start and goal",
+                               verb, problem.stops.size() + 1));
+}
+
 int intervals_of(const MotionProblem& problem, int asked) {
   return asked > 0 ? asked : problem.knots.value_or(101) - 1;
 }

@@ -35,6 +35,9 @@ UsageError no_model();
 ProblemAndModel load_problem_and_model(const std::string& problem_path,
                                        const std::string& model_path, const Listener& listener);
 
+/// Refuses a cycle, or a motion that begins or ends moving, where a verb knows one move from rest to rest only. @param verb whose words the sentence begins with  @throws InputError
+void require_one_move(const std::string& verb, const MotionProblem& problem);
+
 /// Mesh intervals of a problem: those that are asked for, else as its knots, else 100. @param asked 0: not asked for
 int intervals_of(const MotionProblem& problem, int asked);
 

@@ -13,6 +13,7 @@
 #include "optimizer/grid/driven_grid_path.h"
 #include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/child_progress.h"
+#include "optimizer/solve/optimize_cycle.h"
 
 namespace sparflow {
 namespace {
@@ -90,6 +91,25 @@ Seeds warm_seeds(const Trajectory& from, OptimizeOptions& options) {
   return seeds;
 }
 
+/// The legs' seed paths are sought one after the other, for a leg begins where the one before ends.
+Optimized optimize_cycle_task(const CraneModel& model, const MotionProblem& problem,
+                              const OptimizeTask& task, OptimizeOptions& options,
+                              const Listener& listener) {
+  if (task.from) require_one_move("a warm start (--from)", problem);
+  if (task.smooth_only) require_one_move("the smooth law without modes (--smooth-only)", problem);
+  if (task.searching) task.searching();
+  options.progress = listener.progress;
+  SeedOptions paths = task.seeds;
+  paths.progress = {};
+  const auto seeds_of = [&](const MotionProblem& leg) {
+    const Seeds seeds = make_seeds(leg, paths, options.intervals);
+    LegSeeds found{seeds.motions, seeds.paths.message};
+    for (const std::string& r : seeds.refused) found.message += " " + r + ".";
+    return found;
+  };
+  return {{}, optimize_cycle(model, problem, seeds_of, options)};
+}
+
 }  // namespace
 
 void check_ranges(const OptimizeTask& task) {
@@ -111,6 +131,7 @@ Optimized optimize_task(const CraneModel& model, const MotionProblem& problem,
     options.smooth_iterations = 1000;
   }
   options.interrupted = listener.interrupted;
+  if (!problem.stops.empty()) return optimize_cycle_task(model, problem, task, options, listener);
   Optimized both;
   SeedOptions paths = task.seeds;
   paths.progress = part_of(listener.progress, 0.0, kPathShare);
@@ -130,6 +151,11 @@ void add_bound(const CraneModel& model, const MotionProblem& problem, const List
                OptimizeResult& result) {
   if (listener.stop()) {
     result.interrupted = true;
+    return;
+  }
+  if (!problem.stops.empty()) return;  // the result says that a cycle has no bound
+  if (moves_at_an_end(problem)) {
+    result.bound_note = "no bound for motions that begin or end moving: the bounds know rest only";
     return;
   }
   const auto begin = std::chrono::steady_clock::now();

@@ -16,6 +16,7 @@ void check_ranges(const ParetoTask& task) {
 ParetoCurve pareto_task(const ProblemAndModel& both, const ParetoTask& task, Journal& journal,
                         const Listener& listener) {
   check_ranges(task);
+  require_one_move("pareto", both.problem);
   const auto& [problem, model] = both;
   ParetoOptions options;
   options.points = task.points;

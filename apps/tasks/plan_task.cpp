@@ -26,6 +26,7 @@ Seeds plan_task(const MotionProblem& problem, SeedOptions options, const Listene
   require_range("plan: --paths", options.count, 1, 64);
   require_range("plan: --seconds", options.seconds, 1e-3, 1e6);
   options.progress = listener.progress;
+  require_one_move("plan", problem);
   return make_seeds(problem, options, problem.knots.value_or(100));
 }
 

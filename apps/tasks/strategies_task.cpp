@@ -140,6 +140,7 @@ void check_ranges(const StrategiesTask& task) {
 
 void check_strategies_problem(const StrategiesTask& task, const ProblemAndModel& problem,
                               const Listener& listener) {
+  require_one_move("strategies", problem.problem);
   if (task.options.own_time && idle_power_of(task, problem) <= 0.0) {
     listener.say_warning(
         fmt::format("{}: no idle power is given, so time costs nothing and the best time of each "

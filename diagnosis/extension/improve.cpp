@@ -207,7 +207,6 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
       }
     }
     improvement.test_again(part(0.5));
-    improvement.merge(part(0.5));
   } catch (const Interruption&) {  // what was kept so far stays
     result.interrupted = true;
     result.reason = "it was interrupted";

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "models/effects/registry.h"
-#include "models/math/error.h"
 
 namespace sparflow {
 namespace {
@@ -79,62 +78,6 @@ void Improvement::test_again(const SearchProgress& progress) {
       keep(try_removing(context_, current_, e, progress), context_, current_, result_);
   }
   added_ = still;
-}
-
-void Improvement::merge(const SearchProgress& progress) {
-  while (const std::optional<Merge> best = best_merge(progress)) {
-    for (const EffectAt& e : {best->first, best->second}) {
-      keep(try_removing(context_, current_, e, progress), context_, current_, result_);
-      std::erase(added_, e);
-    }
-    keep(try_adding(context_, current_, best->by, progress), context_, current_, result_);
-    added_.push_back(best->by);
-  }
-}
-
-std::vector<Improvement::Merge> Improvement::possible_merges() const {
-  std::vector<Merge> out;
-  const auto one_place = [](const EffectAt& a, const EffectAt& b) {
-    const EffectStage stage = a.effect->info().stage;
-    return (stage == EffectStage::kForce || stage == EffectStage::kFlow) && a.at == b.at &&
-           stage == b.effect->info().stage && a.effect->info().place == b.effect->info().place;
-  };
-  const std::vector<EffectAt> all = places_of(current_.model.effects);
-  for (std::size_t i = 0; i < added_.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (!one_place(added_[i], added_[j])) continue;
-      for (const EffectAt& by : candidates(context_.machine()))
-        if (one_place(added_[i], by) && !contains(all, by))
-          out.push_back({added_[i], added_[j], by});
-    }
-  }
-  return out;
-}
-
-std::optional<Improvement::Merge> Improvement::best_merge(const SearchProgress& progress) const {
-  const std::vector<Merge> possible = possible_merges();
-  std::optional<Merge> best;
-  if (possible.empty()) return best;
-  const std::vector<EffectAt> all = places_of(current_.model.effects);
-  const CompareResult now = context_.measured_errors(current_.model, all, progress);
-  double least = context_.options().change.refit_moves;
-  for (const Merge& m : possible) {
-    std::vector<EffectAt> effects = without(without(all, m.first), m.second);
-    effects.push_back(m.by);
-    ExtendStep step;
-    try {
-      judge_step(context_, m.by, now, context_.measured_errors(current_.model, effects, progress),
-                 step);
-      if (!(step.change.own < least) || !harmed_measured(step).empty()) continue;
-      step.effect = context_.measured_model(current_.model, effects, {}, progress).effects.back();
-    } catch (const InputError&) {
-      continue;  // these logs do not show that effect
-    }
-    if (!is_determined(step.effect)) continue;
-    least = step.change.own;
-    best = m;
-  }
-  return best;
 }
 
 std::vector<EffectAt> Improvement::places(const std::vector<std::string>& keys) const {

@@ -29,10 +29,6 @@ class Improvement {
   /// Tests the effects of former rounds again beside those that came after them, and removes what has become useless.
   void test_again(const SearchProgress& progress);
 
-  /// Replaces two effects of one place by one that predicts as well: what one law explains need not be two. Dry friction
-  /// at nearly one speed resembles viscous friction, and a later round then adds a Stribeck part that bends it back.
-  void merge(const SearchProgress& progress);
-
   /// Effects that the next diagnosis must not name.
   const std::vector<EffectAt>& excluded() const { return aside_; }
   std::size_t rejected() const { return rejected_; }
@@ -58,18 +54,6 @@ class Improvement {
     ExtendStep step;
     bool stays = false;
   };
-
-  struct Merge {
-    EffectAt first, second;  ///< that are replaced
-    EffectAt by;
-  };
-
-  /// Pairs of added effects of one stage and place, each with every other effect of the catalogue there.
-  std::vector<Merge> possible_merges() const;
-
-  /// Of the possible merges the one with the smallest error in its place, if that error is no more than learning anew may
-  /// change it and no other measured error grows.
-  std::optional<Merge> best_merge(const SearchProgress& progress) const;
 
   std::vector<EffectAt> places(const std::vector<std::string>& keys) const;
 

@@ -9,6 +9,7 @@ Trajectory Trajectory::refined(int factor) const {
   if (size() < 2) return *this;
   const Eigen::Index intervals = size() - 1;
   Trajectory fine;
+  fine.stops = stops;
   const Eigen::Index rows = intervals * factor + 1;
   fine.t.resize(rows);
   fine.q.resize(rows, q.cols());

@@ -1,6 +1,7 @@
 #pragma once
 /// A motion in joint space; planners, optimiser, simulator and pages exchange this type.
 #include <Eigen/Dense>
+#include <vector>
 
 namespace sparflow {
 
@@ -12,6 +13,8 @@ struct Trajectory {
   Eigen::MatrixXd q;    ///< [rad] or [m]
   Eigen::MatrixXd qd;   ///< [rad/s] or [m/s]
   Eigen::MatrixXd qdd;  ///< [rad/s^2] or [m/s^2]
+  /// Instants at which the stops of a cycle are reached, in order; empty = the motion has none. [s]
+  std::vector<double> stops = {};
 
   Eigen::Index size() const { return t.size(); }
   double duration() const { return t.size() == 0 ? 0.0 : t[t.size() - 1] - t[0]; }

@@ -57,7 +57,8 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
       m_(model.machine.cylinder_count()),
       power_(model),
       statics_(*machine_),
-      tip_chain_(model.machine) {
+      tip_chain_(model.machine),
+      payload_(problem.payload) {
   const Machine& machine = model.machine;
   power_.smoothing = options_.smoothing;
   if (SmoothEffects::needed(model)) {
@@ -154,18 +155,22 @@ void CraneKnotModel::choose_clearance_rows() {
 }
 
 void CraneKnotModel::begin_node(int /*knot*/, int interval) {
+  if (!options_.payloads.empty()) payload_ = options_.payloads[static_cast<std::size_t>(interval)];
   if (options_.modes.rows() == 0) return;
   for (int c = 0; c < m_; ++c) mode_[static_cast<std::size_t>(c)] = options_.modes(interval, c);
 }
 
 bool CraneKnotModel::split_at(int knot) const {
+  const auto k = static_cast<std::size_t>(knot);
+  if (knot > 0 && k < options_.payloads.size() && options_.payloads[k] != options_.payloads[k - 1])
+    return true;
   if (options_.modes.rows() == 0 || knot <= 0 || knot >= options_.modes.rows()) return false;
   return (options_.modes.row(knot).array() != options_.modes.row(knot - 1).array()).any();
 }
 
 void CraneKnotModel::update(const double* z, int order, bool forces) {
   if (forces) {
-    statics_.update(z, problem_->payload, order);
+    statics_.update(z, payload_, order);
   }
   for (int c = 0; c < m_; ++c) {
     const auto i = static_cast<std::size_t>(c);
@@ -209,11 +214,12 @@ void CraneKnotModel::chain_hessian(const double* z, const double* g, const Eigen
 
 void CraneKnotModel::update_effects(const double* z, bool derivatives) {
   const Eigen::Map<const Eigen::VectorXd> at(z, size());
-  const bool known = effects_z_ == at && effects_mode_ == mode_;
+  const bool known = effects_z_ == at && effects_mode_ == mode_ && effects_payload_ == payload_;
   if (known && (effects_derivatives_ || !derivatives)) return;
-  effects_->evaluate(z, problem_->payload, mode_.data(), derivatives);
+  effects_->evaluate(z, payload_, mode_.data(), derivatives);
   effects_z_ = at;
   effects_mode_ = mode_;
+  effects_payload_ = payload_;
   effects_derivatives_ = derivatives;
 }
 

@@ -30,9 +30,10 @@ using ModeTable = Eigen::Matrix<CylinderMode, Eigen::Dynamic, Eigen::Dynamic, Ei
 
 struct CraneKnotOptions {
   Smoothing smoothing;
-  double energy_weight = 1.0;   ///< [-] factor on the power
-  double command_weight = 0.0;  ///< [W] factor on the sum of the squared commands
-  ModeTable modes;              ///< empty = every cylinder free everywhere
+  double energy_weight = 1.0;    ///< [-] factor on the power
+  double command_weight = 0.0;   ///< [W] factor on the sum of the squared commands
+  ModeTable modes;               ///< empty = every cylinder free everywhere
+  std::vector<double> payloads;  ///< [kg] by interval; empty = the problem's everywhere
   /// Shares of the limits that may be used [-]; bound tightening sets them below one.
   double flow_share = 1.0;
   double valve_share = 1.0;
@@ -123,6 +124,7 @@ class CraneKnotModel final : public KnotModel {
   std::unique_ptr<SmoothEffects> effects_;  // null when no effect of the model acts in a motion
   Eigen::VectorXd effects_z_;               // z of the last evaluation of effects_,
   std::vector<CylinderMode> effects_mode_;  // its modes, and whether derivatives were computed
+  double effects_payload_ = 0.0;
   bool effects_derivatives_ = false;
   StaticForce statics_;
   ChainGeometry tip_chain_;
@@ -134,6 +136,7 @@ class CraneKnotModel final : public KnotModel {
   Eigen::VectorXd all_clearance_, all_multipliers_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all_clearance_jacobian_;
   Eigen::Vector3d line_start_, line_direction_;
+  double payload_;  // [kg] of the interval selected last
   std::vector<CylinderMode> mode_;
   std::vector<FullSpeed> full_speed_;
   Eigen::VectorXd speed_, force_, scratch_gradient_;
@@ -141,6 +144,26 @@ class CraneKnotModel final : public KnotModel {
   Eigen::MatrixXd jacobian_;  // d(v, F)/dz, [2 m x 2 n]
   Eigen::MatrixXd scratch_hessian_, product_, outer_;
   Eigen::Matrix3Xd tip_jacobian_;
+};
+
+/// Constraint that the tip is within a ball around a goal point.
+class TipNearGoal final : public TerminalModel {
+ public:
+  /// @param tolerance radius of the ball [m], > 0
+  TipNearGoal(const Machine& machine, const Eigen::Vector3d& goal, double tolerance);
+  int count() const override { return 1; }
+  void bounds(double* lower, double* upper) const override;
+  /// The squared distance over the squared tolerance.
+  void value(const double* q, double* g) override;
+  void jacobian(const double* q, double* jacobian) override;
+  void add_hessian(const double* q, const double* multiplier, double* hessian) override;
+  std::string name(int row) const override;
+
+ private:
+  const Machine* machine_;
+  ChainGeometry chain_;
+  Eigen::Vector3d goal_;
+  double scale_;
 };
 
 /// Constraint that the tip, in the directions in which it can move, is at a goal point [m].

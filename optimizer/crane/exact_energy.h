@@ -38,13 +38,28 @@ struct MotionEnergy {
 ///        the motion needs them to arrive, and a least flow can thus never make a motion cheaper.
 MotionEnergy exact_energy(const CraneModel& model, const Trajectory& motion, double payload,
                           int refine = 16, const LeastFlows& least = {});
-/// The same with the problem's payload and its valves' least flows.
+/// The same with the problem's payload and its valves' least flows; of a cycle the sum over its legs, each with its payload.
 MotionEnergy exact_energy(const CraneModel& model, const MotionProblem& problem,
                           const Trajectory& motion, int refine = 16);
 
 /// MotionEnergy::total alone, in less than half the time: standard deviations and shares are not computed. [J]
 double exact_total_energy(const CraneModel& model, const Trajectory& motion, double payload,
                           int refine = 16);
+
+/// The same with the problem's payload, of a cycle the sum over its legs.
+double exact_total_energy(const CraneModel& model, const MotionProblem& problem,
+                          const Trajectory& motion, int refine = 16);
+
+/// A leg of a cycle as driven.
+struct CycleLeg {
+  std::string to;        ///< name of the stop in which it ends
+  double payload = 0.0;  ///< [kg]
+  double begin = 0.0;    ///< [s] when the machine leaves the stop before
+  double end = 0.0;      ///< [s] when it arrives
+  Trajectory motion;     ///< of the leg alone, in the cycle's time
+};
+/// The legs of a motion with stops; one leg where the problem has none.
+std::vector<CycleLeg> legs_of(const MotionProblem& problem, const Trajectory& motion);
 
 /// Integral over a motion of the sum of the squared valve commands (1 = full flow). [s]
 double command_effort(const CraneModel& model, const MotionProblem& problem,

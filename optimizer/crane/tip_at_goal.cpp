@@ -69,4 +69,48 @@ void TipAtGoal::add_hessian(const double* q, const double* multiplier, double* h
   }
 }
 
+TipNearGoal::TipNearGoal(const Machine& machine, const Eigen::Vector3d& goal, double tolerance)
+    : machine_(&machine), chain_(machine), goal_(goal), scale_(1.0 / (tolerance * tolerance)) {}
+
+void TipNearGoal::bounds(double* lower, double* upper) const {
+  lower[0] = -kNoBound;
+  upper[0] = 1.0;
+}
+
+std::string TipNearGoal::name(int /*row*/) const {
+  return fmt::format("distance of the tip from its stop ({:.4g}, {:.4g}, {:.4g})", goal_.x(),
+                     goal_.y(), goal_.z());
+}
+
+void TipNearGoal::value(const double* q, double* g) {
+  chain_.update(*machine_, q);
+  const Tip& tip = machine_->tip;
+  g[0] = scale_ * (chain_.point(tip.joint, tip.xyz) - goal_).squaredNorm();
+}
+
+void TipNearGoal::jacobian(const double* q, double* jacobian) {
+  chain_.update(*machine_, q);
+  const Tip& tip = machine_->tip;
+  const Eigen::Vector3d p = chain_.point(tip.joint, tip.xyz);
+  for (int k = 0; k < machine_->joint_count(); ++k)
+    jacobian[k] = 2.0 * scale_ * (p - goal_).dot(point_jacobian(chain_, tip.joint, p, k));
+}
+
+void TipNearGoal::add_hessian(const double* q, const double* multiplier, double* hessian) {
+  chain_.update(*machine_, q);
+  const Tip& tip = machine_->tip;
+  const Eigen::Vector3d p = chain_.point(tip.joint, tip.xyz);
+  const int n = machine_->joint_count();
+  const double factor = 2.0 * scale_ * multiplier[0];
+  for (int k = 0; k <= tip.joint; ++k) {
+    const Eigen::Vector3d column = point_jacobian(chain_, tip.joint, p, k);
+    for (int i = 0; i <= k; ++i) {
+      const double value = factor * (column.dot(point_jacobian(chain_, tip.joint, p, i)) +
+                                     (p - goal_).dot(point_hessian(chain_, i, column)));
+      hessian[k * n + i] += value;
+      if (i != k) hessian[i * n + k] += value;
+    }
+  }
+}
+
 }  // namespace sparflow

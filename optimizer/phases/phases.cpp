@@ -136,6 +136,32 @@ PhasePlan with_overlaps(const PhasePlan& plan, double share) {
   return out.plan();
 }
 
+PhasePlan with_moving_ends(const PhasePlan& plan, const std::vector<CylinderMode>& first,
+                           const std::vector<CylinderMode>& last, double shortest) {
+  const auto row_of = [](const std::vector<CylinderMode>& modes) {
+    return Eigen::Map<const Eigen::Matrix<CylinderMode, 1, Eigen::Dynamic>>(
+               modes.data(), static_cast<Index>(modes.size()))
+        .eval();
+  };
+  const auto lacks = [&](Index phase, const std::vector<CylinderMode>& asked) {
+    for (std::size_t c = 0; c < asked.size(); ++c) {
+      if (moves(asked[c]) && plan.modes(phase, static_cast<Index>(c)) != asked[c]) return true;
+    }
+    return false;
+  };
+  const Index phases = plan.modes.rows();
+  PlanBuilder out(plan.modes.cols());
+  if (lacks(0, first)) out.add(row_of(first), shortest);
+  for (Index p = 0; p < phases; ++p) {
+    out.add(plan.modes.row(p), plan.durations[p]);
+    pass_waypoints(plan, p, out);
+  }
+  if (lacks(phases - 1, last)) out.add(row_of(last), shortest);
+  PhasePlan wider = out.plan();
+  wider.durations *= plan.total() / wider.total();
+  return wider;
+}
+
 PhasePlan without_short(const PhasePlan& plan, double shortest) {
   PlanBuilder out(plan.modes.cols());
   double owed = 0.0;
@@ -305,6 +331,10 @@ Trajectory with_durations(const Trajectory& motion, const VectorXd& from, const 
     const double ratio = to[p] / from[p];
     out.t[k] = motion.t[0] + after + (t - before) * ratio;
     out.qd.row(k) /= ratio;
+  }
+  for (double& stop : out.stops) {
+    const Index k = std::lower_bound(motion.t.begin(), motion.t.end(), stop) - motion.t.begin();
+    stop = out.t[std::min(k, motion.size() - 1)];
   }
   for (Index k = 0; k + 1 < out.size(); ++k)
     out.qdd.row(k) = (out.qd.row(k + 1) - out.qd.row(k)) / (out.t[k + 1] - out.t[k]);

@@ -29,6 +29,13 @@ PhasePlan plan_of(const ModeTable& modes, const Eigen::VectorXd& times,
 /// directions. The overlap takes `share` of the shorter neighbour's duration, half from each side.
 PhasePlan with_overlaps(const PhasePlan& plan, double share);
 
+/// The same with a phase before the first and after the last one where the cylinders that must move at the start and at the
+/// end do so, and no others, unless the first and the last phase already have them.
+/// @param first, last [cylinders] modes of the cylinders that move there, kRest of the others
+/// @param shortest duration of an added phase [s]
+PhasePlan with_moving_ends(const PhasePlan& plan, const std::vector<CylinderMode>& first,
+                           const std::vector<CylinderMode>& last, double shortest);
+
 /// Removes phases shorter than `shortest` [s], whose durations go to their neighbours, and joins equal neighbours.
 PhasePlan without_short(const PhasePlan& plan, double shortest);
 

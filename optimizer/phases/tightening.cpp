@@ -21,6 +21,13 @@ bool Tightening::tighten_bounds(const MotionProblem& problem, const std::vector<
     }
     if (c.what.starts_with("distance of the tip from its line")) line *= share;
     if (c.what.starts_with("standard deviation of the pressure")) trust *= share;
+    // The rest of the sway is small where the linear load leaves none, so its share may fall by half at once at most.
+    const double sway_share = std::max(0.5, share);
+    if (c.what == "sway of the load") {
+      sway *= sway_share;
+    } else if (c.what.starts_with("sway of the load")) {
+      still *= sway_share;
+    }
     if (c.what.starts_with("clearance")) clearance += 1.3 * c.excess;
     if (c.what.starts_with("position of joint ")) {
       const int j = problem.machine.joint_index(c.what.substr(18));

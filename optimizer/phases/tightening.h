@@ -11,8 +11,10 @@ namespace sparflow {
 /// Bound tightening: limits narrowed at the knots, so that they also hold between them.
 struct Tightening {
   double flow = 1.0, valve = 1.0, pressure = 1.0, line = 1.0,
-         trust = 1.0;            ///< shares of the limits [-]
-  double clearance = 0.0;        ///< added to the required clearance [m]
+         trust = 1.0;  ///< shares of the limits [-]
+  double sway = 1.0,
+         still = 1.0;      ///< shares of the sway's limit, and of that at the end and at stops [-]
+  double clearance = 0.0;  ///< added to the required clearance [m]
   std::vector<double> position;  ///< narrowing of the position range, by joint [rad] or [m]
   bool limit_pressure = false;   ///< whether the NLP has rows for the pumps' pressures
 

@@ -11,6 +11,7 @@
 #include "optimizer/grid/energy_grid.h"
 #include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/grid_seeds.h"
+#include "optimizer/solve/optimize_cycle.h"
 #include "optimizer/solve/optimize_outcome.h"
 #include "optimizer/solve/start_bytes.h"
 #include "problems/clearance.h"
@@ -522,15 +523,19 @@ OptimizeResult optimize_at(const CraneModel& model, const MotionProblem& problem
   return optimize_in(model, problem, seeds, TimeWindow::fixed(duration), options);
 }
 
+void require_complete(const CraneModel& model, const MotionProblem& problem) {
+  const std::vector<std::string> missing = model.missing();
+  if (missing.empty()) return;
+  throw InputError({problem.file, 0, 0}, "model",
+                   fmt::format("the model has no working pressure for {}; fit it on a log in "
+                               "which that movement occurs",
+                               fmt::join(missing, ", ")));
+}
+
 OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
                         const std::vector<SeedMotion>& seeds, const OptimizeOptions& options) {
-  const std::vector<std::string> missing = model.missing();
-  if (!missing.empty()) {
-    throw InputError({problem.file, 0, 0}, "model",
-                     fmt::format("the model has no working pressure for {}; fit it on a log in "
-                                 "which that movement occurs",
-                                 fmt::join(missing, ", ")));
-  }
+  require_complete(model, problem);
+  if (!problem.stops.empty()) return optimize_cycle(model, problem, {}, options);
   if (seeds.empty()) {
     const GridSeeds found = grid_seeds(model, problem, options.grid_nodes);
     if (!found.motions.empty()) return optimize(model, problem, found.motions, options);

@@ -201,6 +201,8 @@ struct OptimizeResult {
   /// [J] straight joint line to the nearest goal configuration (the first straight seed); 0 = it violates a limit.
   double nearest_line_energy = 0.0;
   std::string straight_line_name;
+  /// [J] of a cycle: its legs optimised one after the other, in shares of the time; 0 = no cycle.
+  double legwise_energy = 0.0;
   /// [s] shortest motion found within all limits; it is sought when no start keeps them in the duration asked for. 0 = none.
   double shortest_duration = 0.0;
   bool interrupted = false;  ///< the search or what was asked beside it ended early
@@ -250,8 +252,16 @@ OptimizeResult shortest_motion(const CraneModel& model, const MotionProblem& pro
                                const std::vector<SeedMotion>& seeds,
                                const OptimizeOptions& options);
 
+/// Why a cycle has no bound.
+inline constexpr const char* kNoBoundOfCycles =
+    "no bound for cycles: that of each leg holds from a given posture, and the postures at the "
+    "stops are free";
+
+/// @throws InputError when the model lacks a pressure model that the machine needs
+void require_complete(const CraneModel& model, const MotionProblem& problem);
+
 /// The problem as posed: a fixed duration, or the duration that minimises energy + idle power * time.
-/// Without seeds it starts from paths of the joint grid (grid_seeds.h).
+/// Without seeds it starts from paths of the joint grid (grid_seeds.h). A cycle takes its seeds from there (optimize_cycle.h).
 /// @throws InputError when the model lacks a pressure model that the machine needs
 OptimizeResult optimize(const CraneModel& model, const MotionProblem& problem,
                         const std::vector<SeedMotion>& seeds, const OptimizeOptions& options = {});

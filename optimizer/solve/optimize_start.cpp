@@ -7,6 +7,7 @@
 #include "optimizer/phases/tightening.h"
 #include "optimizer/solve/optimize.h"
 #include "optimizer/solve/optimize_outcome.h"
+#include "optimizer/sway/sway_model.h"
 
 namespace sparflow {
 namespace {
@@ -51,7 +52,9 @@ class Start {
     // The seed's own modes are solved first, so the smooth law can only improve on that result.
     if (options_.modes) hold_modes(resampled(timed, mesh_.times));
     Trajectory motion = timed;
-    const std::size_t stages = problem_.waypoints.empty() ? options_.schedule.size() : 0;
+    // Waypoints and stops need phases.
+    const bool one_move = problem_.waypoints.empty() && problem_.stops.empty();
+    const std::size_t stages = one_move ? options_.schedule.size() : 0;
     for (std::size_t stage = 0; stage < stages; ++stage) {
       uniform_mesh();
       const bool last = stage + 1 == options_.schedule.size();
@@ -61,7 +64,7 @@ class Start {
       note_status(solved);
       if (solved.status == NlpStatus::kInterrupted) return finished();
       if (!usable(solved)) break;  // the last usable motion, if any, has supplied the modes
-      motion = transcription_->trajectory(solved.x);
+      motion = motion_of(solved);
       if (options_.modes || last) {
         keep_limits(motion, options_.schedule[stage], !options_.modes);
       }
@@ -102,7 +105,7 @@ class Start {
     const ModeTable& modes = mesh_.modes;
     TranscriptionSpec spec;
     spec.t = mesh_.times;
-    for (std::size_t w = 0; w < mesh_.waypoint_knots.size(); ++w) {
+    for (std::size_t w = 0; w < mesh_.waypoint_knots.size() && problem_.stops.empty(); ++w) {
       spec.waypoints.push_back(
           {mesh_.waypoint_knots[w],
            std::make_shared<TipAtGoal>(model_.machine, problem_.waypoints[w])});
@@ -112,6 +115,7 @@ class Start {
       phases.of_interval = mesh_.of_interval;
       phases.lower.setConstant(phases.count(), shortest_phase());
       phases.upper.setConstant(phases.count(), time_.upper);
+      hold_dwells(phases);
       phases.total_lower = time_.lower;
       phases.total_upper = time_.upper;
       phases.price =
@@ -122,6 +126,7 @@ class Start {
     knot.energy_weight = problem_.objective.energy;
     knot.command_weight = problem_.objective.commands;
     knot.modes = modes;
+    knot.payloads = payloads();
     knot.flow_share = tightening_.flow;
     knot.valve_share = tightening_.valve;
     knot.pressure_share = tightening_.pressure;
@@ -138,6 +143,8 @@ class Start {
     if (options_.knot_wrapper) spec.knot = options_.knot_wrapper(knot, spec.knot);
     set_bounds(spec);
     if (modes.rows() > 0) apply_modes(model_, modes, spec.bounds);
+    set_stops(spec);
+    set_end_velocities(spec.bounds);
     spec.acceleration_weight.resize(model_.machine.joint_count());
     for (int j = 0; j < model_.machine.joint_count(); ++j) {
       const auto i = static_cast<std::size_t>(j);
@@ -149,8 +156,7 @@ class Start {
                                         ? *problem_.objective.smoothness * 1e-3
                                         : 1e-3 / (full * full);
     }
-    transcription_ = std::make_unique<Transcription>(std::move(spec));
-    transcription_->set_start(from);
+    transcribe(from, std::move(spec));
     NlpOptions nlp;
     nlp.tolerance = tolerance;
     nlp.max_iterations = modes.rows() > 0 ? options_.phase_iterations : options_.smooth_iterations;
@@ -170,6 +176,19 @@ class Start {
     return solved;
   }
 
+  void transcribe(const Trajectory& from, TranscriptionSpec spec) {
+    if (!problem_.sway) {
+      transcription_ = std::make_unique<Transcription>(std::move(spec));
+      transcription_->set_start(from);
+      return;
+    }
+    const bool on_mesh = !mesh_.of_interval.empty() && from.size() == mesh_.times.size();
+    const Trajectory guess = on_mesh ? from : resampled(from, mesh_.times);
+    add_load(guess, spec);
+    transcription_ = std::make_unique<Transcription>(std::move(spec));
+    transcription_->set_start(extended(guess));
+  }
+
   void note_stage(const NlpResult& solved, const Smoothing& smoothing) {
     StageRecord record;
     record.what = mesh_.modes.rows() > 0
@@ -182,7 +201,7 @@ class Start {
     record.iterations = solved.iterations;
     record.solve_s = solved.solve_s;
     if (usable(solved)) {
-      const Trajectory motion = transcription_->trajectory(solved.x);
+      const Trajectory motion = motion_of(solved);
       record.energy_exact = verdict(motion).energy;
       record.excess = worst_excess(verdict(motion).checks);
     }
@@ -207,12 +226,174 @@ class Start {
     spec.bounds = TranscriptionBounds::uniform(static_cast<int>(mesh_.times.size()) - 1,
                                                {lo[0], hi[0]}, {lo[1], hi[1]}, {lo[2], hi[2]});
     spec.bounds.rest_to_rest(problem_.start);
-    if (const auto* goal = std::get_if<TipGoal>(&problem_.goal)) {
-      spec.terminal = std::make_shared<TipAtGoal>(model_.machine, goal->tip);
-    } else {
-      spec.bounds.fix_q(static_cast<int>(mesh_.times.size()) - 1,
-                        std::get<JointGoal>(problem_.goal).q);
+    spec.terminal = reach(problem_.goal, static_cast<int>(mesh_.times.size()) - 1, spec.bounds);
+  }
+
+  /// The constraint of a place in which the machine rests: rows of the tip, or (null) bounds of the posture at that knot.
+  std::shared_ptr<TerminalModel> reach(const Goal& place, int knot,
+                                       TranscriptionBounds& bounds) const {
+    if (const auto* goal = std::get_if<TipGoal>(&place)) {
+      if (goal->tolerance > 0.0)
+        return std::make_shared<TipNearGoal>(model_.machine, goal->tip, goal->tolerance);
+      return std::make_shared<TipAtGoal>(model_.machine, goal->tip);
     }
+    const auto& posture = std::get<JointGoal>(place);
+    if (posture.tolerance.size() == 0) {
+      bounds.fix_q(knot, posture.q);
+      return nullptr;
+    }
+    for (Eigen::Index j = 0; j < posture.q.size(); ++j) {
+      bounds.q_lower(knot, j) =
+          std::max(bounds.q_lower(knot, j), posture.q[j] - posture.tolerance[j]);
+      bounds.q_upper(knot, j) =
+          std::min(bounds.q_upper(knot, j), posture.q[j] + posture.tolerance[j]);
+    }
+    return nullptr;
+  }
+
+  /// Velocities at the start and at the goal, where they are not rest.
+  void set_end_velocities(TranscriptionBounds& bounds) const {
+    if (problem_.start_velocity.size() > 0) bounds.fix_qd(0, problem_.start_velocity);
+    if (problem_.goal_velocity.size() > 0)
+      bounds.fix_qd(static_cast<int>(mesh_.times.size()) - 1, problem_.goal_velocity);
+  }
+
+  /// Modes of the cylinders that move at an end; the others rest there.
+  std::vector<CylinderMode> modes_at(const Eigen::VectorXd& q, const Eigen::VectorXd& qd) const {
+    const Machine& machine = model_.machine;
+    std::vector<CylinderMode> modes(machine.cylinders.size(), CylinderMode::kRest);
+    for (int c = 0; c < machine.cylinder_count(); ++c) {
+      const Cylinder& cylinder = machine.cylinders[static_cast<std::size_t>(c)];
+      const auto j = static_cast<Eigen::Index>(cylinder.joint);
+      CylinderMode& mode = modes[static_cast<std::size_t>(c)];
+      if (!cylinder.hydraulic()) mode = CylinderMode::kFree;
+      if (!cylinder.hydraulic() || qd.size() == 0 || qd[j] == 0.0) continue;
+      const double speed = linkage_rates(machine, c, q[j]).d1 * qd[j];
+      mode = speed > 0.0 ? CylinderMode::kExtend : CylinderMode::kRetract;
+    }
+    return modes;
+  }
+
+  /// A plan in which the cylinders that move at the start and at the goal do so.
+  PhasePlan moving_at_ends(const PhasePlan& plan) const {
+    if (!moves_at_an_end(problem_)) return plan;
+    const auto* goal = std::get_if<JointGoal>(&problem_.goal);
+    const Eigen::VectorXd end = goal != nullptr ? goal->q : problem_.start;
+    /// Duration of a phase in which the cylinders stop that move at the start, over that of the whole.
+    /// @threshold [1] 0.001..0.5; chosen: its duration is a variable
+    constexpr double kBraking = 0.05;
+    return with_moving_ends(plan, modes_at(problem_.start, problem_.start_velocity),
+                            modes_at(end, problem_.goal_velocity), kBraking * plan.total());
+  }
+
+  /// Number of the leg to which a phase belongs, or that follows the stop in which it rests.
+  std::size_t leg_of_phase(int phase) const {
+    std::size_t leg = 0;
+    while (leg < plan_.waypoint_after.size() && plan_.waypoint_after[leg] < phase) ++leg;
+    return leg;
+  }
+
+  /// Payload of every interval; empty where it does not change.
+  std::vector<double> payloads() const {
+    std::vector<double> all;
+    if (problem_.stops.empty()) return all;
+    all.reserve(mesh_.of_interval.size());
+    for (const int phase : mesh_.of_interval)
+      all.push_back(payload_on(problem_, leg_of_phase(phase)));
+    return all;
+  }
+
+  /// Whether the machine rests at a stop in this phase, as long as the stop asks for.
+  bool dwells(int phase) const {
+    return !problem_.stops.empty() && (plan_.modes.row(phase).array() == CylinderMode::kRest).all();
+  }
+
+  /// Gives the phases at rest the times that the stops ask for.
+  void hold_dwells(PhaseTimes& phases) const {
+    for (int p = 0; p < phases.count(); ++p) {
+      const std::size_t leg = leg_of_phase(p);
+      if (dwells(p) && leg > 0) phases.lower[p] = phases.upper[p] = problem_.stops[leg - 1].dwell;
+    }
+  }
+
+  /// Rest at the stops and while the machine dwells there, and where they are.
+  void set_stops(TranscriptionSpec& spec) const {
+    if (problem_.stops.empty()) return;
+    const Eigen::VectorXd still = Eigen::VectorXd::Zero(model_.machine.joint_count());
+    for (std::size_t s = 0; s < mesh_.waypoint_knots.size(); ++s) {
+      const int knot = mesh_.waypoint_knots[s];
+      spec.bounds.fix_qd(knot, still);
+      if (auto model = reach(problem_.stops[s].goal, knot, spec.bounds))
+        spec.waypoints.push_back({knot, std::move(model)});
+    }
+    for (std::size_t k = 0; k < mesh_.of_interval.size(); ++k) {
+      if (!dwells(mesh_.of_interval[k])) continue;
+      spec.bounds.fix_qd(static_cast<int>(k), still);
+      spec.bounds.fix_qd(static_cast<int>(k) + 1, still);
+    }
+  }
+
+  /// Makes the load's coordinates further joints of the transcription.
+  void add_load(const Trajectory& from, TranscriptionSpec& spec) const {
+    const SwayLimit& sway = *problem_.sway;
+    const Machine& machine = model_.machine;
+    /// Share of the sway's limits that a solve uses at first.
+    /// @threshold [1] 0.8..1; chosen: the load's equations are averaged over an interval, an error of some tenths of a per cent
+    constexpr double kFirstShare = 0.995;
+    SwayRows rows;
+    rows.limit = kFirstShare * tightening_.sway * sway.limit;
+    rows.end_limit = kFirstShare * tightening_.still * sway.end_limit;
+    rows.cable = sway.cable;
+    rows.still_knots = mesh_.waypoint_knots;
+    rows.still_knots.push_back(static_cast<int>(mesh_.times.size()) - 1);
+    if (const auto* goal = std::get_if<JointGoal>(&problem_.goal);
+        goal != nullptr && problem_.goal_velocity.size() > 0) {
+      const Tip& tip = machine.tip;
+      rows.end_velocity =
+          sway_directions(machine).transpose() *
+          (point_jacobian_matrix(machine, goal->q, tip.joint, tip.xyz) * problem_.goal_velocity);
+    }
+    spec.knot = std::make_shared<SwayKnotModel>(machine, spec.knot, rows);
+    spec.interval =
+        std::make_shared<SwayDynamics>(machine, load_stiffness(machine, from, sway.cable));
+    const Trajectory with = extended(from);
+    const Eigen::Index n = from.q.cols(), all = with.q.cols();
+    const auto beside = [&](std::shared_ptr<TerminalModel>& posture) {
+      if (posture)
+        posture = std::make_shared<PostureBesideLoad>(posture, static_cast<int>(n),
+                                                      static_cast<int>(all - n));
+    };
+    beside(spec.terminal);
+    for (Waypoint& w : spec.waypoints) beside(w.model);
+    const auto widen = [&](Eigen::MatrixXd& bound, double value) {
+      bound.conservativeResize(Eigen::NoChange, all);
+      bound.rightCols(all - n).setConstant(value);
+    };
+    TranscriptionBounds& b = spec.bounds;
+    for (Eigen::MatrixXd* lower : {&b.q_lower, &b.qd_lower, &b.qdd_lower}) widen(*lower, -kNoBound);
+    for (Eigen::MatrixXd* upper : {&b.q_upper, &b.qd_upper, &b.qdd_upper}) widen(*upper, kNoBound);
+    // At the start the load hangs still below the tip, and moves with it.
+    for (Eigen::Index c = n; c < all; ++c) {
+      b.q_lower(0, c) = b.q_upper(0, c) = with.q(0, c);
+      b.qd_lower(0, c) = b.qd_upper(0, c) = with.qd(0, c);
+      spec.joint_names.push_back(fmt::format("load, direction {}", c - n + 1));
+    }
+    spec.acceleration_weight.conservativeResize(all);
+    spec.acceleration_weight.tail(all - n).setZero();
+  }
+
+  /// The motion with the load's coordinates, where the transcription has them.
+  Trajectory extended(const Trajectory& motion) const {
+    return problem_.sway ? with_load(model_.machine, motion, *problem_.sway) : motion;
+  }
+
+  /// The machine's motion that a solve found, with the instants of its stops.
+  Trajectory motion_of(const NlpResult& solved) const {
+    Trajectory motion = transcription_->trajectory(solved.x);
+    if (problem_.sway) motion = without_load(motion, model_.machine.joint_count());
+    for (std::size_t s = 0; s < mesh_.waypoint_knots.size() && !problem_.stops.empty(); ++s)
+      motion.stops.push_back(motion.t[mesh_.waypoint_knots[s]]);
+    return motion;
   }
 
   /// Limits and energy of a motion by the exact law, between its knots too.
@@ -226,10 +407,11 @@ class Start {
     const Trajectory& known = verdict_.motion;
     const bool same = known.t.size() == motion.t.size() && known.t == motion.t &&
                       known.q == motion.q && known.qd == motion.qd &&
-                      known.qdd.rows() == motion.qdd.rows() && known.qdd == motion.qdd;
+                      known.qdd.rows() == motion.qdd.rows() && known.qdd == motion.qdd &&
+                      known.stops == motion.stops;
     if (!same) {
       verdict_.checks = check_limits(model_, problem_, motion, options_.refine);
-      verdict_.energy = exact_total_energy(model_, motion, problem_.payload, options_.refine);
+      verdict_.energy = exact_total_energy(model_, problem_, motion, options_.refine);
       verdict_.motion = motion;
     }
     return verdict_;
@@ -266,9 +448,10 @@ class Start {
     }
     // The smooth energy is that of the last solve; before the first one there is none.
     result_.energy_smooth =
-        transcription_ ? 1e3 * transcription_->model_cost(transcription_->variables(motion)) /
-                             problem_energy_weight()
-                       : energy;
+        transcription_
+            ? 1e3 * transcription_->model_cost(transcription_->variables(extended(motion))) /
+                  problem_energy_weight()
+            : energy;
     return checks;
   }
 
@@ -287,7 +470,7 @@ class Start {
       ++tightenings_used_;
       const NlpResult solved = solve(motion, smoothing, options_.tolerance);
       if (!usable(solved)) return;
-      motion = transcription_->trajectory(solved.x);
+      motion = motion_of(solved);
     }
   }
 
@@ -341,20 +524,21 @@ class Start {
             : resampled(shown, Eigen::VectorXd::LinSpaced(modes.rows() + 1, shown.t[0],
                                                           shown.t[shown.size() - 1]));
     // Near obstacles a rough start would move through them if durations were free from the beginning.
-    const bool hemmed =
-        !problem_.obstacles.empty() && time_.lower == time_.upper && problem_.waypoints.empty();
+    const bool hemmed = !problem_.obstacles.empty() && time_.lower == time_.upper &&
+                        problem_.waypoints.empty() && !moves_at_an_end(problem_);
     if (options_.free_phases && !hemmed &&
         hold_plan(plan_of(modes, from.t, waypoint_times(from)), from, overlaps))
       return;
-    if (!problem_.waypoints.empty()) return;  // waypoints need phases
-    if (time_.lower < time_.upper) return;    // a free duration needs phases
+    // They need phases.
+    if (!problem_.waypoints.empty() || !problem_.stops.empty() || moves_at_an_end(problem_)) return;
+    if (time_.lower < time_.upper) return;  // a free duration needs phases
     mesh_ = PhaseMesh{};
     mesh_.times = from.t;
     mesh_.modes = modes;
     const NlpResult solved = solve(from, exact_law(), options_.tolerance);
     note_status(solved);
     if (!usable(solved)) return;
-    keep_limits(transcription_->trajectory(solved.x), exact_law());
+    keep_limits(motion_of(solved), exact_law());
     if (options_.free_phases && hemmed && result_.excess <= options_.limit_tolerance)
       hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
   }
@@ -397,6 +581,7 @@ class Start {
   bool hold_plan(const PhasePlan& wanted, const Trajectory& from, bool overlaps) {
     PhasePlan plan = wanted;
     if (overlaps) plan = with_overlaps(plan, options_.overlap);
+    plan = moving_at_ends(plan);
     Trajectory guess = from;
     bool any = false;
     for (int round = 0; round < 3; ++round) {
@@ -406,10 +591,10 @@ class Start {
           solve(resampled(guess, mesh_.times), exact_law(), options_.tolerance);
       note_status(solved);
       if (!usable(solved)) return any;
-      const Trajectory motion = transcription_->trajectory(solved.x);
+      const Trajectory motion = motion_of(solved);
       PhasePlan found = plan;
       found.durations = durations_of(mesh_, motion.t);
-      const PhasePlan kept = without_short(found, 1.5 * shortest_phase());
+      const PhasePlan kept = moving_at_ends(without_short(found, 1.5 * shortest_phase()));
       const bool last = kept.count() == found.count() || round == 2;
       keep_limits(motion, exact_law(), last);
       any = true;

@@ -57,6 +57,8 @@ std::optional<Trajectory> replan(const CraneModel& model, const MotionProblem& p
   MotionProblem left = problem;
   const Trajectory rest = rest_of(*now.motion, now.t, options.intervals);
   left.start = now.q;
+  // The load swings already, which its limit's model from rest does not know.
+  left.sway.reset();
   left.duration = {rest.duration(), rest.duration()};
   CraneKnotOptions knot;
   knot.smoothing.pressure = options.pressure;

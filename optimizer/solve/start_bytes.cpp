@@ -10,6 +10,8 @@ std::string pack_start(const StartResult& r) {
   p.matrix(r.motion.q);
   p.matrix(r.motion.qd);
   p.matrix(r.motion.qdd);
+  p.number(static_cast<double>(r.motion.stops.size()));
+  for (const double stop : r.motion.stops) p.number(stop);
   p.number(r.duration).number(r.cost).number(r.plan.count());
   p.number(static_cast<double>(r.plan.modes.cols()));
   for (Eigen::Index i = 0; i < r.plan.modes.size(); ++i)
@@ -38,6 +40,8 @@ StartResult unpack_start(const std::string& bytes) {
   r.motion.q = u.matrix();
   r.motion.qd = u.matrix();
   r.motion.qdd = u.matrix();
+  r.motion.stops.resize(static_cast<std::size_t>(u.number()));
+  for (double& stop : r.motion.stops) stop = u.number();
   r.duration = u.number();
   r.cost = u.number();
   const auto phases = static_cast<Eigen::Index>(u.number());

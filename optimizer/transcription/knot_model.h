@@ -36,6 +36,8 @@ class KnotModel {
   /// Whether row `row` depends on the accelerations. Rows that do are imposed at both ends of every
   /// interval with that interval's qdd, the others once a knot.
   virtual bool path_uses_acceleration(int /*row*/) const { return uses_acceleration(); }
+  /// Whether row `row` is imposed at this knot (limits that hold at the end or at stops only).
+  virtual bool path_imposed_at(int /*row*/, int /*knot*/) const { return true; }
   /// Name for messages, e.g. "flow of pump main".
   virtual std::string path_name(int row) const { return "path row " + std::to_string(row); }
   virtual void path(const double* /*z*/, double* /*g*/) {}
@@ -44,6 +46,30 @@ class KnotModel {
   /// Adds sum_row multiplier[row] * Hessian of row to `hessian` [size x size, column-major].
   virtual void add_path_hessian(const double* /*z*/, const double* /*multiplier*/,
                                 double* /*hessian*/) {}
+};
+
+/// Equalities that couple both ends of an interval: further dynamics of the joints' motion, for example of a load that hangs
+/// from the tip. Each row is linear in the interval's acceleration, a function of the positions at both ends, and has no mixed
+/// derivatives, so that its Hessian lies in the blocks of the two knots.
+class IntervalModel {
+ public:
+  virtual ~IntervalModel() = default;
+  /// Rows of an interval; each is to vanish.
+  virtual int count() const = 0;
+  /// @param q0, q1 [n] positions at both ends  @param qdd [n] acceleration of the interval
+  struct Ends {
+    const double* q0;
+    const double* q1;
+    const double* qdd;
+  };
+  virtual void value(int interval, const Ends& at, double* g) = 0;
+  /// [count x 3 n, row-major], columns q0, q1, qdd
+  virtual void jacobian(int interval, const Ends& at, double* jacobian) = 0;
+  /// Adds sum_row multiplier[row] * Hessian to the blocks of q0 and q1 [n x n each, column-major].
+  virtual void add_hessian(int interval, const Ends& at, const double* multiplier, double* hessian0,
+                           double* hessian1) = 0;
+  /// Name for messages.
+  virtual std::string name(int row) const { return "interval row " + std::to_string(row); }
 };
 
 /// Equality or range constraints on the last configuration (tip at the goal, or none).

@@ -52,6 +52,7 @@ Transcription::Transcription(TranscriptionSpec spec)
     share_.resize(intervals_);
     for (int k = 0; k < intervals_; ++k) share_[k] = step_[k] / tau[phase(k)];
   }
+  interval_rows_ = spec_.interval ? spec_.interval->count() : 0;
   make_points();
   make_nodes();
   make_defects();
@@ -71,6 +72,8 @@ Transcription::Transcription(TranscriptionSpec spec)
   node_cost_gradient_.resize(nodes_.size() * z);
   block_.resize(z * z);
   terminal_block_.resize(static_cast<std::size_t>(n_ * n_));
+  interval_block_.resize(static_cast<std::size_t>(2 * n_ * n_));
+  interval_jacobian_value_.resize(interval_rows_ * 3 * n_);
   z_.resize(z_size_);
   path_multiplier_.resize(path_count_);
   path_value_.resize(nodes_.size() * static_cast<std::size_t>(path_count_));
@@ -187,6 +190,9 @@ void Transcription::constraints(In x, Out g) {
   for (const Point& p : points_) {
     p.model->value(x.data() + q_index(p.knot, 0), g.data() + p.row);
   }
+  for (int k = 0; k < intervals_ && interval_rows_ > 0; ++k)
+    spec_.interval->value(k, ends(x.data(), k),
+                          g.data() + first_interval_row_ + k * interval_rows_);
   if (total_time_row_ >= 0) g[total_time_row_] = x.tail(phase_count_).sum();
   if (path_count_ == 0) return;
   update_values(x.data());
@@ -219,6 +225,11 @@ void Transcription::jacobian(In x, Out value) {
   for (const Point& p : points_) {
     p.model->jacobian(x.data() + q_index(p.knot, 0), terminal_jacobian_value_.data());
     value.segment(p.jacobian, p.count * n_) = terminal_jacobian_value_.head(p.count * n_);
+  }
+  for (int k = 0; k < intervals_ && interval_rows_ > 0; ++k) {
+    const Eigen::Index size = interval_jacobian_value_.size();
+    spec_.interval->jacobian(k, ends(x.data(), k), interval_jacobian_value_.data());
+    value.segment(first_interval_jacobian_ + k * size, size) = interval_jacobian_value_;
   }
   if (path_count_ == 0) return;
   update_derivatives(x.data());
@@ -279,12 +290,30 @@ void Transcription::hessian(In x, double objective_factor, In multiplier, Out va
       }
     }
   }
+  add_interval_hessian(x.data(), multiplier.data(), value);
   for (std::size_t i = 0; i < acceleration_hessian_.size(); ++i) {
     const int k = static_cast<int>(i) / n_, joint = static_cast<int>(i) % n_;
     value[acceleration_hessian_[i]] +=
         2.0 * objective_factor * acceleration_factor(x.data(), k, joint);
   }
   if (phase_count_ > 0) time_hessian(x.data(), objective_factor, multiplier.data(), value);
+}
+
+void Transcription::add_interval_hessian(const double* x, const double* multiplier, Out value) {
+  const int* at = interval_hessian_.data();
+  const std::size_t end = static_cast<std::size_t>(n_ * n_);
+  for (int k = 0; k < intervals_ && interval_rows_ > 0; ++k) {
+    std::fill(interval_block_.begin(), interval_block_.end(), 0.0);
+    spec_.interval->add_hessian(k, ends(x, k),
+                                multiplier + first_interval_row_ + k * interval_rows_,
+                                interval_block_.data(), interval_block_.data() + end);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const double* block = interval_block_.data() + side * end;
+      for (int c = 0; c < n_; ++c) {
+        for (int r = c; r < n_; ++r) value[*at++] += block[c * n_ + r];
+      }
+    }
+  }
 }
 
 }  // namespace sparflow

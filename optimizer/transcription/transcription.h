@@ -61,6 +61,7 @@ struct TranscriptionSpec {
   std::shared_ptr<KnotModel> knot;
   std::shared_ptr<TerminalModel> terminal;  ///< null = only the bounds restrict the end posture
   std::vector<Waypoint> waypoints;
+  std::shared_ptr<IntervalModel> interval;  ///< null = no further dynamics
   PhaseTimes phases;
   TranscriptionBounds bounds;
   Eigen::VectorXd acceleration_weight;  ///< [n] w_i >= 0, empty = none
@@ -74,6 +75,7 @@ struct TranscriptionMultipliers {
   Eigen::MatrixXd q_defect;      ///< [N x n] of q_{k+1} - q_k - h/2 (qd_k + qd_{k+1}) = 0
   Eigen::MatrixXd qd_defect;     ///< [N x n] of qd_{k+1} - qd_k - h qdd_k = 0
   Eigen::VectorXd terminal;      ///< [rows of the terminal model, then of the waypoints]
+  Eigen::MatrixXd interval;      ///< [N x rows of the interval model]
   Eigen::MatrixXd path;          ///< [nodes x path rows], zero where a row is not imposed
   Eigen::VectorXd lower, upper;  ///< of the bounds, laid out as x
   double total_time = 0.0;       ///< of total_lower <= sum tau <= total_upper
@@ -137,6 +139,7 @@ class Transcription final : public NlpProblem {
     int law = 0;        ///< interval whose law applies
     /// false: only rows that use the acceleration; another node of the knot has the others
     bool all_rows = true;
+    int rows = 0;  ///< of row_sets_
   };
   struct Defect {
     int interval, joint;
@@ -167,6 +170,8 @@ class Transcription final : public NlpProblem {
                     Out value) const;
   void make_nodes();
   void make_points();
+  void make_row_sets();
+  void place_nodes();
   void make_defects();
   void make_jacobian();
   void make_hessian();
@@ -175,6 +180,10 @@ class Transcription final : public NlpProblem {
   void gather(const Node& node, const double* x, double* z) const;
   double acceleration_factor(const double* x, int interval, int joint) const;
   double acceleration_cost(const double* x) const;
+  IntervalModel::Ends ends(const double* x, int interval) const {
+    return {x + q_index(interval, 0), x + q_index(interval + 1, 0), x + qdd_index(interval, 0)};
+  }
+  void add_interval_hessian(const double* x, const double* multiplier, Out value);
   void update_values(const double* x);
   void update_derivatives(const double* x);
   std::string joint_name(int joint) const;
@@ -189,11 +198,16 @@ class Transcription final : public NlpProblem {
   std::vector<Defect> defects_;  ///< in row order; rows between fixed variables are left out
   int terminal_row_ = 0, total_time_row_ = -1, row_count_ = 0;
   std::vector<int> all_rows_, acceleration_rows_;
+  std::vector<std::vector<int>> row_sets_;  ///< path rows that a node can have
+  int interval_rows_ = 0,
+      first_interval_row_ = 0;  ///< rows of an interval; index in g of the first
 
   // Structure, and the values that never change.
   std::vector<int> jacobian_row_, jacobian_column_, hessian_row_, hessian_column_;
   Eigen::VectorXd jacobian_constant_;
   std::vector<std::vector<int>> row_columns_;   ///< per path row: the local indices it depends on
+  int first_interval_jacobian_ = 0;             ///< first value of the interval rows
+  std::vector<int> interval_hessian_;           ///< [N x 2 ends x lower triangle of q]
   int first_path_jacobian_ = 0;                 ///< first value of the path blocks, node by node
   std::vector<int> node_hessian_;               ///< [node x lower triangle of z, column by column]
   std::vector<int> acceleration_hessian_;       ///< [N x n] diagonal of qdd
@@ -213,7 +227,8 @@ class Transcription final : public NlpProblem {
   std::vector<double> path_value_;                      ///< [node x path rows]
   std::vector<double> path_jacobian_;                   ///< [node x path rows x z]
   Eigen::VectorXd z_, path_multiplier_, terminal_jacobian_value_;
-  std::vector<double> block_, terminal_block_;
+  std::vector<double> block_, terminal_block_, interval_block_;  ///< the last: of both ends
+  Eigen::VectorXd interval_jacobian_value_;
 };
 
 /// The motion at other instants; before its first and after its last instant it is at rest in that posture.

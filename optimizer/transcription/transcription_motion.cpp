@@ -95,6 +95,8 @@ TranscriptionMultipliers Transcription::multipliers(const NlpMultipliers& rows) 
     (d.velocity ? m.qd_defect : m.q_defect)(d.interval, d.joint) = rows.constraint[row];
   }
   m.terminal = rows.constraint.segment(terminal_row_, terminal_count_);
+  m.interval = Eigen::Map<const Eigen::Matrix<double, -1, -1, Eigen::RowMajor>>(
+      rows.constraint.data() + first_interval_row_, intervals_, interval_rows_);
   m.path = MatrixXd::Zero(static_cast<int>(nodes_.size()), path_count_);
   for (std::size_t s = 0; s < nodes_.size(); ++s) {
     int row = nodes_[s].first_row;
@@ -111,7 +113,9 @@ TranscriptionMultipliers Transcription::multipliers(const NlpMultipliers& rows) 
 void Transcription::set_start_multipliers(const TranscriptionMultipliers& m) {
   SPARFLOW_CHECK(m.q_defect.rows() == intervals_ && m.q_defect.cols() == n_ &&
                      m.qd_defect.rows() == intervals_ && m.qd_defect.cols() == n_ &&
-                     m.terminal.size() == terminal_count_ && m.path.cols() == path_count_ &&
+                     m.terminal.size() == terminal_count_ &&
+                     m.interval.size() == intervals_ * interval_rows_ &&
+                     m.path.cols() == path_count_ &&
                      m.path.rows() == static_cast<int>(nodes_.size()) &&
                      m.lower.size() == start_.size() && m.upper.size() == start_.size(),
                  "multipliers of a transcription of another shape");
@@ -122,6 +126,10 @@ void Transcription::set_start_multipliers(const TranscriptionMultipliers& m) {
     rows->constraint[row] = (d.velocity ? m.qd_defect : m.q_defect)(d.interval, d.joint);
   }
   rows->constraint.segment(terminal_row_, terminal_count_) = m.terminal;
+  for (int k = 0; k < intervals_; ++k) {
+    for (int r = 0; r < interval_rows_; ++r)
+      rows->constraint[first_interval_row_ + k * interval_rows_ + r] = m.interval(k, r);
+  }
   for (std::size_t s = 0; s < nodes_.size(); ++s) {
     int row = nodes_[s].first_row;
     for (int path_row : rows_of(nodes_[s])) {
@@ -137,7 +145,8 @@ void Transcription::set_start_multipliers(const TranscriptionMultipliers& m) {
 Trajectory resampled(const Trajectory& motion, const VectorXd& t) {
   SPARFLOW_CHECK(motion.size() >= 1, "an empty motion cannot be sampled");
   const Eigen::Index last = motion.size() - 1, rows = t.size(), joints = motion.q.cols();
-  Trajectory out{t, MatrixXd(rows, joints), MatrixXd(rows, joints), MatrixXd::Zero(rows, joints)};
+  Trajectory out{t, MatrixXd(rows, joints), MatrixXd(rows, joints), MatrixXd::Zero(rows, joints),
+                 motion.stops};
   // A mesh over the whole motion may exceed it by a rounding error, which does not count as outside.
   const double slack = 1e-12 * (std::abs(motion.t[0]) + std::abs(motion.t[last]));
   for (Eigen::Index r = 0; r < rows; ++r) {
@@ -164,6 +173,7 @@ Trajectory with_duration(const Trajectory& motion, double duration) {
   const double slower = duration / motion.duration();
   Trajectory out = motion;
   out.t = motion.t[0] + slower * (motion.t.array() - motion.t[0]);
+  for (double& stop : out.stops) stop = motion.t[0] + slower * (stop - motion.t[0]);
   out.qd /= slower;
   out.qdd /= slower * slower;
   return out;

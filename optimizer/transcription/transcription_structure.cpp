@@ -40,6 +40,24 @@ void Transcription::make_nodes() {
     }
     row_columns_.push_back(std::move(columns));
   }
+  make_row_sets();
+}
+
+/// Gives every node its path rows; nodes with equal rows share a list.
+void Transcription::make_row_sets() {
+  place_nodes();
+  for (Node& node : nodes_) {
+    std::vector<int> rows;
+    for (const int row : node.all_rows ? all_rows_ : acceleration_rows_) {
+      if (spec_.knot->path_imposed_at(row, node.knot)) rows.push_back(row);
+    }
+    const auto known = std::find(row_sets_.begin(), row_sets_.end(), rows);
+    node.rows = static_cast<int>(known - row_sets_.begin());
+    if (known == row_sets_.end()) row_sets_.push_back(std::move(rows));
+  }
+}
+
+void Transcription::place_nodes() {
   if (!with_acceleration_) {
     for (int k = 0; k < knots_; ++k) {
       const int after = k < intervals_ ? k : -1;
@@ -60,7 +78,7 @@ void Transcription::make_nodes() {
 }
 
 const std::vector<int>& Transcription::rows_of(const Node& node) const {
-  return node.all_rows ? all_rows_ : acceleration_rows_;
+  return row_sets_[static_cast<std::size_t>(node.rows)];
 }
 
 /// Leaves out a defect that holds and all of whose variables are fixed: its empty row would make the KKT matrix singular
@@ -106,6 +124,8 @@ void Transcription::make_defects() {
     p.row = row_count_;
     row_count_ += p.count;
   }
+  first_interval_row_ = row_count_;
+  row_count_ += intervals_ * interval_rows_;
   for (Node& node : nodes_) {
     node.first_row = row_count_;
     row_count_ += static_cast<int>(rows_of(node).size());
@@ -150,6 +170,15 @@ void Transcription::make_jacobian() {
       for (int i = 0; i < n_; ++i) add(p.row + r, q_index(p.knot, i), 0.0);
     }
   }
+  first_interval_jacobian_ = static_cast<int>(constant.size());
+  for (int k = 0; k < intervals_; ++k) {
+    for (int r = 0; r < interval_rows_; ++r) {
+      const int row = first_interval_row_ + k * interval_rows_ + r;
+      for (int i = 0; i < n_; ++i) add(row, q_index(k, i), 0.0);
+      for (int i = 0; i < n_; ++i) add(row, q_index(k + 1, i), 0.0);
+      for (int i = 0; i < n_; ++i) add(row, qdd_index(k, i), 0.0);
+    }
+  }
   first_path_jacobian_ = static_cast<int>(constant.size());
   for (const Node& node : nodes_) {
     int row = node.first_row;
@@ -191,6 +220,14 @@ void Transcription::make_hessian() {
     for (int c = 0; c < n_; ++c) {
       for (int r = c; r < n_; ++r)
         p.hessian.push_back(place(q_index(p.knot, r), q_index(p.knot, c)));
+    }
+  }
+  for (int k = 0; k < intervals_ && interval_rows_ > 0; ++k) {
+    for (const int knot : {k, k + 1}) {
+      for (int c = 0; c < n_; ++c) {
+        for (int r = c; r < n_; ++r)
+          interval_hessian_.push_back(place(q_index(knot, r), q_index(knot, c)));
+      }
     }
   }
   for (int k = 0; k < intervals_; ++k) {
@@ -254,6 +291,8 @@ void Transcription::bounds(Out x_lower, Out x_upper, Out g_lower, Out g_upper) c
   g_lower.head(terminal_row_).setZero();
   g_upper.head(terminal_row_).setZero();
   for (const Point& p : points_) p.model->bounds(g_lower.data() + p.row, g_upper.data() + p.row);
+  g_lower.segment(first_interval_row_, intervals_ * interval_rows_).setZero();
+  g_upper.segment(first_interval_row_, intervals_ * interval_rows_).setZero();
   if (total_time_row_ >= 0) {
     g_lower[total_time_row_] = spec_.phases.total_lower;
     g_upper[total_time_row_] = spec_.phases.total_upper;
@@ -297,6 +336,11 @@ std::string Transcription::constraint_name(int index) const {
   if (index == total_time_row_) return "total duration";
   for (const Point& p : points_) {
     if (index >= p.row && index < p.row + p.count) return p.model->name(index - p.row);
+  }
+  const int interval_row = index - first_interval_row_;
+  if (interval_row >= 0 && interval_row < intervals_ * interval_rows_) {
+    return fmt::format("{} after t = {:.4g} s", spec_.interval->name(interval_row % interval_rows_),
+                       spec_.t[interval_row / interval_rows_]);
   }
   for (const Node& node : nodes_) {
     const std::vector<int>& rows = rows_of(node);

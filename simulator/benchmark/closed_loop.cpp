@@ -220,6 +220,8 @@ class Loop {
       const Eigen::Vector3d at = tip();
       const double speed = (at - before).norm() / o_.sample_time;
       before = at;
+      row_.sway_path =
+          std::max(row_.sway_path, std::acos(std::cos(record.swing_1) * std::cos(record.swing_2)));
       const bool there = (at - goal.tip).norm() <= s_.tolerance &&
                          rods_away(goal) <= s_.tolerance && speed <= o_.rest_speed;
       if (!there) {

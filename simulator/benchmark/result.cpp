@@ -38,6 +38,7 @@ ordered_json as_json(const Row& r) {
   j["tip_error_path_m"] = number(r.tip_error_path);
   j["tip_error_end_m"] = number(r.tip_error_end);
   j["sway_rad"] = number(r.sway);
+  j["sway_path_rad"] = number(r.sway_path);
   j["peak_pressure_bar"] = r.peak_pressure / units::kBar;
   j["limits_broken"] = r.limits;
   j["roughness_1_s"] = number(r.roughness);
@@ -81,6 +82,7 @@ Row row_from(const std::string& text) {
   r.tip_error_path = read(j, "tip_error_path_m");
   r.tip_error_end = read(j, "tip_error_end_m");
   r.sway = read(j, "sway_rad");
+  r.sway_path = read(j, "sway_path_rad");
   r.peak_pressure = read(j, "peak_pressure_Pa");
   r.limits = j.at("limits_broken").get<std::vector<std::string>>();
   r.roughness = read(j, "roughness_1_s");
@@ -97,7 +99,8 @@ Row row_from(const std::string& text) {
 std::string csv_head() {
   std::string text =
       "scenario,controller,seed,status,energy_J,pump_work_J,useful_J,time_s,tip_error_path_m,"
-      "tip_error_end_m,sway_rad,peak_pressure_bar,limits_broken,roughness_1_s,step_median_s,"
+      "tip_error_end_m,sway_rad,sway_path_rad,peak_pressure_bar,limits_broken,roughness_1_s,step_"
+      "median_s,"
       "step_worst_s";
   for (const char* place : plant::kLossNames) text += fmt::format(",loss_{}_J", place);
   return text + ",loss_pump_J,loss_return_line_J,loss_swing_J,reason\n";
@@ -106,11 +109,11 @@ std::string csv_head() {
 std::string row_csv(const Row& r) {
   const auto cell = [](double v) { return std::isfinite(v) ? fmt::format("{:.6g}", v) : ""; };
   std::string text =
-      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", r.scenario, r.controller,
+      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", r.scenario, r.controller,
                   r.seed, r.done ? "done" : "failed", cell(r.energy), cell(r.pump_work),
                   cell(r.useful), cell(r.time), cell(r.tip_error_path), cell(r.tip_error_end),
-                  cell(r.sway), cell(r.peak_pressure / units::kBar), r.limits.size(),
-                  cell(r.roughness), cell(r.step_median), cell(r.step_worst));
+                  cell(r.sway), cell(r.sway_path), cell(r.peak_pressure / units::kBar),
+                  r.limits.size(), cell(r.roughness), cell(r.step_median), cell(r.step_worst));
   for (const double loss : r.loss) text += "," + cell(loss);
   std::string reason = r.reason;
   for (std::size_t at = 0; (at = reason.find('"', at)) != std::string::npos; at += 2)

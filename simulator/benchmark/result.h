@@ -37,6 +37,7 @@ struct Row {
       kNotKnown;  ///< [m] RMS from the controller's own path; unknown without one
   double tip_error_end = kNotKnown;  ///< [m] the largest over the goals, when they end
   double sway = kNotKnown;     ///< [rad] of the payload while it is held at a goal, the largest
+  double sway_path = 0.0;      ///< [rad] of the payload over the whole run, the largest
   double peak_pressure = 0.0;  ///< [Pa] of all chambers and pumps
   std::vector<std::string> limits;             ///< broken ones, in words
   double roughness = 0.0;                      ///< [1/s] RMS rate of the commands

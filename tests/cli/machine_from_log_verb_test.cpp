@@ -38,7 +38,8 @@ TEST_F(MachineFromLogVerb, AsksByNameAndLeavesTheQuestionInTheFile) {
   EXPECT_EQ(o.code, 4) << o.err << o.out;
   EXPECT_THAT(o.out, HasSubstr("open: cylinders[boom].length_at_zero_stroke: "));
   EXPECT_THAT(slurp(at("machine.yaml")), HasSubstr("# OPEN: "));
-  for (const std::string verb : {"machine ", "compare -l " + kTrain + " -m ", "simulate -m "}) {
+  const std::string compare = "compare -l " + kTrain + " -m ";
+  for (const std::string& verb : {std::string("machine "), compare, std::string("simulate -m ")}) {
     o = run(verb + at("machine.yaml") + (verb[0] == 's' ? " -o " + at("x.csv") : ""));
     EXPECT_EQ(o.code, 3) << verb;
     EXPECT_THAT(o.err, HasSubstr("is left open (unknown)")) << verb;

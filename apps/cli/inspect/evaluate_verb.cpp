@@ -104,6 +104,7 @@ int run(const EvaluateArguments& a) {
   CraneModel model;
   if (!a.problem.empty()) {
     ProblemAndModel both = load_problem_and_model(a.problem, a.model);
+    require_one_move("evaluate", both.problem);
     problem = std::move(both.problem);
     model = std::move(both.model);
   } else if (a.model.empty()) {

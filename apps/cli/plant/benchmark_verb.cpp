@@ -103,6 +103,11 @@ void add_benchmark_verb(CLI::App& app, int& code) {
       ->type_name("CONTROLLER.GAIN=VALUE");
   verb->add_flag("--no-optimum", a->task.no_optimum,
                  "leave the energy-optimal motions out; controllers that follow one fail");
+  verb->add_option("--sway", a->task.sway_limit,
+                   "largest angle of the payload's rope for which energy-optimal motions are "
+                   "planned; absent: any")
+      ->type_name("DEG")
+      ->check(number_from(0.1, 45.0));
   verb->add_flag("--no-bound", a->task.no_bound, "leave the lower bounds of the energy out");
   verb->add_option("--jobs,--processes", a->task.jobs,
                    "runs at the same time; absent: as many as there are processors")

@@ -170,7 +170,7 @@ def simulate(machine, *, seconds=60.0, rate=50.0, seed=1, effects=(), plant=None
 
 
 def benchmark(scenarios, controllers=None, *, model=None, functions=None, processes=None, gains=None, reference="", seeds=0,
-              optimum=True, bound=True, step_budget_s=0.5, jobs=0, progress=None):
+              optimum=True, bound=True, sway_deg=0.0, step_budget_s=0.5, jobs=0, progress=None):
     """Compares controllers on the dynamic plant: true energy, time, errors; returns a BenchmarkResult.
 
     scenarios: a path of a scenario or a folder of them, or several. controllers: names of the program's; None is all of them,
@@ -182,6 +182,7 @@ def benchmark(scenarios, controllers=None, *, model=None, functions=None, proces
     model: a Model or the path of one; None is the one that each scenario names. gains: {'joint_pi.proportional': 1.2}.
     reference: name of the controller that others are compared with; '' is tracked_optimum, or the first. seeds: runs of each
     controller in each scenario; 0 is the scenario's seeds. optimum, bound: also the energy-optimal motion and its lower bound.
+    sway_deg: limit of the payload's sway for which these motions are planned, 0 is none.
     jobs: runs at the same time, 0 is one for each processor. After Ctrl-C the exception's `result` has the runs done.
     """
     functions, processes = dict(functions or {}), dict(processes or {})
@@ -193,10 +194,10 @@ def benchmark(scenarios, controllers=None, *, model=None, functions=None, proces
         functions=[(name, _controllers.words(f), lambda f=f: _controllers.asked(f)) for name, f in functions.items()],
         processes=[f"{name}={command}" for name, command in processes.items()],
         gains=[f"{name}={value!r}" for name, value in dict(gains or {}).items()], model=model, reference=reference, seeds=seeds,
-        optimum=optimum, bound=bound, step_budget_s=step_budget_s, jobs=jobs, progress=progress))
+        optimum=optimum, bound=bound, sway_deg=sway_deg, step_budget_s=step_budget_s, jobs=jobs, progress=progress))
 
 
-def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0, most_effects=8, moves=3, seed=1, effects=(),
+def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0, most_effects=12, moves=3, seed=1, effects=(),
                   processes=0, progress=None):
     """Closes the loop on the dynamic plant: does what a model promises come true? Returns a TrustLoop.
 

@@ -8,6 +8,9 @@
 #include "apps/report/charts/obstacle_drawing.h"
 #include "models/files/model_file.h"
 #include "models/math/units.h"
+#include "optimizer/solve/optimize_cycle.h"
+#include "optimizer/sway/pendulum.h"
+#include "problems/motion_table.h"
 
 namespace sparflow {
 namespace {
@@ -33,8 +36,8 @@ struct Curves {
   VectorXd power;                  // [kW]
 };
 
-Curves curves_of(const CraneModel& model, const Trajectory& motion, double payload,
-                 const LeastFlows& least) {
+Curves curves_of(const CraneModel& model, const MotionProblem& problem, const Trajectory& motion) {
+  const LeastFlows least = least_flows(model.machine, problem.limits);
   const Trajectory fine = motion.refined(4);
   const Eigen::Index rows = fine.size();
   const auto cylinders = static_cast<Eigen::Index>(model.cylinders.size());
@@ -52,7 +55,8 @@ Curves curves_of(const CraneModel& model, const Trajectory& motion, double paylo
     q = fine.q.row(k);
     qd = fine.qd.row(k);
     qdd = fine.qdd.row(k);
-    const MachineState& s = chain.evaluate({q.data(), qd.data(), qdd.data()}, payload);
+    const MachineState& s =
+        chain.evaluate({q.data(), qd.data(), qdd.data()}, payload_at(problem, motion, fine.t[k]));
     for (Eigen::Index i = 0; i < cylinders; ++i) {
       const CylinderState& cylinder = s.cylinders[static_cast<std::size_t>(i)];
       c.flow(k, i) = cylinder.flow / units::kLitrePerMinute;
@@ -87,11 +91,56 @@ std::optional<double> ground_of(const MotionProblem& problem) {
   return std::nullopt;
 }
 
+/// Angle of the rope along the motion, by the pendulum.
+void add_sway(Page& page, const Machine& machine, const MotionProblem& problem,
+              const Trajectory& motion, std::vector<Span> legs) {
+  const Trajectory fine = motion.refined(4);
+  const RopeCourse course = rope_course(machine, fine, problem.sway->cable, 2);
+  LineChart chart;
+  chart.title = "Sway of the load";
+  chart.group = "motion";
+  chart.y_axis = {"angle of the rope", "deg"};
+  chart.note =
+      "From the vertical, by the pendulum without damping. What a swinging load does to the "
+      "cylinders' forces is not part of the model.";
+  chart.x = fine.t;
+  VectorXd angle(fine.size());
+  for (Eigen::Index k = 0; k < fine.size(); ++k)
+    angle[k] = rope_angle(machine, course.knots[static_cast<std::size_t>(k)]) / units::kDegree;
+  chart.series.push_back(curve("sway", std::move(angle)));
+  chart.series.push_back(
+      curve("limit", VectorXd::Constant(fine.size(), problem.sway->limit / units::kDegree), -1,
+            LineStyle::kLimit));
+  chart.spans = std::move(legs);
+  page.plot(std::move(chart));
+}
+
+/// Time, payload and energy of each leg of a cycle.
+void add_leg_table(Page& page, const CraneModel& model, const MotionProblem& problem,
+                   const OptimizeResult& result) {
+  if (problem.stops.empty()) return;
+  Table table;
+  table.title = "Legs of the cycle";
+  table.columns = {
+      {"to"}, {"payload", "kg", 4}, {"from", "s", 4}, {"to", "s", 4}, {"energy", "kJ"}};
+  table.note = fmt::format(
+      "One optimisation over the whole: {:.1f} kJ; its legs optimised one after the other, in "
+      "shares of the time in proportion to their shortest: {:.1f} kJ.",
+      result.energy.total / 1e3, result.legwise_energy / 1e3);
+  for (const LegEnergy& leg : leg_energies(model, problem, result.motion))
+    table.rows.push_back({leg.to, leg.payload, leg.begin, leg.end, leg.energy / 1e3});
+  page.table(std::move(table));
+}
+
 void add_curves(Page& page, const CraneModel& model, const MotionProblem& problem,
                 const OptimizeResult& result) {
   const Machine& machine = model.machine;
-  const Curves c =
-      curves_of(model, result.motion, problem.payload, least_flows(machine, problem.limits));
+  const Curves c = curves_of(model, problem, result.motion);
+  std::vector<Span> legs;
+  if (!problem.stops.empty()) {
+    for (const CycleLeg& leg : legs_of(problem, result.motion))
+      legs.push_back({leg.begin, leg.end, fmt::format("to {}, {:.4g} kg", leg.to, leg.payload)});
+  }
   const auto chart = [&](const std::string& title, const std::string& label,
                          const std::string& unit) {
     LineChart out;
@@ -100,6 +149,7 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
     out.width = FigureWidth::kHalf;
     out.y_axis = {label, unit};
     out.x = c.t;
+    out.spans = legs;
     return out;
   };
   LineChart speed = chart("Joint speeds", "share of the limit", "%");
@@ -139,6 +189,7 @@ void add_curves(Page& page, const CraneModel& model, const MotionProblem& proble
   page.plot(std::move(flow));
   page.plot(std::move(pressure));
   page.plot(std::move(power));
+  if (problem.sway) add_sway(page, machine, problem, result.motion, std::move(legs));
 }
 
 void add_losses(Page& page, const CraneModel& model, const MotionProblem& problem,
@@ -369,6 +420,7 @@ void add_motion(Page& page, const CraneModel& model, const MotionProblem& proble
   std::vector<ComparedMotion> others;
   if (baseline) others.push_back(*baseline);
   add_views(page, model.machine, problem, result.motion, others);
+  add_leg_table(page, model, problem, result);
   add_curves(page, model, problem, result);
   add_losses(page, model, problem, result, baseline);
   add_tables(page, result);

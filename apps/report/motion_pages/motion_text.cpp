@@ -8,6 +8,7 @@
 #include "apps/report/motion_pages/evaluation.h"
 #include "apps/report/motion_pages/motion_page.h"
 #include "models/math/units.h"
+#include "optimizer/solve/optimize_cycle.h"
 
 namespace sparflow {
 namespace {
@@ -75,6 +76,22 @@ void add_limit_keys(const std::vector<LimitCheck>& checks, nlohmann::json& out) 
   }
 }
 
+void add_legs(const CraneModel& model, const MotionProblem& problem, const OptimizeResult& r,
+              nlohmann::json& out) {
+  if (problem.stops.empty()) return;
+  out["legs"] = nlohmann::json::array();
+  for (const LegEnergy& leg : leg_energies(model, problem, r.motion)) {
+    out["legs"].push_back({{"to", leg.to},
+                           {"payload_kg", leg.payload},
+                           {"begin_s", leg.begin},
+                           {"end_s", leg.end},
+                           {"energy_exact_J", leg.energy}});
+  }
+  out["legwise_energy_exact_J"] =
+      r.legwise_energy > 0.0 ? nlohmann::json(r.legwise_energy) : nlohmann::json();
+  out["bound_note"] = r.bound_note;
+}
+
 /// The engine's energy while time passes, which no motion avoids; "" without idle power.
 std::string idle_text(const MotionProblem& problem, double duration) {
   if (problem.idle_power <= 0.0) return "";
@@ -109,9 +126,13 @@ std::string energies_text(const MotionProblem& problem, const OptimizeResult& r)
     else
       text += fmt::format("  {:<20}         -      it breaks a limit in this time\n", what);
   };
-  against("straight, nearest", r.nearest_line_energy, "");
-  against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
-  against("best seed path", r.best_seed_energy, r.best_seed_name);
+  if (problem.stops.empty()) {
+    against("straight, nearest", r.nearest_line_energy, "");
+    against("straight, cheapest", r.straight_line_energy, r.straight_line_name);
+    against("best seed path", r.best_seed_energy, r.best_seed_name);
+  } else if (r.legwise_energy > 0.0) {
+    against("legs one by one", r.legwise_energy, "");
+  }
   if (r.grid_path_energy > 0.0) against("dynamic programming", r.grid_path_energy, "");
   if (r.unlimited_energy > 0.0) {
     text += fmt::format(
@@ -147,6 +168,18 @@ std::string cylinders_text(const Machine& machine, const MotionEnergy& energy) {
     text += fmt::format("  {:<14} {:>12.2f} {:>14.2f}\n", machine.cylinders[i].name,
                         energy.useful[i] / 1e3, energy.throttling[i] / 1e3);
   }
+  return text;
+}
+
+/// Time and energy of each leg of a cycle; "" where there is one move.
+std::string legs_text(const CraneModel& model, const MotionProblem& problem,
+                      const Trajectory& motion) {
+  if (problem.stops.empty()) return "";
+  std::string text = fmt::format("  {:<20} {:>12} {:>9} {:>9} {:>12}\n", "leg to", "payload [kg]",
+                                 "from [s]", "to [s]", "energy [kJ]");
+  for (const LegEnergy& leg : leg_energies(model, problem, motion))
+    text += fmt::format("  {:<20} {:>12.4g} {:>9.2f} {:>9.2f} {:>12.2f}\n", leg.to, leg.payload,
+                        leg.begin, leg.end, leg.energy / 1e3);
   return text;
 }
 
@@ -295,6 +328,7 @@ std::string optimize_json(const CraneModel& model, const MotionProblem& problem,
     out["seed"] = r.starts[static_cast<std::size_t>(r.best_start)].seed;
     add_energy_keys(model, problem, r.energy, r.duration, out);
     add_limit_keys(r.checks, out);
+    add_legs(model, problem, r, out);
     out["mesh_error"] = r.mesh_error;
     if (r.lower_bound > 0.0) {
       out["lower_bound_J"] = r.lower_bound;
@@ -330,8 +364,8 @@ std::string optimize_table(const CraneModel& model, const MotionProblem& problem
   return fmt::format("{}: {}{}\n", to_string(r.status), problem.name,
                      mostly_outside_data(r) ? "; " + outside_text(r) : "") +
          reached + energies_text(problem, r) + idle_text(problem, r.duration) +
-         cylinders_text(model.machine, r.energy) + limits_text(r.checks) +
-         reservations_text(model, r.energy) + starts_text(r);
+         legs_text(model, problem, r.motion) + cylinders_text(model.machine, r.energy) +
+         limits_text(r.checks) + reservations_text(model, r.energy) + starts_text(r);
 }
 
 bool limits_kept(const MotionEvaluation& e) {

@@ -6,6 +6,7 @@
 
 #include "apps/tasks/benchmark/learned_run.h"
 #include "models/math/interruption.h"
+#include "models/math/units.h"
 #include "optimizer/solve/kept_work.h"
 #include "simulator/controllers/foreign_process.h"
 
@@ -21,6 +22,7 @@ class Benchmark {
             const Listener& listener)
       : work_(work), task_(task), journal_(journal), listener_(listener) {
     planning_.bound = !task.no_bound;
+    planning_.sway_limit = task.sway_limit * units::kDegree;
     planning_.interrupted = listener.interrupted;
   }
   BenchmarkResult result();

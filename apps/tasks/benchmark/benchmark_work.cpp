@@ -173,6 +173,7 @@ std::string reference_of(const BenchmarkTask& a, const BenchmarkWork& work) {
 BenchmarkWork benchmark_work(const BenchmarkTask& a, const Listener& listener) {
   require_range("benchmark: --seeds", a.seeds, 0, 1000);
   require_range("benchmark: --step-budget", a.step_budget, 1e-3, 600.0);
+  require_range_or("benchmark: --sway", a.sway_limit, 0.0, 0.1, 45.0);
   require_range("benchmark: --jobs", a.jobs, 0, 256);
   BenchmarkWork work;
   work.entrants = entrants_of(a);
@@ -203,6 +204,7 @@ BenchmarkWork benchmark_work(const BenchmarkTask& a, const Listener& listener) {
 std::string benchmark_fingerprint(const BenchmarkWork& work, const BenchmarkTask& a) {
   std::string options = fmt::format("benchmark bound {} optimum {} seeds {} budget {}", !a.no_bound,
                                     !a.no_optimum, a.seeds, a.step_budget);
+  if (a.sway_limit > 0.0) options += fmt::format(" sway {}", a.sway_limit);
   for (const Entrant& e : work.entrants)
     options += fmt::format("; {} = {} [{}]", e.name, e.words, fmt::join(e.gains, ", "));
   return run_fingerprint(work.files, options);

@@ -34,6 +34,7 @@ struct BenchmarkTask {
   int jobs = 0;                             ///< runs at a time; 0: as many as there are processors
   double step_budget = 0.5;                 ///< [s] in which a process must answer
   bool no_bound = false, no_optimum = false;
+  double sway_limit = 0.0;  ///< [deg] of the energy-optimal motions' payload; 0: none
   /// Called as a part of the work begins; gives whom the part tells its progress, from 0 to 1. May be empty.
   std::function<WorkProgress(const std::string& part)> begin;
 };

@@ -78,6 +78,9 @@ MotionProblem problem_of(const benchmark::Scenario& s, const CraneModel& model, 
     p.goal = TipGoal{goal.tip};
   }
   p.duration = {goal.duration, goal.duration};
+  const double rope = s.plant.pendulum.rope_length;
+  if (o.sway_limit > 0.0 && rope > 0.0)
+    p.sway = SwayLimit{rope, o.sway_limit, o.sway_end_share * o.sway_limit};
   return p;
 }
 

@@ -20,6 +20,11 @@ struct OptimalMotionOptions {
   /// Mesh intervals.
   /// @threshold [1] 20..500; chosen: two thirds of optimize's, as scenarios are many
   int intervals = 60;
+  /// Largest angle of the payload's rope, which is the plant's, along the motion; 0: no limit. [rad]
+  double sway_limit = 0.0;
+  /// Share of that limit to which the payload may swing when the motion has ended.
+  /// @threshold [1] 0.05..1; chosen: half, so that it can be set down
+  double sway_end_share = 0.5;
   /// Also an estimated lower bound.
   bool bound = true;
   std::uint64_t seed = 1;

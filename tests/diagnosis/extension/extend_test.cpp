@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "diagnosis/extension/improvement.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "models/files/model_file.h"
 #include "models/math/error.h"
@@ -300,30 +299,6 @@ TEST(EstimateEffects, VariantsOfALawAreNotRefinedBetween) {
     EXPECT_EQ(a.upper95[p], a.values[p]);
   }
   EXPECT_THAT(e.notes, ::testing::Each(::testing::Not(HasSubstr("lies on the bound"))));
-}
-
-// Dry friction at nearly one speed resembles viscous friction, and a Stribeck part then bends it back.
-TEST(Improve, TwoLawsThatOneReplacesAreOne) {
-  const ExtendOptions options;
-  const ExtendLogs logs = logs_with_friction();
-  const RefitContext context(ignorant_model(), logs, options);
-  ExtendResult result;
-  Judged current = context.as_it_is(ignorant_model(), result.notes, {});
-  Improvement improvement(context, result, current);
-  ImproveRound round;  // as an earlier run has made it, so that nothing is tested
-  round.wanted = {"viscous_friction:arm", "stribeck_friction:arm"};
-  ASSERT_TRUE(improvement.add(round, nullptr, {}));
-  ASSERT_THAT(current.model.effects, SizeIs(2));
-  const double with_two = force_error(current.error);
-  improvement.merge({});
-  ASSERT_THAT(current.model.effects, SizeIs(1));
-  EXPECT_EQ(current.model.effects[0].key(current.model.machine), "coulomb_friction:arm");
-  EXPECT_NEAR(current.model.effects[0].values[0], kFriction, 0.05 * kFriction);
-  EXPECT_LE(force_error(current.error), options.change.refit_moves * with_two);
-  ASSERT_THAT(result.steps, SizeIs(5));  // two added, two removed, one added
-  EXPECT_EQ(result.steps.back().added, "coulomb_friction:arm");
-  improvement.merge({});  // nothing is left to merge
-  EXPECT_THAT(current.model.effects, SizeIs(1));
 }
 
 TEST(Improve, DoesNotKeepWhatMakesTheErrorWorse) {
