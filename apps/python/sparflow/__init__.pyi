@@ -384,8 +384,8 @@ def simulate(machine: Machine, *, seconds: float = 60.0, rate: float = 50.0, see
 def benchmark(scenarios: Union[Path, Iterable[Path]], controllers: Union[None, str, Iterable[str]] = None, *,
               model: Union[None, Model, Path] = None, functions: Optional[Mapping[str, Any]] = None,
               processes: Optional[Mapping[str, str]] = None, gains: Optional[Mapping[str, float]] = None, reference: str = "",
-              seeds: int = 0, optimum: bool = True, bound: bool = True, step_budget_s: float = 0.5, jobs: int = 0,
-              progress: Progress = None) -> BenchmarkResult: ...
+              seeds: int = 0, optimum: bool = True, bound: bool = True, sway_deg: float = 0.0, step_budget_s: float = 0.5,
+              jobs: int = 0, progress: Progress = None) -> BenchmarkResult: ...
 def loop_of_trust(machine: Machine, *, train_seconds: float = 200.0, test_seconds: float = 100.0, rate: float = 25.0,
                   most_effects: int = 12, moves: int = 3, seed: int = 1, effects: Union[str, Iterable[str]] = (),
                   processes: int = 0, progress: Progress = None) -> TrustLoop: ...
