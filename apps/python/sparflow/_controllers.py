@@ -25,7 +25,11 @@ def asked(controller):
         answer = made(message)
         if not (isinstance(answer, dict) and isinstance(answer.get("u"), dict)):
             answer = {"u": {} if answer is None else answer}
-        return json.dumps(answer, default=float, allow_nan=False)
+        try:
+            return json.dumps(answer, default=float, allow_nan=False)
+        except ValueError:
+            raise UsageError(f"the controller's levers are no finite numbers at {message.get('t_s')} s: {answer['u']!r}; "
+                             "expected -1 to 1 by cylinder") from None
 
     return ask
 

@@ -7,6 +7,9 @@ from . import _sparflow as core
 from ._errors import InputError, SparflowWarning
 
 
+_SUFFIXES = {"degC": "C"}  # units of signals that columns write otherwise
+
+
 def _pandas():
     import pandas
     return pandas
@@ -111,16 +114,22 @@ def benchmark_frame(self):
 
 
 def log_frame(self):
-    """All signals in SI, indexed by time [s]."""
+    """All signals in SI, indexed by time [s]; their units stand in `frame.attrs["units"]`, where Log.from_frame finds them."""
     pandas = _pandas()
-    return pandas.DataFrame({name: self[name] for name in self.signals}, index=pandas.Index(self.time, name="t_s"))
+    frame = pandas.DataFrame({name: self[name] for name in self.signals}, index=pandas.Index(self.time, name="t_s"))
+    frame.attrs["units"] = {name: self.unit(name) for name in self.signals}
+    return frame
 
 
 def log_from_frame(frame, machine, name="frame", mapping=None):
     """Makes a log of a DataFrame whose columns are named as in a file, with units ('t_s', 'q_boom_rad', ...).
 
-    An index named 't_s' serves as that column. Raises InputError.
+    An index named 't_s' serves as that column. Columns without a unit in their names have that of `frame.attrs["units"]`, as
+    Log.to_frame writes it. Raises InputError.
     """
+    if len(frame) == 0:
+        raise InputError(f"{name}: the frame has no rows; expected at least two samples")
+    units = {label: _SUFFIXES.get(unit, unit) for label, unit in frame.attrs.get("units", {}).items() if unit}
     if "t_s" not in frame.columns and frame.index.name == "t_s":
         frame = frame.reset_index()
     columns = {}
@@ -129,7 +138,8 @@ def log_from_frame(frame, machine, name="frame", mapping=None):
             raise InputError(f"{label}: two columns of the frame have this name; rename one")
         numbers = _numbers(frame.iloc[:, position], str(label))
         if numbers is not None:
-            columns[str(label)] = numbers
+            unit = units.get(str(label))
+            columns[f"{label}_{unit}" if unit else str(label)] = numbers
     return core.Log.from_arrays(columns, machine, name, mapping)
 
 

@@ -2,21 +2,24 @@
 
 import os
 
-from . import _controllers
+from . import _controllers, _inputs
 from . import _sparflow as core
 from ._errors import UsageError
 
 
-def fit(machine, logs, test=None, *, threads=0, effects=None, progress=None):
+def fit(machine, logs, test=None, *, mapping=None, threads=0, effects=None, progress=None):
     """Identifies pressure models, margins, standby and valve gains from logs; returns a FitResult.
 
-    test: logs to judge the model on, from which nothing is learned; without any, motions are held out.
+    machine: a Machine or the path of its file. test: logs to judge the model on, from which nothing is learned; without any,
+    motions are held out. mapping: path of a mapping file for logs given by their paths (docs/log_format.md).
     threads: for learning; 0 is one for each processor.
     effects: effects of your own (@sparflow.effect, or paths of YAML files) that the model's file shall contain.
     progress: called as progress(share, words) in this thread.
     Raises InputError where nothing could be learned, UsageError for a log given twice.
     """
-    return core.fit(machine, dict(logs=logs, test=test, threads=threads, effects=effects, progress=progress))
+    machine = _inputs.one("fit", machine, core.Machine)
+    return core.fit(machine, dict(logs=_inputs.logs(logs, machine, mapping), test=_inputs.logs(test, machine, mapping),
+                                  threads=_inputs.threads("fit", threads), effects=effects, progress=progress))
 
 
 def compare(model, logs):
@@ -24,7 +27,7 @@ def compare(model, logs):
 
     With a Machine in place of the model, static forces and measured flows alone.
     """
-    return core.compare(model, logs)
+    return core.compare(_inputs.one("compare", model, core.Model, core.Machine), logs)
 
 
 def diagnose(model, logs, references=None, test=None, *, candidates=None, effects=None, check_data=True, progress=None):
@@ -35,8 +38,9 @@ def diagnose(model, logs, references=None, test=None, *, candidates=None, effect
     effects: effects of your own (@sparflow.effect, or paths of YAML files).
     check_data: look for stuck, jumping or noisy channels first.
     """
-    return core.diagnose(model, dict(logs=logs, references=references, test=test, candidates=candidates,
-                                     effects=effects, check_data=check_data, progress=progress))
+    return core.diagnose(_inputs.one("diagnose", model, core.Model), dict(
+        logs=logs, references=references, test=test, candidates=candidates,
+        effects=effects, check_data=check_data, progress=progress))
 
 
 def extend(model, logs, add=(), test=None, *, remove="", threads=0, effects=None, progress=None):
@@ -48,8 +52,9 @@ def extend(model, logs, add=(), test=None, *, remove="", threads=0, effects=None
     add = [add] if isinstance(add, str) else list(add)
     if bool(add) == bool(remove):
         raise UsageError("extend: give either add=[EFFECT[:AT], ...] or remove=EFFECT[:AT]")
-    return core.extend(model, dict(logs=logs, add=add, test=test, remove=remove, threads=threads, effects=effects,
-                                   progress=progress))
+    return core.extend(_inputs.one("extend", model, core.Model), dict(
+        logs=logs, add=add, test=test, remove=remove, threads=_inputs.threads("extend", threads), effects=effects,
+        progress=progress))
 
 
 def improve(model, logs, references=None, test=None, *, max_steps=12, candidates=None, threads=0, effects=None,
@@ -59,8 +64,9 @@ def improve(model, logs, references=None, test=None, *, max_steps=12, candidates
     Only effects that lower the error on data that took no part are kept. After Ctrl-C the exception's `result` has the
     steps done, where the work answered in time.
     """
-    return core.improve(model, dict(logs=logs, references=references, test=test, max_steps=max_steps,
-                                    candidates=candidates, threads=threads, effects=effects, progress=progress))
+    return core.improve(_inputs.one("improve", model, core.Model), dict(
+        logs=logs, references=references, test=test, max_steps=_inputs.whole("improve", "max_steps", max_steps, 1, 20),
+        candidates=candidates, threads=_inputs.threads("improve", threads), effects=effects, progress=progress))
 
 
 def selftest(model, logs, references=None, *, check=6, candidates=None, effects=None, progress=None):
@@ -68,8 +74,9 @@ def selftest(model, logs, references=None, *, check=6, candidates=None, effects=
 
     check: number of effects for which the whole search is run on injected data.
     """
-    return core.selftest(model, dict(logs=logs, references=references, check=check, candidates=candidates,
-                                     effects=effects, progress=progress))
+    return core.selftest(_inputs.one("selftest", model, core.Model), dict(
+        logs=logs, references=references, check=_inputs.whole("selftest", "check", check, 0, 10**9), candidates=candidates,
+        effects=effects, progress=progress))
 
 
 def plan(problem, *, paths=8, seconds=5.0, seed=1, progress=None):
@@ -77,7 +84,8 @@ def plan(problem, *, paths=8, seconds=5.0, seed=1, progress=None):
 
     paths: largest number. seconds: time for the search [s]. seed: of the random search.
     """
-    return core.plan(problem, dict(paths=paths, seconds=seconds, seed=seed, progress=progress))
+    return core.plan(_inputs.one("plan", problem, core.Problem), dict(
+        paths=paths, seconds=seconds, seed=_inputs.seed("plan", seed), progress=progress))
 
 
 def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, seed=1, intervals=0, processes=0,
@@ -89,8 +97,9 @@ def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, see
     Raises InfeasibleError or NotConvergedError, whose `result` is what was tried; after Ctrl-C the exception's `result` has
     the best motion so far, where the work answered in time.
     """
-    return core.optimize(problem, dict(bound=bound, start_from=start_from, paths=paths, seconds=seconds, seed=seed,
-                                       intervals=intervals, processes=processes, progress=progress))
+    return core.optimize(_inputs.one("optimize", problem, core.Problem), dict(
+        bound=bound, start_from=start_from, paths=paths, seconds=seconds, seed=_inputs.seed("optimize", seed),
+        intervals=intervals, processes=processes, progress=progress))
 
 
 def _several(given, one):
@@ -106,9 +115,9 @@ def strategies(problems, *, time="equal", idle_kW=None, paths=8, orders=4, seed=
     the problem's. processes: problems solved in parallel, 0 is one for each processor.
     Raises InfeasibleError where no energy-optimal motion was found; after Ctrl-C the exception's `result` has the problems done.
     """
-    return core.strategies(_several(problems, core.Problem),
-                           dict(time=str(time), idle_kW=idle_kW, paths=paths, orders=orders, seed=seed, intervals=intervals,
-                                processes=processes, progress=progress))
+    return core.strategies(_inputs.several("strategies", problems, core.Problem), dict(
+        time=str(time), idle_kW=idle_kW, paths=paths, orders=orders, seed=_inputs.seed("strategies", seed), intervals=intervals,
+        processes=processes, progress=progress))
 
 
 def pareto(problem, *, points=14, longest=6.0, idle_kW=(1, 2, 5, 10, 15), paths=8, seed=1, intervals=0, processes=0,
@@ -120,8 +129,9 @@ def pareto(problem, *, points=14, longest=6.0, idle_kW=(1, 2, 5, 10, 15), paths=
     solved in parallel, 0 is two.
     Raises InfeasibleError where there is no motion; after Ctrl-C the exception's `result` has the points done.
     """
-    return core.pareto(problem, dict(points=points, longest=longest, idle_kW=list(idle_kW), paths=paths, seed=seed,
-                                     intervals=intervals, processes=processes, progress=progress))
+    return core.pareto(_inputs.one("pareto", problem, core.Problem), dict(
+        points=points, longest=longest, idle_kW=list(idle_kW), paths=paths, seed=_inputs.seed("pareto", seed),
+        intervals=intervals, processes=processes, progress=progress))
 
 
 def audit(model, logs, *, payload_kg=None, pause_s=1.0, moves=40, litres_per_kWh=0.0, engine_map=None, bound=True,
@@ -136,8 +146,9 @@ def audit(model, logs, *, payload_kg=None, pause_s=1.0, moves=40, litres_per_kWh
     """
     if litres_per_kWh and engine_map is not None:
         raise UsageError("audit: give either litres_per_kWh or engine_map")
-    return core.audit(model, dict(logs=logs, payload_kg=payload_kg, pause_s=pause_s, moves=moves, litres_per_kWh=litres_per_kWh,
-                                  engine_map=engine_map, bound=bound, processes=processes, progress=progress))
+    return core.audit(_inputs.one("audit", model, core.Model), dict(
+        logs=logs, payload_kg=payload_kg, pause_s=pause_s, moves=moves, litres_per_kWh=litres_per_kWh, engine_map=engine_map,
+        bound=bound, processes=processes, progress=progress))
 
 
 def simulate(machine, *, seconds=60.0, rate=50.0, seed=1, effects=(), plant=None, programme="operator", track=None, replay=None,
@@ -163,9 +174,9 @@ def simulate(machine, *, seconds=60.0, rate=50.0, seed=1, effects=(), plant=None
         raise UsageError("simulate: start is for a controller; programmes begin where they say")
     if controller is not None:
         _controllers.check(controller)
-    return core.simulate(machine, dict(
-        seconds=seconds, rate=rate, seed=seed, effects=_several(effects, str), plant=plant, programme=programme, track=track,
-        replay=replay, motion=motion, ask=None if controller is None else _controllers.asked(controller), start=dict(start or {}),
+    return core.simulate(_inputs.one("simulate", machine, core.Machine), dict(
+        seconds=seconds, rate=rate, seed=_inputs.seed("simulate", seed), effects=_several(effects, str), plant=plant,
+        programme=programme, track=track, replay=replay, motion=motion, ask=None if controller is None else _controllers.asked(controller), start=dict(start or {}),
         payload_kg=payload_kg, progress=progress))
 
 
@@ -207,9 +218,9 @@ def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0
     rate: samples a second [Hz]. most_effects: that improve may add. moves: number of them.
     effects: of the plant, as in simulate. processes: motions at the same time, 0 is one for each processor.
     """
-    return core.loop_of_trust(machine, dict(
-        train_seconds=train_seconds, test_seconds=test_seconds, rate=rate, most_effects=most_effects, moves=moves, seed=seed,
-        effects=_several(effects, str), processes=processes, progress=progress))
+    return core.loop_of_trust(_inputs.one("loop_of_trust", machine, core.Machine), dict(
+        train_seconds=train_seconds, test_seconds=test_seconds, rate=rate, most_effects=most_effects, moves=moves,
+        seed=_inputs.seed("loop_of_trust", seed), effects=_several(effects, str), processes=processes, progress=progress))
 
 
 def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
@@ -220,7 +231,7 @@ def evaluate(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
     'pressure' [Pa, 0 at rest]; [N x pumps]: 'pump_flow', 'pump_pressure'; [N x 1]: 'power' of the pumps [W].
     Raises UsageError for another shape and for a posture in which a linkage cannot close.
     """
-    return core.evaluate(model, dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))
+    return core.evaluate(_inputs.one("evaluate", model, core.Model), dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))
 
 
 def derivatives(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
@@ -232,4 +243,4 @@ def derivatives(model, q, qd, qdd=None, *, payload_kg=0.0, oil_C=40.0):
     jump, and where two demands on a pump are equal: there those of rest and of the first demand are given.
     Raises UsageError as `evaluate` does, InputError for a machine of more than ten joints (seven with inertia).
     """
-    return core.derivatives(model, dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))
+    return core.derivatives(_inputs.one("derivatives", model, core.Model), dict(q=q, qd=qd, qdd=qdd, payload_kg=payload_kg, oil_C=oil_C))
