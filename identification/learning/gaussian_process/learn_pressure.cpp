@@ -63,10 +63,19 @@ Problem make_problem(const ArrayXd& flow, const ArrayXd& force, const ArrayXd& p
   p.points.x1 = p.flow.apply(flow);
   p.points.x2 = p.force.apply(force);
   p.points.y = p.pressure.apply(pressure);
-  const bool over_force = !p.force.constant, over_flow = !p.flow.constant;
-  p.points.basis = MatrixXd::Ones(flow.size(), 1 + (over_force ? 1 : 0) + (over_flow ? 1 : 0));
-  if (over_force) p.points.basis.col(1) = p.points.x2;
-  if (over_flow) p.points.basis.rightCols<1>() = p.points.x1;
+  const bool over_force = !p.force.constant;
+  const auto mean_over = [&](bool over_flow) {
+    MatrixXd basis = MatrixXd::Ones(flow.size(), 1 + (over_force ? 1 : 0) + (over_flow ? 1 : 0));
+    if (over_force) basis.col(1) = p.points.x2;
+    if (over_flow) basis.rightCols<1>() = p.points.x1;
+    return basis;
+  };
+  p.points.basis = mean_over(!p.flow.constant);
+  // Losses grow with the flow. A plane that falls with it follows starts, where pressure is high and flow low, or friction at
+  // low speed; beyond the flows of the data it would promise what no valve does. The process keeps the fall inside them.
+  if (!p.flow.constant &&
+      !(p.points.basis.colPivHouseholderQr().solve(p.points.y).tail<1>()[0] >= 0.0))
+    p.points.basis = mean_over(false);
   p.points.basis_precision = VectorXd::Zero(p.points.basis.cols());
   p.points.basis_precision.tail(p.points.basis.cols() - 1)
       .setConstant(1.0 / (options.slope_std * options.slope_std));

@@ -66,6 +66,29 @@ TEST(LearnPressure, LearnsTheLawAndItsNoise) {
   EXPECT_NEAR(learned.report.rmse, 0.8e5, 0.06e5);
 }
 
+// Starts, with high pressure at low flow, make the samples fall with the flow; an optimiser would drive faster than the data to
+// get there.
+TEST(LearnPressure, APressureThatFallsWithTheFlowDoesNotFallBeyondTheData) {
+  Data d = make_data(600, 0.8e5);
+  const auto at_start = [](double flow) { return 30e5 * std::exp(-flow / 0.4e-3); };
+  for (Index i = 0; i < d.flow.size(); ++i)
+    d.pressure[i] += at_start(d.flow[i]) - 1.5e12 * d.flow[i] * d.flow[i];
+  const GpParameters falls = learn_gp(d.flow, d.force, d.pressure).parameters;
+  EXPECT_EQ(falls.mean_flow_slope, 0.0);
+  const GaussianProcess process(falls);
+  for (const double force : {0.0, 1e5, 2e5}) {
+    // the fall inside the data stays: 30 bar less those that are left at their end
+    EXPECT_NEAR(process.mean(0.1e-3, force) - process.mean(1.5e-3, force),
+                at_start(0.1e-3) - at_start(1.5e-3), 1.5e5);
+    // at three times their end, far beyond the length-scale, the mean is one over all flows, above what the end has
+    EXPECT_GE(process.mean(4.8e-3, force), process.mean(1.5e-3, force) - 1e5) << force;
+  }
+  EXPECT_GT(learn_gp(make_data(600, 0.8e5).flow, make_data(600, 0.8e5).force,
+                     make_data(600, 0.8e5).pressure)
+                .parameters.mean_flow_slope,
+            0.0);
+}
+
 TEST(LearnPressure, ManySamplesAreThinnedForTheWeightsAndAllAreScreenedAndJudged) {
   Data d = make_data(6000, 0.8e5);
   d.pressure[4321] += 30e5;  // an outlier that thinning alone would miss
