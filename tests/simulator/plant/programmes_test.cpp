@@ -63,8 +63,10 @@ TEST(PlantProgrammes, OperatorsWorkMovesEveryCylinderOfEveryMachineWithinItsRang
         hi = std::max(hi, r.q[j]);
       }
       EXPECT_GT(hi - lo, 0.1 * (range.hi - range.lo)) << name << ' ' << c.name;
-      EXPECT_GT(lo, range.lo - 0.01) << name << ' ' << c.name;
-      EXPECT_LT(hi, range.hi + 0.01) << name << ' ' << c.name;
+      // A stop yields: an excavator's boom that sinks into it at 0.2 rad/s, because its port relief valve limits the pressure
+      // that could hold it, presses it together by 0.012 rad.
+      EXPECT_GT(lo, range.lo - 0.02) << name << ' ' << c.name;
+      EXPECT_LT(hi, range.hi + 0.02) << name << ' ' << c.name;
     }
   }
 }
