@@ -128,10 +128,4 @@ EffectDesign without_optional(EffectDesign design) {
   return design;
 }
 
-EffectDesign with_share_of_one(EffectDesign design) {
-  const EffectParameter& first = design.effect.effect->info().parameters.front();
-  if (first.linear && first.name == "share") design.lower[0] = design.upper[0] = 1.0;
-  return design;
-}
-
 }  // namespace sparflow

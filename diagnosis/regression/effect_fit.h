@@ -35,11 +35,6 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
 /// The same design with the columns of its optional parameters set to zero.
 EffectDesign without_optional(EffectDesign design);
 
-/// The same design with a leading share ("share of the flow's change that is delayed") fixed at one. Physics says one: a
-/// share is searched freely only because a gain needs a linear parameter. Free, it trades against the nonlinear
-/// parameter (of a short lag only the product of share and time is observable). A design without a share stays as it is.
-EffectDesign with_share_of_one(EffectDesign design);
-
 /// The columns of all designs in a channel side by side. [rows x columns]
 Eigen::MatrixXd columns_of(const std::vector<const EffectDesign*>& designs, std::size_t channel,
                            Eigen::Index rows);

@@ -113,7 +113,7 @@ class Estimator {
       std::optional<Evidence> updated = evidence_.with_leaders_of(applied(found));
       if (!acts(Mechanism::kEstimateLeaders, updated.has_value())) break;
       evidence_ = std::move(*updated);
-      for (EffectDesign& d : designs_) d = made(d.effect, d.shape);
+      designs_ = rebuilt_designs(evidence_, designs_);
       for (std::size_t d = 0; d < designs_.size(); ++d) refine(d);
       log_likelihood = likelihood();
       found = with_intervals();
@@ -169,7 +169,7 @@ class Estimator {
                      [&](const AppliedEffect& a) { return a.effect == e.effect && a.at == e.at; });
     std::vector<EffectDesign> acting;
     if (known != model.effects.end() && !options_.differences) {
-      acting.push_back(made(e, shape_of(*known)));
+      acting.push_back(make_design(evidence_, e, shape_of(*known)));
       if (!acting.back().acts()) acting.clear();
     } else {
       for (SearchCandidate& c : search_candidates(evidence_, {e})) acting = std::move(c.designs);
@@ -180,27 +180,13 @@ class Estimator {
           fmt::format("these logs do not show it; it needs {}, and motions in which it acts",
                       fmt::join(e.effect->info().signals, ", ")));
     }
-    for (EffectDesign& d : acting) {
-      d = whole(std::move(d));
+    for (const EffectDesign& d : acting) {
       for (std::size_t c = 0; c < active_.size(); ++c) active_[c] = active_[c] || d.touches(c);
     }
     designs_.push_back(acting.front());
     grids_.push_back(std::move(acting));
   }
 
-  bool model_has(const EffectAt& e) const {
-    return std::any_of(known_.begin(), known_.end(), [&](const AppliedEffect& a) {
-      return a.effect == e.effect && a.at == e.at;
-    });
-  }
-  /// A share is one, but in a difference to the model's value.
-  EffectDesign whole(EffectDesign design) const {
-    if (options_.differences && model_has(design.effect)) return design;
-    return with_share_of_one(std::move(design));
-  }
-  EffectDesign made(const EffectAt& e, std::vector<double> shape) const {
-    return whole(make_design(evidence_, e, std::move(shape)));
-  }
   std::vector<const EffectDesign*> pointers() const {
     std::vector<const EffectDesign*> out;
     for (const EffectDesign& d : designs_) out.push_back(&d);
@@ -236,7 +222,7 @@ class Estimator {
   double likelihood_at(std::size_t d, std::size_t s, double value) {
     std::vector<double> shape = designs_[d].shape;
     shape[s] = value;
-    EffectDesign design = made(designs_[d].effect, std::move(shape));
+    EffectDesign design = make_design(evidence_, designs_[d].effect, std::move(shape));
     if (!design.acts()) return -std::numeric_limits<double>::infinity();
     std::swap(designs_[d], design);
     const double l = likelihood();
@@ -270,7 +256,7 @@ class Estimator {
           kShapeWidth * std::max(std::abs(b), 1e-12));
       std::vector<double> shape = designs_[d].shape;
       shape[s] = -found.value > at_start ? found.x : start;
-      designs_[d] = made(designs_[d].effect, std::move(shape));
+      designs_[d] = make_design(evidence_, designs_[d].effect, std::move(shape));
     }
   }
 

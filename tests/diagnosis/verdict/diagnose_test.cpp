@@ -193,9 +193,6 @@ TEST(Diagnose, AValveLagIsNoPumpLag) {
   const Answer a = with_reference({{"valve_lag", "boom", 1.0, 0}});
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
   EXPECT_THAT(a.keys(), ElementsAre("valve_lag:boom"));
-  // all of the flow's change is late, whatever share a free estimate would trade against the time constant
-  EXPECT_EQ(a.value("valve_lag:boom", "share"), 1.0);
-  EXPECT_LT(a.error("valve_lag:boom", "tau"), 0.15);
 }
 
 TEST(Diagnose, AStickingSpoolIsNotInTheCatalogue) {
