@@ -217,9 +217,12 @@ class Estimate {
       complete(OpenKind::kMass, l, file_number(link.mass), source);
       complete(OpenKind::kCog, l, pin_text(link.joint, link.cog), mass_open ? "" : source);
       const std::string path = fmt::format("links[{}].mass", link.name);
-      if (!mass_open || asked(path)) continue;
-      out_.values.push_back({path, link.mass, std::nan(""), "kg",
-                             "static forces, by the convention for centres", ""});
+      if (asked(path)) continue;
+      constexpr const char* kSource = "static forces, by the convention for centres";
+      if (mass_open) out_.values.push_back({path, link.mass, std::nan(""), "kg", kSource, ""});
+      for (int axis = 0; cog_open && axis < 3; ++axis)
+        out_.values.push_back({fmt::format("links[{}].cog[{}]", link.name, axis), link.cog[axis],
+                               std::nan(""), "m", kSource, ""});
     }
   }
 
@@ -227,10 +230,14 @@ class Estimate {
     for (int i = 0; i < machine_.cylinder_count(); ++i) {
       const auto c = static_cast<std::size_t>(i);
       const std::string& name = machine_.cylinders[c].name;
-      if (fit.used[c]) {
-        out_.friction.push_back({fmt::format("{}: Coulomb friction", name), fit.friction[c].coulomb,
-                                 fit.friction[c].coulomb_half, "N", "pressures and static forces",
-                                 fmt::format("viscous {:.3g} N s/m", fit.friction[c].viscous)});
+      const FrictionState& friction = fit.friction[c];
+      // A friction that may be none, or that drives the rod, is no finding.
+      if (fit.used[c] && friction.coulomb > friction.coulomb_half) {
+        out_.friction.push_back({fmt::format("{}: Coulomb friction", name), friction.coulomb,
+                                 friction.coulomb_half, "N", "pressures and static forces",
+                                 friction.viscous > 0.0
+                                     ? fmt::format("viscous {:.3g} N s/m", friction.viscous)
+                                     : std::string()});
       }
       const bool forces = fit.used[c] && (fit.areas[c].has_scale || tests_[c].load_cell);
       HeldOutError e = held_out_error(known, i, resolved_[c], forces ? &tests_[c] : nullptr,

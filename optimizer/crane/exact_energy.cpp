@@ -312,6 +312,13 @@ LimitCheck check_duration(const MotionProblem& problem, double duration) {
   return {"duration", duration, limit, "s", duration, std::isfinite(limit) ? beyond / limit : -1.0};
 }
 
+bool is_end_condition(const LimitCheck& check) {
+  const auto named = [&](const char* word) { return check.what.find(word) != std::string::npos; };
+  if (named("start") || named("goal")) return true;
+  // where a stop has a tolerance, its limit is one like any other
+  return check.limit == 0.0 && (named("at the stops") || named("from posture"));
+}
+
 namespace {
 
 /// Sway of the load by the exact pendulum, and the amplitude that is left at stops and at the end.

@@ -80,6 +80,10 @@ struct LimitCheck {
       0.0;  ///< relative overshoot: (value - limit) / scale of the limit; <= 0 when kept
 };
 
+/// Whether this is a condition that every motion meets at equality (rest, start, goal, stops), so that its being touched is
+/// no news.
+bool is_end_condition(const LimitCheck& check);
+
 /// Worst instant of every limit, most violated first: joint position, velocity and acceleration, valves, pump
 /// flow and pressure, clearance, tip line, start and goal, evaluated at `refine` samples per mesh interval.
 /// @param model without pressure models the pressures are not checked

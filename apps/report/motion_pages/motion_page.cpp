@@ -228,9 +228,7 @@ void add_losses(Page& page, const CraneModel& model, const MotionProblem& proble
 /// Distance to a limit [%]; in words where the number would only show the solver's rounding.
 TableCell margin_cell(const LimitCheck& c) {
   constexpr double kTouching = 1e-4;  // of the limit's scale
-  const bool end_condition =
-      c.what.find("start") != std::string::npos || c.what.find("goal") != std::string::npos;
-  if (std::abs(c.excess) <= kTouching) return end_condition ? "met" : "at the limit";
+  if (std::abs(c.excess) <= kTouching) return is_end_condition(c) ? "met" : "at the limit";
   return -100.0 * c.excess;
 }
 

@@ -183,17 +183,27 @@ std::string legs_text(const CraneModel& model, const MotionProblem& problem,
   return text;
 }
 
+/// Largest sway of the load, and how far it swings on, of a problem that limits it.
+std::string sway_text(const std::vector<LimitCheck>& checks) {
+  std::string text;
+  for (const LimitCheck& k : checks)
+    if (k.what.starts_with("sway of the load"))
+      text += fmt::format("  {:<20} {:.2f} of {:.2f} deg at {:.2f} s\n",
+                          "sway" + k.what.substr(std::string_view("sway of the load").size()),
+                          k.value, k.limit, k.time);
+  return text;
+}
+
 /// Whether all limits are kept, and which one is nearest; start and goal are met at equality and are no news.
 std::string limits_text(const std::vector<LimitCheck>& checks) {
   const double margin = -100.0 * checks.front().excess;
   for (const LimitCheck& k : checks) {
-    if (k.what.find("start") != std::string::npos || k.what.find("goal") != std::string::npos)
-      continue;
+    if (is_end_condition(k)) continue;
     return fmt::format(
-        "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of {:.4g} "
-        "{} at "
-        "{:.2f} s\n",
-        margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time);
+               "  limits               {} at 16 samples per mesh interval; nearest: {} {:.4g} of "
+               "{:.4g} {} at {:.2f} s\n",
+               margin >= -1e-3 ? "all kept" : "BROKEN", k.what, k.value, k.limit, k.unit, k.time) +
+           sway_text(checks);
   }
   return {};
 }
