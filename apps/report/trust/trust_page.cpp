@@ -37,17 +37,18 @@ LineChart over_log(const TrustLoop& loop, const ComparedSeries& before,
   const Eigen::VectorXd& time = loop.test_after.logs.front().signals.time;
   const double* begin = time.data();
   const Index n = std::upper_bound(begin, begin + time.size(), time[0] + kDrawn) - begin;
-  const auto cut = [&](const Eigen::VectorXd& y) {
-    return Eigen::VectorXd(y.head(n) / after.unit.si);
-  };
+  const bool force =
+      after.stage == "force";  // drawn in kN, so that the axis has room for its numbers
+  const double si = force ? 1e3 : after.unit.si;
+  const auto cut = [&](const Eigen::VectorXd& y) { return Eigen::VectorXd(y.head(n) / si); };
   LineChart chart;
   chart.title = fmt::format("{} of {}, measured and predicted",
-                            after.stage == "force"  ? "Force"
+                            force                   ? "Force"
                             : after.stage == "pump" ? "Pressure"
                                                     : "Working pressure",
                             after.at);
   chart.note = fmt::format("The first {:.0f} s of the held-out log of the plant.", kDrawn);
-  chart.y_axis = {after.stage == "force" ? "force" : "pressure", after.unit.name};
+  chart.y_axis = {force ? "force" : "pressure", force ? "kN" : after.unit.name};
   chart.group = "held-out log";
   chart.x = time.head(n);
   chart.series.push_back({"measured", cut(after.measured), LineStyle::kMeasured, 0, {}, {}});
