@@ -86,7 +86,10 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
     if (bound.valid) f.bound = f.slow_bound = bound.lower_bound_J;
     const StrategyOutcome* best = f.optimum();
     if (settings.timed && bound.valid && best != nullptr) {
-      const TimedBound timed = energy_bound_at(*task.model, task.problem, best->duration);
+      TimedBoundOptions at_its_time;
+      at_its_time.any_duration = bound.lower_bound_J;
+      const TimedBound timed =
+          energy_bound_at(*task.model, task.problem, best->duration, at_its_time);
       if (timed.valid) f.bound = std::max(f.bound, timed.value);
     }
   }

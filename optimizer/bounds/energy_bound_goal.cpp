@@ -87,6 +87,7 @@ class TipBoxes {
 struct PostureBox {
   double least = 0.0;
   VectorXd lo, hi;
+  VectorXd variation;  // of the potential between corners, along each side
   bool operator>(const PostureBox& other) const { return least > other.least; }
 };
 
@@ -99,8 +100,6 @@ class GoalSearch {
         potential_(potential),
         lattice_(potential.lattice()),
         n_(lattice_.joints()),
-        corner_(n_),
-        variation_(n_),
         values_(1u << n_) {}
 
   /// Opens the cells that can hold the goal; they are found by halving ranges of grid lines.
@@ -118,7 +117,7 @@ class GoalSearch {
   int longest_side(const Block& block, const PostureBox& box) const;
   /// Sets a box's least potential and, by joint, the variation along its sides from its corners; the box lies in one cell.
   void survey(PostureBox& box);
-  /// Joint along which the box surveyed last is the least accurate, and by how much it is beyond the accuracy wanted.
+  /// Joint along which the box is the least accurate, and by how much it is beyond the accuracy wanted.
   std::pair<int, double> coarsest_side(const PostureBox& box, double accuracy,
                                        double tip_accuracy) const;
   /// Opens the halves of the box that can hold the goal.
@@ -128,23 +127,19 @@ class GoalSearch {
   const EnergyPotential& potential_;
   const Lattice& lattice_;
   int n_;
-  VectorXd corner_, variation_;  // of `survey`
   std::vector<double> values_;
   std::priority_queue<PostureBox, std::vector<PostureBox>, std::greater<>> open_;
   LeastOnGoal result_;
 };
 
 void GoalSearch::survey(PostureBox& box) {
-  for (unsigned k = 0; k < values_.size(); ++k) {
-    for (int j = 0; j < n_; ++j) corner_[j] = (k >> j & 1u) != 0 ? box.hi[j] : box.lo[j];
-    values_[k] = potential_.value(corner_);
-  }
+  potential_.corner_values(box.lo, box.hi, values_);
   box.least = *std::min_element(values_.begin(), values_.end());
+  box.variation.setZero(n_);
   for (int j = 0; j < n_; ++j) {
-    variation_[j] = 0.0;
     for (unsigned k = 0; k < values_.size(); ++k) {
       if ((k >> j & 1u) == 0)
-        variation_[j] = std::max(variation_[j], std::abs(values_[k | 1u << j] - values_[k]));
+        box.variation[j] = std::max(box.variation[j], std::abs(values_[k | 1u << j] - values_[k]));
     }
   }
 }
@@ -208,7 +203,7 @@ std::pair<int, double> GoalSearch::coarsest_side(const PostureBox& box, double a
   std::pair<int, double> coarsest{0, -1.0};
   const double scale = std::max(box.least, 1e-9);
   for (int j = 0; j < n_; ++j) {
-    const double want = std::max(variation_[j] / (accuracy * scale),
+    const double want = std::max(box.variation[j] / (accuracy * scale),
                                  tips_.side(j, 0.5 * (box.hi[j] - box.lo[j])) / tip_accuracy);
     if (want > coarsest.second) coarsest = {j, want};
   }
@@ -232,7 +227,6 @@ void GoalSearch::narrow(const GoalAccuracy& accuracy) {
     // The least box of all comes first, and cutting raises it: what was shown once stays.
     result_.lower = std::max(result_.lower, box.least);
     result_.q = 0.5 * (box.lo + box.hi);
-    survey(box);
     const auto [joint, beyond] = coarsest_side(box, accuracy.value, accuracy.tip);
     if (beyond <= 1.0) return;
     result_.capped = ++cuts > accuracy.most_cuts;

@@ -443,6 +443,44 @@ double EnergyPotential::value(const VectorXd& q) const {
   return sum;
 }
 
+void EnergyPotential::corner_values(const VectorXd& lo, const VectorXd& hi,
+                                    std::vector<double>& values) const {
+  const int n = lattice_.joints();
+  // no threshold: size of the array
+  SPARFLOW_CHECK(n <= 8, "a grid has at most eight joints");
+  const std::size_t corners = std::size_t{1} << n;
+  long base = 0;
+  std::array<std::array<double, 2>, 8> share{};
+  for (int j = 0; j < n; ++j) {
+    const int cell = cell_of(j, 0.5 * (lo[j] + hi[j]));
+    const VectorXd& u = axes_[ix(j)].u;
+    const double width = u[cell + 1] - u[cell];
+    share[ix(j)] = {(coordinate(j, cell, lo[j]) - u[cell]) / width,
+                    (coordinate(j, cell, hi[j]) - u[cell]) / width};
+    base += cell * lattice_.stride[ix(j)];
+  }
+  values.resize(corners);
+  for (std::size_t corner = 0; corner < corners; ++corner) {
+    long node = base;
+    for (int j = 0; j < n; ++j) {
+      if (corner >> j & 1u) node += lattice_.stride[ix(j)];
+    }
+    values[corner] = phi_[ix(node)];
+  }
+  // The cell's values become those of the box along one axis after the other.
+  for (int j = 0; j < n; ++j) {
+    const auto [at_lo, at_hi] = share[ix(j)];
+    for (std::size_t corner = 0; corner < corners; ++corner) {
+      if (corner >> j & 1u) continue;
+      double& low = values[corner];
+      double& high = values[corner | std::size_t{1} << j];
+      const double first = low, second = high;
+      low = (1.0 - at_lo) * first + at_lo * second;
+      high = (1.0 - at_hi) * first + at_hi * second;
+    }
+  }
+}
+
 std::vector<double> EnergyPotential::corner_weights(const VectorXd& q) const {
   std::vector<double> weights(ix(lattice_.nodes), 0.0);
   over_corners(q, [&](long node, double weight) { weights[ix(node)] += weight; });

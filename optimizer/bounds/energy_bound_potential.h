@@ -69,6 +69,9 @@ class EnergyPotential {
   double node_value(long node) const { return phi_[static_cast<std::size_t>(node)]; }
   /// Potential, interpolated multilinearly in the axes' coordinates u. [J]
   double value(const Eigen::VectorXd& q) const;
+  /// Values at the corners of a box inside one cell [J]; corner k has hi[j] where bit j of k is set, else lo[j].
+  void corner_values(const Eigen::VectorXd& lo, const Eigen::VectorXd& hi,
+                     std::vector<double>& values) const;
   /// Gradient of value() inside a cell [J/rad] or [J/m].
   Eigen::VectorXd gradient(const Eigen::VectorXd& q) const;
   /// Nodes of the shortest path from the start to a node, both included.

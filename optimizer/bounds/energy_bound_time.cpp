@@ -70,22 +70,27 @@ class TimedSearch {
     const std::vector<int> few =
         balanced_cells(first.losses(), rough.lattice, static_cast<double>(options_.search_nodes));
     const TimedGrid small = grid(few);
-    x = best_shares(small, x, options_.evaluations, std::log(4.0));
-    TimedBound bound;
-    bound.value = -1.0;
-    // The best shares on the small grid need not be the best on the fine one, so all candidates are evaluated there.
+    x = climbed(small, x, options_.evaluations / 2, std::log(4.0));
+    x = best_shares(small, x, options_.evaluations / 3, 0.5);
+    // The best shares on the small grid need not be the best on the fine one, so they are chosen on one between.
     const std::vector<Found> candidates = posture_shares(small, x);
-    int done = 0;
-    for (const Found& found : candidates) {
+    const auto cells = [&](const Found& found, long nodes) {
       base_ = found.base;
       set(found.x);
       const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
-      TimedBound one = bound_on(
-          grid(balanced_cells(again.losses(), rough.lattice, static_cast<double>(options_.nodes))));
-      if (one.value > bound.value) bound = std::move(one);
-      const double share = static_cast<double>(++done) / static_cast<double>(candidates.size());
-      tell(kSearchShare + (1.0 - kSearchShare) * share, "fine grid");
+      return balanced_cells(again.losses(), rough.lattice, static_cast<double>(nodes));
+    };
+    const Found* best = &candidates.front();
+    if (candidates.size() > 1) {
+      double most = -std::numeric_limits<double>::infinity();
+      for (const Found& found : candidates) {
+        const double value = bound_on(grid(cells(found, options_.choice_nodes))).value;
+        if (value > most) best = &found;
+        most = std::max(most, value);
+      }
     }
+    TimedBound bound = bound_on(grid(cells(*best, options_.nodes)));
+    tell(1.0, "fine grid");
     return bound;
   }
 
@@ -461,11 +466,17 @@ TimedBound energy_bound_at(const CraneModel& model, const MotionProblem& problem
   timed.progress = part_of(options.progress, 0.0, kTimed);
   TimedBound bound = bound_with_time(model, problem, timed, {1.0, duration, 0.0});
   if (!bound.valid) return bound;
-  EnergyBoundOptions unlimited;
-  unlimited.progress = part_of(options.progress, kTimed, 1.0);
-  unlimited.nodes = options.nodes;
-  unlimited.most_joints = options.most_joints;
-  const EnergyBound slow = energy_bound(model, problem, unlimited);
+  EnergyBound slow;
+  if (options.any_duration) {
+    slow.valid = true;
+    slow.lower_bound_J = *options.any_duration;
+  } else {
+    EnergyBoundOptions unlimited;
+    unlimited.progress = part_of(options.progress, kTimed, 1.0);
+    unlimited.nodes = options.nodes;
+    unlimited.most_joints = options.most_joints;
+    slow = energy_bound(model, problem, unlimited);
+  }
   if (slow.valid && slow.lower_bound_J > bound.value) {  // this duration raises no motion's energy
     bound.value = slow.lower_bound_J;
     bound.price_W = 0.0;

@@ -11,6 +11,7 @@
 /// The inequality is enforced at the grid's nodes and tested at random postures; between them it is estimated. So these
 /// are estimated bounds, not proven ones.
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,12 +28,17 @@ struct TimedBoundOptions {
   /// Number of nodes of the grids on which the shares are searched.
   /// @threshold [nodes] 100..1e6; chosen: shares found on it differ little from those of the final grid
   long search_nodes = 2500;
+  /// Number of nodes of the grid on which the best of the shares found is chosen.
+  /// @threshold [nodes] 100..1e7; chosen: shares that are better there mostly are on the final grid, at a sixth of its cost
+  long choice_nodes = 20000;
   /// Evaluations of that search.
   /// @threshold [1] 1..10000; chosen: ends the search; any shares give a bound
   int evaluations = 90;
   /// A machine with more joints gets no bound.
   /// @threshold [joints] 1..8; chosen: the nodes of a grid grow with the power of the joints
   int most_joints = 4;
+  /// Bound of motions of any duration where it is known [J]; energy_bound_at() computes it otherwise.
+  std::optional<double> any_duration;
   WorkProgress progress = {};  ///< called after each evaluation
 };
 

@@ -8,12 +8,13 @@
 
 namespace sparflow {
 
-double TimedMove::flow(double pressure, double* growth) const {
+double TimedMove::flow(double pressure, double* growth, std::size_t* knot) const {
   *growth = 0.0;
   if (!(flow_step > 0.0)) return top;
   if (pressure < demand[0]) return 0.0;
-  std::size_t k = 0;  // the last knot whose demand this pressure meets
+  std::size_t k = *knot;
   while (k < kFlowKnots && demand[k + 1] <= pressure) ++k;
+  *knot = k;
   double flow = static_cast<double>(k) * flow_step;
   if (k < kFlowKnots && flow < top) {
     const double rate = flow_step / (demand[k + 1] - demand[k]);
@@ -29,7 +30,8 @@ double TimedMove::least_pressure() const {
 
 double TimedMove::least_slope(double gain) const {
   const double first = least_pressure();
-  double growth = 0.0, pressure = first, flow_here = flow(first, &growth);
+  std::size_t at = 0;
+  double growth = 0.0, pressure = first, flow_here = flow(first, &growth, &at);
   if (!(gain > 0.0)) return first;
   double best =
       flow_here > 0.0 ? first + gain / flow_here : std::numeric_limits<double>::infinity();
@@ -41,7 +43,7 @@ double TimedMove::least_slope(double gain) const {
         std::clamp(std::sqrt(gain * growth), flow_here, std::min(flow_at_knot, top));
     if (want > 0.0) best = std::min(best, pressure + (want - flow_here) / growth + gain / want);
     pressure = demand[k];
-    flow_here = flow(pressure, &growth);
+    flow_here = flow(pressure, &growth, &at);
     if (flow_here > 0.0) best = std::min(best, pressure + gain / flow_here);
   }
   return best;
@@ -103,6 +105,7 @@ double MaximisedHamiltonian::of_pump(double pump_flow) {
   breaks_.push_back(highest);
   flow_.resize(order_.size());
   growth_.resize(order_.size());
+  knot_.assign(order_.size(), 0);  // the pressures below rise
   double best = 0.0;
   for (std::size_t b = 0; b + 1 < breaks_.size(); ++b) {
     if (breaks_[b + 1] <= breaks_[b]) continue;
@@ -110,7 +113,7 @@ double MaximisedHamiltonian::of_pump(double pump_flow) {
     double most = 0.0;  // upper bound of the maximum between these two breaks
     for (std::size_t i = 0; i < order_.size(); ++i) {
       // The line is evaluated in the middle: at a break itself rounding decides which of the two lines is found.
-      const double middle = order_[i]->flow(breaks_[b] + half, &growth_[i]);
+      const double middle = order_[i]->flow(breaks_[b] + half, &growth_[i], &knot_[i]);
       flow_[i] = middle - growth_[i] * half;
       const double at_end = middle + growth_[i] * half;
       most += std::max(0.0, order_[i]->slope - breaks_[b]) * at_end;

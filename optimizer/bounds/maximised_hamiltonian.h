@@ -21,7 +21,8 @@ struct TimedMove {
   /// Pump pressure of this move alone at vanishing flow. [Pa]
   double least_pressure() const;
   /// Largest volume flow at a supply pressure [m^3/s], and its right derivative [m^3/s/Pa].
-  double flow(double pressure, double* growth) const;
+  /// @param knot where the search for the pressure begins: at or below the last knot whose demand it meets; set to that knot
+  double flow(double pressure, double* growth, std::size_t* knot) const;
   /// Slope at which this move alone has the Hamiltonian `gain` [W]: min over P >= standby of P + gain / flow(P). [Pa]
   double least_slope(double gain) const;
 };
@@ -47,6 +48,7 @@ class MaximisedHamiltonian {
 
   std::vector<const TimedMove*> order_;  // moves of one pump, by falling slope
   std::vector<double> breaks_, flow_, growth_;
+  std::vector<std::size_t> knot_;  // where each move's flow was found last
 };
 
 }  // namespace sparflow

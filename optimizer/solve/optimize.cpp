@@ -45,9 +45,12 @@ constexpr double kSlower[] = {1.25, 1.6};
 constexpr double kSearchTolerance = 1e-4;
 
 // Shares of the work left, on which only the progress that is told depends.
-/// Of the first starts.
-/// @threshold [1] 0.1..0.9; tuned: on five bundled reaches they take 40 to 60 % of the time
-constexpr double kStarts = 0.5;
+/// Of the sequential motions and the paths of the grid.
+/// @threshold [1] 0.1..0.9; tuned: on the bundled reaches they take a third of the time
+constexpr double kCandidates = 0.3;
+/// Of the seeds.
+/// @threshold [1] 0.1..0.9; chosen: mostly few of them are solved, or all
+constexpr double kStarts = 0.2;
 /// Of the search for the shortest motion, and of the starts from it.
 /// @threshold [1] 0.1..0.9; chosen: it has as many starts as the search before it
 constexpr double kRescue = 0.3;
@@ -93,21 +96,8 @@ class Search {
       }
     }
     drop_repeated(one_by_one);
-    const std::size_t given = seeds_.size();
-    solve(
-        searching_ ? kStarts : 1.0, static_cast<int>(given + one_by_one.size()),
-        [&](int i) {
-          const auto k = static_cast<std::size_t>(i);
-          OptimizeOptions options = coarse_;
-          if (i >= options.smooth_starts && options.modes) options.schedule.clear();
-          return k < given
-                     ? optimize_from(model_, problem_, seeds_[k], time_, options)
-                     : optimize_with_modes(model_, problem_, one_by_one[k - given], time_, options);
-        },
-        [&](int i) {
-          const auto k = static_cast<std::size_t>(i);
-          return k < given ? seeds_[k].name : one_by_one[k - given].name;
-        });
+    solve_candidates(one_by_one);
+    solve_seeds(seeds_worth_solving());
     if (options_.modes && options_.free_phases) {
       if (ranking(result_, options_.limit_tolerance).empty()) rescue();
       search_sequences();
@@ -130,6 +120,57 @@ class Search {
            time_.lower == time_.upper && time_.guess < kShortOfTime * shortest;
   }
 
+  void solve_candidates(const std::vector<ModeCandidate>& candidates) {
+    if (candidates.empty()) return;
+    solve(
+        searching_ ? kCandidates : 0.5, static_cast<int>(candidates.size()),
+        [&](int i) {
+          return optimize_with_modes(model_, problem_, candidates[static_cast<std::size_t>(i)],
+                                     time_, start_options(options_.smooth_starts + i));
+        },
+        [&](int i) { return candidates[static_cast<std::size_t>(i)].name; });
+  }
+
+  void solve_seeds(const std::vector<int>& chosen) {
+    if (chosen.empty()) return;
+    const auto seed = [&](int i) -> const SeedMotion& {
+      return seeds_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])];
+    };
+    solve(
+        searching_ ? kStarts : 1.0, static_cast<int>(chosen.size()),
+        [&](int i) { return optimize_from(model_, problem_, seed(i), time_, start_options(i)); },
+        [&](int i) { return seed(i).name; });
+  }
+
+  /// Options of the start with this number: the later ones do without the smooth law.
+  OptimizeOptions start_options(int number) const {
+    OptimizeOptions options = coarse_;
+    if (number >= options.smooth_starts && options.modes) options.schedule.clear();
+    return options;
+  }
+
+  /// Seeds that can lead to a better motion than the starts solved before them. Sequential motions and paths of the grid are
+  /// made for little energy and are solved first; a seed is solved where these give no motion that keeps all limits, where
+  /// something else is minimised, or where the seed itself is hardly dearer than the best of them.
+  std::vector<int> seeds_worth_solving() const {
+    const std::vector<int> ranked = ranking(result_, options_.limit_tolerance);
+    const ObjectiveWeights& w = problem_.objective;
+    const bool made_for_it = w.energy > 0.0 && w.commands <= 0.0;
+    std::vector<int> chosen;
+    for (int i = 0; i < static_cast<int>(seeds_.size()); ++i) {
+      const SeedMotion& seed = seeds_[static_cast<std::size_t>(i)];
+      if (!ranked.empty() && made_for_it) {
+        const double least = result_.starts[static_cast<std::size_t>(ranked.front())].cost;
+        const Trajectory motion = with_duration(seed.motion, time_.guess);
+        const double energy = exact_total_energy(model_, problem_, motion, options_.refine);
+        const double cost = exact_cost(model_, problem_, motion, energy, options_.refine);
+        if (cost > options_.seeds_within * std::abs(least)) continue;
+      }
+      chosen.push_back(i);
+    }
+    return chosen;
+  }
+
   /// Sequential starts for this duration, and the cheapest paths of the joint grid.
   std::vector<ModeCandidate> sequences(double duration) const {
     std::vector<ModeCandidate> found;
@@ -145,25 +186,31 @@ class Search {
   }
 
   /// Of candidates with the same phases to (nearly) the same goal configuration the first is kept: the phases' durations are
-  /// variables, so that the others would lead to the same motion.
+  /// variables, so that the others would lead to the same motion. Beside obstacles the way counts as well, because the first
+  /// solve holds the times.
   void drop_repeated(std::vector<ModeCandidate>& candidates) const {
-    /// Difference of a joint's end position, as share of its range, up to which goal configurations count as the same.
+    /// Difference of a joint's position, as share of its range, up to which goal configurations (or ways) count as the same.
     /// @threshold [1] 0..0.5; chosen: a solve moves the end along the goal set by more than that
-    constexpr double kSameEnd = 0.05;
-    if (!options_.free_phases || !problem_.obstacles.empty()) return;
+    constexpr double kSamePlace = 0.05;
+    if (!options_.free_phases) return;
+    const bool ends_only = problem_.obstacles.empty();
     std::vector<PhasePlan> plans;
     std::vector<ModeCandidate> kept;
+    const auto same_way = [&](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+      const Eigen::Index rows = ends_only ? 1 : a.rows();
+      if (!ends_only && a.rows() != b.rows()) return false;
+      for (Eigen::Index j = 0; j < a.cols(); ++j) {
+        const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
+        const auto apart = (a.col(j).tail(rows) - b.col(j).tail(rows)).cwiseAbs().maxCoeff();
+        if (apart > kSamePlace * (r.hi - r.lo)) return false;
+      }
+      return true;
+    };
     for (ModeCandidate& c : candidates) {
       PhasePlan plan = plan_of(c.modes, c.guess.t);
       bool known = false;
-      for (std::size_t k = 0; k < kept.size() && !known; ++k) {
-        known = same_plan(plan, plans[k]);
-        for (Eigen::Index j = 0; known && j < c.guess.q.cols(); ++j) {
-          const Range& r = problem_.limits.position[static_cast<std::size_t>(j)];
-          known = std::abs(c.guess.q.bottomRows(1)(0, j) - kept[k].guess.q.bottomRows(1)(0, j)) <=
-                  kSameEnd * (r.hi - r.lo);
-        }
-      }
+      for (std::size_t k = 0; k < kept.size() && !known; ++k)
+        known = same_plan(plan, plans[k]) && same_way(c.guess.q, kept[k].guess.q);
       if (known) continue;
       plans.push_back(std::move(plan));
       kept.push_back(std::move(c));

@@ -56,6 +56,9 @@ struct OptimizeOptions {
   /// and each takes time. One and four give the same energies as two to 0.001 % on ten bundled reaches of the loader
   /// crane
   int smooth_starts = 2;
+  /// Cost of a seed over that of the best motion of the sequential and grid starts up to which the seed is solved too.
+  /// @threshold [1] 1..10; tuned: on 36 bundled reaches no seed led to a lower energy than these starts and the search from them
+  double seeds_within = 1.05;
   /// Falling smoothing, (eps [m/s], beta [Pa]); each stage starts from the solution of the one before.
   std::vector<Smoothing> schedule = {{20e-3, 10e5}};
   /// Iteration limit of a smooth stage; its motion only supplies the modes, so it need not converge.

@@ -30,7 +30,9 @@ double payload_before(const benchmark::Scenario& s, int leg) {
 double bound_of(const CraneModel& model, const MotionProblem& problem) {
   const EnergyBound any = energy_bound(model, problem);
   if (!any.valid) return 0.0;
-  const TimedBound timed = energy_bound_at(model, problem, problem.duration.max);
+  TimedBoundOptions options;
+  options.any_duration = any.lower_bound_J;
+  const TimedBound timed = energy_bound_at(model, problem, problem.duration.max, options);
   return std::max(any.lower_bound_J, timed.valid ? timed.value : 0.0);
 }
 

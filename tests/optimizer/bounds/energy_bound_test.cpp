@@ -161,6 +161,36 @@ TEST(EnergyBound, NoRandomMotionCostsLess) {
   }
 }
 
+TEST(EnergyBound, CornersOfABoxHaveTheValuesOfTheirPostures) {
+  const BoundCase c("excavator_dump");
+  MoveWeights weights = c.weights();
+  const EnergyPotential potential = c.potential(weights, 9);
+  const auto& lines = potential.lattice().lines;
+  const auto n = static_cast<Eigen::Index>(lines.size());
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::vector<double> values;
+  for (int i = 0; i < 200; ++i) {
+    VectorXd lo(n), hi(n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const VectorXd& l = lines[static_cast<std::size_t>(j)];
+      const auto cell = static_cast<Eigen::Index>(unit(random) * static_cast<double>(l.size() - 1));
+      const double a = unit(random), b = unit(random), width = l[cell + 1] - l[cell];
+      lo[j] = l[cell] + (i % 3 == 0 ? 0.0 : std::min(a, b)) * width;  // also whole cells
+      hi[j] = l[cell] + (i % 3 == 0 ? 1.0 : std::max(a, b)) * width;
+    }
+    potential.corner_values(lo, hi, values);
+    ASSERT_EQ(values.size(), std::size_t{1} << n);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      VectorXd corner = lo;
+      for (Eigen::Index j = 0; j < n; ++j) {
+        if (k >> j & 1u) corner[j] = hi[j];
+      }
+      EXPECT_NEAR(values[k], potential.value(corner), 1e-9 * potential.value(corner) + 1e-6);
+    }
+  }
+}
+
 TEST(EnergyBound, SlopesStayBelowThePricesAtRandomPostures) {
   for (const char* reach : {"loader_crane_lift", "hmf_reach", "excavator_dump"}) {
     const BoundCase c(reach);

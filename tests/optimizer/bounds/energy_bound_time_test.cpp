@@ -127,7 +127,8 @@ TEST(MaximisedHamiltonian, AgreesWithAFineScanOfPressures) {
       double left = pump[0], gain = 0.0, growth = 0.0;
       for (const TimedMove& m : order) {
         if (!(m.slope > pressure)) break;
-        const double flow = std::min(left, m.flow(pressure, &growth));
+        std::size_t knot = 0;
+        const double flow = std::min(left, m.flow(pressure, &growth, &knot));
         gain += (m.slope - pressure) * flow;
         left -= flow;
       }

@@ -258,6 +258,37 @@ TEST(Optimize, AMotionOfNoConvergedSolveIsFeasibleAndNotOptimal) {
   EXPECT_GE(whole.motion.size(), quick().intervals) << "the mesh asked for, not that of the search";
 }
 
+TEST(Optimize, SeedsAreSolvedOnlyWhereTheyCanLeadToABetterMotion) {
+  const Case c = lift_case();
+  const auto solved = [&](const OptimizeResult& r) {
+    return std::count_if(r.starts.begin(), r.starts.end(), [&](const StartResult& s) {
+      return std::any_of(c.seeds.begin(), c.seeds.end(),
+                         [&](const SeedMotion& seed) { return seed.name == s.seed; });
+    });
+  };
+  const auto all = static_cast<std::ptrdiff_t>(c.seeds.size());
+  OptimizeOptions options = quick();
+  const OptimizeResult usual = optimize(c.model, c.problem, c.seeds, options);
+  ASSERT_GT(usual.best_seed_energy, options.seeds_within * usual.energy.total) << "the case bites";
+  EXPECT_EQ(solved(usual), 0);
+  options.seeds_within = 10.0;
+  const OptimizeResult with_all = optimize(c.model, c.problem, c.seeds, options);
+  EXPECT_EQ(solved(with_all), all);
+  EXPECT_NEAR(usual.energy.total / with_all.energy.total, 1.0, 1e-4);
+  // Where nothing else is there, or something else is minimised, they are what there is.
+  options = quick();
+  options.sequential_starts = options.grid_starts = 0;
+  EXPECT_EQ(solved(optimize(c.model, c.problem, c.seeds, options)), all);
+  Case gentle = lift_case();
+  gentle.problem.objective.commands = 1e3;
+  options = quick();
+  options.sequence_rounds = 0;
+  EXPECT_EQ(solved(optimize(gentle.model, gentle.problem, gentle.seeds, options)), all);
+  // A seed that is nearly the optimum, as that of a warm start, is solved.
+  const std::vector<SeedMotion> warm = {{c.seeds.front().name, usual.motion, 0.0, false}};
+  EXPECT_EQ(solved(optimize(c.model, c.problem, warm, quick())), 1);
+}
+
 TEST(Optimize, WithoutSeedsItStartsFromTheGrid) {
   const Case c = lift_case();
   const OptimizeResult with = optimize(c.model, c.problem, c.seeds, quick());
