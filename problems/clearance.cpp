@@ -209,6 +209,44 @@ void ClearanceModel::build_rows(double inflation) {
   }
 }
 
+void ClearanceModel::use_planes(const Eigen::MatrixXd& postures, double within) {
+  const std::size_t parts = parts_.size(), count = obstacles_.size();
+  std::vector<char> near(parts * count, 0);
+  Eigen::VectorXd q;
+  for (Eigen::Index k = 0; k < postures.rows(); ++k) {
+    q = postures.row(k);
+    chain_.update(machine_, q.data());
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const Part& part = parts_[i / count];
+      const double d = part_distance(part, obstacles_[i % count], position(part.from, q.data()),
+                                     position(part.to, q.data()));
+      if (d - radius_ < within) near[i] = 1;
+    }
+  }
+  rows_.clear();
+  planes_.clear();
+  for (Eigen::Index k = 0; k < postures.rows(); ++k) {
+    q = postures.row(k);
+    chain_.update(machine_, q.data());
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      if (near[i] == 0) continue;
+      const Part& part = parts_[i / count];
+      const Obstacle plane{"",
+                           separating_plane(obstacles_[i % count], position(part.from, q.data()),
+                                            position(part.to, q.data()))};
+      const SmoothObstacle smooth(plane, radius_);
+      for (const auto& [end, moves] :
+           {std::pair{&part.from, part.from_moves}, std::pair{&part.to, part.to_moves}}) {
+        if (!moves) continue;
+        planes_.push_back(smooth);
+        if (k == 0)
+          rows_.push_back({*end, smooth, static_cast<int>(i / count), static_cast<int>(i % count)});
+      }
+    }
+  }
+  posture_ = 0;
+}
+
 /// Distance of a part from an obstacle. Where the part's immovable end lies inside the clearance of a half-space, only its
 /// other end is checked: a column on the ground is no collision, because no motion changes the distance of its foot.
 double ClearanceModel::part_distance(const Part& part, const Obstacle& obstacle,
@@ -282,7 +320,7 @@ Nearest ClearanceModel::nearest_on(const Trajectory& motion, int factor, double*
 void ClearanceModel::values(const double* q, double* g) {
   chain_.update(machine_, q);
   for (std::size_t r = 0; r < rows_.size(); ++r) {
-    g[r] = rows_[r].smooth.value(position(rows_[r].point, q));
+    g[r] = smooth(r).value(position(rows_[r].point, q));
   }
 }
 
@@ -303,7 +341,7 @@ void ClearanceModel::jacobian(const double* q, double* g, double* jacobian) {
   Eigen::Matrix3d hessian;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Vector3d p = position(rows_[r].point, q);
-    g[r] = rows_[r].smooth.derivatives(p, &gradient, &hessian);
+    g[r] = smooth(r).derivatives(p, &gradient, &hessian);
     const std::size_t moving = at(update_columns(rows_[r].point, p));
     for (std::size_t k = 0; k < n; ++k) {
       jacobian[r * n + k] = k < moving ? gradient.dot(columns_[k]) : 0.0;
@@ -319,7 +357,7 @@ void ClearanceModel::add_hessian(const double* q, const double* multiplier, doub
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (multiplier[r] == 0.0) continue;
     const Vector3d p = position(rows_[r].point, q);
-    rows_[r].smooth.derivatives(p, &gradient, &curvature);
+    smooth(r).derivatives(p, &gradient, &curvature);
     const int moving = update_columns(rows_[r].point, p);
     for (int k = 0; k < moving; ++k) {
       const Vector3d bent = curvature * columns_[at(k)];

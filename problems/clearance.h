@@ -71,6 +71,15 @@ class ClearanceModel {
   /// Nearest approach of a motion, tested at `factor` instants in every interval. @param when set to its time [s]
   Nearest nearest_on(const Trajectory& motion, int factor, double* when = nullptr);
 
+  /// Replaces the smooth rows by planes, of which each posture has its own: between every part and every obstacle that come
+  /// nearer than `within` [m] in one of the postures, the plane at a right angle to their shortest connection there
+  /// (separating_plane()), with a row for each moving end of the part: its distance from the plane less the radius. The rows
+  /// are exact in the posture itself and imply clearance in every other one.
+  /// @param postures one in each row, which at_posture() selects
+  void use_planes(const Eigen::MatrixXd& postures, double within);
+  /// Selects the planes of a posture for the rows; without planes it does nothing.
+  void at_posture(int posture) { posture_ = static_cast<std::size_t>(posture); }
+
   int rows() const { return static_cast<int>(rows_.size()); }
   /// False when an obstacle is so near to an immovable point that the bound of the rows does not hold there; then
   /// rows >= 0 does not imply clearance, and only the exact check decides.
@@ -106,6 +115,9 @@ class ClearanceModel {
   };
   double part_distance(const Part& part, const Obstacle& obstacle, const Eigen::Vector3d& from,
                        const Eigen::Vector3d& to) const;
+  const SmoothObstacle& smooth(std::size_t row) const {
+    return planes_.empty() ? rows_[row].smooth : planes_[posture_ * rows_.size() + row];
+  }
   void build_parts();
   void build_rows(double inflation);
   /// Longest allowed half piece h of a part before this obstacle [m].
@@ -125,6 +137,8 @@ class ClearanceModel {
   bool cover_complete_ = true;
   std::vector<Part> parts_;
   std::vector<Row> rows_;
+  std::vector<SmoothObstacle> planes_;  ///< [posture][row] of use_planes()
+  std::size_t posture_ = 0;             ///< of the planes selected
   /// parts x joints: largest displacement of the part per unit of the joint [m/rad] or [-]
   Eigen::MatrixXd travel_radius_;
   ChainGeometry chain_;

@@ -31,7 +31,11 @@ double squared_distance_slope(const Vector3d& y, const Vector3d& u, const Vector
 
 /// Outside the box the squared distance along the segment is convex and piecewise quadratic: bracket the
 /// piece in which its slope vanishes, then take the zero of that linear slope.
-double segment_box_distance(const Vector3d& y, const Vector3d& u, const Vector3d& half) {
+struct NearestOnSegment {
+  double share = 0.0;     // of the segment from its first end
+  double distance = 0.0;  // [m]
+};
+NearestOnSegment nearest_to_box(const Vector3d& y, const Vector3d& u, const Vector3d& half) {
   double lo = 0.0, hi = 1.0;
   double slope_lo = squared_distance_slope(y, u, half, lo);
   double slope_hi = squared_distance_slope(y, u, half, hi);
@@ -52,12 +56,14 @@ double segment_box_distance(const Vector3d& y, const Vector3d& u, const Vector3d
     best = lo - slope_lo / (slope_hi - slope_lo) * (hi - lo);
   }
   const double outside = box_distance(y + best * u, half);
-  if (outside > 0.0) return outside;
+  if (outside > 0.0) return {best, outside};
 
   // The segment enters the box. The depth max_i(|y_i| - a_i) is convex along it, so golden section finds its minimum.
   const auto depth = [&](double s) { return ((y + s * u).cwiseAbs() - half).maxCoeff(); };
   constexpr int kSections = 45;  // 0.618^45: a bracket of 4e-10 of the segment
-  return std::min(golden_section(0.0, 1.0, kSections, depth).value, outside);
+  const auto deepest = golden_section(0.0, 1.0, kSections, depth);
+  if (deepest.value < outside) return {deepest.x, deepest.value};
+  return {best, outside};
 }
 
 }  // namespace
@@ -75,8 +81,9 @@ double signed_distance(const Obstacle& obstacle, const Vector3d& point) {
 
 double segment_distance(const Obstacle& obstacle, const Vector3d& a, const Vector3d& b) {
   if (const auto* box = std::get_if<Box>(&obstacle.shape)) {
-    return segment_box_distance(box->rotation.transpose() * (a - box->center),
-                                box->rotation.transpose() * (b - a), 0.5 * box->size);
+    return nearest_to_box(box->rotation.transpose() * (a - box->center),
+                          box->rotation.transpose() * (b - a), 0.5 * box->size)
+        .distance;
   }
   if (const auto* sphere = std::get_if<Sphere>(&obstacle.shape)) {
     const Vector3d u = b - a;
@@ -86,6 +93,39 @@ double segment_distance(const Obstacle& obstacle, const Vector3d& a, const Vecto
     return (a + s * u - sphere->center).norm() - sphere->radius;
   }
   return std::min(signed_distance(obstacle, a), signed_distance(obstacle, b));
+}
+
+HalfSpace separating_plane(const Obstacle& obstacle, const Vector3d& a, const Vector3d& b) {
+  if (const auto* box = std::get_if<Box>(&obstacle.shape)) {
+    const Vector3d y = box->rotation.transpose() * (a - box->center);
+    const Vector3d u = box->rotation.transpose() * (b - a), half = 0.5 * box->size;
+    const Vector3d near = y + nearest_to_box(y, u, half).share * u;
+    const Vector3d touched = near.cwiseMin(half).cwiseMax(-half);
+    Vector3d normal = near - touched;
+    /// Distance from which the direction of the shortest connection is known.
+    /// @threshold [m] 1e-12..1e-6; numerical: rounding of coordinates of some metres
+    constexpr double kApart = 1e-9;
+    Vector3d on_plane = touched;
+    if (normal.norm() > kApart) {
+      normal.normalize();
+    } else {
+      Eigen::Index face = 0;
+      (near.cwiseAbs() - half).maxCoeff(&face);
+      normal = std::copysign(1.0, near[face]) * Vector3d::Unit(face);
+      on_plane[face] = std::copysign(half[face], near[face]);
+    }
+    return {box->center + box->rotation * on_plane, box->rotation * normal};
+  }
+  if (const auto* sphere = std::get_if<Sphere>(&obstacle.shape)) {
+    const Vector3d u = b - a;
+    const double length2 = u.squaredNorm();
+    const double s =
+        length2 > 0.0 ? std::clamp(u.dot(sphere->center - a) / length2, 0.0, 1.0) : 0.0;
+    const Vector3d away = a + s * u - sphere->center;
+    const Vector3d normal = away.norm() > 0.0 ? Vector3d(away.normalized()) : Vector3d::UnitZ();
+    return {sphere->center + sphere->radius * normal, normal};
+  }
+  return std::get<HalfSpace>(obstacle.shape);
 }
 
 SmoothObstacle::SmoothObstacle(const Obstacle& obstacle, double level) {

@@ -14,6 +14,13 @@ double signed_distance(const Obstacle& obstacle, const Eigen::Vector3d& point);
 double segment_distance(const Obstacle& obstacle, const Eigen::Vector3d& a,
                         const Eigen::Vector3d& b);
 
+/// Half-space that holds an obstacle and whose free side is as far from it as the segment from `a` to `b` is: its plane touches
+/// the obstacle in the point nearest to the segment, at a right angle to the shortest connection. The obstacle is convex, so
+/// a segment with both ends at least d in front of the plane is at least d away from the obstacle. Where the segment is inside
+/// a box, the plane is the face nearest to its deepest point.
+HalfSpace separating_plane(const Obstacle& obstacle, const Eigen::Vector3d& a,
+                           const Eigen::Vector3d& b);
+
 /// A function of a point, twice differentiable everywhere (also inside), convex, and such that
 /// value(p) >= 0 implies signed_distance(p) >= level. In metres: its gradient is about 1 near level.
 ///

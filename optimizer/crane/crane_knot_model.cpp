@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "models/effects/effective_machine.h"
 #include "models/math/error.h"
@@ -127,10 +128,18 @@ CraneKnotModel::CraneKnotModel(const CraneModel& model, const MotionProblem& pro
 }
 
 void CraneKnotModel::choose_clearance_rows() {
+  if (options_.plane_postures.rows() > 0) clearance_->use_planes(options_.plane_postures, kNearRow);
   const int all = clearance_->rows();
   all_clearance_.setZero(all);
   all_multipliers_.setZero(all);
   all_clearance_jacobian_.setZero(all, n_);
+  if (options_.plane_postures.rows() > 0) {
+    near_rows_.resize(static_cast<std::size_t>(all));
+    std::iota(near_rows_.begin(), near_rows_.end(), 0);
+    clearance_rows_ = all;
+    clearance_lower_ = Eigen::VectorXd::Constant(all, options_.extra_clearance);
+    return;
+  }
   const auto least = [&](const Eigen::MatrixXd& postures, double start) {
     Eigen::VectorXd low = Eigen::VectorXd::Constant(all, start), q;
     for (Eigen::Index k = 0; k < postures.rows(); ++k) {
@@ -154,7 +163,8 @@ void CraneKnotModel::choose_clearance_rows() {
   clearance_lower_ = Eigen::Map<const Eigen::VectorXd>(bounds.data(), clearance_rows_);
 }
 
-void CraneKnotModel::begin_node(int /*knot*/, int interval) {
+void CraneKnotModel::begin_node(int knot, int interval) {
+  if (clearance_) clearance_->at_posture(knot);
   if (!options_.payloads.empty()) payload_ = options_.payloads[static_cast<std::size_t>(interval)];
   if (options_.modes.rows() == 0) return;
   for (int c = 0; c < m_; ++c) mode_[static_cast<std::size_t>(c)] = options_.modes(interval, c);

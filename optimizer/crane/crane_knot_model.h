@@ -48,6 +48,9 @@ struct CraneKnotOptions {
   /// Postures the solve starts from, one in each row: only clearance rows within kNearRow of zero in one of them are
   /// imposed (all of them if this is empty). The caller must check the exact distance afterwards.
   Eigen::MatrixXd near_postures;
+  /// Postures of a motion on the knots, one in each row: clearance is kept by planes between machine and obstacles as they are in
+  /// these postures, instead of the smooth rows. Empty = smooth rows.
+  Eigen::MatrixXd plane_postures;
   double tip_line_share = 1.0;
   /// Whether to impose the pumps' pressure limits. Their rows need a second evaluation of the pressure models, so they
   /// are added only after a motion without them came too near a limit.

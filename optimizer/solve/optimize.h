@@ -80,6 +80,9 @@ struct OptimizeOptions {
   /// Number of nodes of that grid.
   /// @threshold [nodes] 100..1e7; chosen: half the path becomes better and the time grows with it
   int grid_nodes = 15000;
+  /// Largest number of solves of a start with renewed planes between machine and obstacles; two in the search.
+  /// @threshold [solves] 0..50; chosen: most motions change by less than the mesh error after three
+  int plane_solves = 6;
   bool modes = true;        ///< solve with fixed modes at last; false: the smooth NLP alone
   bool free_phases = true;  ///< durations of phases are variables; false: as in the start
   /// Overlap inserted between two phases, as share of the shorter one's duration.

@@ -26,6 +26,11 @@ class Start {
     keep_clear_ends(candidate.guess);
     offer(candidate.guess, false, false);
     hold(candidate.modes, candidate.guess, true);
+    if (result_.plan.count() > 0) {
+      approach(result_.plan, result_.motion, false);
+    } else if (candidate.guess.size() == candidate.modes.rows() + 1) {
+      approach(plan_of(candidate.modes, candidate.guess.t), candidate.guess, true);
+    }
     return finished();
   }
 
@@ -34,7 +39,12 @@ class Start {
     result_.seed = name;
     keep_clear_ends(guess);
     offer(guess, false, false);
-    hold_plan(plan, guess, overlaps);
+    if (problem_.obstacles.empty() || result_.excess > options_.limit_tolerance) {
+      hold_plan(plan, guess, overlaps);
+      approach(result_.plan, result_.motion, false);
+    } else {
+      approach(plan, guess, overlaps);
+    }
     return finished();
   }
 
@@ -70,6 +80,7 @@ class Start {
       }
       if (options_.modes) hold_modes(motion);
     }
+    if (options_.modes) approach(result_.plan, result_.motion, false);
     return finished();
   }
 
@@ -135,7 +146,10 @@ class Start {
     knot.extra_clearance = tightening_.clearance;
     knot.limit_pressure = tightening_.limit_pressure;
     knot.clear_postures = clear_postures_;
-    if (!problem_.obstacles.empty()) {
+    if (planes_) {
+      knot.plane_postures =
+          from.size() == mesh_.times.size() ? from.q : resampled(from, mesh_.times).q;
+    } else if (!problem_.obstacles.empty()) {
       knot.near_postures = from.q;
       if (is_clear(from)) knot.clear_motion = from.q;
     }
@@ -461,6 +475,11 @@ class Start {
     for (int attempt = 0;; ++attempt) {
       const std::vector<LimitCheck> checks = offer(motion, mesh_.modes.rows() > 0, converged_);
       if (!solve_again || attempt == options_.tightenings) return;
+      // Tighter limits make a motion dearer, and this one is no better already.
+      if (result_.excess <= options_.limit_tolerance &&
+          exact_cost(model_, problem_, motion, verdict(motion).energy, options_.refine) >=
+              result_.cost)
+        return;
       if (split_where_it_touches(problem_, motion, options_.refine, 4 * options_.intervals,
                                  mesh_)) {
         motion = resampled(motion, mesh_.times);
@@ -543,6 +562,35 @@ class Start {
       hold_plan(plan_of(modes, from.t), result_.motion, overlaps);
   }
 
+  /// Beside obstacles: solves with planes between machine and obstacles at every knot, renewed at each solve, from a motion
+  /// that keeps all limits. The smooth rows keep some centimetres more than the exact distance; the planes keep no more than
+  /// that in the motion they come from, so that each solve begins at a motion that its rows allow, and none is dearer than
+  /// the last. @return whether a solve gave a motion that is better than those before
+  bool approach(const PhasePlan& plan, const Trajectory& guess, bool overlaps) {
+    if (problem_.obstacles.empty() || plan.count() == 0 || guess.size() < 2 ||
+        worst_excess(verdict(guess).checks) > options_.limit_tolerance)
+      return false;
+    planes_ = true;
+    PhasePlan next = plan;
+    Trajectory from = guess;
+    bool any = false;
+    for (int round = 0; round < options_.plane_solves; ++round) {
+      const double before = result_.cost;
+      tightening_.clearance = 0.0;
+      if (!hold_plan(next, from, overlaps && round == 0)) break;
+      if (!(result_.cost < before) || result_.plan.count() == 0) break;
+      any = true;
+      /// Relative gain of a solve from which another one follows.
+      /// @threshold [1] 1e-6..0.01; chosen: as the mesh error
+      constexpr double kEnough = 1e-4;
+      if (result_.cost > (1.0 - kEnough) * before) break;
+      next = result_.plan;
+      from = result_.motion;
+    }
+    planes_ = false;
+    return any;
+  }
+
   /// Instants at which the tip is nearest to each waypoint, in increasing order. [s]
   std::vector<double> waypoint_times(const Trajectory& motion) const {
     std::vector<double> times;
@@ -587,8 +635,12 @@ class Start {
     for (int round = 0; round < 3; ++round) {
       plan_ = plan;
       mesh_ = mesh_of(plan, options_.intervals, options_.phase_intervals);
-      const NlpResult solved =
-          solve(resampled(guess, mesh_.times), exact_law(), options_.tolerance);
+      Trajectory start = resampled(guess, mesh_.times);
+      // Where the guess bends around an obstacle within an interval of this mesh, the mesh is made finer first.
+      while (planes_ && split_where_it_touches(problem_, start, options_.refine,
+                                               4 * options_.intervals, mesh_))
+        start = resampled(guess, mesh_.times);
+      const NlpResult solved = solve(start, exact_law(), options_.tolerance);
       note_status(solved);
       if (!usable(solved)) return any;
       const Trajectory motion = motion_of(solved);
@@ -613,6 +665,7 @@ class Start {
   PhasePlan plan_;  // phases of the mesh
   Tightening tightening_;
   int tightenings_used_ = 0;
+  bool planes_ = false;     // whether planes keep the clearance, instead of smooth rows
   bool converged_ = false;  // whether the last solve did, to the tolerance of results
   Eigen::MatrixXd clear_postures_;
   std::unique_ptr<Transcription> transcription_;

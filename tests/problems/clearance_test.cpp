@@ -102,52 +102,127 @@ TEST(ObstacleDistance, SmoothValueNeverExceedsTheDistanceAndKeepsItsBias) {
   EXPECT_LT(worst_bias, 0.18);  // documented: 17 % of the level at a box's corner
 }
 
+void compare_with_differences(ClearanceModel& model, const Machine& m, Dice& dice) {
+  const int n = m.joint_count();
+  const int rows = model.rows();
+  ASSERT_GT(rows, 3);
+  const auto in_rows = static_cast<std::size_t>(rows);
+  std::vector<double> g(in_rows), up(in_rows), down(in_rows), weight(in_rows);
+  const std::size_t size = in_rows * static_cast<std::size_t>(n);
+  std::vector<double> jac(size), jac_up(size), jac_down(size);
+  for (int trial = 0; trial < 20; ++trial) {
+    VectorXd q = dice.configuration(m);
+    for (double& w : weight) w = dice.in(-1, 1);
+    model.jacobian(q.data(), g.data(), jac.data());
+    model.values(q.data(), up.data());
+    for (std::size_t r = 0; r < in_rows; ++r) EXPECT_DOUBLE_EQ(g[r], up[r]);
+    MatrixXd hessian = MatrixXd::Zero(n, n), numeric(n, n);
+    model.add_hessian(q.data(), weight.data(), hessian.data());
+    EXPECT_TRUE(hessian.isApprox(hessian.transpose(), 1e-12));
+    const double step = 1e-5;
+    for (int k = 0; k < n; ++k) {
+      const double q_k = q[k];
+      q[k] = q_k + step;
+      model.jacobian(q.data(), up.data(), jac_up.data());
+      q[k] = q_k - step;
+      model.jacobian(q.data(), down.data(), jac_down.data());
+      q[k] = q_k;
+      for (int i = 0; i < n; ++i) numeric(i, k) = 0.0;
+      for (std::size_t r = 0; r < in_rows; ++r) {
+        const std::size_t row = r * static_cast<std::size_t>(n);
+        // values up to 50 m: 1e-14 relative rounding over the step, and step^2 times third derivatives
+        EXPECT_NEAR(jac[row + static_cast<std::size_t>(k)], (up[r] - down[r]) / (2 * step), 2e-6);
+        for (int i = 0; i < n; ++i) {
+          const std::size_t e = row + static_cast<std::size_t>(i);
+          numeric(i, k) += weight[r] * (jac_up[e] - jac_down[e]) / (2 * step);
+        }
+      }
+    }
+    // fourth derivatives of exp(.../tau) at tau = 7 cm and arms of 12 m
+    EXPECT_LT((hessian - numeric).cwiseAbs().maxCoeff(),
+              1e-4 * (1.0 + hessian.cwiseAbs().maxCoeff()));
+  }
+}
+
 TEST(Clearance, RowsDerivativesMatchFiniteDifferences) {
   Dice dice(3);
   for (const Machine& m : {arms::loader_crane(), arms::slewing_crane(), arms::two_link()}) {
-    const int n = m.joint_count();
     std::vector<Obstacle> obstacles;
     for (int i = 0; i < 6; ++i) obstacles.push_back(dice.obstacle(2.0));
     ClearanceModel model(with_obstacles(m, obstacles, 0.2));
-    const int rows = model.rows();
-    ASSERT_GT(rows, 3);
-    const auto in_rows = static_cast<std::size_t>(rows);
-    std::vector<double> g(in_rows), up(in_rows), down(in_rows), weight(in_rows);
-    const std::size_t size = in_rows * static_cast<std::size_t>(n);
-    std::vector<double> jac(size), jac_up(size), jac_down(size);
-    for (int trial = 0; trial < 20; ++trial) {
-      VectorXd q = dice.configuration(m);
-      for (double& w : weight) w = dice.in(-1, 1);
-      model.jacobian(q.data(), g.data(), jac.data());
-      model.values(q.data(), up.data());
-      for (std::size_t r = 0; r < in_rows; ++r) EXPECT_DOUBLE_EQ(g[r], up[r]);
-      MatrixXd hessian = MatrixXd::Zero(n, n), numeric(n, n);
-      model.add_hessian(q.data(), weight.data(), hessian.data());
-      EXPECT_TRUE(hessian.isApprox(hessian.transpose(), 1e-12));
-      const double step = 1e-5;
-      for (int k = 0; k < n; ++k) {
-        const double q_k = q[k];
-        q[k] = q_k + step;
-        model.jacobian(q.data(), up.data(), jac_up.data());
-        q[k] = q_k - step;
-        model.jacobian(q.data(), down.data(), jac_down.data());
-        q[k] = q_k;
-        for (int i = 0; i < n; ++i) numeric(i, k) = 0.0;
-        for (std::size_t r = 0; r < in_rows; ++r) {
-          const std::size_t row = r * static_cast<std::size_t>(n);
-          // values up to 50 m: 1e-14 relative rounding over the step, and step^2 times third derivatives
-          EXPECT_NEAR(jac[row + static_cast<std::size_t>(k)], (up[r] - down[r]) / (2 * step), 2e-6);
-          for (int i = 0; i < n; ++i) {
-            const std::size_t e = row + static_cast<std::size_t>(i);
-            numeric(i, k) += weight[r] * (jac_up[e] - jac_down[e]) / (2 * step);
-          }
-        }
+    compare_with_differences(model, m, dice);
+    MatrixXd postures(2, m.joint_count());
+    for (int k = 0; k < 2; ++k) postures.row(k) = dice.configuration(m).transpose();
+    model.use_planes(postures, 100.0);
+    model.at_posture(1);
+    compare_with_differences(model, m, dice);
+  }
+}
+
+TEST(ObstacleDistance, PlanesTouchTheObstacleAndLieBetweenItAndTheSegment) {
+  Dice dice(11);
+  int outside = 0, inside = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Obstacle o = dice.obstacle(2.0);
+    const Vector3d a = Vector3d(4, 0, 2) + dice.point(3), b = Vector3d(4, 0, 2) + dice.point(3);
+    const HalfSpace plane = separating_plane(o, a, b);
+    EXPECT_NEAR(plane.normal.norm(), 1.0, 1e-12);
+    EXPECT_NEAR(signed_distance(o, plane.point), 0.0, 1e-9) << "it touches the obstacle";
+    // No point of the obstacle lies in front of it.
+    for (int i = 0; i < 20; ++i) {
+      const Vector3d x = plane.point + dice.point(2);
+      if (signed_distance(o, x) <= 0.0) {
+        EXPECT_LE(plane.normal.dot(x - plane.point), 1e-9);
       }
-      // fourth derivatives of exp(.../tau) at tau = 7 cm and arms of 12 m
-      EXPECT_LT((hessian - numeric).cwiseAbs().maxCoeff(),
-                1e-4 * (1.0 + hessian.cwiseAbs().maxCoeff()));
+    }
+    const double exact = segment_distance(o, a, b);
+    const double ends =
+        std::min(plane.normal.dot(a - plane.point), plane.normal.dot(b - plane.point));
+    if (exact > 1e-6) {
+      ++outside;
+      EXPECT_NEAR(ends, exact, 1e-7) << "its distance from the segment is the obstacle's";
+    } else {
+      ++inside;
+      EXPECT_LE(ends, 1e-6);
     }
   }
+  EXPECT_GT(outside, 500);
+  EXPECT_GT(inside, 200);
+}
+
+TEST(Clearance, PlanesAreExactInTheirPostureAndImplyClearanceInOthers) {
+  Dice dice(12);
+  int exact_ones = 0, covered = 0;
+  for (int scene = 0; scene < 400; ++scene) {
+    const Machine m = scene % 2 ? arms::loader_crane() : arms::slewing_crane();
+    const MotionProblem problem =
+        with_obstacles(m, {dice.obstacle(3.0), dice.obstacle(3.0)}, dice.in(0.05, 0.4));
+    ClearanceModel model(problem);
+    MatrixXd postures(3, m.joint_count());
+    for (int k = 0; k < 3; ++k) postures.row(k) = dice.configuration(m).transpose();
+    model.use_planes(postures, 100.0);
+    std::vector<double> g(static_cast<std::size_t>(model.rows()) + 1, 1e9);
+    for (int k = 0; k < 3; ++k) {
+      model.at_posture(k);
+      const VectorXd own = postures.row(k);
+      const double exact = model.nearest(own.data()).distance;
+      model.values(own.data(), g.data());
+      if (exact > -model.radius() + 1e-6) {  // outside the obstacles
+        ++exact_ones;
+        // An end that no joint moves has no row and may be the nearest one.
+        EXPECT_GE(*std::min_element(g.begin(), g.end()), exact - 1e-7);
+      }
+      for (int i = 0; i < 10; ++i) {
+        const VectorXd q = own + 0.05 * (dice.configuration(m) - own);
+        model.values(q.data(), g.data());
+        if (exact < 0.0 || *std::min_element(g.begin(), g.end()) < 0.0) continue;
+        ++covered;
+        EXPECT_GE(model.nearest(q.data()).distance, -1e-7);
+      }
+    }
+  }
+  EXPECT_GT(exact_ones, 300);
+  EXPECT_GT(covered, 1000);
 }
 
 TEST(Clearance, NonNegativeRowsImplyExactClearance) {
