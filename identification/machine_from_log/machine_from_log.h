@@ -51,14 +51,23 @@ struct MachineFromLogOptions {
   int four_bar_values = 4;
 };
 
+/// One mass, or mass times a coordinate of its centre, in a combination of masses.
+struct MassTerm {
+  int link = -1;
+  int axis =
+      -1;  ///< -1: the mass itself [kg]; 0, 1, 2: mass times that coordinate [kg m], link's frame
+  double factor = 0.0;
+};
+
 /// A number that the logs gave.
 struct FoundValue {
   std::string name;  ///< "cylinders[boom].bore", "boom: distance of the rod pin from the joint"
   double value = 0.0;
   double half_width = 0.0;  ///< of the 95 % interval
   std::string unit;
-  std::string source;  ///< "boom's strokes and joint positions, 2400 rows"
-  std::string remark;  ///< "nearest bore of ISO 3320: 0.16 m"; may be empty
+  std::string source;                ///< "boom's strokes and joint positions, 2400 rows"
+  std::string remark;                ///< "nearest bore of ISO 3320: 0.16 m"; may be empty
+  std::vector<MassTerm> terms = {};  ///< of a combination of masses
 };
 
 /// A value that the logs do not determine.

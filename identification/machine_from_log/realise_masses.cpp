@@ -160,11 +160,17 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
                             name_of(machine, unknowns[static_cast<std::size_t>(other)]));
       }
     }
+    std::vector<MassTerm> terms;
+    for (Index k = 0; k < n; ++k) {
+      const MassUnknown& unknown = unknowns[static_cast<std::size_t>(k)];
+      if (weights[k] != 0.0) terms.push_back({unknown.link, unknown.axis, weights[k]});
+    }
     const double variance = weights.dot(fit.covariance * weights);
     out.combinations.push_back({name, weights.dot(fit.masses),
                                 t_quantile(fit.degrees) * std::sqrt(std::max(variance, 0.0)),
                                 unknowns[static_cast<std::size_t>(u)].axis < 0 ? "kg" : "kg m",
-                                fmt::format("pressures and static forces, {} rows", rows), ""});
+                                fmt::format("pressures and static forces, {} rows", rows), "",
+                                std::move(terms)});
   }
 }
 
