@@ -31,6 +31,13 @@ struct MachineFromLogOptions {
   /// Share of a joint's acceleration limit above which a row is no static balance.
   /// @threshold [-] 0.01..1; chosen: inertial forces of a crane then are some percent of its load
   double steady = 0.15;
+  /// Size of forces that the balance does not know (standard deviation of each form, model_error.h), as share of the pressure's
+  /// or the load's force; 0: there are none.
+  /// @threshold [-] 0..0.3; cited: friction beyond Coulomb's and offsets of sensors are some percent (docs/effects.md)
+  double model_error = 0.05;
+  /// Standard deviation of the inertia that the masses found do not have, as share of theirs.
+  /// @threshold [-] 0..2; chosen: masses are found by their weight, which tells half of their inertia
+  double inertia_error = 0.5;
   /// Half width of a 95 % interval, relative to the value, beyond which a value is asked for.
   /// @threshold [-] 0.005..0.5; chosen: a bore known to a tenth gives its area to a fifth
   double largest_width = 0.1;

@@ -165,9 +165,7 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
       const MassUnknown& unknown = unknowns[static_cast<std::size_t>(k)];
       if (weights[k] != 0.0) terms.push_back({unknown.link, unknown.axis, weights[k]});
     }
-    const double variance = weights.dot(fit.covariance * weights);
-    out.combinations.push_back({name, weights.dot(fit.masses),
-                                t_quantile(fit.degrees) * std::sqrt(std::max(variance, 0.0)),
+    out.combinations.push_back({name, weights.dot(fit.masses), fit.half_of(weights),
                                 unknowns[static_cast<std::size_t>(u)].axis < 0 ? "kg" : "kg m",
                                 fmt::format("pressures and static forces, {} rows", rows), "",
                                 std::move(terms)});
