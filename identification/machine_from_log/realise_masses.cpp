@@ -43,9 +43,9 @@ std::vector<Indices> indices_of(const Machine& machine, const std::vector<MassUn
 
 /// Size of a link [m], by which centres of mass are judged.
 double length_of(const Machine& machine, const Link& link) {
-  constexpr double kShortest = 0.5;  // no threshold: a joint without a next one
-  return link.joint < 0 ? kShortest
-                        : std::max(to_next_joint(machine, link.joint).norm(), kShortest);
+  constexpr double kShortestLink = 0.5;  // no threshold: a joint without a next one
+  return link.joint < 0 ? kShortestLink
+                        : std::max(to_next_joint(machine, link.joint).norm(), kShortestLink);
 }
 
 Eigen::Vector3d direction_of(const Machine& machine, const Link& link) {
