@@ -64,8 +64,10 @@ void areas_from_flow(const Machine& machine, int cylinder, const SketchRows& row
     const VectorXd residual = flow - columns * found;
     const double spread = std::sqrt(residual.squaredNorm() / static_cast<double>(n - 2));
     if (!(spread > 0.0) || !(found[0] > 0.0)) continue;
-    const VectorXd half = half_widths(columns / spread, residual / spread,
-                                      Eigen::VectorXi::Map(side.block.data(), n));
+    const MatrixXd scaled = columns / spread;
+    const VectorXd unit = residual / spread;
+    const Eigen::VectorXi block = Eigen::VectorXi::Map(side.block.data(), n);
+    const VectorXd half = intervals_of({scaled, unit, block}, {1, options.hold_out_blocks}).half;
     if (!std::isfinite(half[0])) continue;
     const bool extends = &side == &sides[0];
     (extends ? area.flow_piston : area.flow_annulus) = found[0];

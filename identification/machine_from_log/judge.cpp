@@ -44,8 +44,7 @@ HeldOutError held_out_error(const Known& known, int cylinder, bool linkage, cons
   const auto n = static_cast<double>(load->rows());
   e.force_rows = load->rows();
   e.force_static = std::sqrt((measured - expected).squaredNorm() / n);
-  expected += load->inertia + friction.coulomb * load->direction + friction.viscous * load->speed +
-              friction.inertia * load->acceleration;
+  expected += load->inertia + force_beside_load(*load, expected, friction, known.options);
   e.force_rmse = std::sqrt((measured - expected).squaredNorm() / n);
   e.force_variation = std::sqrt((measured.array() - measured.mean()).square().mean());
   return e;

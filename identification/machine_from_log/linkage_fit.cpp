@@ -398,7 +398,8 @@ double Search::largest_half_width(const Searched& s, double value, const StrokeR
 }
 
 void Search::conclude(const StrokeRows& data, const CurveFit& best, LinkageFit& fit) {
-  const VectorXd half = half_widths(best.jacobian, best.residual, data.block);
+  const VectorXd half =
+      intervals_of({best.jacobian, best.residual, data.block}, {1, options_.hold_out_blocks}).half;
   const std::vector<Searched> names = searched();
   fit.determined = true;
   const std::string& name = cylinder().name;

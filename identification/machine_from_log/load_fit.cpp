@@ -38,6 +38,7 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 struct Places {
   Index piston = -1, rod = -1;
   Index coulomb = -1, viscous = -1, inertia = -1;
+  Index errors = -1;  // the first of error_count(); -1: none
 };
 
 class Balance {
@@ -52,6 +53,7 @@ class Balance {
  private:
   void place_unknowns();
   void evaluate();
+  void evaluate_cylinder(std::size_t i, Index& at);
   void step();
   void store(const VectorXd& theta);
   void free_directions(const MatrixXd& information);
@@ -63,6 +65,7 @@ class Balance {
   const MachineFromLogOptions& options_;
   std::vector<Places> places_;
   Index size_ = 0, rows_ = 0;
+  Index measured_ = 0;  // rows that are no prior value
   VectorXd theta_;
   MatrixXd jacobian_;  // of residuals of unit variance
   VectorXd residual_;  // of unit variance
@@ -86,10 +89,16 @@ void Balance::place_unknowns() {
     p.viscous = size_++;
     p.inertia = size_++;
     rows_ += loads_[i].rows();
+    if (options_.model_error > 0.0) {
+      p.errors = size_;
+      size_ += error_count();
+    }
   }
+  measured_ = rows_;
   // Areas by flow are rows of their own.
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     if (!fit_.used[i]) continue;
+    if (places_[i].errors >= 0) rows_ += error_count();
     if (places_[i].piston >= 0 && fit_.areas[i].flow_piston_std > 0.0) ++rows_;
     if (places_[i].rod >= 0 && fit_.areas[i].flow_annulus_std > 0.0) ++rows_;
   }
@@ -102,71 +111,94 @@ void Balance::place_unknowns() {
     theta_[places_[i].coulomb] = fit_.friction[i].coulomb;
     theta_[places_[i].viscous] = fit_.friction[i].viscous;
     theta_[places_[i].inertia] = fit_.friction[i].inertia;
+    if (places_[i].errors >= 0 && fit_.friction[i].errors.size() > 0)
+      theta_.segment(places_[i].errors, error_count()) = fit_.friction[i].errors;
   }
+  std::set<int> blocks;
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
+    if (fit_.used[i]) blocks.insert(loads_[i].block.begin(), loads_[i].block.end());
+  }
+  /// Residuals of a block that count as independent of each other.
+  /// @threshold [1] 1..50; chosen: what is left after smoothing swings a few times in two seconds
+  constexpr double kInBlock = 4.0;
+  correlated_ = std::max(1.0, static_cast<double>(measured_) /
+                                  (kInBlock * std::max(1.0, static_cast<double>(blocks.size()))));
 }
 
 void Balance::evaluate() {
   jacobian_ = MatrixXd::Zero(rows_, size_);
   residual_ = VectorXd::Zero(rows_);
-  block_ = Eigen::VectorXi::Zero(rows_);
+  block_ = Eigen::VectorXi::Constant(rows_, -1);
   Index at = 0;
-  int extra = -1;
-  std::set<int> blocks;
   for (std::size_t i = 0; i < loads_.size(); ++i) {
-    if (!fit_.used[i]) continue;
-    const LoadRows& l = loads_[i];
-    const Places& p = places_[i];
-    const AreaState& area = fit_.areas[i];
-    const double piston = area.piston, rod = area.rod;
-    const Index n = l.rows();
-    const VectorXd load = l.known + l.inertia + l.masses * theta_.head(unknowns_) +
-                          theta_[p.coulomb] * l.direction + theta_[p.viscous] * l.speed +
-                          theta_[p.inertia] * l.acceleration;
-    VectorXd r = l.load_cell
-                     ? VectorXd(l.force - load)
-                     : VectorXd(l.pressure_a - l.pressure_b + (rod * l.pressure_b - load) / piston);
-    const double by_force = l.load_cell ? -1.0 : -1.0 / piston;
-    const double typical =
-        (l.load_cell ? l.force : l.pressure_a).norm() / std::sqrt(static_cast<double>(n));
-    const double spread = std::max(robust_std(r), kLeastResidual * typical);
-    MatrixXd j = MatrixXd::Zero(n, size_);
-    j.leftCols(unknowns_) = by_force * l.masses;
-    j.col(p.coulomb) = by_force * l.direction;
-    j.col(p.viscous) = by_force * l.speed;
-    j.col(p.inertia) = by_force * l.acceleration;
-    if (p.piston >= 0) {
-      j.col(p.piston) = (load - rod * l.pressure_b) / (piston * piston);
-      // A rod that is known keeps its section while the piston's area moves.
-    }
-    if (p.rod >= 0) j.col(p.rod) = l.pressure_b / piston;
-    for (Index k = 0; k < n; ++k) {
-      const double weight = std::sqrt(huber_weight(r[k], 2.0 * kHuberStds * spread)) / spread;
-      residual_[at + k] = weight * r[k];
-      jacobian_.row(at + k) = weight * j.row(k);
-      block_[at + k] = l.block[k];
-      blocks.insert(l.block[k]);
-    }
-    at += n;
+    if (fit_.used[i]) evaluate_cylinder(i, at);
   }
+  // A prior value counts as one independent value, of which rows have fewer than their number.
+  const double weight = std::sqrt(correlated_);
+  const auto put_prior = [&](double value, double std) {
+    residual_[at] = weight * value / std;
+    return weight / std;
+  };
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     if (!fit_.used[i]) continue;
     const AreaState& area = fit_.areas[i];
     const Places& p = places_[i];
+    for (Index k = 0; p.errors >= 0 && k < error_count(); ++k, ++at)
+      jacobian_(at, p.errors + k) = put_prior(theta_[p.errors + k], 1.0);
     if (p.piston >= 0 && area.flow_piston_std > 0.0) {
-      residual_[at] = (area.flow_piston - area.piston) / area.flow_piston_std;
-      jacobian_(at, p.piston) = -1.0 / area.flow_piston_std;
-      block_[at++] = extra--;
+      jacobian_(at, p.piston) = -put_prior(area.flow_piston - area.piston, area.flow_piston_std);
+      ++at;
     }
     if (p.rod >= 0 && area.flow_annulus_std > 0.0) {
-      residual_[at] = (area.flow_annulus - (area.piston - area.rod)) / area.flow_annulus_std;
-      if (p.piston >= 0) jacobian_(at, p.piston) = -1.0 / area.flow_annulus_std;
-      jacobian_(at, p.rod) = 1.0 / area.flow_annulus_std;
-      block_[at++] = extra--;
+      const double slope =
+          put_prior(area.flow_annulus - (area.piston - area.rod), area.flow_annulus_std);
+      if (p.piston >= 0) jacobian_(at, p.piston) = -slope;
+      jacobian_(at, p.rod) = slope;
+      ++at;
     }
   }
-  correlated_ =
-      std::max(1.0, static_cast<double>(rows_) /
-                        (4.0 * std::max<double>(1.0, static_cast<double>(blocks.size()))));
+}
+
+/// Rows of one cylinder, from `at` on.
+void Balance::evaluate_cylinder(std::size_t i, Index& at) {
+  const LoadRows& l = loads_[i];
+  const Places& p = places_[i];
+  const AreaState& area = fit_.areas[i];
+  FrictionState& friction = fit_.friction[i];
+  const double piston = area.piston, rod = area.rod;
+  const Index n = l.rows();
+  const VectorXd weight_force = l.known + l.masses * theta_.head(unknowns_);
+  if (friction.scale.speed == 0.0) friction.scale = error_scale(l, piston, weight_force);
+  MatrixXd errors;
+  VectorXd load = weight_force + l.inertia + theta_[p.coulomb] * l.direction +
+                  theta_[p.viscous] * l.speed + theta_[p.inertia] * l.acceleration;
+  if (p.errors >= 0) {
+    errors = error_columns(l, weight_force, friction.scale, options_);
+    load += errors * theta_.segment(p.errors, error_count());
+  }
+  const VectorXd r =
+      l.load_cell ? VectorXd(l.force - load)
+                  : VectorXd(l.pressure_a - l.pressure_b + (rod * l.pressure_b - load) / piston);
+  const double by_force = l.load_cell ? -1.0 : -1.0 / piston;
+  const double typical =
+      (l.load_cell ? l.force : l.pressure_a).norm() / std::sqrt(static_cast<double>(n));
+  const double spread = std::max(robust_std(r), kLeastResidual * typical);
+  MatrixXd j = MatrixXd::Zero(n, size_);
+  j.leftCols(unknowns_) = by_force * l.masses;
+  j.col(p.coulomb) = by_force * l.direction;
+  j.col(p.viscous) = by_force * l.speed;
+  j.col(p.inertia) = by_force * l.acceleration;
+  if (p.errors >= 0) j.middleCols(p.errors, error_count()) = by_force * errors;
+  // A rod that is known keeps its section while the piston's area moves.
+  if (p.piston >= 0) j.col(p.piston) = (load - rod * l.pressure_b) / (piston * piston);
+  if (p.rod >= 0) j.col(p.rod) = l.pressure_b / piston;
+  for (Index k = 0; k < n; ++k) {
+    const double weight = std::sqrt(huber_weight(r[k], 2.0 * kHuberStds * spread)) / spread;
+    residual_[at + k] = weight * r[k];
+    jacobian_.row(at + k) = weight * j.row(k);
+    block_[at + k] = l.block[k];
+  }
+  at += n;
 }
 
 /// One Gauss-Newton step in the directions that the rows determine.
@@ -207,6 +239,7 @@ void Balance::store(const VectorXd& theta) {
     fit_.friction[i].coulomb = theta_[p.coulomb];
     fit_.friction[i].viscous = theta_[p.viscous];
     fit_.friction[i].inertia = theta_[p.inertia];
+    if (p.errors >= 0) fit_.friction[i].errors = theta_.segment(p.errors, error_count());
   }
   fit_.masses = theta_.head(unknowns_);
 }
@@ -278,11 +311,12 @@ void Balance::free_directions(const MatrixXd& information) {
 }
 
 void Balance::intervals() {
-  MatrixXd covariance;
-  const VectorXd half = half_widths(jacobian_, residual_, block_, &covariance);
-  fit_.covariance = covariance.topLeftCorner(unknowns_, unknowns_);
-  std::set<int> blocks(block_.begin(), block_.end());
-  fit_.degrees = std::max(1.0, static_cast<double>(blocks.size()) - static_cast<double>(size_));
+  const Intervals found =
+      intervals_of({jacobian_, residual_, block_, correlated_}, {1, options_.hold_out_blocks});
+  const VectorXd& half = found.half;
+  fit_.squared_half.clear();
+  for (const MatrixXd& all : found.squared)
+    fit_.squared_half.emplace_back(all.topLeftCorner(unknowns_, unknowns_));
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     const Places& p = places_[i];
     if (p.piston >= 0) fit_.areas[i].piston_half = half[p.piston];
@@ -295,7 +329,7 @@ void Balance::solve() {
   place_unknowns();
   if (rows_ == 0) {
     fit_.free = MatrixXd::Identity(unknowns_, unknowns_);
-    fit_.covariance = MatrixXd::Zero(unknowns_, unknowns_);
+    fit_.squared_half.clear();
     return;
   }
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -358,6 +392,21 @@ bool start_areas(const LoadRows& l, const LoadFit& fit, const MachineFromLogOpti
 
 }  // namespace
 
+double LoadFit::half_of(const VectorXd& weights) const {
+  double largest = 0.0;
+  for (const MatrixXd& s : squared_half) largest = std::max(largest, weights.dot(s * weights));
+  return std::sqrt(largest);
+}
+
+VectorXd force_beside_load(const LoadRows& rows, const VectorXd& load,
+                           const FrictionState& friction, const MachineFromLogOptions& options) {
+  VectorXd force = friction.coulomb * rows.direction + friction.viscous * rows.speed +
+                   friction.inertia * rows.acceleration;
+  if (friction.errors.size() > 0)
+    force += error_columns(rows, load, friction.scale, options) * friction.errors;
+  return force;
+}
+
 LoadFit fit_loads(const Known& known, const std::vector<LoadRows>& loads) {
   const MachineSketch& sketch = known.sketch;
   const Machine& machine = known.machine;
@@ -367,7 +416,6 @@ LoadFit fit_loads(const Known& known, const std::vector<LoadRows>& loads) {
   LoadFit fit;
   fit.masses = VectorXd::Zero(unknowns);
   fit.free = MatrixXd::Identity(unknowns, unknowns);
-  fit.covariance = MatrixXd::Zero(unknowns, unknowns);
   fit.areas.resize(loads.size());
   fit.friction.resize(loads.size());
   fit.used.assign(loads.size(), false);

@@ -6,10 +6,12 @@
 /// with the areas A_A of the bore and A_D of the rod's section, masses and first moments pi, and friction F_c and c; m a takes
 /// what acceleration is left. The residual is written as error of p_A, so that noise and unmodelled forces are in the
 /// dependent variable and bias no area; the balance is homogeneous, and its scale comes from what is known: a payload that
-/// changes, a mass, an area, or a measured flow.
+/// changes, a mass, an area, or a measured flow. Forces of forms that the balance does not know (model_error.h) are estimated
+/// beside it with a prior size, so that areas and masses do not take them up and their intervals know of them.
 #include <vector>
 
 #include "identification/machine_from_log/load_rows.h"
+#include "identification/machine_from_log/model_error.h"
 
 namespace sparflow::from_log {
 
@@ -29,6 +31,8 @@ struct FrictionState {
   double coulomb = 0.0, coulomb_half = 0.0;  ///< [N]
   double viscous = 0.0;                      ///< [N s/m]
   double inertia = 0.0;                      ///< [kg] left by acceleration
+  ErrorScale scale;
+  Eigen::VectorXd errors;  ///< by column of error_columns(), in standard deviations; empty: none
 };
 
 struct LoadFit {
@@ -36,10 +40,16 @@ struct LoadFit {
   std::vector<FrictionState> friction;  ///< by cylinder
   std::vector<bool> used;               ///< by cylinder: its rows took part
   Eigen::VectorXd masses;               ///< by unknown, one of the solutions
-  Eigen::MatrixXd free;        ///< [unknowns x directions] that change no force of these rows
-  Eigen::MatrixXd covariance;  ///< of the masses, where they are determined
-  double degrees = 1.0;        ///< of freedom of the intervals
+  Eigen::MatrixXd free;  ///< [unknowns x directions] that change no force of these rows
+  /// Of the masses: squares of half widths, as Intervals::squared.
+  std::vector<Eigen::MatrixXd> squared_half;
+  double half_of(const Eigen::VectorXd& weights) const;  ///< of a sum of masses
 };
+
+/// Friction and forces of unknown forms in rows of a cylinder. [N] @param load static force
+Eigen::VectorXd force_beside_load(const LoadRows& rows, const Eigen::VectorXd& load,
+                                  const FrictionState& friction,
+                                  const MachineFromLogOptions& options);
 
 /// @param loads rows by cylinder, empty where there are none
 LoadFit fit_loads(const Known& known, const std::vector<LoadRows>& loads);

@@ -31,6 +31,13 @@ struct MachineFromLogOptions {
   /// Share of a joint's acceleration limit above which a row is no static balance.
   /// @threshold [-] 0.01..1; chosen: inertial forces of a crane then are some percent of its load
   double steady = 0.15;
+  /// Size of forces that the balance does not know (standard deviation of each form, model_error.h), as share of the pressure's
+  /// or the load's force; 0: there are none.
+  /// @threshold [-] 0..0.3; cited: friction beyond Coulomb's and offsets of sensors are some percent (docs/effects.md)
+  double model_error = 0.05;
+  /// Standard deviation of the inertia that the masses found do not have, as share of theirs.
+  /// @threshold [-] 0..2; chosen: masses are found by their weight, which tells half of their inertia
+  double inertia_error = 0.5;
   /// Half width of a 95 % interval, relative to the value, beyond which a value is asked for.
   /// @threshold [-] 0.005..0.5; chosen: a bore known to a tenth gives its area to a fifth
   double largest_width = 0.1;
@@ -51,14 +58,23 @@ struct MachineFromLogOptions {
   int four_bar_values = 4;
 };
 
+/// One mass, or mass times a coordinate of its centre, in a combination of masses.
+struct MassTerm {
+  int link = -1;
+  int axis =
+      -1;  ///< -1: the mass itself [kg]; 0, 1, 2: mass times that coordinate [kg m], link's frame
+  double factor = 0.0;
+};
+
 /// A number that the logs gave.
 struct FoundValue {
   std::string name;  ///< "cylinders[boom].bore", "boom: distance of the rod pin from the joint"
   double value = 0.0;
   double half_width = 0.0;  ///< of the 95 % interval
   std::string unit;
-  std::string source;  ///< "boom's strokes and joint positions, 2400 rows"
-  std::string remark;  ///< "nearest bore of ISO 3320: 0.16 m"; may be empty
+  std::string source;                ///< "boom's strokes and joint positions, 2400 rows"
+  std::string remark;                ///< "nearest bore of ISO 3320: 0.16 m"; may be empty
+  std::vector<MassTerm> terms = {};  ///< of a combination of masses
 };
 
 /// A value that the logs do not determine.

@@ -43,9 +43,9 @@ std::vector<Indices> indices_of(const Machine& machine, const std::vector<MassUn
 
 /// Size of a link [m], by which centres of mass are judged.
 double length_of(const Machine& machine, const Link& link) {
-  constexpr double kShortest = 0.5;  // no threshold: a joint without a next one
-  return link.joint < 0 ? kShortest
-                        : std::max(to_next_joint(machine, link.joint).norm(), kShortest);
+  constexpr double kShortestLink = 0.5;  // no threshold: a joint without a next one
+  return link.joint < 0 ? kShortestLink
+                        : std::max(to_next_joint(machine, link.joint).norm(), kShortestLink);
 }
 
 Eigen::Vector3d direction_of(const Machine& machine, const Link& link) {
@@ -160,11 +160,15 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
                             name_of(machine, unknowns[static_cast<std::size_t>(other)]));
       }
     }
-    const double variance = weights.dot(fit.covariance * weights);
-    out.combinations.push_back({name, weights.dot(fit.masses),
-                                t_quantile(fit.degrees) * std::sqrt(std::max(variance, 0.0)),
+    std::vector<MassTerm> terms;
+    for (Index k = 0; k < n; ++k) {
+      const MassUnknown& unknown = unknowns[static_cast<std::size_t>(k)];
+      if (weights[k] != 0.0) terms.push_back({unknown.link, unknown.axis, weights[k]});
+    }
+    out.combinations.push_back({name, weights.dot(fit.masses), fit.half_of(weights),
                                 unknowns[static_cast<std::size_t>(u)].axis < 0 ? "kg" : "kg m",
-                                fmt::format("pressures and static forces, {} rows", rows), ""});
+                                fmt::format("pressures and static forces, {} rows", rows), "",
+                                std::move(terms)});
   }
 }
 

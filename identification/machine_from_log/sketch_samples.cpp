@@ -73,8 +73,9 @@ void put_cylinder(const Picker& pick, const SavitzkyGolay& filter, int index, Cy
 /// Blocks, and which of them are held out.
 void put_blocks(const Picker& pick, bool test, bool share, const MachineFromLogOptions& options,
                 SketchRows& out) {
-  // Blocks of one log continue behind those of the log before.
-  const int first_block = pick.at == 0 ? 0 : out.block[pick.at - 1] + 1;
+  // Blocks of one log continue behind those of the log before and begin a cluster of their own.
+  const int motion = options.hold_out_blocks;
+  const int first_block = pick.at == 0 ? 0 : (out.block[pick.at - 1] / motion + 1) * motion;
   const Index at = pick.at;
   const int group = options.hold_out_every * options.hold_out_blocks;
   for (Index k = 0; k < pick.count(); ++k) {

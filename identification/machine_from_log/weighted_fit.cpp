@@ -43,11 +43,16 @@ double t_quantile(double degrees) {
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
 }
 
-VectorXd half_widths(const MatrixXd& jacobian, const VectorXd& residual,
-                     const Eigen::VectorXi& block, MatrixXd* covariance) {
+namespace {
+
+/// The directions that rows determine, in coordinates in which their information is the identity.
+struct Determined {
+  MatrixXd to;    ///< [parameters x directions] parameters of unit coordinates
+  VectorXd lost;  ///< by parameter: 1 where a direction without information takes part
+};
+
+Determined determined_by(const MatrixXd& jacobian) {
   const Index p = jacobian.cols();
-  const double unknown = std::numeric_limits<double>::infinity();
-  if (jacobian.rows() <= p || p == 0) return VectorXd::Constant(p, unknown);
   VectorXd scale(p);
   for (Index k = 0; k < p; ++k) {
     scale[k] = jacobian.col(k).norm();
@@ -58,50 +63,92 @@ VectorXd half_widths(const MatrixXd& jacobian, const VectorXd& residual,
   /// Smallest eigenvalue of the scaled information that is not rounding.
   /// @threshold [1] 1e-16..1e-8; numerical: sums of products of thousands of rows
   constexpr double kRounding = 1e-12;
-  const VectorXd values = eigen.eigenvalues().cwiseMax(kRounding);
-  const MatrixXd inverse =
-      eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-  std::map<int, VectorXd> score;
-  for (Index k = 0; k < residual.size(); ++k) {
-    VectorXd& s = score.try_emplace(block[k], VectorXd::Zero(p)).first->second;
-    s += residual[k] * scaled.row(k).transpose();
-  }
-  MatrixXd meat = MatrixXd::Zero(p, p);
-  for (const auto& [b, s] : score) meat += s * s.transpose();
-  const auto blocks = static_cast<double>(score.size());
-  const double spare = std::max(blocks - static_cast<double>(p), 1.0);
-  const double excess =
-      std::max(1.0, residual.squaredNorm() / static_cast<double>(residual.size() - p));
-  MatrixXd cov = blocks / spare * inverse * meat * inverse;
+  Index rank = 0;
+  for (Index k = 0; k < p; ++k) rank += eigen.eigenvalues()[k] > 10.0 * kRounding;
+  Determined out{MatrixXd(p, rank), VectorXd::Zero(p)};
   for (Index k = 0; k < p; ++k) {
-    // The larger variance, with the correlations of the blocks.
-    const double factor =
-        std::sqrt(std::max(1.0, excess * inverse(k, k) / std::max(cov(k, k), 1e-300)));
-    cov.row(k) *= factor;
-    cov.col(k) *= factor;
-  }
-  VectorXd half(p);
-  for (Index k = 0; k < p; ++k) {
-    half[k] = t_quantile(spare) * std::sqrt(std::max(cov(k, k), 0.0)) / scale[k];
-    // A direction without information has no finite interval.
-    const bool lost = (eigen.eigenvectors().row(k).transpose().array().square() *
-                       (eigen.eigenvalues().array() < kRounding).cast<double>())
-                          .sum() > kRounding;
-    if (lost) half[k] = unknown;
-  }
-  if (covariance != nullptr) {  // without the directions that the rows do not determine
-    VectorXd determined = values.cwiseInverse();
-    for (Index k = 0; k < p; ++k) {
-      if (eigen.eigenvalues()[k] <= 10.0 * kRounding) determined[k] = 0.0;
+    const VectorXd direction = eigen.eigenvectors().col(k);
+    if (eigen.eigenvalues()[k] <= 10.0 * kRounding) {
+      for (Index i = 0; i < p; ++i)
+        if (direction[i] * direction[i] > kRounding) out.lost[i] = 1.0;
+      continue;
     }
-    const MatrixXd part =
-        eigen.eigenvectors() * determined.asDiagonal() * eigen.eigenvectors().transpose();
-    const MatrixXd independent = excess * part, sandwich = blocks / spare * part * meat * part;
-    *covariance = scale.cwiseInverse().asDiagonal() *
-                  MatrixXd(sandwich.trace() > independent.trace() ? sandwich : independent) *
-                  scale.cwiseInverse().asDiagonal();
+    // Eigenvalues ascend: those that are kept are the last.
+    out.to.col(k - (p - rank)) =
+        (direction / std::sqrt(eigen.eigenvalues()[k])).cwiseQuotient(scale);
   }
-  return half;
+  return out;
+}
+
+/// Variance of the coordinates by leaving out each cluster, and by the known variance of priors.
+MatrixXd jackknife(const WeightedRows& rows, const MatrixXd& unit, int longer, double& clusters) {
+  const Index r = unit.cols();
+  struct Cluster {
+    MatrixXd information;
+    VectorXd score;
+  };
+  std::map<int, Cluster> all;
+  MatrixXd variance = MatrixXd::Zero(r, r);
+  for (Index k = 0; k < unit.rows(); ++k) {
+    const VectorXd row = unit.row(k).transpose();
+    if (rows.block[k] < 0) {
+      variance += rows.prior_weight * row * row.transpose();
+      continue;
+    }
+    Cluster& c =
+        all.try_emplace(rows.block[k] / longer, Cluster{MatrixXd::Zero(r, r), VectorXd::Zero(r)})
+            .first->second;
+    c.information += row * row.transpose();
+    c.score += rows.residual[k] * row;
+  }
+  clusters = static_cast<double>(all.size());
+  /// Information that an estimate keeps in each direction when a cluster is left out, as share of all.
+  /// @threshold [-] 1e-9..0.01; numerical: what one cluster alone determines gets a very wide interval, not an infinite one
+  constexpr double kKept = 1e-4;
+  for (const auto& [b, c] : all) {
+    MatrixXd left = MatrixXd::Identity(r, r) * (1.0 + kKept) - c.information;
+    const VectorXd change = left.ldlt().solve(c.score);
+    variance += (clusters - 1.0) / clusters * change * change.transpose();
+  }
+  return variance;
+}
+
+}  // namespace
+
+double Intervals::half_of(const VectorXd& weights) const {
+  double largest = 0.0;
+  for (const MatrixXd& s : squared) largest = std::max(largest, weights.dot(s * weights));
+  return std::sqrt(largest);
+}
+
+Intervals intervals_of(const WeightedRows& rows, const std::vector<int>& longer) {
+  const Index p = rows.jacobian.cols();
+  Intervals out;
+  const double unknown = std::numeric_limits<double>::infinity();
+  out.half = VectorXd::Constant(p, unknown);
+  if (rows.jacobian.rows() <= p || p == 0) {
+    out.squared.push_back(MatrixXd::Zero(p, p));
+    return out;
+  }
+  const Determined determined = determined_by(rows.jacobian);
+  const MatrixXd unit = rows.jacobian * determined.to;
+  const double excess =
+      std::max(1.0, rows.residual.squaredNorm() / static_cast<double>(rows.residual.size() - p));
+  const auto square = [](double x) { return x * x; };
+  double most = 1.0;
+  for (const int length : longer) {
+    double clusters = 0.0;
+    const MatrixXd variance = jackknife(rows, unit, length, clusters);
+    most = std::max(most, clusters);
+    if (clusters < 2.0) continue;
+    out.squared.push_back(square(t_quantile(clusters - 1.0)) * determined.to * variance *
+                          determined.to.transpose());
+  }
+  out.squared.push_back(square(t_quantile(std::max(1.0, most - 1.0))) * excess * determined.to *
+                        determined.to.transpose());
+  for (Index k = 0; k < p; ++k)
+    if (determined.lost[k] == 0.0) out.half[k] = out.half_of(VectorXd::Unit(p, k));
+  return out;
 }
 
 CurveFit fit_curve(const Residuals& residuals, const VectorXd& start, const VectorXd& scale,
