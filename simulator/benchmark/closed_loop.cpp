@@ -10,7 +10,6 @@
 
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
-#include "simulator/plant/run/plant_run.h"
 #include "simulator/sensors/sensors.h"
 
 namespace sparflow::benchmark {
@@ -220,6 +219,7 @@ class Loop {
       const Eigen::Vector3d at = tip();
       const double speed = (at - before).norm() / o_.sample_time;
       before = at;
+      if (o_.watch) o_.watch(record, plant_->ledger());
       row_.sway_path =
           std::max(row_.sway_path, std::acos(std::cos(record.swing_1) * std::cos(record.swing_2)));
       const bool there = (at - goal.tip).norm() <= s_.tolerance &&

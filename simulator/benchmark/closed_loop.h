@@ -7,6 +7,7 @@
 #include "simulator/benchmark/result.h"
 #include "simulator/benchmark/scenario.h"
 #include "simulator/controllers/controller.h"
+#include "simulator/plant/run/plant_run.h"
 
 namespace sparflow::benchmark {
 
@@ -36,6 +37,8 @@ struct LoopOptions {
   /// @threshold [s] 0.02..5; chosen: a picture shows no more
   double trace_step = 0.2;
   std::function<bool()> stop;  ///< asked at each sample; true ends the run as a failure
+  /// Told the plant's true values and energies at each sample. May be empty.
+  std::function<void(const plant::Record&, const plant::EnergyLedger&)> watch;
 };
 
 /// Makes the controller of a run; what it throws is the row's reason.

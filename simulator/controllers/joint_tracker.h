@@ -10,11 +10,11 @@ namespace sparflow::control {
 
 struct TrackerGains {
   /// Speed by which an error of the rod's position is corrected.
-  /// @threshold [1/s] 0.1..10; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
-  double proportional = 1.0;
+  /// @threshold [1/s] 0.1..10; tuned: prediction_study --gains on problems/scenarios/tuning (docs/benchmark.md)
+  double proportional = 1.4;
   /// Growth of that speed while the error stays.
-  /// @threshold [1/s2] 0..5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
-  double integral = 1.4;
+  /// @threshold [1/s2] 0..5; tuned: prediction_study --gains on problems/scenarios/tuning (docs/benchmark.md); more hunts
+  double integral = 0.1;
   /// Time by which the speed ahead is taken earlier, as valves follow late.
   /// @threshold [s] 0..0.5; tuned: studies/controllers/tune_gains.py on problems/scenarios/tuning
   double lead = 0.2;
