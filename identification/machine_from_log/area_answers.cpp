@@ -116,7 +116,7 @@ AreaAnswers answer_areas(const Known& known, const std::vector<LoadRows>& loads,
       const std::string remark = side.kind == OpenKind::kBore
                                      ? standard_remark(kBores, diameter, half, "bore")
                                      : standard_remark(kRods, diameter, half, "rod");
-      out.values.push_back({open->path, diameter, half, "m", area.source, remark});
+      out.values.push_back({open->path, diameter, half, "m", area.source, remark, {}, i});
       out.diameters.push_back(
           {side.kind, i, diameter,
            fmt::format("from the log ({}): {} {:.5g} ± {:.2g} m{}{}", area.source, side.word,

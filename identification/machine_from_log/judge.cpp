@@ -10,6 +10,30 @@ namespace sparflow::from_log {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+/// The rows of each log by themselves, because logs have clocks of their own.
+std::vector<HeldOutForces> by_log(const SketchRows& rows, const LoadRows& load,
+                                  const VectorXd& measured, const VectorXd& predicted) {
+  std::vector<HeldOutForces> out;
+  for (std::size_t l = 0; l < rows.files.size(); ++l) {
+    std::vector<Index> own;  // of the load's rows
+    for (Index k = 0; k < load.rows(); ++k) {
+      if (rows.log[load.row[static_cast<std::size_t>(k)]] == static_cast<int>(l)) own.push_back(k);
+    }
+    if (own.empty()) continue;
+    const auto n = static_cast<Index>(own.size());
+    HeldOutForces forces{rows.files[l], VectorXd(n), measured(own), predicted(own)};
+    for (Index k = 0; k < n; ++k)
+      forces.time[k] =
+          rows.time[load.row[static_cast<std::size_t>(own[static_cast<std::size_t>(k)])]];
+    out.push_back(std::move(forces));
+  }
+  return out;
+}
+
+}  // namespace
+
 HeldOutError held_out_error(const Known& known, int cylinder, bool linkage, const LoadRows* load,
                             const FoundLoads& found) {
   const Machine& machine = known.machine;
@@ -46,6 +70,7 @@ HeldOutError held_out_error(const Known& known, int cylinder, bool linkage, cons
   e.force_static = std::sqrt((measured - expected).squaredNorm() / n);
   expected += load->inertia + force_beside_load(*load, expected, friction, known.options);
   e.force_rmse = std::sqrt((measured - expected).squaredNorm() / n);
+  e.forces = by_log(rows, *load, measured, expected);
   e.force_variation = std::sqrt((measured.array() - measured.mean()).square().mean());
   return e;
 }

@@ -407,7 +407,7 @@ void Search::conclude(const StrokeRows& data, const CurveFit& best, LinkageFit& 
       fmt::format("strokes of {} and positions of {}, {} rows", name, joint().name, data.q.size());
   for (Index p = 0; p < half.size(); ++p) {
     const Searched& s = names[static_cast<std::size_t>(p)];
-    fit.values.push_back({s.name, best.theta[p], half[p], s.unit, source, ""});
+    fit.values.push_back({s.name, best.theta[p], half[p], s.unit, source, "", {}, index_});
     if (half[p] <= largest_half_width(s, best.theta[p], data)) continue;
     if (fit.determined) {
       ask(fit, fmt::format(

@@ -30,6 +30,15 @@ void append_all(std::vector<std::string>& to, const std::vector<std::string>& fr
   to.insert(to.end(), from.begin(), from.end());
 }
 
+/// The combination that is nothing but the mass of a link; nullptr where the forces do not tell it from others.
+const FoundValue* combination_of_mass(const RealisedMasses& masses, int link) {
+  for (const FoundValue& v : masses.combinations) {
+    const bool alone = v.terms.size() == 1 && v.terms[0].link == link && v.terms[0].axis < 0;
+    if (alone && v.terms[0].factor == 1.0) return &v;
+  }
+  return nullptr;
+}
+
 /// One estimate from sketch to machine.
 class Estimate {
  public:
@@ -219,10 +228,29 @@ class Estimate {
       const std::string path = fmt::format("links[{}].mass", link.name);
       if (asked(path)) continue;
       constexpr const char* kSource = "static forces, by the convention for centres";
-      if (mass_open) out_.values.push_back({path, link.mass, std::nan(""), "kg", kSource, ""});
+      if (mass_open) {
+        // Where the forces tell this mass alone, no convention was needed and its interval is known.
+        const FoundValue* alone = combination_of_mass(masses, l);
+        out_.values.push_back({path,
+                               link.mass,
+                               alone != nullptr ? alone->half_width : std::nan(""),
+                               "kg",
+                               alone != nullptr ? alone->source : kSource,
+                               "",
+                               {},
+                               -1,
+                               l});
+      }
       for (int axis = 0; cog_open && axis < 3; ++axis)
-        out_.values.push_back({fmt::format("links[{}].cog[{}]", link.name, axis), link.cog[axis],
-                               std::nan(""), "m", kSource, ""});
+        out_.values.push_back({fmt::format("links[{}].cog[{}]", link.name, axis),
+                               link.cog[axis],
+                               std::nan(""),
+                               "m",
+                               kSource,
+                               "",
+                               {},
+                               -1,
+                               l});
     }
   }
 

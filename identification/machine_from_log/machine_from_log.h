@@ -75,12 +75,23 @@ struct FoundValue {
   std::string source;                ///< "boom's strokes and joint positions, 2400 rows"
   std::string remark;                ///< "nearest bore of ISO 3320: 0.16 m"; may be empty
   std::vector<MassTerm> terms = {};  ///< of a combination of masses
+  int cylinder = -1;                 ///< whose value it is; -1: not a cylinder's
+  int link = -1;                     ///< whose value it is; -1: not a link's
 };
 
 /// A value that the logs do not determine.
 struct MachineQuestion {
   std::string path;      ///< "cylinders[jib].bore"
   std::string sentence;  ///< why it is not determined and what would answer it
+};
+
+/// Forces of one cylinder in the rows of one log that took no part in the estimate.
+struct HeldOutForces {
+  std::string log;            ///< its file
+  Eigen::VectorXd time;       ///< [s] ascending
+  Eigen::VectorXd measured;   ///< [N] of pressures and areas, or of a load cell
+  Eigen::VectorXd predicted;  ///< [N] static force, inertia and friction
+  Eigen::Index rows() const { return time.size(); }
 };
 
 /// How the machine does on motions that took no part in the estimate.
@@ -93,6 +104,8 @@ struct HeldOutError {
   Eigen::Index force_rows = 0;
   double stroke_rmse = 0.0;  ///< [m]; NaN: stroke or joint position is not measured
   Eigen::Index stroke_rows = 0;
+  std::vector<HeldOutForces>
+      forces;  ///< rows of force_rmse, by log; logs without rows are left out
 };
 
 struct MachineFromLog {

@@ -140,12 +140,14 @@ SketchRows sketch_rows(const Machine& machine, const std::vector<Log>& logs,
   out.position = out.q = out.qd = out.qdd = Eigen::MatrixXd::Constant(rows, joints, kNaN);
   out.position_noise = out.rate_noise = VectorXd::Zero(joints);
   out.payload = VectorXd::Zero(rows);
-  out.block = Eigen::VectorXi::Zero(rows);
+  out.block = out.log = Eigen::VectorXi::Zero(rows);
   out.held_out = out.usable = Mask::Constant(rows, false);
   out.cylinders.resize(machine.cylinders.size());
   Index at = 0;
   for (std::size_t l = 0; l < all.size(); ++l) {
     const Picker pick{*all[l], stride, at, rows};
+    out.files.push_back(all[l]->file);
+    out.log.segment(at, pick.count()).setConstant(static_cast<int>(l));
     put_log(machine, pick, options, out);
     put_blocks(pick, l >= logs.size(), tests.empty(), options, out);
     at += pick.count();

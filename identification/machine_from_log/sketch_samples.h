@@ -20,6 +20,8 @@ struct CylinderRows {
 
 struct SketchRows {
   Eigen::VectorXd time;            ///< [s]
+  Eigen::VectorXi log;             ///< index in `files`
+  std::vector<std::string> files;  ///< of the logs, then of the test logs
   Eigen::MatrixXd position;        ///< [rows x joints] as logged, NaN where a log has none
   Eigen::MatrixXd q, qd, qdd;      ///< [rows x joints] smoothed
   Eigen::VectorXd position_noise;  ///< [joints] standard deviation, raw

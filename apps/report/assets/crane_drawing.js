@@ -2,7 +2,7 @@
 /* The crane at several instants, and a slider that moves it. */
 (function () {
   const { theme, number, ticks, element, svg } = page;
-  const { line, label } = page.svgTools;
+  const { line, label, textWidth } = page.svgTools;
 
   /* Draws the parts of one instant into an SVG group, with line widths relative to the crane's size; `only` is one
      colour for all parts. */
@@ -16,6 +16,7 @@
     kinds.forEach((kind, i) => {
       const p = points[i];
       if (p.length < 2) return;
+      if (kind === "mark") return drawMark(into, p, plane, unit);
       if (kind === "pin") {
         into.append(svg("circle", { cx: plane.X(p[0]), cy: plane.Z(p[1]), r: 2.4 * unit, fill: theme.paper(),
           stroke: only || steel, "stroke-width": 1.2 * unit }));
@@ -33,6 +34,56 @@
     let text = "";
     for (let i = 0; i < p.length; i += 2) text += plane.X(p[i]).toFixed(1) + "," + plane.Z(p[i + 1]).toFixed(1) + " ";
     return text;
+  }
+
+  /* A halo over a part, or the sign of a centre of mass. */
+  function drawMark(into, p, plane, unit) {
+    const color = theme.color(4);
+    if (p.length > 2) {
+      into.append(svg("polyline", { points: polyline(p, plane), fill: "none", stroke: color, "stroke-width": 13 * unit,
+        "stroke-linecap": "round", opacity: 0.5 }));
+      return;
+    }
+    const x = plane.X(p[0]), y = plane.Z(p[1]), r = 5.5 * unit;
+    into.append(svg("circle", { cx: x, cy: y, r, fill: theme.paper(), stroke: theme.ink(), "stroke-width": 1 }));
+    for (const [dx, dy] of [[1, -1], [-1, 1]])
+      into.append(svg("path", { d: `M${x},${y} h${dx * r} A${r},${r} 0 0 0 ${x},${y + dy * r} Z`, fill: theme.ink() }));
+    into.append(svg("circle", { cx: x, cy: y, r: r + 2.5 * unit, fill: "none", stroke: color, "stroke-width": 2.2 * unit }));
+  }
+
+  const kLineHeight = 16;
+  /* Where the texts of marks stand: a column right of the drawing, in the order of the places' heights at the last instant. */
+  function markTexts(spec) {
+    const marks = spec.marks || [], last = spec.frames[spec.frames.length - 1];
+    if (marks.length === 0 || !last) return [];
+    const parts = spec.kinds.map((kind, i) => i).filter((i) => spec.kinds[i] === "mark");
+    const height = (i) => middle(last.points[i])[1];
+    return marks.map((mark, k) => ({ ...mark, part: parts[k] })).sort((a, b) => (height(b.part) || 0) - (height(a.part) || 0));
+  }
+
+  function middle(p) {
+    return p.length < 4 ? p : [(p[0] + p[2]) / 2, (p[1] + p[3]) / 2];
+  }
+
+  function drawMarkTexts(into, texts, points, plane) {
+    const x = plane.right + 30, size = (t) => (1 + t.lines.length) * kLineHeight + 10;
+    let y = plane.top;
+    const tops = texts.map((t) => {  // as near to its place's height as the texts above allow
+      const p = middle(points[t.part]);
+      const top = Math.max(y, p.length ? plane.Z(p[1]) - size(t) / 2 : y);
+      y = top + size(t);
+      return top;
+    });
+    for (let k = texts.length - 1, floor = plane.height; k >= 0; --k) {
+      tops[k] = Math.max(0, Math.min(tops[k], floor - size(texts[k])));
+      floor = tops[k];
+    }
+    texts.forEach((t, k) => {
+      const p = middle(points[t.part]);
+      if (p.length) into.append(line(plane.X(p[0]), plane.Z(p[1]), x - 6, tops[k] + 10, theme.ink(), 0.9));
+      into.append(label(t.name, x, tops[k] + 14, "start", theme.ink(), { "font-weight": 600 }));
+      t.lines.forEach((text, i) => into.append(label(text, x, tops[k] + 14 + (i + 1) * kLineHeight, "start", theme.ink())));
+    });
   }
 
   function drawPayload(into, tip, plane) {
@@ -136,7 +187,9 @@
   }
 
   page.kinds.crane = function (host, spec) {
-    const plane = page.plane(host, extent(spec), spec, 14, spec.height || 580);
+    const texts = markTexts(spec), widest = Math.max(0, ...texts.flatMap((t) => [t.name, ...t.lines]).map(textWidth));
+    const margin = texts.length ? Math.min(widest + 50, host.clientWidth / 2) : 14;
+    const plane = page.plane(host, extent(spec), spec, margin, spec.height || 580);
     const { content, drawing } = plane, frames = spec.frames;
     drawScene(plane, spec);
     const stills = Math.min(spec.stills, frames.length);
@@ -144,13 +197,17 @@
       const time = frames[0].t + (frames[frames.length - 1].t - frames[0].t) * (stills > 1 ? k / (stills - 1) : 1);
       const still = svg("g", { opacity: (0.1 + 0.3 * (k + 1) / stills).toFixed(2) });
       const frame = between(frames, time);
-      page.drawParts(still, spec.kinds, frame.points, plane, 0.85);
+      // What is marked moves with the crane.
+      const parts = frame.points.map((p, i) => (spec.kinds[i] === "mark" ? [] : p));
+      page.drawParts(still, spec.kinds, parts, plane, 0.85);
       content.append(still);
     }
     drawTipPaths(plane, spec);
     drawObstacleNames(plane, spec);
     const moving = svg("g");
+    const words = svg("g");
     content.append(moving);
+    drawing.append(words);
     drawScaleBar(plane);
     if (frames.length === 0) {
       drawing.append(label("no values", (plane.left + plane.right) / 2, plane.top + 20, "middle"));
@@ -169,6 +226,8 @@
       const frame = between(frames, Math.min(Math.max(time, start), end));
       moving.replaceChildren();
       page.drawParts(moving, spec.kinds, frame.points, plane);
+      words.replaceChildren();
+      drawMarkTexts(words, texts, frame.points, plane);
       if (spec.payload) drawPayload(moving, frame.tip, plane);
       slider.value = time;
       const metres = (v) => v.toFixed(2).replace("-", "−") + " m";

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -72,6 +73,8 @@ const char* part_name(PartKind kind) {
       return "rocker";
     case PartKind::kCoupler:
       return "coupler";
+    case PartKind::kMark:
+      return "mark";
     case PartKind::kPin:
       return "pin";
   }
@@ -311,6 +314,19 @@ json chart_json(const CraneDrawing& chart, Index /*most_points*/) {
   for (const DrawingObstacle& o : chart.obstacles) {
     out["obstacles"].push_back(
         {{"name", o.name}, {"points", flat(o.points)}, {"radius", metre(o.radius)}});
+  }
+  if (!chart.marks.empty()) {
+    if (!chart.frames.empty()) {
+      const auto& parts = chart.frames.front().parts;
+      const auto marked = std::count_if(parts.begin(), parts.end(), [](const DrawingPart& p) {
+        return p.kind == PartKind::kMark;
+      });
+      SPARFLOW_CHECK(static_cast<std::size_t>(marked) == chart.marks.size(),
+                     fmt::format("drawing \"{}\": each mark needs a place", chart.title));
+    }
+    out["marks"] = json::array();
+    for (const DrawingMark& mark : chart.marks)
+      out["marks"].push_back({{"name", mark.name}, {"lines", mark.lines}});
   }
   out["paths"] = json::array();
   for (const DrawingPath& p : chart.paths) {

@@ -132,6 +132,12 @@ struct DrawingPath {
   std::vector<Eigen::Vector2d> points;  ///< [m]
 };
 
+/// What is written beside a marked place of a drawing, with a line to it.
+struct DrawingMark {
+  std::string name;                ///< of the part
+  std::vector<std::string> lines;  ///< below the name
+};
+
 /// The crane at several instants, with a slider that moves it.
 struct CraneDrawing : Figure {
   Quantity x_axis = {"x", "m"};
@@ -141,8 +147,9 @@ struct CraneDrawing : Figure {
   std::vector<DrawingObstacle> obstacles;
   std::vector<DrawingPath> paths;  ///< paths of the tip besides that of the frames, e.g. of a seed
   std::optional<Eigen::Vector2d> goal;
-  std::optional<double> ground;  ///< [m] height of the ground line
-  bool payload = true;           ///< draw a load at the tip
+  std::optional<double> ground;    ///< [m] height of the ground line
+  bool payload = true;             ///< draw a load at the tip
+  std::vector<DrawingMark> marks;  ///< of the frames' parts kMark, in their order
 };
 
 }  // namespace sparflow

@@ -21,6 +21,10 @@ constexpr double kUprightCosine = 0.7071;
 // [-] Share of the shortest pin-to-pin length that the barrel takes; the rest is rod eye and gland.
 constexpr double kBarrelShare = 0.86;
 
+/// Drawings of one joint's way over its range.
+/// @threshold [1] 4..500; chosen: 10 deg apart for a joint that turns around
+constexpr int kFramesOfLeg = 36;
+
 Vector3d axis_in_base(const Machine& machine, const Frames& frames, int joint) {
   const auto j = static_cast<std::size_t>(joint);
   return frames[j].rotation * machine.joints[j].axis;
@@ -137,6 +141,30 @@ double shortest_length(const Machine& machine, int cylinder) {
     }
   }
   return shortest;
+}
+
+/// Where a mark lies at one configuration, in the base frame; empty where a four-bar does not close.
+std::vector<Vector3d> mark_points(const Machine& machine, const Frames& frames, const VectorXd& q,
+                                  const MarkedPlace& mark) {
+  if (mark.link >= 0) {
+    const Link& link = machine.links[static_cast<std::size_t>(mark.link)];
+    Vector3d centre = point_in_base(frames, link.joint, link.cog);
+    if (link.slides_with >= 0)
+      centre +=
+          link.fraction * q[link.slides_with] * axis_in_base(machine, frames, link.slides_with);
+    return {centre};
+  }
+  const Cylinder& c = machine.cylinders[static_cast<std::size_t>(mark.cylinder)];
+  if (!std::holds_alternative<FourBarLinkage>(c.linkage) &&
+      !std::holds_alternative<PinsLinkage>(c.linkage))
+    return {mount(machine, frames, c.joint), frames[static_cast<std::size_t>(c.joint)].position};
+  try {
+    const LinkagePins<double> local = linkage_pins(machine, mark.cylinder, q[c.joint]);
+    return {point_in_base(frames, c.joint - 1, local.barrel),
+            point_in_base(frames, c.joint - 1, local.rod)};
+  } catch (const std::domain_error&) {
+    return {};
+  }
 }
 
 /// Parts of a machine in the order in which they are drawn: pins over everything.
@@ -261,11 +289,21 @@ DrawingFrame drawing_frame(const Machine& machine, const VectorXd& q, double tim
 }
 
 std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajectory& motion,
-                                         int count, const std::optional<DrawingPlane>& fixed) {
+                                         int count, const std::optional<DrawingPlane>& fixed,
+                                         const std::vector<MarkedPlace>& marks) {
   std::vector<DrawingFrame> frames;
   if (motion.size() == 0 || count < 1) return frames;
   const auto add = [&](const VectorXd& q, double time) {
-    frames.push_back(drawing_frame(machine, q, time, fixed ? *fixed : drawing_plane(machine, q)));
+    const DrawingPlane plane = fixed ? *fixed : drawing_plane(machine, q);
+    frames.push_back(drawing_frame(machine, q, time, plane));
+    if (marks.empty()) return;
+    const Frames links = forward_kinematics<double>(machine, q);
+    for (const MarkedPlace& mark : marks) {
+      DrawingPart part{PartKind::kMark, {}};
+      for (const Vector3d& p : mark_points(machine, links, q, mark))
+        part.points.push_back(plane.project(p));
+      frames.back().parts.push_back(std::move(part));
+    }
   };
   if (motion.size() == 1 || count == 1) {
     const Eigen::Index last = motion.size() - 1;
@@ -282,6 +320,29 @@ std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajector
     add(q, time);
   }
   return frames;
+}
+
+Trajectory joint_sweep(const Machine& machine, const VectorXd& posture) {
+  std::vector<VectorXd> q = {posture};
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const Range& range = machine.joints[static_cast<std::size_t>(j)].position;
+    for (const double end : {range.lo, range.hi, posture[j]}) {
+      VectorXd next = posture;
+      next[j] = end;
+      q.push_back(next);
+    }
+  }
+  Trajectory motion;
+  const auto n = static_cast<Eigen::Index>(q.size());
+  motion.t = VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1));
+  motion.q.resize(n, machine.joint_count());
+  for (Eigen::Index k = 0; k < n; ++k) motion.q.row(k) = q[static_cast<std::size_t>(k)].transpose();
+  motion.qd = motion.qdd = Eigen::MatrixXd::Zero(n, machine.joint_count());
+  return motion;
+}
+
+int joint_sweep_frames(const Trajectory& sweep) {
+  return kFramesOfLeg * static_cast<int>(sweep.size() - 1);
 }
 
 }  // namespace sparflow

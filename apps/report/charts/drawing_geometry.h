@@ -11,7 +11,8 @@
 
 namespace sparflow {
 
-enum class PartKind { kLink, kTelescope, kBarrel, kRod, kRocker, kCoupler, kPin };
+/// kMark is no part of the machine; it shows where one is (MarkedPlace).
+enum class PartKind { kLink, kTelescope, kBarrel, kRod, kRocker, kCoupler, kPin, kMark };
 
 /// One polyline (a single point for kPin) in the base frame. It has no points where it cannot be drawn at this
 /// configuration, e.g. a four-bar that does not close.
@@ -31,6 +32,12 @@ struct DrawingFrame {
   double time = 0.0;               ///< [s]
   std::vector<DrawingPart> parts;  ///< the same kinds in the same order at every configuration
   Eigen::Vector2d tip = Eigen::Vector2d::Zero();  ///< [m]
+};
+
+/// What a drawing points at: a cylinder, or the centre of mass of a link. The other number is -1.
+struct MarkedPlace {
+  int cylinder = -1;  ///< from pin to pin; over the joint's travel where a cylinder has no pins
+  int link = -1;      ///< index in Machine::links
 };
 
 /// A plane of the base frame: vertical, or horizontal for the view from above.
@@ -70,7 +77,15 @@ DrawingFrame drawing_frame(const Machine& machine, const Eigen::VectorXd& q, dou
 /// Returns `count` frames evenly spaced in time over a motion, with joint coordinates interpolated linearly between its
 /// instants; one frame when the motion has a single instant, none when it has none.
 /// @param fixed plane of all frames; absent: that of the arm at each instant
+/// @param marks places that get one more part each (kMark) behind those of the machine, in this order
 std::vector<DrawingFrame> drawing_frames(const Machine& machine, const Trajectory& motion,
-                                         int count, const std::optional<DrawingPlane>& fixed = {});
+                                         int count, const std::optional<DrawingPlane>& fixed = {},
+                                         const std::vector<MarkedPlace>& marks = {});
+
+/// Every joint over its whole range in turn while the others stand at the posture, which is also the last instant; one second
+/// for each leg, at rest at its ends.
+Trajectory joint_sweep(const Machine& machine, const Eigen::VectorXd& posture);
+/// Drawings of a sweep that make a smooth motion.
+int joint_sweep_frames(const Trajectory& sweep);
 
 }  // namespace sparflow

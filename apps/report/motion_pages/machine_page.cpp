@@ -14,9 +14,6 @@ namespace {
 /// Samples of a curve over a joint's range.
 /// @threshold [1] 20..2000; chosen: a smooth curve on a screen
 constexpr int kCurveSamples = 121;
-/// Drawings of one joint's way over its range.
-/// @threshold [1] 4..500; chosen: 10 deg apart for a joint that turns around
-constexpr int kFramesOfLeg = 36;
 
 struct ReviewedJoint {
   const Cylinder& cylinder;
@@ -36,27 +33,6 @@ const char* linkage_word(const Cylinder& c) {
   if (std::holds_alternative<PinsLinkage>(c.linkage)) return "pins";
   if (std::holds_alternative<FourBarLinkage>(c.linkage)) return "four_bar";
   return std::holds_alternative<RackLinkage>(c.linkage) ? "rack" : "direct";
-}
-
-/// Every joint over its whole range in turn, the others at the posture; one second for each leg.
-Trajectory sweep(const MachineReview& review) {
-  const Machine& machine = review.machine;
-  std::vector<Eigen::VectorXd> q = {review.posture};
-  for (int j = 0; j < machine.joint_count(); ++j) {
-    const Range& range = machine.joints[static_cast<std::size_t>(j)].position;
-    for (const double end : {range.lo, range.hi, review.posture[j]}) {
-      Eigen::VectorXd next = review.posture;
-      next[j] = end;
-      q.push_back(next);
-    }
-  }
-  Trajectory motion;
-  const auto n = static_cast<Eigen::Index>(q.size());
-  motion.t = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1));
-  motion.q.resize(n, machine.joint_count());
-  for (Eigen::Index k = 0; k < n; ++k) motion.q.row(k) = q[static_cast<std::size_t>(k)].transpose();
-  motion.qd = motion.qdd = Eigen::MatrixXd::Zero(n, machine.joint_count());
-  return motion;
 }
 
 LineChart joint_chart(const ReviewedJoint& r, const std::vector<LinkageSample>& samples,
@@ -141,12 +117,12 @@ Page machine_page(const MachineReview& review) {
   drawing.note =
       "The slider moves one joint after another over its range; the others stand in the posture of "
       "the tables. The line is the tip's path.";
-  const Trajectory motion = sweep(review);
+  const Trajectory motion = joint_sweep(machine, review.posture);
   const DrawingPlane plane = drawing_plane(machine, review.posture);
   drawing.x_axis = {plane.horizontal_name, "m"};
   drawing.z_axis = {plane.vertical_name, "m"};
   drawing.stills = 1;
-  const int frames = kFramesOfLeg * static_cast<int>(motion.size() - 1);
+  const int frames = joint_sweep_frames(motion);
   drawing.frames = drawing_frames(machine, motion, frames);
   drawing.payload = review.payload > 0.0;
   page.plot(std::move(drawing));

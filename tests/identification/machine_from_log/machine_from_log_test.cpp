@@ -290,6 +290,13 @@ TEST(MachineFromLogs, MachineWithoutOpenValuesIsOnlyJudged) {
   ASSERT_TRUE(found.complete());
   EXPECT_TRUE(found.values.empty());
   for (const HeldOutError& e : found.held_out) {
+    ASSERT_EQ(e.forces.size(), 1U) << e.cylinder;  // the curves of a page are the rows of the error
+    const HeldOutForces& rows = e.forces.front();
+    EXPECT_EQ(rows.rows(), e.force_rows);
+    EXPECT_NEAR(std::sqrt((rows.measured - rows.predicted).squaredNorm() /
+                          static_cast<double>(rows.rows())),
+                e.force_rmse, 1e-6);
+    EXPECT_GT((rows.time.tail(rows.rows() - 1) - rows.time.head(rows.rows() - 1)).minCoeff(), 0.0);
     // What the program warns of: noise of 0.5 bar on 38 cm^2 is a tenth of the telescope's small force.
     EXPECT_LT(e.force_rmse, MachineFromLogOptions{}.warn_residual * e.force_variation)
         << e.cylinder;
