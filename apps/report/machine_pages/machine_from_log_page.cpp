@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostCurves = 40;
 /// Rows further apart are not joined in a curve.
 /// @threshold [s] 0.1..5; chosen: shorter than a rest between moves; rods that creep fall below the speed of judged rows
-constexpr double kJoin = 1.0;
+constexpr double kJoinedRows = 1.0;
 
 void add_values(Page& page, const std::string& title, const std::vector<FoundValue>& values) {
   if (values.empty()) return;
@@ -128,7 +128,7 @@ LineChart force_curves(const HeldOutError& e, const HeldOutForces& forces, int c
     predicted.push_back(p / 1e3);
   };
   for (Index k = 0; k < n; ++k) {
-    if (k > 0 && forces.time[k] - forces.time[k - 1] > kJoin)
+    if (k > 0 && forces.time[k] - forces.time[k - 1] > kJoinedRows)
       append(0.5 * (forces.time[k] + forces.time[k - 1]), kNaN, kNaN);
     append(forces.time[k], forces.measured[k], forces.predicted[k]);
   }
