@@ -1,6 +1,7 @@
 /// Comparisons of motions: strategies, energy against time, and recorded moves beside their optimum.
 #include <fmt/format.h>
 
+#include "apps/python/kept_parts.h"
 #include "apps/python/long_call.h"
 #include "apps/python/motion.h"
 #include "apps/python/result.h"
@@ -97,6 +98,14 @@ double number_given(const char* option, const py::object& value, double most) {
   return number;
 }
 
+/// All that a comparison depends on but its problems. The number of processes is no part of it.
+std::string options_of(const StrategiesTask& task, const py::dict& a) {
+  return fmt::format(
+      "strategies --time {} --idle {} --paths {} --orders {} --seed {} --intervals {}",
+      a["time"].cast<std::string>(), task.idle_kw, task.seeds.count,
+      task.options.baselines.polished_orders, task.seeds.random_seed, task.intervals);
+}
+
 std::shared_ptr<Strategies> compare_problems(const std::vector<Problem>& given, const py::dict& a) {
   StrategiesTask task;
   read_times(a["time"].cast<std::string>(), task.options);
@@ -117,11 +126,21 @@ std::shared_ptr<Strategies> compare_problems(const std::vector<Problem>& given, 
     problems.push_back(p.task);
   }
   if (problems.empty()) throw UsageError("strategies: expected at least one problem, got none");
+  std::vector<std::string> files;
+  std::string options = options_of(task, a);
+  for (const SharedProblem& p : problems) {
+    files.push_back(p->problem.file);
+    options += "; " + identity_of(p->model);
+  }
+  const std::shared_ptr<Journal> journal = journal_of("strategies", a, files, options);
   std::shared_ptr<Strategies> result =
-      long_call<Strategies>(a["progress"], [problems, task](const Listener& working) {
-        Journal none;
-        return std::make_shared<Strategies>(problems,
-                                            strategies_task(problems, task, none, working));
+      long_call<Strategies>(a["progress"], [problems, task, journal](const Listener& working) {
+        tell_of_trouble(*journal, working);
+        auto done = std::make_shared<Strategies>(
+            problems, strategies_task(problems, task, *journal, working));
+        const ComparedStrategies& c = done->compared();
+        if (!c.interrupted && !any_interrupted(c.all) && c.broken == 0) journal->remove();
+        return done;
       });
   if (!result->compared().has_optimum())
     raise_unsolved("InfeasibleError", result->headline(), py::cast(result));
@@ -139,10 +158,18 @@ std::shared_ptr<Pareto> energy_over_time(const Problem& problem, const py::dict&
   task.seeds.random_seed = a["seed"].cast<std::uint64_t>();
   task.intervals = a["intervals"].cast<int>();
   task.processes = a["processes"].cast<int>();
-  std::shared_ptr<Pareto> result =
-      long_call<Pareto>(a["progress"], [both = problem.task, task](const Listener& listener) {
-        Journal none;
-        return std::make_shared<Pareto>(both, pareto_task(*both, task, none, listener));
+  const std::shared_ptr<Journal> journal = journal_of(
+      "pareto", a, {problem.task->problem.file},
+      fmt::format(
+          "pareto --points {} --longest {} --idle {} --paths {} --seed {} --intervals {}; {}",
+          task.points, task.longest, fmt::join(task.idle_kw, ","), task.seeds.count,
+          task.seeds.random_seed, task.intervals, identity_of(problem.task->model)));
+  std::shared_ptr<Pareto> result = long_call<Pareto>(
+      a["progress"], [both = problem.task, task, journal](const Listener& listener) {
+        tell_of_trouble(*journal, listener);
+        auto done = std::make_shared<Pareto>(both, pareto_task(*both, task, *journal, listener));
+        if (!done->curve().interrupted) journal->remove();
+        return done;
       });
   if (result->curve().points.empty())
     raise_unsolved("InfeasibleError", result->curve().message, py::cast(result));

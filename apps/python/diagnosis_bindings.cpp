@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <optional>
 
 #include "apps/python/bindings.h"
+#include "apps/python/kept_parts.h"
 #include "apps/python/long_call.h"
 #include "apps/python/result.h"
 #include "apps/report/model_pages/diagnose_page.h"
@@ -122,6 +125,18 @@ std::shared_ptr<Extended> extend_model(const CraneModel& model, const py::dict& 
       });
 }
 
+/// All that an improvement depends on; its logs are objects as a rule.
+std::string inputs_in_words(const Inputs& inputs, const py::dict& a) {
+  std::string words =
+      fmt::format("improve --max-steps {} candidates {}; {}", a["max_steps"].cast<int>(),
+                  py::str(a["candidates"]).cast<std::string>(), identity_of(inputs.model));
+  for (const auto* list : {&inputs.logs.suspects, &inputs.logs.references, &inputs.logs.tests}) {
+    words += fmt::format("; {} logs", list->size());
+    for (const Log& log : *list) words += fmt::format(" {} {}", log.file, log.sha256);
+  }
+  return words;
+}
+
 std::shared_ptr<Extended> improve_model(const CraneModel& model, const py::dict& a) {
   const std::shared_ptr<Inputs> inputs = inputs_of("improve", model, a);
   ExtendOptions options;
@@ -129,13 +144,17 @@ std::shared_ptr<Extended> improve_model(const CraneModel& model, const py::dict&
   options.max_steps = a["max_steps"].cast<int>();
   options.date = today();
   options.diagnose.candidates = inputs->candidates;
-  std::shared_ptr<Extended> result =
-      long_call<Extended>(a["progress"], [inputs, options](const Listener& listener) {
-        tell_what_is_reference(inputs->model, inputs->logs, listener);
-        return std::make_shared<Extended>(
-            improve(inputs->model, inputs->logs, options, progress_or_stop(listener)));
-      });
-  return result;
+  const std::shared_ptr<Journal> journal =
+      journal_of("improve", a, {}, inputs_in_words(*inputs, a));
+  options.journal = journal.get();
+  return long_call<Extended>(a["progress"], [inputs, options, journal](const Listener& listener) {
+    tell_of_trouble(*journal, listener);
+    tell_what_is_reference(inputs->model, inputs->logs, listener);
+    auto done = std::make_shared<Extended>(
+        improve(inputs->model, inputs->logs, options, progress_or_stop(listener)));
+    if (!done->result().interrupted) journal->remove();
+    return done;
+  });
 }
 
 std::shared_ptr<Selftested> selftest_logs(const CraneModel& model, const py::dict& a) {

@@ -4,6 +4,7 @@
 #include <deque>
 
 #include "apps/python/bindings.h"
+#include "apps/python/kept_parts.h"
 #include "apps/python/long_call.h"
 #include "apps/python/result.h"
 #include "apps/report/motion_pages/benchmark_page.h"
@@ -241,11 +242,16 @@ std::shared_ptr<Benchmarked> run_benchmark(const py::dict& a) {
   }
   const auto work =
       std::make_shared<BenchmarkWork>(benchmark_work(task, Listener{warn, warn, {}, {}}));
+  std::string options = benchmark_fingerprint(*work, task);
+  if (task.model) options += "; " + identity_of(*task.model);
+  const std::shared_ptr<Journal> journal = journal_of("benchmark", a, {}, options);
   return long_call<Benchmarked>(
       a["progress"],
-      [work, task](const Listener& listener) {
-        Journal none;
-        return std::make_shared<Benchmarked>(benchmark_task(*work, task, none, listener));
+      [work, task, journal](const Listener& listener) {
+        tell_of_trouble(*journal, listener);
+        auto done = std::make_shared<Benchmarked>(benchmark_task(*work, task, *journal, listener));
+        if (!done->result().interrupted && done->result().broken == 0) journal->remove();
+        return done;
       },
       telling);
 }

@@ -39,6 +39,14 @@ def program():
     return pathlib.Path(os.environ["SPARFLOW_BINARY_DIR"]) / "sparflow"
 
 
+@pytest.fixture
+def scenario(tmp_path):
+    path = tmp_path / "lift.yaml"
+    path.write_text("id: lift\nmachine: loader_crane\nstart: {q: {boom: 0.2, jib: -1.2, extension: 0.6}}\npayload_kg: 200\n"
+                    "goals: [{q: {boom: 0.3, jib: -1.1, extension: 0.7}, duration_s: 8}]\ntolerance_m: 0.2\nseeds: [1, 2]\n")
+    return path
+
+
 TIMES = {"solve_s", "callbacks_s", "linear_solver_s", "stages", "bound_s"}
 
 

@@ -85,14 +85,6 @@ def test_an_optimised_motion_is_tracked(machine):
     assert abs(q[0] - motion.q[0, 0]) < 0.01 and abs(q[-1] - motion.q[-1, 0]) < 0.03  # [rad] what feedback leaves
 
 
-@pytest.fixture
-def scenario(tmp_path):
-    path = tmp_path / "lift.yaml"
-    path.write_text("id: lift\nmachine: loader_crane\nstart: {q: {boom: 0.2, jib: -1.2, extension: 0.6}}\npayload_kg: 200\n"
-                    "goals: [{q: {boom: 0.3, jib: -1.1, extension: 0.7}, duration_s: 8}]\ntolerance_m: 0.2\nseeds: [1, 2]\n")
-    return path
-
-
 class Straight:
     """The controller of examples/own_controller.py."""
 

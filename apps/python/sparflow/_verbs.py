@@ -58,15 +58,18 @@ def extend(model, logs, add=(), test=None, *, remove="", threads=0, effects=None
 
 
 def improve(model, logs, references=None, test=None, *, max_steps=12, candidates=None, threads=0, effects=None,
-            progress=None):
+            journal=None, resume=False, progress=None):
     """Repeats diagnose and extend until no effect is missing; returns an ExtendResult.
 
     Only effects that lower the error on data that took no part are kept. After Ctrl-C the exception's `result` has the
     steps done, where the work answered in time.
+    journal: path of a file that takes every finished part at once; a call that ends whole deletes it. resume: take what the
+    journal of an earlier call with the same inputs and options has; InputError for one of other inputs.
     """
     return core.improve(_inputs.one("improve", model, core.Model), dict(
         logs=logs, references=references, test=test, max_steps=_inputs.whole("improve", "max_steps", max_steps, 1, 20),
-        candidates=candidates, threads=_inputs.threads("improve", threads), effects=effects, progress=progress))
+        candidates=candidates, threads=_inputs.threads("improve", threads), effects=effects, journal=journal, resume=bool(resume),
+        progress=progress))
 
 
 def selftest(model, logs, references=None, *, check=6, candidates=None, effects=None, progress=None):
@@ -106,7 +109,8 @@ def _several(given, one):
     return [given] if isinstance(given, one) else list(given)
 
 
-def strategies(problems, *, time="equal", idle_kW=None, paths=8, orders=4, seed=1, intervals=0, processes=0, progress=None):
+def strategies(problems, *, time="equal", idle_kW=None, paths=8, orders=4, seed=1, intervals=0, processes=0, journal=None,
+               resume=False, progress=None):
     """Compares sequential, simultaneous and energy-optimal motions of one Problem or several; returns a StrategiesResult.
 
     time: 'equal' (the problem's duration), 'own' (the best time of each strategy, with idle power), factors of the shortest
@@ -114,24 +118,28 @@ def strategies(problems, *, time="equal", idle_kW=None, paths=8, orders=4, seed=
     paths, seed: of the search for paths. orders: of the cylinders, whose segments are optimised. intervals: of the mesh, 0 is
     the problem's. processes: problems solved in parallel, 0 is one for each processor.
     Raises InfeasibleError where no energy-optimal motion was found; after Ctrl-C the exception's `result` has the problems done.
+    journal: path of a file that takes every finished part at once; a call that ends whole deletes it. resume: take what the
+    journal of an earlier call with the same inputs and options has; InputError for one of other inputs.
     """
     return core.strategies(_inputs.several("strategies", problems, core.Problem), dict(
         time=str(time), idle_kW=idle_kW, paths=paths, orders=orders, seed=_inputs.seed("strategies", seed), intervals=intervals,
-        processes=processes, progress=progress))
+        processes=processes, journal=journal, resume=bool(resume), progress=progress))
 
 
 def pareto(problem, *, points=14, longest=6.0, idle_kW=(1, 2, 5, 10, 15), paths=8, seed=1, intervals=0, processes=0,
-           progress=None):
+           journal=None, resume=False, progress=None):
     """Computes the least energy over the duration of a Problem; returns a ParetoResult.
 
     points: number of durations besides those that search for the shortest. longest: the longest duration over the shortest.
     idle_kW: idle powers [kW] for which the best duration is told. paths, seed, intervals: as in optimize. processes: starts
     solved in parallel, 0 is two.
     Raises InfeasibleError where there is no motion; after Ctrl-C the exception's `result` has the points done.
+    journal: path of a file that takes every finished part at once; a call that ends whole deletes it. resume: take what the
+    journal of an earlier call with the same inputs and options has; InputError for one of other inputs.
     """
     return core.pareto(_inputs.one("pareto", problem, core.Problem), dict(
         points=points, longest=longest, idle_kW=list(idle_kW), paths=paths, seed=_inputs.seed("pareto", seed),
-        intervals=intervals, processes=processes, progress=progress))
+        intervals=intervals, processes=processes, journal=journal, resume=bool(resume), progress=progress))
 
 
 def audit(model, logs, *, payload_kg=None, pause_s=1.0, moves=40, litres_per_kWh=0.0, engine_map=None, bound=True,
@@ -181,7 +189,7 @@ def simulate(machine, *, seconds=60.0, rate=50.0, seed=1, effects=(), plant=None
 
 
 def benchmark(scenarios, controllers=None, *, model=None, functions=None, processes=None, gains=None, reference="", seeds=0,
-              optimum=True, bound=True, sway_deg=0.0, step_budget_s=0.5, jobs=0, progress=None):
+              optimum=True, bound=True, sway_deg=0.0, step_budget_s=0.5, jobs=0, journal=None, resume=False, progress=None):
     """Compares controllers on the dynamic plant: true energy, time, errors; returns a BenchmarkResult.
 
     scenarios: a path of a scenario or a folder of them, or several. controllers: names of the program's; None is all of them,
@@ -195,6 +203,9 @@ def benchmark(scenarios, controllers=None, *, model=None, functions=None, proces
     controller in each scenario; 0 is the scenario's seeds. optimum, bound: also the energy-optimal motion and its lower bound.
     sway_deg: limit of the payload's sway for which these motions are planned, 0 is none.
     jobs: runs at the same time, 0 is one for each processor. After Ctrl-C the exception's `result` has the runs done.
+    journal: path of a file that takes every finished part at once; a call that ends whole deletes it. resume: take what the
+    journal of an earlier call with the same inputs and options has; InputError for one of other inputs. What functions and
+    programs of your own do is not known to it: after a change of one, begin anew.
     """
     functions, processes = dict(functions or {}), dict(processes or {})
     for function in functions.values():
@@ -205,7 +216,8 @@ def benchmark(scenarios, controllers=None, *, model=None, functions=None, proces
         functions=[(name, _controllers.words(f), lambda f=f: _controllers.asked(f)) for name, f in functions.items()],
         processes=[f"{name}={command}" for name, command in processes.items()],
         gains=[f"{name}={value!r}" for name, value in dict(gains or {}).items()], model=model, reference=reference, seeds=seeds,
-        optimum=optimum, bound=bound, sway_deg=sway_deg, step_budget_s=step_budget_s, jobs=jobs, progress=progress))
+        optimum=optimum, bound=bound, sway_deg=sway_deg, step_budget_s=step_budget_s, jobs=jobs, journal=journal,
+        resume=bool(resume), progress=progress))
 
 
 def loop_of_trust(machine, *, train_seconds=200.0, test_seconds=100.0, rate=25.0, most_effects=12, moves=3, seed=1, effects=(),
