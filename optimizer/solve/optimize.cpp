@@ -76,7 +76,10 @@ class Search {
     if (options.modes && options.free_phases && options.search_intervals > 0)
       coarse_.intervals = std::min(options.intervals, options.search_intervals);
     coarse_.phase_iterations = options.phase_iterations / 2;
-    coarse_.plane_solves = std::min(options.plane_solves, 2);
+    /// Solves of a start with renewed planes in the search.
+    /// @threshold [solves] 1..10; chosen: starts need only be compared; the last meshes go on
+    constexpr int kPlaneSolves = 2;
+    coarse_.plane_solves = std::min(options.plane_solves, kPlaneSolves);
     if (options.modes && options.free_phases)
       coarse_.tolerance = std::max(options.tolerance, kSearchTolerance);
     // Near obstacles a solve takes ten times longer, and seeds differ more than neighbouring sequences do.
