@@ -94,11 +94,23 @@ TEST(MachineFromLogPage, DrawsEveryRowThatJudgesOnceOverTimeAndOnceAgainstTheOth
   EXPECT_EQ(clouds[0]["of"], found.held_out[0].force_rows);
   EXPECT_EQ(clouds[1]["of"], found.held_out[1].force_rows);
   EXPECT_TRUE(clouds[0]["diagonal"].get<bool>());
+  // The first log's forces are predicted 1 kN too high, the second's 2 kN; figures have four digits or more.
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
+    const auto& group = clouds[k]["groups"][0];
+    ASSERT_EQ(group["x"].size(), group["y"].size());
+    const std::size_t first = k == 0 ? 40 : 60;
+    for (std::size_t i = 0; i < group["x"].size(); ++i)
+      EXPECT_NEAR(group["y"][i].get<double>() - group["x"][i].get<double>(), i < first ? 1.0 : 2.0,
+                  0.01);
+  }
   const auto curves = figures(page, "lines");
   ASSERT_EQ(curves.size(), 4U);  // a log, a cylinder
   const Eigen::Index rows[] = {40, 60, 20, 20};
   for (std::size_t k = 0; k < curves.size(); ++k) {
-    for (const auto& series : curves[k]["series"]) {
+    const auto& both = curves[k]["series"];
+    EXPECT_NEAR(both[1]["y"][3].get<double>() - both[0]["y"][3].get<double>(), k < 2 ? 1.0 : 2.0,
+                0.01);
+    for (const auto& series : both) {
       const auto& y = series["y"];
       const auto values =
           std::count_if(y.begin(), y.end(), [](const auto& v) { return !v.is_null(); });
