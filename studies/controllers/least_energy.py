@@ -34,6 +34,8 @@ def main():
     least = [s for s in done if all(energy[s, mine] <= energy.get((s, c), float("inf")) for c in others)]
     print(f"{mine}: done {len(done)} of {len(scenarios)}; less true energy than each of {', '.join(others)}: "
           f"{len(least)} of {len(scenarios)}")
+    near = [s for s in done if all(energy[s, mine] <= 1.02 * energy.get((s, c), float("inf")) for c in others)]
+    print(f"  within 2 % of the least of them: {len(near)} of {len(scenarios)}")
     for c in others:
         both = [s for s in done if (s, c) in energy]
         if both:
@@ -50,6 +52,14 @@ def main():
     if known:
         errors = [promised[s] / energy[s, mine] - 1 for s in known]
         print(f"  predicted less true energy: {shares(errors)}; without sign {100 * statistics.median(map(abs, errors)):.1f} %")
+        true_above = [energy[s, mine] / promised[s] - 1 for s in known]
+        print(f"  true above predicted: {shares(true_above)}; within 5 % in {sum(abs(e) <= 0.05 for e in true_above)}")
+    for machine in sorted({s.rstrip("0123456789").rstrip("_") for s in known}):
+        own = [s for s in known if s.startswith(machine)]
+        saved = [1 - energy[s, mine] / energy[s, "joint_pi"] for s in own if (s, "joint_pi") in energy]
+        print(f"  {machine}: true above predicted {shares([energy[s, mine] / promised[s] - 1 for s in own])}")
+        if saved:
+            print(f"    saved against joint PI {shares(saved)}")
     both = [s for s in scenarios if all((s, c) in energy for c in ("sequential_operator", "simultaneous_operator"))]
     if both:
         more = [energy[s, "sequential_operator"] / energy[s, "simultaneous_operator"] - 1 for s in both]
