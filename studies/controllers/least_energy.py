@@ -27,7 +27,7 @@ def main():
     mine = sys.argv[2] if len(sys.argv) > 2 else "tracked_optimum"
     rows = result["rows"]
     scenarios = sorted({row["scenario"] for row in rows})
-    others = sorted({row["controller"] for row in rows} - {mine, "replanned_optimum"})
+    others = sorted({row["controller"] for row in rows} - {mine, "tracked_optimum", "replanned_optimum"})
     energy, end = mean_by_scenario(rows, "energy_J"), mean_by_scenario(rows, "tip_error_end_m")
     way = mean_by_scenario(rows, "tip_error_path_m")
     done = [s for s in scenarios if (s, mine) in energy]
