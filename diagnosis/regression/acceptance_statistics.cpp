@@ -117,6 +117,7 @@ bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>
     const double lo = design.lower[static_cast<std::size_t>(k)];
     const double hi = design.upper[static_cast<std::size_t>(k)];
     const double edge = kOnBound * (hi - lo);
+    if (!design.parameter_acts(k)) continue;
     if (theta[k] > hi - edge || (lo > 0.0 && theta[k] < lo + edge)) return true;
   }
   return false;

@@ -74,6 +74,11 @@ bool is_optional(const EffectDesign& design, Index k) {
 
 }  // namespace
 
+bool EffectDesign::parameter_acts(Index k) const {
+  return std::any_of(columns.begin(), columns.end(),
+                     [&](const MatrixXd& m) { return m.cols() > 0 && !m.col(k).isZero(0.0); });
+}
+
 bool EffectDesign::acts() const {
   return std::any_of(columns.begin(), columns.end(),
                      [](const MatrixXd& c) { return c.cols() > 0; });

@@ -22,6 +22,8 @@ struct EffectDesign {
   std::uint64_t number = 0;
 
   bool acts() const;
+  /// Whether linear parameter k acts in any channel; what does not act is not determined by the data.
+  bool parameter_acts(Eigen::Index k) const;
   bool touches(std::size_t channel) const { return columns[channel].cols() > 0; }
 };
 

@@ -128,6 +128,7 @@ class Estimator {
     EffectEstimate out;
     out.log_likelihood = log_likelihood;
     out.effects = applied(found);
+    for (const FoundEffect& f : found) out.significant.push_back(!f.not_significant);
     add_notes(out);
     tell(1.0, "parameters of the effects");
     return out;
@@ -157,7 +158,8 @@ class Estimator {
     how.whole_motions = how.whole_motions || sharp_;
     Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, how);
     // a lag keeps the valve openings of the dead band known before, also while both are estimated
-    for (MachineSeries& s : evidence.series) s = with_openings(known_, std::move(s));
+    for (MachineSeries& s : evidence.series)
+      s = with_passed_flows(known_, with_openings(known_, std::move(s)));
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
     return evidence;

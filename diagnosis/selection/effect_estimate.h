@@ -37,8 +37,10 @@ struct EstimateLogs {
 
 struct EffectEstimate {
   std::vector<AppliedEffect> effects;  ///< in the order of `wanted`, with 95 % intervals
-  std::vector<std::string> notes;      ///< which parameters lie on their bounds; whole sentences
-  double log_likelihood = 0.0;         ///< [nats]
+  std::vector<bool>
+      significant;  ///< of each: its joint 95 % region (sampling error alone) excludes zero
+  std::vector<std::string> notes;  ///< which parameters lie on their bounds; whole sentences
+  double log_likelihood = 0.0;     ///< [nats]
 };
 
 /// @param model its margins give the first estimate of pump demand; its effects are initial values of those in `wanted`

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/regression/acceptance_statistics.h"
+#include "identification/comparison/report_numbers.h"
 #include "models/math/linear_algebra.h"
 
 namespace sparflow {
@@ -33,7 +34,7 @@ bool less_than_plausible(const EffectDesign& design, const VectorXd& theta) {
   for (Index k = 0; k < design.linear; ++k) {
     const double lo = design.lower[static_cast<std::size_t>(k)];
     const double hi = design.upper[static_cast<std::size_t>(k)];
-    if (lo > 0.0 && theta[k] < lo + kOnBound * (hi - lo)) return true;
+    if (lo > 0.0 && theta[k] < lo + kOnBound * (hi - lo) && design.parameter_acts(k)) return true;
   }
   return false;
 }
@@ -61,6 +62,20 @@ bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
     if (!p.linear && !p.choice && std::abs(values[k]) <= half[k]) return true;
   }
   return false;
+}
+
+/// A linear parameter that acts in no channel and cannot be zero keeps its typical value, with an interval that says nothing.
+void set_undetermined(FoundEffect& f) {
+  Index linear = 0;
+  const std::vector<EffectParameter>& parameters = f.design.effect.effect->info().parameters;
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (!parameters[k].linear || f.design.parameter_acts(linear++) || parameters[k].lower <= 0.0)
+      continue;
+    const double half = 2.0 * kUndeterminedWidth * parameters[k].typical;
+    f.values[k] = parameters[k].typical;
+    f.lower95[k] = f.values[k] - half;
+    f.upper95[k] = f.values[k] + half;
+  }
 }
 
 }  // namespace
@@ -105,6 +120,7 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
       f.lower95[k] -= whole;
       f.upper95[k] += whole;
     }
+    set_undetermined(f);
     plain += linear;
     at += designs[i].linear;
   }

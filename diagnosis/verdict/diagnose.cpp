@@ -118,19 +118,36 @@ void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
   d.search.final = fit_without(d, d.search.found.size());
 }
 
-/// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets.
+/// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets. An effect that is not
+/// significant by the values that would be reported is no finding; the last one found goes first, because others may hold part of it.
 void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signals,
-                         const EvidenceOptions& evidence, std::vector<FoundEffect>& found) {
-  std::vector<EffectAt> wanted;
-  wanted.reserve(found.size());
-  for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
+                         const EvidenceOptions& evidence, Diagnosis& d) {
   EstimateOptions options;
   options.evidence = evidence;
   options.differences = !signals.references.empty();
-  const EffectEstimate all = estimate_effects(
-      model, wanted,
-      {signals.suspects, signals.references, {}, effects_in_references(model, signals.references)},
-      {}, options);
+  std::vector<FoundEffect>& found = d.search.found;
+  const std::size_t before = found.size();
+  EffectEstimate all;
+  while (!found.empty()) {
+    std::vector<EffectAt> wanted;
+    wanted.reserve(found.size());
+    for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
+    all = estimate_effects(model, wanted,
+                           {signals.suspects,
+                            signals.references,
+                            {},
+                            effects_in_references(model, signals.references)},
+                           {}, options);
+    const auto nothing = std::find(all.significant.rbegin(), all.significant.rend(), false);
+    if (nothing == all.significant.rend()) break;
+    const auto at = std::ssize(found) - 1 - (nothing - all.significant.rbegin());
+    d.notes.push_back(fmt::format(
+        "{} is not named: the 95 % region of its values, estimated together, contains zero",
+        effect_key(wanted[static_cast<std::size_t>(at)].effect->info(), model.machine,
+                   wanted[static_cast<std::size_t>(at)].at)));
+    found.erase(found.begin() + at);
+  }
+  if (found.size() < before) d.search.final = fit_without(d, found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     found[i].values = all.effects[i].values;
     found[i].lower95 = all.effects[i].lower95;
@@ -274,8 +291,7 @@ Diagnosis diagnose_once(const CraneModel& model, const DiagnosisSignals& signals
   if (progress) progress(0.92, "searching for unmodelled structure in the residual");
   const std::vector<ResidualStructure> unmodelled = find_unmodelled(options, d);
   drop_minor_effects(d, options.search);
-  if (!d.search.found.empty())
-    set_joint_estimates(model, signals, options.evidence, d.search.found);
+  set_joint_estimates(model, signals, options.evidence, d);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe_effect(d, i, options.search));
   set_verdict(unmodelled, d);

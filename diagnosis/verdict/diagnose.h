@@ -107,14 +107,10 @@ struct VerdictOptions {
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double structure_false_alarm = 0.01;
   /// RMS of a channel's residual over that in the references, above which it is a difference although no effect and no signal
-  /// explains it.
+  /// explains it, of a structure in it over that of one in the references or over what they leave there beyond the sensors' noise,
+  /// below which it may be shared, and of what an effect leaves over what the references leave, above which it may be a minor one.
   /// @threshold [1] 1..; chosen: other motions alone change it by half; of twice the error three quarters of the square are new
   double least_excess_ratio = 2.0;
-  /// RMS of a structure in the references, or of what they leave in that channel beyond the sensors' noise, over that of
-  /// a structure in the suspect logs, from which the latter may be shared.
-  /// @threshold [1] 0..; chosen: half of the squared error; a structure near the residual models' own limits is found in
-  /// one log and missed in the other
-  double shared_structure_ratio = 0.7;
   /// Probability, over all effects found together, with which an effect is taken for a change although its size differs
   /// from that in the references no more than from motion to motion.
   /// @threshold [1] 0..1; chosen: one log in a hundred
@@ -127,6 +123,9 @@ struct VerdictOptions {
   /// change but a law that is not exact. The effect has passed the test above already.
   /// @threshold [1] 0..0.5; chosen: one in twenty, in the effect's own channels
   double excess_false_alarm = 0.05;
+  /// Share of the squared residual beyond that of the references which a found effect must explain in such a channel.
+  /// @threshold [1] 0..1; chosen: half; the motions of a log alone can make its residual larger, with the effect and without it
+  double least_excess_explained = 0.5;
   /// Absorbed share of an effect from which its size in single motions is not compared, but its parameters in all of them.
   /// @threshold [1] 0..1; chosen: more of it is learned than left
   double absorbed_by_learned_laws = 0.5;

@@ -311,8 +311,7 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
       find_residual_structure(swapped, d.search.final, options.residual);
   for (std::size_t i = 0; i < left.size(); ++i) {
     const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
-      return r.channel == left[i].channel &&
-             r.rms >= d.thresholds.shared_structure_ratio * left[i].rms;
+      return r.channel == left[i].channel && d.thresholds.least_excess_ratio * r.rms >= left[i].rms;
     });
     const std::size_t channel = left[i].channel;
     const double floor = d.evidence.channels[channel].noise_floor;
@@ -321,12 +320,13 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
     const double here =
         std::min(left[i].rms, suspect_rms(d.evidence, channel, d.search.final.residual[channel]));
     const bool room = rms * rms - (std::isfinite(floor) ? floor * floor : 0.0) >=
-                      std::pow(d.thresholds.shared_structure_ratio * here, 2);
+                      std::pow(here / d.thresholds.least_excess_ratio, 2);
     // one that is weaker than what counts as an oscillation is one all the same
     const bool oscillates =
         left[i].oscillation &&
-        strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
-            d.thresholds.shared_structure_ratio * left[i].rms;
+        d.thresholds.least_excess_ratio *
+                strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
+            left[i].rms;
     shared[i] = (found || room || oscillates) && !exceeds_references(d, channel);
   }
   return shared;
@@ -346,8 +346,18 @@ struct SizeVerdict {
   Proof proof = Proof::kClearExcess;
 };
 
+/// Share of the squared residual of a channel in the suspect logs beyond that in the references that goes when a residual
+/// becomes that of the final fit.
+double explained_excess(const Diagnosis& d, const Diagnosis& without, std::size_t channel) {
+  const auto square = [&](const Diagnosis& of) {
+    return std::pow(suspect_rms(of.evidence, channel, of.search.final.residual[channel]), 2);
+  };
+  const double excess = square(without) - std::pow(reference_rms(d, channel), 2);
+  return excess > 0.0 ? (square(without) - square(d)) / excess : 1.0;
+}
+
 /// Whether the residual of one of its channels in the suspect logs exceeds that in the references once the action of a found
-/// effect is left in it, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
+/// effect is left in it, and mostly for that reason, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
 bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
   Index first = 0;
   for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
@@ -360,6 +370,7 @@ bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
         design.columns[c] * d.search.final.theta.segment(first, design.linear);
     const std::optional<Excess> excess = excess_over_references(without, c);
     if (!excess) return true;
+    if (explained_excess(d, without, c) < d.thresholds.least_excess_explained) continue;
     least = std::min({least, excess->level, excess->largest});
     tests += kWaysToExceed;
   }
@@ -379,6 +390,16 @@ void trace_sizes(const Diagnosis& d, const EffectAt& effect, const SizeByLogs& s
              shared ? "change of " : "",
              effect_key(effect.effect->info(), *d.evidence.series[0].machine, effect.at),
              in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
+}
+
+/// Standard error of the difference of both sizes by sampling alone over that with the law's form error: the deviation of the law from
+/// the machine is another one in other motions, in proportion to the part of the effect that both groups have.
+double share_beside_form(const SizeByLogs& sizes, double form) {
+  const double sampling =
+      std::hypot(sizes.suspects.standard_error, sizes.references.standard_error);
+  const double here = sizes.suspects.size, there = sizes.references.size;
+  const double common = here * there > 0.0 ? std::min(std::abs(here), std::abs(there)) : 0.0;
+  return sampling / std::hypot(sampling, form * common);
 }
 
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
@@ -436,22 +457,28 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
     return {InReferences::kVaries, Proof::kClearExcess};
-  if (!both || there.blocks == 0 || !significant(here.size / there.standard_error))
-    return {InReferences::kNot, here.blocks > 0 && certain(here.size / here.standard_error)
-                                    ? Proof::kNone
-                                    : Proof::kExcess};
-  const double form = form_share(*suspect.effect.effect, options.regression);
+  if (!both || there.blocks == 0)
+    return {InReferences::kNot, here.blocks == 0                           ? Proof::kClearExcess
+                                : certain(here.size / here.standard_error) ? Proof::kNone
+                                                                           : Proof::kExcess};
+  // The references cannot tell whether they have it.
+  if (!significant(here.size / there.standard_error))
+    return {InReferences::kNot, here.blocks == 0              ? Proof::kClearExcess
+                                : certain(sizes.difference()) ? Proof::kNone
+                                                              : Proof::kExcess};
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(
       d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
   // the direction in which they differ most is chosen by the data, so that its square has as many degrees of freedom
-  const double difference =
+  const double beside_sampling =
       suspect.linear > 1
           ? std::max(std::abs(sizes.difference()),
                      deviate_of_chi_square(std::pow(change.difference(), 2), suspect.linear))
           : std::abs(sizes.difference());
-  if (!significant(difference) || std::abs(here.size - there.size) <= form * there.size) return {};
+  const double form = form_share(*suspect.effect.effect, options.regression);
+  const double difference = beside_sampling * share_beside_form(sizes, form);
+  if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
       certain(difference) ? Proof::kNone : Proof::kExcess};
@@ -459,7 +486,31 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
 
 }  // namespace
 
+void trace_beside_shared(const Diagnosis& d, std::size_t found) {
+  Index first = 0;
+  for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
+  const EffectDesign& design = d.search.found[found].design;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!design.touches(c)) continue;
+    const VectorXd a = design.columns[c] * d.search.final.theta.segment(first, design.linear);
+    const double act = suspect_rms(d.evidence, c, a);
+    const double now = suspect_rms(d.evidence, c, d.search.final.residual[c]);
+    const double with = suspect_rms(d.evidence, c, d.search.final.residual[c] + a);
+    const double ref = reference_rms(d, c), fl = d.evidence.channels[c].noise_floor,
+                 u = d.evidence.channels[c].unit.si;
+    fmt::print(
+        stderr,
+        "  RATIO {} {}: action {:.3g} before {:.3g} after {:.3g} ref {:.3g} floor {:.3g} ratio "
+        "{:.3g} drop {:.3g}\n",
+        effect_key(design.effect.effect->info(), *d.evidence.series[0].machine, design.effect.at),
+        d.evidence.channels[c].text, act / u, with / u, now / u, ref / u, fl / u,
+        act / std::sqrt(std::max(ref * ref - fl * fl, 1e-300)),
+        std::sqrt(std::max(0.0, with * with - now * now) / std::max(ref * ref - fl * fl, 1e-300)));
+  }
+}
+
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  if (tracing()) trace_beside_shared(d, found);
   const auto [by, proof] = by_size(d, found, options);
   if (by == InReferences::kAlike || by == InReferences::kVaries || proof == Proof::kNone) return by;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is

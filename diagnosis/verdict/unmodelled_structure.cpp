@@ -75,8 +75,11 @@ double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
   const ChannelGain& g = e.channels.front();
   // what stays unexplained in the references as well is no sign against an effect
   const double shared = reference_rms(d, g.channel);
-  const double floor = std::isfinite(shared) ? std::max(g.noise_floor, shared) : g.noise_floor;
-  if (!(g.rmse_after > d.thresholds.far_above_noise * floor)) return 1.0;
+  const bool by_references = shared > g.noise_floor;
+  const double floor = by_references ? shared : g.noise_floor;
+  // the references' residual contains the model's errors already
+  const double far = by_references ? d.thresholds.least_excess_ratio : d.thresholds.far_above_noise;
+  if (!(g.rmse_after > far * floor)) return 1.0;
   const double before = suspect_rms(d.evidence, g.channel, d.search.null.residual[g.channel]);
   const double noise = floor * floor;
   return (before * before - g.rmse_after * g.rmse_after) / (before * before - noise);

@@ -144,6 +144,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     out.pumps.push_back(std::move(pump));
   }
   out.pumps = pumps_led_by({}, out);  // first without effects, as these may depend on the demand
+  out = with_passed_flows(model.effects, std::move(out));
   if (!model.effects.empty()) out.pumps = pumps_led_by(model.effects, out);
   return out;
 }
@@ -154,6 +155,17 @@ MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSe
     c.opening = c.command;
     for (const AppliedEffect& e : effects)
       e.effect->shape_opening(static_cast<int>(i), e.at, e.values, c.opening);
+  }
+  return series;
+}
+
+MachineSeries with_passed_flows(const std::vector<AppliedEffect>& effects, MachineSeries series) {
+  for (CylinderSeries& c : series.cylinders) c.passed.resize(0);
+  for (std::size_t i = 0; i < series.cylinders.size(); ++i) {
+    for (const AppliedEffect& e : effects) {
+      VectorXd passed = e.effect->passed_flow(series, static_cast<int>(i), e.at, e.values);
+      if (passed.size() > 0) series.cylinders[i].passed = std::move(passed);
+    }
   }
   return series;
 }

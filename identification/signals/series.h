@@ -17,6 +17,10 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
 /// `make_series` computes them with the model's effects.
 MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSeries series);
 
+/// The same series with the shares of the valves' flow that the pressure drop passes by the law of these effects
+/// (CylinderSeries::passed); `make_series` computes them with the model's effects.
+MachineSeries with_passed_flows(const std::vector<AppliedEffect>& effects, MachineSeries series);
+
 /// Contribution of one effect, at its parameter values, to the measured quantity `kind` of cylinder or pump `index`, not
 /// filtered: exact for effects that change the machine, else the effect's columns times its linear parameters.
 /// @return [samples] force [N], rod speed [m/s] or pressure [Pa]; empty when the effect does not act on this quantity or

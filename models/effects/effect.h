@@ -139,6 +139,12 @@ class Effect {
   virtual void shape_opening(int /*cylinder*/, int /*at*/, std::span<const double> /*p*/,
                              Eigen::VectorXd& /*opening*/) const {}
 
+  /// Share of a valve's flow [samples, -] that the measured pressure drop over its edge passes; empty: no such law.
+  virtual Eigen::VectorXd passed_flow(const MachineSeries& /*log*/, int /*cylinder*/, int /*at*/,
+                                      std::span<const double> /*p*/) const {
+    return {};
+  }
+
   /// YAML text that defines a user's effect, so that a model file can contain it; empty for built-in effects.
   virtual std::string definition() const { return {}; }
 

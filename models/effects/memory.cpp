@@ -25,6 +25,24 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
   return y;
 }
 
+Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, double limit,
+                            double tau) {
+  Eigen::VectorXd y = x;
+  for (const auto& [first, last] : log.runs) {
+    for (Eigen::Index i = first + 1; i < last; ++i) {
+      if (!std::isfinite(y[i - 1])) continue;  // Without a value before, the run starts here.
+      const double target = std::isfinite(x[i]) ? x[i] : y[i - 1];
+      double from = y[i - 1], dt = log.time[i] - log.time[i - 1];
+      // Far below its target y rises along a straight line, from there on exponentially.
+      const double straight = std::clamp((target - limit - from) * tau / limit, 0.0, dt);
+      from += straight * limit / tau;
+      y[i] = target + std::exp(-(dt - straight) / tau) * (from - target);
+      if (straight == dt) y[i] = from;
+    }
+  }
+  return y;
+}
+
 Eigen::VectorXd second_order_lag(const MachineSeries& log, const Eigen::VectorXd& x,
                                  double frequency, double damping) {
   const double decay = damping * frequency;

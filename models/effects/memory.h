@@ -14,6 +14,11 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
 Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double rising,
                                 double falling);
 
+/// Solves tau dy/dt = min(x - y, limit) in the same way: y rises no faster than limit / tau.
+/// @param limit in the unit of x, > 0  @param tau [s] > 0
+Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, double limit,
+                            double tau);
+
 /// Solves y'' / w^2 + 2 d y' / w + y = x exactly for x constant over each interval, from y = x and y' = 0 at the start of
 /// every run. Where x is NaN, y follows its last value.
 /// @param frequency undamped natural frequency w [rad/s] > 0  @param damping ratio d, 0 < d < 1

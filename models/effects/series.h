@@ -30,6 +30,9 @@ struct CylinderSeries {
   /// [-] valve opening that the model's valve effects without memory (a dead band) leave of the command; a valve lag acts
   /// on it. Empty: the command itself.
   Eigen::VectorXd opening;
+  /// [-] share of the valve's flow that the measured pressure drop over its edge passes, by the model's law. What lowers the pump's
+  /// pressure shows in it, and beside it in no flow. Empty: the model has no such law.
+  Eigen::VectorXd passed;
   /// [Pa] pressures of the chambers, through the same filter as the position
   Eigen::VectorXd pressure_a, pressure_b;
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter

@@ -50,7 +50,8 @@ struct Change {
 
 const std::vector<Change>& changes() {
   static const std::vector<Change> all = {
-      {"coulomb_friction", "coulomb_friction_N", 2.5, 0.0, {"coulomb_friction"}},
+      // The plant's friction is LuGre's law, whose rigid limit is Coulomb's and whose slow limit is Dahl's.
+      {"coulomb_friction", "coulomb_friction_N", 2.5, 0.0, {"coulomb_friction", "presliding"}},
       {"viscous_friction", "viscous_friction_N_s_m", 5.0, 0.0, {"viscous_friction"}},
       {"leakage", "leakage_lpm_100bar", 1.0, 1.5, {"leakage"}},
       {"line_loss", "line_drop_bar", 3.0, 5.0, {"line_loss"}},

@@ -126,6 +126,7 @@ class FlowSaturation final : public Effect {
     }
     const Eigen::VectorXd& command =
         log.cylinders[static_cast<std::size_t>(measured.index)].command;
+    if (by_pressure_drop(log, measured.index)) return false;
     const SectionFit& fit = demand.fits[static_cast<std::size_t>(measured.index)];
     const Eigen::VectorXd& served = demand.served[static_cast<std::size_t>(measured.index)];
     for (Eigen::Index k = 0; k < log.samples(); ++k)
@@ -135,6 +136,11 @@ class FlowSaturation final : public Effect {
 
  private:
   enum class Form { kShared, kSoft, kUnshared };
+
+  /// Whether the model computes the flow of a cylinder from the measured pump pressure, in which the lack of flow shows already.
+  static bool by_pressure_drop(const MachineSeries& log, int cylinder) {
+    return log.cylinders[static_cast<std::size_t>(cylinder)].passed.size() > 0;
+  }
 
   /// Whether the log says which pressure each section asks for and has at its load.
   static bool loads_known(const MachineSeries& log, int pump) {
@@ -178,7 +184,10 @@ class FlowSaturation final : public Effect {
         for (std::size_t f = 0; f < feeds.size(); ++f) {
           const auto c = static_cast<std::size_t>(feeds[f]);
           const Eigen::VectorXd& u = log.cylinders[c].command;
-          fits[c] = fit_gains(log, feeds[f], u.cwiseProduct(served[c]));
+          fits[c] =
+              fit_gains(log, feeds[f],
+                        u.cwiseProduct(by_pressure_drop(log, feeds[f]) ? log.cylinders[c].passed
+                                                                       : served[c]));
           for (Eigen::Index k = 0; k < u.size(); ++k) {
             if (std::isnan(u[k])) continue;
             asked(k, static_cast<Eigen::Index>(f)) =

@@ -39,23 +39,25 @@ class PumpLag final : public Effect {
               "-",
               1.0,
               0.0,
-              3.0,
+              4.0,
               0.0,
               "0: first order, 1: two equal stages, 2: two equal stages, rising four times "
               "as fast as falling, 3: second order that swings (hunting regulator, "
-              "damping ratio 0.3)",
+              "damping ratio 0.3), 4: first order, built up by its own margin (the load-sensing "
+              "port sees no more than the pump's pressure until the load's check valve opens)",
               false,
-              {0.0, 1.0, 2.0, 3.0},
+              {0.0, 1.0, 2.0, 3.0, 4.0},
               true}},
         .equation =
             "tau dp/dt + p = demand, or (tau/2 d/dt + 1)^2 p = demand, or p''/w^2 + 2 d p'/w + p = "
-            "demand",
+            "demand, or tau dp/dt = min(demand - p, standby)",
         .signals = {"pump pressure", "working pressures", "commands"},
         .confused_with = {"sensor_delay"},
         .separated_by = "repeated steps of one cylinder",
         .citation =
             "Kumar, Dasgupta, Ghoshal (2015); first-order lag; H. E. Merritt (1967), Hydraulic "
-            "Control Systems, ch. 6 (second order)",
+            "Control Systems, ch. 6 (second order); P. Krus (1988), On Load Sensing Fluid Power "
+            "Systems, Linkoping (build-up by the margin)",
         .form_error = 0.1,
         .in_motion =
             "nothing: a planned motion's pump is at its demand; a lag of tenths of a second costs "
@@ -68,13 +70,14 @@ class PumpLag final : public Effect {
     if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    columns = late(log, demand, shape[0], shape[1]) - demand;
+    columns = late(log, at, shape[0], shape[1]) - demand;
     return true;
   }
 
  private:
-  static Eigen::VectorXd late(const MachineSeries& log, const Eigen::VectorXd& demand, double tau,
-                              double form) {
+  static Eigen::VectorXd late(const MachineSeries& log, int at, double tau, double form) {
+    const PumpSeries& pump = log.pumps[static_cast<std::size_t>(at)];
+    const Eigen::VectorXd& demand = pump.demand;
     /// Damping ratio of a regulator that hunts.
     /// @threshold [1] 0.1..0.6; chosen: two or three swings are seen before the pressure rests
     constexpr double kDamping = 0.3;
@@ -91,6 +94,9 @@ class PumpLag final : public Effect {
         const double r = 0.5 * rising, f = kFallingToRising * r;
         return first_order_lag(log, first_order_lag(log, demand, r, f), r, f);
       }
+      case 4:
+        return pump.standby > 0.0 ? limited_lag(log, demand, pump.standby, tau)
+                                  : first_order_lag(log, demand, tau);
       default:
         return second_order_lag(log, demand, 2.0 * kDamping / tau, kDamping);
     }

@@ -65,24 +65,40 @@ class ValvePressureDrop final : public Effect {
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    const int pump = log.machine->pump_of_cylinder(at);
-    if (pump < 0) return false;
-    const Eigen::VectorXd& supply = log.pumps[static_cast<std::size_t>(pump)].pressure;
     const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
-    if (command.size() == 0 || supply.size() == 0 || c.pressure_a.size() == 0 ||
-        c.pressure_b.size() == 0)
-      return false;
-    Eigen::VectorXd lacking = Eigen::VectorXd::Zero(log.samples());
-    for (Eigen::Index k = 0; k < log.samples(); ++k) {
-      const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
-      if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / shape[0], 0.0, 1.0));
-    }
+    const Eigen::VectorXd lacking = lacking_flow(log, at, shape[0]);
+    if (lacking.size() == 0) return false;
     const Eigen::VectorXd passed = command.cwiseProduct((1.0 - lacking.array()).matrix());
     const SectionFit fit = fit_gains(log, at, passed);
     columns.resize(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k)
       columns(k, 0) = -fit.gain(command[k]) * command[k] * lacking[k];
     return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
+  }
+  Eigen::VectorXd passed_flow(const MachineSeries& log, int cylinder, int at,
+                              std::span<const double> p) const override {
+    if (cylinder != at) return {};
+    const Eigen::VectorXd lacking = lacking_flow(log, at, p[1]);
+    return lacking.size() == 0 ? lacking : (1.0 - p[0] * lacking.array()).matrix();
+  }
+
+ private:
+  /// Share of the valve's flow that the measured pressure drop does not pass; empty where it is not measured.
+  static Eigen::VectorXd lacking_flow(const MachineSeries& log, int at, double setting) {
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    const int pump = log.machine->pump_of_cylinder(at);
+    if (pump < 0) return {};
+    const Eigen::VectorXd& supply = log.pumps[static_cast<std::size_t>(pump)].pressure;
+    const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
+    if (command.size() == 0 || supply.size() == 0 || c.pressure_a.size() == 0 ||
+        c.pressure_b.size() == 0)
+      return {};
+    Eigen::VectorXd lacking = Eigen::VectorXd::Zero(log.samples());
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+      if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / setting, 0.0, 1.0));
+    }
+    return lacking;
   }
 };
 

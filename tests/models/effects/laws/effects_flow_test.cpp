@@ -148,6 +148,32 @@ TEST_F(FlowEffects, FlowFollowsThePressureDropBelowTheCompensatorsSetting) {
                    .columns(log, {EvidenceKind::kFlow, 0}, 0, std::vector{setting}, none));
 }
 
+// Where the model computes the flow from the measured pump pressure, a pump at its limit lowers that pressure, and beside it no flow.
+TEST_F(FlowEffects, SaturationActsInThePumpAloneWhereFlowsFollowThePressureDrop) {
+  const double limit = 1.3e-3;
+  const std::vector<double> law{1.0, 12e5};
+  MatrixXd c;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const int at = static_cast<int>(i);
+    ASSERT_TRUE(effect_named("flow_saturation")
+                    .columns(log, {EvidenceKind::kFlow, at}, 0, std::vector{limit}, c));
+    log.cylinders[i].passed = effect_named("valve_pressure_drop").passed_flow(log, at, at, law);
+    EXPECT_EQ(effect_named("valve_pressure_drop").passed_flow(log, 1 - at, at, law).size(), 0);
+    EXPECT_FALSE(effect_named("flow_saturation")
+                     .columns(log, {EvidenceKind::kFlow, at}, 0, std::vector{limit}, c));
+  }
+  EXPECT_TRUE(effect_named("flow_saturation")
+                  .columns(log, {EvidenceKind::kPump, 0}, 0, std::vector{limit}, c));
+  for (Index k = 0; k < log.samples(); ++k) {
+    const CylinderSeries& s = log.cylinders[0];
+    const double drop =
+        log.pumps[0].pressure[k] - (s.command[k] > 0.0 ? s.pressure_a[k] : s.pressure_b[k]);
+    const double passed =
+        s.command[k] == 0.0 || drop > 12e5 ? 1.0 : std::sqrt(std::max(0.0, drop) / 12e5);
+    ASSERT_NEAR(s.passed[k], passed, 1e-12) << k;
+  }
+}
+
 TEST_F(FlowEffects, SaturationSharesThePumpInProportion) {
   const double limit = 1.3e-3;
   std::vector<VectorXd> straight;

@@ -44,11 +44,13 @@ class PumpEffects : public ::testing::Test {
   }
 };
 
-// The second path integrates p''/w^2 + 2 d p'/w + p = demand, or the stages with their own time constants, in small steps.
+// The second path integrates p''/w^2 + 2 d p'/w + p = demand, the stages with their own time constants, or the build-up by the
+// margin, in small steps.
 TEST_F(PumpEffects, PumpLagsOfAllFormsFollowTheirDifferentialEquations) {
   const double tau = 0.2;
   const VectorXd& demand = log.pumps[0].demand;
-  for (const int form : {0, 1, 2, 3}) {
+  log.pumps[0].standby = 5 * kBar;  // so that the demand's steps exceed it
+  for (const int form : {0, 1, 2, 3, 4}) {
     VectorXd late = demand;
     for (const auto& [first, last] : log.runs) {
       double x = demand[first], y = x, slope = 0.0;
@@ -64,6 +66,8 @@ TEST_F(PumpEffects, PumpLagsOfAllFormsFollowTheirDifferentialEquations) {
             const double d = 0.3, w = 2.0 * d / tau;
             slope += (w * w * (demand[k] - y) - 2.0 * d * w * slope) * h;
             y += slope * h;
+          } else if (form == 4) {
+            y += std::min(demand[k] - y, log.pumps[0].standby) / tau * h;
           } else {
             x += form == 0 ? demand[k] - x : stage(demand[k], x);
             y += stage(x, y);
