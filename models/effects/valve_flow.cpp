@@ -99,6 +99,14 @@ SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::Vector
   return fit;
 }
 
+Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::VectorXd& opening,
+                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late) {
+  const Eigen::VectorXd extend = opening.cwiseMax(0.0), retract = opening.cwiseMin(0.0);
+  const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
+  const SectionFit fit = fit_gains(log, cylinder, late_extend + late_retract);
+  return fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
+}
+
 SectionFit fit_dead_bands(const MachineSeries& log, int cylinder) {
   const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
   SectionFit fit = fit_gains(log, cylinder, c.command);

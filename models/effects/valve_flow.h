@@ -1,6 +1,8 @@
 #pragma once
 /// Fit of a valve section to a log: rod speed against command by ordinary least squares. It scales the columns of the
 /// flow effects, so that their parameters are dimensionless or times.
+#include <functional>
+
 #include "models/effects/series.h"
 
 namespace sparflow {
@@ -19,6 +21,12 @@ struct SectionFit {
 /// samples gets the gain of the machine file's full flow, 0 if it has none.
 /// @param command [samples, -] the logged command, or the delayed one where the flow follows that
 SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command);
+
+/// What the rod speed changes by when the valve's opening acts late. The gains are those of the late opening; those of the opening
+/// itself would be biased towards zero.
+/// @param opening [samples, -]  @param late delays or filters a series  @return [samples, m/s]
+Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::VectorXd& opening,
+                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late);
 
 /// Fits gains and dead bands: the dead band has the smallest sum of squares, by grid search and golden section.
 SectionFit fit_dead_bands(const MachineSeries& log, int cylinder);

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
+#include "models/effects/valve_flow.h"
 
 namespace sparflow {
 namespace {
@@ -95,40 +95,21 @@ class SensorDelay final : public Effect {
     if (measured.kind != EvidenceKind::kFlow || !positions) return false;
     const int joint = log.machine->cylinders[static_cast<std::size_t>(measured.index)].joint;
     if (alone >= 0 && joint != alone) return false;
-    columns = c.speed - delayed(log, c.speed, shift);
-    if (c.command.size() > 0) keep_changes(log, c.command, shape[0], columns);
-    return true;
+    return speed_late(log, measured.index, shape[0], columns);
   }
 
  private:
-  /// Sets the column to zero while the command is constant: the difference of two measured speeds is noise there, and
-  /// noise in a regressor biases its coefficient towards zero.
-  static void keep_changes(const MachineSeries& log, const Eigen::VectorXd& command, double delay,
-                           Eigen::MatrixXd& columns) {
-    /// Time after a change of the command from which a sample tells nothing.
-    /// @threshold [s] 0.05..5; chosen: filters and accelerations have settled by then
-    constexpr double kSettled_s = 0.4;
-    /// Change of the command, as share of full command, up to which it is the same.
-    /// @threshold [1] 0..0.1; chosen: the logger's resolution
-    constexpr double kSame = 2e-3;
-    for (const auto& [first, last] : log.runs) {
-      Eigen::Index since = first;  // the command has been `level` from here on
-      double level = command[first];
-      std::vector<std::pair<Eigen::Index, Eigen::Index>> constant;
-      for (Eigen::Index k = first; k <= last; ++k) {
-        if (k < last && std::abs(command[k] - level) <= kSame) continue;
-        constant.emplace_back(since, k);
-        since = k;
-        if (k < last) level = command[k];
-      }
-      for (const auto& [from, to] : constant) {
-        for (Eigen::Index k = from; k < to; ++k) {
-          const bool before = from == first || log.time[k] - log.time[from] > delay + kSettled_s;
-          const bool after = to == last || log.time[to - 1] - log.time[k] > kSettled_s;
-          if (before && after) columns(k, 0) = 0.0;
-        }
-      }
-    }
+  /// The logged speed is that of `delay` ago, and thus follows the command of then. The column is made of the command and not
+  /// of the speed that it is to explain: with a share s the latter would be compared as (1 - s) v(t) + s v(t + delay), a mean
+  /// that smooths noise and oscillations away, so that the likelihood would favour half a delay whether anything is late or not.
+  static bool speed_late(const MachineSeries& log, int cylinder, double delay,
+                         Eigen::MatrixXd& columns) {
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+    const Eigen::VectorXd& opening = c.opening.size() > 0 ? c.opening : c.command;
+    if (opening.size() == 0) return false;
+    columns = late_flow(log, cylinder, opening,
+                        [&](const Eigen::VectorXd& x) { return delayed(log, x, delay); });
+    return true;
   }
 
   /// The delay of one position acts to first order, because an angle 0.2 s late is wrong by some hundredths [rad].

@@ -79,12 +79,7 @@ class ValveLag final : public Effect {
       if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
     };
-    // The gains are fitted to the delayed command; fitted to the command itself they would be biased towards zero.
-    const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
-    const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
-    const SectionFit fit = fit_gains(log, at, late_extend + late_retract);
-    columns =
-        fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
+    columns = late_flow(log, at, command, late);
     return true;
   }
 };

@@ -449,7 +449,10 @@ TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
   };
   MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
   StaticForce statics(machine);
-  for (CylinderSeries& c : log.cylinders) c.static_slope.resize(log.samples(), joints);
+  for (CylinderSeries& c : log.cylinders) {
+    c.static_slope.resize(log.samples(), joints);
+    c.command = 10.0 * c.speed;
+  }
   for (Index k = 0; k < log.samples(); ++k) {
     const VectorXd q = log.q.row(k);
     statics.update(q.data(), 300.0, 1);
@@ -481,21 +484,59 @@ TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
   EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
 }
 
-/// While the command is constant a delay shows nothing: the difference of two measured speeds is noise.
+/// While the command is constant a delay shows nothing in the speed; after a step, for as long as it lasts.
 TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
   const Machine machine = test_support::loader_crane();
   MachineSeries log = log_of(
       machine, [&](double t) { return swinging(machine, t); }, 10.0, 0.02, 300.0);
   CylinderSeries& c = log.cylinders[0];
   c.command.setZero(log.samples());
-  c.command.tail(250).setConstant(0.5);  // step at 5 s
+  c.command.tail(251).setConstant(0.5);  // step at 5 s
   MatrixXd column;
   ASSERT_TRUE(
       effect("sensor_delay")
           .columns(log, {EvidenceKind::kFlow, 0}, -1, std::vector<double>{0.1, 1.0}, column));
-  EXPECT_EQ(column.topRows(220).cwiseAbs().maxCoeff(), 0.0);
-  EXPECT_EQ(column.bottomRows(220).cwiseAbs().maxCoeff(), 0.0);
-  EXPECT_GT(column.middleRows(250, 20).cwiseAbs().minCoeff(), 0.0);
+  EXPECT_EQ(column.topRows(250).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(column.bottomRows(246).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_GT(column.middleRows(250, 5).cwiseAbs().minCoeff(), 0.0);
+}
+
+/// A signature that contains the speed which it is to explain smooths it: half of v(t + d) - v(t) cancels an oscillation of period
+/// 2 d. Gains and dead bands, fitted to the whole log, may move by what the oscillation happens to have in common with commands.
+TEST(SignaturesOfFlow, DoNotContainTheSpeedThatTheyExplain) {
+  const Machine machine = test_support::loader_crane();
+  MachineSeries log = log_of(
+      machine, [&](double t) { return swinging(machine, t); }, 30.0, 0.02, 300.0);
+  const VectorXd ripple = (2.0 * M_PI * 2.5 * log.time.array()).sin() * 0.01;
+  for (CylinderSeries& c : log.cylinders) {
+    c.stroke_measured = true;
+    c.command = 10.0 * c.speed;
+    c.pressure_a.setConstant(log.samples(), 8e6);
+    c.pressure_b.setConstant(log.samples(), 5e6);
+    c.measured_a = c.pressure_a, c.measured_b = c.pressure_b;
+  }
+  MachineSeries shaken = log;
+  for (CylinderSeries& c : shaken.cylinders) c.speed += ripple;
+  // A pump's limit is left out: whether it is reached at all depends on the gains.
+  for (const char* id :
+       {"sensor_delay", "valve_lag", "valve_deadband", "compressibility", "leakage"}) {
+    const Effect& e = effect(id);
+    const std::vector<EffectParameter>& parameters = e.info().parameters;
+    std::vector<double> shape;
+    for (const EffectParameter& p : parameters)
+      if (!p.linear) shape.push_back(p.typical);
+    const int at = e.places(machine).front();
+    MatrixXd still, moved;
+    ASSERT_TRUE(e.columns(log, {EvidenceKind::kFlow, 0}, at, shape, still)) << id;
+    ASSERT_TRUE(e.columns(shaken, {EvidenceKind::kFlow, 0}, at, shape, moved)) << id;
+    for (Index k = 0; k < still.cols(); ++k) {
+      const VectorXd change =
+          (moved - still).col(k).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+      const double typical = std::abs(parameters[static_cast<std::size_t>(k)].typical);
+      EXPECT_LT(typical * std::abs(change.dot(ripple)), 0.02 * ripple.squaredNorm())
+          << id << ", parameter " << k;
+    }
+  }
 }
 
 // --- texts -------------------------------------------------------------------------------------------------------
