@@ -8,7 +8,6 @@
 
 #include "apps/tasks/argument_range.h"
 #include "apps/tasks/benchmark/learned_machine.h"
-#include "apps/tasks/benchmark/optimal_motions.h"
 #include "apps/tasks/motion_inputs.h"
 #include "identification/signals/recorded_motion.h"
 #include "models/math/error.h"
@@ -125,11 +124,15 @@ void add_fuel(const Machine& machine, const EngineMap& engine, const MachineSign
   result.fuel_at_rest += engine.fuel_rate(0.0) * time_at_rest(signals);
 }
 
+/// Time from rest to full speed that valves are given in the optimum.
+/// @threshold [s] 0..5; chosen: somewhat above an operator's lever time; spools and pilot lines follow within 0.4 s
+constexpr double kRamp = 0.8;
+
 /// Lets the optimum accelerate no joint faster than valves can, or than the recording did where that was faster.
 void narrow_accelerations(const CraneModel& model, const Trajectory& recorded,
                           MotionLimits& limits) {
   const std::vector<Range> machine = limits.acceleration;
-  limit_accelerations(model, recorded.q.row(0).transpose(), OptimalMotionOptions{}.ramp, limits);
+  limit_accelerations(model, recorded.q.row(0).transpose(), kRamp, limits);
   for (Eigen::Index j = 0; j < recorded.qdd.cols(); ++j) {
     const auto k = static_cast<std::size_t>(j);
     Range& a = limits.acceleration[k];

@@ -9,15 +9,26 @@
 namespace sparflow::control {
 namespace {
 
-/// Error of the rod that is left alone while the motion rests.
-/// @threshold [m] 0..0.02; chosen: no hunting in the valve's dead band
-constexpr double kRest = 0.002;
 /// Largest part of the full speed that the integral may ask for.
 /// @threshold [-] 0..1; chosen: it makes up for a valve that was learned badly, not for one that is exhausted
 constexpr double kMostIntegral = 0.2;
 /// Share of the time in which a straight line's speed rises, and falls again.
 /// @threshold [-] 0.01..0.5; chosen: a third more than the mean speed between the ramps
 constexpr double kRamp = 0.25;
+
+/// Rates below which a linkage is singular.
+/// @threshold [m/rad] 0..0.1; numerical: nothing is divided by zero
+constexpr double kLeastRate = 1e-3;
+
+/// Way of the tip per movement of a joint. [m/rad] or [-]
+double tip_way(const Machine& machine, int joint, const Eigen::VectorXd& q) {
+  ChainGeometry chain(machine);
+  chain.update(machine, q.data());
+  const auto j = static_cast<std::size_t>(joint);
+  if (!chain.revolute[j]) return 1.0;
+  const Eigen::Vector3d arm = chain.point(machine.tip.joint, machine.tip.xyz) - chain.origin[j];
+  return chain.axis[j].cross(arm).norm();
+}
 
 }  // namespace
 
@@ -71,6 +82,21 @@ JointTracker::JointTracker(const Knowledge& knowledge, const TrackerGains& gains
 void JointTracker::reset() {
   integral_.assign(know_.machine->cylinders.size(), 0.0);
   way_.assign(know_.machine->cylinders.size(), 0);
+  rest_.assign(know_.machine->cylinders.size(), RestCorrection());
+}
+
+double JointTracker::held(int c, double error, const Measurement& now) {
+  const auto k = static_cast<std::size_t>(c);
+  const int j = know_.machine->cylinders[k].joint;
+  const double rate = linkage_rates(*know_.machine, c, now.q[j]).d1;
+  RestCorrection::Rod rod;
+  rod.error = error;
+  rod.speed = rate * now.qd[j];
+  rod.tip_way = std::max(tip_way(*know_.machine, j, now.q) / std::max(std::abs(rate), kLeastRate),
+                         kLeastRate);
+  rod.full_speed = know_.valves->full_speed(c, error > 0.0);
+  rod.sample_time = know_.sample_time;
+  return rest_[k].speed(rod, gains_.proportional);
 }
 
 std::vector<double> JointTracker::step(const Trajectory& motion, double t, const Measurement& now) {
@@ -87,8 +113,11 @@ std::vector<double> JointTracker::step(const Trajectory& motion, double t, const
     const int way = speed > 0.0 ? 1 : speed < 0.0 ? -1 : 0;
     if (way != way_[k]) integral_[k] = 0.0;
     way_[k] = way;
-    const bool resting = wanted.qd[j] == 0.0 && ahead.qd[j] == 0.0;
-    if (resting && std::abs(error) < kRest) continue;
+    if (wanted.qd[j] == 0.0 && ahead.qd[j] == 0.0) {
+      lever[k] = know_.valves->lever(c, held(c, error, now));
+      continue;
+    }
+    rest_[k].moving();
     const double asked = speed + gains_.proportional * error + integral_[k];
     const double full = know_.valves->full_speed(c, asked > 0.0);
     if (std::abs(asked) < full) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "simulator/controllers/registry.h"
+#include "simulator/controllers/rest_correction.h"
 
 namespace sparflow::control {
 
@@ -40,10 +41,14 @@ class JointTracker {
   std::vector<double> step(const Trajectory& motion, double t, const Measurement& now);
 
  private:
+  /// Speed to ask for of a rod that the motion holds at rest. [m/s]
+  double held(int cylinder, double error, const Measurement& now);
+
   Knowledge know_;
   TrackerGains gains_;
-  std::vector<double> integral_;  // [m/s] by cylinder
-  std::vector<int> way_;          // by cylinder: sign of the speed ahead
+  std::vector<RestCorrection> rest_;  // by cylinder
+  std::vector<double> integral_;      // [m/s] by cylinder
+  std::vector<int> way_;              // by cylinder: sign of the speed ahead
 };
 
 /// A controller that follows a motion of the joints with the joint tracker; which motion, `begin` says.

@@ -1,10 +1,14 @@
 // Where the difference between the energy that a model predicts of its optima and the true energy of tracking them comes
 // from, scenario by scenario, with any gains of the tracker. docs/benchmark.md.
 //   prediction_study SCENARIO.yaml... [--model MODEL.json] [--controller NAME] [--gains 1.4:0.1:0.2,...] [--sway DEG] [--quiet]
+//       [--ramp S] [--plans FOLDER] [--trace FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numeric>
 #include <sstream>
 
@@ -16,6 +20,7 @@
 #include "models/math/units.h"
 #include "problems/bundled.h"
 #include "simulator/benchmark/scenario_file.h"
+#include "simulator/controllers/joint_tracker.h"
 #include "simulator/controllers/registry.h"
 
 namespace sparflow::bench {
@@ -24,6 +29,7 @@ namespace {
 struct Arguments {
   std::vector<std::string> scenarios, gains;
   std::string model, controller = "tracked_optimum";
+  std::string plans, trace;  // folders; empty: none
   double sway = 0.0, ramp = OptimalMotionOptions{}.ramp;
   bool quiet = false;
 };
@@ -196,6 +202,47 @@ void tell_row(const std::string& id, const Split& x, const benchmark::Row& row) 
       (x.driven - x.predicted) / 1e3, x.late / 1e3, x.flow / 1e3, x.pressure / 1e3, x.starts / 1e3,
       x.count, x.sway / units::kDegree, 1e3 * row.tip_error_end, 1e3 * row.tip_error_path,
       row.done ? "" : row.reason);
+  std::fflush(stdout);
+}
+
+/// The scenario's optima: read where an earlier run has kept them, as the tracker is tuned on the same plans many times.
+OptimalMotions motions_of(const benchmark::Scenario& s, const CraneModel& model, const Arguments& a,
+                          const OptimalMotionOptions& planning) {
+  if (a.plans.empty()) return optimal_motions(s, model, planning);
+  const std::filesystem::path file = std::filesystem::path(a.plans) / (s.id + ".plan");
+  if (std::filesystem::exists(file)) {
+    std::ifstream in(file, std::ios::binary);
+    return motions_from({std::istreambuf_iterator<char>(in), {}});
+  }
+  OptimalMotions motions = optimal_motions(s, model, planning);
+  std::filesystem::create_directories(a.plans);
+  std::ofstream(file, std::ios::binary) << packed(motions);
+  return motions;
+}
+
+/// What was wanted and what the plant did, for a picture of one run.
+void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
+  std::filesystem::create_directories(folder);
+  std::ofstream out(std::filesystem::path(folder) / (p.scenario.id + ".csv"));
+  out << "t";
+  for (const Joint& j : p.scenario.machine.joints)
+    out << fmt::format(",{0}_q,{0}_qd,{0}_plan_q,{0}_plan_qd", j.name);
+  for (const Cylinder& c : p.scenario.machine.cylinders)
+    out << fmt::format(",{0}_u,{0}_spool,{0}_flow,{0}_pa,{0}_pb", c.name);
+  out << "\n";
+  const Trajectory& plan = p.motions.legs.front().motion;
+  for (const plant::Record& r : d.records) {
+    out << r.t;
+    const control::MotionInstant wanted = control::at_time(plan, r.t);
+    for (std::size_t j = 0; j < r.q.size(); ++j) {
+      const auto k = static_cast<Eigen::Index>(j);
+      out << fmt::format(",{},{},{},{}", r.q[j], r.qd[j], wanted.q[k], wanted.qd[k]);
+    }
+    for (std::size_t c = 0; c < r.command.size(); ++c)
+      out << fmt::format(",{},{},{},{},{}", r.command[c], r.spool[c], r.flow[c], r.pressure_a[c],
+                         r.pressure_b[c]);
+    out << "\n";
+  }
 }
 
 std::vector<Planned> planned(const Arguments& a, const OptimalMotionOptions& planning) {
@@ -204,7 +251,7 @@ std::vector<Planned> planned(const Arguments& a, const OptimalMotionOptions& pla
   for (const std::string& file : a.scenarios) {
     benchmark::Scenario s = benchmark::load_scenario(file, bundled_file);
     CraneModel model = load_model(a.model.empty() ? s.model_path : a.model);
-    OptimalMotions motions = optimal_motions(s, model, planning);
+    OptimalMotions motions = motions_of(s, model, a, planning);
     if (!motions.found()) {
       fmt::print("{}: left out: {}\n", s.id, motions.message());
       continue;
@@ -230,6 +277,7 @@ void run_all(const std::vector<Planned>& all, const std::string& gains, const Ar
     const benchmark::Row row = LearnedRun{p.scenario, &p.model, p.motions, planning}.run(
         a.controller, [&](const control::Knowledge& know) { return info.make(know, values); },
         p.scenario.seeds.front(), loop);
+    if (!a.trace.empty()) write_trace(a.trace, p, d);
     const Split x = split_of(d, p);
     if (!a.quiet) tell_row(p.scenario.id, x, row);
     sums.add(x, row, p.scenario.goals.front().duration);
@@ -265,6 +313,8 @@ int run_with(int argc, char** argv) {
   app.add("--ramp", a.ramp, "seconds from rest to full speed that the plan gives valves")
       .range(0.0, 5.0);
   app.add("--sway", a.sway, "limit of the planned payload's angle [deg], 0: none").range(0.0, 45.0);
+  app.add("--plans", a.plans, "folder in which the optima are kept for the next run");
+  app.add("--trace", a.trace, "folder for a CSV of each run");
   app.flag("--quiet", a.quiet, "only the medians");
   if (const auto code = app.parse(argc, argv)) return *code;
   return run(a);

@@ -36,8 +36,8 @@ double bound_of(const CraneModel& model, const MotionProblem& problem) {
   return std::max(any.lower_bound_J, timed.valid ? timed.value : 0.0);
 }
 
-OptimalLeg solve_leg(const MotionProblem& problem, const CraneModel& model,
-                     const OptimalMotionOptions& o) {
+OptimalLeg solve(const MotionProblem& problem, const CraneModel& model,
+                 const OptimalMotionOptions& o) {
   OptimalLeg leg;
   OptimizeOptions options;
   options.intervals = o.intervals;
@@ -57,6 +57,21 @@ OptimalLeg solve_leg(const MotionProblem& problem, const CraneModel& model,
   leg.energy = r.energy.total;
   if (o.bound && !(o.interrupted && o.interrupted())) leg.bound = bound_of(model, problem);
   return leg;
+}
+
+/// A goal's motion. One that has no time for the ramps gets shorter ones.
+OptimalLeg solve_leg(const benchmark::Scenario& s, const CraneModel& model, int leg,
+                     const Eigen::VectorXd& from, const OptimalMotionOptions& o) {
+  OptimalMotionOptions now = o;
+  OptimalLeg found = solve(problem_of(s, model, leg, from, now), model, now);
+  while (found.motion.size() < 2 && 0.5 * now.ramp >= o.shortest_ramp &&
+         !(o.interrupted && o.interrupted())) {
+    now.ramp *= 0.5;
+    const double spent = found.solve_s;
+    found = solve(problem_of(s, model, leg, from, now), model, now);
+    found.solve_s += spent;
+  }
+  return found;
 }
 
 }  // namespace
@@ -95,7 +110,7 @@ OptimalMotions optimal_motions(const benchmark::Scenario& s, const CraneModel& m
     if (g > 0 && all.legs.back().motion.size() < 2) {
       leg.message = "there is no motion to the goal before";
     } else {
-      leg = solve_leg(problem_of(s, model, g, from, o), model, o);
+      leg = solve_leg(s, model, g, from, o);
       if (leg.motion.size() > 1) from = leg.motion.q.row(leg.motion.size() - 1);
     }
     all.legs.push_back(std::move(leg));

@@ -15,8 +15,12 @@ struct OptimalMotionOptions {
   /// @threshold [1] 0.5..1; chosen: feedback must be able to catch up
   double flow_share = 0.9;
   /// Time from rest to full speed that valves are given: it limits the joints' accelerations.
-  /// @threshold [s] 0..5; chosen: somewhat above an operator's lever time; spools and pilot lines follow within 0.4 s
-  double ramp = 0.8;
+  /// @threshold [s] 0..5; tuned: prediction_study --ramp on problems/scenarios/tuning (docs/benchmark.md): less tip error and
+  /// sway than with a third of it at the same true energy
+  double ramp = 2.4;
+  /// Where there is no motion with these ramps, they are halved as long as they stay above this.
+  /// @threshold [s] 0.05..5; chosen: above an operator's lever time; spools and pilot lines follow within 0.4 s
+  double shortest_ramp = 0.6;
   /// Mesh intervals.
   /// @threshold [1] 20..500; chosen: two thirds of optimize's, as scenarios are many
   int intervals = 60;
