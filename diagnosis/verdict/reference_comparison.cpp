@@ -486,31 +486,27 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
 
 }  // namespace
 
-void trace_beside_shared(const Diagnosis& d, std::size_t found) {
+void trace_channels(const Diagnosis& d, std::size_t found) {
   Index first = 0;
   for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
   const EffectDesign& design = d.search.found[found].design;
+  const std::string key =
+      effect_key(design.effect.effect->info(), *d.evidence.series[0].machine, design.effect.at);
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     if (!design.touches(c)) continue;
-    const VectorXd a = design.columns[c] * d.search.final.theta.segment(first, design.linear);
-    const double act = suspect_rms(d.evidence, c, a);
-    const double now = suspect_rms(d.evidence, c, d.search.final.residual[c]);
-    const double with = suspect_rms(d.evidence, c, d.search.final.residual[c] + a);
-    const double ref = reference_rms(d, c), fl = d.evidence.channels[c].noise_floor,
-                 u = d.evidence.channels[c].unit.si;
-    fmt::print(
-        stderr,
-        "  RATIO {} {}: action {:.3g} before {:.3g} after {:.3g} ref {:.3g} floor {:.3g} ratio "
-        "{:.3g} drop {:.3g}\n",
-        effect_key(design.effect.effect->info(), *d.evidence.series[0].machine, design.effect.at),
-        d.evidence.channels[c].text, act / u, with / u, now / u, ref / u, fl / u,
-        act / std::sqrt(std::max(ref * ref - fl * fl, 1e-300)),
-        std::sqrt(std::max(0.0, with * with - now * now) / std::max(ref * ref - fl * fl, 1e-300)));
+    const VectorXd& with = d.search.final.residual[c];
+    const VectorXd without =
+        with + design.columns[c] * d.search.final.theta.segment(first, design.linear);
+    const FieldUnit& unit = d.evidence.channels[c].unit;
+    fmt::print(stderr, "  {} in {}: residual {:.3g} -> {:.3g} {}, in the references {:.3g}\n", key,
+               d.evidence.channels[c].text, suspect_rms(d.evidence, c, without) / unit.si,
+               suspect_rms(d.evidence, c, with) / unit.si, unit.name,
+               reference_rms(d, c) / unit.si);
   }
 }
 
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
-  if (tracing()) trace_beside_shared(d, found);
+  if (tracing()) trace_channels(d, found);
   const auto [by, proof] = by_size(d, found, options);
   if (by == InReferences::kAlike || by == InReferences::kVaries || proof == Proof::kNone) return by;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is

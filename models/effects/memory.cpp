@@ -37,7 +37,6 @@ Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, 
       const double straight = std::clamp((target - limit - from) * tau / limit, 0.0, dt);
       from += straight * limit / tau;
       y[i] = target + std::exp(-(dt - straight) / tau) * (from - target);
-      if (straight == dt) y[i] = from;
     }
   }
   return y;

@@ -57,7 +57,7 @@ class PumpLag final : public Effect {
         .citation =
             "Kumar, Dasgupta, Ghoshal (2015); first-order lag; H. E. Merritt (1967), Hydraulic "
             "Control Systems, ch. 6 (second order); P. Krus (1988), On Load Sensing Fluid Power "
-            "Systems, Linkoping (build-up by the margin)",
+            "Systems, Linkoping (dynamics of load-sensing pumps)",
         .form_error = 0.1,
         .in_motion =
             "nothing: a planned motion's pump is at its demand; a lag of tenths of a second costs "
