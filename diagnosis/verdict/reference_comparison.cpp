@@ -392,14 +392,33 @@ void trace_sizes(const Diagnosis& d, const EffectAt& effect, const SizeByLogs& s
              in(sizes.suspects), in(sizes.references), sizes.variation, sizes.difference());
 }
 
-/// Standard error of the difference of both sizes by sampling alone over that with the law's form error: the deviation of the law from
-/// the machine is another one in other motions, in proportion to the part of the effect that both groups have.
-double share_beside_form(const SizeByLogs& sizes, double form) {
-  const double sampling =
-      std::hypot(sizes.suspects.standard_error, sizes.references.standard_error);
-  const double here = sizes.suspects.size, there = sizes.references.size;
-  const double common = here * there > 0.0 ? std::min(std::abs(here), std::abs(there)) : 0.0;
-  return sampling / std::hypot(sampling, form * common);
+/// What an effect with these linear parameters does in the suspect logs, over the residuals that are left. [-]
+double action(const Diagnosis& d, const EffectDesign& suspect, const VectorXd& parameters) {
+  double squares = 0.0;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!suspect.touches(c)) continue;
+    const double left = suspect_rms(d.evidence, c, d.search.final.residual[c]);
+    squares += std::pow(suspect_rms(d.evidence, c, suspect.columns[c] * parameters) / left, 2);
+  }
+  return std::sqrt(squares);
+}
+
+/// Action of the part of an effect that both groups of logs have over that of their difference. [-]
+double common_over_change(const Diagnosis& d, const EffectDesign& suspect, const VectorXd& here,
+                          const VectorXd& there) {
+  const VectorXd common = (here.array() * there.array() > 0.0)
+                              .select(here.cwiseAbs().cwiseMin(there.cwiseAbs()), 0.0)
+                              .cwiseProduct(here.cwiseSign());
+  return action(d, suspect, common) / action(d, suspect, here - there);
+}
+
+/// Fit of designs beside others, with covariance.
+EffectFit fit_beside(const Diagnosis& d, std::vector<const EffectDesign*> others,
+                     std::initializer_list<const EffectDesign*> more) {
+  others.insert(others.end(), more);
+  FitControl control;
+  control.covariance = true;
+  return fit_effects(d.evidence, others, &d.search.final, control);
 }
 
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
@@ -412,11 +431,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const OtherEffects beside(d, found);
   const std::vector<const EffectDesign*>& others = beside.designs;
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
-    std::vector<const EffectDesign*> designs = others;
-    designs.insert(designs.end(), more);
-    FitControl control;
-    control.covariance = true;
-    return fit_effects(d.evidence, designs, &d.search.final, control);
+    return fit_beside(d, others, more);
   };
   const bool both = reference.acts();
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
@@ -476,8 +491,11 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
           ? std::max(std::abs(sizes.difference()),
                      deviate_of_chi_square(std::pow(change.difference(), 2), suspect.linear))
           : std::abs(sizes.difference());
-  const double form = form_share(*suspect.effect.effect, options.regression);
-  const double difference = beside_sampling * share_beside_form(sizes, form);
+  // In standard errors of sampling and form error: the deviation of a law from the machine is another one in other motions, in
+  // proportion to the part of the effect that both groups have.
+  const double form = form_share(*suspect.effect.effect, options.regression) *
+                      common_over_change(d, suspect, in_suspects, in_reference);
+  const double difference = beside_sampling / std::hypot(1.0, beside_sampling * form);
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,

@@ -16,7 +16,13 @@ constexpr double kShortestGap = 0.04, kLongestGap = 0.4;  // [s] of a channel th
 }  // namespace
 
 Sensors::Sensors(const Machine& machine, const PlantParameters& parameters, std::uint64_t seed)
-    : machine_(machine), sensors_(parameters.sensors), random_(seed, "sensors") {
+    : machine_(machine),
+      sensors_(parameters.sensors),
+      hook_mass_(parameters.pendulum.rope_length > 0.0 && machine.gravity.norm() > 0.0 &&
+                         machine.tip.joint >= 0
+                     ? parameters.pendulum.hook_mass
+                     : 0.0),
+      random_(seed, "sensors") {
   for (const Joint& j : machine.joints)
     add_channel(fmt::format("q_{}_{}", j.name, j.type == JointType::kRevolute ? "rad" : "m"),
                 SensedKind::kPosition, 1.0);
@@ -55,7 +61,7 @@ std::vector<double> Sensors::values(const Record& r) const {
   }
   v.insert(v.end(), r.pump_pressure.begin(), r.pump_pressure.end());
   if (!machine_.pumps.empty()) v.push_back(r.tank_pressure);
-  v.push_back(r.payload);
+  v.push_back(std::max(r.payload, hook_mass_));
   if (!machine_.pumps.empty()) v.push_back(std::round(10.0 * r.oil_temperature) / 10.0);
   return v;
 }

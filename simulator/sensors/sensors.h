@@ -37,6 +37,8 @@ class Sensors {
 
   const Machine& machine_;
   SensorParameters sensors_;
+  double hook_mass_ =
+      0.0;  ///< [kg] told where the load is less: whoever weighs a load on a rope weighs the hook
   simulator::Random random_;
   std::vector<SensedChannel> channels_;
   std::deque<std::pair<double, std::vector<double>>> past_;  // true values, for delayed channels

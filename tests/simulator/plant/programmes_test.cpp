@@ -204,6 +204,26 @@ TEST(PlantSensors, NoiseOffsetDelayAndQuantisationAreWhatTheirParametersSay) {
   EXPECT_NEAR(std::sqrt(square / 2000.0), 2.0, 0.13);
 }
 
+/// The payload that a log tells is the mass that acts at the tip, also where only the hook hangs there.
+TEST(PlantSensors, AnEmptyHookIsToldAsPayload) {
+  const Machine machine = machine_at("loader_crane");
+  PlantParameters p = nominal(machine, {"none"});
+  for (const double rope : {0.0, 1.5}) {
+    p.pendulum.rope_length = rope;
+    PlantRun run(machine, p, {0.5, -1.0, 3.0}, 0.0);
+    LogWriter log(machine, p, 1, "");
+    for (const double payload : {0.0, 300.0}) {
+      Record r = run.record();
+      r.payload = payload;
+      log.add(r);
+    }
+    const auto rows = numbers(log.text(""));
+    const std::size_t column = rows[0].size() - 2;  // before the oil's temperature
+    EXPECT_EQ(rows[0][column], rope > 0.0 ? p.pendulum.hook_mass : 0.0);
+    EXPECT_EQ(rows[1][column], 300.0);
+  }
+}
+
 TEST(PlantSensors, DropOutsLeaveEmptyCellsInSingleChannels) {
   const auto rows = rising({"none", "drop_outs=0.5"});
   int empty = 0, whole = 0;
