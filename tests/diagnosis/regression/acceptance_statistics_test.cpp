@@ -269,5 +269,21 @@ TEST(ShapeSlopes, AreTheDerivativeOfTheAction) {
   EXPECT_FALSE(make_design(e, {&ramp, -1}, {width}).acts());
 }
 
+/// A share with the bounds 0.5 and 2 that no channel shows is estimated as zero and lies on no bound; one that is shown does.
+TEST(Bounds, AParameterThatActsInNoChannelLiesOnNone) {
+  EffectDesign d;
+  d.linear = 2;
+  d.lower = {0.5, 0.0};
+  d.upper = {2.0, 1.0};
+  d.columns = {MatrixXd::Zero(4, 2), MatrixXd()};
+  d.columns[0].col(1).setOnes();
+  EXPECT_FALSE(d.parameter_acts(0));
+  EXPECT_TRUE(d.parameter_acts(1));
+  EXPECT_FALSE(rests_on_bound(d, VectorXd{{0.0, 0.5}}));
+  EXPECT_TRUE(rests_on_bound(d, VectorXd{{0.0, 1.0}}));
+  d.columns[0](0, 0) = 1.0;
+  EXPECT_TRUE(rests_on_bound(d, VectorXd{{0.5, 0.5}}));
+}
+
 }  // namespace
 }  // namespace sparflow
