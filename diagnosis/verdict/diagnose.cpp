@@ -12,6 +12,7 @@
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/reference_comparison.h"
+#include "diagnosis/verdict/residual_levels.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
 #include "identification/data_checks/set_aside.h"
 #include "models/effects/plausible.h"

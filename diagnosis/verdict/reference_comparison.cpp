@@ -9,9 +9,9 @@
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/regression/size_by_logs.h"
-#include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/residual_levels.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/nan.h"
 
@@ -21,92 +21,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Mean, variance of the mean and largest of the logarithms of the blocks' mean squares, in which rows count by their deviation.
-struct BlockLevel {
-  double mean = 0.0, variance_of_mean = 0.0, largest = 0.0;
-  int blocks = 0;
-};
-
-BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
-  const EvidenceChannel& c = d.evidence.channels[channel];
-  VectorXd residual = d.search.final.residual[channel];
-  const VectorXd scale = d.search.final.noise[channel].scale_of(c.noise_rows());
-  if (scale.size() > 0) residual.array() /= scale.array();
-  std::vector<double> levels;
-  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
-    if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
-    const Index length = c.blocks[b].last - c.blocks[b].first;
-    const double square = residual.segment(c.blocks[b].first, length).squaredNorm();
-    levels.push_back(std::log(
-        std::max(square / static_cast<double>(length), std::numeric_limits<double>::min())));
-  }
-  BlockLevel level;
-  level.blocks = static_cast<int>(levels.size());
-  if (levels.size() < 2) return level;
-  const auto n = static_cast<double>(levels.size());
-  const Eigen::Map<const VectorXd> v(levels.data(), static_cast<Index>(levels.size()));
-  level.mean = v.mean();
-  level.largest = v.maxCoeff();
-  level.variance_of_mean = (v.array() - level.mean).square().sum() / (n - 1.0) / n;
-  return level;
-}
-
-/// One-sided probability of Student's t as that of a normal deviate (Abramowitz and Stegun 1964, 26.7.8).
-double chance_of_t(double t, double freedom) {
-  const double z = t * (1.0 - 0.25 / freedom) / std::sqrt(1.0 + 0.5 * t * t / freedom);
-  return 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
-}
-
-/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike (Welch and
-/// Satterthwaite).
-double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
-  const double variance = suspect.variance_of_mean + reference.variance_of_mean;
-  const double freedom = variance * variance /
-                         (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
-                          std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
-  return chance_of_t((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
-}
-
-/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
-/// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
-/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
-/// no difference.
-/// @param excess ratio of the RMS
-double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
-  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
-  const double n = reference.blocks;
-  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
-}
-
-/// Probabilities by chance that the residual of a channel in the suspect logs exceeds that in the references so far.
-struct Excess {
-  double level = 1.0;    ///< in the mean over the blocks
-  double largest = 1.0;  ///< in the largest block
-};
-constexpr double kWaysToExceed = 2.0;  // for Bonferroni's bound
-
-/// Nothing where there are no references, or too few motions of one kind.
-std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel) {
-  if (!d.evidence.has_reference()) return std::nullopt;
-  const BlockLevel suspect = block_level(d, channel, false),
-                   reference = block_level(d, channel, true);
-  if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
-  const Excess excess{chance_of_level(suspect, reference),
-                      chance_of_largest(suspect, reference, d.thresholds.least_excess_ratio)};
-  if (tracing())
-    fmt::print(stderr,
-               "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
-               "block {:.2g}, {} and {} blocks\n",
-               d.evidence.channels[channel].text,
-               suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
-                   d.evidence.channels[channel].unit.si,
-               reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name, excess.level, excess.largest, suspect.blocks,
-               reference.blocks);
-  return excess;
-}
 
 /// Columns of a found effect in other logs than the suspect ones.
 EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
@@ -140,22 +54,6 @@ void move_channels(DiagnosedEffect& e, const Evidence& from, const Evidence& to)
     g.channel = static_cast<std::size_t>(now - to.channels.data());
     return false;
   });
-}
-
-/// The same rows with references in the place of suspect logs, and these in theirs.
-Evidence references_first(const Evidence& evidence) {
-  Evidence out = evidence;
-  std::rotate(out.series.begin(),
-              out.series.begin() + static_cast<std::ptrdiff_t>(evidence.suspects),
-              out.series.end());
-  const auto suspects = static_cast<int>(evidence.suspects);
-  const auto references = static_cast<int>(evidence.series.size()) - suspects;
-  out.suspects = static_cast<std::size_t>(references);
-  for (EvidenceChannel& c : out.channels) {
-    for (int& log : c.log) log = log < suspects ? log + references : log - suspects;
-    if (!c.raw.empty()) std::rotate(c.raw.begin(), c.raw.begin() + suspects, c.raw.end());
-  }
-  return out;
 }
 
 /// Whether both have the same nonlinear parameters and therefore proportional columns.
@@ -260,79 +158,6 @@ struct OtherEffects {
   OtherEffects(const OtherEffects&) = delete;
   OtherEffects& operator=(const OtherEffects&) = delete;
 };
-
-}  // namespace
-
-double reference_rms(const Diagnosis& d, std::size_t channel) {
-  const EvidenceChannel& c = d.evidence.channels[channel];
-  double squares = 0.0, n = 0.0;
-  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
-    if (static_cast<std::size_t>(c.log[b]) < d.evidence.suspects) continue;
-    const Index length = c.blocks[b].last - c.blocks[b].first;
-    squares += d.search.final.residual[channel].segment(c.blocks[b].first, length).squaredNorm();
-    n += static_cast<double>(length);
-  }
-  return n > 0.0 ? std::sqrt(squares / n) : kNaN;
-}
-
-std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {
-  const std::optional<Excess> excess = excess_over_references(d, channel);
-  if (!excess) return std::nullopt;
-  return std::min(1.0, kWaysToExceed * static_cast<double>(d.evidence.channels.size()) *
-                           std::min(excess->level, excess->largest));
-}
-
-bool exceeds_references(const Diagnosis& d, std::size_t channel) {
-  const std::optional<double> chance = chance_beyond_references(d, channel);
-  return !chance || *chance < d.thresholds.structure_false_alarm;
-}
-
-std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
-  std::optional<std::size_t> found;
-  double least = d.thresholds.structure_false_alarm;
-  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
-    const double here = suspect_rms(d.evidence, c, d.search.final.residual[c]);
-    if (!(here > d.thresholds.least_excess_ratio * reference_rms(d, c))) continue;
-    const std::optional<double> chance = chance_beyond_references(d, c);
-    if (chance && *chance < least) {
-      least = *chance;
-      found = c;
-    }
-  }
-  return found;
-}
-
-std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
-                                   const DiagnoseOptions& options) {
-  std::vector<bool> shared(left.size(), false);
-  if (left.empty() || !d.evidence.has_reference()) return shared;
-  const Evidence swapped = references_first(d.evidence);
-  const std::vector<ResidualStructure> there =
-      find_residual_structure(swapped, d.search.final, options.residual);
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
-      return r.channel == left[i].channel && d.thresholds.least_excess_ratio * r.rms >= left[i].rms;
-    });
-    const std::size_t channel = left[i].channel;
-    const double floor = d.evidence.channels[channel].noise_floor;
-    const double rms = reference_rms(d, channel);
-    // an oscillation is measured before the filter, so after it the residual limits it
-    const double here =
-        std::min(left[i].rms, suspect_rms(d.evidence, channel, d.search.final.residual[channel]));
-    const bool room = rms * rms - (std::isfinite(floor) ? floor * floor : 0.0) >=
-                      std::pow(here / d.thresholds.least_excess_ratio, 2);
-    // one that is weaker than what counts as an oscillation is one all the same
-    const bool oscillates =
-        left[i].oscillation &&
-        d.thresholds.least_excess_ratio *
-                strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
-            left[i].rms;
-    shared[i] = (found || room || oscillates) && !exceeds_references(d, channel);
-  }
-  return shared;
-}
-
-namespace {
 
 /// What a difference needs beside its size to be called a change.
 enum class Proof {

@@ -8,6 +8,7 @@
 #include "diagnosis/residual/isolated_event.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/reference_comparison.h"
+#include "diagnosis/verdict/residual_levels.h"
 #include "identification/comparison/report_numbers.h"
 #include "models/effects/hydraulics.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "diagnosis/residual/residual_oscillation.h"
-#include "diagnosis/verdict/reference_comparison.h"
+#include "diagnosis/verdict/residual_levels.h"
 #include "models/effects/memory.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"

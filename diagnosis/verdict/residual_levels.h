@@ -1,0 +1,45 @@
+#pragma once
+/// Residuals of the suspect logs beside those of the references: what both leave unexplained alike is no change. Used by diagnose.cpp and
+/// its parts only.
+#include <optional>
+#include <vector>
+
+#include "diagnosis/residual/residual_model.h"
+#include "diagnosis/verdict/diagnose.h"
+
+namespace sparflow {
+
+/// Probabilities by chance that the residual of a channel in the suspect logs exceeds that in the references so far.
+struct Excess {
+  double level = 1.0;    ///< in the mean over the blocks
+  double largest = 1.0;  ///< in the largest block
+};
+inline constexpr double kWaysToExceed = 2.0;  ///< for Bonferroni's bound
+
+/// Nothing where there are no references, or too few motions of one kind.
+std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel);
+
+/// The same rows with references in the place of suspect logs, and these in theirs.
+Evidence references_first(const Evidence& evidence);
+
+/// RMS of a channel's final residual in the reference logs [SI]; NaN where they do not have the channel.
+double reference_rms(const Diagnosis& d, std::size_t channel);
+
+/// Probability, by Bonferroni's bound over the channels, that a channel's final residual is so much larger in the suspect logs
+/// than in the references by chance, on the logarithms of the blocks' mean squares: Welch's (1947) test of their means, and
+/// Student's prediction for the largest one, because a deviation in one stretch of motion hardly moves the mean. Nothing
+/// where there are no references, or too few motions of one kind.
+std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel);
+/// Whether that is significant; true where there is nothing to compare with.
+bool exceeds_references(const Diagnosis& d, std::size_t channel);
+/// The channel in which it is most significant, among those whose residual is a multiple of that in the references; nothing
+/// where it is in none, or without references.
+std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
+
+/// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in
+/// the same channel by the same residual models, or leave about as much beyond the sensors' noise there, and the residual of the
+/// suspect logs is not larger (exceeds_references).
+std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
+                                   const DiagnoseOptions& options);
+
+}  // namespace sparflow
