@@ -182,7 +182,8 @@ double explained_excess(const Diagnosis& d, const Diagnosis& without, std::size_
 }
 
 /// Whether the residual of one of its channels in the suspect logs exceeds that in the references once the action of a found
-/// effect is left in it, and mostly for that reason, by the learned laws of the final fit: estimated anew, they would share the difference out among all logs.
+/// effect is left in it, and mostly for that reason, by the learned laws of the final fit: estimated anew, they would share the
+/// difference out among all logs.
 bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
   Index first = 0;
   for (std::size_t i = 0; i < found; ++i) first += d.search.found[i].design.linear;
@@ -195,9 +196,9 @@ bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
         design.columns[c] * d.search.final.theta.segment(first, design.linear);
     const std::optional<Excess> excess = excess_over_references(without, c);
     if (!excess) return true;
+    tests += kWaysToExceed;
     if (explained_excess(d, without, c) < d.thresholds.least_excess_explained) continue;
     least = std::min({least, excess->level, excess->largest});
-    tests += kWaysToExceed;
   }
   // an effect whose size differs has been selected already, so that its own channels alone count
   return proof == Proof::kExcess

@@ -132,8 +132,13 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
 }
 
 /// A friction of the boom in white noise, of one size in the suspect and of another in the reference log.
-/// @param deviation of the noise [N]
-InReferences compared_sizes(double suspect, double reference, double deviation = 2000.0) {
+struct Sizes {
+  double suspect = 0.0, reference = 0.0;  ///< [N]
+  double deviation = 2000.0;              ///< of the noise [N]
+  double louder = 1.0;                    ///< noise of the suspect log over that of the reference
+  double least_explained = VerdictOptions{}.least_excess_explained;
+};
+InReferences compared_sizes(const Sizes& sizes) {
   const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
   Diagnosis d;
   d.evidence =
@@ -143,14 +148,19 @@ InReferences compared_sizes(double suspect, double reference, double deviation =
   EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
   std::mt19937_64 random(2);
   NoiseModel noise;
-  noise.variance = deviation * deviation;
+  noise.variance = sizes.deviation * sizes.deviation;
   const EffectAt friction{find_effect("coulomb_friction"), 1};
   FoundEffect found;
   found.design = make_design(d.evidence, friction, {});
-  channel.y =
-      testing_support::draw(noise, channel.blocks, random) +
-      suspect * found.design.columns[static_cast<std::size_t>(at)].col(0) +
-      reference * d.evidence.columns(friction, {}, channel, {}, ActingLogs::kReferences).col(0);
+  channel.y = testing_support::draw(noise, channel.blocks, random);
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b)
+    if (channel.log[b] == 0)
+      channel.y.segment(channel.blocks[b].first,
+                        channel.blocks[b].last - channel.blocks[b].first) *= sizes.louder;
+  channel.y += sizes.suspect * found.design.columns[static_cast<std::size_t>(at)].col(0) +
+               sizes.reference *
+                   d.evidence.columns(friction, {}, channel, {}, ActingLogs::kReferences).col(0);
+  d.thresholds.least_excess_explained = sizes.least_explained;
   d.search.found.push_back(std::move(found));
   FitControl control;
   control.keep_residuals = true;
@@ -161,15 +171,22 @@ InReferences compared_sizes(double suspect, double reference, double deviation =
 /// The residual of 2 kN is no larger with the friction left in it. In this draw the sizes then differ by 3.0, 3.9 and 7.5 standard
 /// errors: chances of 0.003, 0.0001 and less, of which the first lies between both levels.
 TEST(ReferenceComparison, ADifferenceIsAChangeByItsSizeAloneOnlyIfItIsCertain) {
-  EXPECT_EQ(compared_sizes(1000.0, 1100.0), InReferences::kAlike);
-  EXPECT_EQ(compared_sizes(1000.0, 950.0), InReferences::kOther);
-  EXPECT_EQ(compared_sizes(1000.0, 350.0), InReferences::kNot);
+  EXPECT_EQ(compared_sizes({1000.0, 1100.0}), InReferences::kAlike);
+  EXPECT_EQ(compared_sizes({1000.0, 950.0}), InReferences::kOther);
+  EXPECT_EQ(compared_sizes({1000.0, 350.0}), InReferences::kNot);
+}
+
+/// A suspect log that is twice as noisy as the reference exceeds it with the effect and without: of the squared residual beyond that of
+/// the reference the effect explains 18 %. The difference of the sizes, 2.7 standard errors, is significant and no more.
+TEST(ReferenceComparison, AnEffectThatExplainsLittleOfTheExcessIsNoChange) {
+  EXPECT_EQ(compared_sizes({1000.0, 1160.0, 2000.0, 2.0}), InReferences::kAlike);
+  EXPECT_EQ(compared_sizes({1000.0, 1160.0, 2000.0, 2.0, 0.0}), InReferences::kOther);
 }
 
 /// Form error of the law: 5 % of what both logs have. 8 % more is 1.6 of it, 40 % more is 8; sampling alone resolves 1 %.
 TEST(ReferenceComparison, ADifferenceWithinTheFormErrorOfTheLawIsNoChange) {
-  EXPECT_EQ(compared_sizes(1000.0, 1080.0, 40.0), InReferences::kAlike);
-  EXPECT_EQ(compared_sizes(1000.0, 1400.0, 40.0), InReferences::kOther);
+  EXPECT_EQ(compared_sizes({1000.0, 1080.0, 40.0}), InReferences::kAlike);
+  EXPECT_EQ(compared_sizes({1000.0, 1400.0, 40.0}), InReferences::kOther);
 }
 
 TEST(ReferenceComparison, WhatBothLogsShowIsNoChange) {
