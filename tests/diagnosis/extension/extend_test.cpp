@@ -16,6 +16,7 @@
 namespace sparflow {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -71,6 +72,16 @@ TEST(EstimateEffects, AllEffectsTogether) {
   EXPECT_NEAR(e.effects[0].values[0], kFriction, 0.05 * kFriction);
   // one joint determines only its moment: 60 kg at 1.5 m
   EXPECT_NEAR(e.effects[1].values[1], 90.0, 9.0);
+}
+
+TEST(EstimateEffects, AnEffectThatTheLogDoesNotHaveIsNotSignificant) {
+  const CraneModel model = arm_model();
+  const std::vector<MachineSignals> signals = {
+      make_signals(model.machine, arm_log_with_friction(kFriction))};
+  const EffectEstimate e = estimate_effects(
+      model, {coulomb(), parse_effect("unmodelled_mass:arm", model.machine)}, {signals});
+  EXPECT_THAT(e.significant, ElementsAre(true, false))
+      << "the log has friction and no unmodelled mass";
 }
 
 TEST(EstimateEffects, SamplesLeftOutTakeNoPart) {
