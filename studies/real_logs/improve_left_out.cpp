@@ -12,6 +12,7 @@
 
 #include "diagnosis/extension/extend.h"
 #include "identification/comparison/compare.h"
+#include "identification/data_checks/set_aside.h"
 #include "identification/learning/fit.h"
 #include "models/effects/registry.h"
 #include "models/files/machine_file.h"
@@ -258,12 +259,21 @@ void run_together(const Machine& machine, const std::vector<Log>& logs) {
   }
 }
 
+/// The log without what the data checks find faulty, which neither trains nor judges a model. Jumps stay: an effect may explain
+/// them.
+Log without_faults(const Machine& machine, Log log) {
+  std::vector<BadChannel> faults = find_bad_channels(machine, log, make_signals(machine, log));
+  std::erase_if(faults, [](const BadChannel& b) { return b.kind == BadDataKind::kJumping; });
+  for (const BadChannel& b : faults) fmt::print("{}: {}\n", log.file, bad_channel_sentence(b));
+  return without_bad_data(std::move(log), faults);
+}
+
 int run(const std::string& machine_file, const std::vector<std::string>& files,
         const std::vector<std::string>& only, bool together) {
   const Machine machine = load_machine(machine_file);
   std::vector<Log> logs;
   logs.reserve(files.size());
-  for (const std::string& f : files) logs.push_back(load_log(f, machine));
+  for (const std::string& f : files) logs.push_back(without_faults(machine, load_log(f, machine)));
   if (together) {
     run_together(machine, logs);
     return 0;
