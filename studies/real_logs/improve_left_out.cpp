@@ -2,7 +2,8 @@
 // and a mass at the tip by least squares, which is what an engineer would fit first.
 // With --together no log is left out, and the relative error of each force is printed, |F - F_model| / |F|, over all samples
 // as benchmarks of drives state it.
-//   improve_left_out -m MACHINE.yaml -l LOG.csv... [--only NAME] [--together]
+// With --as-fitted nothing is improved: `after` is `before`, and only least squares is compared with it.
+//   improve_left_out -m MACHINE.yaml -l LOG.csv... [--only NAME] [--together] [--as-fitted]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -269,7 +270,7 @@ Log without_faults(const Machine& machine, Log log) {
 }
 
 int run(const std::string& machine_file, const std::vector<std::string>& files,
-        const std::vector<std::string>& only, bool together) {
+        const std::vector<std::string>& only, bool together, bool as_fitted) {
   const Machine machine = load_machine(machine_file);
   std::vector<Log> logs;
   logs.reserve(files.size());
@@ -293,7 +294,13 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
     }
     const CraneModel before = fit(machine, train.suspects).model;
     const CraneModel squares = by_least_squares(before, signals);
-    const ExtendResult r = improve(before, train);
+    ExtendResult r;
+    if (as_fitted) {
+      r.model = before;
+      r.stopped_because = "not improved";
+    } else {
+      r = improve(before, train);
+    }
     fmt::print("{}: {:.0f} s, {}\n", logs[out].file, r.seconds, r.stopped_because);
     print_effects(r.model);
     fmt::print("  {:26}{:>7}{:>10}{:>10}{:>10}\n", "on the log left out", "samples", "before",
@@ -319,15 +326,16 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
 int main(int argc, char** argv) {
   std::string machine;
   std::vector<std::string> logs, only;
-  bool together = false;
+  bool together = false, as_fitted = false;
   CLI::App app("errors on each log left out, before and after improve");
   app.add_option("-m,--machine", machine, "machine file")->required()->check(CLI::ExistingFile);
   app.add_option("-l,--log", logs, "logs (CSV)")->required()->check(CLI::ExistingFile);
   app.add_option("--only", only, "leave out only logs whose name contains this");
   app.add_flag("--together", together, "leave out none; print the relative error of each force");
+  app.add_flag("--as-fitted", as_fitted, "do not improve");
   CLI11_PARSE(app, argc, argv);
   try {
-    return sparflow::bench::run(machine, logs, only, together);
+    return sparflow::bench::run(machine, logs, only, together, as_fitted);
   } catch (const sparflow::InputError& e) {
     fmt::print(stderr, "{}\n", e.what());
     return 3;
