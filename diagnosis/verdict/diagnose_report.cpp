@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/verdict/diagnose.h"
+#include "diagnosis/verdict/diagnosed_effect.h"
 #include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
@@ -37,6 +38,7 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
       {"log_likelihood_gain", e.gain},
       {"held_out_gain", {{"value", e.held_out_gain}, {"standard_error", e.held_out_error}}},
       {"absorbed", e.absorbed},
+      {"partial_law", !partial_law(e).empty()},
       {"evidence", e.evidence}};
   j["parameters"] = nlohmann::json::array();
   for (const ParameterEstimate& p : e.parameters) {

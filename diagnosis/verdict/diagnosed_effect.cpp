@@ -108,7 +108,22 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
       fmt::format("it improves the prediction of motions left out of the estimate, in {:.0f} % of "
                   "the folds and by {:.1f} standard errors",
                   100.0 * f.held_out_share, e.held_out_gain / std::max(e.held_out_error, 1e-300)));
+  if (const std::string partial = partial_law(e); !partial.empty())
+    e.evidence.insert(e.evidence.begin(), partial);
   return e;
+}
+
+std::string partial_law(const DiagnosedEffect& e) {
+  const auto share = std::find_if(e.parameters.begin(), e.parameters.end(),
+                                  [](const ParameterEstimate& p) { return p.name == "share"; });
+  if (share == e.parameters.end() || !share->determined ||
+      (share->lower95 <= 1.0 && share->upper95 >= 1.0))
+    return {};
+  return fmt::format(
+      "its share is {} ({} to {}), not one: the logs do not show this law as a whole, and another "
+      "one may be the cause",
+      plain_number(share->value, 3), plain_number(share->lower95, 3),
+      plain_number(share->upper95, 3));
 }
 
 }  // namespace sparflow

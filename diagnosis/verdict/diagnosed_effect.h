@@ -15,4 +15,8 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index);
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
                                 const SearchOptions& options);
 
+/// A parameter "share" says how much of its law an effect shows, one for the whole law.
+/// @return a sentence where the 95 % interval of that share excludes one, so that another law may be the cause; else ""
+std::string partial_law(const DiagnosedEffect& e);
+
 }  // namespace sparflow

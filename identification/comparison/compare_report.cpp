@@ -72,6 +72,8 @@ const char* bad_words(BadDataKind kind) {
       return "is cut off";
     case BadDataKind::kWild:
       return "has single samples far off";
+    case BadDataKind::kRippling:
+      return "ripples";
   }
   return "";
 }

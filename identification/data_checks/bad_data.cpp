@@ -167,6 +167,8 @@ const char* bad_data_word(BadDataKind kind) {
       return "saturated";
     case BadDataKind::kWild:
       return "wild";
+    case BadDataKind::kRippling:
+      return "rippling";
   }
   return "";
 }
@@ -185,8 +187,8 @@ bool is_computed_motion(const Machine& machine, const Log& log) {
 }
 
 std::string bad_channel_sentence(const BadChannel& bad) {
-  const char* words[] = {"is stuck",  "jumps",      "is noisy",
-                         "drops out", "is cut off", "has wild samples"};
+  const char* words[] = {"is stuck",         "jumps",  "is noisy", "drops out", "is cut off",
+                         "has wild samples", "ripples"};
   return fmt::format("{} {} between {:.1f} and {:.1f} s ({:.2g} % of the log): {}. {}.",
                      bad.channel, words[static_cast<int>(bad.kind)], bad.from_s, bad.to_s,
                      100.0 * bad.share, bad.evidence, bad.remedy);
@@ -205,8 +207,8 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
   }
   // The first finding of a channel ends its checks: a stuck channel is not reported for the jumps into and out of its value.
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
-  const Check checks[] = {check_missing,   check_stuck, check_stuck_command, check_noise,
-                          check_saturated, check_wild,  check_jumps};
+  const Check checks[] = {check_missing, check_stuck,     check_stuck_command, check_ripple,
+                          check_noise,   check_saturated, check_wild,          check_jumps};
   const bool computed = is_computed_motion(machine, log);
   for (std::size_t i = 0; i < context.channels.size(); ++i) {
     for (const Check check : checks) {

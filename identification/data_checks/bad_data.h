@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "identification/data_checks/position_ripple.h"
 #include "identification/signals/signals.h"
 
 namespace sparflow {
@@ -18,7 +19,8 @@ enum class BadDataKind {
   kNoisy,      ///< white noise far above that of its peers or its own elsewhere
   kDropOut,    ///< falls to zero, or is missing
   kSaturated,  ///< repeatedly cut off at one value
-  kWild        ///< repeated single samples far off both their neighbours
+  kWild,       ///< repeated single samples far off both their neighbours
+  kRippling    ///< a position that oscillates by far more than the pressures allow
 };
 
 struct BadChannel {
@@ -38,7 +40,7 @@ struct BadChannel {
   std::vector<std::pair<double, double>> stretches = {};  ///< [s] affected, in order
 };
 
-/// @return "stuck", "jumping", "noisy", "drop_out", "saturated" or "wild", as in JSON
+/// @return "stuck", "jumping", "noisy", "drop_out", "saturated", "wild" or "rippling", as in JSON
 const char* bad_data_word(BadDataKind kind);
 
 /// Thresholds of the checks. A level of noise is a standard deviation of the white part, estimated
@@ -281,6 +283,9 @@ struct BadDataOptions {
   /// Least jump of an oil temperature.
   /// @threshold [K] 0..30; chosen: oil does not warm by 3 K from one sample to the next
   double least_oil_jump = 3.0;
+
+  /// Oscillations of a position that the pressures do not show.
+  RippleOptions ripple;
 };
 
 /// @param signals of the same log and machine

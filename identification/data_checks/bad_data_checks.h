@@ -54,6 +54,7 @@ struct Finding {
 };
 
 std::optional<Finding> check_missing(const CheckContext& context, std::size_t channel);
+std::optional<Finding> check_ripple(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_noise(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_stuck(const CheckContext& context, std::size_t channel);
 std::optional<Finding> check_stuck_command(const CheckContext& context, std::size_t channel);

@@ -2,7 +2,8 @@
 // and a mass at the tip by least squares, which is what an engineer would fit first.
 // With --together no log is left out, and the relative error of each force is printed, |F - F_model| / |F|, over all samples
 // as benchmarks of drives state it.
-//   improve_left_out -m MACHINE.yaml -l LOG.csv... [--only NAME] [--together]
+// With --as-fitted nothing is improved: `after` is `before`, and only least squares is compared with it.
+//   improve_left_out -m MACHINE.yaml -l LOG.csv... [--only NAME] [--together] [--as-fitted]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +13,7 @@
 
 #include "diagnosis/extension/extend.h"
 #include "identification/comparison/compare.h"
+#include "identification/data_checks/set_aside.h"
 #include "identification/learning/fit.h"
 #include "models/effects/registry.h"
 #include "models/files/machine_file.h"
@@ -258,12 +260,21 @@ void run_together(const Machine& machine, const std::vector<Log>& logs) {
   }
 }
 
+/// The log without what the data checks find faulty, which neither trains nor judges a model. Jumps stay: an effect may explain
+/// them.
+Log without_faults(const Machine& machine, Log log) {
+  std::vector<BadChannel> faults = find_bad_channels(machine, log, make_signals(machine, log));
+  std::erase_if(faults, [](const BadChannel& b) { return b.kind == BadDataKind::kJumping; });
+  for (const BadChannel& b : faults) fmt::print("{}: {}\n", log.file, bad_channel_sentence(b));
+  return without_bad_data(std::move(log), faults);
+}
+
 int run(const std::string& machine_file, const std::vector<std::string>& files,
-        const std::vector<std::string>& only, bool together) {
+        const std::vector<std::string>& only, bool together, bool as_fitted) {
   const Machine machine = load_machine(machine_file);
   std::vector<Log> logs;
   logs.reserve(files.size());
-  for (const std::string& f : files) logs.push_back(load_log(f, machine));
+  for (const std::string& f : files) logs.push_back(without_faults(machine, load_log(f, machine)));
   if (together) {
     run_together(machine, logs);
     return 0;
@@ -283,7 +294,13 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
     }
     const CraneModel before = fit(machine, train.suspects).model;
     const CraneModel squares = by_least_squares(before, signals);
-    const ExtendResult r = improve(before, train);
+    ExtendResult r;
+    if (as_fitted) {
+      r.model = before;
+      r.stopped_because = "not improved";
+    } else {
+      r = improve(before, train);
+    }
     fmt::print("{}: {:.0f} s, {}\n", logs[out].file, r.seconds, r.stopped_because);
     print_effects(r.model);
     fmt::print("  {:26}{:>7}{:>10}{:>10}{:>10}\n", "on the log left out", "samples", "before",
@@ -309,15 +326,16 @@ int run(const std::string& machine_file, const std::vector<std::string>& files,
 int main(int argc, char** argv) {
   std::string machine;
   std::vector<std::string> logs, only;
-  bool together = false;
+  bool together = false, as_fitted = false;
   CLI::App app("errors on each log left out, before and after improve");
   app.add_option("-m,--machine", machine, "machine file")->required()->check(CLI::ExistingFile);
   app.add_option("-l,--log", logs, "logs (CSV)")->required()->check(CLI::ExistingFile);
   app.add_option("--only", only, "leave out only logs whose name contains this");
   app.add_flag("--together", together, "leave out none; print the relative error of each force");
+  app.add_flag("--as-fitted", as_fitted, "do not improve");
   CLI11_PARSE(app, argc, argv);
   try {
-    return sparflow::bench::run(machine, logs, only, together);
+    return sparflow::bench::run(machine, logs, only, together, as_fitted);
   } catch (const sparflow::InputError& e) {
     fmt::print(stderr, "{}\n", e.what());
     return 3;

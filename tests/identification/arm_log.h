@@ -92,17 +92,17 @@ inline Channel& channel(Log& log, const std::string& signal) {
   throw std::logic_error("no channel " + signal);
 }
 
-/// Sixty seconds at 50 Hz: ten strokes up and down, each at its own speed, with a rest before each.
-/// @param noise [bar] of the pressures  @param seed of the noise
-inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
+/// Sixty seconds: ten strokes up and down, each at its own speed, with a rest before each.
+/// @param noise [bar] of the pressures  @param seed of the noise  @param hertz of the sampling, a whole number
+inline Log arm_log(double noise = 0.0, unsigned seed = 1, int hertz = 50) {
   const Machine m = arm_machine();
-  constexpr double kStep = 0.02;
-  const Eigen::Index n = 3000;
+  const double step = 1.0 / hertz;
+  const Eigen::Index n = 60 * hertz;
   Log log;
   log.path = log.file = "arm.csv";
   log.sha256 = std::string(64, '0');
-  log.step = kStep;
-  log.time = Eigen::VectorXd::LinSpaced(n, 0.0, kStep * static_cast<double>(n - 1));
+  log.step = step;
+  log.time = Eigen::VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
   log.runs = {{0, n}};
   Eigen::VectorXd q(n), u = Eigen::VectorXd::Zero(n), a(n), b(n), pump(n), payload(n);
   StaticForce statics(m);
@@ -124,10 +124,10 @@ inline Log arm_log(double noise = 0.0, unsigned seed = 1) {
   };
   double angle = 0.0;
   for (Eigen::Index k = 0; k < n; ++k) {
-    const int stroke = static_cast<int>(k / 300);
+    const int stroke = static_cast<int>(k / (6 * hertz));
     const double t = log.time[k], rate = rate_at(t);
     if (k > 0) {  // Simpson's rule over the last step
-      angle += kStep / 6.0 * (rate_at(t - kStep) + 4.0 * rate_at(t - 0.5 * kStep) + rate);
+      angle += step / 6.0 * (rate_at(t - step) + 4.0 * rate_at(t - 0.5 * step) + rate);
     }
     q[k] = angle;
     payload[k] = 100.0 * (stroke % 3);

@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/verdict/diagnosed_effect.h"
 #include "identification/learning/fit.h"
 #include "models/math/error.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -243,6 +244,45 @@ TEST(Diagnose, APositionThatIsSetAsideForSecondsDoesNotStopTheLaws) {
   ASSERT_EQ(d.set_aside.size(), 1u) << d.table();
   EXPECT_EQ(d.set_aside.front().channel, "q_jib");
   EXPECT_EQ(d.verdict, Verdict::kNone) << d.table();
+}
+
+TEST(Diagnose, ARipplingPositionIsSetAsideInItsStretch) {
+  HiddenCase logs = hidden_case(crane(), {}, {kSeed, kSeconds});
+  EXPECT_TRUE(diagnosis_signals(crane(), {logs.train}, {}, {}).set_aside.empty());
+  const auto q = std::find_if(logs.train.channels.begin(), logs.train.channels.end(),
+                              [](const Channel& c) { return c.signal == "q_jib"; });
+  ASSERT_NE(q, logs.train.channels.end());
+  for (Eigen::Index k = 0; k < logs.train.samples(); ++k) {
+    const double t = logs.train.time[k];
+    if (t > 20.0 && t < 32.0) q->values[k] += 8e-3 * std::sin(2.0 * M_PI * 11.0 * t);
+  }
+  const DiagnosisSignals signals = diagnosis_signals(crane(), {logs.train}, {}, {});
+  ASSERT_EQ(signals.set_aside.size(), 1u);
+  const BadChannel& bad = signals.set_aside.front().channel;
+  EXPECT_EQ(bad.channel, "q_jib");
+  EXPECT_EQ(bad.kind, BadDataKind::kRippling);
+  EXPECT_NEAR(bad.from_s, 20.0, 1.5);
+  EXPECT_NEAR(bad.to_s, 32.0, 1.5);
+  // the rest takes part as before
+  const Mask& usable = signals.suspects.front().usable;
+  for (Eigen::Index k = 0; k < usable.size(); ++k) {
+    const double t = logs.train.time[k];
+    EXPECT_EQ(usable[k], t < bad.from_s || t > bad.to_s) << t;
+  }
+}
+
+TEST(Diagnose, AShareWhoseIntervalExcludesOneIsSaidToBeAPartOfTheLaw) {
+  DiagnosedEffect e;
+  e.parameters = {{"share", "-", "", 0.52, 0.48, 0.56}, {"delay", "s", "", 0.2, 0.1, 0.3}};
+  EXPECT_THAT(partial_law(e), testing::HasSubstr("0.520 (0.480 to 0.560), not one"));
+  e.parameters[0].upper95 = 1.04;
+  EXPECT_EQ(partial_law(e), "");
+  e.parameters[0] = {"share", "-", "", 1.87, 1.7, 2.0};
+  EXPECT_NE(partial_law(e), "");
+  e.parameters[0].determined = false;
+  EXPECT_EQ(partial_law(e), "") << "no value of it is shown";
+  e.parameters.erase(e.parameters.begin());
+  EXPECT_EQ(partial_law(e), "") << "an effect without a share";
 }
 
 TEST(Diagnose, ABrokenSensorIsSetAsideAndTheRestIsJudged) {

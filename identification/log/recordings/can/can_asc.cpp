@@ -15,7 +15,7 @@ namespace sparflow {
 namespace {
 
 // no threshold: bytes of the longest frame, and lines within which a file's head stands
-constexpr std::size_t kFrameBytes = 64, kHeadLines = 20;
+constexpr std::size_t kLongestFrame = 64, kHeadLines = 20;
 
 /// Takes the next word of a line.
 std::string_view word(std::string_view* rest) {
@@ -62,7 +62,7 @@ std::optional<Head> head_of(std::string_view line) {
 
 enum class Found { kFrame, kOther, kDamaged };
 
-class Line {
+class AscLine {
  public:
   /// @param rest the line behind its time
   Found read(std::string_view rest, int base) {
@@ -91,7 +91,7 @@ class Line {
     word(&rest);                                         // ESI, then the code of the length
     word(&rest);
     unsigned size = 0;
-    if (!number(word(&rest), &size) || size > kFrameBytes) return Found::kDamaged;
+    if (!number(word(&rest), &size) || size > kLongestFrame) return Found::kDamaged;
     base_ = 16;  // FD frames are written in hexadecimal digits
     return data(rest, size) ? Found::kFrame : Found::kDamaged;
   }
@@ -111,7 +111,7 @@ class Line {
   std::uint32_t id_ = 0;
   bool extended_ = false;
   std::size_t size_ = 0;
-  std::array<std::uint8_t, kFrameBytes> bytes_{};
+  std::array<std::uint8_t, kLongestFrame> bytes_{};
 };
 
 }  // namespace
@@ -143,7 +143,7 @@ Recording read_asc(std::string_view bytes, const std::string& file,
     if (!number(word(&behind), &time)) continue;  // head, comments, trigger blocks
     if (!(time >= 0.0 && time < 1e12)) fail("got a time of " + printable(text.substr(0, 40)));
     if (head.relative) time += now;
-    Line line;
+    AscLine line;
     const Found found = line.read(behind, head.base);
     if (found == Found::kDamaged)
       fail(fmt::format("got \"{}\", expected a frame as `2.501000 1  123  Rx  d 2 28 0A`",
