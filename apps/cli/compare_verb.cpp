@@ -54,7 +54,7 @@ void add_compare_verb(CLI::App& app, int& code) {
   verb->add_option("--machine,-m", a->machine,
                    "machine file instead of a model: static forces only")
       ->type_name("FILE");
-  verb->add_option("--log,-l", a->logs, "logs to compare with (CSV or MAT)")
+  verb->add_option("--log,-l", a->logs, "logs to compare with (CSV, MAT or a recording)")
       ->required()
       ->type_name("FILE...");
   verb->add_option("--mapping", a->mapping, "mapping file for logs with other column names (YAML)")

@@ -55,7 +55,7 @@ void add_diagnose_verb(CLI::App& app, int& code) {
       "diagnose",
       "find which physical effect the model lacks, with evidence; or none, unknown or bad data");
   a->inputs.add_model(*verb);
-  a->inputs.add_logs(*verb, "logs to diagnose (CSV or MAT)");
+  a->inputs.add_logs(*verb, "logs to diagnose (CSV, MAT or a recording)");
   a->inputs.add_references(
       *verb,
       "reference logs of the same machine, recorded before the effect; pressure models are learned "

@@ -61,7 +61,7 @@ void add_extend_verb(CLI::App& app, int& code) {
                    "effects to add, in this order; `sparflow effects` lists them")
       ->type_name("EFFECT[:AT]...");
   verb->add_option("--remove", a->remove, "effect to remove instead")->type_name("EFFECT[:AT]");
-  a->inputs.add_logs(*verb, "logs to learn from (CSV or MAT)");
+  a->inputs.add_logs(*verb, "logs to learn from (CSV, MAT or a recording)");
   a->inputs.add_tests(*verb, "logs to judge the error on; absent: motions of --log are held out");
   a->inputs.add_output(*verb);
   a->inputs.add_threads(*verb);

@@ -89,7 +89,7 @@ void add_fit_verb(CLI::App& app, int& code) {
   verb->add_option("--machine,-m", a->machine, "machine file (YAML)")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--log,-l", a->logs, "logs to learn from (CSV or MAT)")
+  verb->add_option("--log,-l", a->logs, "logs to learn from (CSV, MAT or a recording)")
       ->required()
       ->type_name("FILE...");
   verb->add_option("--test,-t", a->tests,

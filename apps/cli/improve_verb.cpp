@@ -47,7 +47,7 @@ void add_improve_verb(CLI::App& app, int& code) {
       "improve",
       "repeat diagnose and extend until no effect is missing; report the error after each step");
   a->inputs.add_model(*verb);
-  a->inputs.add_logs(*verb, "logs to diagnose and learn from (CSV or MAT)");
+  a->inputs.add_logs(*verb, "logs to diagnose and learn from (CSV, MAT or a recording)");
   a->inputs.add_references(
       *verb,
       "reference logs of the same machine, recorded before the effect; the pressure "

@@ -45,7 +45,7 @@ void add_selftest_verb(CLI::App& app, int& code) {
                                       "find what these logs could reveal: inject every effect; "
                                       "report power and indistinguishable sets");
   a->inputs.add_model(*verb);
-  a->inputs.add_logs(*verb, "logs whose motions are judged (CSV or MAT)");
+  a->inputs.add_logs(*verb, "logs whose motions are judged (CSV, MAT or a recording)");
   a->inputs.add_references(*verb, "reference logs of the same machine");
   a->inputs.add_candidates(*verb, "effects to inject");
   verb->add_option("--check", a->check,

@@ -57,14 +57,20 @@ ClockCandidate clock_candidate(const RawColumn& column) {
 /// @return the column that holds the time. @throws InputError where none rises
 ClockCandidate find_clock(const RawTable& table, const TimeColumnOptions& options) {
   ClockCandidate best;
+  std::string named;
   for (const RawColumn& column : table.columns) {
     if (column.text) continue;
     const ClockCandidate c = clock_candidate(column);
+    if (c.named && named.empty()) named = column.name;
     if (c.rising < options.rising) continue;
     const auto rank = [](const ClockCandidate& x) { return (x.named ? 2.0 : 0.0) + x.evenness; };
     if (best.column == nullptr || rank(c) > rank(best)) best = c;
   }
   if (best.column == nullptr) {
+    if (!named.empty())
+      throw InputError({table.file, table.header_line, 0}, named,
+                       "this column is the time by its name, but its numbers do not rise from row "
+                       "to row; sort the rows by their time, and give at least three");
     throw InputError({table.file, table.header_line, 0}, "time",
                      "no column rises from row to row as a time does; add a column of times, or "
                      "map one with `columns: {t_s: ...}` (docs/log_format.md)");

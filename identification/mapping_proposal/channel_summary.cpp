@@ -109,14 +109,18 @@ std::string summary_table(const std::vector<ChannelSummary>& channels) {
   std::string text = fmt::format(
       "  {:<{}} {:<8} {:>8} {:>11} {:>11} {:>11} {:>5} {:>8} {:>11} {:>9}\n", "channel", width,
       "unit", "rate Hz", "smallest", "largest", "mean", "gaps", "missing", "resolution", "noise");
+  // A channel without any value has neither range nor noise.
+  const auto value = [](double v) { return std::isfinite(v) ? fmt::format("{:.5g}", v) : "-"; };
   for (const ChannelSummary& c : channels) {
     const std::string missing =
-        c.missing_share > 0.0 ? fmt::format("{:.2g} %", 100.0 * c.missing_share) : "-";
+        c.missing_share > 0.0 ? fmt::format("{:.3g} %", 100.0 * c.missing_share) : "-";
     const std::string resolution = c.resolution > 0.0 ? fmt::format("{:.3g}", c.resolution) : "-";
-    text += fmt::format(
-        "  {:<{}} {:<8} {:>8.4g} {:>11.5g} {:>11.5g} {:>11.5g} {:>5} {:>8} {:>11} {:>9}\n", c.name,
-        width, c.unit.empty() ? "-" : c.unit, c.rate, c.smallest, c.largest, c.mean, c.gaps,
-        missing, resolution, c.constant ? "constant" : fmt::format("{:.2g}", c.noise));
+    const std::string noise = c.constant                  ? "constant"
+                              : std::isfinite(c.smallest) ? fmt::format("{:.2g}", c.noise)
+                                                          : "-";
+    text += fmt::format("  {:<{}} {:<8} {:>8.4g} {:>11} {:>11} {:>11} {:>5} {:>8} {:>11} {:>9}\n",
+                        c.name, width, c.unit.empty() ? "-" : c.unit, c.rate, value(c.smallest),
+                        value(c.largest), value(c.mean), c.gaps, missing, resolution, noise);
   }
   return text;
 }

@@ -228,7 +228,8 @@ Json parse(const std::string& text, const std::string& file) {
   }
   if (text[start] != '{') {
     throw InputError(place_of_byte(file, text, start + 1), "",
-                     "this is not JSON; expected a model written by `sparflow fit`");
+                     fmt::format("this is not {}; expected a model written by `sparflow fit`",
+                                 text[start] == '[' ? "a JSON object but a list" : "JSON"));
   }
   try {
     return Json::parse(text);

@@ -129,6 +129,17 @@ TEST_F(LogVerb, AFileWithoutAClockIsRefusedWithASentence) {
   std::ofstream(folder / "flat.csv") << "a,b\n1,2\n1,3\n1,2\n";
   EXPECT_EQ(run((folder / "flat.csv").string()), 3);
   EXPECT_THAT(read("err"), HasSubstr("no column rises from row to row"));
+  // a time there is, but it falls
+  std::ofstream(folder / "falling.csv") << "t_s,b\n3,2\n2,3\n1,2\n0,4\n";
+  EXPECT_EQ(run((folder / "falling.csv").string()), 3);
+  EXPECT_THAT(read("err"), HasSubstr("falling.csv:1: t_s: this column is the time by its name"));
+}
+
+TEST_F(LogVerb, AChannelWithoutValuesHasNeitherRangeNorNoise) {
+  std::ofstream(folder / "hollow.csv") << "t_s,b,c\n0,nan,1\n1,nan,2\n2,nan,1\n3,nan,3\n";
+  ASSERT_EQ(run((folder / "hollow.csv").string()), 0) << read("err");
+  EXPECT_THAT(read("out"), HasSubstr("100 %"));
+  EXPECT_THAT(read("out"), testing::Not(HasSubstr("nan")));
 }
 
 }  // namespace

@@ -54,6 +54,18 @@ TEST_F(CliSimulate, ItsLogCanBeReplayedAndTracked) {
   EXPECT_EQ(run(simulate("--seconds 4 --motion \"boom alone, fast\"")).code, 0);
 }
 
+TEST_F(CliSimulate, DoubtsAboutAFileThatDrivesThePlantAreSaid) {
+  write("commands.csv", "t_s,u_boom\n0,0\n1,7\n2,0\n");
+  Outcome o = run(simulate("--replay " + at("commands.csv")));
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(o.err, HasSubstr("u_boom: 1 of 3 values lie beyond 1"));
+  EXPECT_THAT(o.err, HasSubstr("no column u_jib: that valve stays closed"));
+  write("degrees.csv",
+        "t_s,q_boom_rad,q_jib_rad,q_extension_m\n0,20,-60,1\n1,21,-61,1\n2,22,-62,1\n");
+  o = run(simulate("--track " + at("degrees.csv")));
+  EXPECT_THAT(o.err, HasSubstr("are they in degrees?"));
+}
+
 TEST_F(CliSimulate, WrongUsageAndBadInputSayWhatIsWrong) {
   Outcome o = run(simulate("--effects coulomb_frction"));
   EXPECT_EQ(o.code, 2);

@@ -72,7 +72,7 @@ void add_audit_verb(CLI::App& app, int& code) {
   auto a = std::make_shared<AuditArguments>();
   CLI::App* verb = app.add_subcommand(
       "audit", "compare each recorded move with its optimum: what was wasted, where, why");
-  verb->add_option("log,--log,-l", a->logs, "recorded logs (CSV or MAT)")
+  verb->add_option("log,--log,-l", a->logs, "recorded logs (CSV, MAT or a recording)")
       ->required()
       ->type_name("LOG...");
   verb->add_option("--model", a->model, "fitted model")->required()->type_name("MODEL.json");
@@ -100,7 +100,8 @@ void add_audit_verb(CLI::App& app, int& code) {
   verb->add_option("--motions", a->motions,
                    "folder for the proposed motion of each judged move (move_01.csv, ...)")
       ->type_name("DIR");
-  verb->add_flag("!--no-bound", a->task.bound, "leave the lower bounds of the energy out");
+  verb->add_flag_callback(
+      "--no-bound", [a] { a->task.bound = false; }, "leave the lower bounds of the energy out");
   verb->add_option("--processes", a->task.processes,
                    "starts solved in parallel; absent: all processors")
       ->check(CLI::Range(1, 256));

@@ -72,12 +72,12 @@ void add_simulate_verb(CLI::App& app, int& code) {
   verb->add_option("--output,-o", a->output, "log to write (CSV)")
       ->required()
       ->type_name("LOG.csv");
-  verb->add_option("--seconds", a->task.seconds, "duration")
+  verb->add_option("--seconds", a->task.seconds, "duration [s]")
       ->check(number_from(0.1, 1e6))
       ->capture_default_str();
   verb->add_option("--seed", a->task.seed, "random seed of work and sensors")
       ->capture_default_str();
-  verb->add_option("--rate", a->task.rate, "samples a second")
+  verb->add_option("--rate", a->task.rate, "samples per second")
       ->check(CLI::Range(10.0, 1000.0))
       ->capture_default_str();
   verb->add_option("--effects", a->task.effects,

@@ -2,7 +2,7 @@
 /* Line and scatter charts, drawn by uPlot. */
 (function () {
   const { theme, faded, titled, number, tickLabels, element } = page;
-  const kLeft = 62, kRight = 14;  // equal margins, so that the time axes of charts below one another are aligned
+  const kLeft = 70, kRight = 14;  // equal margins, so that the time axes of charts below one another are aligned
 
   /* Gives a scale without values a range: uPlot leaves it undefined, but an empty chart still needs its axes. */
   function range(pad) {

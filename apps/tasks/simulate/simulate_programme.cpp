@@ -51,16 +51,44 @@ std::vector<double> middle_of_ranges(const Machine& machine) {
   return middle;
 }
 
+Log load_log_with_warnings(const std::string& path, const Machine& machine,
+                           const Listener& listener) {
+  Log log = load_log(path, machine);
+  for (const std::string& w : log.warnings) listener.say_warning(w);
+  return log;
+}
+
+/// Says what the plant does with commands that are missing or more than a full lever.
+void doubt_commands(const Log& log, const Machine& machine, const Listener& listener) {
+  for (int c = 0; c < machine.cylinder_count(); ++c) {
+    const std::string name = "u_" + machine.cylinders[static_cast<std::size_t>(c)].name;
+    const Channel* command = log.find(Role::kCommand, c);
+    if (command == nullptr) {
+      listener.say_warning(
+          fmt::format("{}: no column {}: that valve stays closed", log.path, name));
+      continue;
+    }
+    // NaN is not larger than anything.
+    const auto beyond = (command->values.array().abs() > 1.0).count();
+    if (beyond > 0)
+      listener.say_warning(
+          fmt::format("{}: {}: {} of {} values lie beyond 1, the full lever, and count as 1",
+                      log.path, name, beyond, command->values.size()));
+  }
+}
+
 /// Commands of a file that need not tell positions; where it does, the machine starts there.
-plant::TimeTable command_table(const Machine& machine, const SimulateTask& a) {
+plant::TimeTable command_table(const Machine& machine, const SimulateTask& a,
+                               const Listener& listener) {
   Machine no_joints = machine;  // so that the reader does not ask for positions
   no_joints.joints.clear();
-  const Log log = load_log(a.replay, no_joints);
+  const Log log = load_log_with_warnings(a.replay, no_joints, listener);
   plant::TimeTable table;
   table.t = log.time;
   table.values = log.matrix(Role::kCommand, machine.cylinder_count());
   if (!table.values.array().isFinite().any())
     throw InputError({a.replay, 0, 0}, "u_<cylinder>", "the file has no command to replay");
+  doubt_commands(log, machine, listener);
   table.values = table.values.array().isFinite().select(table.values, 0.0);
   const bool placed = std::any_of(log.channels.begin(), log.channels.end(), [](const Channel& c) {
     return c.signal.starts_with("q_") || c.role == Role::kStroke;
@@ -173,7 +201,8 @@ Eigen::MatrixXd simulated_positions(const Log& log, const Machine& machine) {
 }
 
 std::unique_ptr<plant::Programme> simulate_programme(const SimulateTask& a, const Machine& machine,
-                                                     const plant::PlantParameters& parameters) {
+                                                     const plant::PlantParameters& parameters,
+                                                     const Listener& listener) {
   plant::WorkRequest request{a.seed, a.seconds, 1.0 / a.rate, std::nullopt};
   if (!std::isnan(a.payload)) request.payload = a.payload;
   if (a.controller) return std::make_unique<Controlled>(machine, a);
@@ -181,9 +210,10 @@ std::unique_ptr<plant::Programme> simulate_programme(const SimulateTask& a, cons
     return plant::tracked_motion(machine, parameters,
                                  trajectory_table(*a.trajectory, machine, a.payload));
   if (!a.track.empty())
-    return plant::tracked_motion(machine, parameters,
-                                 motion_table(load_log(a.track, machine), machine, a));
-  if (!a.replay.empty()) return plant::replayed_commands(command_table(machine, a));
+    return plant::tracked_motion(
+        machine, parameters,
+        motion_table(load_log_with_warnings(a.track, machine, listener), machine, a));
+  if (!a.replay.empty()) return plant::replayed_commands(command_table(machine, a, listener));
   if (!a.motion.empty()) {
     CraneModel model;
     model.machine = machine;

@@ -161,7 +161,7 @@ Simulation simulate_task(std::shared_ptr<const Machine> machine, const SimulateT
   check_ranges(task);
   const plant::PlantParameters parameters = plant_of(*machine, task);
   const std::unique_ptr<plant::Programme> programme =
-      simulate_programme(task, *machine, parameters);
+      simulate_programme(task, *machine, parameters, listener);
   plant::LogWriter log(
       *machine, parameters, task.seed,
       fmt::format(

@@ -128,10 +128,12 @@ std::string simulation_table(const Simulation& s, const std::string& log) {
   if (std::abs(l.payload_exchange) > 1.0)
     text +=
         fmt::format("  {:<21} {:10.2f} kJ brought\n", "payloads taken", l.payload_exchange / 1e3);
-  text += fmt::format("  energy balance closes to {:.2g} %\n",
-                      100.0 * std::abs(l.imbalance()) /
-                          std::max(1.0, l.drive_work + std::accumulate(l.pump_work.begin(),
-                                                                       l.pump_work.end(), 0.0)));
+  // Where a load falls, far more energy is lost than the pumps gave.
+  double lost = l.tank_loss + std::accumulate(l.pump_loss.begin(), l.pump_loss.end(), 0.0);
+  for (const auto& c : l.cylinder_loss) lost += std::accumulate(c.begin(), c.end(), 0.0);
+  text += fmt::format(
+      "  energy balance closes to {:.2g} %\n",
+      100.0 * std::abs(l.imbalance()) / std::max({1.0, l.drive_work + plant_work(s), lost}));
   if (!s.message.empty()) text += fmt::format("  ended at {:.2f} s: {}\n", s.time, s.message);
   if (!log.empty()) text += fmt::format("log written to {}\n", log);
   return text;

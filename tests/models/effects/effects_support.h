@@ -3,6 +3,7 @@
 #include "models/effects/instant.h"
 #include "models/effects/registry.h"
 #include "models/machine/static_force.h"
+#include "models/math/error.h"
 #include "tests/models/test_machines.h"
 
 namespace sparflow::test_support {
@@ -143,6 +144,32 @@ MachineSeries log_of(const Machine& machine, const Motion& motion, double second
 inline std::vector<Machine> effect_machines() {
   return {loader_crane(), knuckle_crane(), swing_crane(), random_machine(4, 402),
           random_machine(5, 501)};
+}
+
+/// An effect of the catalogue.
+inline const Effect& effect(const std::string& id) {
+  const Effect* found = find_effect(id);
+  SPARFLOW_CHECK(found != nullptr, id);
+  return *found;
+}
+
+/// Every joint oscillates with its own period, so that poses, speeds and accelerations vary independently.
+inline Eigen::VectorXd swinging(const Machine& machine, double t) {
+  const Eigen::Index n = machine.joint_count();
+  Eigen::VectorXd q(n), qd(n), qdd(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Range& r = machine.joints[static_cast<std::size_t>(j)].position;
+    const double a = 0.3 * (r.hi - r.lo), w = 0.5 + 0.13 * static_cast<double>(j);
+    q[j] = 0.5 * (r.lo + r.hi) + a * std::sin(w * t + 0.4 + static_cast<double>(j));
+    qd[j] = a * w * std::cos(w * t + 0.4 + static_cast<double>(j));
+    qdd[j] = -a * w * w * std::sin(w * t + 0.4 + static_cast<double>(j));
+  }
+  return stacked(q, qd, qdd);
+}
+
+inline MachineSeries swinging_log(const Machine& machine, double payload = 300.0) {
+  return log_of(
+      machine, [&](double t) { return swinging(machine, t); }, 8.0, 0.05, payload);
 }
 
 }  // namespace sparflow::test_support

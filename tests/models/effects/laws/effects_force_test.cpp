@@ -1,11 +1,9 @@
-/// Effects of force and sensors: laws against hand cases, Jets against numeric derivatives over the registry,
+/// Effects of force: laws against hand cases, Jets against numeric derivatives over the registry,
 /// columns against the laws, and what an effect must leave unchanged.
 #include <gtest/gtest.h>
 
 #include "models/effects/builtin.h"
-#include "models/effects/effect_text.h"
 #include "models/machine/inertial_torque.h"
-#include "models/math/error.h"
 #include "tests/models/effects/effects_support.h"
 
 namespace sparflow {
@@ -14,17 +12,14 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test_support::effect;
 using test_support::instant_at;
 using test_support::log_of;
 using test_support::numeric_derivative;
 using test_support::Random;
 using test_support::stacked;
-
-const Effect& effect(const std::string& id) {
-  const Effect* found = find_effect(id);
-  SPARFLOW_CHECK(found != nullptr, id);
-  return *found;
-}
+using test_support::swinging;
+using test_support::swinging_log;
 
 std::vector<double> typical(const EffectInfo& info) {
   std::vector<double> p;
@@ -38,25 +33,6 @@ VectorXd added(const Effect& e, const Instant<double>& s, int at, std::vector<do
   VectorXd out = VectorXd::Zero(s.machine->cylinder_count());
   e.add_force(s, at, p, {out.data(), static_cast<std::size_t>(out.size())});
   return out;
-}
-
-/// Every joint oscillates with its own period, so that poses, speeds and accelerations vary independently.
-VectorXd swinging(const Machine& machine, double t) {
-  const Index n = machine.joint_count();
-  VectorXd q(n), qd(n), qdd(n);
-  for (Index j = 0; j < n; ++j) {
-    const Range& r = machine.joints[static_cast<std::size_t>(j)].position;
-    const double a = 0.3 * (r.hi - r.lo), w = 0.5 + 0.13 * static_cast<double>(j);
-    q[j] = 0.5 * (r.lo + r.hi) + a * std::sin(w * t + 0.4 + static_cast<double>(j));
-    qd[j] = a * w * std::cos(w * t + 0.4 + static_cast<double>(j));
-    qdd[j] = -a * w * w * std::sin(w * t + 0.4 + static_cast<double>(j));
-  }
-  return stacked(q, qd, qdd);
-}
-
-MachineSeries swinging_log(const Machine& machine, double payload = 300.0) {
-  return log_of(
-      machine, [&](double t) { return swinging(machine, t); }, 8.0, 0.05, payload);
 }
 
 /// The static force of a machine with an effect's masses, gravity or angles.
@@ -358,7 +334,7 @@ TEST(ForceEffects, ColumnsAreTheLaw) {
   }
 }
 
-// --- memory and sensors ----------------------------------------------------------------------------------------
+// --- memory ----------------------------------------------------------------------------------------------------
 
 TEST(Presliding, ReversalBuildsUpOverItsDistance) {
   const Machine machine = test_support::loader_crane();
@@ -381,204 +357,6 @@ TEST(Presliding, ReversalBuildsUpOverItsDistance) {
     EXPECT_NEAR(column(100 + k, 0), -1.0 + 2.0 * std::exp(-1e-3 * k / distance), 1e-6);
   }
   EXPECT_NEAR(column(200, 0), -1.0, 1e-9);
-}
-
-TEST(PressureOffset, ShowsInForceChambersAndPump) {
-  const Machine machine = test_support::loader_crane();
-  MachineSeries log = swinging_log(machine);
-  const Index n = log.samples();
-  log.pumps[0].leader.setZero(n);
-  const Effect& e = effect("pressure_offset");
-  const std::vector<double> a{1.0}, b{-1.0};
-  MatrixXd column;
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, 0}, 0, a, column));
-  EXPECT_DOUBLE_EQ(column(3, 0), machine.cylinders[0].area_piston());
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, 0}, 0, b, column));
-  EXPECT_DOUBLE_EQ(column(3, 0), -machine.cylinders[0].area_rod());
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kSupplyExtend, 0}, 0, a, column));
-  EXPECT_EQ(column(3, 0), 1.0);
-  // The chamber whose sensor is right shows it only by way of the force (Evidence::columns).
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kReturnExtend, 0}, 0, a, column));
-  EXPECT_EQ(column(3, 0), 0.0);
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kReturnExtend, 0}, 0, b, column));
-  EXPECT_EQ(column(3, 0), 1.0);
-  ASSERT_TRUE(e.columns(log, {EvidenceKind::kPump, 0}, 0, a, column));
-  for (Index k = 0; k < n; k += 5) {  // the demand follows the wrong measurement while extending
-    EXPECT_EQ(column(k, 0), log.cylinders[0].direction[k] > 0 ? -1.0 : 0.0);
-  }
-  EXPECT_FALSE(e.columns(log, {EvidenceKind::kForce, 1}, 0, a, column));
-}
-
-/// With positions late by d, the difference between the true force and that of the logged pose determines d.
-TEST(SensorDelay, IsEstimatedWithinFivePerCentFrom20To200Milliseconds) {
-  const Machine machine = test_support::loader_crane();
-  for (const double delay : {0.02, 0.1, 0.2}) {
-    const auto late = [&](double t) { return swinging(machine, t - delay); };
-    const MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
-    for (int i = 0; i < 2; ++i) {
-      MatrixXd column;
-      const std::vector<double> positions{delay, 1.0};
-      ASSERT_TRUE(
-          effect("sensor_delay").columns(log, {EvidenceKind::kForce, i}, -1, positions, column));
-      double xy = 0.0, xx = 0.0;
-      for (Index k = 0; k < log.samples(); ++k) {
-        if (!std::isfinite(column(k, 0))) continue;
-        const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
-                                 .static_force[static_cast<std::size_t>(i)];
-        const double left = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
-        xy += column(k, 0) * left;
-        xx += column(k, 0) * column(k, 0);
-      }
-      EXPECT_NEAR(xy / xx, 1.0, 0.05);  // the share of the shift that shows
-    }
-  }
-}
-
-/// With one joint's position late, every cylinder's force is that of a pose with this joint elsewhere, and only its own
-/// cylinder's speed is delayed.
-TEST(SensorDelay, OfOnePositionIsDistinguishedFromThatOfAll) {
-  const Machine machine = test_support::loader_crane();
-  const Index joints = machine.joint_count();
-  const Index joint = 1;
-  const double delay = 0.1;
-  const auto late = [&](double t) {
-    VectorXd x = swinging(machine, t);
-    const VectorXd before = swinging(machine, t - delay);
-    for (const Index k : {joint, joints + joint, 2 * joints + joint}) x[k] = before[k];
-    return x;
-  };
-  MachineSeries log = log_of(machine, late, 30.0, 0.02, 300.0);
-  StaticForce statics(machine);
-  for (CylinderSeries& c : log.cylinders) {
-    c.static_slope.resize(log.samples(), joints);
-    c.command = 10.0 * c.speed;
-  }
-  for (Index k = 0; k < log.samples(); ++k) {
-    const VectorXd q = log.q.row(k);
-    statics.update(q.data(), 300.0, 1);
-    for (std::size_t i = 0; i < log.cylinders.size(); ++i)
-      log.cylinders[i].static_slope.row(k) = statics.force_jacobian().row(static_cast<Index>(i));
-  }
-  const Effect& e = effect("sensor_delay");
-  const std::vector<double> all{delay, 1.0}, one{delay, 2.0 + static_cast<double>(joint)};
-  for (int i = 0; i < 2; ++i) {
-    double left = 0.0, by_one = 0.0, by_all = 0.0;
-    MatrixXd alone, together;
-    ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, i}, -1, one, alone));
-    ASSERT_TRUE(e.columns(log, {EvidenceKind::kForce, i}, -1, all, together));
-    for (Index k = 0; k + 10 < log.samples(); ++k) {  // samples after the end are not known
-      const double truth = instant_at(machine, swinging(machine, log.time[k]), 300.0)
-                               .static_force[static_cast<std::size_t>(i)];
-      const double y = truth - log.cylinders[static_cast<std::size_t>(i)].static_force[k];
-      left += y * y;
-      by_one += std::pow(y - alone(k, 0), 2);
-      by_all += std::pow(y - together(k, 0), 2);
-    }
-    EXPECT_LT(by_one, 0.01 * left) << i;  // to first order in an angle of some hundredths
-    EXPECT_GT(by_all, 0.1 * left) << i;
-    MatrixXd speed;
-    const bool own = machine.cylinders[static_cast<std::size_t>(i)].joint == joint;
-    EXPECT_EQ(e.columns(log, {EvidenceKind::kFlow, i}, -1, one, speed), own);
-  }
-  const std::vector<double> grid = e.grid(log, -1, 1);
-  EXPECT_EQ(grid.size(), 2 + static_cast<std::size_t>(joints));
-}
-
-/// While the command is constant a delay shows nothing in the speed; after a step, for as long as it lasts.
-TEST(SensorDelay, ShowsOnlyWhereTheCommandHasChanged) {
-  const Machine machine = test_support::loader_crane();
-  MachineSeries log = log_of(
-      machine, [&](double t) { return swinging(machine, t); }, 10.0, 0.02, 300.0);
-  CylinderSeries& c = log.cylinders[0];
-  c.command.setZero(log.samples());
-  c.command.tail(251).setConstant(0.5);  // step at 5 s
-  MatrixXd column;
-  ASSERT_TRUE(
-      effect("sensor_delay")
-          .columns(log, {EvidenceKind::kFlow, 0}, -1, std::vector<double>{0.1, 1.0}, column));
-  EXPECT_EQ(column.topRows(250).cwiseAbs().maxCoeff(), 0.0);
-  EXPECT_EQ(column.bottomRows(246).cwiseAbs().maxCoeff(), 0.0);
-  EXPECT_GT(column.middleRows(250, 5).cwiseAbs().minCoeff(), 0.0);
-}
-
-/// A signature that contains the speed which it is to explain smooths it: half of v(t + d) - v(t) cancels an oscillation of period
-/// 2 d. Gains and dead bands, fitted to the whole log, may move by what the oscillation happens to have in common with commands.
-TEST(SignaturesOfFlow, DoNotContainTheSpeedThatTheyExplain) {
-  const Machine machine = test_support::loader_crane();
-  MachineSeries log = log_of(
-      machine, [&](double t) { return swinging(machine, t); }, 30.0, 0.02, 300.0);
-  const VectorXd ripple = (2.0 * M_PI * 2.5 * log.time.array()).sin() * 0.01;
-  for (CylinderSeries& c : log.cylinders) {
-    c.stroke_measured = true;
-    c.command = 10.0 * c.speed;
-    c.pressure_a.setConstant(log.samples(), 8e6);
-    c.pressure_b.setConstant(log.samples(), 5e6);
-    c.measured_a = c.pressure_a, c.measured_b = c.pressure_b;
-  }
-  MachineSeries shaken = log;
-  for (CylinderSeries& c : shaken.cylinders) c.speed += ripple;
-  // A pump's limit is left out: whether it is reached at all depends on the gains.
-  for (const char* id :
-       {"sensor_delay", "valve_lag", "valve_deadband", "compressibility", "leakage"}) {
-    const Effect& e = effect(id);
-    const std::vector<EffectParameter>& parameters = e.info().parameters;
-    std::vector<double> shape;
-    for (const EffectParameter& p : parameters)
-      if (!p.linear) shape.push_back(p.typical);
-    const int at = e.places(machine).front();
-    MatrixXd still, moved;
-    ASSERT_TRUE(e.columns(log, {EvidenceKind::kFlow, 0}, at, shape, still)) << id;
-    ASSERT_TRUE(e.columns(shaken, {EvidenceKind::kFlow, 0}, at, shape, moved)) << id;
-    for (Index k = 0; k < still.cols(); ++k) {
-      const VectorXd change =
-          (moved - still).col(k).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
-      const double typical = std::abs(parameters[static_cast<std::size_t>(k)].typical);
-      EXPECT_LT(typical * std::abs(change.dot(ripple)), 0.02 * ripple.squaredNorm())
-          << id << ", parameter " << k;
-    }
-  }
-}
-
-// --- texts -------------------------------------------------------------------------------------------------------
-
-TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
-  for (const auto& e : effect_catalogue()) {
-    const EffectInfo& info = e->info();
-    SCOPED_TRACE(info.id);
-    EXPECT_FALSE(info.title.empty() || info.equation.empty() || info.citation.empty());
-    EXPECT_FALSE(info.separated_by.empty() || info.in_motion.empty() || info.signals.empty());
-    EXPECT_FALSE(e->shows_in().empty());
-    bool shapes = false;
-    for (const EffectParameter& p : info.parameters) {
-      EXPECT_LT(p.lower, p.upper) << p.name;
-      EXPECT_GE(p.typical, p.lower) << p.name;
-      EXPECT_LE(p.typical, p.upper) << p.name;
-      EXPECT_FALSE(p.meaning.empty()) << p.name;
-      EXPECT_FALSE(p.linear && shapes) << "linear parameters come first";
-      shapes = shapes || !p.linear;
-    }
-    EXPECT_NE(effect_table().find(effect_signature(info)), std::string::npos);
-    const std::string entry = effect_entry(*e);
-    for (const EffectParameter& p : info.parameters) {
-      EXPECT_NE(entry.find(p.name + ": "), std::string::npos);
-    }
-    for (const char* heading : {"equation", "needs", "shows in", "separated by", "source"}) {
-      EXPECT_NE(entry.find(heading), std::string::npos) << heading;
-    }
-  }
-}
-
-TEST(Catalogue, ContainsSensorFaultsAndSuggestsNearIds) {
-  EXPECT_NE(effect_table().find("sensor_fault:<channel>"), std::string::npos);
-  EXPECT_NE(effect_entry(std::string("sensor_fault:pA_boom")).find("bad data"), std::string::npos);
-  EXPECT_NE(effect_entry(std::string("coulomb_friction:boom")).find("Coulomb"), std::string::npos);
-  try {
-    effect_entry(std::string("colomb_friction"));
-    FAIL();
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("coulomb_friction"), std::string::npos);
-  }
-  EXPECT_NE(effects_json().find("\"sensor_fault\""), std::string::npos);
 }
 
 }  // namespace
