@@ -18,16 +18,16 @@ using testing_support::arm_machine;
 using testing_support::channel;
 using testing_support::remove_channel;
 
-const std::filesystem::path kLogsBeside = SPARFLOW_SOURCE_DIR "/../shared";
+const std::filesystem::path kSharedLogs = SPARFLOW_SOURCE_DIR "/../shared";
 constexpr double kHertz = 11.0, kFrom = 20.0, kTo = 30.0;
 constexpr double kAmplitude = 4e-3;  // [m] of the rod
 
-std::vector<BadChannel> bad_of(const Machine& machine, const Log& log) {
+std::vector<BadChannel> faults_of(const Machine& machine, const Log& log) {
   return find_bad_channels(machine, log, make_signals(machine, log));
 }
 
 std::vector<BadChannel> ripples_of(const Machine& machine, const Log& log) {
-  std::vector<BadChannel> out = bad_of(machine, log);
+  std::vector<BadChannel> out = faults_of(machine, log);
   std::erase_if(out, [](const BadChannel& b) { return b.kind != BadDataKind::kRippling; });
   return out;
 }
@@ -64,7 +64,7 @@ Log with_oscillation(int hertz, double share) {
 
 TEST(PositionRipple, IsFoundWithItsStretchAtAnySampling) {
   for (const int hertz : {25, 50, 100, 200}) {
-    const std::vector<BadChannel> bad = bad_of(arm_machine(), with_oscillation(hertz, 0.0));
+    const std::vector<BadChannel> bad = faults_of(arm_machine(), with_oscillation(hertz, 0.0));
     ASSERT_EQ(bad.size(), 1u) << hertz;
     EXPECT_EQ(bad[0].channel, "q_arm");
     EXPECT_STREQ(bad_data_word(bad[0].kind), "rippling") << hertz;
@@ -111,7 +111,7 @@ TEST(PositionRipple, IsNotJudgedWithoutPressures) {
 
 /// From 10.7 to 19.0 s the jib's position ripples while its pressures are smooth; another log does so from 21 to 28.5 s.
 TEST(PositionRippleOnCranes, OnlyTheJibOfTwoRealLogsRipples) {
-  const std::filesystem::path data = kLogsBeside / "data";
+  const std::filesystem::path data = kSharedLogs / "data";
   if (!std::filesystem::exists(data / "hmf_2020_k4")) GTEST_SKIP() << "no logs of cranes here";
   const std::pair<const char*, const char*> machines[] = {{"hmf_2020_k4", "hmf_2020_k4"},
                                                           {"foreign_plant", "three_axis"},
@@ -119,7 +119,7 @@ TEST(PositionRippleOnCranes, OnlyTheJibOfTwoRealLogsRipples) {
                                                           {"emps", "emps"}};
   for (const auto& [folder, name] : machines) {
     const Machine machine =
-        load_machine((kLogsBeside / "machines" / (std::string(name) + ".yaml")).string());
+        load_machine((kSharedLogs / "machines" / (std::string(name) + ".yaml")).string());
     for (const auto& entry : std::filesystem::directory_iterator(data / folder)) {
       const std::string file = entry.path().filename().string();
       const std::vector<BadChannel> bad =

@@ -231,13 +231,13 @@ TEST(SharpestWindow, NoiseIsAThousandthOfTheAcceleration) {
 
 /// A motion that starts, continues steadily and stops: noise in the steady part makes an estimated inertia too small.
 TEST(QuietenAcceleration, KeepsStartsAndStopsAndReducesTheNoiseBetween) {
-  constexpr int kRows = 600;
+  constexpr int kSamples = 600;
   constexpr double kRow = 0.02, kDigits = 4.5e-4, kRamp = 0.4, kSpeed = 0.1;
-  Eigen::VectorXd time(kRows), smooth(kRows), q(kRows);
+  Eigen::VectorXd time(kSamples), smooth(kSamples), q(kSamples);
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
   double speed = 0.0, position = 0.0;
-  for (int i = 0; i < kRows; ++i) {
+  for (int i = 0; i < kSamples; ++i) {
     time[i] = kRow * i;
     const bool starts = time[i] >= 2.0 && time[i] < 2.0 + kRamp - 1e-9;
     const bool stops = time[i] >= 9.0 && time[i] < 9.0 + kRamp - 1e-9;
@@ -247,7 +247,7 @@ TEST(QuietenAcceleration, KeepsStartsAndStopsAndReducesTheNoiseBetween) {
     smooth[i] = position;
     q[i] = position + kDigits * normal(random);
   }
-  const std::vector<SampleRange> runs = {{0, kRows}};
+  const std::vector<SampleRange> runs = {{0, kSamples}};
   const SavitzkyGolay filter(time, runs, 0.24);
   const Eigen::VectorXd narrow = filter.apply(q, 2), truth = filter.apply(smooth, 2);
   Eigen::VectorXd quiet = narrow;
@@ -262,8 +262,8 @@ TEST(QuietenAcceleration, KeepsStartsAndStopsAndReducesTheNoiseBetween) {
   EXPECT_LT(scale(narrow), 0.75);
   EXPECT_NEAR(scale(quiet), 1.0, 0.12);
   // Without noise all windows agree, or the narrow one is kept.
-  Eigen::VectorXd clean(kRows);
-  for (int i = 0; i < kRows; ++i) clean[i] = std::sin(2.0 * time[i]);
+  Eigen::VectorXd clean(kSamples);
+  for (int i = 0; i < kSamples; ++i) clean[i] = std::sin(2.0 * time[i]);
   const Eigen::VectorXd before = filter.apply(clean, 2);
   Eigen::VectorXd after = before;
   quieten_acceleration(time, runs, clean, filter, after);
