@@ -288,9 +288,11 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
   ChannelBuilder b = builder(EvidenceKind::kFlow, cylinder, {"mm/s", 1e-3});
   const std::string name = b.channel.at;
   std::vector<double> still;
+  bool commanded = false;
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_command()) continue;
+    commanded = true;
     MatrixXd base(c.command.size(), 2);
     base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
     base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
@@ -306,8 +308,8 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
           ? robust_std(Eigen::Map<VectorXd>(still.data(), static_cast<Index>(still.size())))
           : kNaN;
   if (!b.finish(e.channels)) {
-    e.notes.push_back(
-        fmt::format("{}: no command is logged, valve effects cannot be judged", name));
+    e.notes.push_back(fmt::format("{}: {}, valve effects cannot be judged", name,
+                                  commanded ? "the logs are too short" : "no command is logged"));
   }
 }
 

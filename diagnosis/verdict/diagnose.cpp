@@ -399,7 +399,8 @@ Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& sign
   }
   for (const auto* aside : {&signals.set_aside, &faults})
     for (const LogFault& f : *aside) d.set_aside.push_back(f.channel);
-  if (!d.set_aside.empty() && d.evidence.channels.empty()) d.verdict = Verdict::kBadData;
+  if (d.evidence.channels.empty())
+    d.verdict = d.set_aside.empty() ? Verdict::kUnknown : Verdict::kBadData;
   return d;
 }
 

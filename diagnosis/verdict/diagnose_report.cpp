@@ -88,6 +88,10 @@ std::string Diagnosis::headline() const {
                                : "; what the model lacks, it lacks in both");
       return "Nothing is missing: the residual is noise, as far as these logs can show.";
     case Verdict::kUnknown:
+      if (evidence.channels.empty())
+        return "Nothing can be judged: no stage of the model shows in these logs; the notes say "
+               "what "
+               "each lacks.";
       if (unexplained && unexplained->few_places)
         return fmt::format("Isolated event, on which no law can be tested: {}.",
                            unexplained->sentence);

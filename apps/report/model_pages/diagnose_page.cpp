@@ -75,7 +75,9 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
   for (std::size_t i = 0; i < d.set_aside.size(); ++i) {  // the headline names the first
     if (i > 0) text += sentence(bad_channel_sentence(d.set_aside[i])) + " ";
   }
-  if (d.verdict == Verdict::kUnknown)
+  if (d.verdict == Verdict::kUnknown && d.evidence.channels.empty())
+    text += "Record motions of each cylinder with its command, position and pressures.";
+  else if (d.verdict == Verdict::kUnknown)
     text +=
         "Do not add anything to the model before the cause is known; the signals on which the "
         "residual depends are shown below.";

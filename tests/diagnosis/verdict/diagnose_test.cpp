@@ -320,6 +320,21 @@ TEST(Diagnose, WithoutCommandsForcesAreStillJudged) {
   EXPECT_THAT(a.diagnosis.notes, Contains(HasSubstr("valve effects cannot be judged")));
 }
 
+TEST(Diagnose, ALogInWhichNothingMovesDecidesNothing) {
+  const std::string whole = simulator::csv_text(
+      testing_support::hidden_case(reference_model().machine, {}, {5, 90.0}).logs.train);
+  std::size_t end = 0;
+  for (int line = 0; line < 40; ++line)
+    end = whole.find('\n', end) + 1;  // 0.8 s before the first motion
+  const Diagnosis d =
+      diagnose(reference_model(),
+               {log_from_text("rest.csv", whole.substr(0, end), reference_model().machine)});
+  EXPECT_EQ(d.verdict, Verdict::kUnknown);
+  EXPECT_THAT(d.headline(), HasSubstr("Nothing can be judged"));
+  EXPECT_THAT(d.notes, testing::Not(Contains(HasSubstr("no command is logged"))));
+  EXPECT_THAT(d.notes, Contains(HasSubstr("too short")));
+}
+
 TEST(Diagnose, AnotherMachine) {
   const Machine machine = drawn_machine("excavator");
   const std::string at = machine.cylinders[1].name;
