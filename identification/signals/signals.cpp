@@ -222,7 +222,6 @@ Mask edges(const MachineSignals& s) {
 /// Frees what is no longer read after speeds and forces are known (SignalOptions::slim).
 void free_poses(MachineSignals& s) {
   for (Eigen::MatrixXd* m : {&s.q_measured, &s.qd, &s.qdd, &s.tip}) m->resize(0, 0);
-  for (CylinderSignals& c : s.cylinders) c.rate.resize(0);
 }
 
 /// Computes all signals that follow from the measured ones and the filter.
@@ -371,7 +370,7 @@ MachineSignals make_signals(const Machine& machine, const Log& log, const Signal
 
 MachineSignals without_checked(MachineSignals signals) {
   for (CylinderSignals& c : signals.cylinders)
-    for (VectorXd* v : {&c.length, &c.pressure_a, &c.pressure_b}) v->resize(0);
+    for (VectorXd* v : {&c.length, &c.rate, &c.pressure_a, &c.pressure_b}) v->resize(0);
   return signals;
 }
 

@@ -129,7 +129,7 @@ struct MachineSignals {
   ~MachineSignals();
 };
 
-/// The signals without what only checks of sensors read: chamber pressures as logged, and lengths.
+/// The signals without what only checks of sensors read: chamber pressures as logged, lengths and their derivatives.
 MachineSignals without_checked(MachineSignals signals);
 
 /// @throws InputError when the linkage cannot reach the measured stroke of a joint at any sample

@@ -75,6 +75,16 @@ TEST(PositionRipple, IsFoundWithItsStretchAtAnySampling) {
   }
 }
 
+TEST(PositionRipple, IsFoundInSlimSignalsToo) {
+  SignalOptions options;
+  options.slim = true;
+  const Log log = with_oscillation(50, 0.0);
+  const std::vector<BadChannel> bad =
+      find_bad_channels(arm_machine(), log, make_signals(arm_machine(), log, options));
+  ASSERT_EQ(bad.size(), 1u);
+  EXPECT_EQ(bad[0].kind, BadDataKind::kRippling);
+}
+
 TEST(PositionRipple, ALoadThatRingsIsNone) {
   // A third of the force: a structure that bends between rod and masses takes less of it than rigid links.
   for (const int hertz : {25, 50, 100, 200})
