@@ -9,6 +9,7 @@
 
 #include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/nan.h"
 
 namespace sparflow {

@@ -309,7 +309,8 @@ TEST(BadDataOnCranes, RealAndSimulatedLogsHaveNoFindings) {
     for (const auto& path : logs_below(kLogsBeside / "data" / name)) {
       const Log log = load_log(path.string(), machine);
       for (const BadChannel& b : bad_of(machine, log)) {
-        if (b.kind == BadDataKind::kRippling) continue;  // true of two logs: position_ripple_test.cpp
+        if (b.kind == BadDataKind::kRippling)
+          continue;  // true of two logs: position_ripple_test.cpp
         ADD_FAILURE() << path.filename() << ": " << bad_channel_sentence(b);
       }
     }
