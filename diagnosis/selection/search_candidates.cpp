@@ -31,6 +31,10 @@ std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence&
     }
     points = std::move(next);
   }
+  if (!evidence.has_reference())
+    std::erase_if(points, [&](const std::vector<double>& point) {
+      return effect.effect->needs_reference(point);
+    });
   return points;
 }
 

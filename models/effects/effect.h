@@ -145,6 +145,11 @@ class Effect {
     return {};
   }
 
+  /// Whether a variant of the law is only told against a reference log: a part of the model that is learned from the same log may
+  /// have the same signature.
+  /// The argument has the nonlinear parameters [SI].
+  virtual bool needs_reference(std::span<const double> /*shape*/) const { return false; }
+
   /// YAML text that defines a user's effect, so that a model file can contain it; empty for built-in effects.
   virtual std::string definition() const { return {}; }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <random>
 
+#include "diagnosis/selection/search_candidates.h"
 #include "identification/learning/fit.h"
 #include "identification/signals/series.h"
 #include "models/effects/hydraulics.h"
@@ -187,6 +188,23 @@ TEST(ReferenceComparison, AnEffectThatExplainsLittleOfTheExcessIsNoChange) {
 TEST(ReferenceComparison, ADifferenceWithinTheFormErrorOfTheLawIsNoChange) {
   EXPECT_EQ(compared_sizes({1000.0, 1080.0, 40.0}), InReferences::kAlike);
   EXPECT_EQ(compared_sizes({1000.0, 1400.0, 40.0}), InReferences::kOther);
+}
+
+/// A valve whose flow falls with the load has the signature of a leak in motion; both logs have it, so that a reference tells them apart.
+TEST(ReferenceComparison, ALeakInMotionIsACandidateBesideAReferenceOnly) {
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  const MachineSignals train = make_signals(loader(), logs.train),
+                       reference = make_signals(loader(), logs.reference);
+  const auto forms = [&](const std::vector<MachineSignals>& references) {
+    const Evidence evidence =
+        collect_evidence(CraneModel::untrained(loader()), {train}, references);
+    std::vector<double> found;
+    for (const SearchCandidate& c : search_candidates(evidence, {{find_effect("leakage"), 1}}))
+      for (const EffectDesign& d : c.designs) found.push_back(d.shape.front());
+    return found;
+  };
+  EXPECT_THAT(forms({reference}), Contains(2.0));
+  EXPECT_THAT(forms({}), testing::AllOf(Contains(1.0), testing::Not(Contains(2.0))));
 }
 
 TEST(ReferenceComparison, WhatBothLogsShowIsNoChange) {

@@ -53,6 +53,8 @@ class Leakage final : public Effect {
     return hydraulic_cylinders(machine);
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  /// In motion, a flow that falls with the pressure across the piston is also that of a valve whose compensator yields.
+  bool needs_reference(std::span<const double> shape) const override { return is_tight(shape); }
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
@@ -63,7 +65,7 @@ class Leakage final : public Effect {
     const Eigen::VectorXd& force = carried_force(log_cylinder);
     const Eigen::VectorXi& direction = log_cylinder.direction;
     const bool chambers = log_cylinder.pressure_a.size() > 0 && log_cylinder.pressure_b.size() > 0;
-    const bool tight = shape[0] > 1.5, at_rest_only = shape[0] < 0.5;  // no threshold: 0, 1 or 2
+    const bool tight = is_tight(shape), at_rest_only = shape[0] < 0.5;  // no threshold: 0, 1 or 2
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       const double load_area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // holds the load
@@ -78,6 +80,11 @@ class Leakage final : public Effect {
       }
     }
     return true;
+  }
+
+ private:
+  static bool is_tight(std::span<const double> shape) {
+    return shape[0] > 1.5;  // no threshold: 0, 1 or 2
   }
 };
 
