@@ -384,9 +384,11 @@ void EvidenceCollector::add_pump_channel(int pump) {
   }
   b.channel.noise_floor = noise.value();
   if (!b.finish(e.channels)) {
-    e.notes.push_back(fmt::format(
-        "pump {}: its pressure or what it feeds is not measured, pump effects cannot be judged",
-        name));
+    e.notes.push_back(
+        fmt::format("pump {}: its pressure or what it feeds is not measured or hardly moves, pump "
+                    "effects cannot "
+                    "be judged",
+                    name));
   }
 }
 

@@ -179,8 +179,9 @@ std::string Diagnosis::table(const std::string& first_line) const {
       out += fmt::format("      {:32s} {:8.1f}\n", ranking[i].first, ranking[i].second);
     }
   }
-  out +=
-      fmt::format("\n  Probability of this evidence if nothing were missing: {}\n", p_value_text());
+  if (verdict != Verdict::kUnknown || !evidence.channels.empty())
+    out += fmt::format("\n  Probability of this evidence if nothing were missing: {}\n",
+                       p_value_text());
   for (const std::string& note : notes) out += fmt::format("  note: {}\n", note);
   return out;
 }

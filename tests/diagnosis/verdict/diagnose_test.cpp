@@ -331,6 +331,7 @@ TEST(Diagnose, ALogInWhichNothingMovesDecidesNothing) {
                {log_from_text("rest.csv", whole.substr(0, end), reference_model().machine)});
   EXPECT_EQ(d.verdict, Verdict::kUnknown);
   EXPECT_THAT(d.headline(), HasSubstr("Nothing can be judged"));
+  EXPECT_THAT(d.table(), testing::Not(HasSubstr("Probability of this evidence")));
   EXPECT_THAT(d.notes, testing::Not(Contains(HasSubstr("no command is logged"))));
   EXPECT_THAT(d.notes, Contains(HasSubstr("too short")));
 }

@@ -75,6 +75,24 @@ TEST(PositionRipple, IsFoundWithItsStretchAtAnySampling) {
   }
 }
 
+/// Both chambers swing against each other without a net force: the oil, and no mass, lets the rod oscillate.
+TEST(PositionRipple, OilThatIsCompressedIsNone) {
+  const Machine machine = arm_machine();
+  Log log = with_oscillation(50, 0.0);
+  ASSERT_EQ(ripples_of(machine, log).size(), 1u);
+  const double areas = machine.cylinders[0].area_piston() / machine.cylinders[0].area_rod();
+  const double pressure =
+      1.5e6;  // [Pa] twice what 4 mm of the softest oil on a metre of stroke need
+  for (Eigen::Index k = 0; k < log.samples(); ++k) {
+    const double t = log.time[k];
+    if (t < kFrom || t > kTo) continue;
+    const double swing = pressure * std::sin(2.0 * M_PI * kHertz * (t - kFrom));
+    channel(log, "pA_arm").values[k] += swing;
+    channel(log, "pB_arm").values[k] += areas * swing;
+  }
+  EXPECT_THAT(ripples_of(machine, log), testing::IsEmpty());
+}
+
 TEST(PositionRipple, IsFoundInSlimSignalsToo) {
   SignalOptions options;
   options.slim = true;
