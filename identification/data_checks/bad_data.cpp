@@ -95,14 +95,13 @@ CheckedChannel describe(const CheckContext& context, const Channel& channel) {
   return c;
 }
 
-/// @return affected stretches [s]; short gaps between them are closed for the chart
+/// @return affected stretches, from their first to their last sample [s]
 std::vector<std::pair<double, double>> stretches_of(const Log& log, const Mask& affected) {
-  const double gap = 0.01 * log.duration();  // about the width of a line in the chart
   std::vector<std::pair<double, double>> out;
   for (Index k = 0; k < affected.size(); ++k) {
     if (!affected[k]) continue;
     const double t = log.time[k];
-    if (!out.empty() && t - out.back().second <= std::max(gap, 1.5 * log.step)) {
+    if (k > 0 && affected[k - 1]) {
       out.back().second = t;
     } else {
       out.emplace_back(t, t);
@@ -189,7 +188,7 @@ bool is_computed_motion(const Machine& machine, const Log& log) {
 std::string bad_channel_sentence(const BadChannel& bad) {
   const char* words[] = {"is stuck",         "jumps",  "is noisy", "drops out", "is cut off",
                          "has wild samples", "ripples"};
-  return fmt::format("{} {} between {:.1f} and {:.1f} s ({:.2g} % of the log): {}. {}.",
+  return fmt::format("{} {} between {:.1f} and {:.1f} s ({:.3g} % of the log): {}. {}.",
                      bad.channel, words[static_cast<int>(bad.kind)], bad.from_s, bad.to_s,
                      100.0 * bad.share, bad.evidence, bad.remedy);
 }

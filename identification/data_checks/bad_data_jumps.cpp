@@ -133,24 +133,58 @@ double resolution(const VectorXd& x) {
   return std::isfinite(least) ? least : 0.0;
 }
 
+/// Nearest samples before and after a sample, between which it is judged.
+struct Neighbours {
+  Index before = 1, after = 1;  ///< [samples]
+};
+
+/// @return whether so many samples are wild that they are a fault
+bool is_wild(const CheckContext& context, const Mask& wild) {
+  const auto fewest = std::max(context.options.wild_fewest,
+                               context.options.wild_share * static_cast<double>(wild.size()));
+  return static_cast<double>(wild.count()) >= fewest;
+}
+
+/// @return median change from one sample to the next around sample k, which single wild samples hardly affect
+double trend_around(const VectorXd& x, const SampleRange& run, Index k, Index reach) {
+  std::vector<double> change;
+  for (Index i = std::max(run.begin, k - reach); i < std::min(run.end - 1, k + reach); ++i)
+    change.push_back(x[i + 1] - x[i]);
+  return median(Eigen::Map<VectorXd>(change.data(), std::ssize(change)));
+}
+
 /// Marks samples far off both their neighbours, which agree with each other; inertia and compressibility exclude such
 /// signals. A single one may be an impact; many are a fault, however small they are in the channel's units.
 Mask wild_samples(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
   const VectorXd noise = local_noise(context.noise[channel], x.size());
-  const OtherChannels others(context, channel);
-  Mask out = Mask::Constant(x.size(), false);
   const double least = context.options.wild_resolution * resolution(x);
-  for (const SampleRange& run : context.log.runs) {
-    for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
-      const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
-      if (!(off > std::max(least, context.options.jump_noise * noise[k]))) continue;
-      if (std::abs(x[k + 1] - x[k - 1]) > context.options.wild_neighbours * off) continue;
-      if (c.family != "position" && others.explain(k - 1, off)) continue;
-      out[k] = true;
+  Mask out = Mask::Constant(x.size(), false);
+  const OtherChannels others(context, channel);
+  const auto mark = [&](Neighbours n, bool known) {
+    for (const SampleRange& run : context.log.runs) {
+      for (Index k = run.begin + n.before; k + n.after < run.end; ++k) {
+        const double limit = std::max(least, context.options.jump_noise * noise[k]);
+        if (!(std::max(std::abs(x[k] - x[k - n.before]), std::abs(x[k] - x[k + n.after])) > limit))
+          continue;
+        const double trend =
+            known ? trend_around(x, run, k, context.options.wild_trend_samples) : 0.0;
+        const double before = x[k - n.before] + trend * static_cast<double>(n.before),
+                     after = x[k + n.after] - trend * static_cast<double>(n.after);
+        const double off = std::abs(x[k] - 0.5 * (before + after));
+        if (!(off > limit)) continue;
+        if (std::abs(after - before) > context.options.wild_neighbours * off) continue;
+        if (out[k - n.before] || out[k + n.after]) continue;
+        if (!known && c.family != "position" && others.explain(k - 1, off)) continue;
+        out[k] = true;
+      }
     }
-  }
+  };
+  mark({}, false);
+  if (!is_wild(context, out)) return out;
+  // In a channel that is known to have them, they also come in motion, beside motions of a lever, and two in a row.
+  for (const Neighbours n : {Neighbours{1, 1}, Neighbours{1, 2}, Neighbours{2, 1}}) mark(n, true);
   return out;
 }
 
@@ -253,19 +287,16 @@ std::optional<Finding> check_wild(const CheckContext& context, std::size_t chann
   const double noise = context.noise[channel].typical;
   if (c.least_jump <= 0.0 || c.channel->role == Role::kCommand || noise <= 0.0) return {};
   const Mask wild = wild_samples(context, channel);
-  const auto count = static_cast<double>(wild.count());
-  const double fewest =
-      std::max(options.wild_fewest, options.wild_share * static_cast<double>(wild.size()));
-  if (count < fewest) return {};
+  if (!is_wild(context, wild)) return {};
   if (!(wild && c.channel->values.array() != 0.0).any())
     return {};  // check_jumps reports these as drop-outs
   Finding found;
   found.kind = BadDataKind::kWild;
   found.affected = wild;
   found.evidence = fmt::format(
-      "{:.0f} single samples lie more than {:.0f} times its noise ({}) off both their neighbours, "
-      "and nothing else in the log changes there",
-      count, options.jump_noise, in_field(c, noise));
+      "{} single samples lie more than {:.0f} times its noise ({}) off both their neighbours, "
+      "most of them where nothing else in the log changes",
+      wild.count(), options.jump_noise, in_field(c, noise));
   found.remedy = "Check the sensor's cable and plug, and leave these samples out";
   return found;
 }

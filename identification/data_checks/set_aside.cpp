@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "identification/log/log_time.h"
 #include "models/math/nan.h"
 
 namespace sparflow {
@@ -21,6 +22,9 @@ Log without_bad_data(Log log, const std::vector<BadChannel>& bad) {
       channel->values[i] = kNaN;
       channel->valid[i] = false;
     }
+    // The reader would hold a payload or a temperature over any hole; what a check refuses is not held.
+    if (channel->role != Role::kPayload && channel->role != Role::kOilTemperature)
+      fill_holes(log.time, log.runs, {}, &*channel);
   }
   return log;
 }

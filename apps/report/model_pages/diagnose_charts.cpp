@@ -329,10 +329,16 @@ LineChart bad_channel_chart(const BadChannel& bad) {
   chart.series.push_back({"as logged", bad.values, LineStyle::kPlain, 0, {}, {}});
   std::string word = bad_data_word(bad.kind);
   std::replace(word.begin(), word.end(), '_', ' ');
-  const double thinnest = bad.time.size() > 1  // A single sample would be too thin to be seen.
-                              ? 0.002 * (bad.time[bad.time.size() - 1] - bad.time[0])
-                              : 0.0;
+  const double lasts = bad.time.size() > 1 ? bad.time[bad.time.size() - 1] - bad.time[0] : 0.0;
+  const double thinnest = 0.002 * lasts;         // A single sample would be too thin to be seen.
+  std::vector<std::pair<double, double>> drawn;  // gaps about as wide as a line are closed
   for (const auto& [from, to] : bad.stretches) {
+    if (!drawn.empty() && from - drawn.back().second <= 0.01 * lasts)
+      drawn.back().second = to;
+    else
+      drawn.emplace_back(from, to);
+  }
+  for (const auto& [from, to] : drawn) {
     const double more = std::max(0.0, 0.5 * (thinnest - (to - from)));
     chart.spans.push_back({from - more, to + more, chart.spans.empty() ? word : ""});
   }

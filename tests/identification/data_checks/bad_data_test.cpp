@@ -188,6 +188,46 @@ TEST(BadData, ManyWildSamplesNeedNotBeLarge) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
+// In a channel that is known to have them, they are left out beside motions of a lever, too, and where two follow each other.
+TEST(BadData, WildSamplesOfAKnownFaultAreAllSetAside) {
+  Log log = noisy_arm();
+  const VectorXd u = channel(log, "u_arm").values;
+  VectorXd& p = channel(log, "pA_arm").values;
+  const VectorXd clean = p;
+  std::mt19937 random(7);
+  Mask wild = Mask::Constant(p.size(), false);
+  const auto disturb = [&](Eigen::Index k, double off) {
+    if (std::abs(clean[k + 1] - clean[k - 1]) > 3.0 * kBar)
+      return;  // a true step at the same instant
+    p[k] += off * kBar;
+    wild[k] = true;
+  };
+  for (Eigen::Index k = 10; k + 10 < p.size(); k += 40 + static_cast<Eigen::Index>(random() % 20))
+    disturb(k, random() % 2 == 0 ? 15.0 : -15.0);
+  for (const Eigen::Index k : {655, 1855}) {
+    wild.segment(k - 1, 3).setConstant(false);
+    p.segment(k - 1, 3) = clean.segment(k - 1, 3);
+    disturb(k, 15.0);
+    disturb(k + 1, -20.0);
+  }
+  int starts = 0;
+  for (Eigen::Index k = 10; k + 10 < p.size(); ++k) {
+    if ((u[k] == 0.0) == (u[k + 1] == 0.0) || wild.segment(k - 5, 10).any()) continue;
+    disturb(k + 3, 15.0);  // the pressure itself steps with the command
+    ++starts;
+  }
+  ASSERT_GT(starts, 0);
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("pA_arm wild"));
+  for (Eigen::Index k = 0; k < p.size(); ++k) {
+    const bool aside = std::any_of(
+        bad[0].stretches.begin(), bad[0].stretches.end(), [&](const std::pair<double, double>& s) {
+          return s.first - 1e-9 <= log.time[k] && log.time[k] <= s.second + 1e-9;
+        });
+    EXPECT_EQ(aside, wild[k]) << "sample " << k;
+  }
+}
+
 TEST(BadData, APressureStepThatAnotherChannelShowsIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200}) {
@@ -288,6 +328,25 @@ TEST(BadData, WhatIsSetAsideIsMissingThereAndNowhereElse) {
     }
   }
   EXPECT_GT(missing, 20);
+}
+
+// A filter does not reach across a hole, so single wild samples would cost their whole neighbourhood.
+TEST(BadData, SingleSamplesThatAreSetAsideAreInterpolated) {
+  const Log log = noisy_arm();
+  Log wild = log;
+  BadChannel one;
+  one.channel = "pA_arm";
+  one.kind = BadDataKind::kWild;
+  for (const Eigen::Index k : {300, 340, 341, 700}) {
+    channel(wild, "pA_arm").values[k] += 20.0 * kBar;
+    one.stretches.emplace_back(log.time[k], log.time[k]);
+  }
+  Log left = without_bad_data(wild, {one});
+  const VectorXd& p = channel(left, "pA_arm").values;
+  EXPECT_TRUE(channel(left, "pA_arm").valid.all());
+  EXPECT_NEAR(p[300], 0.5 * (p[299] + p[301]), 1.0);
+  EXPECT_NEAR(p[341], p[339] + 2.0 / 3.0 * (p[342] - p[339]), 1.0);
+  EXPECT_EQ(p[500], channel(wild, "pA_arm").values[500]);
 }
 
 // ---- logs of real and simulated cranes -------------------------------------------------------------------------
