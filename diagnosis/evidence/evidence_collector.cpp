@@ -8,6 +8,7 @@
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
 #include "diagnosis/evidence/evidence.h"
+#include "identification/learning/learn_pump.h"
 #include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/low_pass.h"
 #include "identification/signals/series.h"
@@ -137,6 +138,21 @@ std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& s
 
 bool measures_both_chambers(const CylinderSignals& c) {
   return c.pressure_a.size() > 0 && c.pressure_b.size() > 0;
+}
+
+/// Where the law of a load-sensing pump does not end at its pressure cut-off, neither at a sample nor in the filter's window about
+/// it; learning leaves the same samples out. [samples]
+Mask below_cut_off(const Pump& pump, const MachineSignals& signals, const VectorXd& pressure) {
+  Mask below = Mask::Constant(pressure.size(), true);
+  if (pump.type != PumpType::kLoadSensing || !(pump.max_pressure > 0.0)) return below;
+  const double limit = LearnPumpOptions{}.cut_off_share * pump.max_pressure;
+  const auto half = static_cast<Index>(std::lround(0.5 * signals.window / signals.step));
+  for (Index k = 0; k < pressure.size(); ++k) {
+    if (!(pressure[k] > limit)) continue;
+    const Index first = std::max<Index>(0, k - half);
+    below.segment(first, std::min(pressure.size(), k + half + 1) - first).setConstant(false);
+  }
+  return below;
 }
 
 /// One cylinder that moves to one side, as the branches' mixture takes it.
@@ -377,7 +393,9 @@ void EvidenceCollector::add_pump_channel(int pump) {
     const VectorXd y =
         e.filter(log, EvidenceKind::kPump,
                  s.pressure - series.demand - e.known(log, EvidenceKind::kPump, pump));
-    b.add(log, signals_[log]->usable && !signals_[log]->edge, y, e.margins(log, pump), 0);
+    const Mask follows = below_cut_off(model_.machine.pumps[at], *signals_[log], s.pressure_smooth);
+    b.add(log, signals_[log]->usable && !signals_[log]->edge && follows, y, e.margins(log, pump),
+          0);
     b.channel.raw.resize(signals_.size());
     b.channel.raw[log] = s.pressure - series.demand;
     if (is_suspect(log)) noise.add(s.pressure, gain_pressure_[log]);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -20,6 +21,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr unsigned kFourierSeed = 7;      ///< of the random features, so that results repeat
 constexpr std::size_t kNamedSignals = 4;  ///< at most so many signals are named in a sentence
 
@@ -49,7 +51,7 @@ MatrixXd hats(const VectorXd& x, const ResidualModelOptions& options) {
 /// Cross-validated ridge regression: held-out prediction at the regularisation that predicts best.
 struct Ridge {
   VectorXd prediction;
-  double explained = -1.0;  // 1 - squared error / variance, held out
+  double explained = -kInfinity;  // 1 - squared error / variance, held out
 };
 
 Ridge cross_validated(const MatrixXd& x, const VectorXd& y, const std::vector<int>& fold,
@@ -131,12 +133,10 @@ struct ResidualModelFit {
   std::vector<MatrixXd> parts;  // by signal
 };
 
-/// The flexible model: hat functions of every signal and random Fourier features of all together.
-ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
-                                         const std::vector<MatrixXd>& hat, const VectorXd& y,
-                                         const std::vector<int>& fold,
-                                         const ResidualModelOptions& options) {
-  MatrixXd standard(y.size(), static_cast<Index>(values.size()));
+/// Random Fourier features of all signals together. [rows x features]
+MatrixXd fourier_features(const std::vector<VectorXd>& values, Index rows,
+                          const ResidualModelOptions& options) {
+  MatrixXd standard(rows, static_cast<Index>(values.size()));
   for (std::size_t s = 0; s < values.size(); ++s) {
     const VectorXd& v = values[s];
     const double sd = std::sqrt((v.array() - v.mean()).square().mean());
@@ -146,7 +146,7 @@ ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
   std::mt19937 random(kFourierSeed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 2.0 * std::numbers::pi);
-  MatrixXd fourier(standard.rows(), options.fourier);
+  MatrixXd fourier(rows, options.fourier);
   for (int k = 0; k < options.fourier; ++k) {
     VectorXd w = VectorXd::Zero(standard.cols());
     for (int pick = 0; pick < options.fourier_signals; ++pick)
@@ -155,21 +155,43 @@ ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
     fourier.col(k) = ((standard * w).array() + uniform(random)).cos();
   }
   fourier.rowwise() -= fourier.colwise().mean().eval();
-  ResidualModelFit model;
-  Index width = options.fourier;
-  for (const MatrixXd& h : hat) {
-    model.parts.push_back(h);
-    if (h.cols() > 0) model.parts.back().rowwise() -= h.colwise().mean().eval();
-    width += h.cols();
-  }
-  MatrixXd x(y.size(), width);
-  x.leftCols(options.fourier) = options.fourier_weight * fourier;
-  Index at = options.fourier;
-  for (const MatrixXd& p : model.parts) {
+  return options.fourier_weight * fourier;
+}
+
+MatrixXd side_by_side(const std::vector<MatrixXd>& parts, Index rows) {
+  Index width = 0;
+  for (const MatrixXd& p : parts) width += p.cols();
+  MatrixXd x(rows, width);
+  Index at = 0;
+  for (const MatrixXd& p : parts) {
     x.middleCols(at, p.cols()) = p;
     at += p.cols();
   }
-  model.ridge = cross_validated(x, y, fold, options);
+  return x;
+}
+
+std::vector<MatrixXd> centred(std::vector<MatrixXd> hat) {
+  for (MatrixXd& h : hat) {
+    if (h.cols() > 0) h.rowwise() -= h.colwise().mean().eval();
+  }
+  return hat;
+}
+
+std::vector<MatrixXd> driven_by(const VectorXd& driver, std::vector<MatrixXd> hat) {
+  for (MatrixXd& h : hat) h = driver.asDiagonal() * h;
+  return hat;
+}
+
+/// The flexible model: hat functions of every signal and random Fourier features of all together.
+ResidualModelFit additive_residual_model(const std::vector<VectorXd>& values,
+                                         const std::vector<MatrixXd>& hat, const VectorXd& y,
+                                         const std::vector<int>& fold,
+                                         const ResidualModelOptions& options) {
+  ResidualModelFit model;
+  model.parts = centred(hat);
+  std::vector<MatrixXd> all = {fourier_features(values, y.size(), options)};
+  all.insert(all.end(), model.parts.begin(), model.parts.end());
+  model.ridge = cross_validated(side_by_side(all, y.size()), y, fold, options);
   return model;
 }
 
@@ -178,18 +200,8 @@ ResidualModelFit driven_residual_model(const VectorXd& driver, const std::vector
                                        const VectorXd& y, const std::vector<int>& fold,
                                        const ResidualModelOptions& options) {
   ResidualModelFit model;
-  Index width = 0;
-  for (const MatrixXd& h : hat) {
-    model.parts.emplace_back(driver.asDiagonal() * h);
-    width += h.cols();
-  }
-  MatrixXd x(y.size(), width);
-  Index at = 0;
-  for (const MatrixXd& p : model.parts) {
-    x.middleCols(at, p.cols()) = p;
-    at += p.cols();
-  }
-  model.ridge = cross_validated(x, y, fold, options);
+  model.parts = driven_by(driver, hat);
+  model.ridge = cross_validated(side_by_side(model.parts, y.size()), y, fold, options);
   return model;
 }
 
@@ -332,6 +344,55 @@ std::optional<ResidualStructure> residual_structure_of(const Evidence& evidence,
 }
 
 }  // namespace
+
+std::vector<double> agreement_with_references(const Evidence& evidence, const EffectFit& fit,
+                                              const ResidualStructure& structure,
+                                              const ResidualModelOptions& options) {
+  const std::size_t channel = structure.channel;
+  const EvidenceChannel& c = evidence.channels[channel];
+  if (!evidence.has_reference() || fit.residual[channel].size() == 0) return {};
+  VectorXd y = fit.residual[channel];
+  const VectorXd scale = fit.noise[channel].scale_of(c.noise_rows());
+  if (scale.size() > 0) y.array() /= scale.array();
+  std::vector<Index> rows(static_cast<std::size_t>(c.rows()));
+  std::iota(rows.begin(), rows.end(), Index{0});
+  std::vector<int> group(rows.size());
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    const bool reference = static_cast<std::size_t>(c.log[b]) >= evidence.suspects;
+    std::fill(group.begin() + c.blocks[b].first, group.begin() + c.blocks[b].last, reference);
+  }
+  std::vector<VectorXd> values;
+  std::vector<MatrixXd> hat;
+  std::vector<SignalColumn> signals = channel_signals(evidence, c, options);
+  const auto named = [&](const SignalColumn& s) {
+    return std::find(structure.depends_on.begin(), structure.depends_on.end(), s.name) !=
+           structure.depends_on.end();
+  };
+  if (std::any_of(signals.begin(), signals.end(), named))
+    std::erase_if(signals, [&](const SignalColumn& s) { return !named(s); });
+  for (SignalColumn& s : signals) {
+    values.push_back(std::move(s.values));
+    hat.push_back(hats(values.back(), options));
+  }
+  std::vector<MatrixXd> all = {fourier_features(values, c.rows(), options)};
+  const auto add = [&](const std::vector<MatrixXd>& parts) {
+    all.insert(all.end(), parts.begin(), parts.end());
+  };
+  add(centred(hat));
+  const VectorXd driver = driver_of(evidence, c, rows);
+  if (driver.size() > 0) add(driven_by(driver, hat));
+  ResidualModelOptions two = options;
+  two.folds = 2;
+  const Ridge other = cross_validated(side_by_side(all, c.rows()), y, group, two);
+  const double square = y.squaredNorm() / static_cast<double>(c.blocks.size());
+  std::vector<double> agreement;
+  agreement.reserve(c.blocks.size());
+  for (const NoiseBlock& b : c.blocks) {
+    const Index n = b.last - b.first;
+    agreement.push_back(other.prediction.segment(b.first, n).dot(y.segment(b.first, n)) / square);
+  }
+  return agreement;
+}
 
 std::vector<ResidualStructure> find_residual_structure(const Evidence& evidence,
                                                        const EffectFit& fit,

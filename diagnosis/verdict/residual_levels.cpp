@@ -76,6 +76,26 @@ double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
   return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
 }
 
+/// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and
+/// equal sizes of what is left are no sign of a common cause.
+/// @return probability by chance of what is seen, small where they are opposite
+double chance_of_opposite_law(const Diagnosis& d, const ResidualStructure& left,
+                              const DiagnoseOptions& options) {
+  const std::vector<double> agreement =
+      agreement_with_references(d.evidence, d.search.final, left, options.residual);
+  if (agreement.size() < 2) return 1.0;
+  const auto n = static_cast<double>(agreement.size());
+  const Eigen::Map<const VectorXd> v(agreement.data(), static_cast<Index>(agreement.size()));
+  const double error = std::sqrt((v.array() - v.mean()).square().sum() / (n - 1.0) / n);
+  const double chance = error > 0.0 ? chance_of_t(-v.mean() / error, n - 1.0) : 1.0;
+  if (tracing())
+    fmt::print(stderr,
+               "  {}: suspect logs against references {:.3g} +- {:.2g} by block, opposite by "
+               "chance {:.2g}\n",
+               d.evidence.channels[left.channel].text, v.mean(), error, chance);
+  return chance;
+}
+
 }  // namespace
 
 std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel) {
@@ -177,7 +197,9 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
         d.thresholds.least_excess_ratio *
                 strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
             left[i].rms;
-    shared[i] = (found || room || oscillates) && !exceeds_references(d, channel);
+    shared[i] = (found || room || oscillates) && !exceeds_references(d, channel) &&
+                static_cast<double>(left.size()) * chance_of_opposite_law(d, left[i], options) >=
+                    d.thresholds.structure_false_alarm;
   }
   return shared;
 }

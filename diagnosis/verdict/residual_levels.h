@@ -38,7 +38,7 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
 
 /// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in
 /// the same channel by the same residual models, or leave about as much beyond the sensors' noise there, and the residual of the
-/// suspect logs is not larger (exceeds_references).
+/// suspect logs is not larger (exceeds_references) nor opposite (agreement_with_references).
 std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
                                    const DiagnoseOptions& options);
 

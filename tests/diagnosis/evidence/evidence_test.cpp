@@ -448,5 +448,36 @@ TEST(Evidence, WhileAPumpsPressureMovesNothingIsSettled) {
   EXPECT_GT(still[at], 0.5);
 }
 
+/// At its pressure cut-off a pump does not follow the load, so that nothing there says what the model lacks; learning leaves it
+/// out, too.
+TEST(Evidence, APumpIsJudgedBelowItsCutOff) {
+  Machine machine = testing_support::drawn_machine("loader_crane");
+  const auto logs = testing_support::hidden_case(machine, {}, {5, 60.0});
+  const MachineSignals signals = make_signals(machine, logs.train);
+  const VectorXd& p = signals.pumps[0].pressure_smooth;
+  const auto judged = [&] {
+    const Evidence e = evidence_of(CraneModel::untrained(machine), {logs.train});
+    return e.find(EvidenceKind::kPump, 0)->sample;
+  };
+  const std::vector<Index> all = judged();
+  machine.pumps[0].max_pressure = 0.8 * p.maxCoeff();
+  const std::vector<Index> below = judged();
+  const auto half = static_cast<Index>(std::lround(0.5 * signals.window / signals.step));
+  Index left_out = 0;
+  for (const Index k : all) {
+    const Index first = std::max<Index>(0, k - half);
+    const Index n = std::min(p.size(), k + half + 1) - first;
+    const bool limited = p.segment(first, n).maxCoeff() > 0.98 * machine.pumps[0].max_pressure;
+    const bool kept = std::find(below.begin(), below.end(), k) != below.end();
+    EXPECT_FALSE(limited && kept) << "sample " << k;
+    left_out += limited ? 1 : 0;
+  }
+  EXPECT_GT(left_out, 10);
+  EXPECT_GT(below.size(), all.size() / 2);
+  // a pump of constant pressure is always at its cut-off
+  machine.pumps[0].type = PumpType::kConstantPressure;
+  EXPECT_EQ(judged().size(), all.size());
+}
+
 }  // namespace
 }  // namespace sparflow

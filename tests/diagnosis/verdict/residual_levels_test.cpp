@@ -1,0 +1,64 @@
+/// What suspect logs and references leave unexplained: equal sizes are no change only where the law is the same.
+#include "diagnosis/verdict/residual_levels.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "diagnosis/residual/residual_model.h"
+#include "tests/diagnosis/evidence_support.h"
+#include "tests/diagnosis/hidden_case.h"
+
+namespace sparflow {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr double kNoise = 500.0;  // [N]
+
+/// Force of the boom in which a law of the boom's position remains: of one sign in the suspect, of another in the reference log.
+Diagnosis with_laws(double suspect, double reference) {
+  const Machine machine = testing_support::drawn_machine("loader_crane");
+  static const auto logs = testing_support::hidden_case(machine, {}, {5, 90.0});
+  Diagnosis d;
+  d.evidence = collect_evidence(CraneModel::untrained(machine), {make_signals(machine, logs.train)},
+                                {make_signals(machine, logs.reference)});
+  std::mt19937_64 random(4);
+  NoiseModel noise;
+  noise.variance = kNoise * kNoise;
+  for (EvidenceChannel& c : d.evidence.channels)
+    c.y = testing_support::draw(noise, c.blocks, random);
+  const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
+  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+  const std::vector<SignalColumn> signals = channel_signals(d.evidence, channel);
+  const auto position = std::find_if(signals.begin(), signals.end(),
+                                     [](const SignalColumn& s) { return s.name == "q_boom"; });
+  const VectorXd law = (6.0 * position->values.array()).sin() * kNoise;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    const Eigen::Index first = channel.blocks[b].first, n = channel.blocks[b].last - first;
+    channel.y.segment(first, n) +=
+        (channel.log[b] == 0 ? suspect : reference) * law.segment(first, n);
+  }
+  FitControl control;
+  control.keep_residuals = true;
+  d.search.final = fit_effects(d.evidence, {}, nullptr, control);
+  return d;
+}
+
+bool is_shared(double suspect, double reference) {
+  const Diagnosis d = with_laws(suspect, reference);
+  const std::vector<ResidualStructure> left = find_residual_structure(d.evidence, d.search.final);
+  EXPECT_EQ(left.size(), 1u);
+  return !left.empty() && shared_structure(d, left, {}).front();
+}
+
+TEST(ResidualLevels, TheSameLawInBothLogsIsNoChange) { EXPECT_TRUE(is_shared(1.5, 1.5)); }
+
+/// A law that is learned from both logs lies between the two, and leaves residuals of equal size and opposite sign.
+TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) { EXPECT_FALSE(is_shared(1.5, -1.5)); }
+
+TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) { EXPECT_FALSE(is_shared(1.5, 0.0)); }
+
+}  // namespace
+}  // namespace sparflow
