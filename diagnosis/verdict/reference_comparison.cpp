@@ -319,9 +319,15 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
           : std::abs(sizes.difference());
   // In standard errors of sampling and form error: the deviation of a law from the machine is another one in other motions, in
   // proportion to the part of the effect that both groups have.
-  const double form = form_share(*suspect.effect.effect, options.regression) *
-                      common_over_change(d, suspect, in_suspects, in_reference);
+  const bool single = suspect.linear == 1;
+  const double form =
+      form_share(*suspect.effect.effect, options.regression) *
+      common_over_change(d, suspect, single ? VectorXd(here.size * in_suspects) : in_suspects,
+                         single ? VectorXd(there.size * in_suspects) : in_reference);
   const double difference = beside_sampling / std::hypot(1.0, beside_sampling * form);
+  if (tracing())
+    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
+               beside_sampling, form, difference);
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,

@@ -84,32 +84,6 @@ class PoseMargin final : public HiddenLaw {
   Range range_;
 };
 
-/// Failed pressure compensator: the flow follows the square root of the pressure drop over the spool.
-class CompensatorFailure final : public HiddenLaw {
- public:
-  explicit CompensatorFailure(LawContext& c)
-      : machine_(c.machine),
-        at_(static_cast<std::size_t>(c.at)),
-        share_(std::min(1.0, c.size * c.draw(0.7, 1.0))) {}
-  void flow(PlantState& s) override {
-    const int p = machine_->pump_of_cylinder(static_cast<int>(at_));
-    CylinderState& c = s.cylinders[at_];
-    if (p < 0 || c.side == 0) return;
-    const double chamber = c.side > 0 ? c.pressure_a : c.pressure_b;
-    const double over = std::max(2e5, s.pumps[static_cast<std::size_t>(p)].pressure - chamber);
-    // The flow rises with the pressure that the other cylinder causes, at most to twice its value.
-    const double gain = std::clamp(std::sqrt(over / std::max(1e5, c.margin)), 0.5, 2.0);
-    smooth_ += (gain - smooth_) * std::min(1.0, s.h / 0.08);
-    c.flow *= 1.0 + share_ * (smooth_ - 1.0);
-  }
-  std::vector<HiddenParameter> parameters() const override { return one("share", share_, "-"); }
-
- private:
-  const Machine* machine_;
-  std::size_t at_;
-  double share_, smooth_ = 1.0;
-};
-
 /// Hysteresis between lever and spool.
 class SpoolHysteresis final : public HiddenLaw {
  public:
@@ -222,12 +196,6 @@ class PressureDrift final : public HiddenLaw {
 bool one_of_several(const Machine& machine, int i) {
   return hydraulic(machine, i) && machine.cylinder_count() > 1;
 }
-bool shares_pump(const Machine& machine, int i) {
-  const int p = machine.pump_of_cylinder(i);
-  if (p < 0 || !hydraulic(machine, i)) return false;
-  const Pump& pump = machine.pumps[static_cast<std::size_t>(p)];
-  return pump.feeds.size() > 1 && pump.type == PumpType::kLoadSensing;
-}
 }  // namespace
 
 std::vector<LawEntry> outside_hydraulic_laws() {
@@ -252,13 +220,6 @@ std::vector<LawEntry> outside_hydraulic_laws() {
            "rise [Pa]",
            make_law<PoseMargin>,
            load_sensing},
-          {"compensator_failure",
-           cylinder,
-           false,
-           {"flow with the square root of the pressure drop over the spool"},
-           "share [-]",
-           make_law<CompensatorFailure>,
-           shares_pump},
           {"spool_hysteresis",
            cylinder,
            false,

@@ -83,6 +83,41 @@ class Lag final : public HiddenLaw {
   std::deque<double> queue_;
 };
 
+/// Failed pressure compensator: the flow follows the pressure drop over the spool, which another cylinder of the pump raises.
+class LostCompensator final : public HiddenLaw {
+ public:
+  explicit LostCompensator(LawContext& c)
+      : machine_(c.machine),
+        at_(static_cast<std::size_t>(c.at)),
+        law_(c.law),
+        size_(std::min(1.0, c.size)),
+        share_(c.draw(0.7, 1.0)) {}
+  void flow(PlantState& s) override {
+    const int p = machine_->pump_of_cylinder(static_cast<int>(at_));
+    CylinderState& c = s.cylinders[at_];
+    if (p < 0 || c.side == 0) return;
+    const double chamber = c.side > 0 ? c.pressure_a : c.pressure_b;
+    const double over = std::max(2e5, s.pumps[static_cast<std::size_t>(p)].pressure - chamber) /
+                        std::max(1e5, c.margin);
+    // root of the drop; law 1: in proportion to it where it is small, as in a laminar gap
+    const double free =
+        law_ == 1 ? over * std::sqrt((1.0 + kLaminar) / (over + kLaminar)) : std::sqrt(over);
+    // A compensator that still yields a little leaves a smaller power; the valve's own limits keep the flow within twice its value.
+    const double gain = std::clamp(std::pow(free, size_), 0.5, 2.0);
+    smooth_ += (gain - smooth_) * std::min(1.0, s.h / 0.08);
+    c.flow *= 1.0 + share_ * (smooth_ - 1.0);
+  }
+  // The published law's share of the flow depends on the valve's gain, which is learned beside it, so that no value is comparable.
+  std::vector<HiddenParameter> parameters() const override { return {}; }
+
+ private:
+  static constexpr double kLaminar = 0.05;  // [-] drop of the transition over the margin
+  const Machine* machine_;
+  std::size_t at_;
+  int law_;
+  double size_, share_, smooth_ = 1.0;
+};
+
 class Saturation final : public HiddenLaw {
  public:
   explicit Saturation(LawContext& c) : feeds_(c.pump().feeds), law_(c.law) {
@@ -115,6 +150,13 @@ class Saturation final : public HiddenLaw {
   double limit_ = 0.0;
 };
 
+bool shares_pump(const Machine& machine, int i) {
+  const int p = machine.pump_of_cylinder(i);
+  if (p < 0 || !hydraulic(machine, i)) return false;
+  const Pump& pump = machine.pumps[static_cast<std::size_t>(p)];
+  return pump.feeds.size() > 1 && pump.type == PumpType::kLoadSensing;
+}
+
 }  // namespace
 
 std::vector<LawEntry> valve_laws() {
@@ -132,6 +174,13 @@ std::vector<LawEntry> valve_laws() {
            "tau [s] (two stages: their sum), delay 1: pure delay",
            make_law<Lag>,
            hydraulic},
+          {"valve_pressure_drop",
+           HiddenPlace::kCylinder,
+           true,
+           {"root of the pressure drop", "laminar at small drops"},
+           "",
+           make_law<LostCompensator>,
+           shares_pump},
           {"flow_saturation",
            HiddenPlace::kPump,
            true,

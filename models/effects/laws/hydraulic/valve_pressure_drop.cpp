@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "models/effects/builtin.h"
 #include "models/effects/hydraulics.h"
@@ -9,7 +10,8 @@ namespace sparflow {
 namespace {
 
 /// An edge of constant opening carries the root of its pressure difference. A compensator keeps that difference at its
-/// setting while the pump's pressure suffices; without one, the setting lies above all differences of the log.
+/// setting while the pump's pressure suffices. Without one the flow goes on rising; in a single log that is the same law with a
+/// setting above all differences and another gain, so that only a reference, which tells the gain, determines it.
 class ValvePressureDrop final : public Effect {
  public:
   const EffectInfo& info() const override {
@@ -21,7 +23,7 @@ class ValvePressureDrop final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.5,
+                        0.1,
                         2.0,
                         1.0,
                         "share of the flow that follows the pressure drop, about 1",
@@ -33,15 +35,25 @@ class ValvePressureDrop final : public Effect {
                         0.5 * units::kBar,
                         500 * units::kBar,
                         10 * units::kBar,
-                        "pressure drop from which the flow no longer rises: the compensator's "
+                        "pressure drop at which the valve passes its flow: the compensator's "
                         "setting; above all pressure drops of the log the valve has none",
                         false,
                         {2 * units::kBar, 5 * units::kBar, 10 * units::kBar, 20 * units::kBar,
-                         40 * units::kBar, 80 * units::kBar, 160 * units::kBar,
-                         320 * units::kBar}}},
+                         40 * units::kBar, 80 * units::kBar, 160 * units::kBar, 320 * units::kBar}},
+                       {"compensator",
+                        "-",
+                        1.0,
+                        0.0,
+                        1.0,
+                        1.0,
+                        "1: holds the pressure drop at the setting, where the pump's pressure "
+                        "suffices; 0: has failed, so that the flow rises beyond",
+                        false,
+                        {1.0, 0.0},
+                        true}},
         .equation =
-            "Q = Q_valve(u) min(1, max(0, p_pump - p) / setting)^0.5, p = pressure of the "
-            "supply chamber",
+            "Q = Q_valve(u) (max(0, p_pump - p) / setting)^0.5, with a compensator at most "
+            "Q_valve(u); p = pressure of the supply chamber",
         .signals = {"command", "position", "pump pressure", "chamber pressures"},
         .confused_with = {"valve_lag", "flow_saturation", "pump_lag"},
         .separated_by =
@@ -60,13 +72,14 @@ class ValvePressureDrop final : public Effect {
     return hydraulic_cylinders(machine);
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  bool needs_reference(std::span<const double> shape) const override { return shape[1] < 0.5; }
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
-    const Eigen::VectorXd lacking = lacking_flow(log, at, shape[0]);
+    const Eigen::VectorXd lacking = lacking_flow(log, at, shape);
     if (lacking.size() == 0) return false;
     const Eigen::VectorXd passed = command.cwiseProduct((1.0 - lacking.array()).matrix());
     const SectionFit fit = fit_gains(log, at, passed);
@@ -78,13 +91,17 @@ class ValvePressureDrop final : public Effect {
   Eigen::VectorXd passed_flow(const MachineSeries& log, int cylinder, int at,
                               std::span<const double> p) const override {
     if (cylinder != at) return {};
-    const Eigen::VectorXd lacking = lacking_flow(log, at, p[1]);
+    const Eigen::VectorXd lacking = lacking_flow(log, at, p.subspan(1));
     return lacking.size() == 0 ? lacking : (1.0 - p[0] * lacking.array()).matrix();
   }
 
  private:
-  /// Share of the valve's flow that the measured pressure drop does not pass; empty where it is not measured.
-  static Eigen::VectorXd lacking_flow(const MachineSeries& log, int at, double setting) {
+  /// Share of the valve's flow that the measured pressure drop does not pass, negative where it passes more; empty where it is
+  /// not measured.
+  static Eigen::VectorXd lacking_flow(const MachineSeries& log, int at,
+                                      std::span<const double> shape) {
+    const double setting = shape[0];
+    const double most = shape[1] < 0.5 ? std::numeric_limits<double>::infinity() : 1.0;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     const int pump = log.machine->pump_of_cylinder(at);
     if (pump < 0) return {};
@@ -96,7 +113,7 @@ class ValvePressureDrop final : public Effect {
     Eigen::VectorXd lacking = Eigen::VectorXd::Zero(log.samples());
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
-      if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / setting, 0.0, 1.0));
+      if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / setting, 0.0, most));
     }
     return lacking;
   }

@@ -136,22 +136,44 @@ TEST_F(FlowEffects, FlowFollowsThePressureDropBelowTheCompensatorsSetting) {
   }
   ASSERT_GT(starved, 100);
   ASSERT_GT(closed, 100);
-  const MatrixXd right = gains_and(columns("valve_pressure_drop", 0, 0, {setting}), 0);
+  const MatrixXd right = gains_and(columns("valve_pressure_drop", 0, 0, {setting, 1.0}), 0);
   EXPECT_NEAR(scaled_least_squares(right, c.speed)[2], 1.0, 1e-9);  // the same law, no noise
   for (const double wrong : {0.7 * setting, 1.5 * setting}) {
-    const MatrixXd other = gains_and(columns("valve_pressure_drop", 0, 0, {wrong}), 0);
+    const MatrixXd other = gains_and(columns("valve_pressure_drop", 0, 0, {wrong, 1.0}), 0);
     EXPECT_LT(0.01, residual(other, c.speed)) << wrong;
   }
   log.pumps[0].pressure.resize(0);
   MatrixXd none;
   EXPECT_FALSE(effect_named("valve_pressure_drop")
-                   .columns(log, {EvidenceKind::kFlow, 0}, 0, std::vector{setting}, none));
+                   .columns(log, {EvidenceKind::kFlow, 0}, 0, std::vector{setting, 1.0}, none));
+}
+
+/// Without its compensator a valve passes more than at the setting, too; what a single log shows then is another gain.
+TEST_F(FlowEffects, FlowRisesBeyondTheSettingOfACompensatorThatHasFailed) {
+  const double setting = 12e5;
+  const Effect& effect = effect_named("valve_pressure_drop");
+  EXPECT_TRUE(effect.needs_reference(std::vector{setting, 0.0}));
+  EXPECT_FALSE(effect.needs_reference(std::vector{setting, 1.0}));
+  const VectorXd passed = effect.passed_flow(log, 0, 0, std::vector{1.0, setting, 0.0});
+  const CylinderSeries& c = log.cylinders[0];
+  Index more = 0;
+  for (Index k = 0; k < log.samples(); ++k) {
+    if (c.command[k] == 0.0) continue;
+    const double drop =
+        log.pumps[0].pressure[k] - (c.command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+    ASSERT_NEAR(passed[k], std::sqrt(std::max(0.0, drop) / setting), 1e-12) << k;
+    more += passed[k] > 1.0 ? 1 : 0;
+  }
+  EXPECT_GT(more, 100);
+  log.cylinders[0].speed = c.speed.cwiseProduct(passed);
+  const MatrixXd right = gains_and(columns("valve_pressure_drop", 0, 0, {setting, 0.0}), 0);
+  EXPECT_LT(residual(right, log.cylinders[0].speed), 1e-9);
 }
 
 // Where the model computes the flow from the measured pump pressure, a pump at its limit lowers that pressure, and beside it no flow.
 TEST_F(FlowEffects, SaturationActsInThePumpAloneWhereFlowsFollowThePressureDrop) {
   const double limit = 1.3e-3;
-  const std::vector<double> law{1.0, 12e5};
+  const std::vector<double> law{1.0, 12e5, 1.0};
   MatrixXd c;
   for (std::size_t i = 0; i < 2; ++i) {
     const int at = static_cast<int>(i);
