@@ -10,6 +10,7 @@
 namespace sparflow::simulator {
 namespace {
 
+constexpr double kNoMachine = 5e8;  // [Pa] no cylinder bears such a pressure
 constexpr double kLongestStep =
     0.01;  // [s] of the plant; short compared with every lag that is drawn
 
@@ -201,6 +202,9 @@ GeneratedLog generate(const LogRequest& request) {
   SensorState sensors;
   drive_log(request, one, {}, [&](Plant& plant, double payload) {
     plant.sense(sensors);
+    for (const CylinderState& c : plant.state().cylinders)
+      SPARFLOW_CHECK(std::max(std::abs(c.pressure_a), std::abs(c.pressure_b)) < kNoMachine,
+                     "a hidden law makes the simulated crane unstable");
     recorder.add(plant.state(), sensors, payload);
   });
   Random noise(request.motion_seed, "noise");

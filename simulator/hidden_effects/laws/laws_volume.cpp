@@ -8,6 +8,8 @@
 namespace sparflow::simulator {
 namespace {
 
+constexpr double kLineTime = 0.04;  // [s] of a line and its oil
+
 class Leakage final : public HiddenLaw {
  public:
   explicit Leakage(LawContext& c)
@@ -18,9 +20,13 @@ class Leakage final : public HiddenLaw {
         conductance_(c.size * c.draw(0.4, 1.0) * kLpm / (100.0 * kBar)) {}
   void drift(PlantState& s) override {
     CylinderState& c = s.cylinders[at_];
+    // The oil's volume delays its pressure by the line's time constant; a leak that follows the force of its own acceleration at
+    // once has no stable motion.
+    force_ = started_ ? force_ + (c.force - force_) * (1.0 - std::exp(-s.h / kLineTime)) : c.force;
+    started_ = true;
     if (c.side != 0 && law_ != 2) return;  // Laws 0 and 1 leak past the closed spool.
-    const bool on_a = c.force >= 0.0;
-    const double load = on_a ? c.force / area_a_ : -c.force / area_b_;
+    const bool on_a = force_ >= 0.0;
+    const double load = on_a ? force_ / area_a_ : -force_ / area_b_;
     // Laminar through gaps; law 1: through an orifice with the same flow at 100 bar.
     const double flow = law_ == 1 ? conductance_ * 100.0 * kBar * std::sqrt(load / (100.0 * kBar))
                                   : conductance_ * load;
@@ -35,6 +41,8 @@ class Leakage final : public HiddenLaw {
   std::size_t at_;
   int law_;
   double area_a_, area_b_, conductance_;
+  double force_ = 0.0;  ///< [N] through the oil's volume
+  bool started_ = false;
   Equivalent equivalent_;
 };
 
@@ -82,7 +90,7 @@ class Compressibility final : public HiddenLaw {
   }
 
  private:
-  static constexpr double kFilter = 0.04;   // [s]
+  static constexpr double kFilter = kLineTime;
   static constexpr double kFastest = 0.01;  // [m/s]
   std::size_t at_;
   int law_, side_ = 0;
