@@ -191,14 +191,14 @@ void search(const CraneModel& model, const DiagnoseOptions& options, const Searc
 std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, Diagnosis& d) {
   const std::vector<ResidualStructure> left = find_residual_structure(
       d.evidence, fit_with_other_powers(d, options.search.regression), options.residual);
-  const std::vector<bool> shared = shared_structure(d, left, options);
+  const std::vector<BesideReferences> beside = beside_references(d, left, options);
   std::vector<ResidualStructure> unmodelled;
   bool in_touched = false;
   for (std::size_t i = 0; i < left.size(); ++i) {
     const ResidualStructure& l = left[i];
     bool touched = d.search.found.empty();
     for (const FoundEffect& f : d.search.found) touched = touched || f.design.touches(l.channel);
-    if (shared[i]) {
+    if (beside[i] == BesideReferences::kShared) {
       d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
       continue;
     }
@@ -208,7 +208,7 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
           "; the references have too few motions there to tell whether that has changed");
       continue;
     }
-    const double share = unmodelled_share(d, l);
+    const double share = unmodelled_share(d, l, beside[i]);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
     if (share <
         (l.event ? d.thresholds.largest_event_share : d.thresholds.largest_unmodelled_share))

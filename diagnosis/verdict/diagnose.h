@@ -73,9 +73,9 @@ struct Unexplained {
 struct VerdictOptions {
   /// Unmodelled share of a channel (unmodelled_structure.h) above which a cause is not in the
   /// catalogue.
-  /// @threshold [1] 0..1; tuned on the foreign plant and seeds 72000..72023: a law without the plant's transients leaves a
-  /// tenth of the squared error that effects and residual model explain together, imitations of other causes 0.18 and more
-  double largest_unmodelled_share = 0.15;
+  /// @threshold [1] 0..1; chosen: a twentieth of the squared error that effects and residual model
+  /// explain together, that is a fifth of its amplitude.
+  double largest_unmodelled_share = 0.05;
   /// The same share for an isolated event.
   /// @threshold [1] 0..1; chosen: larger than for other structure, because the model-form error of
   /// an effect is also concentrated where the effect acts most.

@@ -81,6 +81,7 @@ double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
 /// @return probability by chance of what is seen, small where they are opposite
 double chance_of_opposite_law(const Diagnosis& d, const ResidualStructure& left,
                               const DiagnoseOptions& options) {
+  if (left.event || left.oscillation) return 1.0;  // no law of measured signals
   const std::vector<double> agreement =
       agreement_with_references(d.evidence, d.search.final, left, options.residual);
   if (agreement.size() < 2) return 1.0;
@@ -172,10 +173,11 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
   return found;
 }
 
-std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
-                                   const DiagnoseOptions& options) {
-  std::vector<bool> shared(left.size(), false);
-  if (left.empty() || !d.evidence.has_reference()) return shared;
+std::vector<BesideReferences> beside_references(const Diagnosis& d,
+                                                const std::vector<ResidualStructure>& left,
+                                                const DiagnoseOptions& options) {
+  std::vector<BesideReferences> out(left.size(), BesideReferences::kMore);
+  if (left.empty() || !d.evidence.has_reference()) return out;
   const Evidence swapped = references_first(d.evidence);
   const std::vector<ResidualStructure> there =
       find_residual_structure(swapped, d.search.final, options.residual);
@@ -197,11 +199,13 @@ std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<Residua
         d.thresholds.least_excess_ratio *
                 strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
             left[i].rms;
-    shared[i] = (found || room || oscillates) && !exceeds_references(d, channel) &&
-                static_cast<double>(left.size()) * chance_of_opposite_law(d, left[i], options) >=
-                    d.thresholds.structure_false_alarm;
+    const double tests = static_cast<double>(left.size());
+    if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.structure_false_alarm)
+      out[i] = BesideReferences::kOpposite;
+    else if ((found || room || oscillates) && !exceeds_references(d, channel))
+      out[i] = BesideReferences::kShared;
   }
-  return shared;
+  return out;
 }
 
 }  // namespace sparflow

@@ -36,10 +36,17 @@ bool exceeds_references(const Diagnosis& d, std::size_t channel);
 /// where it is in none, or without references.
 std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
 
-/// For each structure in the suspect logs' final residual, whether it is no change: the references have as large a structure in
-/// the same channel by the same residual models, or leave about as much beyond the sensors' noise there, and the residual of the
-/// suspect logs is not larger (exceeds_references) nor opposite (agreement_with_references).
-std::vector<bool> shared_structure(const Diagnosis& d, const std::vector<ResidualStructure>& left,
-                                   const DiagnoseOptions& options);
+/// Structure in the suspect logs' final residual beside that of the references.
+enum class BesideReferences {
+  kMore,  ///< larger than theirs, or without references
+  kOpposite,  ///< of the same size, but of opposite sign (agreement_with_references): both lack another law
+  kShared  ///< theirs, so that it is no change
+};
+/// For each structure: shared is one of which the references have as large a one in the same channel by the same residual models, or
+/// leave about as much beyond the sensors' noise there, and the residual of the suspect logs is neither larger
+/// (exceeds_references) nor opposite.
+std::vector<BesideReferences> beside_references(const Diagnosis& d,
+                                                const std::vector<ResidualStructure>& left,
+                                                const DiagnoseOptions& options);
 
 }  // namespace sparflow

@@ -48,12 +48,17 @@ double size_of(const DiagnosedEffect& e) {
 
 }  // namespace
 
-double unmodelled_share(const Diagnosis& d, const ResidualStructure& left) {
+double unmodelled_share(const Diagnosis& d, const ResidualStructure& left,
+                        BesideReferences beside) {
   const double before = suspect_rms(d.evidence, left.channel, d.search.null.residual[left.channel]);
   const double after = suspect_rms(d.evidence, left.channel, d.search.final.residual[left.channel]);
   const double catalogue = std::max(0.0, before * before - after * after);
   // an intermittent oscillation is measured where it occurs, so over the whole log it is limited by the residual
-  const double flexible = std::min(left.rms * left.rms, after * after);
+  double flexible = std::min(left.rms * left.rms, after * after);
+  const double there = reference_rms(d, left.channel);
+  const double floor = d.evidence.channels[left.channel].noise_floor;
+  if (beside != BesideReferences::kOpposite && there > floor)
+    flexible = std::max(0.0, flexible - (there * there - floor * floor));
   return flexible / std::max(catalogue + flexible, 1e-300);
 }
 

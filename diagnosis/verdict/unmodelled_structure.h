@@ -4,12 +4,14 @@
 
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/verdict/diagnose.h"
+#include "diagnosis/verdict/residual_levels.h"
 
 namespace sparflow {
 
 /// Variance of a channel that a residual model explains, divided by that which effects and residual model explain
-/// together. 0..1
-double unmodelled_share(const Diagnosis& d, const ResidualStructure& left);
+/// together. 0..1. What the references leave beyond the sensors' noise as well says nothing against an effect, unless it is
+/// opposite.
+double unmodelled_share(const Diagnosis& d, const ResidualStructure& left, BesideReferences beside);
 
 /// Whether unmodelled structure makes an effect doubtful: structure in the channel where the effect acts most, or
 /// larger structure in another channel whose cause shows there too, so that the effect may be a part of it. An error of

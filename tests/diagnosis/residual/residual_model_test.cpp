@@ -160,9 +160,9 @@ TEST(ResidualModel, AnOscillationThatTheReferencesHaveLessRegularlyIsNoChange) {
   const std::vector<ResidualStructure> found = find_residual_structure(d.evidence, left.fit);
   ASSERT_FALSE(found.empty());
   ASSERT_TRUE(found[0].channel == c && found[0].oscillation);
-  EXPECT_TRUE(shared_structure(d, found, options)[0]);
+  EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kShared);
   d.evidence.channels[c].raw[1] = quiet;
-  EXPECT_FALSE(shared_structure(d, found, options)[0]);
+  EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kMore);
 }
 
 TEST(ResidualModel, NoiseBesideAnOscillationIsThatOfAllRuns) {

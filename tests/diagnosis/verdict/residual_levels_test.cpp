@@ -46,19 +46,25 @@ Diagnosis with_laws(double suspect, double reference) {
   return d;
 }
 
-bool is_shared(double suspect, double reference) {
+BesideReferences beside(double suspect, double reference) {
   const Diagnosis d = with_laws(suspect, reference);
   const std::vector<ResidualStructure> left = find_residual_structure(d.evidence, d.search.final);
   EXPECT_EQ(left.size(), 1u);
-  return !left.empty() && shared_structure(d, left, {}).front();
+  return beside_references(d, left, {}).at(0);
 }
 
-TEST(ResidualLevels, TheSameLawInBothLogsIsNoChange) { EXPECT_TRUE(is_shared(1.5, 1.5)); }
+TEST(ResidualLevels, TheSameLawInBothLogsIsNoChange) {
+  EXPECT_EQ(beside(1.5, 1.5), BesideReferences::kShared);
+}
 
 /// A law that is learned from both logs lies between the two, and leaves residuals of equal size and opposite sign.
-TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) { EXPECT_FALSE(is_shared(1.5, -1.5)); }
+TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) {
+  EXPECT_EQ(beside(1.5, -1.5), BesideReferences::kOpposite);
+}
 
-TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) { EXPECT_FALSE(is_shared(1.5, 0.0)); }
+TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) {
+  EXPECT_EQ(beside(1.5, 0.0), BesideReferences::kMore);
+}
 
 }  // namespace
 }  // namespace sparflow
