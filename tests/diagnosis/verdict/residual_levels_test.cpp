@@ -7,6 +7,7 @@
 #include <random>
 
 #include "diagnosis/residual/residual_model.h"
+#include "diagnosis/verdict/unmodelled_structure.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
 
@@ -29,6 +30,7 @@ Diagnosis with_laws(double suspect, double reference) {
   noise.variance = kNoise * kNoise;
   for (EvidenceChannel& c : d.evidence.channels)
     c.y = testing_support::draw(noise, c.blocks, random);
+  for (EvidenceChannel& c : d.evidence.channels) c.noise_floor = kNoise;
   const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
   EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
   const std::vector<SignalColumn> signals = channel_signals(d.evidence, channel);
@@ -43,6 +45,7 @@ Diagnosis with_laws(double suspect, double reference) {
   FitControl control;
   control.keep_residuals = true;
   d.search.final = fit_effects(d.evidence, {}, nullptr, control);
+  d.search.null = d.search.final;
   return d;
 }
 
@@ -64,6 +67,17 @@ TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) {
 
 TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) {
   EXPECT_EQ(beside(1.5, 0.0), BesideReferences::kMore);
+}
+
+/// What the references leave as well is no sign against an effect in the suspect log, unless it has the opposite sign.
+TEST(ResidualLevels, OnlyWhatTheReferencesDoNotLeaveIsUnmodelled) {
+  const auto share = [](double suspect, double reference, BesideReferences beside) {
+    const Diagnosis d = with_laws(suspect, reference);
+    return unmodelled_share(d, find_residual_structure(d.evidence, d.search.final).at(0), beside);
+  };
+  EXPECT_EQ(share(1.5, 0.0, BesideReferences::kMore), 1.0);
+  EXPECT_EQ(share(1.5, 1.6, BesideReferences::kMore), 0.0);
+  EXPECT_EQ(share(1.5, -1.6, BesideReferences::kOpposite), 1.0);
 }
 
 }  // namespace
