@@ -113,8 +113,10 @@ class ProblemReader {
       }
     }
     if (const Machine* machine = choose(problem_.model_path); machine != nullptr) {
-      if (const auto own = root.find("machine"))
+      if (const auto own = root.find("machine")) {
         problem_.machine_path = machine_file_of(own->text("the machine file"));
+        require_same_joints(*own, *machine);
+      }
       problem_.machine = *machine;
       return;
     }
@@ -128,6 +130,18 @@ class ProblemReader {
                       resolved(given), given));
     }
     problem_.machine = load_machine(problem_.machine_path, &problem_.machine_warnings);
+  }
+
+  /// @param machine that of the model, @param own the problem's own machine file, which a model replaces
+  void require_same_joints(const YamlValue& own, const Machine& machine) const {
+    if (problem_.machine_path.empty()) return;
+    const std::vector<std::string> here = joint_names(load_machine(problem_.machine_path)),
+                                   there = joint_names(machine);
+    if (here == there) return;
+    own.fail(
+        fmt::format("the problem is for a machine with the joints {}, the model is of {} with the "
+                    "joints {}; give a model of the problem's machine",
+                    listed(here), machine.name, listed(there)));
   }
 
   /// Path of a machine file beside the problem, or of the bundled machine of that name; empty: there is neither.
@@ -144,9 +158,9 @@ class ProblemReader {
     }
   }
 
-  std::vector<std::string> joint_names() const {
+  static std::vector<std::string> joint_names(const Machine& machine) {
     std::vector<std::string> names;
-    for (const Joint& joint : problem_.machine.joints) names.push_back(joint.name);
+    for (const Joint& joint : machine.joints) names.push_back(joint.name);
     return names;
   }
 
@@ -211,7 +225,7 @@ class ProblemReader {
         {"joints", "pumps", "valve_fraction", "valve_least_fraction", "pressure_std_bar"});
     problem_.limits.pressure_std = map.number_or("pressure_std_bar", kPressure, 0.0);
     if (const auto joints = map.find("joints")) {
-      const YamlMap named = joints->map("limits by joint name", joint_names());
+      const YamlMap named = joints->map("limits by joint name", joint_names(problem_.machine));
       for (std::size_t i = 0; i < problem_.machine.joints.size(); ++i) {
         if (const auto entry = named.find(joint(i).name)) read_joint_limits(*entry, i);
       }

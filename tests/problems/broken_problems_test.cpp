@@ -78,6 +78,8 @@ TEST(GoodProblem, TheUnchangedFileIsRead) {
 const std::vector<Broken> kCases = {
     {"unknown key", "payload_kg: 500", "payload: 500",
      "lift.yaml:2:1: unknown key \"payload\"; did you mean \"payload_kg\"?"},
+    {"a colon is missing", "duration_s: 16", "duration_s 16:",
+     "lift.yaml:5:1: unknown key \"duration_s 16\"; a colon is missing: \"duration_s: 16\""},
     {"payload in the wrong unit", "payload_kg: 500", "payload_t: 0.5",
      "lift.yaml:2:1: unknown key \"payload_t\"; did you mean \"payload_kg\"?"},
     {"negative payload", "payload_kg: 500", "payload_kg: -5",

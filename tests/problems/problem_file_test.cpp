@@ -136,6 +136,20 @@ TEST(ProblemFile, TheModelThatItNamesGivesTheMachine) {
   EXPECT_EQ(p.machine_path, own.machine_path);
 }
 
+TEST(ProblemFile, AModelOfAnotherMachineIsRefusedByTheMachinesName) {
+  const MotionProblem other = load_problem(bundled_file("reaches/swing_crane_far.yaml"));
+  try {
+    load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &other.machine);
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_THAT(
+        error.what(),
+        testing::HasSubstr("machine: the problem is for a machine with the joints boom, jib, "
+                           "extension, the model is of " +
+                           other.machine.name + " with the joints slew, boom"));
+  }
+}
+
 TEST(ProblemFile, EveryBundledProblemLoads) {
   const std::vector<std::string> files = bundled_files("reaches", ".yaml");
   EXPECT_GE(files.size(), 6u);
