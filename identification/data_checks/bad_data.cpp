@@ -206,8 +206,9 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
   }
   // The first finding of a channel ends its checks: a stuck channel is not reported for the jumps into and out of its value.
   using Check = std::optional<Finding> (*)(const CheckContext&, std::size_t);
-  const Check checks[] = {check_missing, check_stuck,     check_stuck_command, check_ripple,
-                          check_noise,   check_saturated, check_wild,          check_jumps};
+  // Likewise blocks are noisy where many samples are wild, so that these come first.
+  const Check checks[] = {check_missing, check_stuck, check_stuck_command, check_wild,
+                          check_ripple,  check_noise, check_saturated,     check_jumps};
   const bool computed = is_computed_motion(machine, log);
   for (std::size_t i = 0; i < context.channels.size(); ++i) {
     for (const Check check : checks) {

@@ -228,6 +228,20 @@ TEST(BadData, WildSamplesOfAKnownFaultAreAllSetAside) {
   }
 }
 
+/// Where they come often, the white part of a block's differences is large for that reason alone.
+TEST(BadData, WildSamplesThatMakeAStretchNoisyAreWild) {
+  Log log = noisy_arm();
+  std::mt19937 random(11);
+  VectorXd& p = channel(log, "pA_arm").values;
+  const auto disturb = [&](Eigen::Index from, Eigen::Index to, unsigned every) {
+    for (Eigen::Index k = from; k < to; ++k)
+      if (random() % every == 0) p[k] += (random() % 2 == 0 ? 25.0 : -25.0) * kBar;
+  };
+  disturb(0, p.size(), 50);
+  disturb(1000, 1200, 7);
+  EXPECT_THAT(names(bad_of(arm_machine(), log)), ElementsAre("pA_arm wild"));
+}
+
 TEST(BadData, APressureStepThatAnotherChannelShowsIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200}) {
