@@ -247,6 +247,42 @@ EffectFit fit_beside(const Diagnosis& d, std::vector<const EffectDesign*> others
   return fit_effects(d.evidence, others, &d.search.final, control);
 }
 
+/// Linear parameters of an effect in both groups of logs. [SI]
+struct InBothGroups {
+  const VectorXd &suspects, &references;
+};
+/// Sizes of an effect in the direction of the suspect logs' parameters, and beyond those of the references.
+struct SizesCompared {
+  const SizeByLogs &from_nothing, &from_references;
+};
+
+/// Difference of both groups in standard errors of sampling and form error: the deviation of a law from the machine is another
+/// one in other motions, in proportion to the part of the effect that both groups have.
+double difference_beside_form_error(const Diagnosis& d, const EffectDesign& suspect,
+                                    const InBothGroups& parameters, const SizesCompared& sizes,
+                                    const RegressionOptions& options) {
+  const SizeByLogs& from_nothing = sizes.from_nothing;
+  const bool single = suspect.linear == 1;
+  // the direction in which they differ most is chosen by the data, so that its square has as many degrees of freedom
+  const double sampling =
+      single ? std::abs(from_nothing.difference())
+             : std::max(std::abs(from_nothing.difference()),
+                        deviate_of_chi_square(std::pow(sizes.from_references.difference(), 2),
+                                              suspect.linear));
+  // of one parameter the sizes that are compared say which part both groups have
+  const VectorXd here = single ? VectorXd(from_nothing.suspects.size * parameters.suspects)
+                               : parameters.suspects,
+                 there = single ? VectorXd(from_nothing.references.size * parameters.suspects)
+                                : parameters.references;
+  const double form =
+      form_share(*suspect.effect.effect, options) * common_over_change(d, suspect, here, there);
+  const double difference = sampling / std::hypot(1.0, sampling * form);
+  if (tracing())
+    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
+               sampling, form, difference);
+  return difference;
+}
+
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
   const bool shared = is_shared(d.evidence, d.search.found[found]);
   if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
@@ -311,23 +347,8 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(
       d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
-  // the direction in which they differ most is chosen by the data, so that its square has as many degrees of freedom
-  const double beside_sampling =
-      suspect.linear > 1
-          ? std::max(std::abs(sizes.difference()),
-                     deviate_of_chi_square(std::pow(change.difference(), 2), suspect.linear))
-          : std::abs(sizes.difference());
-  // In standard errors of sampling and form error: the deviation of a law from the machine is another one in other motions, in
-  // proportion to the part of the effect that both groups have.
-  const bool single = suspect.linear == 1;
-  const double form =
-      form_share(*suspect.effect.effect, options.regression) *
-      common_over_change(d, suspect, single ? VectorXd(here.size * in_suspects) : in_suspects,
-                         single ? VectorXd(there.size * in_suspects) : in_reference);
-  const double difference = beside_sampling / std::hypot(1.0, beside_sampling * form);
-  if (tracing())
-    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
-               beside_sampling, form, difference);
+  const double difference = difference_beside_form_error(d, suspect, {in_suspects, in_reference},
+                                                         {sizes, change}, options.regression);
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,

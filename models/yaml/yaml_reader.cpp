@@ -158,7 +158,8 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
   const std::string first = word.substr(0, space);
   if (space != std::string::npos &&
       std::find(candidates.begin(), candidates.end(), first) != candidates.end())
-    return fmt::format("; a colon is missing: \"{}: {}\"", first, printable(word.substr(space + 1)));
+    return fmt::format("; a colon is missing: \"{}: {}\"", first,
+                       printable(word.substr(space + 1)));
   for (const std::string& candidate : candidates) {  // the right key with a wrong unit or none
     if (without_unit(candidate) == without_unit(word)) {
       return fmt::format("; did you mean \"{}\"?", candidate);
