@@ -384,13 +384,17 @@ std::vector<double> agreement_with_references(const Evidence& evidence, const Ef
   ResidualModelOptions two = options;
   two.folds = 2;
   const Ridge other = cross_validated(side_by_side(all, c.rows()), y, group, two);
-  const double square = y.squaredNorm() / static_cast<double>(c.blocks.size());
   std::vector<double> agreement;
   agreement.reserve(c.blocks.size());
-  for (const NoiseBlock& b : c.blocks) {
-    const Index n = b.last - b.first;
-    agreement.push_back(other.prediction.segment(b.first, n).dot(y.segment(b.first, n)) / square);
+  double squares = 0.0;
+  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
+    if (static_cast<std::size_t>(c.log[b]) >= evidence.suspects) continue;
+    const Index n = c.blocks[b].last - c.blocks[b].first;
+    const auto left = y.segment(c.blocks[b].first, n);
+    agreement.push_back(other.prediction.segment(c.blocks[b].first, n).dot(left));
+    squares += left.squaredNorm();
   }
+  for (double& a : agreement) a *= static_cast<double>(agreement.size()) / squares;
   return agreement;
 }
 

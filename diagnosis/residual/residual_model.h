@@ -34,12 +34,12 @@ std::vector<ResidualStructure> find_residual_structure(const Evidence& evidence,
                                                        const EffectFit& fit,
                                                        const ResidualModelOptions& options = {});
 
-/// What the residual of the reference logs says about that of the suspect logs and the other way round, in the channel of a
-/// structure: a ridge regression on the flexible and the driven model's functions of the signals on which the structure
-/// depends, all where it names none, is fitted to either group of logs and predicts the other one.
+/// What the residual of the reference logs says about that of the suspect logs in the channel of a structure: a ridge regression
+/// on the flexible and the driven model's functions of the signals on which the structure depends, all where it names none, is
+/// fitted to the references and predicts the suspect logs. The ridge is chosen by this prediction and the reverse one.
 /// @param fit with residuals
-/// @return [blocks] sums of residual times prediction over the mean block's sum of squares; positive where both groups lack the
-///   same law, negative where a law that is learned from both lies between two different ones; empty without references
+/// @return [blocks of suspect logs] residual times prediction over the mean block's sum of squares; positive where both groups lack
+///   the same law, negative where a law that is learned from both lies between two different ones; empty without references
 std::vector<double> agreement_with_references(const Evidence& evidence, const EffectFit& fit,
                                               const ResidualStructure& structure,
                                               const ResidualModelOptions& options = {});

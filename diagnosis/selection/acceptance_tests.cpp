@@ -42,7 +42,7 @@ std::string why_not_named(const FoundEffect& found, const SearchOptions& options
                      behind_process && found.absorbed_where_seen > options.largest_absorbed)) {
     return fmt::format(
         "its absorbed share is {:.0f} % (learning pressure models, margins and gains again would "
-        "take that part over); a reference log would decide",
+        "take that part over); a reference log of the same motions would decide",
         100.0 * found.absorbed_where_seen);
   }
   if (mechanisms.act(Mechanism::kSize, found.size < options.smallest_effect)) {

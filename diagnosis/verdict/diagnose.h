@@ -106,6 +106,10 @@ struct VerdictOptions {
   /// larger is no change.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double structure_false_alarm = 0.01;
+  /// Probability, over all structures together, with which unrelated structures are taken for opposite ones (Student's test on
+  /// the blocks of the suspect logs). A common cause has the same sign, so that chance hardly ever makes it an opposite one.
+  /// @threshold [1] 0..1; chosen: one log in twenty that has structures of equal size and another cause
+  double opposite_false_alarm = 0.05;
   /// RMS of a channel's residual over that in the references, above which it is a difference although no effect and no signal
   /// explains it, of a structure in it over that of one in the references or over what they leave there beyond the sensors' noise,
   /// below which it may be shared, and of what an effect leaves over what the references leave, above which it may be a minor one.
