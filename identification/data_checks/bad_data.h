@@ -227,10 +227,10 @@ struct BadDataOptions {
   /// Least number of wild samples.
   /// @threshold [samples] 1..1000; chosen: the same for short logs
   double wild_fewest = 10.0;
-  /// Samples either side of a wild one whose median change is the motion's trend there.
-  /// @threshold [samples] 3..20; chosen: a wild sample disturbs two of eight changes, two in a row three
-  Eigen::Index wild_trend_samples = 4;
-  /// Largest difference of a wild sample's neighbours, less the trend, over its distance to their mean.
+  /// Samples either side with which a sample is compared once a channel is known to have wild ones.
+  /// @threshold [samples] 2..10; chosen: three wild samples of seven do not move the median
+  Eigen::Index wild_reach_samples = 3;
+  /// Largest difference of a wild sample's neighbours over its distance to their mean.
   /// @threshold [1] 0..2; chosen: the neighbours agree with each other clearly better than with it
   double wild_neighbours = 0.5;
   /// Least distance of a wild sample, in steps of the channel's resolution.

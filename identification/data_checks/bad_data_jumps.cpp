@@ -133,11 +133,6 @@ double resolution(const VectorXd& x) {
   return std::isfinite(least) ? least : 0.0;
 }
 
-/// Nearest samples before and after a sample, between which it is judged.
-struct Neighbours {
-  Index before = 1, after = 1;  ///< [samples]
-};
-
 /// @return whether so many samples are wild that they are a fault
 bool is_wild(const CheckContext& context, const Mask& wild) {
   const auto fewest = std::max(context.options.wild_fewest,
@@ -145,12 +140,13 @@ bool is_wild(const CheckContext& context, const Mask& wild) {
   return static_cast<double>(wild.count()) >= fewest;
 }
 
-/// @return median change from one sample to the next around sample k, which single wild samples hardly affect
-double trend_around(const VectorXd& x, const SampleRange& run, Index k, Index reach) {
-  std::vector<double> change;
-  for (Index i = std::max(run.begin, k - reach); i < std::min(run.end - 1, k + reach); ++i)
-    change.push_back(x[i + 1] - x[i]);
-  return median(Eigen::Map<VectorXd>(change.data(), std::ssize(change)));
+/// Marks samples far off the median of those around them (F. R. Hampel (1974), J. Am. Stat. Assoc. 69, 383-393): up to three wild
+/// ones of seven hardly move it, and in the middle of a step or a ramp it is the sample itself.
+/// @param limit [samples] least distance
+void mark_off_median(const VectorXd& x, const SampleRange& run, const VectorXd& limit, Index reach,
+                     Mask& out) {
+  for (Index k = run.begin + reach; k + reach < run.end; ++k)
+    out[k] = std::abs(x[k] - median(x.segment(k - reach, 2 * reach + 1))) > limit[k];
 }
 
 /// Marks samples far off both their neighbours, which agree with each other; inertia and compressibility exclude such
@@ -158,33 +154,25 @@ double trend_around(const VectorXd& x, const SampleRange& run, Index k, Index re
 Mask wild_samples(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
   const VectorXd& x = c.channel->values;
-  const VectorXd noise = local_noise(context.noise[channel], x.size());
-  const double least = context.options.wild_resolution * resolution(x);
-  Mask out = Mask::Constant(x.size(), false);
   const OtherChannels others(context, channel);
-  const auto mark = [&](Neighbours n, bool known) {
-    for (const SampleRange& run : context.log.runs) {
-      for (Index k = run.begin + n.before; k + n.after < run.end; ++k) {
-        const double limit = std::max(least, context.options.jump_noise * noise[k]);
-        if (!(std::max(std::abs(x[k] - x[k - n.before]), std::abs(x[k] - x[k + n.after])) > limit))
-          continue;
-        const double trend =
-            known ? trend_around(x, run, k, context.options.wild_trend_samples) : 0.0;
-        const double before = x[k - n.before] + trend * static_cast<double>(n.before),
-                     after = x[k + n.after] - trend * static_cast<double>(n.after);
-        const double off = std::abs(x[k] - 0.5 * (before + after));
-        if (!(off > limit)) continue;
-        if (std::abs(after - before) > context.options.wild_neighbours * off) continue;
-        if (out[k - n.before] || out[k + n.after]) continue;
-        if (!known && c.family != "position" && others.explain(k - 1, off)) continue;
-        out[k] = true;
-      }
+  Mask out = Mask::Constant(x.size(), false);
+  const VectorXd limit =
+      (context.options.jump_noise * local_noise(context.noise[channel], x.size()))
+          .cwiseMax(context.options.wild_resolution * resolution(x));
+  for (const SampleRange& run : context.log.runs) {
+    for (Index k = run.begin + 1; k + 1 < run.end; ++k) {
+      const double off = std::abs(x[k] - 0.5 * (x[k - 1] + x[k + 1]));
+      if (!(off > limit[k])) continue;
+      if (std::abs(x[k + 1] - x[k - 1]) > context.options.wild_neighbours * off) continue;
+      if (c.family != "position" && others.explain(k - 1, off)) continue;
+      out[k] = true;
     }
-  };
-  mark({}, false);
+  }
   if (!is_wild(context, out)) return out;
-  // In a channel that is known to have them, they also come in motion, beside motions of a lever, and two in a row.
-  for (const Neighbours n : {Neighbours{1, 1}, Neighbours{1, 2}, Neighbours{2, 1}}) mark(n, true);
+  // In a channel that is known to have them, they also come in motion, beside motions of a lever, and several in a row.
+  out.setConstant(false);
+  for (const SampleRange& run : context.log.runs)
+    mark_off_median(x, run, limit, context.options.wild_reach_samples, out);
   return out;
 }
 
