@@ -342,7 +342,10 @@ LineChart bad_channel_chart(const BadChannel& bad) {
     const double more = std::max(0.0, 0.5 * (thinnest - (to - from)));
     chart.spans.push_back({from - more, to + more, chart.spans.empty() ? word : ""});
   }
-  chart.note = fmt::format("Shaded: the channel is {} there.", word);
+  chart.note = fmt::format(
+      "Shaded: the channel is {} there; close samples are shaded together, and {:.3g} % of the "
+      "log are set aside.",
+      word, 100.0 * bad.share);
   return chart;
 }
 
