@@ -120,7 +120,7 @@ void ChannelBuilder::block(std::size_t log, Index first, Index last, const Vecto
     y_.push_back(values[k]);
     rows_.push_back(base.row(k));
     channel.sample.push_back(k);
-    if (log < evidence_.since_change.size()) since_.push_back(evidence_.since_change[log][k]);
+    if (log < since_change.size()) since_.push_back(since_change[log][k]);
   }
   b.last = static_cast<Index>(y_.size());
   close(log, b);

@@ -13,9 +13,12 @@ inline constexpr double kBaselineFlow = 1e-3, kBaselineForce = 1e5;
 class ChannelBuilder {
  public:
   /// @param evidence with series, stride and options; must outlive this
-  explicit ChannelBuilder(const Evidence& evidence) : evidence_(evidence) {}
+  explicit ChannelBuilder(const Evidence& evidence)
+      : since_change(evidence.since_change), evidence_(evidence) {}
 
   EvidenceChannel channel;  ///< the caller sets kind, place, unit and noise floor
+  /// [logs][samples, s] time for which the machine has been settling; no logs: not used
+  std::vector<Eigen::VectorXd> since_change;
 
   /// @param values residual in one log [samples, SI]  @param base baseline columns [samples x columns]
   void add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
@@ -30,7 +33,7 @@ class ChannelBuilder {
 
   const Evidence& evidence_;
   std::vector<double> y_;
-  std::vector<double> since_;          // [s] by row, since a command changed
+  std::vector<double> since_;          // [s] by row, of since_change
   std::vector<Eigen::VectorXd> rows_;  // baseline
 };
 

@@ -114,7 +114,8 @@ struct EvidenceOptions {
   NoiseOptions noise;
   CavitationOptions cavitation;
   /// Whether the noise may settle after commands (NoiseModel::settling): in a comparison with references, which lack the same of
-  /// starts and stops. In a log alone a start may be where the effect shows, as friction does.
+  /// starts and stops. In a log alone a start may be where an effect of flow or pump shows;
+  /// forces settle there after fast changes of speed (unsteady_span).
   bool settles = false;
   /// Uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
   /// (sharpest_window) that it distorts nothing.
@@ -126,6 +127,9 @@ struct EvidenceOptions {
   /// Change of a command, as share of full command, from which machine and oil have to settle again.
   /// @threshold [1] 0..1; chosen: levers rest within a twentieth
   double least_change = 0.05;
+  /// Time in which the speed of a steady cylinder changes by less than itself.
+  /// @threshold [s] 0.05..2; chosen: a start or a stop by the lever takes as long
+  double unsteady_span = 0.5;
   /// Rate of a pump's pressure above which machine and oil are not settled.
   /// @threshold [Pa/s] 1e5..1e8; chosen: a load that is driven through its range in two seconds changes its pressure as fast; a pump
   /// that follows a demand is ten times faster

@@ -192,6 +192,15 @@ SettlingTimes::SettlingTimes(const Eigen::VectorXd& since, const NoiseOptions& o
       laws_.push_back(law_of(ratio, settling));
 }
 
+SettlingTimes SettlingTimes::of_rows(const std::vector<Eigen::Index>& rows) const {
+  SettlingTimes out = *this;
+  if (!known()) return out;
+  out.class_of_.clear();
+  for (const Eigen::Index r : rows) out.class_of_.push_back(class_of_[static_cast<std::size_t>(r)]);
+  for (Eigen::VectorXd& d : out.decay_) d = d(rows).eval();
+  return out;
+}
+
 double SettlingTimes::time(int k) {
   if (k == 0) return 0.5 * kFirstClass;
   if (k == kClasses - 1) return std::numeric_limits<double>::infinity();

@@ -26,6 +26,8 @@ class SettlingTimes {
   /// @param since [rows, s] infinite where no command changed before; no rows: not known
   explicit SettlingTimes(const Eigen::VectorXd& since, const NoiseOptions& options = {});
 
+  /// Of these rows, in this order.
+  SettlingTimes of_rows(const std::vector<Eigen::Index>& rows) const;
   bool known() const { return !class_of_.empty(); }
   /// Class of a row's time, from 0 to kClasses - 1.
   std::size_t class_of(Eigen::Index row) const { return class_of_[static_cast<std::size_t>(row)]; }
@@ -57,8 +59,9 @@ struct NoiseRows {
       : blocks(all), since_change(since.known() ? &since : nullptr) {}
 };
 
-/// The autoregression and the offsets are those of y / s(t), s(t) = 1 + (transient - 1) exp(-t / settling), with t the time since a command changed: pumps, spools and columns of oil settle, and what a model lacks of that must not count as noise of
-/// steady motion.
+/// The autoregression and the offsets are those of y / s(t), s(t) = 1 + (transient - 1) exp(-t / settling), with t the time since the
+/// machine began to settle: pumps, spools, columns of oil and a bouncing boom settle, and what a model lacks of that must not count as
+/// noise of steady motion.
 struct NoiseModel {
   double phi1 = 0.0, phi2 = 0.0;  ///< y_t = phi1 y_{t-1} + phi2 y_{t-2} + e_t; stationary
   double variance = 1.0;          ///< [unit^2 of the series] variance of e_t

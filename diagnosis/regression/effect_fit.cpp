@@ -115,20 +115,14 @@ MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
 
 namespace {
 
-/// White noise with the variance of `values`.
-NoiseModel white_noise_of(const VectorXd& values) {
-  NoiseModel noise;
-  noise.variance = std::max(values.squaredNorm() / static_cast<double>(values.size()), 1e-300);
-  return noise;
-}
-
-/// The same with a deviation that settles after commands.
-NoiseModel settling_noise_of(const EvidenceChannel& channel, const NoiseOptions& options) {
-  NoiseModel noise = NoiseModel::settling_of(channel.y, channel.noise_rows(), options);
+/// White noise with the variance of `values`, whose deviation settles after commands.
+NoiseModel settling_noise_of(const EvidenceChannel& channel, const VectorXd& values,
+                             const NoiseOptions& options) {
+  NoiseModel noise = NoiseModel::settling_of(values, channel.noise_rows(), options);
   const VectorXd scale = noise.scale_of(channel.noise_rows());
-  noise.variance =
-      white_noise_of(scale.size() > 0 ? VectorXd(channel.y.cwiseQuotient(scale)) : channel.y)
-          .variance;
+  const double squares =
+      scale.size() > 0 ? values.cwiseQuotient(scale).squaredNorm() : values.squaredNorm();
+  noise.variance = std::max(squares / static_cast<double>(values.size()), 1e-300);
   return noise;
 }
 
@@ -247,7 +241,7 @@ VectorXd ProfileLikelihood::residual_in(std::size_t c) const {
 
 void ProfileLikelihood::update_noise(std::size_t c, const VectorXd& residual, bool keeps_former) {
   if (control_.ordinary) {
-    fit_.noise[c] = white_noise_of(residual);
+    fit_.noise[c] = settling_noise_of(evidence_.channels[c], residual, evidence_.options.noise);
     return;
   }
   // the more likely of the former model and the moment estimate, so that no pass makes the fit worse
@@ -314,9 +308,8 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
   } else {
     for (std::size_t c = 0; c < channels(); ++c) {
       if (!active(c)) continue;
-      fit_.noise[c] = control_.ordinary
-                          ? white_noise_of(evidence_.channels[c].y)
-                          : settling_noise_of(evidence_.channels[c], evidence_.options.noise);
+      const EvidenceChannel& channel = evidence_.channels[c];
+      fit_.noise[c] = settling_noise_of(channel, channel.y, evidence_.options.noise);
     }
   }
   for (int pass = 0; pass < control_.noise_passes + 1; ++pass) {
@@ -352,7 +345,7 @@ WhitenedChannels WhitenedChannels::cold(const Evidence& evidence) {
   std::vector<NoiseModel> noise;
   noise.reserve(evidence.channels.size());
   for (const EvidenceChannel& c : evidence.channels)
-    noise.push_back(settling_noise_of(c, evidence.options.noise));
+    noise.push_back(settling_noise_of(c, c.y, evidence.options.noise));
   return by(evidence, std::move(noise));
 }
 

@@ -85,7 +85,7 @@ struct FitControl {
   int noise_passes = 3;  ///< estimates of the noise models, each from the residuals of the last fit
   bool keep_residuals = false;
   bool covariance = false;
-  /// Ordinary least squares, in which every row has the same weight. Where model errors exceed the noise, a fit with
+  /// Ordinary least squares, in which every row of steady motion has the same weight. Where model errors exceed the noise, a fit with
   /// autoregressive noise follows differences of neighbouring rows, that is the shape of the model error.
   bool ordinary = false;
   /// By channel; a channel that is not active keeps log-likelihood and noise of `start`. Empty = all are active.

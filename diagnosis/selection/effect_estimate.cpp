@@ -70,6 +70,7 @@ EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& lea
     }
   }
   out.y = all.y(kept).eval();
+  out.since_change = all.since_change.of_rows(kept);
   out.baseline = all.baseline(kept, Eigen::all).eval();
   return out;
 }

@@ -106,10 +106,13 @@ void trace_found(const SearchState& search, const std::vector<FoundEffect>& foun
              f.absorbed, f.held_out, f.held_out_error);
   for (std::size_t c = 0; c < search.evidence.channels.size(); ++c) {
     const EvidenceChannel& ch = search.evidence.channels[c];
-    fmt::print(stderr, "     {:40s} n {} sd {:.3g} floor {:.3g} {} phi {:.2f} {:.2f} off {:.3g}\n",
+    fmt::print(stderr,
+               "     {:40s} n {} sd {:.3g} floor {:.3g} {} phi {:.2f} {:.2f} off {:.3g}, "
+               "settles {:.1f} in {:.2f} s\n",
                ch.text, ch.rows(), fit.noise[c].deviation() / ch.unit.si,
                ch.noise_floor / ch.unit.si, ch.unit.name, fit.noise[c].phi1, fit.noise[c].phi2,
-               std::sqrt(fit.noise[c].offset_variance) / ch.unit.si);
+               std::sqrt(fit.noise[c].offset_variance) / ch.unit.si, fit.noise[c].transient,
+               fit.noise[c].settling);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/selection/leader_updates.h"
+#include "diagnosis/verdict/residual_levels.h"
 #include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
@@ -97,11 +98,20 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   for (const ChannelGain& g : e.channels) {
     const EvidenceChannel& c = d.evidence.channels[g.channel];
     if (g.rmse_before < d.thresholds.least_reduction * g.rmse_after) continue;
+    const VectorXd before = settled(d, g.channel, without.residual[g.channel]);
+    const VectorXd after = settled(d, g.channel, d.search.final.residual[g.channel]);
+    const bool settles = d.search.final.noise[g.channel].transient != 1.0;
     e.evidence.push_back(fmt::format(
-        "{}: error {} -> {} {}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
+        "{}: error {} -> {} {}{}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
         plain_number(g.rmse_after / c.unit.si, 3), c.unit.name,
         std::isfinite(g.noise_floor)
             ? fmt::format(" (sensor noise {})", plain_number(g.noise_floor / c.unit.si, 2))
+            : "",
+        settles
+            ? fmt::format("; without starts and stops {} -> {} {}",
+                          plain_number(suspect_rms(d.evidence, g.channel, before) / c.unit.si, 3),
+                          plain_number(suspect_rms(d.evidence, g.channel, after) / c.unit.si, 3),
+                          c.unit.name)
             : ""));
   }
   e.evidence.push_back(

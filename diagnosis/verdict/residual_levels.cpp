@@ -26,9 +26,7 @@ struct BlockLevel {
 
 BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
   const EvidenceChannel& c = d.evidence.channels[channel];
-  VectorXd residual = d.search.final.residual[channel];
-  const VectorXd scale = d.search.final.noise[channel].scale_of(c.noise_rows());
-  if (scale.size() > 0) residual.array() /= scale.array();
+  const VectorXd residual = settled(d, channel, d.search.final.residual[channel]);
   std::vector<double> levels;
   for (std::size_t b = 0; b < c.blocks.size(); ++b) {
     if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
@@ -134,16 +132,26 @@ Evidence references_first(const Evidence& evidence) {
   return out;
 }
 
-double reference_rms(const Diagnosis& d, std::size_t channel) {
+VectorXd settled(const Diagnosis& d, std::size_t channel, const VectorXd& residual) {
+  const VectorXd scale =
+      d.search.final.noise[channel].scale_of(d.evidence.channels[channel].noise_rows());
+  return scale.size() > 0 ? VectorXd(residual.cwiseQuotient(scale)) : residual;
+}
+
+double reference_rms(const Diagnosis& d, std::size_t channel, const VectorXd& residual) {
   const EvidenceChannel& c = d.evidence.channels[channel];
   double squares = 0.0, n = 0.0;
   for (std::size_t b = 0; b < c.blocks.size(); ++b) {
     if (static_cast<std::size_t>(c.log[b]) < d.evidence.suspects) continue;
     const Index length = c.blocks[b].last - c.blocks[b].first;
-    squares += d.search.final.residual[channel].segment(c.blocks[b].first, length).squaredNorm();
+    squares += residual.segment(c.blocks[b].first, length).squaredNorm();
     n += static_cast<double>(length);
   }
   return n > 0.0 ? std::sqrt(squares / n) : kNaN;
+}
+
+double reference_rms(const Diagnosis& d, std::size_t channel) {
+  return reference_rms(d, channel, d.search.final.residual[channel]);
 }
 
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {

@@ -22,7 +22,12 @@ std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t cha
 /// The same rows with references in the place of suspect logs, and these in theirs.
 Evidence references_first(const Evidence& evidence);
 
-/// RMS of a channel's final residual in the reference logs [SI]; NaN where they do not have the channel.
+/// A channel's residual relative to the deviation with which its noise settles, which is one in steady motion (NoiseModel::scale_of).
+/// What a model lacks of starts and stops, an effect of steady motion need not explain. [rows, SI]
+Eigen::VectorXd settled(const Diagnosis& d, std::size_t channel, const Eigen::VectorXd& residual);
+
+/// RMS of a channel's residual, absent: its final one, in the reference logs [SI]; NaN where they do not have the channel.
+double reference_rms(const Diagnosis& d, std::size_t channel, const Eigen::VectorXd& residual);
 double reference_rms(const Diagnosis& d, std::size_t channel);
 
 /// Probability, by Bonferroni's bound over the channels, that a channel's final residual is so much larger in the suspect logs

@@ -40,6 +40,12 @@ double common_size(const Machine& machine, const EvidenceChannel& channel, doubl
   return channel.kind == EvidenceKind::kForce ? value / area : value * area;
 }
 
+/// In logs alone, starts and stops count by the deviation that settles; beside references, what the model lacks of them is taken off
+/// by what the references leave.
+VectorXd weighed(const Diagnosis& d, std::size_t channel, const VectorXd& residual) {
+  return d.evidence.has_reference() ? residual : settled(d, channel, residual);
+}
+
 /// RMS of what an effect explains in the channel that it improves most. [SI]
 double size_of(const DiagnosedEffect& e) {
   const ChannelGain& g = e.channels.front();
@@ -50,12 +56,14 @@ double size_of(const DiagnosedEffect& e) {
 
 double unmodelled_share(const Diagnosis& d, const ResidualStructure& left,
                         BesideReferences beside) {
-  const double before = suspect_rms(d.evidence, left.channel, d.search.null.residual[left.channel]);
-  const double after = suspect_rms(d.evidence, left.channel, d.search.final.residual[left.channel]);
+  const VectorXd final = weighed(d, left.channel, d.search.final.residual[left.channel]);
+  const double before = suspect_rms(d.evidence, left.channel,
+                                    weighed(d, left.channel, d.search.null.residual[left.channel]));
+  const double after = suspect_rms(d.evidence, left.channel, final);
   const double catalogue = std::max(0.0, before * before - after * after);
   // an intermittent oscillation is measured where it occurs, so over the whole log it is limited by the residual
   double flexible = std::min(left.rms * left.rms, after * after);
-  const double there = reference_rms(d, left.channel);
+  const double there = reference_rms(d, left.channel, final);
   const double floor = d.evidence.channels[left.channel].noise_floor;
   if (beside != BesideReferences::kOpposite && there > floor)
     flexible = std::max(0.0, flexible - (there * there - floor * floor));
@@ -80,15 +88,18 @@ bool is_doubtful(const Evidence& evidence, const DiagnosedEffect& e,
 double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
   const ChannelGain& g = e.channels.front();
   // what stays unexplained in the references as well is no sign against an effect
-  const double shared = reference_rms(d, g.channel);
+  const VectorXd final = weighed(d, g.channel, d.search.final.residual[g.channel]);
+  const double shared = reference_rms(d, g.channel, final);
   const bool by_references = shared > g.noise_floor;
   const double floor = by_references ? shared : g.noise_floor;
   // the references' residual contains the model's errors already
   const double far = by_references ? d.thresholds.least_excess_ratio : d.thresholds.far_above_noise;
-  if (!(g.rmse_after > far * floor)) return 1.0;
-  const double before = suspect_rms(d.evidence, g.channel, d.search.null.residual[g.channel]);
+  const double after = suspect_rms(d.evidence, g.channel, final);
+  if (!(after > far * floor)) return 1.0;
+  const double before =
+      suspect_rms(d.evidence, g.channel, weighed(d, g.channel, d.search.null.residual[g.channel]));
   const double noise = floor * floor;
-  return (before * before - g.rmse_after * g.rmse_after) / (before * before - noise);
+  return (before * before - after * after) / (before * before - noise);
 }
 
 bool is_minor_effect(const Diagnosis& d, const DiagnosedEffect& e) {

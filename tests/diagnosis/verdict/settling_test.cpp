@@ -1,0 +1,101 @@
+/// Friction behind the bounce of starts and stops, which no law of the catalogue describes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "diagnosis/verdict/diagnose.h"
+#include "identification/learning/fit.h"
+#include "tests/diagnosis/hidden_case.h"
+
+namespace sparflow {
+namespace {
+
+using ::testing::HasSubstr;
+using testing_support::drawn_machine;
+using testing_support::hidden_case;
+using testing_support::HiddenCase;
+
+CraneModel settling_model(const Machine& machine, const Log& log) {
+  FitOptions options;
+  options.hold_out_every = 0;
+  return fit(machine, {log}, {}, options).model;
+}
+
+/// Adds to the piston's pressure 100 bar that ring out after every start and stop of the boom, at 2 to 4 Hz.
+void let_boom_bounce(simulator::GeneratedLog& log) {
+  const auto column = [&](const std::string& name) -> std::vector<double>& {
+    const auto at = std::find(log.names.begin(), log.names.end(), name);
+    return log.columns.at(static_cast<std::size_t>(at - log.names.begin()));
+  };
+  const std::vector<double>&lever = column("u_boom"), &time = column("t_s");
+  std::vector<double>& pressure = column("pA_boom_bar");
+  double since = -10.0, frequency = 2.0;
+  for (std::size_t k = 1; k < log.rows(); ++k) {
+    if ((lever[k] == 0.0) != (lever[k - 1] == 0.0)) {
+      since = time[k];
+      frequency = frequency > 3.5 ? 2.0 : frequency + 0.3;
+    }
+    const double t = time[k] - since;
+    pressure[k] += 100.0 * std::exp(-t / 0.25) * std::cos(2.0 * std::numbers::pi * frequency * t);
+  }
+}
+
+struct Bounce {
+  Diagnosis with, without;  ///< with noise that settles, and with even noise
+  double truth = 0.0;       ///< [N] Coulomb friction
+};
+
+const Bounce& bounce() {
+  static const Bounce b = [] {
+    const Machine machine = drawn_machine("loader_crane");
+    HiddenCase logs = hidden_case(machine, {{"coulomb_friction", "boom", 0.5, 0}}, {7, 100.0});
+    let_boom_bounce(logs.logs.train);
+    const Log log = log_from_text("train.csv", simulator::csv_text(logs.logs.train), machine);
+    const CraneModel model = settling_model(machine, log);
+    DiagnoseOptions even;
+    even.evidence.mechanisms.switch_off(Mechanism::kSettling);
+    return Bounce{diagnose(model, {log}), diagnose(model, {log}, {}, even),
+                  logs.truth("coulomb_friction", "Fc")};
+  }();
+  return b;
+}
+
+TEST(DiagnoseSettling, BounceOfStartsAndStopsHidesNoFriction) {
+  const Diagnosis& d = bounce().with;
+  ASSERT_EQ(d.verdict, Verdict::kMissing) << d.table();
+  EXPECT_EQ(d.effects.front().key(), "coulomb_friction:boom") << d.table();
+  EXPECT_NEAR(d.effects.front().applied.values[0], bounce().truth, 0.1 * bounce().truth);
+  EXPECT_THAT(d.table(), HasSubstr("; without starts and stops "));
+}
+
+TEST(DiagnoseSettling, WithEvenNoiseItIsHidden) {
+  const Diagnosis& d = bounce().without;
+  EXPECT_NE(d.verdict, Verdict::kMissing) << d.table();
+}
+
+/// Two strokes: 6 s extending and 2 s retracting, after a start from the ground and before a stop on it.
+TEST(DiagnoseRealCrane, DryFrictionOfALaboratoryCrane) {
+  const std::string beside = SPARFLOW_SOURCE_DIR "/../shared/";
+  if (!std::filesystem::exists(beside + "data/lab_crane"))
+    GTEST_SKIP() << "no log of the laboratory crane beside the source tree";
+  const Machine machine = load_machine(beside + "machines/lab_crane.yaml");
+  const Log log = load_log(beside + "data/lab_crane/friction.csv", machine);
+  const Diagnosis d = diagnose(settling_model(machine, log), {log});
+  ASSERT_EQ(d.verdict, Verdict::kMissing) << d.table();
+  const DiagnosedEffect* friction = nullptr;
+  for (const DiagnosedEffect& e : d.effects) {
+    if (!d.named(e)) continue;
+    EXPECT_NE(e.id, "unmodelled_mass") << d.table();
+    if (e.key() == "coulomb_friction:boom") friction = &e;
+  }
+  ASSERT_NE(friction, nullptr) << d.table();
+  // 992 N is the mean over both strokes where they are steady; the friction rises by a third towards the end of the stroke
+  EXPECT_GT(friction->applied.values[0], 0.9 * 992.0);
+  EXPECT_LT(friction->applied.lower95[0], 1.1 * 992.0);
+}
+
+}  // namespace
+}  // namespace sparflow
