@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -32,7 +33,71 @@ constexpr std::size_t kLongestLine = 1 << 20;
 /// @threshold [bytes] 10..1000; chosen: enough to recognise it
 constexpr std::size_t kQuoted = 60;
 
-/// A child process with one socket for its input and output.
+/// End of what a process writes to its standard error that is kept for the sentence on its failure.
+/// @threshold [bytes] 100..1e6; chosen: an error message and its last line
+constexpr std::size_t kLastErrors = 4096;
+
+/// What is printable of a text; of a longer one its begin.
+std::string quoted(const std::string& text, std::size_t longest) {
+  std::string out;
+  for (const char c : text.substr(0, longest)) out += c >= ' ' && c <= '~' ? c : '?';
+  return out;
+}
+
+/// The standard error of a child process: what arrives goes on to that of this process, and its end is kept.
+class ErrorPipe {
+ public:
+  ErrorPipe() {
+    if (::pipe2(ends_, O_CLOEXEC | O_NONBLOCK) != 0)
+      throw ControllerFailure("its process could not be started: no pipe");
+    ::fcntl(ends_[1], F_SETFL, 0);  // a child does not expect that writing fails
+  }
+  ~ErrorPipe() {
+    close(0);
+    close(1);
+  }
+  ErrorPipe(const ErrorPipe&) = delete;
+  ErrorPipe& operator=(const ErrorPipe&) = delete;
+
+  void use_in_child() const { ::dup2(ends_[1], 2); }
+  void started() { close(1); }
+  int readable() const { return ends_[0]; }  ///< -1 once it has ended
+  void drain() {
+    char bytes[4096];
+    while (ends_[0] >= 0) {
+      const ssize_t n = ::read(ends_[0], bytes, sizeof bytes);
+      if (n > 0) {
+        const auto count = static_cast<std::size_t>(n);
+        last_.append(bytes, count);
+        last_.erase(0, last_.size() - std::min(last_.size(), kLastErrors));
+        if (::write(2, bytes, count) < 0) continue;  // nobody listens
+      } else if (n == 0 || (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) {
+        close(0);
+      } else if (errno != EINTR) {
+        return;
+      }
+    }
+  }
+  /// "; its last message: ..." with the last line that is not empty; "" without one.
+  std::string words() {
+    drain();
+    const std::size_t end = last_.find_last_not_of(" \t\r\n");
+    if (end == std::string::npos) return "";
+    const std::size_t before = last_.find_last_of('\n', end);
+    const std::size_t first = before == std::string::npos ? 0 : before + 1;
+    return "; its last message: " + quoted(last_.substr(first, end + 1 - first), 3 * kQuoted);
+  }
+
+ private:
+  void close(int end) {
+    if (ends_[end] >= 0) ::close(ends_[end]);
+    ends_[end] = -1;
+  }
+  int ends_[2] = {-1, -1};
+  std::string last_;
+};
+
+/// A child process with one socket for its input and output, and a pipe for its messages.
 class Child {
  public:
   explicit Child(const std::string& command) {
@@ -47,12 +112,14 @@ class Child {
       if (::getppid() != parent) ::_exit(127);
       ::dup2(ends[1], 0);
       ::dup2(ends[1], 1);
+      errors_.use_in_child();
       ::signal(SIGPIPE, SIG_DFL);
       ::signal(SIGINT, SIG_IGN);
       ::execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
       ::_exit(127);
     }
     ::close(ends[1]);
+    errors_.started();
     socket_ = ends[0];
     if (pid_ < 0) {
       ::close(socket_);
@@ -110,16 +177,26 @@ class Child {
   }
 
  private:
-  void wait(short what, Clock::time_point end, double budget, double t) const {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
-    pollfd p{socket_, what, 0};
-    if (left.count() <= 0 || ::poll(&p, 1, static_cast<int>(left.count()) + 1) == 0)
-      throw ControllerFailure(
-          fmt::format("its process gave no answer within {:g} s at t = {:.2f} s", budget, t));
+  void wait(short what, Clock::time_point end, double budget, double t) {
+    while (true) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+      pollfd p[] = {{socket_, what, 0}, {errors_.readable(), POLLIN, 0}};
+      if (left.count() <= 0 || ::poll(p, 2, static_cast<int>(left.count()) + 1) == 0)
+        throw ControllerFailure(
+            fmt::format("its process gave no answer within {:g} s at t = {:.2f} s{}", budget, t,
+                        errors_.words()));
+      if (p[1].revents != 0) errors_.drain();
+      if (p[0].revents != 0) return;
+    }
+  }
+
+  std::string gone(double t) {
+    const std::string how = end_of_process(t);
+    return how + errors_.words();
   }
 
   /// How it ended; a moment is given to a process that is just ending.
-  std::string gone(double t) const {
+  std::string end_of_process(double t) const {
     int status = 0;
     for (int k = 0; k < 50; ++k) {  // no threshold: half a second in all
       siginfo_t info{};
@@ -135,6 +212,7 @@ class Child {
     return fmt::format("its process closed its output at t = {:.2f} s", t);
   }
 
+  ErrorPipe errors_;
   pid_t pid_ = -1;
   int socket_ = -1;
   std::string buffer_;
@@ -212,9 +290,8 @@ class Asked : public Controller {
 
  private:
   [[noreturn]] void fail(const std::string& what, const std::string& found, double t) const {
-    std::string quoted;
-    for (const char c : found.substr(0, kQuoted)) quoted += c >= ' ' && c <= '~' ? c : '?';
-    throw ControllerFailure(fmt::format("{} {} at t = {:.2f} s: {}", who_, what, t, quoted));
+    throw ControllerFailure(
+        fmt::format("{} {} at t = {:.2f} s: {}", who_, what, t, quoted(found, kQuoted)));
   }
 
   json ask(const json& message, double t) const {

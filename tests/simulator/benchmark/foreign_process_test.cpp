@@ -70,6 +70,18 @@ TEST_F(ForeignProcess, OneThatEndsIsNamedWithItsEnd) {
   EXPECT_THAT(run("no_such_program_anywhere 2>/dev/null").reason, HasSubstr("code 127"));
 }
 
+TEST_F(ForeignProcess, ItsLastMessageTellsWhyItEnded) {
+  EXPECT_THAT(run("echo one >&2; echo 'no model of the pump' >&2; echo >&2; exit 3").reason,
+              HasSubstr("ended with code 3 at t = 0.00 s; its last message: no model of the pump"));
+  EXPECT_THAT(run(kReady + "read l; python3 -c 'import no_such_module'; exit 1", 5.0).reason,
+              HasSubstr("its last message: ModuleNotFoundError: No module named"));
+  EXPECT_THAT(run(kReady + "read l; echo 'still waiting' >&2; sleep 100", 0.2).reason,
+              HasSubstr("no answer within 0.2 s at t = 0.00 s; its last message: still waiting"));
+  // more than a pipe holds before it answers
+  EXPECT_THAT(run("head -c 100000 /dev/zero >&2; read l; echo hello", 5.0).reason,
+              HasSubstr("no JSON object at t = 0.00 s: hello"));
+}
+
 TEST_F(ForeignProcess, OneThatPrintsRubbishIsQuoted) {
   EXPECT_THAT(run("read l; echo hello").reason, HasSubstr("no JSON object at t = 0.00 s: hello"));
   EXPECT_THAT(run(kReady + "read l; echo '{\"v\": 1}'").reason, HasSubstr("gave no commands"));
