@@ -12,6 +12,7 @@
 #include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/low_pass.h"
 #include "identification/signals/series.h"
+#include "identification/signals/steady.h"
 #include "models/effects/hydraulics.h"
 #include "models/math/nan.h"
 #include "models/math/robust.h"
@@ -125,20 +126,6 @@ void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries
       }
     }
   }
-}
-
-/// Time since the cylinder's speed last changed fast: within `span` by as much as itself. Infinite before. [samples, s]
-VectorXd since_unsteady(const MachineSeries& series, const CylinderSeries& c, double span) {
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  VectorXd since = VectorXd::Constant(series.samples(), kNever);
-  for (const auto& [first, last] : series.runs) {
-    double changed = -kNever;
-    for (Index k = first; k < last; ++k) {
-      if (std::abs(c.acceleration[k]) * span > std::abs(c.speed[k])) changed = series.time[k];
-      since[k] = series.time[k] - changed;
-    }
-  }
-  return since;
 }
 
 std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
@@ -291,15 +278,10 @@ void EvidenceCollector::add_force_channel(int cylinder) {
   ChannelBuilder b = builder(EvidenceKind::kForce, cylinder, {"N", 1.0});
   const std::string name = b.channel.at;
   MeanNoise noise(e.options);
-  if (e.options.mechanisms.enabled(Mechanism::kSettling)) {
-    b.since_change.resize(signals_.size());
-    for (std::size_t log = 0; log < signals_.size(); ++log) {
-      const auto at = static_cast<std::size_t>(cylinder);
-      const VectorXd motion =
-          since_unsteady(e.series[log], e.series[log].cylinders[at], e.options.unsteady_span);
-      VectorXd& since = b.since_change[log];
-      since = since.size() > 0 ? VectorXd(since.cwiseMin(motion)) : motion;
-    }
+  if (!e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling)) {
+    for (const MachineSignals* s : signals_)
+      b.since_change.push_back(since_unsteady(*s, s->cylinders[static_cast<std::size_t>(cylinder)],
+                                              e.options.unsteady_span));
   }
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];

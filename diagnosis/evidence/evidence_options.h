@@ -127,7 +127,7 @@ struct EvidenceOptions {
   /// Change of a command, as share of full command, from which machine and oil have to settle again.
   /// @threshold [1] 0..1; chosen: levers rest within a twentieth
   double least_change = 0.05;
-  /// Time in which the speed of a steady cylinder changes by less than itself.
+  /// Time in which the speed of a steady rod changes by less than its median while it moves.
   /// @threshold [s] 0.05..2; chosen: a start or a stop by the lever takes as long
   double unsteady_span = 0.5;
   /// Rate of a pump's pressure above which machine and oil are not settled.

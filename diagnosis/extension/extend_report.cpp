@@ -187,7 +187,9 @@ Json step_json(const ExtendStep& step) {
   out["stage"] = step.stage;
   out["parameters"] = parameters_json(step.effect);
   out["judged_on"] = step.judged_on;
-  out["error_ratio"] = {{"overall", step.change.overall}, {"own", step.change.own}};
+  out["error_ratio"] = {{"overall", step.change.overall},
+                        {"own", step.change.own},
+                        {"own_steady", step.change.own_steady}};
   Json harmed = Json::array();
   for (const HarmedError& h : step.change.harmed) harmed.push_back(h.sentence);
   out["harmed"] = std::move(harmed);
@@ -229,6 +231,9 @@ std::string ExtendResult::table() const {
   for (const ExtendStep& s : steps) {
     text += fmt::format("{}. {}\n   {}\n", ++number_of, s.title, parameters_text(s.effect));
     text += fmt::format("   RMS error on the {}:\n{}", s.judged_on, step_table(s));
+    if (s.change.own_steady < 0.9 * s.change.own)  // no threshold: from there on it says more
+      text += fmt::format("   without starts and stops the force error where it acts is {}\n",
+                          signed_percent(s.change.own_steady));
   }
   if (steps.size() > 1) {  // a joint estimate changes the values of former steps
     text += "in the model now:\n";

@@ -143,7 +143,8 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
     step.judged_on = context_.measured_on();
   }
   step.determined = is_determined(step.effect);
-  const bool falls = step.change.own * options.change.refit_moves < 1.0;
+  const double change = std::min(step.change.own, step.change.own_steady);
+  const bool falls = change * options.change.refit_moves < 1.0;
   // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
   const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
   tested.stays = step.determined && (falls || unseen);

@@ -115,7 +115,7 @@ MatrixXd whitened_rows(const EvidenceChannel& channel, const NoiseModel& noise,
 
 namespace {
 
-/// White noise with the variance of `values`, whose deviation settles after commands.
+/// White noise with the variance of `values`, whose deviation settles.
 NoiseModel settling_noise_of(const EvidenceChannel& channel, const VectorXd& values,
                              const NoiseOptions& options) {
   NoiseModel noise = NoiseModel::settling_of(values, channel.noise_rows(), options);
@@ -123,6 +123,16 @@ NoiseModel settling_noise_of(const EvidenceChannel& channel, const VectorXd& val
   const double squares =
       scale.size() > 0 ? values.cwiseQuotient(scale).squaredNorm() : values.squaredNorm();
   noise.variance = std::max(squares / static_cast<double>(values.size()), 1e-300);
+  return noise;
+}
+
+/// The same for ordinary least squares: beside references it is even, as starts and stops show in both groups of logs alike.
+NoiseModel ordinary_noise_of(const Evidence& evidence, std::size_t channel,
+                             const VectorXd& values) {
+  if (!evidence.options.settles)
+    return settling_noise_of(evidence.channels[channel], values, evidence.options.noise);
+  NoiseModel noise;
+  noise.variance = std::max(values.squaredNorm() / static_cast<double>(values.size()), 1e-300);
   return noise;
 }
 
@@ -241,7 +251,7 @@ VectorXd ProfileLikelihood::residual_in(std::size_t c) const {
 
 void ProfileLikelihood::update_noise(std::size_t c, const VectorXd& residual, bool keeps_former) {
   if (control_.ordinary) {
-    fit_.noise[c] = settling_noise_of(evidence_.channels[c], residual, evidence_.options.noise);
+    fit_.noise[c] = ordinary_noise_of(evidence_, c, residual);
     return;
   }
   // the more likely of the former model and the moment estimate, so that no pass makes the fit worse
@@ -308,8 +318,10 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
   } else {
     for (std::size_t c = 0; c < channels(); ++c) {
       if (!active(c)) continue;
-      const EvidenceChannel& channel = evidence_.channels[c];
-      fit_.noise[c] = settling_noise_of(channel, channel.y, evidence_.options.noise);
+      const VectorXd& y = evidence_.channels[c].y;
+      fit_.noise[c] = control_.ordinary
+                          ? ordinary_noise_of(evidence_, c, y)
+                          : settling_noise_of(evidence_.channels[c], y, evidence_.options.noise);
     }
   }
   for (int pass = 0; pass < control_.noise_passes + 1; ++pass) {

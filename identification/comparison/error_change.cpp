@@ -8,6 +8,7 @@
 
 #include "identification/comparison/compare_parts.h"
 #include "identification/comparison/report_numbers.h"
+#include "identification/signals/steady.h"
 
 namespace sparflow {
 namespace {
@@ -104,6 +105,35 @@ BlockSums squared_errors(const CompareResult& before, const CompareResult& after
                     sums.weight[block[k]] += 1.0;
                   }
                 });
+  return sums;
+}
+
+/// Squared errors of a force in steady motion, and their number.
+struct SteadySquares {
+  double before = 0.0, after = 0.0, n = 0.0;
+};
+
+SteadySquares steady_errors(const Machine& machine, const CompareResult& before,
+                            const CompareResult& after, const StageScore& of,
+                            const ErrorChangeOptions& options) {
+  SteadySquares sums;
+  const int cylinder = machine.cylinder_index(of.at);
+  if (of.stage != "force" || cylinder < 0) return sums;
+  for_each_pair(
+      before, after, {},
+      [&](const ComparedSeries& b, const ComparedSeries& a, std::size_t l, const Eigen::VectorXi&) {
+        if (b.stage != of.stage || b.at != of.at) return;
+        const MachineSignals& s = after.logs[l].signals;
+        const VectorXd since = since_unsteady(s, s.cylinders[static_cast<std::size_t>(cylinder)],
+                                              options.unsteady_span);
+        for (Index k = 0; k < b.measured.size(); ++k) {
+          if (since[k] < options.settled_s || !counts(b, of.regime, k) || !counts(a, of.regime, k))
+            continue;
+          sums.before += std::pow(b.predicted[k] - b.measured[k], 2);
+          sums.after += std::pow(a.predicted[k] - a.measured[k], 2);
+          sums.n += 1.0;
+        }
+      });
   return sums;
 }
 
@@ -246,6 +276,7 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
   ErrorChange out;
   OverallNoise noise(blocks.motions.size());
   double all = 0.0, all_n = 0.0;
+  SteadySquares steady;
   struct Pool {
     double before = 0.0, after = 0.0, n = 0.0;
     double won = 0.0, lost = 0.0;  // decrease and increase of squared error, summed over quantities
@@ -270,6 +301,10 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
       pool.after += is;
       pool.n += n;
       (is < was ? pool.won : pool.lost) += std::abs(is - was);
+      const SteadySquares moving = steady_errors(machine, before, after, b, options);
+      steady.before += moving.before;
+      steady.after += moving.after;
+      steady.n += moving.n;
     }
     const BlockSums sums = blocks.enough([&](const std::vector<CompareBlock>& over) {
       return squared_errors(before, after, over, b);
@@ -296,6 +331,9 @@ ErrorChange error_change(const Machine& machine, const CompareResult& before,
     own_n += pool.n;
   }
   out.own = own_n > 0.0 ? std::exp(log_own / own_n) : out.overall;
+  out.own_steady = steady.n >= options.fewest_steady && steady.before > 0.0 && own.size() == 1
+                       ? std::sqrt(steady.after / steady.before)
+                       : out.own;
   return out;
 }
 

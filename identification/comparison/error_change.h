@@ -38,6 +38,15 @@ struct ErrorChangeOptions {
   /// @threshold [1] 0..1; chosen: a small increase of one is accepted for a large decrease of
   /// others
   double largest_loss = 0.25;
+  /// Time in which the speed of a steady rod changes by less than its median while it moves.
+  /// @threshold [s] 0.05..2; chosen: a start or a stop by the lever takes as long
+  double unsteady_span = 0.5;
+  /// Time after a faster change from which a motion is steady.
+  /// @threshold [s] 0.1..10; chosen: a bounce of 1 to 3 Hz has decayed by then
+  double settled_s = 1.0;
+  /// Least number of steady samples from which their error is told.
+  /// @threshold [samples] 10..1000; chosen: one second at 20 Hz
+  double fewest_steady = 20.0;
   /// A change acts on a quantity when it moves its prediction by this share of the error.
   /// @threshold [1] 0..0.5; chosen: a smaller change is invisible in the error
   double acts_share = 0.02;
@@ -63,6 +72,9 @@ struct ErrorChange {
   std::vector<HarmedError> harmed;
   /// Standard error of log(overall), from the variation between blocks of motion.
   double overall_deviation = 0.0;
+  /// The same for forces where it acts, in samples in which the rod has moved steadily for a while: starts, stops and the bounce after
+  /// them, which many laws do not concern, may hold nearly all of the squared error. Equals `own` where there are no such samples.
+  double own_steady = 1.0;
 
   /// @return true when the error where the change acts grew, another error is harmed, or the overall error grew by more
   ///   than refitting alone may change it

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "diagnosis/extension/extend.h"
 #include "diagnosis/verdict/diagnose.h"
 #include "identification/learning/fit.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -95,6 +96,13 @@ TEST(DiagnoseRealCrane, DryFrictionOfALaboratoryCrane) {
   // 992 N is the mean over both strokes where they are steady; the friction rises by a third towards the end of the stroke
   EXPECT_GT(friction->applied.values[0], 0.9 * 992.0);
   EXPECT_LT(friction->applied.lower95[0], 1.1 * 992.0);
+
+  // what was named can be added: the error falls where the motion is steady, though starts and stops hold most of it
+  const ExtendResult better = improve(settling_model(machine, log), {{log}, {}, {}});
+  ASSERT_FALSE(better.steps.empty()) << better.table();
+  EXPECT_EQ(better.steps[0].added, "coulomb_friction:boom");
+  EXPECT_LT(better.steps[0].change.own_steady, 0.5);
+  EXPECT_THAT(better.table(), HasSubstr("without starts and stops the force error"));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "identification/signals/steady.h"
 #include "tests/identification/arm_log.h"
 
 namespace sparflow {
@@ -70,6 +71,41 @@ TEST(ErrorChange, IsTheGeometricMeanWhereItActsAndOverall) {
   EXPECT_TRUE((ErrorChange{0.9, 1.02, {}}.worse())) << "not better where it acts";
   EXPECT_TRUE((ErrorChange{1.05, 0.9, {}}.worse())) << "larger overall error";
   EXPECT_FALSE((ErrorChange{1.01, 0.9, {}}.worse())) << "refitting alone changes as much";
+}
+
+/// Every start and stop leaves 50 kN, before and after; in steady motion 2 kN become 0.5 kN.
+TEST(ErrorChange, ErrorsOfSteadyMotionAreToldApart) {
+  ErrorChangeOptions options;
+  options.settled_s = 0.3;  // strokes of 2.4 s
+  const auto with = [&options](CompareResult r, double steady) {
+    const MachineSignals& s = r.logs[0].signals;
+    const Eigen::VectorXd since = since_unsteady(s, s.cylinders[0], options.unsteady_span);
+    double squares = 0.0, n = 0.0, rows = 0.0;
+    for (ComparedSeries& c : r.logs[0].series) {
+      if (c.stage != "force") continue;
+      for (Eigen::Index k = 0; k < c.measured.size(); ++k) {
+        if (!std::isfinite(c.measured[k])) continue;
+        const bool settled = since[k] >= options.settled_s;
+        const double error = settled ? steady : 5e4;
+        c.predicted[k] = c.measured[k] + (k % 2 == 0 ? error : -error);
+        squares += error * error;
+        n += 1.0;
+        rows += settled ? 1.0 : 0.0;
+      }
+    }
+    EXPECT_GT(rows, 50.0);
+    EXPECT_GT(n - rows, 50.0);
+    for (StageScore& score : r.scores)
+      if (score.stage == "force") score.rmse = std::sqrt(squares / n);
+    return r;
+  };
+  const CompareResult before = with(compared(), 2e3), after = with(compared(), 500.0);
+  const ErrorChange c = error_change(arm_machine(), before, after, {{"force"}, "arm"}, options);
+  EXPECT_GT(c.own, 0.98);
+  EXPECT_NEAR(c.own_steady, 0.25, 1e-9);
+  // a change of a pump has no force of its own
+  const ErrorChange pump = error_change(arm_machine(), before, after, {{"pump"}, "main"}, options);
+  EXPECT_EQ(pump.own_steady, pump.own);
 }
 
 TEST(ErrorChange, GrowthOfAnotherErrorIsHarm) {
