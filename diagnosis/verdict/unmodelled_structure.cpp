@@ -15,6 +15,9 @@
 namespace sparflow {
 namespace {
 
+using Eigen::Index;
+using Eigen::VectorXd;
+
 /// Whether a cause in channel `from` can also show in `to`: both are computed from the chamber pressures of one
 /// cylinder, `to` is the pump whose demand they determine, or both are speeds of cylinders on one pump.
 bool shows_too(const Machine& machine, const EvidenceChannel& from, const EvidenceChannel& to) {
