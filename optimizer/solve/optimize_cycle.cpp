@@ -8,10 +8,8 @@
 #include <limits>
 
 #include "models/math/error.h"
-#include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/grid_seeds.h"
 #include "optimizer/solve/optimize_outcome.h"
-#include "optimizer/solve/start_bytes.h"
 
 namespace sparflow {
 namespace {
@@ -312,37 +310,17 @@ class Cycle {
 
   void solve(const std::vector<PhasedStart>& starts, const OptimizeOptions& options, double from,
              double to, bool last) {
-    const WorkProgress progress = part_of(options_.progress, from, to);
-    const int count = static_cast<int>(starts.size());
-    const std::vector<ChildResult> children = run_in_children(
-        count, options_.processes,
-        [&](int i) {
-          const PhasedStart& s = starts[static_cast<std::size_t>(i)];
-          return pack_start(
-              optimize_with_phases(model_, problem_, s, window(s.guess.duration()), options));
-        },
-        [&](int index, int finished, const ChildResult&) {
-          if (progress)
-            progress(static_cast<double>(finished) / count,
-                     starts[static_cast<std::size_t>(index)].name);
-        });
-    for (int i = 0; i < count; ++i) {
-      const ChildResult& child = children[static_cast<std::size_t>(i)];
-      StartResult r;
-      if (child.ok) {
-        r = unpack_start(child.bytes);
-        r.solved = r.converged;
-        r.converged = r.converged && last;
-      } else {
-        r.seed = starts[static_cast<std::size_t>(i)].name;
-        r.message = child.error;
-      }
-      for (std::size_t k = 0; k < result_.starts.size() && r.same_as < 0; ++k) {
-        if (same_motion(problem_, r.motion, result_.starts[k].motion))
-          r.same_as = static_cast<int>(k);
-      }
-      result_.starts.push_back(std::move(r));
-    }
+    const auto at = [&](int i) -> const PhasedStart& {
+      return starts[static_cast<std::size_t>(i)];
+    };
+    StartJobs jobs;
+    jobs.count = static_cast<int>(starts.size());
+    jobs.start = [&](int i) {
+      return optimize_with_phases(model_, problem_, at(i), window(at(i).guess.duration()), options);
+    };
+    jobs.name = [&](int i) { return at(i).name; };
+    jobs.last = last;
+    solve_starts(jobs, problem_, options_.processes, part_of(options_.progress, from, to), result_);
   }
 
   void together() {

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optimizer/solve/child_processes.h"
+#include "optimizer/solve/start_bytes.h"
+
 namespace sparflow {
 
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b) {
@@ -23,6 +26,33 @@ bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajec
       return false;
   }
   return true;
+}
+
+void solve_starts(const StartJobs& jobs, const MotionProblem& problem, int processes,
+                  const WorkProgress& progress, OptimizeResult& result) {
+  const std::vector<ChildResult> children = run_in_children(
+      jobs.count, processes, [&](int i) { return pack_start(jobs.start(i)); },
+      [&](int index, int finished, const ChildResult&) {
+        if (progress) progress(static_cast<double>(finished) / jobs.count, jobs.name(index));
+      });
+  for (int i = 0; i < jobs.count; ++i) {
+    const ChildResult& child = children[static_cast<std::size_t>(i)];
+    StartResult r;
+    if (child.ok) {
+      r = unpack_start(child.bytes);
+      // A solve of the search is not one to the tolerance of results.
+      r.solved = r.converged;
+      r.converged = r.converged && jobs.last;
+    } else {
+      r.seed = jobs.name(i);
+      r.message = child.error;
+      r.duration = jobs.duration;
+    }
+    for (std::size_t k = 0; k < result.starts.size() && r.same_as < 0; ++k) {
+      if (same_motion(problem, r.motion, result.starts[k].motion)) r.same_as = static_cast<int>(k);
+    }
+    result.starts.push_back(std::move(r));
+  }
 }
 
 double shortest_seed(const std::vector<SeedMotion>& seeds) {

@@ -1,5 +1,6 @@
 #pragma once
 /// Evaluation of a search's starts: ranking, energies of the seeds, and why nothing was found.
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,19 @@ inline constexpr double kSameCost = 1e-4;
 
 /// Whether two motions are equal: all joints within a thousandth of their range at all of a's knots.
 bool same_motion(const MotionProblem& problem, const Trajectory& a, const Trajectory& b);
+
+/// Starts of one step of a search.
+struct StartJobs {
+  int count = 0;
+  std::function<StartResult(int)> start;  ///< solves one of them, in a child process
+  std::function<std::string(int)> name;
+  double duration = 0.0;  ///< [s] told for a start whose child failed
+  bool last = false;      ///< solved to the tolerance of results; otherwise they are only compared
+};
+
+/// Solves all of them and adds them to the result, each with the first start that has the same motion.
+void solve_starts(const StartJobs& jobs, const MotionProblem& problem, int processes,
+                  const WorkProgress& progress, OptimizeResult& result);
 
 /// Shortest duration in which a seed path keeps all limits; 0 = none does. [s]
 double shortest_seed(const std::vector<SeedMotion>& seeds);

@@ -7,10 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/optimize.h"
 #include "optimizer/solve/optimize_outcome.h"
-#include "optimizer/solve/start_bytes.h"
 #include "optimizer/solve/start_candidates.h"
 
 namespace sparflow {
@@ -142,31 +140,8 @@ class Search {
   /// @param of_rest share of the work left that these starts are expected to be [1]
   void solve(double of_rest, int count, const std::function<StartResult(int)>& start,
              const std::function<std::string(int)>& name) {
-    const WorkProgress progress = next_part(of_rest);
-    const auto done = [&](int index, int finished, const ChildResult&) {
-      if (progress) progress(static_cast<double>(finished) / count, name(index));
-    };
-    const std::vector<ChildResult> children = run_in_children(
-        count, options_.processes, [&](int i) { return pack_start(start(i)); }, done);
-    for (int i = 0; i < count; ++i) {
-      const ChildResult& child = children[static_cast<std::size_t>(i)];
-      StartResult r;
-      if (child.ok) {
-        r = unpack_start(child.bytes);
-        // A solve of the search is not one to the tolerance of results.
-        r.solved = r.converged;
-        r.converged = r.converged && !searching_;
-      } else {
-        r.seed = name(i);
-        r.message = child.error;
-        r.duration = time_.guess;
-      }
-      for (std::size_t k = 0; k < result_.starts.size() && r.same_as < 0; ++k) {
-        if (same_motion(problem_, r.motion, result_.starts[k].motion))
-          r.same_as = static_cast<int>(k);
-      }
-      result_.starts.push_back(std::move(r));
-    }
+    solve_starts({count, start, name, time_.guess, !searching_}, problem_, options_.processes,
+                 next_part(of_rest), result_);
   }
 
   /// Called when no start kept all limits. The shortest motion found shows whether the duration is the reason; if it is
