@@ -74,6 +74,7 @@ void set_bound(const CraneModel& model, const MotionProblem& problem,
   if (!std::isfinite(time) || result.energy.total < 1.005 * bound.lower_bound_J) return;
   options.progress = begin(3);
   options.any_duration = bound.lower_bound_J;
+  options.known_energy = result.energy.total;
   const TimedBound timed = energy_bound_at(model, problem, time, options);
   if (timed.valid && timed.price_W > 0.0 && timed.value > result.lower_bound) {
     result.lower_bound = timed.value;

@@ -72,14 +72,26 @@ class TimedSearch {
     const TimedGrid small = grid(few);
     x = climbed(small, x, options_.evaluations / 2, std::log(4.0));
     x = best_shares(small, x, options_.evaluations / 3, 0.5);
-    // The best shares on the small grid need not be the best on the fine one, so they are chosen on one between.
-    const std::vector<Found> candidates = posture_shares(small, x);
     const auto cells = [&](const Found& found, long nodes) {
       base_ = found.base;
       set(found.x);
       const EnergyPotential again(*loaded_, problem_, *weights_, rough.lattice, rough.forces);
       return balanced_cells(again.losses(), rough.lattice, static_cast<double>(nodes));
     };
+    // Where time costs little, constant shares may do, and others need not be better on the fine grid.
+    std::optional<TimedBound> simple;
+    const double constant = objective(small, x), share = shares_.price * duration_ / constant;
+    if (price_searched() && share < kShortTime) {
+      simple = bound_on(grid(cells({base_, x}, options_.nodes)));
+      const double reached = std::max(simple->value, options_.any_duration.value_or(0.0));
+      if (share < kNoTime || (options_.known_energy &&
+                              *options_.known_energy <= (1.0 + options_.near_enough) * reached)) {
+        tell(1.0, "fine grid");
+        return *simple;
+      }
+    }
+    // The best shares on the small grid need not be the best on the fine one, so they are chosen on one between.
+    const std::vector<Found> candidates = posture_shares(small, x, constant);
     const Found* best = &candidates.front();
     if (candidates.size() > 1) {
       double most = -std::numeric_limits<double>::infinity();
@@ -91,10 +103,17 @@ class TimedSearch {
     }
     TimedBound bound = bound_on(grid(cells(*best, options_.nodes)));
     tell(1.0, "fine grid");
-    return bound;
+    return simple && simple->value > bound.value ? *simple : bound;
   }
 
  private:
+  /// Cost of the time, as share of the constant shares' bound, below which they may do.
+  /// @threshold [1] 0..0.1; chosen: below a per cent the search is as often for nothing as it raises the bound by half of that
+  static constexpr double kShortTime = 0.01;
+  /// Cost of the time below which nothing else is tried.
+  /// @threshold [1] 0..0.01; chosen: the bound of unlimited time is as good
+  static constexpr double kNoTime = 1e-3;
+
   /// Share of the time that the search takes, of which only the progress that is told depends.
   /// @threshold [1] 0.1..0.95; chosen: it evaluates a hundred bounds on a small grid; the fine grid has one or two
   static constexpr double kSearchShare = 0.8;
@@ -124,13 +143,10 @@ class TimedSearch {
   };
 
   /// Shares that change with the posture, found by a search from those of dynamic programming and, where those do not
-  /// begin better, from constant ones too. @param x constant shares and the price
-  std::vector<Found> posture_shares(const TimedGrid& g, const VectorXd& x) {
-    const double constant = objective(g, x), price = shares_.price;
-    /// Share of the constant price's bound below which time costs too little for a search.
-    /// @threshold [1] 0..0.1; chosen: the bound of unlimited time is as good
-    constexpr double kShortTime = 0.01;
-    if (price_searched() && price * duration_ < kShortTime * constant) return {{base_, x}};
+  /// begin better, from constant ones too. @param x constant shares and the price  @param constant objective of these
+  std::vector<Found> posture_shares(const TimedGrid& g, const VectorXd& x, double constant) {
+    set(x);
+    const double price = shares_.price;
     TimeGuide guide(*loaded_, problem_, *weights_, uniform(guide_cells()));
     double guide_price = price;
     if (price_searched()) {  // the price at which the guide's own bound is the largest

@@ -39,6 +39,12 @@ struct TimedBoundOptions {
   int most_joints = 4;
   /// Bound of motions of any duration where it is known [J]; energy_bound_at() computes it otherwise.
   std::optional<double> any_duration;
+  /// Energy of a motion of this duration, where one is known [J]. Where time costs little, the search for shares that change
+  /// with the posture is left out if the bound without it is near enough.
+  std::optional<double> known_energy;
+  /// What the known energy may be above the bound for that, relative to the bound.
+  /// @threshold [1] 0..0.1; chosen: a quarter of the two per cent within which a motion is to be shown good
+  double near_enough = 5e-3;
   WorkProgress progress = {};  ///< called after each evaluation
 };
 
