@@ -88,7 +88,7 @@ ReachFigures solve_reach(const ReachTask& task, const ReachSettings& settings) {
     if (settings.timed && bound.valid && best != nullptr) {
       TimedBoundOptions at_its_time;
       at_its_time.any_duration = bound.lower_bound_J;
-      at_its_time.known_energy = best->energy;
+      at_its_time.known_energy = best->energy.total;
       const TimedBound timed =
           energy_bound_at(*task.model, task.problem, best->duration, at_its_time);
       if (timed.valid) f.bound = std::max(f.bound, timed.value);
