@@ -11,6 +11,7 @@
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/nan.h"
+#include "models/math/student.h"
 
 namespace sparflow {
 namespace {
@@ -46,12 +47,6 @@ BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references)
   return level;
 }
 
-/// One-sided probability of Student's t as that of a normal deviate (Abramowitz and Stegun 1964, 26.7.8).
-double chance_of_t(double t, double freedom) {
-  const double z = t * (1.0 - 0.25 / freedom) / std::sqrt(1.0 + 0.5 * t * t / freedom);
-  return 0.5 * std::erfc(z * std::numbers::sqrt2 / 2.0);
-}
-
 /// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike (Welch and
 /// Satterthwaite).
 double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
@@ -59,7 +54,7 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
   const double freedom = variance * variance /
                          (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
                           std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
-  return chance_of_t((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
+  return student_tail((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
 }
 
 /// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
@@ -71,7 +66,7 @@ double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
   if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
   const double n = reference.blocks;
   const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  return suspect.blocks * chance_of_t((suspect.largest - reference.mean) / deviation, n - 1.0);
+  return suspect.blocks * student_tail((suspect.largest - reference.mean) / deviation, n - 1.0);
 }
 
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and
@@ -86,7 +81,7 @@ double chance_of_opposite_law(const Diagnosis& d, const ResidualStructure& left,
   const auto n = static_cast<double>(agreement.size());
   const Eigen::Map<const VectorXd> v(agreement.data(), static_cast<Index>(agreement.size()));
   const double error = std::sqrt((v.array() - v.mean()).square().sum() / (n - 1.0) / n);
-  const double chance = error > 0.0 ? chance_of_t(-v.mean() / error, n - 1.0) : 1.0;
+  const double chance = error > 0.0 ? student_tail(-v.mean() / error, n - 1.0) : 1.0;
   if (tracing())
     fmt::print(stderr,
                "  {}: suspect logs against references {:.3g} +- {:.2g} by block, opposite by "
