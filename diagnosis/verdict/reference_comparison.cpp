@@ -23,10 +23,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Relative change of a nonlinear parameter between the two columns whose difference is its slope.
-/// @threshold [1] 1e-4..0.1; numerical: laws with thresholds change in steps of the log's samples
-constexpr double kShapeStep = 0.02;
-
 /// Columns of a found effect in other logs than the suspect ones.
 EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
   EffectDesign design = found;
@@ -243,41 +239,6 @@ double common_over_change(const Diagnosis& d, const EffectDesign& suspect, const
   return action(d, suspect, common) / action(d, suspect, here - there);
 }
 
-/// What a found effect changes by when its nonlinear parameters change, as a design in one group of logs. The suspect logs have
-/// chosen the parameters at which its size is largest there; a size beside these columns does not depend on the choice.
-EffectDesign shape_slopes(const Diagnosis& d, const EffectDesign& found, const VectorXd& parameters,
-                          ActingLogs where) {
-  EffectDesign slopes = found;
-  slopes.number = 0;
-  slopes.linear = 0;
-  slopes.lower.clear();
-  slopes.upper.clear();
-  for (std::size_t c = 0; c < found.columns.size(); ++c)
-    slopes.columns[c].resize(found.touches(c) ? d.evidence.channels[c].rows() : 0, 0);
-  const std::vector<bool> choices = shape_choices(*found.effect.effect);
-  for (std::size_t s = 0; s < found.shape.size(); ++s) {
-    if (choices[s]) continue;
-    const double h = kShapeStep * std::max(std::abs(found.shape[s]), 1e-9);
-    EffectDesign up = found, down = found;
-    up.shape[s] += h;
-    down.shape[s] -= h;
-    up = design_in(d.evidence, up, where);
-    down = design_in(d.evidence, down, where);
-    ++slopes.linear;
-    slopes.lower.push_back(-std::numeric_limits<double>::max());
-    slopes.upper.push_back(std::numeric_limits<double>::max());
-    for (std::size_t c = 0; c < found.columns.size(); ++c) {
-      if (!found.touches(c)) continue;
-      VectorXd slope = VectorXd::Zero(d.evidence.channels[c].rows());
-      if (up.touches(c)) slope += up.columns[c] * parameters;
-      if (down.touches(c)) slope -= down.columns[c] * parameters;
-      slopes.columns[c].conservativeResize(Eigen::NoChange, slopes.linear);
-      slopes.columns[c].col(slopes.linear - 1) = slope / (2.0 * h);
-    }
-  }
-  return slopes;
-}
-
 /// Fit of designs beside others, with covariance.
 EffectFit fit_beside(const Diagnosis& d, std::vector<const EffectDesign*> others,
                      std::initializer_list<const EffectDesign*> more) {
@@ -331,7 +292,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (shared)
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
   const OtherEffects beside(d, found);
-  std::vector<const EffectDesign*> others = beside.designs;
+  const std::vector<const EffectDesign*>& others = beside.designs;
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     return fit_beside(d, others, more);
   };
@@ -339,13 +300,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
   const Index first = apart.theta.size() - (both ? 2 : 1) * suspect.linear;
   const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
-  // the intervals of a law that another value replaces were compared above
-  const bool replaced = is_replaced_when_changed(*suspect.effect.effect);
   const VectorXd nothing = VectorXd::Zero(suspect.linear);
-  const EffectDesign slopes_here = shape_slopes(d, suspect, in_suspects, ActingLogs::kSuspects),
-                     slopes_there = shape_slopes(d, suspect, in_suspects, ActingLogs::kReferences);
-  for (const EffectDesign* slopes : {&slopes_here, &slopes_there})
-    if (!shared && !replaced && slopes->acts()) others.push_back(slopes);
   const SizeByLogs sizes =
       size_by_logs(d.evidence, {suspect, reference, nothing, in_suspects, others}, apart);
   // two-sided, Bonferroni's bound over the effects found; the sizes' scatter is estimated from as many stretches of motion as there

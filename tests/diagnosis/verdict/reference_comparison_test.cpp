@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <filesystem>
 #include <random>
 
@@ -185,40 +184,6 @@ TEST(ReferenceComparison, ADifferenceIsAChangeByItsSizeAloneOnlyIfItIsCertain) {
 TEST(ReferenceComparison, AnEffectThatExplainsLittleOfTheExcessIsNoChange) {
   EXPECT_EQ(compared_sizes({1000.0, 1080.0, 2000.0, 2.0}), InReferences::kAlike);
   EXPECT_EQ(compared_sizes({1000.0, 1080.0, 2000.0, 2.0, 0.0}), InReferences::kOther);
-}
-
-/// Each log prefers a nonlinear parameter of its own. By the law of the suspect log (30 mm/s) the reference (20 mm/s) has a smaller size,
-/// though the friction at rest is the same; twice the friction is a change.
-TEST(ReferenceComparison, AnotherShapeOfTheSameLawIsNoOtherSize) {
-  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
-  const EffectAt friction{find_effect("stribeck_friction"), 1};
-  for (const double reference : {2000.0, 1000.0}) {  // [N]
-    Diagnosis d;
-    d.evidence =
-        collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
-                         {make_signals(loader(), logs.reference)});
-    const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
-    EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
-    FoundEffect found;
-    found.design = make_design(d.evidence, friction, {0.03});
-    std::mt19937_64 random(2);
-    NoiseModel noise;
-    noise.variance = 50.0 * 50.0;  // [N^2]
-    const std::array<double, 1> shape = {0.02};
-    channel.y =
-        testing_support::draw(noise, channel.blocks, random) +
-        2000.0 * found.design.columns[static_cast<std::size_t>(at)].col(0) +
-        reference *
-            d.evidence.columns(friction, shape, channel, {}, ActingLogs::kReferences).col(0);
-    d.search.found.push_back(std::move(found));
-    FitControl control;
-    control.keep_residuals = true;
-    d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
-    if (reference == 2000.0)
-      EXPECT_EQ(in_references(d, 0, {}), InReferences::kAlike);
-    else
-      EXPECT_EQ(in_references(d, 0, {}), InReferences::kOther);
-  }
 }
 
 /// Form error of the law: 5 % of what both logs have. 8 % more is 1.6 of it, 40 % more is 8; sampling alone resolves 1 %.
