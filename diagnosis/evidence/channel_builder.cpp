@@ -132,6 +132,13 @@ void ChannelBuilder::close(std::size_t log, const NoiseBlock& b) {
   channel.log.push_back(static_cast<int>(log));
 }
 
+Eigen::MatrixXd ChannelBuilder::baseline() const {
+  Eigen::MatrixXd all(std::ssize(rows_), rows_.empty() ? 0 : rows_.front().size());
+  for (Index i = 0; i < all.rows(); ++i)
+    all.row(i) = rows_[static_cast<std::size_t>(i)].transpose();
+  return all;
+}
+
 bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   const auto n = static_cast<Index>(y_.size());
   const EvidenceOptions& options = evidence_.options;
@@ -139,10 +146,7 @@ bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
       channel.blocks.size() < static_cast<std::size_t>(options.fewest_blocks))
     return false;
   channel.y = Eigen::Map<VectorXd>(y_.data(), n);
-  channel.baseline.resize(n, rows_.front().size());
-  for (Index i = 0; i < n; ++i)
-    channel.baseline.row(i) = rows_[static_cast<std::size_t>(i)].transpose();
-  channel.baseline = acting_columns(channel.baseline);
+  channel.baseline = acting_columns(baseline());
   if (!since_.empty())
     channel.since_change =
         SettlingTimes(Eigen::Map<VectorXd>(since_.data(), std::ssize(since_)), options.noise);

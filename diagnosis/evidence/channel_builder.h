@@ -23,6 +23,8 @@ class ChannelBuilder {
   /// @param values residual in one log [samples, SI]  @param base baseline columns [samples x columns]
   void add(std::size_t log, const Eigen::Array<bool, Eigen::Dynamic, 1>& mask,
            const Eigen::VectorXd& values, const Eigen::MatrixXd& base, Eigen::Index margin);
+  /// Baseline of the rows so far. [rows x columns]
+  Eigen::MatrixXd baseline() const;
   /// Appends the channel. @return false when there are too few rows or blocks; nothing is appended then
   bool finish(std::vector<EvidenceChannel>& out);
 

@@ -1,6 +1,7 @@
 // Builds the channels of an Evidence from the signals of all logs; declared in evidence.h.
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -128,6 +129,42 @@ void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries
   }
 }
 
+/// The region in which the references determine a channel's law: within the ranges of its regressors and the largest leverage of
+/// their rows, which both contain the rows' convex hull. Beyond, the law is extrapolated (D. C. Montgomery, E. A. Peck, G. G.
+/// Vining 2012, Introduction to Linear Regression Analysis, section 3.8, hidden extrapolation).
+class CommonSupport {
+ public:
+  /// @param rows of the references' baseline [rows x columns]; none: everywhere
+  explicit CommonSupport(const MatrixXd& rows) {
+    if (rows.rows() == 0) return;
+    least_ = rows.colwise().minCoeff();
+    largest_ = rows.colwise().maxCoeff();
+    decomposition_.compute(rows.transpose() * rows);
+    for (Index k = 0; k < rows.rows(); ++k)
+      largest_leverage_ = std::max(largest_leverage_, leverage(rows.row(k)));
+  }
+  /// Makes a suspect log's values missing outside. @param base its baseline [samples x columns]
+  void limit(const MatrixXd& base, VectorXd& values) const {
+    if (least_.size() == 0) return;
+    for (Index k = 0; k < values.size(); ++k) {
+      if (std::isfinite(values[k]) && !contains(base.row(k))) values[k] = kNaN;
+    }
+  }
+
+ private:
+  double leverage(const Eigen::RowVectorXd& row) const {
+    return row.dot(decomposition_.solve(row.transpose()));
+  }
+  bool contains(const Eigen::RowVectorXd& row) const {
+    return (row.array() >= least_.array()).all() && (row.array() <= largest_.array()).all() &&
+           leverage(row) <= largest_leverage_;
+  }
+
+  Eigen::RowVectorXd least_, largest_;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition_;
+  double largest_leverage_ = 0.0;
+};
+
 std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
                                             const std::vector<MachineSignals>& references) {
   std::vector<const MachineSignals*> all;
@@ -208,6 +245,12 @@ class EvidenceCollector {
   ChannelBuilder builder(EvidenceKind kind, int index, const FieldUnit& unit) const;
   /// @return for each log; empty where the log does not measure what the branches need
   std::vector<BranchSplit> branches_of(std::size_t cylinder, int side) const;
+  CommonSupport support_of(int cylinder, const ChamberRole& chamber,
+                           const std::vector<BranchSplit>& splits) const;
+  /// @param support outside which the log's values are missing; null: everywhere
+  /// @return false where the log does not measure the chamber
+  bool add_chamber(std::size_t log, const ChamberRole& chamber, const BranchSplit& split,
+                   const CommonSupport* support, ChannelBuilder& to) const;
   /// @param splits of the chamber's side, for each log
   void add_pressure_channel(int cylinder, const ChamberRole& chamber,
                             const std::vector<BranchSplit>& splits);
@@ -364,22 +407,45 @@ void EvidenceCollector::add_pressure_channels(int cylinder) {
   }
 }
 
+CommonSupport EvidenceCollector::support_of(int cylinder, const ChamberRole& chamber,
+                                            const std::vector<BranchSplit>& splits) const {
+  ChannelBuilder references = builder(chamber.kind(), cylinder, {"bar", 1e5});
+  if (options().mechanisms.act(Mechanism::kCommonSupport)) {
+    for (std::size_t log = evidence_.suspects; log < signals_.size(); ++log)
+      add_chamber(log, chamber, splits[log], nullptr, references);
+  }
+  return CommonSupport(references.baseline());
+}
+
+bool EvidenceCollector::add_chamber(std::size_t log, const ChamberRole& chamber,
+                                    const BranchSplit& split, const CommonSupport* support,
+                                    ChannelBuilder& to) const {
+  const auto at = static_cast<std::size_t>(to.channel.index);
+  const CylinderSignals& c = signals_[log]->cylinders[at];
+  if (!measures_both_chambers(c) || split.return_line.size() == 0) return false;
+  const CylinderSeries& s = evidence_.series[log].cylinders[at];
+  VectorXd y = evidence_.filter(
+      log, chamber.kind(),
+      chamber.pressure(c) - evidence_.known(log, chamber.kind(), to.channel.index));
+  const MatrixXd base = chamber.baseline(s);
+  if (support != nullptr) support->limit(base, y);
+  to.add(log, chamber.returning ? split.return_line : split.counterbalance, y, base,
+         margin_of(log));
+  return true;
+}
+
 void EvidenceCollector::add_pressure_channel(int cylinder, const ChamberRole& chamber,
                                              const std::vector<BranchSplit>& splits) {
   Evidence& e = evidence_;
-  const auto at = static_cast<std::size_t>(cylinder);
-  const EvidenceKind kind = chamber.kind();
-  ChannelBuilder b = builder(kind, cylinder, {"bar", 1e5});
+  ChannelBuilder b = builder(chamber.kind(), cylinder, {"bar", 1e5});
   MeanNoise noise(e.options);
+  const CommonSupport support = support_of(cylinder, chamber, splits);
   for (std::size_t log = 0; log < signals_.size(); ++log) {
-    const CylinderSignals& c = signals_[log]->cylinders[at];
-    const BranchSplit& split = splits[log];
-    if (!measures_both_chambers(c) || split.return_line.size() == 0) continue;
-    const VectorXd& raw = chamber.pressure(c);
-    const VectorXd y = e.filter(log, kind, raw - e.known(log, kind, cylinder));
-    b.add(log, chamber.returning ? split.return_line : split.counterbalance, y,
-          chamber.baseline(e.series[log].cylinders[at]), margin_of(log));
-    if (is_suspect(log)) noise.add(raw, gain_pressure_[log]);
+    const bool suspect = is_suspect(log);
+    if (!add_chamber(log, chamber, splits[log], suspect ? &support : nullptr, b)) continue;
+    if (suspect)
+      noise.add(chamber.pressure(signals_[log]->cylinders[static_cast<std::size_t>(cylinder)]),
+                gain_pressure_[log]);
   }
   b.channel.noise_floor = noise.value();
   if (b.finish(e.channels) && !chamber.returning)

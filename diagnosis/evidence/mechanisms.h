@@ -31,6 +31,7 @@ enum class Mechanism : unsigned {
   kOnce,             ///< isolated event: a large gain without significance
   kEvent,            ///< event in the residual of a force or speed
   kSettling,         ///< noise that is larger while the machine settles after a change of a command
+  kCommonSupport,    ///< pressures are compared where the references have flows and forces
   kCount
 };
 

@@ -69,6 +69,14 @@ struct Unexplained {
   std::size_t channel = 0;  ///< index into Evidence::channels
 };
 
+/// A channel in which the references differ more from the model than the suspect logs do (reference_faults.h).
+struct ReferenceFault {
+  std::string text;  ///< "force of boom"
+  FieldUnit unit;
+  double in_references = 0.0, in_log = 0.0;  ///< [SI] RMS of the model's residual
+  std::string sentence() const;
+};
+
 /// Thresholds by which a verdict follows from effects found and unmodelled structure.
 struct VerdictOptions {
   /// Unmodelled share of a channel (unmodelled_structure.h) above which a cause is not in the
@@ -155,6 +163,8 @@ struct Diagnosis {
   /// What the model lacks in the references as in the suspect logs, so that it is no change: effects and structure.
   std::vector<DiagnosedEffect> lacking;
   std::vector<Unexplained> shared_structure;
+  /// Of the channels in which a difference was found, or something stays unexplained; largest ratio first.
+  std::vector<ReferenceFault> reference_faults;
   /// Largest unmodelled share (unmodelled_structure.h) of the channels in which a found effect acts. 0..1
   double unmodelled_share = 0.0;
   std::vector<BadChannel> set_aside;  ///< faulty channels and stretches, which took no part

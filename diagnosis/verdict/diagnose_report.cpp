@@ -139,6 +139,8 @@ std::string Diagnosis::table(const std::string& first_line) const {
   }
   for (const BadChannel& b : set_aside)
     out += fmt::format("  Set aside: {}\n", bad_channel_sentence(b));
+  for (const ReferenceFault& f : reference_faults)
+    out += fmt::format("  Check the references: {}\n", f.sentence());
   for (const DiagnosedEffect& e : effects) {
     out += fmt::format("  {:32s} probability {:>3.0f} %   stage {}{}\n", e.key(),
                        e.shown_probability(), e.stage,
@@ -209,6 +211,13 @@ std::string Diagnosis::json() const {
   for (const Unexplained& u : shared_structure)
     j["unexplained_in_references_too"].push_back(
         {{"stage", u.stage}, {"at", u.at}, {"sentence", u.sentence}});
+  j["reference_faults"] = nlohmann::json::array();
+  for (const ReferenceFault& f : reference_faults)
+    j["reference_faults"].push_back({{"channel", f.text},
+                                     {"rmse_references", f.in_references / f.unit.si},
+                                     {"rmse_log", f.in_log / f.unit.si},
+                                     {"unit", f.unit.name},
+                                     {"sentence", f.sentence()}});
   // members of an indistinguishable set, none of which is probable enough by itself
   if (verdict == Verdict::kMissing) {
     for (const DiagnosedEffect& e : effects) {

@@ -11,6 +11,7 @@
 #include "diagnosis/regression/size_by_logs.h"
 #include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/reference_faults.h"
 #include "diagnosis/verdict/residual_levels.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/nan.h"
@@ -359,6 +360,19 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
       certain(difference) ? Proof::kNone : Proof::kExcess};
 }
 
+/// Whether an effect found as a difference acts in a channel, or something there stays unexplained.
+/// @param text of the channel
+bool differs_in(const Diagnosis& d, const std::string& text) {
+  const auto is = [&](std::size_t channel) {
+    return channel < d.evidence.channels.size() && d.evidence.channels[channel].text == text;
+  };
+  if (d.unexplained && is(d.unexplained->channel)) return true;
+  return std::any_of(d.effects.begin(), d.effects.end(), [&](const DiagnosedEffect& e) {
+    return std::any_of(e.channels.begin(), e.channels.end(),
+                       [&](const ChannelGain& g) { return is(g.channel); });
+  });
+}
+
 }  // namespace
 
 void trace_channels(const Diagnosis& d, std::size_t found) {
@@ -459,6 +473,10 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
     move_channels(effect, evidence, d.evidence);
     d.lacking.push_back(std::move(effect));
   }
+  // Other motions alone can make a residual larger, so that it takes a difference found in the channel to say whose it is.
+  d.reference_faults = reference_faults(model, signals, now);
+  std::erase_if(d.reference_faults,
+                [&](const ReferenceFault& f) { return !differs_in(d, f.text); });
   return d;
 }
 

@@ -52,7 +52,8 @@ const Named kMechanisms[] = {{"leaders", Mechanism::kLeaders},
                              {"minor", Mechanism::kMinor},
                              {"once", Mechanism::kOnce},
                              {"event", Mechanism::kEvent},
-                             {"settling", Mechanism::kSettling}};
+                             {"settling", Mechanism::kSettling},
+                             {"common_support", Mechanism::kCommonSupport}};
 
 struct Options {
   int runs = 100;

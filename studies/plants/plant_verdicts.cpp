@@ -37,7 +37,7 @@ struct Arguments {
   std::uint64_t seed = 1;
   double seconds = 200.0;
   std::string only, json, logs;
-  bool no_reference = false, without_settling = false, verbose = false;
+  bool no_reference = false, without_settling = false, without_support = false, verbose = false;
 };
 
 /// A change of the plant, with what may be named for it.
@@ -189,6 +189,7 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
       DiagnoseOptions options;
       if (a.without_settling) options.evidence.mechanisms.switch_off(Mechanism::kSettling);
+      if (a.without_support) options.evidence.mechanisms.switch_off(Mechanism::kCommonSupport);
       const Diagnosis d =
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
       judge(d, machine, clean ? Hidden{} : hidden, c);
@@ -281,6 +282,8 @@ int run_with(int argc, char** argv) {
   app.add("--logs", a.logs, "folder for the logs and the learned models");
   app.flag("--no-reference", a.no_reference, "diagnose without the reference log");
   app.flag("--without-settling", a.without_settling, "noise that does not settle after commands");
+  app.flag("--without-common-support", a.without_support,
+           "pressures outside the references' flows and forces are compared, too");
   app.flag("-v", a.verbose, "whole diagnoses");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;

@@ -75,6 +75,8 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
   for (std::size_t i = 0; i < d.set_aside.size(); ++i) {  // the headline names the first
     if (i > 0) text += sentence(bad_channel_sentence(d.set_aside[i])) + " ";
   }
+  for (const ReferenceFault& f : d.reference_faults)
+    text += "Check the references: " + f.sentence() + " ";
   if (d.verdict == Verdict::kUnknown && d.evidence.channels.empty())
     text += "Record motions of each cylinder with its command, position and pressures.";
   else if (d.verdict == Verdict::kUnknown)

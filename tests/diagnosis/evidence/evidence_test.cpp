@@ -479,5 +479,77 @@ TEST(Evidence, APumpIsJudgedBelowItsCutOff) {
   EXPECT_EQ(judged().size(), all.size());
 }
 
+/// Columns 1, Q, Q^2, F, Q F of a supply channel in one group of logs. [rows x 5]
+MatrixXd supply_law_in(const EvidenceChannel& channel, bool suspects) {
+  MatrixXd rows(channel.rows(), 5);
+  Index n = 0;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+    if ((channel.log[b] == 0) != suspects) continue;
+    for (Index row = channel.blocks[b].first; row < channel.blocks[b].last; ++row) {
+      const double q = channel.baseline(row, 1), f = channel.baseline(row, 3);
+      rows.row(n++) << 1.0, q, q * q, f, q * f;
+    }
+  }
+  return rows.topRows(n);
+}
+
+/// Variance of what a law learned from `known` says at each of `asked`, for measurements of variance one: its leverage. [rows]
+VectorXd leverage(const MatrixXd& known, const MatrixXd& asked) {
+  const MatrixXd root =
+      Eigen::LLT<MatrixXd>(known.transpose() * known).matrixL().solve(asked.transpose());
+  return root.colwise().squaredNorm();
+}
+
+/// A law learned from the references is extrapolated where they have no such flow or force, and its error there is no change.
+TEST(Evidence, PressuresAreComparedWhereTheReferencesHaveFlowsAndForces) {
+  const Machine machine = testing_support::drawn_machine("loader_crane");
+  const CraneModel model = CraneModel::untrained(machine);
+  const MachineSignals suspect = make_signals(machine, hidden_case(machine, {}, {5, 60.0}).train);
+  const MachineSignals reference = make_signals(machine, hidden_case(machine, {}, {6, 60.0}).train);
+  EvidenceOptions everywhere;
+  everywhere.mechanisms.switch_off(Mechanism::kCommonSupport);
+  const Evidence common = collect_evidence(model, {suspect}, {reference});
+  const Evidence all = collect_evidence(model, {suspect}, {reference}, nullptr, everywhere);
+  const Evidence alone = collect_evidence(model, {suspect});
+  int channels = 0;
+  Index left_out = 0;
+  for (const EvidenceChannel& c : common.channels) {
+    if (c.kind != EvidenceKind::kSupplyExtend && c.kind != EvidenceKind::kSupplyRetract) {
+      if (c.kind == EvidenceKind::kForce || c.kind == EvidenceKind::kFlow) {
+        EXPECT_EQ(c.rows(), all.find(c.kind, c.index)->rows()) << c.text;
+      }
+      continue;
+    }
+    const EvidenceChannel& before = *all.find(c.kind, c.index);
+    const MatrixXd known = supply_law_in(before, false), asked = supply_law_in(c, true);
+    left_out += before.rows() - c.rows();
+    if (known.rows() < 20) continue;  // the references have nothing to say
+    ++channels;
+    EXPECT_EQ(supply_law_in(c, false).rows(), known.rows()) << c.text;
+    const auto inside = [&](const MatrixXd& rows) {
+      const VectorXd h = leverage(known, rows);
+      const double largest = leverage(known, known).maxCoeff() * (1.0 + 1e-6);
+      int n = 0;
+      for (Index k = 0; k < rows.rows(); ++k) {
+        const auto low = rows.row(k).array() >= known.colwise().minCoeff().array();
+        const auto high = rows.row(k).array() <= known.colwise().maxCoeff().array();
+        n += h[k] <= largest && low.all() && high.all() ? 1 : 0;
+      }
+      return n;
+    };
+    EXPECT_EQ(inside(asked), asked.rows()) << c.text;
+    // and nothing else is left out, but for where rows begin anew behind what is left out
+    EXPECT_NEAR(inside(supply_law_in(before, true)), static_cast<double>(asked.rows()), 6.0)
+        << c.text;
+  }
+  EXPECT_GE(channels, 3);
+  EXPECT_GT(left_out, 20);
+  // without references there is nothing to compare with
+  const Evidence alone_everywhere = collect_evidence(model, {suspect}, {}, nullptr, everywhere);
+  for (const EvidenceChannel& c : alone.channels) {
+    EXPECT_EQ(c.rows(), alone_everywhere.find(c.kind, c.index)->rows()) << c.text;
+  }
+}
+
 }  // namespace
 }  // namespace sparflow
