@@ -19,16 +19,27 @@ std::size_t ix(long i) { return static_cast<std::size_t>(i); }
 /// @threshold [1] 0..1; chosen: there the length hardly changes with the joint, and its inverse is steep
 constexpr double kLeastRate = 0.15;
 
+/// Calls function(line, first, count) for every run of consecutive nodes on one line of an axis.
+template <class Function>
+void over_runs(const Lattice& lattice, int joint, const Function& function) {
+  const long stride = lattice.stride[ix(joint)], lines = lattice.lines[ix(joint)].size();
+  for (long first = 0; first < lattice.nodes;) {
+    for (long line = 0; line < lines; ++line, first += stride) function(line, first, stride);
+  }
+}
+
 /// Replaces each node's value by the largest of it and its two neighbours along one axis.
 void widen(const Lattice& lattice, int joint, std::vector<float>& field) {
-  const long stride = lattice.stride[ix(joint)];
   const long lines = lattice.lines[ix(joint)].size();
   const std::vector<float> before = field;
-  for (long node = 0; node < lattice.nodes; ++node) {
-    const long line = node / stride % lines;
-    if (line > 0) field[ix(node)] = std::max(field[ix(node)], before[ix(node - stride)]);
-    if (line + 1 < lines) field[ix(node)] = std::max(field[ix(node)], before[ix(node + stride)]);
-  }
+  over_runs(lattice, joint, [&](long line, long first, long count) {
+    const auto take = [&](long by) {
+      for (long node = first; node < first + count; ++node)
+        field[ix(node)] = std::max(field[ix(node)], before[ix(node + by)]);
+    };
+    if (line > 0) take(-count);
+    if (line + 1 < lines) take(count);
+  });
 }
 
 /// Factor <= 1 by edge for the error of m. The prices are divided by m, which is linear between lines although the
@@ -200,25 +211,28 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
     // From here on the field holds prices per unit of x; m is their mean along the axis.
     std::array<std::vector<float>, 2>& field = cost_[ix(j)];
     VectorXd sum = VectorXd::Zero(lines.size());
-    for (long node = 0; node < lattice_.nodes; ++node) {
-      const int line = lattice_.line(node, j);
-      const double per = axis.cylinder < 0 ? 1.0 : std::abs(forces.rate[ix(axis.cylinder)][line]);
+    over_runs(lattice_, j, [&](long line, long first, long count) {
+      const auto per = static_cast<float>(
+          axis.cylinder < 0 ? 1.0 : std::abs(forces.rate[ix(axis.cylinder)][line]));
       for (auto& f : field) {
-        f[ix(node)] /= static_cast<float>(per);
-        sum[line] += static_cast<double>(f[ix(node)]);
+        for (long node = first; node < first + count; ++node) {
+          f[ix(node)] /= per;
+          sum[line] += static_cast<double>(f[ix(node)]);
+        }
       }
-    }
+    });
     const double top = sum.maxCoeff();
     axis.m = top > 0.0 ? VectorXd((sum / top).cwiseMax(1e-3)) : VectorXd::Ones(lines.size());
     axis.u.setZero(lines.size());
     for (Eigen::Index k = 1; k < lines.size(); ++k) {
       axis.u[k] = axis.u[k - 1] + (axis.x[k] - axis.x[k - 1]) * 0.5 * (axis.m[k] + axis.m[k - 1]);
     }
-    for (auto& f : field) {
-      for (long node = 0; node < lattice_.nodes; ++node) {
-        f[ix(node)] /= static_cast<float>(axis.m[lattice_.line(node, j)]);
+    over_runs(lattice_, j, [&](long line, long first, long count) {
+      const auto m = static_cast<float>(axis.m[line]);
+      for (auto& f : field) {
+        for (long node = first; node < first + count; ++node) f[ix(node)] /= m;
       }
-    }
+    });
   }
   for (int j = 0; j < n; ++j) {
     losses_[ix(j)][1] += (1.0 - chord_factors(axes_[ix(j)]).array()).mean();
@@ -227,12 +241,11 @@ void EnergyPotential::make_costs(const LatticeForces& forces, const MoveWeights&
     for (std::size_t c = 0; c < cylinders; ++c) {
       if (machine_->cylinders[c].joint != j) continue;
       const VectorXd& r = forces.rate[c];
-      for (long node = 0; node < lattice_.nodes; ++node) {
-        const int line = lattice_.line(node, j);
-        if (line + 1 < r.size() && r[line] * r[line + 1] <= 0.0) {
+      over_runs(lattice_, j, [&](long line, long first, long count) {
+        if (line + 1 >= r.size() || r[line] * r[line + 1] > 0.0) return;
+        for (long node = first; node < first + count; ++node)
           cost_[ix(j)][0][ix(node)] = cost_[ix(j)][1][ix(node)] = 0.0F;
-        }
-      }
+      });
     }
   }
 }
@@ -251,27 +264,30 @@ void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
     const long stride = lattice_.stride[ix(k)], lines = u.size();
     double total = 0.0;
     std::vector<float> along(ix(lattice_.nodes), 0.0F);
-    for (long node = 0; node < lattice_.nodes; ++node) {
-      const long line = node / stride % lines;
-      if (line == 0 || line + 1 == lines) continue;
+    over_runs(lattice_, k, [&](long line, long first, long count) {
+      if (line == 0 || line + 1 == lines) return;
       const double a = u[line] - u[line - 1], b = u[line + 1] - u[line], h = std::max(a, b);
-      const double f = static_cast<double>(field[ix(node)]);
-      const double left = static_cast<double>(field[ix(node - stride)]);
-      const double right = static_cast<double>(field[ix(node + stride)]);
-      const double second = 2.0 * ((right - f) / b - (f - left) / a) / (a + b);
-      const double off = kShare * h * h * std::max(0.0, second);
-      along[ix(node)] = static_cast<float>(off);
-      if (f > 0.0) total += off / f;
-    }
-    if (lines >= 4) {  // the ends of the axis have no second difference: theirs is extrapolated
-      for (long node = 0; node < lattice_.nodes; ++node) {
-        const long line = node / stride % lines;
-        if (line > 0 && line + 1 < lines) continue;
-        const long in = line == 0 ? stride : -stride;
-        const float next = along[ix(node + in)], after = along[ix(node + 2 * in)];
-        const float growth = after > 0.0F ? std::clamp(next / after, 1.0F, 3.0F) : 1.0F;
-        along[ix(node)] = growth * next;
+      const double per_left = 2.0 * kShare * h * h / (a * (a + b));
+      const double per_right = 2.0 * kShare * h * h / (b * (a + b));
+      for (long node = first; node < first + count; ++node) {
+        const double f = static_cast<double>(field[ix(node)]);
+        const double left = static_cast<double>(field[ix(node - stride)]);
+        const double right = static_cast<double>(field[ix(node + stride)]);
+        const double off = std::max(0.0, per_right * (right - f) - per_left * (f - left));
+        along[ix(node)] = static_cast<float>(off);
+        if (off > 0.0 && f > 0.0) total += off / f;
       }
+    });
+    if (lines >= 4) {  // the ends of the axis have no second difference: theirs is extrapolated
+      over_runs(lattice_, k, [&](long line, long first, long count) {
+        if (line > 0 && line + 1 < lines) return;
+        const long in = line == 0 ? stride : -stride;
+        for (long node = first; node < first + count; ++node) {
+          const float next = along[ix(node + in)], after = along[ix(node + 2 * in)];
+          const float growth = after > 0.0F ? std::clamp(next / after, 1.0F, 3.0F) : 1.0F;
+          along[ix(node)] = growth * next;
+        }
+      });
     }
     for (std::size_t node = 0; node < along.size(); ++node) allowance[node] += along[node];
     losses_[ix(k)][1] += 0.5 * total / static_cast<double>(lattice_.nodes);
@@ -281,18 +297,19 @@ void EnergyPotential::edge_costs(int joint, std::vector<float>& field) {
   const VectorXd keep = chord_factors(axes_[ix(joint)]);
   const long stride = lattice_.stride[ix(joint)], lines = u.size();
   double change = 0.0;
-  for (long node = 0; node < lattice_.nodes; ++node) {
-    const long line = node / stride % lines;
-    if (line + 1 == lines) continue;
-    const float a = field[ix(node)], b = field[ix(node + stride)];
-    if (a + b > 0.0F) change += static_cast<double>(std::abs(a - b) / (a + b));
-    const double least =
-        static_cast<double>(std::min(a, b)) -
-        static_cast<double>(std::max(allowance[ix(node)], allowance[ix(node + stride)]));
-    const auto cost =
-        static_cast<float>(std::max(0.0, least) * keep[line] * (u[line + 1] - u[line]));
-    field[ix(node)] = std::nextafter(cost, 0.0F);
-  }
+  over_runs(lattice_, joint, [&](long line, long first, long count) {
+    if (line + 1 == lines) return;
+    const double width = u[line + 1] - u[line];
+    for (long node = first; node < first + count; ++node) {
+      const float a = field[ix(node)], b = field[ix(node + stride)];
+      if (a + b > 0.0F) change += static_cast<double>(std::abs(a - b) / (a + b));
+      const double least =
+          static_cast<double>(std::min(a, b)) -
+          static_cast<double>(std::max(allowance[ix(node)], allowance[ix(node + stride)]));
+      const auto cost = static_cast<float>(std::max(0.0, least) * keep[line] * width);
+      field[ix(node)] = std::nextafter(cost, 0.0F);
+    }
+  });
   losses_[ix(joint)][0] += 0.5 * change / static_cast<double>(lattice_.nodes);
 }
 

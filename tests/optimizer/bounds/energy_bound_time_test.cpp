@@ -349,6 +349,81 @@ TEST(TimedBound, IsNeverBelowTheBoundOfUnlimitedTime) {
   EXPECT_EQ(hour.checked_scale, any.checked_scale);
 }
 
+/// Lift of the bundled crane in a given time, bounded with few nodes.
+struct KnownLift {
+  CraneModel model = load_model(bundled_file("models/loader_crane.json"));
+  MotionProblem problem =
+      load_problem(bundled_file("reaches/loader_crane_lift.yaml"), &model.machine);
+  double duration = 22.0;  // [s]
+  TimedBoundOptions options;
+  int evaluations = 0;  // told by the last call of bound()
+
+  KnownLift() {
+    options.nodes = 6000;
+    options.search_nodes = 1000;
+    options.choice_nodes = 3000;
+    options.evaluations = 30;
+    options.any_duration = 0.0;
+  }
+  TimedBound bound(std::optional<double> energy) {
+    evaluations = 0;
+    options.known_energy = energy;
+    options.progress = [this](double, const std::string&) { ++evaluations; };
+    return energy_bound_at(model, problem, duration, options);
+  }
+};
+
+TEST(TimedBound, SharesThatChangeWithThePostureAreSearchedUnlessTheMotionIsNearTheBound) {
+  KnownLift lift;
+  const TimedBound unknown = lift.bound(std::nullopt);
+  ASSERT_TRUE(unknown.valid) << unknown.message;
+  const int searched = lift.evaluations;
+  const TimedBound constant = lift.bound(1.0);  // below any bound, so it is near enough
+  ASSERT_TRUE(constant.valid) << constant.message;
+  const int skipped = lift.evaluations;
+  EXPECT_LT(skipped, searched / 2) << "the search is left out";
+  EXPECT_GT(unknown.value, 1.001 * constant.value) << "the search raises the bound of this reach";
+
+  // A motion in this time is not below the larger bound.
+  EnergyGrid grid(lift.model, lift.problem, {12000, 4});
+  const GridPath path = grid.path_for_duration(lift.duration);
+  ASSERT_TRUE(path.found && path.duration_s <= lift.duration);
+  EXPECT_LT(unknown.value,
+            exact_energy(lift.model, timed_grid_path(lift.model, lift.problem, path, lift.duration),
+                         lift.problem.payload)
+                .total);
+
+  // A known energy decides at the share near_enough above the bound of constant shares.
+  EXPECT_EQ(lift.bound(1.0049 * constant.value).value, constant.value);
+  EXPECT_EQ(lift.evaluations, skipped);
+  EXPECT_EQ(lift.bound(1.0051 * constant.value).value, unknown.value);
+  EXPECT_EQ(lift.evaluations, searched);
+  lift.options.near_enough = 2e-3;
+  EXPECT_EQ(lift.bound(1.0022 * constant.value).value, unknown.value);
+  EXPECT_EQ(lift.evaluations, searched);
+  // The bound of any duration counts where it is larger.
+  lift.options.any_duration = 1.1 * unknown.value;
+  EXPECT_EQ(lift.bound(1.1 * unknown.value).value, 1.1 * unknown.value);
+  EXPECT_EQ(lift.evaluations, skipped);
+}
+
+TEST(TimedBound, TheKnownEnergyDecidesNothingWhereTimeCostsMuchOrNothing) {
+  KnownLift lift;
+  int searched = 0;
+  for (const double duration : {10.0, 600.0}) {
+    lift.duration = duration;
+    const TimedBound far = lift.bound(1e9);
+    const int evaluations = lift.evaluations;
+    EXPECT_EQ(lift.bound(1.0).value, far.value) << duration;
+    EXPECT_EQ(lift.evaluations, evaluations) << duration;
+    if (duration < 100.0) {
+      searched = evaluations;
+    } else {
+      EXPECT_LT(evaluations, searched / 2) << "no search where time costs next to nothing";
+    }
+  }
+}
+
 /// Sleds on one level rail, one upon the other: there are no loads, so a motion's energy depends on flows only. Ramps are
 /// negligibly short.
 struct Rail {
