@@ -231,7 +231,9 @@ class Loop {
         since = record.t;
       }
       if (there) sway = std::max(sway, std::hypot(record.swing_1, record.swing_2));
-      if (there && record.t >= task.begin + task.duration && record.t - since >= o_.hold) {
+      // All that arrive in time run to the same instant, so that energies and tip errors are compared at equal time.
+      if (there && record.t >= task.begin + task.duration + o_.hold &&
+          record.t - since >= o_.hold) {
         row_.time += since - task.begin;
         row_.tip_error_end = std::max(row_.tip_error_end, (at - goal.tip).norm());
         row_.sway = std::max(row_.sway, sway);

@@ -27,11 +27,16 @@ struct RestCorrectionOptions {
   /// Time by which the rod's movement is looked ahead.
   /// @threshold [s] 0..1; chosen: as the tracker's lead
   double lead = 0.2;
+  /// Growth of the error on which a correction begins, where it takes back the one before.
+  /// @threshold [-] 1..4; tuned: prediction_study on problems/scenarios/tuning; a valve whose dead band is crossed late makes a
+  /// rod overshoot each time, and a tip that is moved again and again never rests
+  double calming = 2.0;
 };
 
 class RestCorrection {
  public:
-  explicit RestCorrection(const RestCorrectionOptions& options = {}) : options_(options) {}
+  explicit RestCorrection(const RestCorrectionOptions& options = {})
+      : options_(options), begin_(options.begin) {}
 
   /// What it needs to know of a rod at one sample.
   struct Rod {
@@ -51,6 +56,8 @@ class RestCorrection {
   double filtered_ = 0.0;  // [m] error
   double creep_ = 0.0;     // [-] of the full speed
   int way_ = 0;            // of the correction: 1 extends, -1 retracts, 0 none
+  int last_ = 0;           // way of the correction before
+  double begin_ = 0.0;     // [m] error on which the next one begins, as the way of the tip
   bool moved_ = false;     // by the motion, at the sample before
 };
 
@@ -61,7 +68,11 @@ inline void RestCorrection::moving() {
 
 inline double RestCorrection::speed(const Rod& rod, double proportional) {
   const RestCorrectionOptions& o = options_;
-  if (moved_) filtered_ = rod.error;
+  if (moved_) {
+    filtered_ = rod.error;
+    begin_ = o.begin;
+    last_ = 0;
+  }
   moved_ = false;
   filtered_ += rod.sample_time / (o.filter + rod.sample_time) * (rod.error - filtered_);
   const double coming = rod.error - o.lead * rod.speed;  // where the rod is about to be
@@ -71,10 +82,12 @@ inline double RestCorrection::speed(const Rod& rod, double proportional) {
     filtered_ = coming;  // what was before the correction is no reason for the next one
   }
   if (way_ == 0) {
-    const bool begins = std::abs(filtered_) > o.begin / rod.tip_way && filtered_ * coming > 0.0 &&
+    const bool begins = std::abs(filtered_) > begin_ / rod.tip_way && filtered_ * coming > 0.0 &&
                         std::abs(coming) > end;
     if (!begins) return 0.0;
     way_ = filtered_ > 0.0 ? 1 : -1;
+    if (way_ * last_ < 0) begin_ *= o.calming;
+    last_ = way_;
     creep_ = o.creep;
   }
   const double least = creep_ * rod.full_speed;

@@ -1,7 +1,7 @@
 // Where the difference between the energy that a model predicts of its optima and the true energy of tracking them comes
 // from, scenario by scenario, with any gains of the tracker. docs/benchmark.md.
 //   prediction_study SCENARIO.yaml... [--model MODEL.json] [--controller NAME] [--gains 1.4:0.1:0.2,...] [--sway DEG] [--quiet]
-//       [--ramp S] [--plans FOLDER] [--trace FOLDER]
+//       [--ramp S] [--smoothing S] [--plans FOLDER] [--trace FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -30,7 +30,8 @@ struct Arguments {
   std::vector<std::string> scenarios, gains;
   std::string model, controller = "tracked_optimum";
   std::string plans, trace;  // folders; empty: none
-  double sway = 0.0, ramp = OptimalMotionOptions{}.ramp;
+  double sway = 0.0, ramp = OptimalMotionOptions{}.ramp,
+         smoothing = OptimalMotionOptions{}.smoothing;
   bool quiet = false;
 };
 
@@ -228,10 +229,16 @@ void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
   for (const Joint& j : p.scenario.machine.joints)
     out << fmt::format(",{0}_q,{0}_qd,{0}_plan_q,{0}_plan_qd", j.name);
   for (const Cylinder& c : p.scenario.machine.cylinders)
-    out << fmt::format(",{0}_u,{0}_spool,{0}_flow,{0}_pa,{0}_pb", c.name);
+    out << fmt::format(",{0}_u,{0}_spool,{0}_flow,{0}_pa,{0}_pb,{0}_model_p", c.name);
+  for (const Pump& pump : p.scenario.machine.pumps)
+    out << fmt::format(",{0}_p,{0}_q,{0}_model_p,{0}_model_q", pump.name);
   out << "\n";
+  Chain chain(p.model);
+  chain.oil = p.scenario.plant.tank.temperature;
   const Trajectory& plan = p.motions.legs.front().motion;
-  for (const plant::Record& r : d.records) {
+  for (std::size_t at = 0; at < d.records.size(); ++at) {
+    const plant::Record& r = d.records[at];
+    const MachineState& model = modelled(chain, p.scenario.machine, d, at);
     out << r.t;
     const control::MotionInstant wanted = control::at_time(plan, r.t);
     for (std::size_t j = 0; j < r.q.size(); ++j) {
@@ -239,8 +246,11 @@ void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
       out << fmt::format(",{},{},{},{}", r.q[j], r.qd[j], wanted.q[k], wanted.qd[k]);
     }
     for (std::size_t c = 0; c < r.command.size(); ++c)
-      out << fmt::format(",{},{},{},{},{}", r.command[c], r.spool[c], r.flow[c], r.pressure_a[c],
-                         r.pressure_b[c]);
+      out << fmt::format(",{},{},{},{},{},{}", r.command[c], r.spool[c], r.flow[c], r.pressure_a[c],
+                         r.pressure_b[c], model.cylinders[c].pressure);
+    for (std::size_t i = 0; i < model.pumps.size(); ++i)
+      out << fmt::format(",{},{},{},{}", r.pump_pressure[i], r.pump_flow[i],
+                         model.pumps[i].pressure, model.pumps[i].flow);
     out << "\n";
   }
 }
@@ -291,6 +301,7 @@ int run(const Arguments& a) {
   OptimalMotionOptions planning;
   planning.bound = false;
   planning.ramp = a.ramp;
+  planning.smoothing = a.smoothing;
   planning.sway_limit = a.sway * units::kDegree;
   std::vector<std::string> sets = a.gains;
   if (sets.empty()) {
@@ -312,6 +323,7 @@ int run_with(int argc, char** argv) {
   app.add("--gains", a.gains, "sets of the controller's gains, as 1:1.4:0.2");
   app.add("--ramp", a.ramp, "seconds from rest to full speed that the plan gives valves")
       .range(0.0, 5.0);
+  app.add("--smoothing", a.smoothing, "seconds of the moving average of the plan").range(0.0, 5.0);
   app.add("--sway", a.sway, "limit of the planned payload's angle [deg], 0: none").range(0.0, 45.0);
   app.add("--plans", a.plans, "folder in which the optima are kept for the next run");
   app.add("--trace", a.trace, "folder for a CSV of each run");

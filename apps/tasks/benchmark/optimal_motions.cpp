@@ -6,9 +6,11 @@
 #include <cmath>
 
 #include "apps/tasks/benchmark/learned_machine.h"
+#include "apps/tasks/benchmark/smoothed_motion.h"
 #include "apps/tasks/motion_inputs.h"
 #include "optimizer/bounds/energy_bound.h"
 #include "optimizer/bounds/energy_bound_time.h"
+#include "optimizer/crane/exact_energy.h"
 #include "optimizer/solve/child_processes.h"
 #include "optimizer/solve/optimize.h"
 #include "optimizer/solve/replan.h"
@@ -36,9 +38,15 @@ double bound_of(const CraneModel& model, const MotionProblem& problem) {
   return std::max(any.lower_bound_J, timed.valid ? timed.value : 0.0);
 }
 
-OptimalLeg solve(const MotionProblem& problem, const CraneModel& model,
-                 const OptimalMotionOptions& o) {
+OptimalLeg solve(MotionProblem problem, const CraneModel& model, const OptimalMotionOptions& o) {
   OptimalLeg leg;
+  const double time = problem.duration.max;
+  if (time <= o.smoothing) {
+    leg.message = fmt::format("{:.1f} s are no longer than the {:.1f} s of its moving average",
+                              time, o.smoothing);
+    return leg;
+  }
+  problem.duration = {time - o.smoothing, time - o.smoothing};
   OptimizeOptions options;
   options.intervals = o.intervals;
   options.processes = 1;
@@ -53,13 +61,14 @@ OptimalLeg solve(const MotionProblem& problem, const CraneModel& model,
     leg.message = r.message.empty() ? found.paths.message : r.message;
     return leg;
   }
-  leg.motion = r.motion;
-  leg.energy = r.energy.total;
+  leg.motion = smoothed(r.motion, o.smoothing);
+  leg.energy = exact_total_energy(model, problem, leg.motion);
+  problem.duration = {time, time};  // the bound is of every motion in this time
   if (o.bound && !(o.interrupted && o.interrupted())) leg.bound = bound_of(model, problem);
   return leg;
 }
 
-/// A goal's motion. One that has no time for the ramps gets shorter ones.
+/// A goal's motion. One that has no time for ramps and smoothing gets shorter ones.
 OptimalLeg solve_leg(const benchmark::Scenario& s, const CraneModel& model, int leg,
                      const Eigen::VectorXd& from, const OptimalMotionOptions& o) {
   OptimalMotionOptions now = o;
@@ -67,6 +76,7 @@ OptimalLeg solve_leg(const benchmark::Scenario& s, const CraneModel& model, int 
   while (found.motion.size() < 2 && 0.5 * now.ramp >= o.shortest_ramp &&
          !(o.interrupted && o.interrupted())) {
     now.ramp *= 0.5;
+    now.smoothing *= 0.5;
     const double spent = found.solve_s;
     found = solve(problem_of(s, model, leg, from, now), model, now);
     found.solve_s += spent;

@@ -18,7 +18,10 @@ struct OptimalMotionOptions {
   /// @threshold [s] 0..5; tuned: prediction_study --ramp on problems/scenarios/tuning (docs/benchmark.md): less tip error and
   /// sway than with a third of it at the same true energy
   double ramp = 2.4;
-  /// Where there is no motion with these ramps, they are halved as long as they stay above this.
+  /// Width of the moving average that is taken of the motion, which is planned for so much less time.
+  /// @threshold [s] 0..5; tuned: prediction_study --smoothing on problems/scenarios/tuning (docs/benchmark.md)
+  double smoothing = 1.6;
+  /// Where there is no motion with these ramps and average, both are halved as long as the ramps stay above this.
   /// @threshold [s] 0.05..5; chosen: above an operator's lever time; spools and pilot lines follow within 0.4 s
   double shortest_ramp = 0.6;
   /// Mesh intervals.

@@ -168,6 +168,23 @@ TEST(ClosedLoop, AnotherPostureAtTheSameTipIsNotTheOneAskedFor) {
   EXPECT_TRUE(run_levers(s, {0.0, 0.0, 0.0}).done);
 }
 
+TEST(ClosedLoop, AllThatArriveInTimeRunEquallyLong) {
+  const Scenario away = lift();
+  Scenario here = lift();
+  here.goals.front().q.reset();
+  here.goals.front().tip = tip_position<double>(here.machine, here.start);
+  const Row soon = run_levers(here, {0.0, 0.0, 0.0}), later = run(away, "joint_pi");
+  ASSERT_TRUE(soon.done) << soon.reason;
+  ASSERT_TRUE(later.done) << later.reason;
+  const double duration = away.goals.front().duration;
+  EXPECT_LT(soon.time, 0.1 * duration);
+  EXPECT_GT(later.time, 0.7 * duration);
+  EXPECT_LT(later.time, duration);
+  const LoopOptions loop;
+  EXPECT_NEAR(soon.ran, duration + loop.hold, 1.5 * loop.sample_time);
+  EXPECT_NEAR(later.ran, soon.ran, 1e-9);
+}
+
 TEST(ClosedLoop, ARowReadsBackAsItWasPacked) {
   Row row = run(lift(), "joint_pi");
   row.reason = "a \"quoted\", reason";
