@@ -285,7 +285,29 @@ double difference_beside_form_error(const Diagnosis& d, const EffectDesign& susp
   return difference;
 }
 
+/// Number of the suspect logs' stretches of motion in which an effect acts, in the channel where it acts in most.
+int stretches_of(const Evidence& evidence, const EffectDesign& suspect) {
+  int most = 0;
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    if (!suspect.touches(c)) continue;
+    const EvidenceChannel& channel = evidence.channels[c];
+    int here = 0;
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      const NoiseBlock& rows = channel.blocks[b];
+      here += static_cast<std::size_t>(channel.log[b]) < evidence.suspects &&
+                      !suspect.columns[c].middleRows(rows.first, rows.last - rows.first).isZero(0.0)
+                  ? 1
+                  : 0;
+    }
+    most = std::max(most, here);
+  }
+  return most;
+}
+
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  // a law with as many parameters as stretches of motion follows them whatever the cause is
+  if (stretches_of(d.evidence, d.search.found[found].design) <= d.search.found[found].design.linear)
+    return {InReferences::kVaries, Proof::kClearExcess};
   const bool shared = is_shared(d.evidence, d.search.found[found]);
   if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
   const EffectDesign& suspect = d.search.found[found].design;

@@ -96,6 +96,43 @@ TEST(ReferenceComparison, TwoEffectsOfAChannelThatActInBothLogsAreAlike) {
   EXPECT_EQ(in_references(d, 1, {}), InReferences::kAlike);
 }
 
+/// The dead bands of both directions follow two stretches of motion whatever the cause is, so that these prove no change; eight do.
+TEST(ReferenceComparison, ALawWithAsManyParametersAsStretchesOfMotionIsNoChange) {
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  const CraneModel model = CraneModel::untrained(loader());
+  for (const int stretches : {2, 8}) {
+    Diagnosis d;
+    d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
+                                  {make_signals(loader(), logs.reference)});
+    const int boom = loader().cylinder_index("boom");
+    const auto at = d.evidence.find(EvidenceKind::kFlow, boom) - d.evidence.channels.data();
+    EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+    FoundEffect found;
+    found.design = make_design(d.evidence, {find_effect("valve_deadband"), boom}, {0.0});
+    ASSERT_EQ(found.design.linear, 2);
+    int acting = 0;
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      if (channel.log[b] == 0 && acting++ < stretches) continue;
+      const Eigen::Index first = channel.blocks[b].first;
+      found.design.columns[static_cast<std::size_t>(at)]
+          .middleRows(first, channel.blocks[b].last - first)
+          .setZero();
+    }
+    ASSERT_GT(acting, 8);
+    std::mt19937_64 random(2);
+    NoiseModel noise;
+    noise.variance = 1e-3 * 1e-3;  // [m^2/s^2]
+    channel.y = testing_support::draw(noise, channel.blocks, random) +
+                found.design.columns[static_cast<std::size_t>(at)] * Eigen::Vector2d(0.1, 0.1);
+    d.search.found.push_back(std::move(found));
+    FitControl control;
+    control.keep_residuals = true;
+    d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
+    EXPECT_EQ(in_references(d, 0, {}), stretches == 2 ? InReferences::kVaries : InReferences::kNot)
+        << stretches << " stretches";
+  }
+}
+
 /// A lag whose time constant differs less between both logs than either tells it is no change, whatever the sizes of the one law in
 /// the other log say; a lag whose intervals exclude each other is one.
 TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
