@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/residual_levels.h"
 
 namespace sparflow {
