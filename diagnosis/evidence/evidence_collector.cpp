@@ -1,13 +1,13 @@
 // Builds the channels of an Evidence from the signals of all logs; declared in evidence.h.
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
+#include "diagnosis/evidence/common_support.h"
 #include "diagnosis/evidence/evidence.h"
 #include "identification/learning/learn_pump.h"
 #include "identification/signals/load_sensing_leader.h"
@@ -128,42 +128,6 @@ void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries
     }
   }
 }
-
-/// The region in which the references determine a channel's law: within the ranges of its regressors and the largest leverage of
-/// their rows, which both contain the rows' convex hull. Beyond, the law is extrapolated (D. C. Montgomery, E. A. Peck, G. G.
-/// Vining 2012, Introduction to Linear Regression Analysis, section 3.8, hidden extrapolation).
-class CommonSupport {
- public:
-  /// @param rows of the references' baseline [rows x columns]; none: everywhere
-  explicit CommonSupport(const MatrixXd& rows) {
-    if (rows.rows() == 0) return;
-    least_ = rows.colwise().minCoeff();
-    largest_ = rows.colwise().maxCoeff();
-    decomposition_.compute(rows.transpose() * rows);
-    for (Index k = 0; k < rows.rows(); ++k)
-      largest_leverage_ = std::max(largest_leverage_, leverage(rows.row(k)));
-  }
-  /// Makes a suspect log's values missing outside. @param base its baseline [samples x columns]
-  void limit(const MatrixXd& base, VectorXd& values) const {
-    if (least_.size() == 0) return;
-    for (Index k = 0; k < values.size(); ++k) {
-      if (std::isfinite(values[k]) && !contains(base.row(k))) values[k] = kNaN;
-    }
-  }
-
- private:
-  double leverage(const Eigen::RowVectorXd& row) const {
-    return row.dot(decomposition_.solve(row.transpose()));
-  }
-  bool contains(const Eigen::RowVectorXd& row) const {
-    return (row.array() >= least_.array()).all() && (row.array() <= largest_.array()).all() &&
-           leverage(row) <= largest_leverage_;
-  }
-
-  Eigen::RowVectorXd least_, largest_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition_;
-  double largest_leverage_ = 0.0;
-};
 
 std::vector<const MachineSignals*> in_order(const std::vector<MachineSignals>& suspects,
                                             const std::vector<MachineSignals>& references) {
