@@ -6,14 +6,16 @@
 
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/residual_levels.h"
+#include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
 
 std::string ReferenceFault::sentence() const {
   return fmt::format(
-      "in the {} they differ from the model by {:.3g} {} (RMS), the log by {:.3g} {} only; so the "
+      "in the {} they differ from the model by {} {} (RMS), the log by {} {} only; so the "
       "references are what is off here, or what was off has been mended since.",
-      text, in_references / unit.si, unit.name, in_log / unit.si, unit.name);
+      text, plain_number(in_references / unit.si, 3), unit.name, plain_number(in_log / unit.si, 3),
+      unit.name);
 }
 
 std::vector<ReferenceFault> reference_faults(const CraneModel& model,

@@ -11,6 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 /// A log and its references, of which one may have a sensor that is off.
@@ -59,6 +60,7 @@ TEST(ReferenceFaults, APressureSensorThatIsOffInTheReferencesIsSaid) {
   EXPECT_THAT(faults[0].sentence(),
               StartsWith("in the force of boom they differ from the model by "));
   EXPECT_THAT(faults[0].sentence(), HasSubstr(" N (RMS)"));
+  EXPECT_THAT(faults[0].sentence(), Not(HasSubstr("e+0")));
 }
 
 TEST(ReferenceFaults, WithoutReferencesThereIsNoneAndADiagnosisTakesThemOver) {
