@@ -243,6 +243,7 @@ void judge_answer(const Diagnosis& d, const std::vector<HiddenTruth>& hidden, Bl
     run.named.push_back({effect_key(e.effect->info(), *d.evidence.series[0].machine, e.at), f.size,
                          f.over_form, f.gain});
   }
+  run.said = said_effects(d, [&](const std::string& key) { return truth.count(key) > 0; });
   run.exact = answer == truth;
   run.all_found = std::includes(answer.begin(), answer.end(), truth.begin(), truth.end());
   if (d.verdict != Verdict::kMissing || truth.empty()) return;
@@ -437,11 +438,11 @@ namespace {
 template <class Run, class Visit>
 void each_field(Run& run, const Visit& visit) {
   auto& [asked, machine, truth, answer, verdict, left_out, details, top, in_set, broken_found,
-         all_found, exact, set_size, seconds, rows, named, errors, covered, parameters, rms_ratio,
-         energy_before, energy_after, changed, made_worse, worse_by, absorbed] = run;
+         all_found, exact, set_size, seconds, rows, named, said, errors, covered, parameters,
+         rms_ratio, energy_before, energy_after, changed, made_worse, worse_by, absorbed] = run;
   (void)asked;
   visit(machine, truth, answer, verdict, left_out, details, top, in_set, broken_found, all_found,
-        exact, set_size, seconds, rows, named, errors, covered, parameters, rms_ratio,
+        exact, set_size, seconds, rows, named, said, errors, covered, parameters, rms_ratio,
         energy_before, energy_after, changed, made_worse, worse_by, absorbed);
 }
 
@@ -450,6 +451,10 @@ void put(Packer& p, bool v) { p.number(v ? 1.0 : 0.0); }
 void put(Packer& p, const std::string& v) { p.text(v); }
 void put(Packer& p, const NamedEffect& e) {
   p.text(e.key).number(e.size).number(e.over_form).number(e.gain);
+}
+void put(Packer& p, const SaidEffect& e) {
+  p.text(e.key).number(e.probability).number(e.set_probability);
+  p.number(e.right ? 1.0 : 0.0).number(e.set_right ? 1.0 : 0.0);
 }
 void put(Packer& p, const AbsorbedError& e) { p.text(e.stage).number(e.share); }
 template <class Value>
@@ -466,6 +471,13 @@ void take(Unpacker& u, NamedEffect& e) {
   e.size = u.number();
   e.over_form = u.number();
   e.gain = u.number();
+}
+void take(Unpacker& u, SaidEffect& e) {
+  e.key = u.text();
+  e.probability = u.number();
+  e.set_probability = u.number();
+  e.right = u.number() != 0.0;
+  e.set_right = u.number() != 0.0;
 }
 void take(Unpacker& u, AbsorbedError& e) {
   e.stage = u.text();

@@ -8,6 +8,7 @@
 
 #include "diagnosis/verdict/diagnose.h"
 #include "studies/baseline_methods.h"
+#include "studies/said_effect.h"
 
 namespace sparflow::bench {
 
@@ -47,6 +48,7 @@ struct BlindRun {
   double seconds = 0.0;   ///< [s] wall time of the diagnosis
   double rows = 0.0;
   std::vector<NamedEffect> named;
+  std::vector<SaidEffect> said;         ///< what a user reads, with its probability
   std::vector<double> errors;           ///< [-] relative errors of parameters
   std::vector<bool> covered;            ///< whether the 95 % interval contains the true value
   std::vector<std::string> parameters;  ///< "pump_lag.tau", in the order of `covered`

@@ -283,6 +283,7 @@ nlohmann::json run_json(const BlindRun& r) {
           {"in_set", r.in_set},
           {"set_size", r.set_size},
           {"named", named},
+          {"said", said_json(r.said)},
           {"seconds", r.seconds},
           {"rows", r.rows},
           {"parameters", r.parameters},

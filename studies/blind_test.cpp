@@ -174,6 +174,9 @@ int run(int argc, char** argv) {
     const std::vector<Measure> table = blind_table(own, seconds);
     if (judge == "ours") fmt::print("\n{}", coverage_text(own));
     fmt::print("\n{}", table_text(table, judge));
+    std::vector<SaidEffect> said;
+    for (const BlindRun& r : own) said.insert(said.end(), r.said.begin(), r.said.end());
+    if (judge == "ours" && !said.empty()) fmt::print("\n{}", reliability_text(said));
     for (auto& line : table_json(table, judge)) json["table"].push_back(std::move(line));
   }
   if (!options.json.empty()) write_file_atomically(options.json, json.dump(1) + "\n");

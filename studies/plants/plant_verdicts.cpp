@@ -24,6 +24,7 @@
 #include "simulator/random/random.h"
 #include "simulator/sensors/log_writer.h"
 #include "studies/plants/drawn_plant.h"
+#include "studies/said_effect.h"
 #include "studies/share.h"
 
 namespace sparflow::bench {
@@ -92,6 +93,7 @@ struct Case {
   std::string machine, change, at, verdict, answer, left_out;
   bool right = false;
   double seconds = 0.0;
+  std::vector<SaidEffect> said;
 };
 
 /// Hidden change and place of a case. Index 0 of each plant has none.
@@ -121,32 +123,29 @@ Hidden drawn_change(const Machine& machine, const Arguments& a, Random& random) 
   return h;
 }
 
-void judge(const Diagnosis& d, const Machine& machine, const Hidden& hidden, Case& c) {
+/// Whether an effect, given as id:place, is a right answer to the hidden change.
+bool is_answer(const Hidden& hidden, const std::string& key) {
+  if (hidden.change == nullptr) return false;
+  return std::any_of(hidden.change->named.begin(), hidden.change->named.end(), [&](const char* id) {
+    if (key == id) return true;
+    return key.rfind(std::string(id) + ":", 0) == 0 &&
+           (hidden.at.empty() || key == std::string(id) + ":" + hidden.at);
+  });
+}
+
+void judge(const Diagnosis& d, const Hidden& hidden, Case& c) {
   c.verdict = verdict_name(d.verdict);
+  c.said = said_effects(d, [&](const std::string& key) { return is_answer(hidden, key); });
   bool truth = false, untrue = false;
-  for (const DiagnosedEffect& e : d.effects) {
-    if (d.verdict != Verdict::kMissing) break;
-    c.answer += e.key() + " ";
-    bool mine = false;
-    if (hidden.change != nullptr) {
-      for (const char* id : hidden.change->named) {
-        const auto same = [&](const std::string& key) {
-          if (key == id) return true;
-          return key.rfind(std::string(id) + ":", 0) == 0 &&
-                 (hidden.at.empty() || key == std::string(id) + ":" + hidden.at);
-        };
-        mine = mine || same(e.key());
-        for (const auto& [rival, worse] : e.rivals) mine = mine || same(rival);
-      }
-    }
-    (mine ? truth : untrue) = true;
+  for (const SaidEffect& s : c.said) {
+    c.answer += s.key + " ";
+    (s.set_right ? truth : untrue) = true;
   }
   c.right = hidden.change != nullptr ? truth && !untrue : d.verdict == Verdict::kNone;
   if (d.verdict == Verdict::kUnknown && d.unexplained) c.answer += "? " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData && !d.set_aside.empty())
     c.answer +=
         "bad " + d.set_aside.front().channel + " " + bad_data_word(d.set_aside.front().kind);
-  (void)machine;
 }
 
 /// Two cases of one plant: nothing changed, one change.
@@ -192,7 +191,7 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       if (a.without_support) options.evidence.mechanisms.switch_off(Mechanism::kCommonSupport);
       const Diagnosis d =
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
-      judge(d, machine, clean ? Hidden{} : hidden, c);
+      judge(d, clean ? Hidden{} : hidden, c);
       c.seconds = d.seconds;
       if (a.verbose) c.answer += "\n" + d.table();
       cases.push_back(std::move(c));
@@ -212,9 +211,14 @@ std::string packed(const std::vector<Case>& cases) {
   Packer p;
   p.number(static_cast<double>(cases.size()));
   for (const Case& c : cases) {
-    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds] = c;
+    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, said] = c;
     p.number(static_cast<double>(seed)).text(machine).text(change).text(at).text(verdict);
     p.text(answer).text(left_out).number(right ? 1.0 : 0.0).number(seconds);
+    p.number(static_cast<double>(said.size()));
+    for (const SaidEffect& s : said) {
+      p.text(s.key).number(s.probability).number(s.set_probability);
+      p.number(s.right ? 1.0 : 0.0).number(s.set_right ? 1.0 : 0.0);
+    }
   }
   return p.bytes();
 }
@@ -223,12 +227,20 @@ std::vector<Case> unpacked_cases(const std::string& bytes) {
   Unpacker u(bytes);
   std::vector<Case> cases(static_cast<std::size_t>(u.number()));
   for (Case& c : cases) {
-    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds] = c;
+    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, said] = c;
     seed = static_cast<std::uint64_t>(u.number());
     for (std::string* text : {&machine, &change, &at, &verdict, &answer, &left_out})
       *text = u.text();
     right = u.number() != 0.0;
     seconds = u.number();
+    said.resize(static_cast<std::size_t>(u.number()));
+    for (SaidEffect& s : said) {
+      s.key = u.text();
+      s.probability = u.number();
+      s.set_probability = u.number();
+      s.right = u.number() != 0.0;
+      s.set_right = u.number() != 0.0;
+    }
   }
   return cases;
 }
@@ -266,6 +278,10 @@ int run(const Arguments& a, Journal& journal) {
     fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
     json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
   }
+  std::vector<SaidEffect> said;
+  for (const Case& c : all) said.insert(said.end(), c.said.begin(), c.said.end());
+  if (!said.empty()) fmt::print("{}", reliability_text(said));
+  json["said"] = said_json(said);
   if (!a.json.empty()) write_file_atomically(a.json, json.dump(1) + "\n");
   journal.remove();
   return 0;
