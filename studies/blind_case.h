@@ -8,7 +8,7 @@
 
 #include "diagnosis/verdict/diagnose.h"
 #include "studies/baseline_methods.h"
-#include "studies/said_effect.h"
+#include "studies/trust/said_effect.h"
 
 namespace sparflow::bench {
 

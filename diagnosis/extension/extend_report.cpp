@@ -30,6 +30,7 @@ std::string parameters_text(const AppliedEffect& e) {
   const auto& parameters = e.effect->info().parameters;
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = parameters[p];
+    if (is_absent(q, e.values[p])) continue;
     const std::string unit = q.unit.empty() || q.unit == "-" ? "" : " " + q.unit;
     const bool choice = q.choice || p >= e.lower95.size();
     if (!choice && !is_determined(e.values[p], e.lower95[p], e.upper95[p], q.typical)) {
@@ -153,6 +154,7 @@ Json parameters_json(const AppliedEffect& e) {
   Json parameters = Json::array();
   for (std::size_t p = 0; p < e.values.size(); ++p) {
     const EffectParameter& q = e.effect->info().parameters[p];
+    if (is_absent(q, e.values[p])) continue;
     Json ci = nullptr;
     bool determined = true;
     if (p < e.lower95.size()) {

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "identification/comparison/error_change.h"
 #include "models/effects/registry.h"
+#include "models/math/error.h"
 
 namespace sparflow {
 namespace {
@@ -30,6 +32,21 @@ bool harms_its_own_place(const ExtendStep& step, const Machine& machine, const E
   return std::any_of(harmed.begin(), harmed.end(), [&](const HarmedError& h) {
     return !one || h.at == machine.cylinders[static_cast<std::size_t>(e.at)].name;
   });
+}
+
+/// Effects on forces among these that are confused with one, as either of both says.
+std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const EffectAt& e) {
+  const auto names = [](const EffectAt& by, const EffectAt& other) {
+    const std::vector<std::string>& list = by.effect->info().confused_with;
+    return std::find(list.begin(), list.end(), other.effect->info().id) != list.end();
+  };
+  std::vector<EffectAt> out;
+  for (const EffectAt& c : among) {
+    const bool force = c.effect->info().stage == EffectStage::kForce;
+    if (force && (c.effect == e.effect ? c.at != e.at : names(e, c) || names(c, e)))
+      out.push_back(c);
+  }
+  return out;
 }
 
 std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
@@ -78,6 +95,52 @@ void Improvement::test_again(const SearchProgress& progress) {
       keep(try_removing(context_, current_, e, progress), context_, current_, result_);
   }
   added_ = still;
+}
+
+std::optional<CompareResult> Improvement::errors_with(const Joint& joint,
+                                                      const std::vector<EffectAt>& effects,
+                                                      const SearchProgress& progress) const try {
+  return context_.measured_errors(joint.judged.model, effects, progress);
+} catch (const InputError&) {
+  return std::nullopt;
+}
+
+std::optional<Improvement::Exchange> Improvement::best_exchange(
+    const Joint& joint, const SearchProgress& progress) const {
+  const ErrorChangeOptions& options = context_.options().change;
+  const std::vector<EffectAt>& asked = context_.options().diagnose.candidates;
+  const std::vector<EffectAt> among = asked.empty() ? candidates(context_.machine()) : asked;
+  std::optional<Exchange> best;
+  for (const EffectAt& e : added_) {
+    if (e.effect->info().stage != EffectStage::kForce) continue;
+    for (const EffectAt& rival : confused_with(among, e)) {
+      if (contains(joint.all, rival)) continue;
+      std::vector<EffectAt> all = without(joint.all, e);
+      all.push_back(rival);
+      const std::optional<CompareResult> errors = errors_with(joint, all, progress);
+      if (!errors) continue;
+      const double own =
+          error_change(context_.machine(), joint.measured, *errors, {{"force"}, ""}, options).own;
+      if (own * options.refit_moves < (best ? best->own * options.refit_moves : 1.0))
+        best = Exchange{e, rival, own};
+    }
+  }
+  return best;
+}
+
+void Improvement::exchange(const SearchProgress& progress) {
+  const std::size_t most = added_.size();  // as many as there are effects, so that it ends
+  for (std::size_t turn = 0; turn < most; ++turn) {
+    const Trial trial{places_of(current_.model.effects), {}, nullptr};
+    const std::optional<Exchange> best = best_exchange(joint(trial, progress), progress);
+    if (!best) return;
+    TriedStep added = try_adding(context_, current_, best->in, progress);
+    if (!is_determined(added.step.effect)) return;
+    keep(std::move(added), context_, current_, result_);
+    keep(try_removing(context_, current_, best->out, progress), context_, current_, result_);
+    added_ = without(std::move(added_), best->out);
+    added_.push_back(best->in);
+  }
 }
 
 std::vector<EffectAt> Improvement::places(const std::vector<std::string>& keys) const {

@@ -29,6 +29,10 @@ class Improvement {
   /// Tests the effects of former rounds again beside those that came after them, and removes what has become useless.
   void test_again(const SearchProgress& progress);
 
+  /// Exchanges effects on forces for others that the catalogue says are confused with them, as long as that lowers the error on
+  /// motions left out: which of two was found first depends on what was in the model by then.
+  void exchange(const SearchProgress& progress);
+
   /// Effects that the next diagnosis must not name.
   const std::vector<EffectAt>& excluded() const { return aside_; }
   std::size_t rejected() const { return rejected_; }
@@ -54,6 +58,17 @@ class Improvement {
     ExtendStep step;
     bool stays = false;
   };
+
+  /// An effect of a joint set in place of which another one predicts better.
+  struct Exchange {
+    EffectAt out, in;
+    double own = 1.0;  ///< [-] error of the forces after over before
+  };
+  /// Errors of forces and flows with these effects; absent where one of them acts nowhere in these logs.
+  std::optional<CompareResult> errors_with(const Joint& joint, const std::vector<EffectAt>& effects,
+                                           const SearchProgress& progress) const;
+  /// The exchange that lowers the error most, if there is one.
+  std::optional<Exchange> best_exchange(const Joint& joint, const SearchProgress& progress) const;
 
   std::vector<EffectAt> places(const std::vector<std::string>& keys) const;
 

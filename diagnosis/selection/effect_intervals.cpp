@@ -64,15 +64,16 @@ bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
   return false;
 }
 
-/// A linear parameter that acts in no channel and cannot be zero keeps its typical value, with an interval that says nothing.
+/// A linear parameter that acts in no channel gets an interval that says nothing; where it cannot be zero, its typical value,
+/// too. An optional one is absent then.
 void set_undetermined(FoundEffect& f) {
   Index linear = 0;
   const std::vector<EffectParameter>& parameters = f.design.effect.effect->info().parameters;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (!parameters[k].linear || f.design.parameter_acts(linear++) || parameters[k].lower <= 0.0)
+    if (!parameters[k].linear || f.design.parameter_acts(linear++) || parameters[k].optional)
       continue;
     const double half = 2.0 * kUndeterminedWidth * parameters[k].typical;
-    f.values[k] = parameters[k].typical;
+    if (parameters[k].lower > 0.0) f.values[k] = parameters[k].typical;
     f.lower95[k] = f.values[k] - half;
     f.upper95[k] = f.values[k] + half;
   }

@@ -64,6 +64,7 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   e.applied = {e.effect.effect, e.effect.at, f.values, f.lower95, f.upper95};
   for (std::size_t k = 0; k < info.parameters.size(); ++k) {
     const EffectParameter& p = info.parameters[k];
+    if (is_absent(p, f.values[k])) continue;
     e.parameters.push_back({p.name, p.unit, p.meaning, f.values[k] / p.si, f.lower95[k] / p.si,
                             f.upper95[k] / p.si,
                             is_determined(f.values[k], f.lower95[k], f.upper95[k], p.typical)});

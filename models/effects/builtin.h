@@ -43,4 +43,8 @@ int first_luffing_joint(const Machine& machine);
 /// Unit vector along the link, from a joint towards the next one or the tip, in the joint's frame.
 Eigen::Vector3d link_direction(const Machine& machine, int joint);
 
+/// Unit vector across the link in the plane of its motion, towards which a positive rate of the joint turns the link, in
+/// the joint's frame; of a sliding link, of the joint that turns it. Zero where nothing turns it or it lies along the axis.
+Eigen::Vector3d link_normal(const Machine& machine, int joint);
+
 }  // namespace sparflow

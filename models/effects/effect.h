@@ -37,6 +37,9 @@ struct EffectParameter {
   bool optional = false;
 };
 
+/// Whether an optional parameter takes no part in an effect; no output names it then.
+inline bool is_absent(const EffectParameter& p, double value) { return p.optional && value == 0.0; }
+
 struct EffectInfo {
   std::string id;
   std::string title;  ///< "Coulomb friction"

@@ -1,5 +1,6 @@
 #include "models/files/model_file_effects.h"
 
+#include <algorithm>
 #include <set>
 
 #include "models/effects/formula/user_effect.h"
@@ -164,7 +165,12 @@ AppliedEffect read_effect(const Cursor& element, const Machine& machine) {
       fmt::format("a list, one element for each parameter: {}", listed(names));
   const Cursor list = element.at("parameters", expected);
   const std::vector<Cursor> values = list.list(expected);
-  if (values.size() != parameters.size()) list.fail_expected(expected);
+  // a file of an earlier version lacks optional parameters that have come to an effect since
+  const auto may_lack = [&] {
+    return std::all_of(parameters.begin() + static_cast<std::ptrdiff_t>(values.size()),
+                       parameters.end(), [](const EffectParameter& p) { return p.optional; });
+  };
+  if (values.size() > parameters.size() || !may_lack()) list.fail_expected(expected);
   bool intervals = !values.empty();
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Cursor& p = values[i].keys({"name", "value", "ci95"});
@@ -176,6 +182,8 @@ AppliedEffect read_effect(const Cursor& element, const Machine& machine) {
     applied.upper95.push_back(interval.hi);
     intervals = intervals && !std::isnan(interval.lo);
   }
+  for (auto* numbers : {&applied.values, &applied.lower95, &applied.upper95})
+    numbers->resize(parameters.size(), 0.0);
   if (!intervals) {
     applied.lower95.clear();
     applied.upper95.clear();

@@ -24,8 +24,8 @@
 #include "simulator/random/random.h"
 #include "simulator/sensors/log_writer.h"
 #include "studies/plants/drawn_plant.h"
-#include "studies/said_effect.h"
 #include "studies/share.h"
+#include "studies/trust/said_effect.h"
 
 namespace sparflow::bench {
 namespace {

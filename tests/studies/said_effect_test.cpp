@@ -1,4 +1,4 @@
-#include "studies/said_effect.h"
+#include "studies/trust/said_effect.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

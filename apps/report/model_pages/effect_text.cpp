@@ -62,6 +62,7 @@ std::vector<ParameterEstimate> estimates_of(const AppliedEffect& effect) {
   const auto& parameters = effect.effect->info().parameters;
   for (std::size_t i = 0; i < effect.values.size(); ++i) {
     const EffectParameter& p = parameters[i];
+    if (is_absent(p, effect.values[i])) continue;
     const bool known = i < effect.lower95.size() && i < effect.upper95.size();
     out.push_back(
         {p.name, p.unit, p.meaning, effect.values[i] / p.si,

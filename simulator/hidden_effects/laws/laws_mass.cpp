@@ -23,6 +23,19 @@ Eigen::Vector3d bone(const Machine& machine, int joint) {
   return d;
 }
 
+/// Unit vector across a link in the plane in which its joint, or of a sliding one the joint before, turns it.
+Eigen::Vector3d across(const Machine& machine, int joint) {
+  const Joint& own = machine.joints[static_cast<std::size_t>(joint)];
+  Eigen::Vector3d axis = own.axis;
+  if (own.type == JointType::kPrismatic)
+    axis = joint > 0 ? (own.origin.linear().transpose() *
+                        machine.joints[static_cast<std::size_t>(joint) - 1].axis)
+                           .eval()
+                     : Eigen::Vector3d::Zero().eval();
+  const Eigen::Vector3d d = axis.cross(bone(machine, joint));
+  return d.norm() > 1e-6 ? d.normalized() : Eigen::Vector3d::Zero().eval();
+}
+
 double mass_beyond(const Machine& machine, int joint) {
   double mass = 0.0;
   for (const Link& l : machine.links)
@@ -69,11 +82,13 @@ class UnmodelledMass final : public HiddenLaw {
     const double reach = bone(*c.machine, c.at).norm();
     mass_ = c.size * c.draw(0.07, 0.12) * mass_beyond(*c.machine, c.at);
     cog_ = c.draw(0.25, 0.8) * std::max(reach, 0.5);
+    if (law_ == 2) beside_ = c.random->sign() * c.draw(0.2, 0.5) * cog_;
   }
   void change_machine(Machine& machine) const override {
     const Eigen::Vector3d along = bone(machine, joint_).normalized();
-    if (law_ == 0) {
-      machine.links.push_back({"hidden mass", joint_, mass_, along * cog_});
+    if (law_ != 1) {
+      const Eigen::Vector3d centre = along * cog_ + across(machine, joint_) * beside_;
+      machine.links.push_back({"hidden mass", joint_, mass_, centre});
     } else {  // Two parts with the same total mass and moment.
       machine.links.push_back({"hidden mass", joint_, 0.5 * mass_, along * (0.7 * cog_)});
       machine.links.push_back({"hidden mass", joint_, 0.5 * mass_, along * (1.3 * cog_)});
@@ -82,12 +97,14 @@ class UnmodelledMass final : public HiddenLaw {
   std::vector<HiddenParameter> parameters() const override {
     return {{"mass", mass_, "kg", mass_},
             {"moment", mass_ * cog_, "kg m", mass_ * cog_},
+            {"cross_moment", mass_ * beside_, "kg m", mass_ * beside_},
             {"cog", cog_, "m", cog_}};
   }
 
  private:
   int joint_, law_;
   double mass_, cog_;
+  double beside_ = 0.0;  ///< [m] of the centre, from the line of the link
 };
 
 class PayloadError final : public HiddenLaw {
@@ -211,8 +228,10 @@ std::vector<LawEntry> mass_laws() {
   return {{"unmodelled_mass",
            HiddenPlace::kJoint,
            true,
-           {"point mass along the link", "two parts with the same mass and moment"},
-           "mass [kg], moment = mass * cog [kg m], cog [m] along the link",
+           {"point mass along the link", "two parts with the same mass and moment",
+            "point mass beside the link"},
+           "mass [kg], moment = mass * cog [kg m], cog [m] along the link, cross_moment [kg m] "
+           "beside it",
            make_law<UnmodelledMass>,
            feels_weight},
           {"payload_error",

@@ -152,6 +152,15 @@ TEST(Diagnose, Mass) {
   EXPECT_LT(a.error(e.key(), "moment"), 0.1);
 }
 
+/// Hoses or a valve block on top of a link: without the moment across the link, an angle offset is found in its place.
+TEST(Diagnose, AMassBesideItsLink) {
+  const Answer a = alone({{"unmodelled_mass", "jib", 1.0, 2}});
+  EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing) << a.diagnosis.table();
+  ASSERT_THAT(a.keys(), ElementsAre("unmodelled_mass:jib")) << a.diagnosis.table();
+  EXPECT_LT(a.error("unmodelled_mass:jib", "moment"), 0.1);
+  EXPECT_LT(a.error("unmodelled_mass:jib", "cross_moment"), 0.1);
+}
+
 /// A load attachment that the log does not contain, and a scale that reads 1 % too little.
 TEST(Diagnose, AScaleErrorBesideAnUnloggedLoad) {
   const Answer a = alone({{"payload_error", "", 1.0, 1}});
