@@ -34,7 +34,7 @@ bool harms_its_own_place(const ExtendStep& step, const Machine& machine, const E
   });
 }
 
-/// Effects on forces among these that are confused with one, as either of both says.
+/// Effects on forces among these that are confused with one, as either of both says; two of single cylinders only of the same.
 std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const EffectAt& e) {
   const auto names = [](const EffectAt& by, const EffectAt& other) {
     const std::vector<std::string>& list = by.effect->info().confused_with;
@@ -43,7 +43,9 @@ std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const Ef
   std::vector<EffectAt> out;
   for (const EffectAt& c : among) {
     const bool force = c.effect->info().stage == EffectStage::kForce;
-    if (force && (c.effect == e.effect ? c.at != e.at : names(e, c) || names(c, e)))
+    const bool apart = c.at != e.at && c.effect->info().place == EffectPlace::kCylinder &&
+                       e.effect->info().place == EffectPlace::kCylinder;
+    if (force && !apart && (c.effect == e.effect ? c.at != e.at : names(e, c) || names(c, e)))
       out.push_back(c);
   }
   return out;

@@ -1,0 +1,54 @@
+/// Effects on forces that are confused with each other: `improve` ends with the one that predicts motions left out better,
+/// whichever entered the model first.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "diagnosis/extension/extend.h"
+#include "identification/learning/fit.h"
+#include "models/effects/registry.h"
+#include "tests/diagnosis/hidden_case.h"
+
+namespace sparflow {
+namespace {
+
+using ::testing::ElementsAre;
+using testing_support::drawn_machine;
+using testing_support::hidden_case;
+using testing_support::HiddenCase;
+
+/// `improve` on a log, where an earlier run has put one effect into the model and may add no other one.
+std::vector<std::string> after_exchange(const Machine& machine, const Log& log,
+                                        const std::string& first) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("sparflow_exchange_" + std::to_string(::getpid())))
+          .string();
+  Journal(path, "exchange", false)
+      .keep("round 1", R"({"wanted": [")" + first + R"("], "removed": [], "notes": []})");
+  Journal journal(path, "exchange", true);
+  ExtendOptions options;
+  options.journal = &journal;
+  options.max_steps = 1;
+  options.diagnose.candidates = {parse_effect("unmodelled_mass:jib", machine),
+                                 parse_effect("angle_offset:jib", machine)};
+  const ExtendResult r = improve(fit(machine, {log}).model, {{log}, {}, {}}, options);
+  journal.remove();
+  std::vector<std::string> keys;
+  for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
+  return keys;
+}
+
+TEST(ImproveExchange, TheBetterOfTwoConfusedEffectsStaysWhicheverCameFirst) {
+  const Machine machine = drawn_machine("loader_crane");
+  const HiddenCase beside = hidden_case(machine, {{"unmodelled_mass", "jib", 1.0, 2}}, {7, 100.0});
+  EXPECT_THAT(after_exchange(machine, beside.train, "angle_offset:jib"),
+              ElementsAre("unmodelled_mass:jib"));
+  const HiddenCase offset = hidden_case(machine, {{"angle_offset", "jib", 1.0, 0}}, {7, 100.0});
+  EXPECT_THAT(after_exchange(machine, offset.train, "unmodelled_mass:jib"),
+              ElementsAre("angle_offset:jib"));
+}
+
+}  // namespace
+}  // namespace sparflow
