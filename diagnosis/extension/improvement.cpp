@@ -121,10 +121,13 @@ std::optional<Improvement::Exchange> Improvement::best_exchange(
       all.push_back(rival);
       const std::optional<CompareResult> errors = errors_with(joint, all, progress);
       if (!errors) continue;
-      const double own =
-          error_change(context_.machine(), joint.measured, *errors, {{"force"}, ""}, options).own;
-      if (own * options.refit_moves < (best ? best->own * options.refit_moves : 1.0))
-        best = Exchange{e, rival, own};
+      const ErrorChange change =
+          error_change(context_.machine(), joint.measured, *errors, {{"force"}, ""}, options);
+      const bool beyond_chance =
+          std::log(change.overall) < -options.standard_errors * change.overall_deviation;
+      if (beyond_chance && change.own * options.refit_moves < 1.0 &&
+          (!best || change.own < best->own))
+        best = Exchange{e, rival, change.own};
     }
   }
   return best;
@@ -136,10 +139,11 @@ void Improvement::exchange(const SearchProgress& progress) {
     const Trial trial{places_of(current_.model.effects), {}, nullptr};
     const std::optional<Exchange> best = best_exchange(joint(trial, progress), progress);
     if (!best) return;
-    TriedStep added = try_adding(context_, current_, best->in, progress);
+    TriedStep removed = try_removing(context_, current_, best->out, progress);
+    TriedStep added = try_adding(context_, removed.next, best->in, progress);
     if (!is_determined(added.step.effect)) return;
+    keep(std::move(removed), context_, current_, result_);
     keep(std::move(added), context_, current_, result_);
-    keep(try_removing(context_, current_, best->out, progress), context_, current_, result_);
     added_ = without(std::move(added_), best->out);
     added_.push_back(best->in);
   }
