@@ -37,7 +37,7 @@ constexpr double kRoundedForce = 1e-8;
 constexpr double kPriorErrors = 4.0;
 /// Eigenvalue of the scaled information below which a direction is left where it is.
 /// @threshold [1] 1e-14..1e-6; numerical: rounding of sums over thousands of rows
-constexpr double kRounding = 1e-11;
+constexpr double kRoundedDirection = 1e-11;
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 /// Norms of columns, 1 for empty ones.
@@ -227,7 +227,7 @@ void Balance::step() {
   const VectorXd along = eigen.eigenvectors().transpose() * (scaled.transpose() * residual_);
   VectorXd move = VectorXd::Zero(size_);
   for (Index k = 0; k < size_; ++k) {
-    if (eigen.eigenvalues()[k] > kRounding)
+    if (eigen.eigenvalues()[k] > kRoundedDirection)
       move -= along[k] / eigen.eigenvalues()[k] * eigen.eigenvectors().col(k);
   }
   store(theta_ + scale.cwiseInverse().asDiagonal() * move);
@@ -242,7 +242,7 @@ void Balance::size_errors() {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(transposed_product(scaled, scaled));
   VectorXd variance = VectorXd::Zero(size_);
   for (Index k = 0; k < size_; ++k) {
-    if (eigen.eigenvalues()[k] > kRounding)
+    if (eigen.eigenvalues()[k] > kRoundedDirection)
       variance += correlated_ / eigen.eigenvalues()[k] * eigen.eigenvectors().col(k).cwiseAbs2();
   }
   variance = variance.cwiseQuotient(scale.cwiseAbs2());
