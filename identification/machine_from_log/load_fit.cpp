@@ -32,22 +32,7 @@ constexpr double kLeastResidual = 1e-4;
 /// Share of the known force's square below which what is left of it beside free masses is rounding.
 /// @threshold [1] 1e-14..1e-4; numerical: a ten-thousandth of the force
 constexpr double kRoundedForce = 1e-8;
-/// Forces of the prior size that count beside those found when their size is estimated.
-/// @threshold [1] 0..20; chosen: half as many as one cylinder has
-constexpr double kPriorErrors = 4.0;
-/// Eigenvalue of the scaled information below which a direction is left where it is.
-/// @threshold [1] 1e-14..1e-6; numerical: rounding of sums over thousands of rows
-constexpr double kRoundedDirection = 1e-11;
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-
-/// Norms of columns, 1 for empty ones.
-VectorXd column_sizes(const MatrixXd& matrix) {
-  VectorXd size = matrix.colwise().norm();
-  for (double& s : size) {
-    if (!(s > 0.0)) s = 1.0;
-  }
-  return size;
-}
 
 /// Places of a cylinder's unknowns in the vector; -1: known.
 struct Places {
@@ -70,7 +55,6 @@ class Balance {
   void evaluate();
   void evaluate_cylinder(std::size_t i, Index& at);
   void step();
-  void size_errors();
   void store(const VectorXd& theta);
   void free_directions(const MatrixXd& information);
   void intervals();
@@ -87,7 +71,6 @@ class Balance {
   VectorXd residual_;  // of unit variance
   Eigen::VectorXi block_;
   double correlated_ = 1.0;  // rows that count as one
-  double error_size_ = 1.0;  // of forces that the balance does not know, in their prior sizes
 };
 
 void Balance::place_unknowns() {
@@ -161,8 +144,7 @@ void Balance::evaluate() {
     const AreaState& area = fit_.areas[i];
     const Places& p = places_[i];
     for (Index k = 0; p.errors >= 0 && k < error_count(); ++k, ++at)
-      jacobian_(at, p.errors + k) =
-          put_prior(theta_[p.errors + k], is_force_error(k) ? error_size_ : 1.0);
+      jacobian_(at, p.errors + k) = put_prior(theta_[p.errors + k], 1.0);
     if (p.piston >= 0 && area.flow_piston_std > 0.0) {
       jacobian_(at, p.piston) = -put_prior(area.flow_piston - area.piston, area.flow_piston_std);
       ++at;
@@ -221,41 +203,23 @@ void Balance::evaluate_cylinder(std::size_t i, Index& at) {
 
 /// One Gauss-Newton step in the directions that the rows determine.
 void Balance::step() {
-  const VectorXd scale = column_sizes(jacobian_);
+  VectorXd scale(size_);
+  for (Index k = 0; k < size_; ++k) {
+    scale[k] = jacobian_.col(k).norm();
+    if (!(scale[k] > 0.0)) scale[k] = 1.0;
+  }
   const MatrixXd scaled = jacobian_ * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(transposed_product(scaled, scaled));
   const VectorXd along = eigen.eigenvectors().transpose() * (scaled.transpose() * residual_);
   VectorXd move = VectorXd::Zero(size_);
+  /// Eigenvalue of the scaled information below which a direction is left where it is.
+  /// @threshold [1] 1e-14..1e-6; numerical: rounding of sums over thousands of rows
+  constexpr double kRounding = 1e-11;
   for (Index k = 0; k < size_; ++k) {
-    if (eigen.eigenvalues()[k] > kRoundedDirection)
+    if (eigen.eigenvalues()[k] > kRounding)
       move -= along[k] / eigen.eigenvalues()[k] * eigen.eigenvectors().col(k);
   }
   store(theta_ + scale.cwiseInverse().asDiagonal() * move);
-}
-
-/// How large forces of unknown forms are on this machine, from what the rows say of all of them: one step of
-/// expectation-maximisation, to which the prior size adds its own observations. Without it the intervals would know only of
-/// forces of the prior size. Source: MacKay (1992), Neural Computation 4(3), sec. 4.4; Dempster, Laird, Rubin (1977).
-void Balance::size_errors() {
-  const VectorXd scale = column_sizes(jacobian_);
-  const MatrixXd scaled = jacobian_ * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(transposed_product(scaled, scaled));
-  VectorXd variance = VectorXd::Zero(size_);
-  for (Index k = 0; k < size_; ++k) {
-    if (eigen.eigenvalues()[k] > kRoundedDirection)
-      variance += correlated_ / eigen.eigenvalues()[k] * eigen.eigenvectors().col(k).cwiseAbs2();
-  }
-  variance = variance.cwiseQuotient(scale.cwiseAbs2());
-  double sum = kPriorErrors, count = kPriorErrors;
-  for (std::size_t i = 0; i < loads_.size(); ++i) {
-    const Index first = places_[i].errors;
-    for (Index k = 0; first >= 0 && k < error_count(); ++k) {
-      if (!is_force_error(k)) continue;
-      sum += theta_[first + k] * theta_[first + k] + variance[first + k];
-      count += 1.0;
-    }
-  }
-  error_size_ = std::max(1.0, std::sqrt(sum / count));
 }
 
 void Balance::store(const VectorXd& theta) {
@@ -371,8 +335,6 @@ void Balance::solve() {
   for (int pass = 0; pass < kPasses; ++pass) {
     evaluate();
     step();
-    if (options_.model_error > 0.0 && options_.learn_error_size && pass >= kPasses / 3)
-      size_errors();
   }
   evaluate();
   free_directions(transposed_product(jacobian_, jacobian_));

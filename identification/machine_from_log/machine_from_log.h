@@ -41,8 +41,6 @@ struct MachineFromLogOptions {
   /// Standard deviation of the gain of a flow sensor, which no log of it shows; areas by flow are no better than that.
   /// @threshold [-] 0..0.05; chosen: meters of hydraulic flow are usually specified to some tenths of a percent of the reading, up to one percent
   double flow_gain_error = 0.005;
-  /// Whether the size of model_error may grow where the forces of a machine show more; false: for comparison.
-  bool learn_error_size = true;
   /// Half width of a 95 % interval, relative to the value, beyond which a value is asked for.
   /// @threshold [-] 0.005..0.5; chosen: a bore known to a tenth gives its area to a fifth
   double largest_width = 0.1;

@@ -16,8 +16,7 @@ constexpr double kFallingShares[] = {0.08, 0.2, 0.5};
 /// Share of the rows' speeds that count for the largest.
 /// @threshold [-] 0.8..1; chosen: single samples do not set a scale
 constexpr double kFastest = 0.98;
-constexpr Index kInertia = 4;  // no threshold: the column of inertia
-constexpr int kOthers = 5;     // no threshold: columns beside those that fall with speed
+constexpr int kOthers = 5;  // no threshold: columns beside those that fall with speed
 
 double rms(const VectorXd& v) {
   return v.size() > 0 ? v.norm() / std::sqrt(static_cast<double>(v.size())) : 0.0;
@@ -45,8 +44,6 @@ ErrorScale error_scale(const LoadRows& rows, double piston, const VectorXd& load
 }
 
 int error_count() { return kOthers + static_cast<int>(std::size(kFallingShares)); }
-
-bool is_force_error(Index column) { return column != kInertia; }
 
 Eigen::MatrixXd error_columns(const LoadRows& rows, const VectorXd& load, const ErrorScale& scale,
                               const MachineFromLogOptions& options) {

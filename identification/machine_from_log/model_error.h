@@ -21,9 +21,6 @@ ErrorScale error_scale(const LoadRows& rows, double piston, const Eigen::VectorX
 /// Number of columns that error_columns() has.
 int error_count();
 
-/// Whether a column is a force whose size refers to pressure or load, not to the inertia of the masses.
-bool is_force_error(Eigen::Index column);
-
 /// @return [rows x terms] [N], each of one standard deviation: an offset, friction that grows with the load, falls with speed,
 /// grows with its square or differs between the directions, and inertia that the masses do not have
 Eigen::MatrixXd error_columns(const LoadRows& rows, const Eigen::VectorXd& load,

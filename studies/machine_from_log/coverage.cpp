@@ -196,12 +196,9 @@ int run(int argc, char** argv) {
   app.add("--seconds", seconds, "duration of a log [s]");
   app.add("--machines", machines, "bundled machines");
   app.add("--model-error", options.model_error, "standard deviation of forces of unknown forms");
-  bool fixed = false;
-  app.flag("--fixed-size", fixed, "that deviation is kept, also where the logs show larger forces");
   app.add("--laws", own, "effects of every cylinder in place of the sets of the table");
   app.flag("-v,--verbose", verbose, "print every value");
   if (const auto code = app.parse(argc, argv)) return *code;
-  options.learn_error_size = !fixed;
   const auto begin = std::chrono::steady_clock::now();
   fmt::print("| laws in the logs | bores | rods | masses, first moments | asked |\n");
   fmt::print("|---|---|---|---|---|\n");

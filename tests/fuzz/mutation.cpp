@@ -142,4 +142,25 @@ std::string changed(const std::vector<Sample>& corpus, Random& random) {
   return text;
 }
 
+std::string changed_in_place(const std::vector<Sample>& corpus, Random& random) {
+  std::string text = corpus[below(random, corpus.size())].bytes;
+  if (text.empty()) return text;
+  const std::size_t edits = 1 + below(random, 3);
+  for (std::size_t e = 0; e < edits; ++e) {
+    const std::size_t at = below(random, text.size());
+    switch (below(random, 3)) {
+      case 0:
+        text[at] = static_cast<char>(below(random, 256));
+        break;
+      case 1:
+        text[at] = static_cast<char>(text[at] ^ static_cast<char>(1U << below(random, 8)));
+        break;
+      default:
+        put_number(text, at, random);
+        break;
+    }
+  }
+  return text;
+}
+
 }  // namespace sparflow::fuzz

@@ -25,4 +25,8 @@ std::size_t below(Random& random, std::size_t n);
 /// One to eight changes of bytes, stretches, words and binary numbers of a file drawn from the corpus, which is not empty.
 std::string changed(const std::vector<Sample>& corpus, Random& random);
 
+/// One to three changes of bytes, bits and binary numbers that leave everything where it stands, so that links and lengths of
+/// binary files still lead somewhere.
+std::string changed_in_place(const std::vector<Sample>& corpus, Random& random);
+
 }  // namespace sparflow::fuzz
