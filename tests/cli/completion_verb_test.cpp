@@ -88,7 +88,8 @@ TEST_F(Completion, FilesAreOfferedByEndingWhereThereAreSuch) {
               UnorderedElementsAre("a log.csv", "drive.mf4", "machines"));
   EXPECT_THAT(offered({"sparflow", "log", "--dbc", ""}),
               UnorderedElementsAre("bus.dbc", "machines"));
-  EXPECT_THAT(offered({"sparflow", "log", "d"}), UnorderedElementsAre("drive.mf4"));
+  EXPECT_THAT(offered({"sparflow", "log", ""}),
+              UnorderedElementsAre("a log.csv", "drive.mf4", "machines"));
   // no machine file begins so
   EXPECT_THAT(offered({"sparflow", "fit", "--machine", "a"}), UnorderedElementsAre("a log.csv"));
 }

@@ -56,7 +56,7 @@ std::vector<std::string> endings_of(const std::string& type, const std::string& 
   for (const char* ending : {"json", "csv", "html", "dbc"})
     if (type.find(std::string(".") + ending) != std::string::npos) return {ending};
   const auto says = [&](const char* words) { return help.find(words) != std::string::npos; };
-  if (type.rfind("LOG", 0) == 0 || says("MAT or a recording") || help.rfind("logs", 0) == 0)
+  if (type.rfind("LOG", 0) == 0 || says("CSV, MAT") || help.rfind("logs", 0) == 0)
     return {"csv", "txt", "mat", "mf4", "mdf", "mcap", "asc", "log"};
   if (says("YAML") || type.find(".yaml") != std::string::npos) return {"yaml", "yml"};
   if (says("(CSV)")) return {"csv"};
