@@ -71,13 +71,14 @@ int run(const FitArguments& a) {
     for (const std::string& n : result.notes) note("  " + n);
     throw;
   }
-  for (const std::string& sentence : learning_gaps(result)) warn(sentence);
   a.own.load_into(result.model);
   save_model(result.model, a.output);
   if (!a.outputs.json.empty()) a.outputs.write_json(fit_json(result));
   if (!a.outputs.report.empty()) fit_page(result).write(a.outputs.report);
   tell(fmt::format("{}{}\nmodel written to {}\n", result.full(), fit_judgement(result), a.output));
-  return kDone;
+  for (const std::string& sentence : learning_gaps(result)) warn(sentence);
+  // The model is kept, because other stages can be judged by it; what `fit` is for did not come about.
+  return no_pressure_learned(result) ? kBadInput : kDone;
 }
 
 }  // namespace

@@ -71,8 +71,9 @@ void areas_from_flow(const Machine& machine, int cylinder, const SketchRows& row
     if (!std::isfinite(half[0])) continue;
     const bool extends = &side == &sides[0];
     (extends ? area.flow_piston : area.flow_annulus) = found[0];
-    // As standard deviation of a normal estimate with the same interval.
-    (extends ? area.flow_piston_std : area.flow_annulus_std) = half[0] / 1.96;
+    // As standard deviation of a normal estimate with the same interval, and the sensor's gain.
+    (extends ? area.flow_piston_std : area.flow_annulus_std) =
+        std::hypot(half[0] / 1.96, options.flow_gain_error * found[0]);
   }
 }
 

@@ -38,6 +38,9 @@ struct MachineFromLogOptions {
   /// Standard deviation of the inertia that the masses found do not have, as share of theirs.
   /// @threshold [-] 0..2; chosen: masses are found by their weight, which tells half of their inertia
   double inertia_error = 0.5;
+  /// Standard deviation of the gain of a flow sensor, which no log of it shows; areas by flow are no better than that.
+  /// @threshold [-] 0..0.05; chosen: meters of hydraulic flow are usually specified to some tenths of a percent of the reading, up to one percent
+  double flow_gain_error = 0.005;
   /// Half width of a 95 % interval, relative to the value, beyond which a value is asked for.
   /// @threshold [-] 0.005..0.5; chosen: a bore known to a tenth gives its area to a fifth
   double largest_width = 0.1;

@@ -207,6 +207,34 @@ void ask_for_idle_links(const Known& known, const std::vector<LoadRows>& loads, 
   }
 }
 
+/// Names of the cylinders whose force the convention for centres changes: what it chooses freely is free only beside an offset
+/// and friction, so that it would choose part of the load.
+std::string cylinders_changed(const Known& known, const std::vector<LoadRows>& loads,
+                              const LoadFit& fit, const VectorXd& move) {
+  std::string names;
+  for (std::size_t i = 0; i < loads.size(); ++i) {
+    if (!fit.used[i] || loads[i].rows() == 0) continue;
+    const double load = (loads[i].known + loads[i].masses * fit.masses).norm();
+    if (!((loads[i].masses * move).norm() > known.options.undetermined * load)) continue;
+    names += (names.empty() ? "" : ", ") + known.machine.cylinders[i].name;
+  }
+  return names;
+}
+
+/// Asks for every open link where the logs do not tell masses from an offset and friction.
+void ask_for_doubtful_links(const Known& known, const std::string& cylinders, RealisedMasses& out) {
+  for (const OpenValue& v : known.sketch.open) {
+    const bool centre = v.kind == OpenKind::kCog && !known.sketch.is_open(OpenKind::kMass, v.part);
+    if (v.kind != OpenKind::kMass && !centre) continue;
+    out.questions.push_back(
+        {v.path,
+         fmt::format("in these logs what it weighs on {} looks like an offset of the pressures and "
+                     "like friction, because it hardly changes; give it, or a log with more "
+                     "different postures, speeds and payloads",
+                     cylinders)});
+  }
+}
+
 }  // namespace
 
 RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& loads,
@@ -231,7 +259,8 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
     used = place;
     if (found) break;
   }
-  if (!found && out.questions.empty()) {
+  if (!found && out.questions.empty() &&
+      cylinders_changed(known, loads, fit, masses - fit.masses).empty()) {
     for (const OpenValue& v : sketch.open) {
       if (v.kind != OpenKind::kMass) continue;
       out.questions.push_back(
@@ -240,6 +269,12 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
            "give them with centres near the links; give the mass of this link and leave its cog "
            "open (and check signs, units and the payload)"});
     }
+  }
+  const std::string changed = cylinders_changed(known, loads, fit, masses - fit.masses);
+  if (!changed.empty() && out.questions.empty()) {
+    ask_for_doubtful_links(known, changed, out);
+    masses = fit.masses;
+    found = false;
   }
   if (found && fit.free.cols() > 0) {
     out.notes.push_back(fmt::format(

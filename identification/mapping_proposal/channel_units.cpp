@@ -151,7 +151,11 @@ ChannelUnit channel_unit(const std::string& name, const std::string& unit) {
   if (mark == name.npos || mark == 0) return {};
   const std::string_view suffix = std::string_view(name).substr(mark + 1);
   const ChannelUnit* found = find(suffix);
-  return found != nullptr && may_end_a_name(suffix) ? *found : ChannelUnit{};
+  if (found == nullptr) return {};
+  // "gain_k" has no unit, "oil_C" and "TempTank_K" have one.
+  const bool meant = may_end_a_name(suffix) ||
+                     (found->of == Of::kTemperature && names_a_temperature(name.substr(0, mark)));
+  return meant ? *found : ChannelUnit{};
 }
 
 const std::vector<ChannelUnit>& possible_units(const Meaning& meaning, const Machine& machine) {

@@ -380,6 +380,10 @@ std::string meaning_words(const Meaning& m, const Machine& machine) {
   return "another signal";
 }
 
+bool names_a_temperature(const std::string& name) {
+  return !found_in(kClassWords[kOil].clear, name_words(name)).empty();
+}
+
 bool names_a_clock(const std::string& name) {
   const std::vector<std::string> words = name_words(name);
   static const Words kClock = {"time", "zeit", "timestamp", "zeitstempel", "uhrzeit"};

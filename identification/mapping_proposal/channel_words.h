@@ -94,6 +94,9 @@ std::string looks_like(const std::string& name, const ChannelUnit& unit);
 /// "bore-side pressure of cylinder boom"
 std::string meaning_words(const Meaning& meaning, const Machine& machine);
 
+/// @return whether a name says that the channel is a temperature: "oil_C", "TempTank"
+bool names_a_temperature(const std::string& name);
+
 /// @return whether a name says that the column is a clock: "t", "Zeit [ms]", "timestamp"
 bool names_a_clock(const std::string& name);
 

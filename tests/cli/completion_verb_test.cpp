@@ -16,6 +16,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
 namespace fs = std::filesystem;
 
 std::string printed(const std::string& command) {
@@ -73,6 +74,33 @@ TEST_F(Completion, OffersVerbsOptionsValuesAndFiles) {
   EXPECT_EQ(offered({"sparflow", "help", "par"}), std::vector<std::string>{"pareto"});
   EXPECT_EQ(offered({"sparflow", "completion", ""}),
             (std::vector<std::string>{"bash", "zsh", "fish"}));
+}
+
+TEST_F(Completion, FilesAreOfferedByEndingWhereThereAreSuch) {
+  fs::create_directories(folder / "machines");
+  for (const char* name : {"crane.yaml", "crane.json", "bus.dbc", "drive.mf4"})
+    std::ofstream(folder / name) << "\n";
+  EXPECT_THAT(offered({"sparflow", "fit", "--machine", ""}),
+              UnorderedElementsAre("crane.yaml", "machines"));
+  EXPECT_THAT(offered({"sparflow", "compare", "--model", "cr"}),
+              UnorderedElementsAre("crane.json"));
+  EXPECT_THAT(offered({"sparflow", "fit", "--log", ""}),
+              UnorderedElementsAre("a log.csv", "drive.mf4", "machines"));
+  EXPECT_THAT(offered({"sparflow", "log", "--dbc", ""}),
+              UnorderedElementsAre("bus.dbc", "machines"));
+  EXPECT_THAT(offered({"sparflow", "log", ""}),
+              UnorderedElementsAre("a log.csv", "drive.mf4", "machines"));
+  // no machine file begins so
+  EXPECT_THAT(offered({"sparflow", "fit", "--machine", "a"}), UnorderedElementsAre("a log.csv"));
+}
+
+TEST_F(Completion, NamesOfRegistriesAreOfferedAlsoBehindAComma) {
+  EXPECT_EQ(offered({"sparflow", "benchmark", "--controllers", "joint"}),
+            std::vector<std::string>{"joint_pi"});
+  EXPECT_EQ(offered({"sparflow", "benchmark", "--controllers", "tip_rate,joint"}),
+            std::vector<std::string>{"tip_rate,joint_pi"});
+  EXPECT_THAT(offered({"sparflow", "simulate", "--effects", "no"}), Contains("none"));
+  EXPECT_THAT(offered({"sparflow", "extend", "--add", "coul"}), Contains("coulomb_friction"));
 }
 
 TEST_F(Completion, AValueThatIsANumberOffersNoFile) {

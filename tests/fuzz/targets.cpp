@@ -41,79 +41,82 @@ const Machine& crane() {
   return machine;
 }
 
-/// Calls a reader; refusals are answers.
+/// Calls a reader; refusals are answers. @return whether it took what it got
 template <class Read>
-void answered(const Read& read) {
+bool answered(const Read& read) {
   try {
     read();
+    return true;
   } catch (const InputError&) {
   } catch (const TextError&) {
   } catch (const UsageError&) {
   }
+  return false;
 }
 
-void read_log(const std::string& bytes) {
-  answered([&] { log_from_text("log.csv", bytes, crane()); });
+bool read_log(const std::string& bytes) {
+  return answered([&] { log_from_text("log.csv", bytes, crane()); });
 }
 
-void read_mat_log(const std::string& bytes) {
+bool read_mat_log(const std::string& bytes) {
   // version 7.3 is HDF5's affair, which reads the file itself
-  if (!is_mat_before_73(bytes)) return;
+  if (!is_mat_before_73(bytes)) return false;
   DoorLimits limits;
   limits.log_bytes = 20'000'000;
-  answered([&] { read_matlab("log.mat", bytes, limits); });
+  return answered([&] { read_matlab("log.mat", bytes, limits); });
 }
 
-void read_machine_file(const std::string& bytes) {
-  answered([&] { parse_machine(text_as_utf8("m.yaml", bytes), "m.yaml", "/nonexistent"); });
+bool read_machine_file(const std::string& bytes) {
+  return answered([&] { parse_machine(text_as_utf8("m.yaml", bytes), "m.yaml", "/nonexistent"); });
 }
 
-void read_problem(const std::string& bytes) {
-  answered(
+bool read_problem(const std::string& bytes) {
+  return answered(
       [&] { parse_problem(text_as_utf8("p.yaml", bytes), "p.yaml", "/nonexistent", &crane()); });
 }
 
-void read_model(const std::string& bytes) {
-  answered([&] { model_from_json(text_as_utf8("m.json", bytes), "m.json"); });
+bool read_model(const std::string& bytes) {
+  return answered([&] { model_from_json(text_as_utf8("m.json", bytes), "m.json"); });
 }
 
-void read_mapping(const std::string& bytes) {
-  answered([&] {
+bool read_mapping(const std::string& bytes) {
+  return answered([&] {
     const LogMapping mapping = parse_log_mapping("map.yaml", text_as_utf8("map.yaml", bytes));
     RawTable table = read_delimited("log.csv", "t;x;y\n0;1;2\n1;2;3\n", mapping.dialect);
     apply_mapping(mapping, &table);
   });
 }
 
-void read_effects(const std::string& bytes) {
-  answered([&] { parse_user_effects(text_as_utf8("e.yaml", bytes), "e.yaml", &crane()); });
+bool read_effects(const std::string& bytes) {
+  return answered([&] { parse_user_effects(text_as_utf8("e.yaml", bytes), "e.yaml", &crane()); });
 }
 
-void read_expression(const std::string& bytes) {
-  answered([&] {
+bool read_expression(const std::string& bytes) {
+  const bool read = answered([&] {
     RawTable table = read_delimited("log.csv", "t;x;Time [ms]\n0;1;2\n1;2;3\n", {});
     evaluate_expression(bytes, table, {"map.yaml", 1, 1}, "columns.t_s");
   });
-  answered([&] { parse_unit(bytes); });
+  return answered([&] { parse_unit(bytes); }) || read;
 }
 
-void read_urdf(const std::string& bytes) {
+bool read_urdf(const std::string& bytes) {
   // a file that is nowhere in the file system, because the reader takes a path
   const int fd = ::memfd_create("urdf", MFD_CLOEXEC);
   if (fd < 0 || ::write(fd, bytes.data(), bytes.size()) != static_cast<ssize_t>(bytes.size()))
     std::abort();
   const std::string path = fmt::format("/proc/self/fd/{}", fd);
   std::map<std::string, JointLimitsOverride> limits;
-  answered([&] { import_urdf(path, "", limits, {"m.yaml", 1, 1}); });
+  const bool read = answered([&] { import_urdf(path, "", limits, {"m.yaml", 1, 1}); });
   ::close(fd);
+  return read;
 }
 
-void read_any_recording(const std::string& bytes) {
+bool read_any_recording(const std::string& bytes) {
   RecordingOptions options;
   options.dbc_files = {std::string(SPARFLOW_SOURCE_DIR) + "/tests/fuzz/corpus/dbc/bus.dbc"};
   options.limits.log_bytes = 20'000'000;
   options.limits.log_values = 1'000'000;
-  answered([&] {
+  return answered([&] {
     const Recording recording = read_recording(bytes, "log.mf4", options);
     ClockOptions clock;
     clock.limits = options.limits;
@@ -121,8 +124,8 @@ void read_any_recording(const std::string& bytes) {
   });
 }
 
-void read_dbc(const std::string& bytes) {
-  answered([&] {
+bool read_dbc(const std::string& bytes) {
+  return answered([&] {
     const Dbc dbc = parse_dbc("bus.dbc", text_as_utf8("bus.dbc", bytes));
     // the first frame of every message, all ones
     const std::vector<std::uint8_t> frame(64, 0xFF);

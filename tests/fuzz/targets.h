@@ -7,9 +7,9 @@ namespace sparflow::fuzz {
 
 struct Target {
   const char* name;  ///< also of its folder below tests/fuzz/corpus
-  /// Reads the bytes. It returns, whatever they are: a refusal by InputError, TextError or UsageError is an answer, any
+  /// Reads the bytes. It returns, whatever they are: a refusal by InputError, TextError or UsageError is an answer (false), any
   /// other exception is a finding and leaves the function.
-  void (*read)(const std::string& bytes);
+  bool (*read)(const std::string& bytes);
   std::vector<std::string> seeds;  ///< bundled files that it reads, below problems/
 };
 

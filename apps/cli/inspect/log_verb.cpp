@@ -104,7 +104,7 @@ void add_log_verb(CLI::App& app, int& code) {
       ->type_name("FILE");
   verb->add_option("--dbc", a->reading.dbc_files,
                    "database that decodes CAN frames; may be given several times")
-      ->type_name("FILE");
+      ->type_name("FILE.dbc");
   a->proposal.add_to(*verb);
   a->outputs.add_to(*verb);
   verb->callback([a, &code] { code = run(*a); });

@@ -5,6 +5,8 @@
 #include "apps/cli/shell/shell_completion.h"
 #include "apps/cli/verbs.h"
 #include "models/effects/registry.h"
+#include "simulator/controllers/registry.h"
+#include "simulator/plant/parameters/plant_effects.h"
 
 namespace sparflow::cli {
 namespace {
@@ -42,23 +44,58 @@ std::vector<std::string> effect_ids() {
   return ids;
 }
 
-CompletedOption completed(const CLI::Option& option) {
+std::vector<std::string> plant_effect_ids() {
+  std::vector<std::string> ids = {"none", "all"};
+  for (const plant::PlantEffect& effect : plant::plant_effects()) ids.emplace_back(effect.name);
+  return ids;
+}
+
+/// Endings of the files that an option means, by its type's name ("MODEL.json") or else its description ("logs (CSV, MAT or
+/// a recording)"); none where both are silent.
+std::vector<std::string> endings_of(const std::string& type, const std::string& help) {
+  for (const char* ending : {"json", "csv", "html", "dbc"})
+    if (type.find(std::string(".") + ending) != std::string::npos) return {ending};
+  const auto says = [&](const char* words) { return help.find(words) != std::string::npos; };
+  if (type.rfind("LOG", 0) == 0 || says("CSV, MAT") || help.rfind("logs", 0) == 0)
+    return {"csv", "txt", "mat", "mf4", "mdf", "mcap", "asc", "log"};
+  if (says("YAML") || type.find(".yaml") != std::string::npos) return {"yaml", "yml"};
+  if (says("(CSV)")) return {"csv"};
+  return {};
+}
+
+/// Names of the registry that an option's values are of.
+std::vector<std::string> registered_values(const std::string& verb, const std::string& option,
+                                           const std::string& type) {
+  if (type.rfind("EFFECT", 0) == 0) return effect_ids();
+  if (verb == "benchmark" && type == "NAME") return control::controller_names();
+  if (verb == "simulate" && option == "--effects") return plant_effect_ids();
+  return {};
+}
+
+CompletedOption completed(const std::string& verb, const CLI::Option& option) {
   CompletedOption out;
   for (const std::string& name : option.get_snames()) out.names.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) out.names.push_back("--" + name);
   out.help = option.get_description();
   out.takes_value = option.get_items_expected_max() != 0;
   out.values = permitted_values(option.get_type_name());
-  if (out.takes_value && option.get_type_name().rfind("EFFECT", 0) == 0) out.values = effect_ids();
+  if (out.takes_value && out.values.empty()) {
+    out.values =
+        registered_values(verb, out.names.empty() ? "" : out.names.back(), option.get_type_name());
+  }
   out.takes_file = out.takes_value && out.values.empty() && is_file(option.get_type_name());
+  if (out.takes_file) out.endings = endings_of(option.get_type_name(), out.help);
   return out;
 }
 
 std::vector<CompletedVerb> described(const CLI::App& app) {
   std::vector<CompletedVerb> verbs;
   for (const CLI::App* verb : app.get_subcommands({})) {
-    CompletedVerb out{verb->get_name(), verb->get_description(), {}, {}};
-    for (const CLI::Option* option : verb->get_options()) out.options.push_back(completed(*option));
+    CompletedVerb out{verb->get_name(), verb->get_description(), {}, {}, {}};
+    for (const CLI::Option* option : verb->get_options()) {
+      out.options.push_back(completed(out.name, *option));
+      if (option->get_positional()) out.endings = out.options.back().endings;
+    }
     if (out.name == "effects") out.words = effect_ids();
     if (out.name == "completion") out.words.assign(kShells.begin(), kShells.end());
     verbs.push_back(out);

@@ -40,23 +40,28 @@ std::string zsh_escaped(const std::string& text) {
   return out;
 }
 
+/// Sets `files` to the endings that are offered, or to `*` for any.
+std::string bash_files(const std::vector<std::string>& endings) {
+  if (endings.empty()) return "files='*' ";
+  return fmt::format("files={} ", in_quotes(fmt::format("{}", fmt::join(endings, " "))));
+}
+
 std::string bash_verb(const CompletedVerb& verb) {
   std::string all, cases;
   for (const CompletedOption& option : verb.options) {
     if (option.names.empty()) continue;
     all += fmt::format("{} ", fmt::join(option.names, " "));
     if (!option.takes_value) continue;
-    const char* files = option.takes_file ? "files=1 " : "";
     const std::string offer =
         option.values.empty()
-            ? fmt::format("{}words=", files)
+            ? fmt::format("{}words=", option.takes_file ? bash_files(option.endings) : "")
             : fmt::format("words={}", in_quotes(fmt::format("{}", fmt::join(option.values, " "))));
     cases += fmt::format("        {}) {} ;;\n", fmt::join(option.names, "|"), offer);
   }
   // a verb whose words are known takes no file
   const std::string rest =
-      fmt::format("words={} files={}", in_quotes(fmt::format("{}", fmt::join(verb.words, " "))),
-                  verb.words.empty() ? "1" : "");
+      fmt::format("words={} {}", in_quotes(fmt::format("{}", fmt::join(verb.words, " "))),
+                  verb.words.empty() ? bash_files(verb.endings) : "files=");
   return fmt::format(
       "    {})\n"
       "      options={}\n"
@@ -70,9 +75,15 @@ std::string bash_verb(const CompletedVerb& verb) {
       verb.name, in_quotes(all), rest, cases, rest);
 }
 
+/// zsh offers any file where none has such an ending.
+std::string zsh_files(const std::vector<std::string>& endings) {
+  if (endings.empty()) return "_files";
+  return fmt::format("_files -g \"*.({})\"", fmt::join(endings, "|"));
+}
+
 std::string zsh_value(const CompletedOption& option) {
   if (!option.values.empty()) return fmt::format(":value:({})", fmt::join(option.values, " "));
-  return option.takes_file ? ":file:_files" : ":value: ";
+  return option.takes_file ? ":file:" + zsh_files(option.endings) : ":value: ";
 }
 
 std::string zsh_verb(const CompletedVerb& verb) {
@@ -84,8 +95,9 @@ std::string zsh_verb(const CompletedVerb& verb) {
                                                option.takes_value ? zsh_value(option) : "")));
     }
   }
-  const std::string rest =
-      verb.words.empty() ? "*:file:_files" : fmt::format("*:word:({})", fmt::join(verb.words, " "));
+  const std::string rest = verb.words.empty()
+                               ? "*:file:" + zsh_files(verb.endings)
+                               : fmt::format("*:word:({})", fmt::join(verb.words, " "));
   return out + fmt::format("        {}\n      ;;\n", in_quotes(rest));
 }
 
@@ -124,12 +136,24 @@ std::string bash_completion(const std::vector<CompletedVerb>& verbs) {
       "    COMPREPLY=($(compgen -W \"$options\" -- \"$word\"))\n"
       "    return\n"
       "  fi\n"
-      "  COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
-      "  if [[ -n $files ]]; then\n"
-      "    compopt -o filenames 2>/dev/null\n"
-      "    local IFS=$'\\n'\n"
-      "    COMPREPLY+=($(compgen -f -- \"$word\"))\n"
+      "  # of a list, the word behind the last comma\n"
+      "  local list=\n"
+      "  if [[ -n $words && $word == *,* ]]; then list=${{word%,*}},; fi\n"
+      "  COMPREPLY=($(compgen -P \"$list\" -W \"$words\" -- \"${{word#\"$list\"}}\"))\n"
+      "  if [[ -z $files ]]; then return; fi\n"
+      "  compopt -o filenames 2>/dev/null\n"
+      "  local -a endings found=()\n"
+      "  read -ra endings <<<\"$files\"\n"
+      "  local IFS=$'\\n' ending\n"
+      "  if [[ $files != '*' ]]; then\n"
+      "    for ending in \"${{endings[@]}}\"; do\n"
+      "      found+=($(compgen -f -X \"!*.$ending\" -- \"$word\"))\n"
+      "    done\n"
+      "    # where no file has such an ending, any is offered\n"
+      "    if [[ ${{#found[@]}} != 0 ]]; then found+=($(compgen -d -- \"$word\")); fi\n"
       "  fi\n"
+      "  if [[ ${{#found[@]}} == 0 ]]; then found=($(compgen -f -- \"$word\")); fi\n"
+      "  COMPREPLY+=(\"${{found[@]}}\")\n"
       "}}\n"
       "complete -F _sparflow sparflow\n",
       in_quotes(names_of(verbs) + " help"), in_quotes(names_of(verbs)), cases);

@@ -12,12 +12,15 @@ struct CompletedOption {
   bool takes_value = false;
   std::vector<std::string> values;  ///< values that are permitted; none: a file or a number
   bool takes_file = false;          ///< whether names of files are offered as values
+  std::vector<std::string>
+      endings;  ///< of these files, without dots, offered alone where there are such; none: any
 };
 
 struct CompletedVerb {
   std::string name, help;
   std::vector<CompletedOption> options;
-  std::vector<std::string> words;  ///< what is offered where no option is begun, beside files
+  std::vector<std::string> words;    ///< what is offered where no option is begun, beside files
+  std::vector<std::string> endings;  ///< of the files offered there; none: any
 };
 
 /// @return the script that bash reads at its start

@@ -31,7 +31,7 @@ std::string stage_words(const std::string& stage) {
 /// Rounds to a multiple of `step`, so that rounding errors are shown as 0.
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
-/// One tile for each stage, with its worst quantity, and one for each pump's energy, in the order of the ranking.
+/// One tile for each stage, with the quantity that the ranking puts first (another error may be larger), and one for each pump's energy, in the order of the ranking.
 void add_tiles(Page& page, const CompareResult& result) {
   std::vector<Tile> tiles;
   for (const RankedError* r : result.ranking.worst_of_stages()) {
@@ -42,7 +42,7 @@ void add_tiles(Page& page, const CompareResult& result) {
     const std::size_t space = r->amount.find(' ');
     const std::string unit = r->amount.substr(space + 1, r->amount.rfind(' ') - space - 1);
     tiles.push_back({r->amount.substr(0, space), unit, stage_words(r->stage) + ", RMS error",
-                     fmt::format("{}{}, {:.0f} % explained", of_stage > 1 ? "worst: " : "",
+                     fmt::format("{}{}, {:.0f} % explained", of_stage > 1 ? "ranked worst: " : "",
                                  place_words(*s), r->explained_percent()),
                      tone_of(r->grade)});
   }

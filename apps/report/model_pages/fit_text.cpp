@@ -110,16 +110,22 @@ void check_learned(const FitResult& result, const std::string& file) {
                                lacking));
 }
 
+bool no_pressure_learned(const FitResult& result) {
+  return !result.processes.empty() && result.model.missing().size() == result.processes.size();
+}
+
 std::vector<std::string> learning_gaps(const FitResult& result) {
   if (result.processes.empty()) {
     return {fmt::format(
         "{} has no hydraulic cylinder: there is nothing to learn, only forces are compared",
         result.model.machine.name)};
   }
-  if (result.model.missing().size() != result.processes.size()) return {};
-  return {
-      "no pressure model was learned; the model predicts flows from commands and what the pump "
-      "does, but no working pressures and no energy of a motion"};
+  if (!no_pressure_learned(result)) return {};
+  return {fmt::format(
+      "none of {} pressure models was learned; the model that is written predicts flows from "
+      "commands and what the pump does, but no working pressures and no energy of a motion; the "
+      "notes say what each motion lacks",
+      result.processes.size())};
 }
 
 }  // namespace sparflow

@@ -18,6 +18,9 @@ std::string fit_judgement(const FitResult& result);
 /// @throws InputError that names what the logs lack
 void check_learned(const FitResult& result, const std::string& file);
 
+/// Whether the machine has hydraulic cylinders and no pressure model of any of them was learned.
+bool no_pressure_learned(const FitResult& result);
+
 /// What the model cannot predict, as whole sentences for a warning; empty when it is complete.
 std::vector<std::string> learning_gaps(const FitResult& result);
 

@@ -16,6 +16,7 @@
 #include "models/math/error.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/parallel.h"
+#include "models/math/units.h"
 
 namespace sparflow {
 namespace {
@@ -241,6 +242,8 @@ GpHyper plane_hyper(const Problem& problem) {
 }
 
 void add_warnings(const Problem& problem, const GpHyper& hyper, GpReport& report) {
+  // What is below one measurement's noise is no change that a user could find in the log.
+  const bool above_noise = hyper[2] > hyper[3];
   const auto at_lower = [&](int i) { return hyper[i] <= problem.lower[i] + 1e-6; };
   const char* input[] = {"flow", "force"};
   const bool constant[] = {problem.flow.constant, problem.force.constant};
@@ -250,11 +253,13 @@ void add_warnings(const Problem& problem, const GpHyper& hyper, GpReport& report
           fmt::format("The {} does not vary enough in these samples for the pressure's dependence "
                       "on it to be learned.",
                       input[i]));
-    } else if (at_lower(i)) {
+    } else if (at_lower(i) && above_noise) {
       report.warnings.push_back(fmt::format(
-          "The length-scale of the {} is at its lower bound: the pressure changes more sharply "
-          "than a smooth law does (friction, a dead band, too little data?).",
-          input[i]));
+          "The pressure changes by about {:.2g} bar within {:.0f} % of the range of the "
+          "{}, more sharply than a smooth law does (friction, a dead band, too little "
+          "data?): its length-scale is at its lower bound.",
+          std::exp(0.5 * hyper[2]) * problem.pressure.scale / units::kBar,
+          100.0 * std::exp(problem.lower[i]), input[i]));
     }
   }
   if (!report.converged) {

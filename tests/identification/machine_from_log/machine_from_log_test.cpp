@@ -161,6 +161,46 @@ TEST(MachineFromLogs, FlowTellsAreasWherePayloadDoesNotChange) {
   EXPECT_NEAR(std::get<RackLinkage>(found.machine->cylinders[0].linkage).radius, 0.11, 0.0005);
 }
 
+TEST(MachineFromLogs, IntervalsOfAreasByFlowKnowOfTheSensorsGain) {
+  const Machine truth = load_machine(machine_path("swing_crane"));
+  const std::string text =
+      blanked("swing_crane", {{"bore: 0.090", "bore: unknown"}, {"rod: 0.045", "rod: unknown"}});
+  LogPlan plan;
+  plan.payloads = {300.0};
+  plan.flows = true;
+  plan.flow_noise = 0.05;  // so that rows alone tell far less than a percent
+  plan.flow_gain = 1.007;
+  const MachineFromLog found = found_from(text, truth, plan);
+  ASSERT_TRUE(found.complete()) << machine_from_log_table(found);
+  const FoundValue& bore = value(found, ".bore");
+  EXPECT_GT(bore.value, 0.0902);  // the area follows the sensor
+  EXPECT_LT(std::abs(bore.value - 0.090), bore.half_width);
+  EXPECT_LT(bore.half_width, 0.001);
+}
+
+TEST(MachineFromLogs, AWeightThatLooksLikeAnOffsetIsAskedFor) {
+  // On a straight axis a weight never changes, as an offset of the pressures does not.
+  const std::string text =
+      "name: lift\ngravity: [0, 0, -9.81]\njoints:\n"
+      "  - {name: lift, type: prismatic, parent: base, axis: [0, 0, 1], position: [0, 1], "
+      "velocity: [-0.5, 0.5], acceleration: [-5, 5]}\n"
+      "tip: {joint: lift, xyz: [0, 0, 0]}\nlinks:\n"
+      "  - {name: cage, joint: lift, mass: 150, cog: [0, 0, 0]}\ncylinders:\n"
+      "  - {name: lift, joint: lift, bore: 0.050, rod: 0.035, linkage: {type: direct}}\n"
+      "pumps:\n  - {name: main, type: load_sensing, feeds: [lift], max_flow_lpm: 75, "
+      "max_pressure_bar: 250, standby_bar: 20}\nvalves:\n"
+      "  - {cylinder: lift, max_flow_lpm: {extend: 29.5, retract: 13.2}}\n";
+  const Machine truth = parse_machine(text, "lift.yaml", "");
+  std::string sketch = text;
+  sketch.replace(sketch.find("mass: 150"), 9, "mass: unknown");
+  LogPlan plan;
+  plan.payloads = {0.0};
+  const MachineFromLog found = found_from(sketch, truth, plan);
+  EXPECT_FALSE(found.complete()) << machine_from_log_table(found);
+  ASSERT_THAT(question_paths(found), Contains("links[cage].mass"));
+  EXPECT_THAT(found.questions.front().sentence, HasSubstr("looks like an offset"));
+}
+
 TEST(MachineFromLogs, ExcavatorsKnuckleLengthAndPinsComeBack) {
   const Machine truth = load_machine(machine_path("excavator"));
   const std::string text =

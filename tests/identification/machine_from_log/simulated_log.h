@@ -26,6 +26,7 @@ struct LogPlan {
   double stroke_noise = 5e-4;    ///< [m]
   double pressure_noise = 0.5;   ///< [bar]
   double flow_noise = 0.5;       ///< [l/min]
+  double flow_gain = 1.0;        ///< what the sensor shows of the flow
   double friction = 800.0;       ///< [N] Coulomb, of each cylinder
 };
 
@@ -136,7 +137,8 @@ inline std::vector<LogColumn> simulated_columns(const Machine& machine, const Lo
         columns[b_at[c]].values.push_back(pb / units::kBar + plan.pressure_noise * normal(noise));
       }
       if (plan.flows) {
-        const double flow = std::abs(speed) * (speed > 0.0 ? a : r) / units::kLitrePerMinute;
+        const double flow =
+            plan.flow_gain * std::abs(speed) * (speed > 0.0 ? a : r) / units::kLitrePerMinute;
         columns[flow_at[c]].values.push_back(std::max(0.0, flow + plan.flow_noise * normal(noise)));
       }
     }

@@ -49,6 +49,13 @@ TEST(ChannelUnits, AnElementOfAListIsNoShare) {
   EXPECT_EQ(channel_unit("/pressures.data[1]", "").word, "");
 }
 
+TEST(ChannelUnits, ALastLetterIsTheUnitOfATemperatureOnlyWhereTheNameSaysOne) {
+  EXPECT_EQ(channel_unit("oil_C", "").word, "degC");
+  EXPECT_EQ(channel_unit("TempTank_K", "").word, "K");
+  EXPECT_EQ(channel_unit("gain_k", "").word, "");
+  EXPECT_EQ(channel_unit("sensor_c", "").word, "");
+}
+
 TEST(ChannelSummary, RateGapsMissingResolutionAndNoiseAreThoseOfTheChannel) {
   RecordedChannel channel;
   channel.name = "p";
