@@ -95,8 +95,8 @@ def main():
     program, problems = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
     seeds = sys.argv[3].split(",") if len(sys.argv) > 3 else ["31"]
     seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 100
-    print(f"{'move':<34}{'measured kJ':>12}{'model':>8}{'optimum':>8} | tracked:{'recording':>10}{'proposal':>9} |{'promised %':>11}{'±':>5}"
-          f"{'realised':>9}{'against the log':>16}")
+    print(f"{'move':<34}{'measured kJ':>12}{'model':>8}{'optimum':>8} | tracked:{'recording':>10}{'proposal':>9} |{'promised %':>11}"
+          f"{'±':>5}{'realised':>9}{'against the log':>16}")
     machines, all_moves = {}, []
     with tempfile.TemporaryDirectory() as folder:
         for machine in sys.argv[5:] or MACHINES:
