@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "models/effects/formula/user_effect.h"
 #include "models/effects/registry.h"
@@ -174,6 +175,28 @@ constexpr const char* kSealFriction = R"yaml(effects:
       v0: {unit: mm/s, bounds: [0.5, 50], typical: 5}
       Fc: {unit: N, bounds: [0, 20000], typical: 3000}
 )yaml";
+
+/// `cross_moment` came to the effect in November 2026, as an optional parameter.
+TEST(ModelFile, OfAnEarlierVersionLacksOptionalParametersAlone) {
+  CraneModel model = small_model();
+  AppliedEffect mass;
+  const EffectAt at = parse_effect("unmodelled_mass:arm", model.machine);
+  mass.effect = at.effect;
+  mass.at = at.at;
+  mass.values = {60.0, 90.0, 12.0};
+  mass.lower95 = {50.0, 80.0, 10.0};
+  mass.upper95 = {70.0, 100.0, 14.0};
+  model.effects = {mass};
+  nlohmann::json text = nlohmann::json::parse(model_to_json(model));
+  nlohmann::json& parameters = text["effects"][0]["parameters"];
+  ASSERT_EQ(parameters.size(), 3U);
+  parameters.erase(2);
+  const CraneModel read = model_from_json(text.dump(), "m.json");
+  EXPECT_EQ(read.effects.at(0).values, (std::vector<double>{60.0, 90.0, 0.0}));
+  EXPECT_EQ(read.effects[0].upper95, (std::vector<double>{70.0, 100.0, 0.0}));
+  parameters.erase(1);  // the moment along the link is no optional one
+  EXPECT_THROW(model_from_json(text.dump(), "m.json"), InputError);
+}
 
 TEST(ModelFile, ContainsUserEffects) {
   const UserEffectScope scope;
