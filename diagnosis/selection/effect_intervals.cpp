@@ -64,13 +64,53 @@ bool may_be_plainer(const Effect& effect, const std::vector<double>& values,
   return false;
 }
 
+/// Relative residual of a linear parameter's action beside those of the parameters before it below which it is the same
+/// action: a mass at a link's end and the moment of the link before it.
+/// @threshold [1] 0..1e-2; numerical: difference quotients of masses and angles are right to five digits
+constexpr double kSameAction = 1e-4;
+
+/// Takes parameters whose action is that of former ones out of the designs: the logs cannot tell them apart whatever the motion.
+void drop_same_actions(const Evidence& evidence, std::vector<EffectDesign>& designs) {
+  Index count = 0;
+  for (const EffectDesign& d : designs) count += d.linear;
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(count, count);
+  for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+    const EvidenceChannel& channel = evidence.channels[c];
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(channel.rows(), count);
+    Index at = 0;
+    for (const EffectDesign& d : designs) {
+      if (d.touches(c)) columns.middleCols(at, d.linear) = d.columns[c].leftCols(d.linear);
+      at += d.linear;
+    }
+    const double squares = channel.y.squaredNorm();
+    if (squares > 0.0) gram += columns.transpose() * columns / squares;
+  }
+  // Cholesky's factor column by column; one whose diagonal vanishes adds nothing to those before it
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(count, count);
+  Index k = 0;
+  for (EffectDesign& d : designs) {
+    for (Index own = 0; own < d.linear; ++own, ++k) {
+      const double left = gram(k, k) - factor.row(k).head(k).squaredNorm();
+      if (left > kSameAction * kSameAction * gram(k, k)) {
+        factor(k, k) = std::sqrt(left);
+        for (Index r = k + 1; r < count; ++r)
+          factor(r, k) =
+              (gram(r, k) - factor.row(r).head(k).dot(factor.row(k).head(k))) / factor(k, k);
+        continue;
+      }
+      for (Eigen::MatrixXd& m : d.columns)
+        if (m.cols() > 0) m.col(own).setZero();
+    }
+  }
+}
+
 /// A linear parameter that acts in no channel gets an interval that says nothing; where it cannot be zero, its typical value,
 /// too. An optional one is absent then.
-void set_undetermined(FoundEffect& f) {
+void set_undetermined(const EffectDesign& design, FoundEffect& f) {
   Index linear = 0;
-  const std::vector<EffectParameter>& parameters = f.design.effect.effect->info().parameters;
+  const std::vector<EffectParameter>& parameters = design.effect.effect->info().parameters;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (!parameters[k].linear || f.design.parameter_acts(linear++) || parameters[k].optional)
+    if (!parameters[k].linear || design.parameter_acts(linear++) || parameters[k].optional)
       continue;
     const double half = 2.0 * kUndeterminedWidth * parameters[k].typical;
     if (parameters[k].lower > 0.0) f.values[k] = parameters[k].typical;
@@ -85,6 +125,8 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
   std::vector<EffectDesign> designs;
   designs.reserve(found.size());
   for (const FoundEffect& f : found) designs.push_back(f.design);
+  drop_same_actions(evidence, designs);
+  const std::vector<EffectDesign> plain_designs = designs;
   const EffectFit fit = fit_effects(evidence, pointers(designs), nullptr, all_rows_alike());
   Index first = 0;
   for (EffectDesign& d : designs) {  // one more column for each nonlinear parameter
@@ -121,7 +163,7 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
       f.lower95[k] -= whole;
       f.upper95[k] += whole;
     }
-    set_undetermined(f);
+    set_undetermined(plain_designs[i], f);
     plain += linear;
     at += designs[i].linear;
   }

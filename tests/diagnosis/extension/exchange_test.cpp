@@ -7,6 +7,8 @@
 #include <filesystem>
 
 #include "diagnosis/extension/extend.h"
+#include "diagnosis/selection/effect_estimate.h"
+#include "identification/comparison/report_numbers.h"
 #include "identification/learning/fit.h"
 #include "models/effects/registry.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -48,6 +50,24 @@ TEST(ImproveExchange, TheBetterOfTwoConfusedEffectsStaysWhicheverCameFirst) {
   const HiddenCase offset = hidden_case(machine, {{"angle_offset", "jib", 1.0, 0}}, {7, 100.0});
   EXPECT_THAT(after_exchange(machine, offset.train, "unmodelled_mass:jib"),
               ElementsAre("angle_offset:jib"));
+}
+
+/// A mass at the end of the boom, on the jib's link, loads all cylinders as a moment of the boom does: the one that comes second
+/// takes no part, and the first has an interval that says something.
+TEST(EstimateEffects, OfTwoParametersWithTheSameActionTheSecondTakesNoPart) {
+  const Machine machine = drawn_machine("loader_crane");
+  const HiddenCase logs = hidden_case(machine, {{"unmodelled_mass", "jib", 1.0, 0}}, {7, 60.0});
+  const EffectEstimate e = estimate_effects(
+      fit(machine, {logs.train}).model,
+      {parse_effect("unmodelled_mass:jib", machine), parse_effect("unmodelled_mass:boom", machine)},
+      {{make_signals(machine, logs.train)}});
+  const AppliedEffect &jib = e.effects[0], &boom = e.effects[1];
+  const double truth = logs.truth("unmodelled_mass", "mass");
+  EXPECT_NEAR(jib.values[0], truth, 0.1 * truth);
+  EXPECT_LT(jib.upper95[0] - jib.lower95[0], truth);
+  EXPECT_EQ(boom.values[1], 0.0);
+  EXPECT_FALSE(is_determined(boom.values[1], boom.lower95[1], boom.upper95[1],
+                             boom.effect->info().parameters[1].typical));
 }
 
 }  // namespace
