@@ -478,13 +478,22 @@ Evidence collect_evidence(const CraneModel& model, const std::vector<MachineSign
                           const EvidenceOptions& options) {
   EvidenceCollector collector(model, suspects, references, options);
   collector.add_logs(in_references);
+  const auto wanted = [&](std::initializer_list<EvidenceKind> kinds) {
+    return options.kinds.empty() ||
+           std::find_first_of(options.kinds.begin(), options.kinds.end(), kinds.begin(),
+                              kinds.end()) != options.kinds.end();
+  };
+  using enum EvidenceKind;
   for (int i = 0; i < model.machine.cylinder_count(); ++i) {
-    collector.add_force_channel(i);
-    collector.add_flow_channel(i);
-    collector.add_pressure_channels(i);
+    if (wanted({kForce})) collector.add_force_channel(i);
+    if (wanted({kFlow})) collector.add_flow_channel(i);
+    if (wanted({kReturnExtend, kReturnRetract, kSupplyExtend, kSupplyRetract}))
+      collector.add_pressure_channels(i);
   }
-  for (int p = 0; p < model.machine.pump_count(); ++p) collector.add_pump_channel(p);
-  if (!hydraulic_cylinders(model.machine).empty()) collector.add_return_line_channel();
+  for (int p = 0; wanted({kPump}) && p < model.machine.pump_count(); ++p)
+    collector.add_pump_channel(p);
+  if (wanted({kReturnLine}) && !hydraulic_cylinders(model.machine).empty())
+    collector.add_return_line_channel();
   return collector.finished();
 }
 

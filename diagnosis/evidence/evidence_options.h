@@ -120,6 +120,8 @@ struct EvidenceOptions {
   /// Uses unfiltered rows up to the ends of each motion, for signals whose own window is so short
   /// (sharpest_window) that it distorts nothing.
   bool whole_motions = false;
+  /// Kinds of channels that are collected; empty = all. An estimate needs those in which its effects show.
+  std::vector<EvidenceKind> kinds;
   /// Effects of the model that act in reference and suspect logs alike. Their linear parameters are estimated anew in
   /// each channel, as columns of its baseline: an error of their values is no difference between the logs.
   std::vector<AppliedEffect> shared;

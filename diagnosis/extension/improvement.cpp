@@ -51,6 +51,12 @@ std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const Ef
   return out;
 }
 
+/// Whether an effect acts on pressures alone, beside what is learned.
+bool acts_on_learned_laws(const EffectAt& e) {
+  const EffectStage stage = e.effect->info().stage;
+  return stage == EffectStage::kPressure || stage == EffectStage::kPump;
+}
+
 std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
   std::erase(list, e);
   return list;
@@ -99,10 +105,11 @@ void Improvement::test_again(const SearchProgress& progress) {
   added_ = still;
 }
 
-std::optional<CompareResult> Improvement::errors_with(const Joint& joint,
-                                                      const std::vector<EffectAt>& effects,
-                                                      const SearchProgress& progress) const try {
-  return context_.measured_errors(joint.judged.model, effects, progress);
+std::optional<CompareResult> Improvement::errors_after(const Joint& joint, const Exchange& change,
+                                                       const SearchProgress& progress) const try {
+  std::vector<EffectAt> all = without(joint.all, change.out);
+  all.push_back(change.in);
+  return context_.cross_validated(joint.measured, all, {change.out, change.in}, progress).errors;
 } catch (const InputError&) {
   return std::nullopt;
 }
@@ -117,17 +124,17 @@ std::optional<Improvement::Exchange> Improvement::best_exchange(
     if (e.effect->info().stage != EffectStage::kForce) continue;
     for (const EffectAt& rival : confused_with(among, e)) {
       if (contains(joint.all, rival)) continue;
-      std::vector<EffectAt> all = without(joint.all, e);
-      all.push_back(rival);
-      const std::optional<CompareResult> errors = errors_with(joint, all, progress);
+      Exchange tried{e, rival};
+      const std::optional<CompareResult> errors = errors_after(joint, tried, progress);
       if (!errors) continue;
-      const ErrorChange change =
-          error_change(context_.machine(), joint.measured, *errors, {{"force"}, ""}, options);
+      const ErrorChange change = error_change(context_.machine(), joint.measured.errors, *errors,
+                                              {{"force"}, ""}, options);
+      tried.own = change.own;
       const bool beyond_chance =
           std::log(change.overall) < -options.standard_errors * change.overall_deviation;
       if (beyond_chance && change.own * options.refit_moves < 1.0 &&
           (!best || change.own < best->own))
-        best = Exchange{e, rival, change.own};
+        best = tried;
     }
   }
   return best;
@@ -186,7 +193,9 @@ Improvement::Joint Improvement::joint(const Trial& trial, const SearchProgress& 
   Joint j;
   j.judged = context_.with(current_, trial.effects, progress);
   j.all = places_of(j.judged.model.effects);
-  j.measured = context_.measured_errors(j.judged.model, j.all, progress);
+  j.measured = context_.cross_validated(j.judged.model, j.all, progress);
+  if (std::any_of(j.all.begin(), j.all.end(), acts_on_learned_laws))
+    j.of_all = context_.errors_of_all(j.measured);
   j.on_tests = context_.tested_errors(j.judged.model, j.all, progress);
   return j;
 }
@@ -196,31 +205,32 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   const ExtendOptions& options = context_.options();
   const CraneModel& model = joint.judged.model;
   const std::vector<EffectAt> rest = without(joint.all, e);
-  const EffectStage stage = e.effect->info().stage;
-  const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+  const bool learned = acts_on_learned_laws(e);
   Tested tested;
   ExtendStep& step = tested.step;
   step.added = effect_key(e.effect->info(), model.machine, e.at);
   step.title = effect_title(e.effect->info(), model.machine, e.at);
   step.effect = model.effects[static_cast<std::size_t>(
       std::find(joint.all.begin(), joint.all.end(), e) - joint.all.begin())];
-  if (learned) {
-    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
-               step);
-  } else {
-    judge_step(context_, e, context_.measured_errors(model, rest, progress), joint.measured, step);
-    step.judged_on = context_.measured_on();
-  }
+  const CrossValidated left = context_.cross_validated(joint.measured, rest, {e}, progress);
+  judge_step(context_, e, learned ? context_.errors_of_all(left) : left.errors,
+             learned ? *joint.of_all : joint.measured.errors, step);
+  step.judged_on = context_.measured_on();
   step.determined = is_determined(step.effect);
   const double change = std::min(step.change.own, step.change.own_steady);
   const bool falls = change * options.change.refit_moves < 1.0;
   // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
   const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
   tested.stays = step.determined && (falls || unseen);
-  if (!tested.stays || !joint.on_tests || learned) return tested;
+  if (!tested.stays || !joint.on_tests) return tested;
   // Test logs do not choose an effect, but may contradict it.
   ExtendStep test = step;
-  judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
+  if (learned) {
+    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
+               test);
+  } else {
+    judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
+  }
   tested.stays = !harms_its_own_place(test, model.machine, e);
   if (!tested.stays) step = std::move(test);
   return tested;

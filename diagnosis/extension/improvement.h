@@ -50,8 +50,9 @@ class Improvement {
   struct Joint {
     Judged judged;
     std::vector<EffectAt> all;
-    CompareResult measured;
-    std::optional<CompareResult> on_tests;
+    CrossValidated measured;
+    std::optional<CompareResult> of_all;    ///< where one of them acts on pressures alone
+    std::optional<CompareResult> on_tests;  ///< forces and flows
   };
   /// An effect taken out of a joint set, and whether the data bear it out.
   struct Tested {
@@ -64,9 +65,9 @@ class Improvement {
     EffectAt out, in;
     double own = 1.0;  ///< [-] error of the forces after over before
   };
-  /// Errors of forces and flows with these effects; absent where one of them acts nowhere in these logs.
-  std::optional<CompareResult> errors_with(const Joint& joint, const std::vector<EffectAt>& effects,
-                                           const SearchProgress& progress) const;
+  /// Errors of forces and flows after an exchange; absent where the effect acts nowhere in these logs.
+  std::optional<CompareResult> errors_after(const Joint& joint, const Exchange& change,
+                                            const SearchProgress& progress) const;
   /// The exchange that lowers the error most, if there is one.
   std::optional<Exchange> best_exchange(const Joint& joint, const SearchProgress& progress) const;
 
@@ -86,8 +87,8 @@ class Improvement {
 
   Joint joint(const Trial& trial, const SearchProgress& progress) const;
 
-  /// The step that takes one effect out of a joint set. The errors of forces and flows are those of a cross-validation;
-  /// effects on pressures alone are judged as a step is.
+  /// The step that takes one effect out of a joint set, with the errors of a cross-validation: for effects on pressures
+  /// alone of everything, else of forces and flows. Test logs may contradict it.
   Tested without_one(const Joint& joint, const EffectAt& e, const SearchProgress& progress) const;
 
   /// Of the tested effects the one that the data bear out least, if they do not bear out all.

@@ -28,6 +28,30 @@ void keep_what_was_learned(const CraneModel& old, CraneModel& model) {
   }
 }
 
+/// Those of the effects that show in a quantity in which a changed one shows, or another one of these.
+std::vector<EffectAt> connected(std::vector<EffectAt> effects,
+                                const std::vector<EffectAt>& changed) {
+  std::vector<EvidenceKind> kinds;
+  const auto add = [&](const EffectAt& e) {
+    const std::vector<EvidenceKind> more = e.effect->shows_in();
+    kinds.insert(kinds.end(), more.begin(), more.end());
+  };
+  for (const EffectAt& e : changed) add(e);
+  const auto shows = [&](const EffectAt& e) {
+    const std::vector<EvidenceKind> in = e.effect->shows_in();
+    return std::find_first_of(in.begin(), in.end(), kinds.begin(), kinds.end()) != in.end();
+  };
+  std::vector<EffectAt> out;
+  for (bool more = true; more;) {
+    const auto rest = std::stable_partition(effects.begin(), effects.end(), shows);
+    more = rest != effects.begin();
+    std::for_each(effects.begin(), rest, add);
+    out.insert(out.end(), effects.begin(), rest);
+    effects.erase(effects.begin(), rest);
+  }
+  return out;
+}
+
 bool learned_from(const CraneModel& model, const Log& log) {
   return std::any_of(model.data.begin(), model.data.end(), [&](const DataSource& d) {
     return d.use == "train" && d.sha256 == log.sha256;
@@ -99,24 +123,24 @@ Judged RefitContext::as_references_say(const CraneModel& model, std::vector<std:
   return out;
 }
 
-EffectEstimate RefitContext::estimate(CraneModel base, const std::vector<EffectAt>& effects,
+EffectEstimate RefitContext::estimate(CraneModel base, const EffectSet& effects,
                                       const std::vector<Mask>& leave_out,
                                       const SearchProgress& progress) const {
   const auto in = [](const auto& list, const auto& e) {
     return std::any_of(list.begin(), list.end(),
                        [&](const auto& o) { return o.effect == e.effect && o.at == e.at; });
   };
-  std::erase_if(base.effects, [&](const AppliedEffect& k) { return !in(effects, k); });
+  std::erase_if(base.effects, [&](const AppliedEffect& k) { return !in(effects.all, k); });
   std::vector<AppliedEffect> in_references = in_references_;
-  std::erase_if(in_references, [&](const AppliedEffect& k) { return !in(effects, k); });
-  std::vector<EffectAt> wanted = effects;
+  std::erase_if(in_references, [&](const AppliedEffect& k) { return !in(effects.all, k); });
+  std::vector<EffectAt> wanted = effects.estimated;
   std::erase_if(wanted, [&](const EffectAt& e) { return in(in_references, e); });
   EstimateOptions how;
   how.evidence = options_.diagnose.evidence;
   EffectEstimate estimate = estimate_effects(
       base, wanted, {signals_, references_, leave_out, std::move(in_references)}, progress, how);
   std::vector<AppliedEffect> all;
-  for (const EffectAt& e : effects) {
+  for (const EffectAt& e : effects.all) {
     for (const auto* list : {&estimate.effects, &base.effects}) {
       const auto it = std::find_if(list->begin(), list->end(), [&](const AppliedEffect& a) {
         return a.effect == e.effect && a.at == e.at;
@@ -137,13 +161,14 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
       if (progress) progress(first + width * share, what);
     };
   };
-  EffectEstimate all = estimate(from.model, effects, {}, part(0.0, 0.4));
+  EffectEstimate all = estimate(from.model, {effects, effects}, {}, part(0.0, 0.4));
   Judged out;
   out.effects_held_out = all.effects;
   if (!held_.empty()) {
     CraneModel base = from.model;
     base.effects = from.effects_held_out;
-    out.effects_held_out = estimate(std::move(base), effects, held_, part(0.4, 0.2)).effects;
+    out.effects_held_out =
+        estimate(std::move(base), {effects, effects}, held_, part(0.4, 0.2)).effects;
   }
   if (notes != nullptr) *notes = all.notes;
   if (!references_.empty()) {
@@ -173,8 +198,7 @@ Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effec
   return out;
 }
 
-CraneModel RefitContext::measured_model(const CraneModel& from,
-                                        const std::vector<EffectAt>& effects,
+CraneModel RefitContext::measured_model(const CraneModel& from, const EffectSet& effects,
                                         const std::vector<Mask>& left_out,
                                         const SearchProgress& progress) const {
   FitOptions how = options_.fit;
@@ -185,22 +209,57 @@ CraneModel RefitContext::measured_model(const CraneModel& from,
   return model;
 }
 
-CompareResult RefitContext::measured_errors(const CraneModel& from,
-                                            const std::vector<EffectAt>& effects,
-                                            const SearchProgress& progress) const {
-  if (folds_.empty()) return judge(measured_model(from, effects, {}, progress));
+const std::vector<Mask>& RefitContext::fold(std::size_t f) const {
+  static const std::vector<Mask> kNone;
+  return folds_.empty() ? kNone : folds_[f];
+}
+
+CompareResult RefitContext::errors_on_folds(const std::vector<CraneModel>& models) const {
+  if (folds_.empty()) return judge(models.front());
   std::vector<CompareResult> parts;
-  for (const std::vector<Mask>& fold : folds_)
-    parts.push_back(compare_signals(measured_model(from, effects, fold, progress), signals_, fold,
-                                    compare_options()));
+  for (std::size_t f = 0; f < folds_.size(); ++f)
+    parts.push_back(compare_signals(models[f], signals_, folds_[f], compare_options()));
   return join_results(machine_, std::move(parts));
+}
+
+CrossValidated RefitContext::cross_validated(const CraneModel& from,
+                                             const std::vector<EffectAt>& effects,
+                                             const SearchProgress& progress) const {
+  CrossValidated out;
+  for (std::size_t f = 0; f < fold_count(); ++f)
+    out.models.push_back(measured_model(from, {effects, effects}, fold(f), progress));
+  out.errors = errors_on_folds(out.models);
+  return out;
+}
+
+CrossValidated RefitContext::cross_validated(const CrossValidated& was,
+                                             const std::vector<EffectAt>& effects,
+                                             const std::vector<EffectAt>& changed,
+                                             const SearchProgress& progress) const {
+  const std::vector<EffectAt> again = connected(effects, changed);
+  CrossValidated out;
+  for (std::size_t f = 0; f < fold_count(); ++f)
+    out.models.push_back(measured_model(was.models[f], {effects, again}, fold(f), progress));
+  out.errors = errors_on_folds(out.models);
+  return out;
+}
+
+CompareResult RefitContext::errors_of_all(const CrossValidated& of) const {
+  if (!references_.empty()) return of.errors;
+  std::vector<CraneModel> models;
+  for (std::size_t f = 0; f < fold_count(); ++f) {
+    FitOptions how = options_.fit;
+    how.effects = of.models[f].effects;
+    models.push_back(fit_without(machine_, signals_, fold(f), how));
+  }
+  return errors_on_folds(models);
 }
 
 std::optional<CompareResult> RefitContext::tested_errors(const CraneModel& from,
                                                          const std::vector<EffectAt>& effects,
                                                          const SearchProgress& progress) const {
   if (logs_.tests.empty()) return std::nullopt;
-  return judge(measured_model(from, effects, {}, progress));
+  return judge(measured_model(from, {effects, effects}, {}, progress));
 }
 
 std::vector<DataSource> RefitContext::data() const {

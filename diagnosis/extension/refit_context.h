@@ -1,6 +1,7 @@
 #pragma once
 /// The refit context: logs, options and held-out motions of one extension, on which models with other effects are
 /// learned and judged. Used by extend.cpp only.
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,13 @@ struct Judged {
   CompareResult error;
   /// Its effects estimated without the held-out motions; as in the model where nothing is held out.
   std::vector<AppliedEffect> effects_held_out;
+};
+
+/// Models of one set of effects, each of which was estimated without one fold of the motions, and their errors there.
+struct CrossValidated {
+  std::vector<CraneModel>
+      models;  ///< by fold; forces, flows and effects only. One of all rows where nothing is held out.
+  CompareResult errors;  ///< of forces and flows
 };
 
 class RefitContext {
@@ -44,32 +52,49 @@ class RefitContext {
   Judged with(const Judged& from, const std::vector<EffectAt>& effects,
               const SearchProgress& progress, std::vector<std::string>* notes = nullptr) const;
 
-  /// Errors of forces and flows with these effects by cross-validation over all motions of the logs to learn from: the
-  /// effects are estimated, and the valve gains learned, without the motions that they are judged on. Pressures take no part,
-  /// so that this takes a fraction of the time of `with`.
-  CompareResult measured_errors(const CraneModel& from, const std::vector<EffectAt>& effects,
-                                const SearchProgress& progress) const;
+  /// The effects estimated, and the valve gains learned, without the motions that they are judged on. Pressures take no
+  /// part, so that this takes a fraction of the time of `with`.
+  CrossValidated cross_validated(const CraneModel& from, const std::vector<EffectAt>& effects,
+                                 const SearchProgress& progress) const;
+  /// The same with other effects. Only those are estimated anew that show in the quantities in which a changed one
+  /// shows, directly or through others; the rest does not depend on it.
+  /// @param changed effects that `was` has and `effects` does not, or the other way round
+  CrossValidated cross_validated(const CrossValidated& was, const std::vector<EffectAt>& effects,
+                                 const std::vector<EffectAt>& changed,
+                                 const SearchProgress& progress) const;
+  /// Errors of everything, pressures included, by the same cross-validation; all laws are learned for each fold.
+  CompareResult errors_of_all(const CrossValidated& of) const;
 
-  /// The same on the test logs, which may contradict an effect; without test logs empty.
+  /// Errors of forces and flows on the test logs, which may contradict an effect; without test logs empty.
   std::optional<CompareResult> tested_errors(const CraneModel& from,
                                              const std::vector<EffectAt>& effects,
                                              const SearchProgress& progress) const;
 
-  /// Data on which `measured_errors` judges, as `judged_on` names it.
+  /// Data on which a cross-validation judges, as `judged_on` names it.
   std::string measured_on() const { return folds_.empty() ? judged_on_ : "held-out motions"; }
 
   /// Training and test logs, for the record.
-  /// The model of forces and flows with these effects, estimated and learned without some samples.
-  /// @param left_out [logs] masks of these samples; empty = none
-  CraneModel measured_model(const CraneModel& from, const std::vector<EffectAt>& effects,
-                            const std::vector<Mask>& left_out,
-                            const SearchProgress& progress) const;
   std::vector<DataSource> data() const;
 
  private:
-  /// @param base its effects that are not in `effects` are left out  @param leave_out [logs] masks; empty = none
-  EffectEstimate estimate(CraneModel base, const std::vector<EffectAt>& effects,
+  /// A set of effects, and those of them that are estimated; the others keep their values.
+  struct EffectSet {
+    const std::vector<EffectAt>& all;
+    const std::vector<EffectAt>& estimated;
+  };
+  /// @param base its effects that are not in the set are left out  @param leave_out [logs] masks; empty = none
+  EffectEstimate estimate(CraneModel base, const EffectSet& effects,
                           const std::vector<Mask>& leave_out, const SearchProgress& progress) const;
+  /// The model of forces and flows with these effects, estimated and learned without some samples.
+  /// @param left_out [logs] masks of these samples; empty = none
+  CraneModel measured_model(const CraneModel& from, const EffectSet& effects,
+                            const std::vector<Mask>& left_out,
+                            const SearchProgress& progress) const;
+  /// Folds of the cross-validation; where nothing is held out a single one without samples.
+  std::size_t fold_count() const { return std::max<std::size_t>(1, folds_.size()); }
+  const std::vector<Mask>& fold(std::size_t f) const;
+  /// Joint errors of one model for each fold, on that fold's samples.
+  CompareResult errors_on_folds(const std::vector<CraneModel>& models) const;
   Judged as_references_say(const CraneModel& model, std::vector<std::string>& notes,
                            const SearchProgress& progress) const;
   CompareOptions compare_options() const;

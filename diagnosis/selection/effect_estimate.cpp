@@ -75,6 +75,17 @@ EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& lea
   return out;
 }
 
+/// Kinds of channels in which these effects show.
+std::vector<EvidenceKind> kinds_of(const std::vector<EffectAt>& effects) {
+  std::vector<EvidenceKind> out;
+  for (const EffectAt& e : effects) {
+    for (const EvidenceKind k : e.effect->shows_in()) {
+      if (std::find(out.begin(), out.end(), k) == out.end()) out.push_back(k);
+    }
+  }
+  return out;
+}
+
 class Estimator {
  public:
   Estimator(const CraneModel& model, const std::vector<EffectAt>& wanted, EstimateLogs logs,
@@ -93,6 +104,7 @@ class Estimator {
                          [&](const EffectAt& e) { return a.effect == e.effect && a.at == e.at; });
     });
     in_references_ = logs.in_references.value_or(base_.effects);
+    options_.evidence.kinds = kinds_of(wanted);
     evidence_ = collect(base_);
     active_.assign(evidence_.channels.size(), false);
     for (const EffectAt& e : wanted) add_design(model, e);

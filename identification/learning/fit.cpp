@@ -126,6 +126,14 @@ std::vector<Mask> inside(const std::vector<MachineSignals>& signals) {
   return out;
 }
 
+/// @param left_out [logs] masks; empty = none
+std::vector<Mask> inside_without(const std::vector<MachineSignals>& signals,
+                                 const std::vector<Mask>& left_out) {
+  std::vector<Mask> counts = inside(signals);
+  for (std::size_t l = 0; l < left_out.size(); ++l) counts[l] = counts[l] && !left_out[l];
+  return counts;
+}
+
 /// Judges a model that is learned without the held-out blocks of motion on these blocks.
 /// @param signals lent to the comparison where they come back as they were, which spares a copy
 std::optional<CompareResult> judge_held_out(const Machine& machine,
@@ -138,11 +146,9 @@ std::optional<CompareResult> judge_held_out(const Machine& machine,
         "no error on held-out motions: the logs hold too few separate motions; give --test logs");
     return std::nullopt;
   }
-  std::vector<Mask> counts = inside(signals);
-  for (std::size_t l = 0; l < held.size(); ++l) counts[l] = counts[l] && !held[l];
   FitOptions without = options;
   if (!options.effects_held_out.empty()) without.effects = options.effects_held_out;
-  const FitPass pass = learn(machine, signals, std::move(counts), without, {});
+  const FitPass pass = learn(machine, signals, inside_without(signals, held), without, {});
   CompareOptions compare_options;
   compare_options.signals = options.signals;
   compare_options.find_regions = false;
@@ -176,10 +182,14 @@ CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<Machin
   pass.model = CraneModel::untrained(machine);
   pass.model.effects = options.effects;
   const std::vector<MachineSignals> with = all_with_effects(pass.model, signals);
-  TrainingData data{&with, inside(signals)};
-  for (std::size_t l = 0; l < left_out.size(); ++l) data.counts[l] = data.counts[l] && !left_out[l];
+  TrainingData data{&with, inside_without(signals, left_out)};
   learn_valves(data, options.valve, pass);
   return std::move(pass.model);
+}
+
+CraneModel fit_without(const Machine& machine, const std::vector<MachineSignals>& signals,
+                       const std::vector<Mask>& left_out, const FitOptions& options) {
+  return learn(machine, signals, inside_without(signals, left_out), options, {}).model;
 }
 
 namespace {

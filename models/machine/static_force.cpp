@@ -120,7 +120,7 @@ StaticForce::StaticForce(const Machine& machine) : machine_(&machine), chain_(ma
   torque_hessian_.assign(joints, Eigen::MatrixXd::Zero(n, n));
   force_hessian_.assign(cylinders, Eigen::MatrixXd::Zero(n, n));
   lengths_.resize(cylinders);
-  linkage_masses_.reserve(4);
+  std::apply([](auto&... masses) { (masses.reserve(4), ...); }, linkage_masses_);
   first_.resize(joints);
   second_.resize(joints);
   third_.resize(joints);
@@ -128,7 +128,37 @@ StaticForce::StaticForce(const Machine& machine) : machine_(&machine), chain_(ma
   rigid_mass_.resize(joints);
 }
 
-void StaticForce::accumulate_moments(const double* q, double payload) {
+void StaticForce::add_rigid(double mass, int joint, const Eigen::Vector3d& p) {
+  if (joint < 0) return;
+  rigid_mass_[static_cast<std::size_t>(joint)] += mass;
+  rigid_moment_[static_cast<std::size_t>(joint)] += mass * p;
+}
+
+template <int derivatives>
+void StaticForce::add_linkage_masses(const double* q) {
+  using Series = TaylorSeries<derivatives>;
+  auto& masses = std::get<derivatives - 1>(linkage_masses_);
+  for (int c = 0; c < machine_->cylinder_count(); ++c) {
+    const int j = machine_->cylinders[static_cast<std::size_t>(c)].joint;
+    masses.clear();
+    append_linkage_masses(*machine_, c, Series::variable(q[j]), masses);
+    for (const LinkageMass<Series>& m : masses) {
+      const auto part = [&](int order) {
+        return Eigen::Vector3d(m.position[0].derivative(order), m.position[1].derivative(order),
+                               m.position[2].derivative(order));
+      };
+      const Eigen::Matrix3d turn = j > 0 ? chain_.rotation[static_cast<std::size_t>(j - 1)]
+                                         : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+      const auto k = static_cast<std::size_t>(j);
+      first_[k] += m.mass * (turn * part(1));
+      if constexpr (derivatives >= 2) second_[k] += m.mass * (turn * part(2));
+      if constexpr (derivatives >= 3) third_[k] += m.mass * (turn * part(3));
+      add_rigid(m.mass, j - 1, chain_.point(j - 1, part(0)));
+    }
+  }
+}
+
+void StaticForce::accumulate_moments(const double* q, double payload, int order) {
   const int n = machine_->joint_count();
   for (std::size_t k = 0; k < first_.size(); ++k) {
     first_[k].setZero();
@@ -137,11 +167,6 @@ void StaticForce::accumulate_moments(const double* q, double payload) {
     rigid_moment_[k].setZero();
     rigid_mass_[k] = 0.0;
   }
-  const auto add_rigid = [&](double mass, int joint, const Eigen::Vector3d& p) {
-    if (joint < 0) return;
-    rigid_mass_[static_cast<std::size_t>(joint)] += mass;
-    rigid_moment_[static_cast<std::size_t>(joint)] += mass * p;
-  };
   for (const Link& link : machine_->links) {
     Eigen::Vector3d p = chain_.point(link.joint, link.cog);
     if (link.slides_with >= 0) {
@@ -155,23 +180,12 @@ void StaticForce::accumulate_moments(const double* q, double payload) {
     add_rigid(machine_->tip.payload_scale * payload, machine_->tip.joint,
               chain_.point(machine_->tip.joint, machine_->tip.xyz));
   }
-  for (int c = 0; c < machine_->cylinder_count(); ++c) {
-    const int j = machine_->cylinders[static_cast<std::size_t>(c)].joint;
-    linkage_masses_.clear();
-    append_linkage_masses(*machine_, c, TaylorSeries<3>::variable(q[j]), linkage_masses_);
-    for (const LinkageMass<TaylorSeries<3>>& m : linkage_masses_) {
-      const auto part = [&](int order) {
-        return Eigen::Vector3d(m.position[0].derivative(order), m.position[1].derivative(order),
-                               m.position[2].derivative(order));
-      };
-      const Eigen::Matrix3d turn = j > 0 ? chain_.rotation[static_cast<std::size_t>(j - 1)]
-                                         : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-      const auto k = static_cast<std::size_t>(j);
-      first_[k] += m.mass * (turn * part(1));
-      second_[k] += m.mass * (turn * part(2));
-      third_[k] += m.mass * (turn * part(3));
-      add_rigid(m.mass, j - 1, chain_.point(j - 1, part(0)));
-    }
+  if (order <= 0) {
+    add_linkage_masses<1>(q);
+  } else if (order == 1) {
+    add_linkage_masses<2>(q);
+  } else {
+    add_linkage_masses<3>(q);
   }
   // Everything fixed to link k or beyond moves as one body with joint k.
   double mass = 0.0;
@@ -211,7 +225,7 @@ double StaticForce::torque_third(int i, int j, int k) const {
 void StaticForce::update(const double* q, double payload, int order) {
   const int n = machine_->joint_count();
   chain_.update(*machine_, q);
-  accumulate_moments(q, payload);
+  accumulate_moments(q, payload, order);
   const Eigen::Vector3d& g = machine_->gravity;
   for (int k = 0; k < n; ++k) torque_[k] = -g.dot(first_[static_cast<std::size_t>(k)]);
   if (order >= 1) {

@@ -7,6 +7,7 @@
 ///   dp/dq_k = J_k,  d2p/dq_j dq_k = z_j x J_k,  d3p/dq_i dq_j dq_k = z_i x (z_j x J_k),
 /// and a prismatic joint before k contributes nothing. So gradient and Hessian of all torques need one
 /// vector for each joint (its first mass moment) and cross products, whatever the number of masses.
+#include <tuple>
 #include <vector>
 
 #include "models/machine/kinematics.h"
@@ -76,7 +77,11 @@ class StaticForce {
   const ChainGeometry& chain() const { return chain_; }
 
  private:
-  void accumulate_moments(const double* q, double payload);
+  void add_rigid(double mass, int joint, const Eigen::Vector3d& p);
+  /// The masses of the linkages, with as many derivatives of their positions as an order of `update` needs.
+  template <int derivatives>
+  void add_linkage_masses(const double* q);
+  void accumulate_moments(const double* q, double payload, int order);
   double torque_third(int i, int j, int k) const;
 
   const Machine* machine_;
@@ -85,7 +90,9 @@ class StaticForce {
   Eigen::MatrixXd torque_jacobian_, force_jacobian_;
   std::vector<Eigen::MatrixXd> torque_hessian_, force_hessian_;
   std::vector<Taylor3> lengths_;
-  std::vector<LinkageMass<TaylorSeries<3>>> linkage_masses_;
+  std::tuple<std::vector<LinkageMass<TaylorSeries<1>>>, std::vector<LinkageMass<TaylorSeries<2>>>,
+             std::vector<LinkageMass<TaylorSeries<3>>>>
+      linkage_masses_;  // by derivatives of the positions
   // by joint: mass-weighted position derivatives d/dq_k, d2/dq_k2, d3/dq_k3 of all masses behind it
   std::vector<Eigen::Vector3d> first_, second_, third_;
   std::vector<Eigen::Vector3d> rigid_moment_;  // sum m p of what is fixed to link k or beyond

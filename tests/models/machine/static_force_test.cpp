@@ -76,6 +76,21 @@ TEST(StaticForce, TorqueIsTheGradientOfThePotentialEnergy) {
   });
 }
 
+/// Lower orders carry fewer derivatives of the linkages' masses through the same operations.
+TEST(StaticForce, LowerOrdersGiveTheSameValuesAndGradients) {
+  for_random_states([](const Machine& machine, const Eigen::VectorXd& q, double payload) {
+    StaticForce values(machine), gradients(machine), all(machine);
+    values.update(q.data(), payload, 0);
+    gradients.update(q.data(), payload, 1);
+    all.update(q.data(), payload, 2);
+    const double force = 1.0 + all.force().norm(), slope = 1.0 + all.force_jacobian().norm();
+    EXPECT_LE((values.force() - all.force()).norm(), kSamePathTolerance * force);
+    EXPECT_LE((gradients.force() - all.force()).norm(), kSamePathTolerance * force);
+    EXPECT_LE((gradients.force_jacobian() - all.force_jacobian()).norm(),
+              kSamePathTolerance * slope);
+  });
+}
+
 TEST(StaticForce, EnergyOfOneMassByHand) {
   Machine m;
   m.joints = {
