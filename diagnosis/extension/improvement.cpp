@@ -1,9 +1,12 @@
 #include "diagnosis/extension/improvement.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/selection/search_state.h"
 #include "identification/comparison/error_change.h"
 #include "models/effects/registry.h"
 #include "models/math/error.h"
@@ -130,6 +133,13 @@ std::optional<Improvement::Exchange> Improvement::best_exchange(
       const ErrorChange change = error_change(context_.machine(), joint.measured.errors, *errors,
                                               {{"force"}, ""}, options);
       tried.own = change.own;
+      if (tracing())
+        fmt::print(
+            stderr,
+            "exchange of {} for {}: force error {:.4f} times, all {:.4f}, log deviation {:.4f}\n",
+            effect_key(e.effect->info(), context_.machine(), e.at),
+            effect_key(rival.effect->info(), context_.machine(), rival.at), change.own,
+            change.overall, change.overall_deviation);
       const bool beyond_chance =
           std::log(change.overall) < -options.standard_errors * change.overall_deviation;
       if (beyond_chance && change.own * options.refit_moves < 1.0 &&
