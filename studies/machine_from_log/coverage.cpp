@@ -196,6 +196,8 @@ int run(int argc, char** argv) {
   app.add("--seconds", seconds, "duration of a log [s]");
   app.add("--machines", machines, "bundled machines");
   app.add("--model-error", options.model_error, "standard deviation of forces of unknown forms");
+  app.add("--moving", options.moving, "speed from which a rod counts as moving [m/s]");
+  app.add("--steady", options.steady, "share of the acceleration's limit up to which a row counts");
   app.add("--laws", own, "effects of every cylinder in place of the sets of the table");
   app.flag("-v,--verbose", verbose, "print every value");
   if (const auto code = app.parse(argc, argv)) return *code;
