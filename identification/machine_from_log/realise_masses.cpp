@@ -107,9 +107,11 @@ std::string name_of(const Machine& machine, const MassUnknown& u) {
 }
 
 /// Base parameters: each unknown that the rows determine together with multiples of those that they leave free.
-void name_combinations(const Machine& machine, const std::vector<MassUnknown>& unknowns,
-                       const std::vector<LoadRows>& loads, const LoadFit& fit,
-                       RealisedMasses& out) {
+/// @return by link: whether one of its unknowns is determined so
+std::vector<bool> name_combinations(const Machine& machine,
+                                    const std::vector<MassUnknown>& unknowns,
+                                    const std::vector<LoadRows>& loads, const LoadFit& fit,
+                                    RealisedMasses& out) {
   const Index n = fit.masses.size(), free = fit.free.cols();
   // Which unknowns are expressed by the others: masses first, which are what the convention chooses.
   MatrixXd basis = fit.free;
@@ -145,8 +147,10 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
     square.row(k) = fit.free.row(dependent[static_cast<std::size_t>(k)]);
   Index rows = 0;
   for (std::size_t i = 0; i < loads.size(); ++i) rows += fit.used[i] ? loads[i].rows() : 0;
+  std::vector<bool> told(machine.links.size(), false);
   for (Index u = 0; u < n; ++u) {
     if (taken[static_cast<std::size_t>(u)]) continue;
+    told[static_cast<std::size_t>(unknowns[static_cast<std::size_t>(u)].link)] = true;
     VectorXd weights = VectorXd::Unit(n, u);
     std::string name = name_of(machine, unknowns[static_cast<std::size_t>(u)]);
     if (d > 0) {
@@ -170,6 +174,7 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
                                 fmt::format("pressures and static forces, {} rows", rows), "",
                                 std::move(terms)});
   }
+  return told;
 }
 
 /// Names of the cylinders whose rows took part.
@@ -304,11 +309,14 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
            "open (and check signs, units and the payload)"});
     }
   }
+  const std::vector<bool> told = name_combinations(machine, unknowns, loads, fit, out);
   std::string changed = cylinders_changed(known, loads, fit, masses - fit.masses);
   std::vector<bool> doubtful(machine.links.size(), true);
-  if (changed.empty() && fit.confounded.cols() > 0) {
+  if (changed.empty()) {  // a link of which nothing at all is determined is as doubtful
     doubtful = confounded_links(known, loads, fit);
-    changed = used_cylinders(machine, fit);
+    for (std::size_t l = 0; l < told.size(); ++l) doubtful[l] = doubtful[l] && !told[l];
+    if (std::find(doubtful.begin(), doubtful.end(), true) != doubtful.end())
+      changed = used_cylinders(machine, fit);
   }
   if (!changed.empty() && out.questions.empty()) {
     ask_for_doubtful_links(known, doubtful, changed, out);
@@ -326,7 +334,6 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
         unknowns.size() - static_cast<std::size_t>(fit.free.cols()), unknowns.size(),
         100.0 * used));
   }
-  name_combinations(machine, unknowns, loads, fit, out);
   out.possible = found;
   out.solution = masses;
   out.links.resize(machine.links.size());
