@@ -24,7 +24,9 @@ class Proposed final : public Result {
     return channels_json(file_, channels_, {}, proposal_json(proposal_, machine_));
   }
   std::string text() const override {
-    return summary_table(channels_) + proposal_table(proposal_, machine_);
+    return fmt::format("{}: {}; {} channels\n  {}\n{}{}", file_.recording.file,
+                       file_.recording.format, channels_.size(), file_.clock_reason,
+                       summary_table(channels_), proposal_table(proposal_, machine_));
   }
   std::string headline() const override {
     const auto sure = std::count_if(proposal_.meanings.begin(), proposal_.meanings.end(),

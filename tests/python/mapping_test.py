@@ -9,7 +9,7 @@ import pytest
 import sparflow
 from conftest import DATA
 
-NAMES = {"q_boom_rad": "Boom Angle", "q_jib_rad": "Jib Angle", "q_extension_m": "Extension Length",
+NAMES = {"q_boom_rad": "Boom Angle", "q_jib_rad": "Jib Angle",
          "pA_boom_bar": "Boom Cyl Bore Pressure", "pB_boom_bar": "Boom Cyl Rod Pressure"}
 
 
